@@ -1,0 +1,154 @@
+"""The study: which scenes, methods and settings one run of the pipeline covers."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from pdrom.errors import ConfigurationError, PdromError
+from pdrom.fom.solvers import SOLVERS
+from pdrom.method import MethodSpec, load_methods
+from pdrom.scene import Scene, SceneConfig
+from pdrom.yamlfile import read_yaml, validate
+
+Rank = Annotated[int, Field(ge=1, le=100_000)] | Literal["full"]
+Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Coarsen(_Model):
+    """Factors on mesh resolution (vertices along a side) and on every frame number."""
+
+    resolution: Fraction = 1.0
+    frames: Fraction = 1.0
+
+
+class Sweep(_Model):
+    """Basis sizes of the reconstruction error: all up to ``dense_to``, then every ``step``-th."""
+
+    dense_to: Annotated[int, Field(ge=1)] = 20
+    step: Annotated[int, Field(ge=1)] = 5
+
+    def ranks(self, largest: int) -> list[int]:
+        """Sizes 1 .. ``largest``, which is always among them."""
+        dense = range(1, min(self.dense_to, largest) + 1)
+        coarse = range(self.dense_to + self.step, largest + 1, self.step)
+        return sorted({*dense, *coarse, largest} - {0})
+
+
+class Sensitivity(_Model):
+    """Perturbed full-order runs (EXPERIMENTS section 5); sizes relative to the extent."""
+
+    perturbations: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (1e-12, 1e-10, 1e-8)
+    reference: Annotated[float, Field(gt=0.0, lt=1.0)] = 1e-10
+    seeds: tuple[Annotated[int, Field(ge=0)], ...] = (1, 2, 3)
+    threshold: Annotated[float, Field(gt=0.0)] = 1e-3
+
+    @model_validator(mode="after")
+    def _reference_is_run(self) -> Self:
+        if self.reference not in self.perturbations:
+            raise ValueError(f"reference = {self.reference}: must be one of the perturbations")
+        return self
+
+
+class Timing(_Model):
+    """Protocol of the timing jobs: ``frames`` of each run, warm, interleaved, median."""
+
+    frames: Annotated[int, Field(ge=1)] = 40
+    warmup: Annotated[int, Field(ge=0)] = 1
+    repeats: Annotated[int, Field(ge=1)] = 5
+    interpreted_frames: Annotated[int, Field(ge=1)] = 1
+
+
+class StudySettings(_Model):
+    """Content of config/default.yaml, possibly overridden by --configfile."""
+
+    scenes: Annotated[tuple[str, ...], Field(min_length=1)]
+    methods: Annotated[tuple[str, ...], Field(min_length=1)]
+    ranks: Annotated[tuple[Rank, ...], Field(min_length=1)] = (6, 10, 20, "full")
+    sweep: Sweep = Sweep()
+    solver: str = "cholespy"
+    blowup_extent: Annotated[float, Field(gt=1.0)] = 100.0
+    coarsen: Coarsen = Coarsen()
+    sensitivity: Sensitivity = Sensitivity()
+    timing: Timing = Timing()
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        for key in ("scenes", "methods", "ranks"):
+            values = getattr(self, key)
+            if len(set(values)) < len(values):
+                raise ValueError(f"{key} = {list(values)}: an entry is given twice")
+        if self.solver not in SOLVERS:
+            raise ValueError(f"solver = '{self.solver}': allowed are {', '.join(SOLVERS)}")
+        return self
+
+
+class Study:
+    """Settings with the scenes and methods that they name, all checked."""
+
+    def __init__(self, settings: StudySettings, root: Path) -> None:
+        self.settings = settings
+        self.root = root
+        self.scenes: dict[str, SceneConfig] = {
+            name: load_scene(root, name, settings.coarsen) for name in settings.scenes
+        }
+        self.methods: dict[str, MethodSpec] = _named_methods(root, settings.methods)
+
+    @classmethod
+    def load(cls, config: dict[str, Any], root: Path | str = ".") -> "Study":
+        """Study of a (merged) configuration.
+
+        Raises
+        ------
+        ConfigurationError
+            Naming file, key, value and what is allowed, before anything is computed.
+        """
+        settings = validate(StudySettings, config, "configuration (config/default.yaml)")
+        return cls(settings, Path(root))
+
+    @property
+    def experiments(self) -> list[tuple[str, str]]:
+        """(scene, group) pairs whose group is reduced, in configuration order."""
+        return [(name, group) for name, scene in self.scenes.items() for group in scene.reduce]
+
+    def mesh_of(self, scene: str) -> str:
+        """Identifier of a scene's mesh."""
+        return self.scenes[scene].mesh.identifier
+
+    @property
+    def meshes(self) -> dict[str, Any]:
+        """Mesh configurations by identifier."""
+        return {scene.mesh.identifier: scene.mesh for scene in self.scenes.values()}
+
+
+def load_scene(root: Path, name: str, coarsen: Coarsen | None = None) -> SceneConfig:
+    """Scene ``name`` from config/scenes, coarsened, and built once to find every fault early."""
+    path = root / "config" / "scenes" / f"{name}.yaml"
+    if not path.is_file():
+        known = sorted(p.stem for p in path.parent.glob("*.yaml"))
+        raise ConfigurationError(f"scenes: unknown scene '{name}' (allowed: {', '.join(known)})")
+    scene = validate(SceneConfig, read_yaml(path), str(path))
+    if scene.name != name:
+        raise ConfigurationError(f"{path}: name = '{scene.name}', required: '{name}', as the file")
+    if coarsen is not None and coarsen != Coarsen():
+        scene = scene.coarsened(coarsen.resolution, coarsen.frames)
+    try:
+        for variant in (scene, scene.held_out_variant()):
+            Scene.build(variant, variant.mesh.build(root))
+    except PdromError as error:
+        raise ConfigurationError(f"{path}: {error}") from error
+    return scene
+
+
+def _named_methods(root: Path, names: tuple[str, ...]) -> dict[str, MethodSpec]:
+    path = root / "config" / "methods.yaml"
+    methods = load_methods(path)
+    for name in names:
+        if name not in methods:
+            allowed = ", ".join(methods)
+            raise ConfigurationError(f"methods: unknown method '{name}' (allowed: {allowed})")
+    return {name: methods[name] for name in names}

@@ -1,0 +1,45 @@
+"""Named errors. Each carries one line that names the file or object, the key, the value and what is allowed."""
+
+
+class PdromError(Exception):
+    """Base of every error that a user's input can cause; shown to the user without a traceback."""
+
+
+class ConfigurationError(PdromError):
+    """A configuration file holds an unknown key, a wrong type or a value outside its range."""
+
+
+class MeshError(PdromError):
+    """A mesh is unreadable, not finite, or has unreferenced or repeated vertices."""
+
+
+class DegenerateElementError(MeshError):
+    """A rest element has no length, area or volume, so that its operator does not exist."""
+
+
+class SceneError(PdromError):
+    """A scene contradicts itself or its mesh: an empty selection, no constraint, a wrong element."""
+
+
+class SolverError(PdromError):
+    """The global system cannot be factored or solved."""
+
+
+class SnapshotError(PdromError):
+    """Snapshots are missing, not finite or of the wrong shape."""
+
+
+class RankError(PdromError):
+    """More basis vectors were asked for than the snapshots hold above round-off."""
+
+
+class SamplingError(PdromError):
+    """Sampled entries or elements are out of range, repeated or too few."""
+
+
+class StorageError(PdromError):
+    """A file is missing, truncated or not of the expected layout."""
+
+
+class PaperError(PdromError):
+    """The manuscript cannot be built."""

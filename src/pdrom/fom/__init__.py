@@ -1,0 +1,1 @@
+"""The full-order model: global system, step loop, run."""

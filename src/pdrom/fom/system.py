@@ -1,0 +1,78 @@
+"""The global system (M / h^2 + sum_j S_j^T W_j S_j) y = rhs with exactly eliminated vertices."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import sparse
+
+from pdrom.constraints.base import ConstraintGroup
+from pdrom.errors import SolverError
+from pdrom.fom.solvers import SOLVERS, SparseSolver
+from pdrom.store import require_finite
+
+DEFAULT_SOLVER = "cholespy"
+
+
+class Elimination:
+    """The system with a fixed set of vertices taken out; one factorisation serves x, y and z."""
+
+    def __init__(self, matrix: sparse.csr_array, fixed: np.ndarray, solver: str) -> None:
+        self.fixed = fixed
+        self.free = np.setdiff1d(np.arange(matrix.shape[0]), fixed)
+        self._coupling = matrix[self.free][:, fixed] if len(fixed) else None
+        self._rhs = np.empty((len(self.free), 3))
+        self._solution = np.empty((len(self.free), 3))
+        self._load = np.zeros((len(self.free), 3))
+        self._solver: SparseSolver | None = None
+        if len(self.free):
+            block = matrix if not len(fixed) else matrix[self.free][:, self.free]
+            self._solver = SOLVERS.load(solver)(sparse.csr_array(block))
+
+    def set_targets(self, targets: np.ndarray) -> None:
+        """Positions (n_fixed, 3) of the fixed vertices for the solves that follow."""
+        if self._coupling is not None:
+            self._load = self._coupling @ targets
+
+    def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
+        """Overwrite the free rows of ``y`` (N, 3) with the solution for ``rhs`` (N, 3)."""
+        if self._solver is None:
+            return
+        if self._coupling is None:
+            self._solver.solve(rhs, y)
+            return
+        np.take(rhs, self.free, axis=0, out=self._rhs, mode="clip")
+        self._rhs -= self._load
+        self._solver.solve(self._rhs, self._solution)
+        y[self.free] = self._solution
+
+
+class GlobalSystem:
+    """Matrix of the global step; eliminations are factored once per set of fixed vertices."""
+
+    def __init__(
+        self,
+        masses: np.ndarray,
+        time_step: float,
+        groups: Sequence[ConstraintGroup],
+        solver: str = DEFAULT_SOLVER,
+    ) -> None:
+        self.inertia = masses / time_step**2
+        matrix = sparse.csr_array(sparse.diags_array(self.inertia))
+        for group in groups:
+            matrix = matrix + group.system_matrix()
+        self.matrix = sparse.csr_array(matrix)
+        require_finite("global system", self.matrix.data, SolverError)
+        self._solver = solver
+        self._cache: dict[bytes, Elimination] = {}
+
+    @property
+    def factorisations(self) -> int:
+        """How many factorisations exist so far."""
+        return len(self._cache)
+
+    def eliminate(self, fixed: np.ndarray) -> Elimination:
+        """The system without the vertices ``fixed`` (ascending indices), from the cache if known."""
+        key = np.ascontiguousarray(fixed, dtype=np.int64).tobytes()
+        if key not in self._cache:
+            self._cache[key] = Elimination(self.matrix, fixed, self._solver)
+        return self._cache[key]

@@ -1,0 +1,1 @@
+"""One module per workflow rule: paths and plain parameters in, files out."""

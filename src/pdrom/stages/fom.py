@@ -1,0 +1,20 @@
+"""Rule fom: a full-order run with the snapshots that the scene's experiments need."""
+
+from typing import Any
+
+from pdrom.fom.run import run as run_full_order
+from pdrom.provenance import attributes
+from pdrom.snapshots import stored_frames, test_frames
+from pdrom.stages.scenes import scene_of
+
+
+def run_fom(config: dict[str, Any], mesh: str, run: str, solver: str, output: str) -> None:
+    """Simulate ``run`` of a scene; the held-out run stores the odd frames only."""
+    scene = scene_of(config, mesh, run)
+    frames = scene.config.frames
+    wanted = {
+        group: test_frames(frames) if run == "heldout" else stored_frames(frames, plan.train)
+        for group, plan in scene.config.reduce.items()
+    }
+    metadata = attributes({"scene": config, "run": run, "solver": solver})
+    run_full_order(scene, output, wanted, metadata, solver)
