@@ -1,0 +1,12 @@
+# Entry point of `snakemake` and of `./reproduce`: the workflow with the manuscript as its target.
+configfile: "config/default.yaml"
+
+
+include: "workflow/Snakefile"
+
+
+# `include` resets the default target, so it is declared here.
+rule all:
+    default_target: True
+    input:
+        rules.study.input,

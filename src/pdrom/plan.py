@@ -1,0 +1,109 @@
+"""The plan that the workflow rules ask: file names, parameters and code fingerprints."""
+
+import sys
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from pdrom.config import Study, StudySettings
+from pdrom.errors import PdromError
+from pdrom.fingerprint import fingerprint
+from pdrom.method import MethodSpec, spec_modules
+
+RESULTS = "results"
+
+
+def load_plan(config: dict[str, Any], root: Path) -> "Plan":
+    """Plan of a configuration; a faulty one ends the process with one line, before any job."""
+    try:
+        return Plan(Study.load(config, root))
+    except PdromError as error:
+        sys.exit(f"pdrom: {error}")
+
+
+class Plan:
+    """Everything that depends on the configuration and is needed to write the rules."""
+
+    def __init__(self, study: Study) -> None:
+        self.study = study
+        self.root = study.root
+
+    @property
+    def settings(self) -> StudySettings:
+        """Checked settings of the study."""
+        return self.study.settings
+
+    # Parameters -----------------------------------------------------------------------------
+
+    def scene_config(self, scene: str) -> dict[str, Any]:
+        """Plain configuration of a scene; a change of it reruns the scene's jobs."""
+        return self._scene_configs[scene]
+
+    @cached_property
+    def _scene_configs(self) -> dict[str, dict[str, Any]]:
+        return {name: s.model_dump(mode="json") for name, s in self.study.scenes.items()}
+
+    def mesh_config(self, mesh: str) -> dict[str, Any]:
+        """Plain configuration of a mesh."""
+        return self.study.meshes[mesh].model_dump(mode="json")
+
+    def method_spec(self, method: str) -> dict[str, Any]:
+        """Plain specification of a method."""
+        return self._method(method).model_dump(mode="json")
+
+    def method_specs(self) -> dict[str, dict[str, Any]]:
+        """Plain specifications of all methods of the study."""
+        return {name: self.method_spec(name) for name in self.study.methods}
+
+    def basis_spec(self, basis: str) -> dict[str, Any]:
+        """Plain specification of the first method that uses ``basis``."""
+        names = [m for m, spec in self.study.methods.items() if spec.basis_id == basis]
+        return {k: self.method_spec(names[0])[k] for k in ("weighting", "centring", "layout")}
+
+    def _method(self, method: str) -> MethodSpec:
+        return self.study.methods[method]
+
+    # Files ----------------------------------------------------------------------------------
+
+    def mesh_path(self, scene: str) -> str:
+        """Mesh file of a scene."""
+        return f"{RESULTS}/meshes/{self.study.mesh_of(scene)}.h5"
+
+    def basis_path(self, scene: str, group: str, method: str) -> str:
+        """Basis file that a method needs."""
+        return f"{RESULTS}/pod/{scene}/{group}/{self._method(method).basis_id}.h5"
+
+    def bases_of(self, scene: str) -> list[str]:
+        """All basis files of a scene."""
+        groups = self.study.scenes[scene].reduce
+        paths = [self.basis_path(scene, g, m) for g in groups for m in self.study.methods]
+        return sorted(set(paths))
+
+    def samplings_of(self, scene: str) -> list[str]:
+        """All sampling files of a scene."""
+        return self._per_method("sampling", "h5", scene)
+
+    def per_experiment(self, stage: str, suffix: str) -> list[str]:
+        """Files of a stage over all scenes, groups and methods, in configuration order."""
+        return [p for scene in self.study.scenes for p in self._per_method(stage, suffix, scene)]
+
+    def per_scene(self, stage: str, suffix: str) -> list[str]:
+        """Files of a stage over all scenes."""
+        return [f"{RESULTS}/{stage}/{scene}.{suffix}" for scene in self.study.scenes]
+
+    def _per_method(self, stage: str, suffix: str, scene: str) -> list[str]:
+        return [
+            f"{RESULTS}/{stage}/{scene}/{group}/{method}.{suffix}"
+            for group in self.study.scenes[scene].reduce
+            for method in self.study.methods
+        ]
+
+    # Code -----------------------------------------------------------------------------------
+
+    def code(self, *modules: str) -> str:
+        """Fingerprint of the code that a stage runs; a change of it reruns the stage."""
+        return fingerprint(*modules)
+
+    def scene_code(self, stage: str, scene: str) -> str:
+        """Fingerprint of a stage together with the effects that a scene lists."""
+        return fingerprint(stage, *self.study.scenes[scene].modules)

@@ -1,0 +1,61 @@
+"""Shared builders of small scenes."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pdrom.scene import Scene, SceneConfig
+
+ROOT = Path(__file__).resolve().parents[1]
+
+GROUPS = {
+    "bending": {"kind": "cloth", "rows": 7, "columns": 6, "wave": 0.1},
+    "spring": {"kind": "cloth", "rows": 6, "columns": 5},
+    "strain": {"kind": "cloth", "rows": 6, "columns": 5},
+    "tetrahedron_strain": {"kind": "bar", "nx": 5, "ny": 3, "nz": 3},
+    "deformation_gradient": {"kind": "bar", "nx": 5, "ny": 3, "nz": 3},
+}
+
+
+def make_scene(
+    *effects: dict, mesh: dict | None = None, frames: int = 20, **settings: object
+) -> Scene:
+    """Scene of the given effects on a small mesh."""
+    config = SceneConfig.model_validate(
+        {
+            "name": "test",
+            "title": "test",
+            "mesh": mesh or {"kind": "cloth", "rows": 6, "columns": 5},
+            "frames": frames,
+            "effects": list(effects),
+            **settings,
+        }
+    )
+    return Scene.build(config, config.mesh.build(ROOT))
+
+
+@pytest.fixture
+def scene_of() -> Callable[..., Scene]:
+    """Builder of scenes, see `make_scene`."""
+    return make_scene
+
+
+@pytest.fixture(params=sorted(GROUPS))
+def group_scene(request: pytest.FixtureRequest) -> Scene:
+    """One scene per constraint group, nothing but the group in it."""
+    return make_scene({"effect": request.param, "weight": 1e4}, mesh=GROUPS[request.param])
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """Seeded generator."""
+    return np.random.default_rng(20260101)
+
+
+def random_rotation(rng: np.random.Generator) -> np.ndarray:
+    """Uniformly distributed rotation (3, 3)."""
+    q, r = np.linalg.qr(rng.standard_normal((3, 3)))
+    q *= np.sign(np.diag(r))
+    return q * np.sign(np.linalg.det(q))

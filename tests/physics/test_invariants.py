@@ -1,0 +1,200 @@
+"""What every correct projective-dynamics code must satisfy, whatever the constraint group."""
+
+import numpy as np
+import pytest
+from conftest import make_scene, random_rotation
+
+from pdrom.fom.run import simulate, trajectory
+from pdrom.fom.stepper import State
+
+GRAVITY = {"effect": "gravity"}
+
+
+def test_rest_state_stays_at_rest(group_scene):
+    rest = group_scene.mesh.points
+    final = trajectory(group_scene)[-1]
+    assert np.abs(final - rest).max() < 1e-9
+
+
+def test_free_fall_is_a_rigid_parabola(group_scene):
+    scene = group_scene.__class__.build(
+        group_scene.config.model_copy(
+            update={"effects": (*group_scene.config.effects, *_configs(GRAVITY))}
+        ),
+        group_scene.mesh,
+    )
+    positions = trajectory(scene)
+    h, frames = scene.config.time_step, scene.config.frames
+    fall = -9.81 * h**2 * np.arange(frames + 1) * np.arange(1, frames + 2) / 2
+    expected = scene.mesh.points[None] + fall[:, None, None] * np.array([0.0, 1.0, 0.0])
+    assert np.abs(positions - expected).max() < 1e-8
+
+
+def _configs(*effects):
+    return make_scene({"effect": "spring", "weight": 1.0}, *effects).config.effects[1:]
+
+
+def test_momenta_in_free_flight(group_scene, rng):
+    """Without forces and pins linear momentum is exact and angular momentum kept by iterates.
+
+    The projections are internal forces: they sum to zero, for every group. Angular momentum is kept
+    exactly only by a converged implicit step up to its damping, so that it must not grow.
+    """
+    loop = group_scene.stepper()
+    state = State(
+        group_scene.mesh.points.copy(), rng.standard_normal(group_scene.mesh.points.shape)
+    )
+    masses = group_scene.masses[:, None]
+    before = (masses * state.velocities).sum(axis=0)
+    for frame in range(5):
+        state, _ = loop.step(state, frame)
+        after = (masses * state.velocities).sum(axis=0)
+        assert after == pytest.approx(before, abs=1e-9 * np.abs(masses * state.velocities).sum())
+
+
+@pytest.mark.parametrize("group", ["spring", "strain", "deformation_gradient"])
+def test_angular_momentum_of_the_converged_step(group, rng):
+    """The converged implicit step conserves q x v with q at the end of the step.
+
+    Internal forces are derivatives of a rotation-invariant energy, hence sum_v y_v x f_v = 0 at the
+    fixed point of the local/global iteration.
+    """
+    from conftest import GROUPS
+
+    scene = make_scene(
+        {"effect": group, "weight": 1e3}, mesh=GROUPS[group], iterations=3000, frames=1
+    )
+    points = scene.mesh.points - scene.mesh.points.mean(axis=0)
+    state = State(scene.mesh.points.copy(), np.cross([0.3, -0.2, 0.5], points))
+    after, _ = scene.stepper().step(state, 0)
+    masses = scene.masses[:, None]
+    impulse = masses * (after.velocities - state.velocities)
+    torque = np.cross(after.positions, impulse).sum(axis=0)
+    assert np.abs(torque).max() < 1e-8 * np.linalg.norm(impulse) + 1e-9
+
+
+@pytest.mark.parametrize("spread", [0.05, 1.0, 50.0])
+def test_objective_never_rises(group_scene, rng, spread):
+    """For fixed s each local/global iteration is a descent step, from any state."""
+    scene = group_scene
+    config = scene.config.model_copy(update={"iterations": 40, "frames": 3})
+    scene = scene.__class__.build(config, scene.mesh)
+    loop = scene.stepper()
+    shape = scene.mesh.points.shape
+    state = State(
+        scene.mesh.points + spread * rng.standard_normal(shape), rng.standard_normal(shape)
+    )
+    for frame in range(3):
+        state, report = loop.step(state, frame)
+        assert np.isfinite(state.positions).all()
+        assert (np.diff(report.objective) <= 1e-12 * report.objective[0]).all()
+
+
+def test_objective_never_rises_with_all_groups_and_pins(rng):
+    scene = make_scene(
+        GRAVITY,
+        {"effect": "pins", "select": "top"},
+        {"effect": "bending", "weight": 1e-1},
+        {"effect": "spring", "weight": 1e6},
+        {"effect": "strain", "weight": 1e-2},
+        mesh={"kind": "cloth", "rows": 7, "columns": 6, "wave": 0.1},
+        iterations=30,
+    )
+    points = scene.mesh.points
+    state = State(points + 0.3 * rng.standard_normal(points.shape), np.zeros_like(points))
+    _, report = scene.stepper().step(state, 0)
+    assert (np.diff(report.objective) <= 1e-12 * report.objective[0]).all()
+    assert report.objective[-1] < 0.9 * report.objective[0]
+
+
+def test_rotation_and_translation_equivariance(group_scene, rng):
+    """A rotated and shifted start gives the rotated and shifted motion."""
+    scene = group_scene
+    rotation, shift = random_rotation(rng), rng.standard_normal(3)
+    points = scene.mesh.points + 0.02 * rng.standard_normal(scene.mesh.points.shape)
+    velocities = rng.standard_normal(points.shape)
+    loop = scene.stepper()
+    moved, _ = loop.step(State(points, velocities), 0)
+    other, _ = loop.step(State(points @ rotation.T + shift, velocities @ rotation.T), 0)
+    expected = moved.positions @ rotation.T + shift
+    assert np.abs(other.positions - expected).max() < 1e-9
+
+
+def test_pins_hold_exactly_and_release():
+    scene = make_scene(
+        GRAVITY,
+        {"effect": "pins", "select": "top", "until": 10},
+        {"effect": "spring", "weight": 1e5},
+        frames=20,
+    )
+    positions = trajectory(scene)
+    top = np.flatnonzero(scene.mesh.points[:, 1] > scene.mesh.points[:, 1].max() - 1e-9)
+    assert np.array_equal(positions[10, top], positions[0, top])
+    assert (positions[12, top, 1] < positions[0, top, 1]).all()
+
+
+def test_handles_reach_their_target():
+    scene = make_scene(
+        {"effect": "translate", "select": "top", "offset": [0.1, 0.2, -0.3], "over": 5},
+        {"effect": "rotate", "select": "bottom", "axis": "y", "degrees": 90.0, "over": 8},
+        {"effect": "spring", "weight": 1e5},
+        frames=12,
+    )
+    points, final = scene.mesh.points, trajectory(scene)[-1]
+    top = points[:, 1] > points[:, 1].max() - 1e-9
+    bottom = points[:, 1] < points[:, 1].min() + 1e-9
+    assert final[top] == pytest.approx(points[top] + [0.1, 0.2, -0.3], abs=1e-12)
+    turned = points[bottom][:, [2, 1, 0]] * [1.0, 1.0, -1.0]
+    assert final[bottom] == pytest.approx(turned, abs=1e-12)
+
+
+def test_floor_stops_the_fall():
+    scene = make_scene(
+        GRAVITY,
+        {"effect": "floor", "height": 1.0},
+        {"effect": "strain", "weight": 1e5},
+        frames=60,
+    )
+    positions = trajectory(scene)
+    assert positions[..., 1].min() >= 1.0
+
+
+def test_energy_does_not_grow_without_forcing(group_scene, rng):
+    """Implicit Euler is dissipative: kinetic plus constraint energy never exceeds its start.
+
+    Bending is moved gently: its side rule takes the normal of each frame's beginning, so that its
+    energy is a fixed function of the positions only as long as no vertex changes sides.
+    """
+    scene = group_scene
+    speed = 1e-3 if scene.config.groups == ["bending"] else 0.1
+    velocities = speed * rng.standard_normal(scene.mesh.points.shape)
+    loop = scene.stepper()
+    state = State(scene.mesh.points.copy(), velocities)
+    energies = []
+    for frame in range(30):
+        state, _ = loop.step(state, frame)
+        rhs = np.zeros_like(state.positions)
+        potential = sum(g.accumulate(state.positions, rhs) for g in scene.groups)
+        kinetic = 0.5 * float(scene.masses @ (state.velocities**2).sum(axis=1))
+        energies.append(kinetic + potential)
+    start = 0.5 * float(scene.masses @ (velocities**2).sum(axis=1))
+    assert max(energies) <= start * (1 + 1e-9)
+
+
+def test_two_runs_give_the_same_bits():
+    scene = make_scene(GRAVITY, {"effect": "spring", "weight": 1e6}, frames=10)
+    assert np.array_equal(trajectory(scene), trajectory(scene))
+
+
+def test_one_factorisation_per_pin_set():
+    scene = make_scene(
+        {"effect": "pins", "select": "top", "until": 4},
+        {"effect": "pins", "select": "bottom", "start": 6, "until": 8},
+        {"effect": "pins", "select": "top", "start": 8},
+        {"effect": "spring", "weight": 1e5},
+        frames=12,
+    )
+    system = scene.system_with("cholespy")
+    for _ in simulate(scene, system=system):
+        pass
+    assert system.factorisations == 3

@@ -1,0 +1,67 @@
+# scene -> mesh -> full-order run -> snapshots, and the sensitivity of the full-order run
+rule mesh:
+    output:
+        "results/meshes/{mesh}.h5",
+    log:
+        "results/logs/mesh/{mesh}.log",
+    params:
+        config=lambda w: PLAN.mesh_config(w.mesh),
+        root=lambda w: str(PLAN.root),
+        code=PLAN.code("pdrom.stages.mesh"),
+    message:
+        "Mesh {wildcards.mesh}"
+    script:
+        "../scripts/mesh.py"
+
+
+rule fom:
+    input:
+        mesh=lambda w: PLAN.mesh_path(w.scene),
+    output:
+        "results/fom/{scene}/{run}.h5",
+    log:
+        "results/logs/fom/{scene}_{run}.log",
+    params:
+        scene=lambda w: PLAN.scene_config(w.scene),
+        solver=PLAN.settings.solver,
+        code=lambda w: PLAN.scene_code("pdrom.stages.fom", w.scene),
+    message:
+        "Full-order run of {wildcards.scene} ({wildcards.run})"
+    script:
+        "../scripts/fom.py"
+
+
+rule sensitivity:
+    input:
+        mesh=lambda w: PLAN.mesh_path(w.scene),
+    output:
+        "results/sensitivity/{scene}.csv",
+    log:
+        "results/logs/sensitivity/{scene}.log",
+    params:
+        scene=lambda w: PLAN.scene_config(w.scene),
+        perturbations=list(PLAN.settings.sensitivity.perturbations),
+        seeds=list(PLAN.settings.sensitivity.seeds),
+        code=lambda w: PLAN.scene_code("pdrom.stages.sensitivity", w.scene),
+    message:
+        "Perturbed full-order runs of {wildcards.scene}"
+    script:
+        "../scripts/sensitivity.py"
+
+
+rule snapshots:
+    input:
+        mesh=lambda w: PLAN.mesh_path(w.scene),
+        train="results/fom/{scene}/train.h5",
+        heldout="results/fom/{scene}/heldout.h5",
+    output:
+        "results/snapshots/{scene}/{group}.h5",
+    log:
+        "results/logs/snapshots/{scene}_{group}.log",
+    params:
+        scene=lambda w: PLAN.scene_config(w.scene),
+        code=lambda w: PLAN.scene_code("pdrom.stages.snapshots", w.scene),
+    message:
+        "Snapshots of {wildcards.group} in {wildcards.scene}"
+    script:
+        "../scripts/snapshots.py"

@@ -1,0 +1,59 @@
+# snapshots -> basis -> sampling and reconstruction error -> reduced reruns
+rule pod:
+    input:
+        "results/snapshots/{scene}/{group}.h5",
+    output:
+        "results/pod/{scene}/{group}/{basis}.h5",
+    log:
+        "results/logs/pod/{scene}_{group}_{basis}.log",
+    params:
+        spec=lambda w: PLAN.basis_spec(w.basis),
+        code=PLAN.code("pdrom.stages.pod"),
+    message:
+        "POD of {wildcards.group} in {wildcards.scene} ({wildcards.basis})"
+    script:
+        "../scripts/pod.py"
+
+
+rule sampling:
+    input:
+        snapshots="results/snapshots/{scene}/{group}.h5",
+        basis=lambda w: PLAN.basis_path(w.scene, w.group, w.method),
+    output:
+        sampling="results/sampling/{scene}/{group}/{method}.h5",
+        errors="results/sampling/{scene}/{group}/{method}.csv",
+    log:
+        "results/logs/sampling/{scene}_{group}_{method}.log",
+    params:
+        spec=lambda w: PLAN.method_spec(w.method),
+        sweep=PLAN.settings.sweep.model_dump(),
+        ranks=list(PLAN.settings.ranks),
+        code=PLAN.code("pdrom.stages.sampling"),
+    message:
+        "Sampling by {wildcards.method} of {wildcards.group} in {wildcards.scene}"
+    script:
+        "../scripts/sampling.py"
+
+
+rule reruns:
+    input:
+        mesh=lambda w: PLAN.mesh_path(w.scene),
+        fom="results/fom/{scene}/train.h5",
+        basis=lambda w: PLAN.basis_path(w.scene, w.group, w.method),
+        sampling="results/sampling/{scene}/{group}/{method}.h5",
+    output:
+        runs="results/reruns/{scene}/{group}/{method}.h5",
+        table="results/reruns/{scene}/{group}/{method}.csv",
+    log:
+        "results/logs/reruns/{scene}_{group}_{method}.log",
+    params:
+        scene=lambda w: PLAN.scene_config(w.scene),
+        spec=lambda w: PLAN.method_spec(w.method),
+        ranks=list(PLAN.settings.ranks),
+        blowup_extent=PLAN.settings.blowup_extent,
+        solver=PLAN.settings.solver,
+        code=lambda w: PLAN.scene_code("pdrom.stages.reruns", w.scene),
+    message:
+        "Reduced reruns of {wildcards.scene}, {wildcards.group} by {wildcards.method}"
+    script:
+        "../scripts/reruns.py"

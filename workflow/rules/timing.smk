@@ -1,0 +1,35 @@
+# Timings run alone: a job that takes every core has no neighbour.
+rule timing:
+    input:
+        mesh=lambda w: PLAN.mesh_path(w.scene),
+        bases=lambda w: PLAN.bases_of(w.scene),
+        samplings=lambda w: PLAN.samplings_of(w.scene),
+    output:
+        "results/timings/{scene}.csv",
+    log:
+        "results/logs/timing/{scene}.log",
+    params:
+        scene=lambda w: PLAN.scene_config(w.scene),
+        methods=PLAN.method_specs(),
+        ranks=list(PLAN.settings.ranks),
+        protocol=PLAN.settings.timing.model_dump(),
+        solver=PLAN.settings.solver,
+        code=lambda w: PLAN.scene_code("pdrom.stages.timing", w.scene),
+    threads: workflow.cores or 1
+    message:
+        "Timings of {wildcards.scene} (alone on the machine)"
+    script:
+        "../scripts/timing.py"
+
+
+rule machine:
+    output:
+        "results/machine.json",
+    log:
+        "results/logs/machine.log",
+    params:
+        code=PLAN.code("pdrom.provenance"),
+    message:
+        "Record of the machine and the library versions"
+    script:
+        "../scripts/machine.py"

@@ -1,0 +1,11 @@
+from pdrom.logs import job_log
+from pdrom.stages.fom import run_fom
+
+with job_log(snakemake.log[0]):
+    run_fom(
+        snakemake.params.scene,
+        snakemake.input.mesh,
+        snakemake.wildcards.run,
+        snakemake.params.solver,
+        snakemake.output[0],
+    )

@@ -1,0 +1,11 @@
+from pdrom.logs import job_log
+from pdrom.stages.sensitivity import measure_sensitivity
+
+with job_log(snakemake.log[0]):
+    measure_sensitivity(
+        snakemake.params.scene,
+        snakemake.input.mesh,
+        snakemake.params.perturbations,
+        snakemake.params.seeds,
+        snakemake.output[0],
+    )
