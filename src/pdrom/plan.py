@@ -8,7 +8,7 @@ from typing import Any
 from pdrom.config import Study, StudySettings
 from pdrom.errors import PdromError
 from pdrom.fingerprint import fingerprint
-from pdrom.method import MethodSpec, spec_modules
+from pdrom.method import MethodSpec
 
 RESULTS = "results"
 

@@ -1,0 +1,121 @@
+"""Snapshots -> basis, ingredient by ingredient."""
+
+import numpy as np
+from scipy import linalg
+
+from pdrom.basis.pod import fix_signs, pod
+from pdrom.basis.rank import numerical_rank
+from pdrom.basis.types import Basis
+from pdrom.errors import SnapshotError
+from pdrom.method import BasisSpec
+from pdrom.store import require_finite
+
+
+def compute_basis(
+    snapshots: np.ndarray,
+    row_mass: np.ndarray,
+    roundoff: float,
+    rows_per_element: int,
+    spec: BasisSpec,
+    signs: np.random.Generator | None = None,
+) -> Basis:
+    """Basis of training snapshots.
+
+    Parameters
+    ----------
+    snapshots : (n, e p, 3) projections
+    row_mass : (e p,) kg, used by mass weighting
+    roundoff : Frobenius norm of the rounding errors in ``snapshots``
+    signs : flips the modes at random before "mean-in-modes" adds the mean to them; there the span
+        depends on these arbitrary signs
+
+    Raises
+    ------
+    SnapshotError
+        Fewer than two snapshots, a wrong shape, NaN or Inf.
+    """
+    if snapshots.ndim != 3 or snapshots.shape[2] != 3 or len(snapshots) < 2:
+        raise SnapshotError(f"snapshots of shape {snapshots.shape}, required: (n >= 2, e p, 3)")
+    require_finite("snapshots", snapshots, SnapshotError)
+    matrix = snapshots.reshape(len(snapshots), -1).T
+    scale = _row_scale(row_mass, spec)
+    mean = _offset(matrix, spec)
+    centred = (matrix - mean[:, None]) * scale[:, None]
+    noise = roundoff * float(scale.max())
+    active = _active_axes(matrix, roundoff)
+    if spec.layout == "per-axis":
+        modes, sigma, rank = _per_axis(centred, noise)
+    else:
+        modes, sigma = pod(centred)
+        rank = numerical_rank(sigma, centred.shape, noise)
+    v = modes[:, :rank]
+    if spec.centring == "mean-in-modes":
+        v = _mean_in_modes(v, centred, mean * scale, active, signs)
+        mean = np.zeros_like(mean)
+    return Basis(
+        V=np.ascontiguousarray(v / scale[:, None]),
+        mean=mean,
+        singular_values=sigma,
+        rank=rank,
+        roundoff=noise,
+        rows_per_element=rows_per_element,
+        separate_axes=spec.layout == "per-axis" or spec.centring == "mean-in-modes",
+        active_axes=active,
+    )
+
+
+def _row_scale(row_mass: np.ndarray, spec: BasisSpec) -> np.ndarray:
+    """Square root of the inner product's diagonal, (3 e p,)."""
+    if spec.weighting == "none":
+        return np.ones(3 * len(row_mass))
+    return np.repeat(np.sqrt(row_mass), 3)
+
+
+def _offset(matrix: np.ndarray, spec: BasisSpec) -> np.ndarray:
+    """What is subtracted from every snapshot, (3 e p,)."""
+    if spec.centring == "affine":
+        return matrix.mean(axis=1)
+    if spec.centring == "mean-in-modes":
+        return matrix[:, 0].copy()
+    return np.zeros(len(matrix))
+
+
+def _active_axes(matrix: np.ndarray, roundoff: float) -> tuple[bool, bool, bool]:
+    """Which axes hold more than round-off (of the data, or relative to the largest axis)."""
+    norms = np.array([np.linalg.norm(matrix[axis::3]) for axis in range(3)])
+    relative = max(matrix.shape) * np.finfo(float).eps * norms.max()
+    return tuple(bool(norm > max(roundoff, relative)) for norm in norms)
+
+
+def _per_axis(centred: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray, int]:
+    """One basis per axis, stored side by side; the rank is the largest of the three."""
+    n, m = centred.shape
+    modes = np.zeros((n, min(n // 3, m)))
+    sigma = np.zeros((3, min(n // 3, m)))
+    rank = 0
+    for axis in range(3):
+        u, sigma[axis] = pod(centred[axis::3])
+        own = numerical_rank(sigma[axis], centred[axis::3].shape, noise)
+        modes[axis::3, :own] = u[:, :own]
+        rank = max(rank, own)
+    return modes, np.linalg.norm(sigma, axis=0), rank
+
+
+def _mean_in_modes(
+    v: np.ndarray,
+    centred: np.ndarray,
+    first: np.ndarray,
+    active: tuple[bool, bool, bool],
+    signs: np.random.Generator | None,
+) -> np.ndarray:
+    """The published code's modes: rescaled, first snapshot added to each, QR axis by axis."""
+    if v.shape[1] == 0:
+        return v
+    if signs is not None:
+        v = v * signs.choice([-1.0, 1.0], size=v.shape[1])
+    shifted = v * np.std(centred) + first[:, None]
+    result = np.zeros_like(shifted)
+    for axis in np.flatnonzero(active):
+        q = linalg.qr(shifted[axis::3], mode="economic")[0]
+        result[axis::3] = fix_signs(q)
+    return result

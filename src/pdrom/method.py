@@ -1,0 +1,91 @@
+"""A reduction method is a combination of ingredients; the presets are named combinations."""
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from pdrom.errors import ConfigurationError
+from pdrom.yamlfile import read_yaml, validate
+
+Weighting = Literal["none", "mass"]
+Centring = Literal["none", "affine", "mean-in-modes"]
+Layout = Literal["vectorised", "per-axis"]
+Rows = Literal["all", "scalar", "joint", "element"]
+Selection = Literal["greedy", "pivoted-qr"]
+Solve = Literal["square", "qr", "tikhonov"]
+
+
+class BasisSpec(BaseModel):
+    """How a basis is made from snapshots.
+
+    weighting : "mass" makes the modes orthonormal in the lumped-mass inner product of the rows
+    centring : "affine" subtracts the mean and adds it back online; "mean-in-modes" is the way of
+        the published code (first snapshot subtracted, modes rescaled, it is added to every mode,
+        re-orthogonalised per axis)
+    layout : "vectorised" has one column per snapshot with coefficients shared by x, y, z;
+        "per-axis" has one basis for each axis
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    weighting: Weighting = "none"
+    centring: Centring = "none"
+    layout: Layout = "vectorised"
+
+    @property
+    def basis_id(self) -> str:
+        """Name of the basis file."""
+        return f"{self.weighting}-{self.centring}-{self.layout}"
+
+
+class MethodSpec(BasisSpec):
+    """A reduction of one group's projections.
+
+    rows : "all" is the orthogonal projection, "scalar" samples single entries (classical DEIM),
+        "joint" one row for x, y and z with separate coefficients (the paper's variant), "element"
+        all 3p entries of an element
+    selection : "greedy" residual (DEIM) or "pivoted-qr" (Q-DEIM)
+    solve : of the sampled equations: "square", least squares by "qr", or normal equations with
+        Tikhonov term ("tikhonov", the published code)
+    repeat_rows : whether the greedy may pick a row again (the published code does not exclude it)
+    title : what the method is called in figures and tables
+    """
+
+    title: str
+    rows: Rows
+    selection: Selection = "greedy"
+    solve: Solve = "qr"
+    repeat_rows: bool = False
+    tikhonov: Annotated[float, Field(gt=0.0, le=1.0)] = 1e-8
+
+    @model_validator(mode="after")
+    def _combination_exists(self) -> Self:
+        if self.rows == "joint" and self.selection != "greedy":
+            raise ValueError(f"rows = 'joint' with selection = '{self.selection}': only 'greedy'")
+        if self.rows == "element" and self.solve == "square":
+            raise ValueError("rows = 'element' with solve = 'square': allowed are qr, tikhonov")
+        if self.separate_axes and self.rows in ("scalar", "element"):
+            raise ValueError(
+                f"rows = '{self.rows}' with {self.layout}, {self.centring}: separate bases per "
+                "axis need rows = 'all' or 'joint'"
+            )
+        if self.repeat_rows and self.solve == "square":
+            raise ValueError("repeat_rows with solve = 'square': a repeated row is singular")
+        return self
+
+    @property
+    def separate_axes(self) -> bool:
+        """Whether the basis itself is orthonormal axis by axis, not as a whole."""
+        return self.layout == "per-axis" or self.centring == "mean-in-modes"
+
+
+def load_methods(path: Path) -> dict[str, MethodSpec]:
+    """Methods of config/methods.yaml by name; ConfigurationError for any fault."""
+    content = read_yaml(path)
+    if not isinstance(content, dict) or not content:
+        raise ConfigurationError(f"{path}: a mapping of method names is required")
+    return {
+        str(name): validate(MethodSpec, spec, f"{path}: method '{name}'")
+        for name, spec in content.items()
+    }

@@ -1,0 +1,61 @@
+"""The reduced local step: S^T W p(y) is replaced by S^T W (mean + V c(y))."""
+
+import numpy as np
+
+from pdrom.constraints.base import ConstraintGroup
+from pdrom.sampling.reduction import Reduction
+
+
+class ReducedLocalStep:
+    """Evaluates the sampled elements of a group and lifts their coefficients to the right-hand side.
+
+    Precomputed: the offset S^T W mean (N, 3), the lift S^T W V for each coefficient block, and the
+    solution operators. Online: the projections of the sampled elements, a small dense product for
+    c, and the dense lift.
+    """
+
+    def __init__(self, group: ConstraintGroup, reduction: Reduction) -> None:
+        self.name = group.name
+        self._group = group
+        self._elements = np.ascontiguousarray(reduction.elements)
+        self._everything = len(self._elements) == group.elements
+        mean = reduction.basis.mean.reshape(-1, 3)
+        lift = group.S.T.multiply(group.row_weights[None, :]).tocsr()
+        self._offset = lift @ mean
+        place = _local_positions(reduction)
+        self._blocks = []
+        for block in reduction.blocks:
+            modes = reduction.v[block.output]
+            columns = modes.reshape(len(mean), -1)
+            lifted = np.ascontiguousarray((lift @ columns).reshape(-1, reduction.r))
+            shift = block.operator @ reduction.basis.mean[block.entries]
+            self._blocks.append((block.axis, place(block.entries), block.operator, shift, lifted))
+
+    def begin_frame(self, q: np.ndarray) -> None:
+        """Freeze frame-lagged data of the sampled elements only."""
+        self._group.begin_frame(q, None if self._everything else self._elements)
+
+    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
+        """Add the reduced S^T W p(y) to ``rhs`` (N, 3); the energy is unknown: nan."""
+        sampled = self._group.project_elements(y, self._elements).ravel()
+        rhs += self._offset
+        for axis, positions, operator, shift, lifted in self._blocks:
+            coefficients = operator @ sampled[positions] - shift
+            if axis is None:
+                rhs += (lifted @ coefficients).reshape(rhs.shape)
+            else:
+                rhs[:, axis] += lifted @ coefficients
+        return float("nan")
+
+
+def _local_positions(reduction: Reduction):
+    """Map from entries of the full vector to entries of the sampled elements' vector."""
+    size = 3 * reduction.basis.rows_per_element
+    order = np.argsort(reduction.elements, kind="stable")
+    ordered = reduction.elements[order]
+
+    def place(entries: np.ndarray) -> np.ndarray:
+        element, inside = np.divmod(entries, size)
+        return size * order[np.searchsorted(ordered, element)] + inside
+
+    return place

@@ -1,0 +1,51 @@
+"""From a method's specification to its sampling."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pdrom.basis.types import Basis
+from pdrom.method import MethodSpec
+from pdrom.sampling.block import block_elements
+from pdrom.sampling.deim import deim_entries
+from pdrom.sampling.joint import joint_rows
+from pdrom.sampling.qdeim import qdeim_entries
+from pdrom.sampling.types import Sampling
+
+
+def select(basis: Basis, spec: MethodSpec, r: int) -> Sampling:
+    """Sampling of ``spec`` for the first r modes of ``basis``."""
+    return select_path(basis, spec, [r])[r]
+
+
+def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[int, Sampling]:
+    """Samplings for several r; greedy selections are nested and made once for the largest.
+
+    Raises
+    ------
+    RankError
+        If an r exceeds the numerical rank of the basis.
+    """
+    v = basis.truncated(max(ranks))
+    if spec.rows == "all":
+        everything = Sampling.of_elements(
+            np.arange(basis.elements), basis.rows_per_element, basis.elements
+        )
+        return dict.fromkeys(ranks, everything)
+    if spec.rows == "element":
+        elements = block_elements(v, 3 * basis.rows_per_element)
+        counts = (basis.rows_per_element, basis.elements)
+        return {r: Sampling.of_elements(elements[:r], *counts) for r in ranks}
+    if spec.rows == "joint":
+        path = 3 * joint_rows(v, basis.active_axes, spec.repeat_rows)
+        return {r: _of_entries(path[:r], basis, spec) for r in ranks}
+    if spec.selection == "greedy":
+        path = deim_entries(v)
+        return {r: _of_entries(path[:r], basis, spec) for r in ranks}
+    return {r: _of_entries(qdeim_entries(v[:, :r]), basis, spec) for r in ranks}
+
+
+def _of_entries(entries: np.ndarray, basis: Basis, spec: MethodSpec) -> Sampling:
+    return Sampling.of_entries(
+        entries, basis.rows_per_element, basis.elements, repeats=spec.repeat_rows
+    )
