@@ -21,6 +21,7 @@ from pdrom.constraints.base import ConstraintGroup, GroupConfig
 from pdrom.effects import EFFECTS
 from pdrom.effects.base import Boundary, Contact, Effect, EffectConfig, Force, Start
 from pdrom.errors import ConfigurationError, SceneError
+from pdrom.fom.space import VertexSpace
 from pdrom.fom.stepper import LocalStep, State, Stepper
 from pdrom.fom.system import DEFAULT_SOLVER, GlobalSystem
 from pdrom.mesh.checks import check_mesh
@@ -215,15 +216,16 @@ class Scene:
     ) -> Stepper:
         """Step loop of the scene; ``local_steps`` replaces the full projections of all groups."""
         return Stepper(
-            system or self.system,
+            self.space(system or self.system),
             self.config.time_step,
             self.config.iterations,
             self.groups if local_steps is None else local_steps,
-            self.forces,
-            self.boundaries,
-            self.contacts,
             track_objective,
         )
+
+    def space(self, system: GlobalSystem) -> VertexSpace:
+        """Vertex positions as the coordinates of the step loop."""
+        return VertexSpace(system, self.forces, self.boundaries, self.contacts)
 
 
 def _bind(config: EffectConfig, scene: str, mesh: Mesh, masses: np.ndarray) -> Effect:

@@ -105,12 +105,20 @@ class Boundary(Effect):
         """Whether anything is held in ``frame`` (0-based: the step from state f to f + 1)."""
 
     @abstractmethod
-    def targets(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Held vertices (n,) and their positions (n, 3) m at the end of ``frame``.
+    def held(self, frame: int) -> np.ndarray:
+        """Vertices that are held in an active ``frame``, (n,) int64."""
 
-        ``positions`` (N, 3) is the state at the beginning of the frame; the effect remembers where
-        its vertices were when it took hold of them.
+    @abstractmethod
+    def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
+        """Positions (n, 3) m of the held vertices at the end of ``frame``.
+
+        ``current`` (n, 3) are their positions at its beginning; the effect remembers where they
+        were when it took hold of them.
         """
+
+    @abstractmethod
+    def units(self) -> list[np.ndarray]:
+        """Sets of vertices that are always held together."""
 
 
 class Contact(Effect):

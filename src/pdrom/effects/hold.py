@@ -37,10 +37,16 @@ class Hold(Boundary):
         until = self.config.until
         return self.config.start <= frame and (until is None or frame < until)
 
-    def targets(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def held(self, frame: int) -> np.ndarray:
+        return self.vertices
+
+    def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
         if self._anchor is None or frame == self.config.start:
-            self._anchor = positions[self.vertices].copy()
-        return self.vertices, self._moved(self._anchor, frame)
+            self._anchor = current.copy()
+        return self._moved(self._anchor, frame)
+
+    def units(self) -> list[np.ndarray]:
+        return [self.vertices]
 
     @abstractmethod
     def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:

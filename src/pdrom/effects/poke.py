@@ -55,15 +55,21 @@ class Poke(Boundary):
         turn, phase = divmod(frame, self.config.over + self.config.rest)
         return turn < self.config.count and phase < self.config.over
 
-    def targets(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def held(self, frame: int) -> np.ndarray:
+        turn = frame // (self.config.over + self.config.rest)
+        return self._order[turn : turn + 1]
+
+    def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
         turn, phase = divmod(frame, self.config.over + self.config.rest)
-        vertex = self._order[turn : turn + 1]
         if turn != self._turn or phase == 0:
-            self._turn, self._anchor = turn, positions[vertex].copy()
+            self._turn, self._anchor = turn, current.copy()
         progress = (phase + 1) / self.config.over
         target = self._anchor.copy()
         times = np.linspace(0.0, 1.0, len(KNOTS))
         target[:, AXES[self.config.axis]] += self.config.amplitude * np.interp(
             progress, times, KNOTS
         )
-        return vertex, target
+        return target
+
+    def units(self) -> list[np.ndarray]:
+        return [np.array([vertex]) for vertex in self._order]

@@ -48,7 +48,8 @@ def run(
         is not listed stores nothing.
     """
     frames = scene.config.frames
-    loop = scene.stepper(scene.system_with(solver))
+    system = scene.system_with(solver)
+    loop = scene.stepper(system)
     state = scene.initial_state()
     with write_hdf5(path) as file:
         file.attrs.update(attributes)
@@ -64,7 +65,7 @@ def run(
             series["timings"][frame] = 1e3 * report.seconds
             if (frame + 1) % max(1, frames // 10) == 0:
                 log.info("%s: frame %d of %d", scene.config.name, frame + 1, frames)
-        file.attrs["factorisations"] = loop.system.factorisations
+        file.attrs["factorisations"] = system.factorisations
 
 
 def _create_series(file: h5py.File, scene: Scene) -> dict[str, h5py.Dataset]:

@@ -12,14 +12,16 @@ from typing import Protocol
 
 import numpy as np
 
-from pdrom.effects.base import Boundary, Contact, Force
-from pdrom.fom.system import GlobalSystem
+from pdrom.fom.space import Space
 
 PHASES = ("inertia", "local", "global", "finish")
 
 
 class LocalStep(Protocol):
-    """Contribution of one group to the right-hand side. A constraint group is one itself."""
+    """Contribution of one group to the right-hand side. A constraint group is one itself.
+
+    With a position subspace y and rhs are coordinates (k, 3) in place of vertex positions (N, 3).
+    """
 
     name: str
 
@@ -32,7 +34,7 @@ class LocalStep(Protocol):
 
 @dataclass(frozen=True)
 class State:
-    """Positions (N, 3) m and velocities (N, 3) m/s."""
+    """Positions (N, 3) m and velocities (N, 3) m/s; in a subspace their coordinates (k, 3)."""
 
     positions: np.ndarray
     velocities: np.ndarray
@@ -52,27 +54,20 @@ class FrameReport:
 
 
 class Stepper:
-    """Advances a state frame by frame.
-
-    Roles that a scene does not fill are empty sequences and cost nothing.
-    """
+    """Advances a state frame by frame in the coordinates of a `Space`."""
 
     def __init__(
         self,
-        system: GlobalSystem,
+        space: Space,
         time_step: float,
         iterations: int,
         local_steps: Sequence[LocalStep],
-        forces: Sequence[Force] = (),
-        boundaries: Sequence[Boundary] = (),
-        contacts: Sequence[Contact] = (),
         track_objective: bool = True,
     ) -> None:
-        self.system = system
+        self.space = space
         self.time_step = time_step
         self.iterations = iterations
         self.local_steps = list(local_steps)
-        self._forces, self._boundaries, self._contacts = forces, boundaries, contacts
         self._track = track_objective
 
     def step(
@@ -82,15 +77,15 @@ class Stepper:
         on_last_iterate: Callable[[np.ndarray], None] | None = None,
     ) -> tuple[State, FrameReport]:
         """Do one frame (``frame`` is 0-based); ``on_last_iterate`` sees the last local iterate y."""
-        h = self.time_step
+        space, h = self.space, self.time_step
         seconds = np.zeros(len(PHASES))
         started = perf_counter()
-        s = self._prediction(state)
-        fixed, targets = self._fixed(frame, state.positions)
+        s = state.positions + h * state.velocities
+        s += h**2 * space.acceleration(state.positions, state.velocities)
+        fixed, targets = space.fixed(frame, state.positions)
         s[fixed] = targets
-        elimination = self.system.eliminate(fixed)
-        elimination.set_targets(targets)
-        base = self.system.inertia[:, None] * s
+        elimination = space.eliminate(fixed, targets)
+        base = space.inertia(s)
         for local in self.local_steps:
             local.begin_frame(state.positions)
         y, rhs = s.copy(), np.empty_like(s)
@@ -106,33 +101,13 @@ class Stepper:
                 energy += local.accumulate(y, rhs)
             between = perf_counter()
             if self._track:
-                objective[k] = energy + self._inertia_energy(y, s)
+                objective[k] = energy + space.inertia_energy(y - s)
             tracked = perf_counter()
             elimination.solve(rhs, y)
             seconds[1] += between - before
             seconds[2] += perf_counter() - tracked
         before = perf_counter()
-        for contact in self._contacts:
-            contact.correct(y)
+        space.correct(y)
         velocities = (y - state.positions) / h
         seconds[3] = perf_counter() - before
         return State(y, velocities), FrameReport(objective, seconds)
-
-    def _prediction(self, state: State) -> np.ndarray:
-        """Inertial prediction s = q + h v + h^2 M^-1 f_ext."""
-        s = state.positions + self.time_step * state.velocities
-        for force in self._forces:
-            s += self.time_step**2 * force.acceleration(state.positions, state.velocities)
-        return s
-
-    def _fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Vertices held in this frame, ascending, and their positions (n, 3)."""
-        held = [b.targets(frame, positions) for b in self._boundaries if b.active(frame)]
-        if not held:
-            return np.empty(0, dtype=np.int64), np.empty((0, 3))
-        vertices, first = np.unique(np.concatenate([v for v, _ in held]), return_index=True)
-        return vertices, np.concatenate([t for _, t in held])[first]
-
-    def _inertia_energy(self, y: np.ndarray, s: np.ndarray) -> float:
-        difference = y - s
-        return 0.5 * float(self.system.inertia @ np.einsum("ij,ij->i", difference, difference))
