@@ -4,6 +4,7 @@ Energy of a group (Bouaziz et al. 2014, eq. 4): W(q) = 1/2 sum_e w_e || S_e q - 
 """
 
 from abc import abstractmethod
+from copy import copy
 from typing import Annotated
 
 import numpy as np
@@ -68,6 +69,23 @@ class ConstraintGroup(Effect):
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         """NumPy reference of the projection: S_e q -> p_e, both (len(elements), p, 3)."""
 
+    @abstractmethod
+    def restricted(
+        self, elements: np.ndarray, factors: np.ndarray
+    ) -> tuple["ConstraintGroup", np.ndarray]:
+        """The group of some elements only, on the vertices they need.
+
+        Parameters
+        ----------
+        elements : (m,) element indices
+        factors : (m,) what each element weight is multiplied by
+
+        Returns
+        -------
+        group, vertices
+            A group whose positions are those of ``vertices`` (n,), in this order.
+        """
+
     def system_matrix(self) -> sparse.csr_array:
         """S^T W S, (N, N) CSR."""
         return (self.S.T @ self.S.multiply(self.row_weights[:, None])).tocsr()
@@ -88,6 +106,20 @@ class StencilGroup(ConstraintGroup):
 
     stencil: np.ndarray
     operator: np.ndarray
+    per_element: tuple[str, ...] = ()
+    """Names of further arrays with one entry per element."""
+
+    def restricted(
+        self, elements: np.ndarray, factors: np.ndarray
+    ) -> tuple["ConstraintGroup", np.ndarray]:
+        vertices, local = np.unique(self.stencil[elements], return_inverse=True)
+        part = copy(self)
+        part.stencil = local.reshape(len(elements), -1).astype(np.int32)
+        part.weights = self.weights[elements] * factors
+        for name in ("operator", *self.per_element):
+            setattr(part, name, np.ascontiguousarray(getattr(self, name)[elements]))
+        part._assemble(len(vertices))
+        return part, vertices
 
     def _assemble(self, vertices: int) -> None:
         e, p, m = self.operator.shape

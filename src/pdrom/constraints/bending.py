@@ -1,5 +1,6 @@
 """Vertex bending: the mean-curvature vector keeps its rest magnitude (Bouaziz et al. 2014, 5.4)."""
 
+from copy import copy
 from typing import Literal
 
 import numpy as np
@@ -81,6 +82,26 @@ class VertexBending(ConstraintGroup):
         return _accumulate(
             y, *self._operator(), self.magnitude, self.side, self.normals, self.weights, rhs
         )
+
+    def restricted(
+        self, elements: np.ndarray, factors: np.ndarray
+    ) -> tuple[ConstraintGroup, np.ndarray]:
+        own = self.vertices[elements]
+        fans = [self._fan[self._fan_start[v] : self._fan_start[v + 1]] for v in own]
+        triangles = self._triangles[np.unique(np.concatenate(fans))]
+        rows = self.S[elements]
+        vertices = np.union1d(rows.indices, triangles)
+        part = copy(self)
+        part.vertices = np.searchsorted(vertices, own)
+        part._triangles = np.searchsorted(vertices, triangles).astype(np.int32)
+        part._fan_start, part._fan = vertex_fans(part._triangles, len(vertices))
+        part.S = sparse.csr_array(rows[:, vertices])
+        part.S.sort_indices()
+        part.weights = self.weights[elements] * factors
+        part.magnitude, part.side = self.magnitude[elements], self.side[elements]
+        part.normals = self.normals[elements].copy()
+        part._curved = np.flatnonzero(part.side)
+        return part, vertices
 
     def _operator(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return self.S.indptr, self.S.indices, self.S.data

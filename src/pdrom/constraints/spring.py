@@ -22,6 +22,7 @@ class EdgeSpring(StencilGroup):
         effect: Literal["spring"] = "spring"
 
     rows_per_element = 1
+    per_element = ("rest",)
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)

@@ -1,0 +1,1 @@
+"""Position subspaces: columns, coordinates, reduced system, element sampling with weights."""
