@@ -11,6 +11,11 @@ from pdrom.fingerprint import fingerprint
 from pdrom.method import MethodSpec
 
 RESULTS = "results"
+REFERENCE_BASIS = "none-none-vectorised"
+TABLES = (
+    "singular_values", "reconstruction_error", "reduced_reruns", "accuracy_cost", "local_share",
+    "sensitivity",
+)  # fmt: skip
 
 
 def load_plan(config: dict[str, Any], root: Path) -> "Plan":
@@ -79,6 +84,15 @@ class Plan:
         paths = [self.basis_path(scene, g, m) for g in groups for m in self.study.methods]
         return sorted(set(paths))
 
+    def reference_bases(self) -> list[str]:
+        """One basis file per experiment for the decay of its singular values: uncentred if there."""
+        paths = []
+        for scene, group in self.study.experiments:
+            ids = [spec.basis_id for spec in self.study.methods.values()]
+            chosen = sorted(ids, key=lambda i: (i != REFERENCE_BASIS, ids.index(i)))[0]
+            paths.append(f"{RESULTS}/pod/{scene}/{group}/{chosen}.h5")
+        return paths
+
     def samplings_of(self, scene: str) -> list[str]:
         """All sampling files of a scene."""
         return self._per_method("sampling", "h5", scene)
@@ -97,6 +111,11 @@ class Plan:
             for group in self.study.scenes[scene].reduce
             for method in self.study.methods
         ]
+
+    @property
+    def tables(self) -> list[str]:
+        """All tables."""
+        return [f"{RESULTS}/tables/{name}.csv" for name in TABLES]
 
     # Code -----------------------------------------------------------------------------------
 

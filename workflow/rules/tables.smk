@@ -1,0 +1,101 @@
+# Tables of the study, columns as in src/pdrom/tables/columns.py
+rule singular_values_table:
+    input:
+        bases=PLAN.reference_bases(),
+    output:
+        report("results/tables/singular_values.csv", category="Tables"),
+    log:
+        "results/logs/tables/singular_values.log",
+    params:
+        name="singular_values",
+        code=PLAN.code("pdrom.tables.singular_values"),
+    message:
+        "Table of singular values"
+    script:
+        "../scripts/table.py"
+
+
+rule reconstruction_error_table:
+    input:
+        errors=PLAN.per_experiment("sampling", "csv"),
+    output:
+        report("results/tables/reconstruction_error.csv", category="Tables"),
+    log:
+        "results/logs/tables/reconstruction_error.log",
+    params:
+        name="reconstruction_error",
+        code=PLAN.code("pdrom.tables.reconstruction_error"),
+    message:
+        "Table of reconstruction errors"
+    script:
+        "../scripts/table.py"
+
+
+rule sensitivity_table:
+    input:
+        scenes=PLAN.per_scene("sensitivity", "csv"),
+    output:
+        report("results/tables/sensitivity.csv", category="Tables"),
+    log:
+        "results/logs/tables/sensitivity.log",
+    params:
+        name="sensitivity",
+        code=PLAN.code("pdrom.tables.sensitivity"),
+    message:
+        "Table of sensitivity floors"
+    script:
+        "../scripts/table.py"
+
+
+rule local_share_table:
+    input:
+        timings=PLAN.per_scene("timings", "csv"),
+    output:
+        report("results/tables/local_share.csv", category="Tables"),
+    log:
+        "results/logs/tables/local_share.log",
+    params:
+        name="local_share",
+        code=PLAN.code("pdrom.tables.local_share"),
+    message:
+        "Table of local shares"
+    script:
+        "../scripts/table.py"
+
+
+rule reduced_reruns_table:
+    input:
+        runs=PLAN.per_experiment("reruns", "h5"),
+        tables=PLAN.per_experiment("reruns", "csv"),
+        timings=PLAN.per_scene("timings", "csv"),
+        sensitivity="results/tables/sensitivity.csv",
+    output:
+        report("results/tables/reduced_reruns.csv", category="Tables"),
+    log:
+        "results/logs/tables/reduced_reruns.log",
+    params:
+        name="reduced_reruns",
+        perturbation=PLAN.settings.sensitivity.reference,
+        threshold=PLAN.settings.sensitivity.threshold,
+        code=PLAN.code("pdrom.tables.reduced_reruns"),
+    message:
+        "Table of reduced reruns"
+    script:
+        "../scripts/table.py"
+
+
+rule accuracy_cost_table:
+    input:
+        reruns="results/tables/reduced_reruns.csv",
+    output:
+        report("results/tables/accuracy_cost.csv", category="Tables"),
+    log:
+        "results/logs/tables/accuracy_cost.log",
+    params:
+        name="accuracy_cost",
+        iterations={name: scene.iterations for name, scene in PLAN.study.scenes.items()},
+        code=PLAN.code("pdrom.tables.accuracy_cost"),
+    message:
+        "Table of accuracy against cost"
+    script:
+        "../scripts/table.py"

@@ -1,0 +1,1 @@
+"""The manuscript: macros and tables from the results, bibliography, TeX."""

@@ -1,0 +1,225 @@
+"""Verdicts on the paper's claims, by rules of config/claims.yaml that code evaluates.
+
+A claim is decided by tests: a metric over chosen rows of the tables, compared with a threshold. The
+first tests marked ``decides`` give the verdict, the others stand beside it in the reason.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+import pandas as pd
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+
+from pdrom.errors import ConfigurationError
+from pdrom.tables.columns import COLUMNS
+from pdrom.yamlfile import read_yaml, validate
+
+HOLDS, FAILS, UNDECIDED = "holds", "does not hold", "cannot be decided"
+Tables = Mapping[str, pd.DataFrame]
+Value = str | int | float
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class TestRule(_Model):
+    """One comparison.
+
+    what : words for the rows that are compared, used in the reason
+    metric : name in `METRICS`
+    where : column -> allowed values
+    share : smallest fraction of the rows that must satisfy the comparison
+    """
+
+    __test__ = False
+
+    what: str
+    metric: str
+    where: dict[str, tuple[Value, ...]] = Field(default_factory=dict)
+    compare: Literal[">=", "<="]
+    threshold: FiniteFloat
+    share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+    decides: bool = True
+
+    @model_validator(mode="after")
+    def _metric_exists(self) -> Self:
+        if self.metric not in METRICS:
+            raise ValueError(f"metric = '{self.metric}': allowed are {', '.join(METRICS)}")
+        return self
+
+
+class ClaimRule(_Model):
+    """A claim of the paper, what the paper says, and the tests that decide it."""
+
+    text: str
+    source: str
+    paper: str
+    figure_or_table: str
+    tests: Annotated[tuple[TestRule, ...], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _something_decides(self) -> Self:
+        if not any(test.decides for test in self.tests):
+            raise ValueError("tests: none of them decides")
+        return self
+
+
+def load_claims(path: Path) -> dict[str, ClaimRule]:
+    """Claims by identifier; ConfigurationError for any fault."""
+    content = read_yaml(path)
+    if not isinstance(content, dict) or not content:
+        raise ConfigurationError(f"{path}: a mapping of claims is required")
+    return {str(c): validate(ClaimRule, rule, f"{path}: {c}") for c, rule in content.items()}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Result of one test: None where there was nothing to compare."""
+
+    passed: bool | None
+    measured: str
+    sentence: str
+
+
+def _filter(table: pd.DataFrame, where: Mapping[str, tuple[Value, ...]]) -> pd.DataFrame:
+    for column, allowed in where.items():
+        if column not in table.columns:
+            raise ConfigurationError(
+                f"claims: no column '{column}' (allowed: {', '.join(table.columns)})"
+            )
+        table = table[table[column].isin(allowed)]
+    return table
+
+
+def _full_rank_only(table: pd.DataFrame, where: dict) -> tuple[pd.DataFrame, dict]:
+    """Handles ``r: [full]``: the largest size that ran for each scene, group and method."""
+    if "r" not in where or "full" not in where["r"]:
+        return table, where
+    ran = table[table.frames > 0]
+    largest = ran.groupby(["scene", "group", "method"]).r.transform("max")
+    return ran[ran.r == largest], {k: v for k, v in where.items() if k != "r"}
+
+
+def _local_share(tables: Tables, where: dict) -> pd.Series:
+    return _filter(tables["local_share"], where).local_share
+
+
+def _rerun_error(tables: Tables, where: dict) -> pd.Series:
+    """Error within the horizon; a run that blew up before its horizon counts as infinite."""
+    table, where = _full_rank_only(tables["reduced_reruns"], where)
+    rows = _filter(table, where)
+    ran = rows[(rows.frames > 0) | rows.blowup_frame.notna()]
+    return ran.relative_error_within_horizon.fillna(np.inf)
+
+
+def _error_growth(tables: Tables, where: dict) -> pd.Series:
+    """Error at the largest size over the error at the smallest one, per scene and method."""
+    rows = _filter(tables["reduced_reruns"], where)
+    rows = rows[(rows.frames > 0) | rows.blowup_frame.notna()]
+    ratios = []
+    for _, run in rows.groupby(["scene", "group", "method"], sort=False):
+        ordered = run.sort_values("r").relative_error_within_horizon.fillna(np.inf).to_numpy()
+        if len(ordered) > 1 and np.isfinite(ordered[0]):
+            ratios.append(ordered[-1] / ordered[0])
+    return pd.Series(ratios, dtype=float)
+
+
+def _decay(tables: Tables, where: dict) -> pd.Series:
+    rows = _filter(tables["singular_values"], where)
+    real = rows.groupby(["scene", "group"]).above_roundoff.transform("any")
+    return rows[real].relative
+
+
+def _reconstruction(tables: Tables, where: dict) -> pd.Series:
+    """Reconstruction error; a singular interpolation counts as infinite."""
+    rows = _filter(tables["reconstruction_error"], where)
+    return rows[rows.gain.notna()].relative_error.fillna(np.inf)
+
+
+def _elements_per_entry(tables: Tables, where: dict) -> pd.Series:
+    rows = _filter(tables["reconstruction_error"], where)
+    rows = rows[rows.elements_sampled.notna()]
+    return rows.elements_sampled.astype(float) / rows.r
+
+
+def _local_ratio(tables: Tables, where: dict) -> pd.Series:
+    """Time of the reduced local step over that of the full compiled one, per rerun."""
+    full = tables["local_share"]
+    full = full[full.implementation == "compiled"].set_index("scene").local_ms
+    rows = _filter(tables["reduced_reruns"], where)
+    rows = rows[rows.local_ms.notna()]
+    return (rows.local_ms / rows.scene.map(full)).dropna()
+
+
+def _position_basis_ratio(tables: Tables, where: dict) -> pd.Series:
+    """Error of the snapshot basis over that of the skinning basis at equal k, per scene."""
+    rows = _filter(tables["reduced_reruns"], where)
+    keys = ["scene", "k"]
+    errors = {
+        kind: rows[rows.position_basis == kind].set_index(keys).relative_error_within_horizon
+        for kind in ("pod", "skinning")
+    }
+    return (errors["pod"] / errors["skinning"]).dropna()
+
+
+METRICS: dict[str, Callable[[Tables, dict], pd.Series]] = {
+    "local_share": _local_share,
+    "rerun_error": _rerun_error,
+    "error_growth": _error_growth,
+    "singular_value_decay": _decay,
+    "reconstruction_error": _reconstruction,
+    "elements_per_entry": _elements_per_entry,
+    "local_time_ratio": _local_ratio,
+    "position_basis_ratio": _position_basis_ratio,
+}
+
+
+def evaluate(test: TestRule, tables: Tables) -> Outcome:
+    """Compare the rows of a test with its threshold."""
+    values = METRICS[test.metric](tables, dict(test.where)).to_numpy(float)
+    if len(values) == 0:
+        return Outcome(None, "no data", f"{test.what}: nothing to compare in this configuration")
+    passed = values >= test.threshold if test.compare == ">=" else values <= test.threshold
+    good, total = int(passed.sum()), len(values)
+    spread = _range(values)
+    sign = "at least" if test.compare == ">=" else "at most"
+    sentence = f"{test.what}: {good} of {total} {sign} {test.threshold:g} (measured {spread})"
+    return Outcome(good >= test.share * total, spread, sentence)
+
+
+def _range(values: np.ndarray) -> str:
+    low, high = _text(values.min()), _text(values.max())
+    return low if low == high else f"{low} to {high}"
+
+
+def _text(value: float) -> str:
+    return "blow-up" if np.isinf(value) else f"{value:.2g}"
+
+
+def claims_table(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
+    """The table claims: one row per claim, in the order of the file."""
+    return pd.DataFrame(
+        [_row(name, rule, tables) for name, rule in rules.items()], columns=COLUMNS["claims"]
+    )
+
+
+def _row(name: str, rule: ClaimRule, tables: Tables) -> dict[str, Any]:
+    outcomes = [(test, evaluate(test, tables)) for test in rule.tests]
+    deciding = [o for test, o in outcomes if test.decides]
+    if any(o.passed is None for o in deciding):
+        verdict = UNDECIDED
+    else:
+        verdict = HOLDS if all(o.passed for o in deciding) else FAILS
+    return {
+        "claim": name,
+        "source": rule.source,
+        "paper": rule.paper,
+        "measured": "; ".join(o.measured for o in deciding),
+        "verdict": verdict,
+        "why": "; ".join(o.sentence for _, o in outcomes) + ".",
+        "figure_or_table": rule.figure_or_table,
+    }

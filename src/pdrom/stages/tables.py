@@ -1,0 +1,31 @@
+"""Rules of the tables: files of the stages -> results/tables/*.csv."""
+
+from pathlib import Path
+from typing import Any
+
+from pdrom.store import read_table, write_table
+from pdrom.tables.accuracy_cost import accuracy_cost
+from pdrom.tables.local_share import local_share
+from pdrom.tables.reconstruction_error import reconstruction_error
+from pdrom.tables.reduced_reruns import reduced_reruns
+from pdrom.tables.sensitivity import sensitivity
+from pdrom.tables.singular_values import singular_values
+
+
+def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
+    """Write the table called ``name`` from the named inputs and parameters of its rule."""
+    makers = {
+        "singular_values": lambda: singular_values(inputs.bases),
+        "reconstruction_error": lambda: reconstruction_error(inputs.errors),
+        "sensitivity": lambda: sensitivity(inputs.scenes),
+        "local_share": lambda: local_share(inputs.timings),
+        "reduced_reruns": lambda: reduced_reruns(
+            inputs.runs,
+            inputs.timings,
+            read_table(inputs.sensitivity),
+            params.perturbation,
+            params.threshold,
+        ),
+        "accuracy_cost": lambda: accuracy_cost(read_table(inputs.reruns), params.iterations),
+    }
+    write_table(makers[name](), Path(output))
