@@ -7,6 +7,7 @@ from typing import Any
 
 from pdrom.config import Study, StudySettings
 from pdrom.errors import PdromError
+from pdrom.figures import FIGURES, FigureSpec, Holdings, figure_inputs, load_figures
 from pdrom.fingerprint import fingerprint
 from pdrom.method import MethodSpec
 
@@ -14,7 +15,7 @@ RESULTS = "results"
 REFERENCE_BASIS = "none-none-vectorised"
 TABLES = (
     "singular_values", "reconstruction_error", "reduced_reruns", "accuracy_cost", "local_share",
-    "sensitivity",
+    "sensitivity", "claims",
 )  # fmt: skip
 
 
@@ -116,6 +117,43 @@ class Plan:
     def tables(self) -> list[str]:
         """All tables."""
         return [f"{RESULTS}/tables/{name}.csv" for name in TABLES]
+
+    # Figures --------------------------------------------------------------------------------
+
+    @cached_property
+    def figure_specs(self) -> dict[str, FigureSpec]:
+        """Figures of config/figures.yaml."""
+        return load_figures(self.root / "config" / "figures.yaml")
+
+    @cached_property
+    def _holdings(self) -> Holdings:
+        return Holdings.of_study(self.study)
+
+    @property
+    def figures(self) -> list[str]:
+        """PDF of every figure."""
+        return [f"{RESULTS}/figures/{name}.pdf" for name in self.figure_specs]
+
+    def figure_spec(self, figure: str) -> dict[str, Any]:
+        """Plain specification of a figure."""
+        return self.figure_specs[figure].model_dump(mode="json")
+
+    def figure_label(self, figure: str) -> str:
+        """Number in the paper and name, for the report."""
+        number = self.figure_specs[figure].number
+        return f"{number} {figure}" if number else figure
+
+    def figure_holdings(self, figure: str) -> dict[str, Any]:
+        """What this configuration holds, as plain data."""
+        return self._holdings.model_dump(mode="json")
+
+    def figure_inputs(self, figure: str) -> list[str]:
+        """Files that a figure reads."""
+        return figure_inputs(figure, self.figure_specs[figure], self._holdings, RESULTS)
+
+    def figure_code(self, figure: str) -> str:
+        """Fingerprint of the code that draws a figure."""
+        return fingerprint("pdrom.stages.figures", FIGURES.module(figure))
 
     # Code -----------------------------------------------------------------------------------
 

@@ -99,3 +99,24 @@ rule accuracy_cost_table:
         "Table of accuracy against cost"
     script:
         "../scripts/table.py"
+
+
+rule claims_table:
+    input:
+        rules="config/claims.yaml",
+        tables=[
+            "results/tables/local_share.csv",
+            "results/tables/reduced_reruns.csv",
+            "results/tables/singular_values.csv",
+            "results/tables/reconstruction_error.csv",
+        ],
+    output:
+        report("results/tables/claims.csv", category="Tables"),
+    log:
+        "results/logs/tables/claims.log",
+    params:
+        code=PLAN.code("pdrom.stages.claims"),
+    message:
+        "Verdicts on the claims of the paper"
+    script:
+        "../scripts/claims.py"

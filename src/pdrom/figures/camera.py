@@ -1,0 +1,77 @@
+"""Orthographic camera and the window of a picture."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Window(NamedTuple):
+    """Visible rectangle in the picture plane, metres."""
+
+    left: float
+    right: float
+    bottom: float
+    top: float
+
+    @property
+    def width(self) -> float:
+        """Width, m."""
+        return self.right - self.left
+
+    @property
+    def height(self) -> float:
+        """Height, m."""
+        return self.top - self.bottom
+
+    def contains(self, flat: np.ndarray) -> np.ndarray:
+        """Which picture points (n, 2) lie inside, (n,) bool."""
+        x, y = flat.T
+        return (x >= self.left) & (x <= self.right) & (y >= self.bottom) & (y <= self.top)
+
+    def resized(self, width: float, height: float) -> "Window":
+        """Window of another size about the same centre."""
+        x, y = 0.5 * (self.left + self.right), 0.5 * (self.bottom + self.top)
+        return Window(x - 0.5 * width, x + 0.5 * width, y - 0.5 * height, y + 0.5 * height)
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Parallel projection; y points up.
+
+    azimuth : degrees about the y axis; 0 looks along -z, 90 along -x
+    elevation : degrees above the horizon
+    """
+
+    azimuth: float = 30.0
+    elevation: float = 20.0
+
+    @cached_property
+    def basis(self) -> np.ndarray:
+        """Rows: right, up, towards the eye; a rotation matrix (3, 3)."""
+        a, e = np.radians([self.azimuth, self.elevation])
+        right = np.array([np.cos(a), 0.0, -np.sin(a)])
+        eye = np.array([np.cos(e) * np.sin(a), np.sin(e), np.cos(e) * np.cos(a)])
+        return np.stack([right, np.cross(eye, right), eye])
+
+    def project(self, points: np.ndarray) -> np.ndarray:
+        """Picture coordinates (n, 2), m, of points (n, 3)."""
+        return points @ self.basis[:2].T
+
+    def depth(self, points: np.ndarray) -> np.ndarray:
+        """Distance towards the eye (n,), m: larger is nearer."""
+        return points @ self.basis[2]
+
+
+def bounds(flat: np.ndarray, margin: float = 0.08) -> Window:
+    """Smallest window that shows picture points (n, 2), with a relative margin on each side."""
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    pad = margin * max(float((high - low).max()), 1e-12)
+    return Window(low[0] - pad, high[0] + pad, low[1] - pad, high[1] + pad)
+
+
+def window_of(camera: Camera, clouds: Iterable[np.ndarray], margin: float = 0.08) -> Window:
+    """Window that shows all point clouds (n, 3), see `bounds`."""
+    return bounds(np.concatenate([camera.project(cloud) for cloud in clouds]), margin)

@@ -1,0 +1,126 @@
+"""One look for all figures: fonts, palette, markers, small helpers."""
+
+import functools
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+
+WIDTH = 7.0  # inches, text width of the paper
+
+# Okabe and Ito (2008): told apart with every common colour deficiency.
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
+GREY = "#8C8C8C"
+FAILED = "#B3261E"
+FULL_ORDER = "#DAD6CC"
+
+METHODS: dict[str, tuple[str, str]] = {
+    "pod": (BLACK, "o"),
+    "deim": (ORANGE, "s"),
+    "qdeim": (SKY, "^"),
+    "deim-joint": (VERMILLION, "D"),
+    "published": (PURPLE, "v"),
+    "block-deim": (BLUE, "P"),
+    "block-qdeim": (GREEN, "X"),
+    "gappy": ("#7A5C00", "<"),
+    "ecsw": ("#5E3C99", ">"),
+    "hrpd": ("#5A5A5A", "*"),
+}
+_RESERVE = (("#1B6E6E", "h"), ("#8B1A4A", "p"), ("#3F6B00", "d"), ("#2B2B80", "8"))
+
+GROUPS: dict[str, tuple[str, str]] = {
+    "bending": (GREEN, "^"),
+    "spring": (ORANGE, "s"),
+    "strain": (BLUE, "o"),
+    "tetrahedron_strain": (SKY, "D"),
+    "deformation_gradient": (PURPLE, "v"),
+}
+AXES = {"x": VERMILLION, "y": GREEN, "z": BLUE}
+SPLITS = {"train": "-", "test": "--", "heldout": ":"}
+SPLIT_NAMES = {"train": "train", "test": "test", "heldout": "held-out run"}
+CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
+
+RC: dict[str, Any] = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 8.0,
+    "axes.titlesize": 8.0,
+    "axes.labelsize": 8.0,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "axes.grid": False,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.5,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.minor.size": 0.0,
+    "ytick.minor.size": 0.0,
+    "lines.linewidth": 1.1,
+    "lines.markersize": 3.5,
+    "hatch.linewidth": 0.5,
+    "figure.dpi": 100,
+    "pdf.fonttype": 42,
+    "pdf.use14corefonts": False,
+    "svg.hashsalt": "pdrom",
+}
+
+
+def styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
+    """Decorator: ``draw`` runs with this style, whatever the caller has set."""
+
+    @functools.wraps(draw)
+    def wrapper(*args: Any, **kwargs: Any) -> Figure:
+        with mpl.rc_context(), mpl.rc_context(RC):
+            return draw(*args, **kwargs)
+
+    return wrapper
+
+
+def method_styles(names: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """(colour, marker) of methods; names that are not preset share a reserve, in sorted order."""
+    names = list(names)
+    others = sorted(set(names) - set(METHODS))
+    spare = {name: _RESERVE[i % len(_RESERVE)] for i, name in enumerate(others)}
+    return {name: METHODS.get(name) or spare[name] for name in names}
+
+
+def group_colour(group: str) -> str:
+    """Colour of a constraint group; grey for one without a colour of its own."""
+    return GROUPS.get(group, (GREY, "o"))[0]
+
+
+def surface_colour(group: str) -> tuple[float, float, float]:
+    """Colour of a group on a shaded surface: lightened, so that the shading has room."""
+    return tuple(0.72 * c + 0.28 for c in to_rgb(group_colour(group)))
+
+
+def words(name: str) -> str:
+    """A name of the configuration as plain words."""
+    return name.replace("_", " ")
+
+
+def grid(ax: Axes) -> None:
+    """Light grid behind the data."""
+    ax.grid(True, which="major")
+
+
+def note(text: str) -> Figure:
+    """A figure that only says why there is nothing to draw."""
+    figure = Figure(figsize=(WIDTH, 0.6))
+    figure.text(0.5, 0.5, text, ha="center", va="center", fontsize=9, color="#444444")
+    return figure
+
+
+def no_data(missing: str) -> Figure:
+    """The note of a figure whose data a configuration does not hold."""
+    return note(f"no data in this configuration: {missing}")
