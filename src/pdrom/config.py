@@ -93,9 +93,10 @@ class Study:
     def __init__(self, settings: StudySettings, root: Path) -> None:
         self.settings = settings
         self.root = root
-        self.scenes: dict[str, SceneConfig] = {
-            name: load_scene(root, name, settings.coarsen) for name in settings.scenes
+        self.bound: dict[str, Scene] = {
+            name: load_bound_scene(root, name, settings.coarsen) for name in settings.scenes
         }
+        self.scenes: dict[str, SceneConfig] = {n: s.config for n, s in self.bound.items()}
         self.methods: dict[str, MethodSpec] = _named_methods(root, settings.methods)
 
     @classmethod
@@ -126,7 +127,18 @@ class Study:
 
 
 def load_scene(root: Path, name: str, coarsen: Coarsen | None = None) -> SceneConfig:
-    """Scene ``name`` from config/scenes, coarsened, and built once to find every fault early."""
+    """Configuration of scene ``name``, see `load_bound_scene`."""
+    return load_bound_scene(root, name, coarsen).config
+
+
+def load_bound_scene(root: Path, name: str, coarsen: Coarsen | None = None) -> Scene:
+    """Scene ``name`` from config/scenes, coarsened, and built to find every fault early.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the file and the fault; also for faults of the held-out variant.
+    """
     path = root / "config" / "scenes" / f"{name}.yaml"
     if not path.is_file():
         known = sorted(p.stem for p in path.parent.glob("*.yaml"))
@@ -137,11 +149,11 @@ def load_scene(root: Path, name: str, coarsen: Coarsen | None = None) -> SceneCo
     if coarsen is not None and coarsen != Coarsen():
         scene = scene.coarsened(coarsen.resolution, coarsen.frames)
     try:
-        for variant in (scene, scene.held_out_variant()):
-            Scene.build(variant, variant.mesh.build(root))
+        mesh = scene.mesh.build(root)
+        Scene.build(scene.held_out_variant(), mesh)
+        return Scene.build(scene, mesh)
     except PdromError as error:
         raise ConfigurationError(f"{path}: {error}") from error
-    return scene
 
 
 def _named_methods(root: Path, names: tuple[str, ...]) -> dict[str, MethodSpec]:

@@ -10,6 +10,7 @@ from pdrom.errors import PdromError
 from pdrom.figures import FIGURES, FigureSpec, Holdings, figure_inputs, load_figures
 from pdrom.fingerprint import fingerprint
 from pdrom.method import MethodSpec
+from pdrom.paper.textables import TEX_TABLES
 
 RESULTS = "results"
 REFERENCE_BASIS = "none-none-vectorised"
@@ -154,6 +155,46 @@ class Plan:
     def figure_code(self, figure: str) -> str:
         """Fingerprint of the code that draws a figure."""
         return fingerprint("pdrom.stages.figures", FIGURES.module(figure))
+
+    # Manuscript -----------------------------------------------------------------------------
+
+    @property
+    def paper_inputs(self) -> list[str]:
+        """Generated files that main.tex reads."""
+        return ["macros.tex", "main.bbl", *(f"{name}.tex" for name in TEX_TABLES)]
+
+    def facts(self) -> dict[str, list[dict[str, Any]]]:
+        """Facts of the configuration that the manuscript states, as tables."""
+        settings = self.settings
+        study = {
+            "scenes": len(self.study.scenes),
+            "experiments": len(self.study.experiments),
+            "threshold": settings.sensitivity.threshold,
+            "perturbation": settings.sensitivity.reference,
+            "seeds": len(settings.sensitivity.seeds),
+            "repeats": settings.timing.repeats,
+            "timed_frames": settings.timing.frames,
+            "blowup_extent": settings.blowup_extent,
+            "ranks": ", ".join(str(r) for r in settings.ranks),
+        }
+        methods = [{"method": m, **self.method_spec(m)} for m in self.study.methods]
+        scenes = [self._scene_facts(name) for name in self.study.scenes]
+        return {"study": [study], "methods": methods, "scenes": scenes}
+
+    def _scene_facts(self, name: str) -> dict[str, Any]:
+        config = self.study.scenes[name]
+        scene = self.study.bound[name]
+        weights = {e.effect: e.weight for e in config.effects if e.effect in config.groups}
+        return {
+            "scene": name,
+            "groups": ", ".join(f"{g} ({weights[g]:g})" for g in config.groups),
+            "vertices": scene.mesh.vertices,
+            "elements": sum(group.elements for group in scene.groups),
+            "frames": config.frames,
+            "iterations": config.iterations,
+            "time_step": config.time_step,
+            "vertex_mass": config.vertex_mass,
+        }
 
     # Code -----------------------------------------------------------------------------------
 

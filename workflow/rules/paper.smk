@@ -1,0 +1,37 @@
+# tables and figures -> manuscript; no number is typed in main.tex
+rule paper_inputs:
+    input:
+        source="paper/main.tex",
+        references="paper/references.bib",
+        tables=PLAN.tables,
+        machine="results/machine.json",
+    output:
+        expand("results/paper/{name}", name=PLAN.paper_inputs),
+    log:
+        "results/logs/paper/inputs.log",
+    params:
+        facts=PLAN.facts(),
+        code=PLAN.code("pdrom.stages.paper"),
+    message:
+        "Numbers, tables and references of the manuscript"
+    script:
+        "../scripts/paper_inputs.py"
+
+
+rule paper:
+    input:
+        source="paper/main.tex",
+        inputs=rules.paper_inputs.output,
+        figures=PLAN.figures,
+    output:
+        report("paper/main.pdf", category="Manuscript"),
+    log:
+        "results/logs/paper/main.log",
+    params:
+        figures="results/figures",
+        inputs="results/paper",
+        code=PLAN.code("pdrom.stages.paper"),
+    message:
+        "Manuscript paper/main.pdf"
+    script:
+        "../scripts/paper.py"

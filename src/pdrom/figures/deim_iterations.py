@@ -74,7 +74,7 @@ def _draw_steps(
         ScalarMappable(norm, MAGNITUDE), ax=list(axes[: len(steps)]), aspect=25, pad=0.01,
         fraction=0.03,
     )  # fmt: skip
-    bar.set_label("|residual of mode k| on the element / largest")
+    bar.set_label("residual / largest")
     _legend(figure)
     return figure
 

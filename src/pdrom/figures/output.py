@@ -4,7 +4,6 @@ import logging
 import os
 from pathlib import Path
 
-import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -46,7 +45,7 @@ def write_figure(
     """
     FigureCanvasAgg(figure)
     metadata = {"Title": title, "Creator": "pdrom", "CreationDate": None, "ModDate": None}
-    with mpl.rc_context(), mpl.rc_context(style.RC):
+    with style.look():
         with atomic_path(Path(pdf)) as temporary:
             figure.savefig(temporary, format="pdf", dpi=RASTER_DPI, metadata=metadata)
         with atomic_path(Path(png)) as temporary:

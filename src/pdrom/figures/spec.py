@@ -63,7 +63,7 @@ def load_figures(path: Path | str) -> dict[str, FigureSpec]:
         raise ConfigurationError(f"{path}: a mapping of figure names is required")
     figures = {}
     for name, entry in content.items():
-        if name not in FIGURES:
+        if name not in list(FIGURES):
             allowed = ", ".join(FIGURES)
             raise ConfigurationError(f"{path}: unknown figure '{name}' (allowed: {allowed})")
         figures[name] = validate(FigureSpec, entry, f"{path}: {name}")

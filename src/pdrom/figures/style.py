@@ -1,7 +1,8 @@
 """One look for all figures: fonts, palette, markers, small helpers."""
 
 import functools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import matplotlib as mpl
@@ -75,12 +76,21 @@ RC: dict[str, Any] = {
 }
 
 
+@contextmanager
+def look() -> Iterator[None]:
+    """Context with this style on top of matplotlib's own defaults, whatever the user has set."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(RC)
+        yield
+
+
 def styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
-    """Decorator: ``draw`` runs with this style, whatever the caller has set."""
+    """Decorator: ``draw`` runs with this style."""
 
     @functools.wraps(draw)
     def wrapper(*args: Any, **kwargs: Any) -> Figure:
-        with mpl.rc_context(), mpl.rc_context(RC):
+        with look():
             return draw(*args, **kwargs)
 
     return wrapper

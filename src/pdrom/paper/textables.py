@@ -1,0 +1,137 @@
+"""Tables of the manuscript as TeX, generated from the tables of the study."""
+
+from collections.abc import Mapping, Sequence
+
+import pandas as pd
+
+from pdrom.paper.macros import escape, format_number
+
+Tables = Mapping[str, pd.DataFrame]
+_VERDICT_COLOUR = {"holds": "okgreen", "does not hold": "okred"}
+
+
+def tabular(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
+    """A tabular with a ruled head; cells are TeX already."""
+    lines = [rf"\begin{{tabular}}{{{columns}}}", r"\hline", " & ".join(header) + r" \\", r"\hline"]
+    lines += [" & ".join(row) + r" \\" for row in rows]
+    return "\n".join([*lines, r"\hline", r"\end{tabular}"]) + "\n"
+
+
+def longtable(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
+    """A table that may break across pages."""
+    head = " & ".join(header) + r" \\"
+    lines = [rf"\begin{{longtable}}{{{columns}}}", r"\hline", head, r"\hline", r"\endhead"]
+    lines += [" & ".join(row) + r" \\" for row in rows]
+    return "\n".join([*lines, r"\hline", r"\end{longtable}"]) + "\n"
+
+
+def name(text: str) -> str:
+    """A scene, group or method name, in typewriter."""
+    return rf"\texttt{{{escape(text)}}}"
+
+
+def claims(tables: Tables) -> str:
+    """Verdict on each claim, with what was measured."""
+    rows = []
+    for row in tables["claims"].itertuples():
+        colour = _VERDICT_COLOUR.get(row.verdict, "okgrey")
+        verdict = rf"\textcolor{{{colour}}}{{{escape(row.verdict)}}}"
+        measured = escape(str(row.measured)).replace("; ", r"; \newline ")
+        rows.append([row.claim, escape(row.paper), measured, verdict, name(row.figure_or_table)])
+    header = ["claim", "the paper says", "measured", "verdict", "shown in"]
+    left = r">{\raggedright\arraybackslash}"
+    return longtable(header, rows, rf"l{left}p{{3.6cm}}{left}p{{3cm}}{left}p{{2.4cm}}l")
+
+
+def scenes(tables: Tables) -> str:
+    """Scenes with their groups, sizes and horizons."""
+    horizon = tables["reduced_reruns"].groupby("scene").horizon_frame.first()
+    rows = []
+    for row in tables["scenes"].itertuples():
+        end = int(horizon[row.scene]) if row.scene in horizon else None
+        shown = "run" if end == row.frames else str(end)
+        groups = escape(row.groups)
+        rows.append(
+            [name(row.scene), groups, str(row.vertices), str(row.elements), str(row.frames), shown]
+        )
+    header = ["scene", "groups (weight)", "vertices", "elements", "frames", "horizon"]
+    return longtable(header, rows, r"l>{\raggedright\arraybackslash}p{5.2cm}rrrr")
+
+
+def methods(tables: Tables) -> str:
+    """Ingredients of each method."""
+    rows = [
+        [name(row.method), escape(row.title), row.centring, row.rows, row.selection, row.solve]
+        for row in tables["methods"].itertuples()
+    ]
+    header = ["method", "title", "centring", "rows", "selection", "solve"]
+    return tabular(header, rows, "llllll")
+
+
+def ranks(tables: Tables) -> str:
+    """Numerical rank and decay of each group's snapshots."""
+    rows = []
+    for (scene, group), part in tables["singular_values"].groupby(["scene", "group"], sort=False):
+        real = part[part.above_roundoff]
+        decay = [_relative(real, component) for component in (6, 10, 20)]
+        rows.append([name(scene), escape(group.replace("_", " ")), str(len(real)), *decay])
+    header = ["scene", "group", "rank", r"$\sigma_6/\sigma_1$", r"$\sigma_{10}/\sigma_1$",
+              r"$\sigma_{20}/\sigma_1$"]  # fmt: skip
+    return longtable(header, rows, "llrrrr")
+
+
+def _relative(rows: pd.DataFrame, component: int) -> str:
+    cell = rows[rows.component == component].relative
+    return format_number(cell.iloc[0]) if len(cell) else "--"
+
+
+def reruns(tables: Tables) -> str:
+    """Error within the horizon of every method at r = 20 and at full rank."""
+    table = tables["reduced_reruns"]
+    table = table[table.position_basis == "full"]
+    order = list(tables["methods"].method)
+    rows = []
+    for (scene, group), part in table.groupby(["scene", "group"], sort=False):
+        if not (part.frames > 0).any() and not part.blowup_frame.notna().any():
+            continue
+        cells = [_rerun_cell(part[part.method == method]) for method in order]
+        rows.append([name(scene), escape(group.replace("_", " ")), *cells])
+    header = ["scene", "group", *(escape(m) for m in order)]
+    return longtable(header, rows, "ll" + "r" * len(order))
+
+
+def _rerun_cell(part: pd.DataFrame) -> str:
+    """Error at the largest size that the numerical rank allows."""
+    ran = part[(part.frames > 0) | part.blowup_frame.notna()].sort_values("r")
+    if ran.empty:
+        return "--"
+    last = ran.iloc[-1]
+    if pd.isna(last.relative_error_within_horizon):
+        return rf"\textcolor{{okred}}{{blow-up, {int(last.blowup_frame)}}}"
+    return format_number(last.relative_error_within_horizon)
+
+
+def local_share(tables: Tables) -> str:
+    """Share of the local step in a frame, by implementation."""
+    table = tables["local_share"]
+    rows = []
+    for scene, part in table.groupby("scene", sort=False):
+        by = part.set_index("implementation")
+        cells = []
+        for kind in ("interpreted", "numpy", "compiled"):
+            row = by.loc[kind]
+            total = row.local_ms + row.assembly_ms + row.global_ms
+            cells += [format_number(total), format_number(row.local_share)]
+        rows.append([name(scene), *cells])
+    header = ["scene", "interp.\\ ms", "share", "NumPy ms", "share", "compiled ms", "share"]
+    return longtable(header, rows, "lrrrrrr")
+
+
+TEX_TABLES = {
+    "tab_claims": claims,
+    "tab_scenes": scenes,
+    "tab_methods": methods,
+    "tab_ranks": ranks,
+    "tab_reruns": reruns,
+    "tab_local_share": local_share,
+}

@@ -1,0 +1,214 @@
+"""Every figure draws from invented results; what it says about failures and missing data."""
+
+import os
+import shutil
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import h5py
+import pytest
+from matplotlib.figure import Figure
+
+from pdrom.errors import StorageError
+from pdrom.figures import FIGURES, Sources, figure_inputs
+from pdrom.figures.output import draw_figure, make_figure
+from pdrom.mesh.generators import cloth
+from pdrom.mesh.types import save_mesh
+
+from .conftest import BLOWN_UP, BLOWUP_FRAME, ROOT, Study
+
+PICTURES = ("snapshots_and_modes", "deim_iterations", "cloth_all_grid", "bending_runs",
+            "spring_runs", "strain_runs", "bar_runs")  # fmt: skip
+
+
+def draw(study: Study, name: str, **changes: object) -> Figure:
+    return draw_figure(name, study.sources, study.specs[name].model_copy(update=changes))
+
+
+def texts(figure: Figure) -> list[str]:
+    """Every text of a figure."""
+    found = [t.get_text() for t in figure.findobj(lambda artist: hasattr(artist, "get_text"))]
+    return [text for text in found if text]
+
+
+def test_draws_without_warnings_and_writes_both_files(study, figure_name, tmp_path):
+    pdf, png = tmp_path / "a.pdf", tmp_path / "a.png"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        make_figure(figure_name, study.sources, study.specs[figure_name], pdf, png)
+    assert pdf.read_bytes().startswith(b"%PDF")
+    assert png.read_bytes().startswith(b"\x89PNG")
+    assert pdf.stat().st_size < 1_500_000
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.pdf", "a.png"]
+
+
+def test_holds_more_than_a_note(study, figure_name):
+    figure = draw(study, figure_name)
+    assert figure.axes
+    assert not any("no data" in text for text in texts(figure))
+
+
+def test_every_panel_holds_data(study, figure_name):
+    for ax in draw(study, figure_name).axes:
+        assert ax.has_data() or ax.texts or ax.images, ax.get_title()
+
+
+@pytest.mark.parametrize("name", sorted(set(FIGURES) - set(PICTURES)))
+def test_axes_are_labelled(study, name):
+    figure = draw(study, name)
+    labels = {ax.get_xlabel() for ax in figure.axes} | {ax.get_ylabel() for ax in figure.axes}
+    assert len(labels - {""}) >= (1 if name == "local_share" else 2)
+
+
+@pytest.mark.parametrize(("name", "unit"), [("local_share", "(%)"), ("accuracy_cost", "(ms)")])
+def test_units_stand_on_the_axes(study, name, unit):
+    assert all(unit in ax.get_xlabel() for ax in draw(study, name).axes if ax.get_xlabel())
+
+
+DRAW_ALL = """
+import sys
+from pathlib import Path
+from pdrom.figures import FIGURES, Holdings, Sources, load_figures
+from pdrom.figures.output import make_figure
+
+config, holdings, root, out = sys.argv[1:]
+sources = Sources(root, Holdings.model_validate_json(holdings))
+for name, spec in load_figures(config).items():
+    make_figure(name, sources, spec, Path(out, name + ".pdf"), Path(out, name + ".png"))
+"""
+
+
+def test_bytes_are_equal_in_another_process(study, tmp_path):
+    """Another hash seed and other settings of the user must not change a byte."""
+    environment = {
+        **os.environ,
+        "PYTHONHASHSEED": "99",
+        "PYTHONPATH": os.pathsep.join(sys.path),
+        "MATPLOTLIBRC": str(tmp_path / "matplotlibrc"),
+        "SOURCE_DATE_EPOCH": "86400",
+    }
+    (tmp_path / "matplotlibrc").write_text("font.size: 31\nsavefig.bbox: tight\nfigure.dpi: 50\n")
+    arguments = [study.sources.holdings.model_dump_json(), str(study.root), str(tmp_path)]
+    config = str(ROOT / "config" / "figures.yaml")
+    subprocess.run(
+        [sys.executable, "-c", DRAW_ALL, config, *arguments], check=True, env=environment
+    )
+    for name, spec in study.specs.items():
+        files = tmp_path / "own.pdf", tmp_path / "own.png"
+        make_figure(name, study.sources, spec, *files)
+        for file in files:
+            assert file.read_bytes() == (tmp_path / f"{name}{file.suffix}").read_bytes(), name
+
+
+def test_reads_only_what_it_declares(study, figure_name, tmp_path):
+    spec, holdings = study.specs[figure_name], study.sources.holdings
+    for path in map(Path, figure_inputs(figure_name, spec, holdings, str(study.root))):
+        target = tmp_path / path.relative_to(study.root)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, target)
+    assert draw_figure(figure_name, Sources(tmp_path, holdings), spec).axes
+
+
+def test_a_missing_file_is_named(study, figure_name, tmp_path):
+    spec, holdings = study.specs[figure_name], study.sources.holdings
+    with pytest.raises(StorageError, match=str(tmp_path)):
+        draw_figure(figure_name, Sources(tmp_path, holdings), spec)
+
+
+def test_a_failed_run_is_marked_and_never_drawn_with_nan(study):
+    scene, _, _ = BLOWN_UP
+    figure = draw(study, "spring_runs", scenes=(scene,))
+    marked = [t for t in texts(figure) if f"blew up at frame {BLOWUP_FRAME}" in t]
+    assert len(marked) == 1
+    hatched = [p for ax in figure.axes for p in ax.patches if p.get_hatch()]
+    assert len(hatched) == 1
+    # the last stored state is not finite: the one before it is drawn
+    assert f"drawn: frame {BLOWUP_FRAME - 1}" in marked[0]
+
+
+def test_a_failure_later_than_the_drawn_instant_is_no_failure(study):
+    figure = draw(study, "spring_runs", scenes=(BLOWN_UP[0],), frames=(0.1,))
+    assert not any("blew up" in text for text in texts(figure))
+
+
+def test_a_run_that_never_began_says_why(study):
+    assert any("round-off" in t for t in texts(draw(study, "bending_runs", scenes=("bend_fall",))))
+    figure = draw(study, "spring_runs", scenes=("spring_stretch",), ranks=(6, 20))
+    assert any("exceeds" in text for text in texts(figure))
+
+
+def test_a_run_out_of_view_is_drawn_to_a_stated_scale(small_study):
+    study = small_study({"spring_twist": ("spring",)}, ["deim-joint"])
+    with h5py.File(study.sources.rerun("spring_twist", "spring", "deim-joint"), "a") as file:
+        file["r0006/positions"][...] *= 8.0
+    figure = draw(study, "spring_runs", ranks=(6, 14))
+    assert sum("scale 1 :" in text for text in texts(figure)) == 1
+
+
+@pytest.mark.parametrize("rank", [6, 14, "full"])
+def test_asked_sizes_are_drawn_once(study, rank):
+    figure = draw(
+        study, "spring_runs", scenes=("spring_stretch",), methods=("deim",), ranks=(rank,)
+    )
+    assert len(figure.axes) == 2
+
+
+def test_missing_scenes_and_methods_leave_their_panels_out(small_study, figure_name):
+    study = small_study({"strain_oop": ("strain",)}, ["deim", "block-deim"])
+    figure = draw(study, figure_name)
+    for ax in figure.axes:
+        assert "spring" not in ax.get_title()
+    empty = {"cloth_all_grid", "bending_runs", "spring_runs", "strain_runs", "bar_runs",
+             "reconstruction_error", "deim_entries"}  # fmt: skip
+    noted = any("no data in this configuration" in text for text in texts(figure))
+    assert noted == (figure_name in empty)
+
+
+def test_experiments_of_round_off_only(small_study, figure_name):
+    study = small_study({"bend_fall": ("bending",)}, ["deim", "deim-joint", "block-deim"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert texts(draw(study, figure_name, scenes=("bend_fall",)))
+
+
+def test_singular_values_below_round_off_are_hollow(study):
+    figure = draw(study, "singular_values", scenes=("bend_fall", "spring_twist"))
+    flat, spring = figure.axes
+    for ax, hollow in ((flat, 14), (spring, 4)):
+        lines = [line for line in ax.lines if line.get_markerfacecolor() == "white"]
+        assert sum(len(line.get_xdata()) for line in lines) == hollow
+
+
+def test_errors_above_the_axis_are_marked_on_its_rim(study):
+    figure = draw(study, "reconstruction_error", scenes=("strain_twist",), methods=("deim",))
+    (ax,) = figure.axes
+    arrows = [line for line in ax.lines if line.get_marker() == 6]
+    assert [list(line.get_xdata()) for line in arrows] == [[1.0]]  # 1e5 / 10^r at r = 1
+    assert max(line.get_ydata().max() for line in ax.lines) <= ax.get_ylim()[1]
+
+
+def test_the_horizon_is_the_first_frame_above_the_threshold(study):
+    figure = draw(study, "sensitivity_floor", scenes=("spring_twist", "strain_oop"))
+    # 10^(-9 + f/2) exceeds 1e-3 first at f = 13
+    assert "spring twist: 13" in texts(figure)
+    assert "strain oop: beyond 20" in texts(figure)
+
+
+def test_published_values_are_drawn_where_they_are_given(study, tmp_path):
+    (tmp_path / "singular_values.csv").write_text(
+        "experiment,group,component,singular_value\nall_three,spring,1,5\nall_three,spring,2,1\n"
+    )
+    sources = Sources(study.root, study.sources.holdings, tmp_path)
+    figure = draw_figure("singular_values", sources, study.specs["singular_values"])
+    assert "published code's output" in texts(figure)
+    without = draw(study, "singular_values")
+    assert "published code's output" not in texts(without)
+
+
+def test_a_mesh_that_does_not_fit_is_refused(small_study):
+    study = small_study({"strain_oop": ("strain",)}, ["deim"])
+    save_mesh(cloth(4, 4), study.sources.mesh("strain_oop"))
+    with pytest.raises(StorageError, match="elements of 'strain'"):
+        draw(study, "deim_iterations")

@@ -1,0 +1,14 @@
+from pathlib import Path
+
+from pdrom.logs import job_log
+from pdrom.stages.paper import write_inputs
+
+with job_log(snakemake.log[0]):
+    write_inputs(
+        snakemake.input.source,
+        snakemake.input.references,
+        list(snakemake.input.tables),
+        snakemake.input.machine,
+        snakemake.params.facts,
+        str(Path(snakemake.output[0]).parent),
+    )
