@@ -197,7 +197,11 @@ def _range(values: np.ndarray) -> str:
 
 
 def _text(value: float) -> str:
-    return "blow-up" if np.isinf(value) else f"{value:.2g}"
+    if np.isinf(value):
+        return "blow-up"
+    if 100.0 <= abs(value) < 1e5:
+        return f"{float(f'{value:.2g}'):.0f}"
+    return f"{value:.2g}"
 
 
 def claims_table(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:

@@ -25,7 +25,10 @@ class Variant:
 
 @dataclass(frozen=True)
 class Measurement:
-    """Median over the repeats of the mean time per frame, ms; ``spread`` is the quartile range."""
+    """The repeat with the median time per frame: its mean times per frame in ms, by phase.
+
+    ``spread`` is the interquartile range of the time per frame over the repeats.
+    """
 
     labels: dict[str, object]
     frame: float
@@ -75,6 +78,8 @@ def _time_once(scene: Scene, system: GlobalSystem, variant: Variant) -> np.ndarr
 
 
 def _summary(labels: dict[str, object], samples: np.ndarray) -> Measurement:
-    frame, local, assembly, solve = np.median(samples, axis=0)
+    # the phases of one repeat belong together, medians of each phase would not
+    middle = np.argsort(samples[:, 0], kind="stable")[len(samples) // 2]
+    frame, local, assembly, solve = samples[middle]
     spread = float(np.subtract(*np.percentile(samples[:, 0], [75, 25])))
     return Measurement(labels, frame, local, assembly, solve, spread, len(samples))

@@ -8,67 +8,15 @@ its objective cannot rise in an iteration. Their quality decides the accuracy, n
 """
 
 import numpy as np
-from scipy import linalg
 
 from pdrom.constraints.base import ConstraintGroup
 from pdrom.subspace.columns import Columns
 from pdrom.subspace.nnls import nnls_early_stop
 
 
-def training_columns(
-    group: ConstraintGroup, columns: Columns, states: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Contributions of each element to the reduced equations, as columns.
-
-    Rows are, for each training state y and each coordinate, the elastic force
-    B^T S_e^T w_e (S_e y - p_e(y)) and the elastic stiffness B^T S_e^T w_e S_e y, each scaled by the
-    norm of its sum, so that the fixed point and the way to it count alike.
-
-    Parameters
-    ----------
-    states : (n, N, 3) positions
-
-    Returns
-    -------
-    forces, stiffnesses
-        Each (3 n K, e), already scaled.
-    """
-    e, p = group.elements, group.rows_per_element
-    k = columns.B.shape[1]
-    strain = (group.S @ columns.B).reshape(e, p, k)
-    forces = np.empty((len(states), k, 3, e))
-    stiffnesses = np.empty_like(forces)
-    for t, y in enumerate(states):
-        group.begin_frame(y)
-        d = (group.S @ y).reshape(e, p, 3)
-        residual = d - group.project(y).reshape(e, p, 3)
-        weighted = strain * group.weights[:, None, None]
-        forces[t] = np.einsum("epk,epa->kae", weighted, residual, optimize=True)
-        stiffnesses[t] = np.einsum("epk,epa->kae", weighted, d, optimize=True)
-    return _scaled(forces.reshape(-1, e)), _scaled(stiffnesses.reshape(-1, e))
-
-
-def _scaled(rows: np.ndarray) -> np.ndarray:
-    norm = np.linalg.norm(rows.sum(axis=1))
-    return rows / norm if norm > 0.0 else rows
-
-
-def compress(rows: np.ndarray, tolerance: float) -> np.ndarray:
-    """Fewer rows with the same column geometry: the leading left singular directions.
-
-    ``rows`` (m, e) is replaced by U^T rows with U from the Gram matrix rows rows^T (m, m), which
-    never forms an e x e matrix. Directions below ``tolerance`` times the norm of the row sum are
-    left out.
-    """
-    values, vectors = linalg.eigh(rows @ rows.T)
-    target = rows.sum(axis=1)
-    order = np.argsort(values)[::-1]
-    values, vectors = np.maximum(values[order], 0.0), vectors[:, order]
-    # what is dropped must be small for every non-negative combination of moderate factors
-    level = np.sqrt(values[0]) * max(tolerance * 1e-3, 1e-8)
-    keep = np.sqrt(values) > level
-    keep |= np.abs(vectors.T @ target) > 0.1 * tolerance * np.linalg.norm(target)
-    return vectors[:, keep].T @ rows
+# Rows that the training equations are hashed to.
+SKETCH = 1500
+SEED = 0
 
 
 def ecsw_elements(
@@ -76,13 +24,51 @@ def ecsw_elements(
     columns: Columns,
     states: np.ndarray,
     tolerance: float,
+    most: int | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Sampled elements (m,) and their factors xi > 0 (m,).
 
-    The mean of the elements' contributions to the total rest weight is kept as one more equation,
-    so that a group at rest (no force at all) still keeps its stiffness.
+    Parameters
+    ----------
+    states : (n, N, 3) training positions, already in the subspace
+    tolerance : relative residual tau of the training equations at which NNLS stops
     """
-    forces, stiffnesses = training_columns(group, columns, states)
+    rows = training_rows(group, columns, states)
+    return nnls_early_stop(rows, rows.sum(axis=1), tolerance, most)
+
+
+def training_rows(
+    group: ConstraintGroup, columns: Columns, states: np.ndarray, sketch: int = SKETCH
+) -> np.ndarray:
+    """Training equations, one column per element, (at most sketch, e).
+
+    For each training state y and each coordinate there are the elastic force
+    B^T S_e^T w_e (S_e y - p_e(y)) and the elastic stiffness B^T S_e^T w_e S_e y, each kind scaled
+    by the norm of its sum, so that the fixed point and the way to it count alike. The share of the
+    rest weight is one more equation: a group at rest (no force at all) still keeps its stiffness.
+
+    Many equations are hashed to ``sketch`` rows with random signs (seeded), which keeps norms of
+    combinations up to a few per cent (count sketch, Charikar et al. 2002) and never forms an e x e
+    matrix.
+    """
+    e, p = group.elements, group.rows_per_element
+    k = columns.B.shape[1]
+    strain = (group.S @ columns.B).reshape(e, p, k)
+    strain *= group.weights[:, None, None]
+    generator = np.random.default_rng(SEED)
+    size = min(sketch, 3 * k * len(states))
+    kinds = [np.zeros((size, e)), np.zeros((size, e))]
+    totals = [0.0, 0.0]
+    for y in states:
+        group.begin_frame(y)
+        d = (group.S @ y).reshape(e, p, 3)
+        residual = d - group.project(y).reshape(e, p, 3)
+        buckets = generator.integers(size, size=3 * k)
+        signs = generator.choice([-1.0, 1.0], size=3 * k)
+        for kind, value in enumerate((residual, d)):
+            rows = np.einsum("epk,epa->kae", strain, value, optimize=True).reshape(3 * k, e)
+            totals[kind] += float(np.sum(rows.sum(axis=1) ** 2))
+            np.add.at(kinds[kind], buckets, signs[:, None] * rows)
+    scaled = [r / np.sqrt(t) if t > 0.0 else r for r, t in zip(kinds, totals, strict=True)]
     measure = (group.weights / group.weights.sum())[None, :]
-    rows = compress(np.vstack([forces, stiffnesses, measure]), tolerance)
-    return nnls_early_stop(rows, rows.sum(axis=1), tolerance)
+    return np.vstack([*scaled, measure])

@@ -33,6 +33,7 @@ def reduced_reruns(
     table["k"] = None
     for column in ("r", "frames", "blowup_frame", "horizon_frame"):
         table[column] = table[column].astype("Int64")
+    table["finite"] = table["finite"].astype("boolean")
     return conform(table, "reduced_reruns")
 
 
