@@ -63,6 +63,14 @@ class Timing(_Model):
     interpreted_frames: Annotated[int, Field(ge=1)] = 1
 
 
+class Subspace(_Model):
+    """Position subspaces: kinds of basis, numbers of modes, tolerances of the element sampling."""
+
+    bases: tuple[Literal["pod", "skinning"], ...] = ("pod", "skinning")
+    sizes: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = (10, 20, 40)
+    tolerances: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (3e-2, 1e-2, 1e-3)
+
+
 class StudySettings(_Model):
     """Content of config/default.yaml, possibly overridden by --configfile."""
 
@@ -75,6 +83,7 @@ class StudySettings(_Model):
     coarsen: Coarsen = Coarsen()
     sensitivity: Sensitivity = Sensitivity()
     timing: Timing = Timing()
+    subspace: Subspace = Subspace()
 
     @model_validator(mode="after")
     def _known(self) -> Self:

@@ -13,6 +13,7 @@ from pdrom.method import MethodSpec
 from pdrom.paper.textables import TEX_TABLES
 
 RESULTS = "results"
+PUBLISHED = Path("config/reference/published_code")
 REFERENCE_BASIS = "none-none-vectorised"
 TABLES = (
     "singular_values", "reconstruction_error", "reduced_reruns", "accuracy_cost", "local_share",
@@ -123,8 +124,11 @@ class Plan:
 
     @cached_property
     def figure_specs(self) -> dict[str, FigureSpec]:
-        """Figures of config/figures.yaml."""
-        return load_figures(self.root / "config" / "figures.yaml")
+        """Figures of config/figures.yaml, with the floor's settings of this study."""
+        floor = self.settings.sensitivity
+        update = {"perturbation": floor.reference, "threshold": floor.threshold}
+        figures = load_figures(self.root / "config" / "figures.yaml")
+        return {name: spec.model_copy(update=update) for name, spec in figures.items()}
 
     @cached_property
     def _holdings(self) -> Holdings:
@@ -150,7 +154,9 @@ class Plan:
 
     def figure_inputs(self, figure: str) -> list[str]:
         """Files that a figure reads."""
-        return figure_inputs(figure, self.figure_specs[figure], self._holdings, RESULTS)
+        spec = self.figure_specs[figure]
+        published = sorted(map(str, PUBLISHED.glob("*.csv"))) if spec.published else []
+        return published + figure_inputs(figure, spec, self._holdings, RESULTS)
 
     def figure_code(self, figure: str) -> str:
         """Fingerprint of the code that draws a figure."""

@@ -27,6 +27,9 @@ class Registry(Mapping[str, str]):
                 f"unknown {self.kind} '{name}' (allowed: {allowed})"
             ) from None
 
+    def __contains__(self, name: object) -> bool:
+        return name in self._entries
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._entries)
 

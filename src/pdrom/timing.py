@@ -1,7 +1,6 @@
 """Honest timings: in-process, warm, interleaved between the compared variants, median.
 
-A variant is a list of local steps for one scene. Every repeat runs each variant once, from the
-initial state, so that drifts of the machine's clock hit all variants alike.
+A variant makes a step loop and its initial state. Every repeat runs each variant once, from there, so that drifts of the machine's clock hit all variants alike.
 """
 
 from collections.abc import Callable, Sequence
@@ -9,17 +8,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pdrom.fom.stepper import LocalStep
-from pdrom.fom.system import GlobalSystem
-from pdrom.scene import Scene
+from pdrom.fom.stepper import State, Stepper
 
 
 @dataclass(frozen=True)
 class Variant:
-    """What is timed: labels for the table, the local steps, and how many frames."""
+    """What is timed: labels for the table, the loop with its first state, and how many frames."""
 
     labels: dict[str, object]
-    local_steps: Sequence[LocalStep]
+    loop: Stepper
+    start: State
     frames: int
 
 
@@ -40,39 +38,36 @@ class Measurement:
 
 
 def measure(
-    scene: Scene,
-    system: GlobalSystem,
     variants: Sequence[Variant],
     warmup: int,
     repeats: int,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Measurement]:
-    """Time all variants of a scene; the factorisations exist before the first measured frame."""
+    """Time all variants; factorisations are cached by the first run, the warm-up."""
     samples: list[list[np.ndarray]] = [[] for _ in variants]
     for repeat in range(-warmup, repeats):
         for index, variant in enumerate(variants):
-            sample = _time_once(scene, system, variant)
+            sample = _time_once(variant)
             if repeat >= 0:
                 samples[index].append(sample)
         progress(repeat + 1, repeats)
     return [_summary(v.labels, np.array(s)) for v, s in zip(variants, samples, strict=True)]
 
 
-def _time_once(scene: Scene, system: GlobalSystem, variant: Variant) -> np.ndarray:
+def _time_once(variant: Variant) -> np.ndarray:
     """Mean milliseconds per frame: total, local, assembly, global."""
-    loop = scene.stepper(system, variant.local_steps, track_objective=False)
-    state = scene.initial_state()
-    for step in variant.local_steps:
+    loop, state = variant.loop, variant.start
+    for step in loop.local_steps:
         if hasattr(step, "assembly_seconds"):
             step.assembly_seconds = 0.0
     seconds, done = 0.0, 0
     with np.errstate(over="ignore", invalid="ignore"):
-        for frame in range(min(variant.frames, scene.config.frames)):
+        for frame in range(variant.frames):
             state, report = loop.step(state, frame)
             seconds, done = seconds + report.seconds, done + 1
             if not np.isfinite(state.positions).all():
                 break
-    assembly = sum(getattr(step, "assembly_seconds", 0.0) for step in variant.local_steps)
+    assembly = sum(getattr(step, "assembly_seconds", 0.0) for step in loop.local_steps)
     local = seconds[1] - assembly
     return 1e3 / done * np.array([seconds.sum(), local, assembly, seconds[2]])
 

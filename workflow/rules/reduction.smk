@@ -57,3 +57,23 @@ rule reruns:
         "Reduced reruns of {wildcards.scene}, {wildcards.group} by {wildcards.method}"
     script:
         "../scripts/reruns.py"
+
+
+rule hyper:
+    input:
+        mesh=lambda w: PLAN.mesh_path(w.scene),
+        fom="results/fom/{scene}/train.h5",
+    output:
+        runs="results/hyper/{scene}.h5",
+        table="results/hyper/{scene}.csv",
+    log:
+        "results/logs/hyper/{scene}.log",
+    params:
+        scene=lambda w: PLAN.scene_config(w.scene),
+        settings=PLAN.settings.subspace.model_dump(mode="json"),
+        blowup_extent=PLAN.settings.blowup_extent,
+        code=lambda w: PLAN.scene_code("pdrom.stages.hyper", w.scene),
+    message:
+        "Position subspaces of {wildcards.scene}, with full and with sampled projections"
+    script:
+        "../scripts/hyper.py"

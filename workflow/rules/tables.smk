@@ -67,6 +67,8 @@ rule reduced_reruns_table:
     input:
         runs=PLAN.per_experiment("reruns", "h5"),
         tables=PLAN.per_experiment("reruns", "csv"),
+        hyper=PLAN.per_scene("hyper", "h5"),
+        hyper_tables=PLAN.per_scene("hyper", "csv"),
         timings=PLAN.per_scene("timings", "csv"),
         sensitivity="results/tables/sensitivity.csv",
     output:

@@ -21,6 +21,7 @@ def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
         "local_share": lambda: local_share(inputs.timings),
         "reduced_reruns": lambda: reduced_reruns(
             inputs.runs,
+            inputs.hyper,
             inputs.timings,
             read_table(inputs.sensitivity),
             params.perturbation,

@@ -1,6 +1,9 @@
 """Rule timing: milliseconds per frame of the full-order run and of every reduced local step."""
 
 import logging
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +11,8 @@ import pandas as pd
 
 from pdrom.basis import load_basis
 from pdrom.constraints.implementations import IMPLEMENTATIONS
+from pdrom.fom.stepper import LocalStep
+from pdrom.fom.system import GlobalSystem
 from pdrom.method import MethodSpec
 from pdrom.rom.local_step import ReducedLocalStep
 from pdrom.rom.ranks import resolve_ranks
@@ -16,12 +21,15 @@ from pdrom.sampling.load import load_reduction
 from pdrom.scene import Scene
 from pdrom.stages.scenes import scene_of
 from pdrom.store import write_table
+from pdrom.subspace.load import load_models
 from pdrom.timing import Measurement, Variant, measure
 
 log = logging.getLogger(__name__)
 
+Make = Callable[[dict[str, Any], Sequence[LocalStep]], Variant]
+
 COLUMNS = [
-    "scene", "group", "method", "r", "vertices", "implementation",
+    "scene", "group", "method", "position_basis", "k", "r", "vertices", "implementation",
     "ms_per_frame", "local_ms", "assembly_ms", "global_ms", "spread_ms", "repeats",
 ]  # fmt: skip
 
@@ -35,36 +43,53 @@ def time_scene(
     mesh: str,
     bases: list[str],
     samplings: list[str],
+    hyper: str,
     output: str,
 ) -> None:
     """Measure one scene and write its timing table."""
     bound = scene_of(scene, mesh)
     system = bound.system_with(solver)
-    variants = _full_order(bound, protocol)
+    frames = min(protocol["frames"], bound.config.frames)
+    make = partial(_variant, bound, system, frames)
+    variants = _full_order(bound, make, protocol["interpreted_frames"])
     for path in samplings:
         group, method = Path(path).parent.name, Path(path).stem
         spec = MethodSpec.model_validate(methods[method])
         basis = next(b for b in bases if Path(b).parent.name == group and Path(b).stem == spec.basis_id)
-        variants += _reduced(bound, group, method, spec, ranks, basis, path, protocol)
+        variants += _reduced(bound, group, method, spec, ranks, basis, path, make)
+    for labels, model in load_models(hyper):
+        labels = {"group": "all", **labels, "implementation": "compiled"}
+        variants.append(Variant(labels, *model.loop(bound), frames))
     slow = [v for v in variants if v.labels["implementation"] == "interpreted"]
     quick = [v for v in variants if v.labels["implementation"] != "interpreted"]
     results = measure(
-        bound,
-        system,
         quick,
         protocol["warmup"],
         protocol["repeats"],
         lambda done, total: log.info("%s: repeat %d of %d", bound.config.name, done, total),
     )
-    results += measure(bound, system, slow, 0, protocol["repeats"])
+    results += measure(slow, 0, protocol["repeats"])
     write_table(pd.DataFrame([_row(bound, m) for m in results], columns=COLUMNS), output)
 
 
-def _full_order(scene: Scene, protocol: dict[str, int]) -> list[Variant]:
-    variants = [Variant({"implementation": "compiled"}, scene.groups, protocol["frames"])]
+def _variant(
+    scene: Scene,
+    system: GlobalSystem,
+    frames: int,
+    labels: dict[str, Any],
+    local_steps: Sequence[LocalStep],
+) -> Variant:
+    loop = scene.stepper(system, local_steps, track_objective=False)
+    return Variant(labels, loop, scene.initial_state(), frames)
+
+
+def _full_order(scene: Scene, make: Make, interpreted_frames: int) -> list[Variant]:
+    variants = [make({"implementation": "compiled"}, scene.groups)]
     for name, step in IMPLEMENTATIONS.items():
-        frames = protocol["interpreted_frames" if name == "interpreted" else "frames"]
-        variants.append(Variant({"implementation": name}, [step(g) for g in scene.groups], frames))
+        variant = make({"implementation": name}, [step(g) for g in scene.groups])
+        if name == "interpreted":
+            variant = replace(variant, frames=min(variant.frames, interpreted_frames))
+        variants.append(variant)
     return variants
 
 
@@ -76,7 +101,7 @@ def _reduced(
     ranks: list[int | str],
     basis: str,
     sampling: str,
-    protocol: dict[str, int],
+    make: Make,
 ) -> list[Variant]:
     space = load_basis(basis)
     variants = []
@@ -86,7 +111,7 @@ def _reduced(
         reduction = load_reduction(space, sampling, spec, r)
         local = ReducedLocalStep(scene.group(group), reduction)
         labels = {"group": group, "method": method, "r": r, "implementation": "compiled"}
-        variants.append(Variant(labels, replace_group(scene, group, local), protocol["frames"]))
+        variants.append(make(labels, replace_group(scene, group, local)))
     return variants
 
 

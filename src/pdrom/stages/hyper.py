@@ -1,0 +1,131 @@
+"""Rule hyper: position subspaces with full projections and with sampled, weighted elements."""
+
+import logging
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pdrom.metrics import trajectory_error
+from pdrom.provenance import attributes
+from pdrom.rom.rerun import displacement_norms
+from pdrom.scene import Scene
+from pdrom.snapshots import training_frames
+from pdrom.stages.scenes import scene_of
+from pdrom.store import open_hdf5, write_hdf5, write_table
+from pdrom.subspace.columns import Columns
+from pdrom.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
+
+log = logging.getLogger(__name__)
+
+COLUMNS = [
+    "scene", "group", "method", "position_basis", "k", "r", "frames", "finite", "blowup_frame",
+    "max_extent", "relative_error",
+]  # fmt: skip
+
+
+def run_hyper(
+    scene: dict[str, Any],
+    settings: dict[str, Any],
+    blowup_extent: float,
+    mesh: str,
+    fom: str,
+    runs_output: str,
+    table_output: str,
+) -> None:
+    """Build and run every model of ``settings`` (bases, sizes, tolerances) of a scene."""
+    bound = scene_of(scene, mesh)
+    with open_hdf5(fom) as file:
+        reference = file["positions"][...]
+    training = _training(bound, reference)
+    displacement = displacement_norms(reference)
+    rows = []
+    with write_hdf5(runs_output) as file:
+        file.attrs.update(attributes({"scene": scene, "settings": settings}))
+        file["displacement"] = displacement
+        for kind in settings["bases"]:
+            for k in settings["sizes"]:
+                columns = make_columns(bound, training, kind, k)
+                base = f"{kind}_k{k:03d}"
+                _store_columns(file.create_group(f"columns/{base}"), columns)
+                for method, samples in _samplings(bound, columns, training, kind, settings):
+                    model = SubspaceModel(kind, columns, samples)
+                    outcome = _run(bound, model, reference, blowup_extent)
+                    labels = {"method": method, "position_basis": kind, "k": k, "base": base}
+                    store = file.create_group(f"models/{base}_{method}")
+                    _store(store, labels, samples, outcome)
+                    rows.append(_row(bound, labels, samples, outcome, displacement))
+                    log.info("%s %s: error %s", base, method, rows[-1]["relative_error"])
+    write_table(pd.DataFrame(rows, columns=COLUMNS), table_output)
+
+
+def _training(scene: Scene, reference: np.ndarray) -> np.ndarray:
+    """Positions after the training frames: the even ones that train the projections, too."""
+    count = max(plan.train for plan in scene.config.reduce.values())
+    return reference[1:][training_frames(scene.config.frames, count)]
+
+
+def _samplings(scene, columns, training, kind, settings):
+    """(method, samples) pairs: full projections, and element sampling on the snapshot basis."""
+    yield "full", {}
+    if kind == "pod":
+        for tolerance in settings["tolerances"]:
+            yield f"ecsw-{tolerance:.0e}", sample_elements(scene, columns, training, tolerance)
+
+
+def _run(scene: Scene, model: SubspaceModel, reference: np.ndarray, limit: float) -> dict[str, Any]:
+    loop, state = model.loop(scene)
+    coordinates, difference, extents, blowup = [state.positions], [], [], None
+    for frame in range(scene.config.frames):
+        with np.errstate(over="ignore", invalid="ignore"):
+            state, _ = loop.step(state, frame)
+            q = model.positions(state.positions)
+        if not np.isfinite(q).all():
+            blowup = frame
+            break
+        coordinates.append(state.positions)
+        difference.append(float(np.linalg.norm(q - reference[frame + 1])))
+        extents.append(float(np.ptp(q, axis=0).max()) / scene.mesh.extent)
+        if extents[-1] > limit:
+            blowup = frame
+            break
+    return {
+        "coordinates": np.stack(coordinates),
+        "difference": np.array(difference),
+        "extent": np.array(extents),
+        "blowup_frame": blowup,
+    }
+
+
+def _store_columns(store, columns: Columns) -> None:
+    store["B"], store["free"] = columns.B, columns.free
+    store.attrs["modes"] = columns.modes
+    for i, (atom, own) in enumerate(zip(columns.atoms, columns.atom_columns, strict=True)):
+        store[f"atoms/{i:04d}/vertices"], store[f"atoms/{i:04d}/columns"] = atom, own
+
+
+def _store(store, labels: dict, samples: dict[str, Samples], outcome: dict[str, Any]) -> None:
+    store.attrs.update(labels)
+    for name, chosen in samples.items():
+        store[f"samples/{name}/elements"] = chosen.elements
+        store[f"samples/{name}/factors"] = chosen.factors
+    for name in ("coordinates", "difference", "extent"):
+        store[name] = outcome[name]
+
+
+def _row(scene, labels, samples, outcome, displacement) -> dict[str, Any]:
+    full = sum(group.elements for group in scene.groups)
+    sampled = sum(len(chosen.elements) for chosen in samples.values()) if samples else full
+    whole = outcome["blowup_frame"] is None
+    error = trajectory_error(outcome["difference"], displacement) if whole else None
+    return {
+        "scene": scene.config.name,
+        "group": "all",
+        **labels,
+        "r": sampled,
+        "frames": len(outcome["difference"]),
+        "finite": whole,
+        "blowup_frame": outcome["blowup_frame"],
+        "max_extent": float(outcome["extent"].max(initial=0.0)),
+        "relative_error": error,
+    }

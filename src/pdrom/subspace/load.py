@@ -1,0 +1,41 @@
+"""Hyper-reduced models from the file that rule hyper wrote."""
+
+import os
+
+from pdrom.store import open_hdf5
+from pdrom.subspace.columns import Columns
+from pdrom.subspace.model import Samples, SubspaceModel
+
+
+def load_models(path: str | os.PathLike[str]) -> list[tuple[dict[str, object], SubspaceModel]]:
+    """Labels (method, position_basis, k) and model of everything in the file, in order."""
+    with open_hdf5(path) as file:
+        columns = {base: _columns(store) for base, store in file["columns"].items()}
+        models = []
+        for store in file["models"].values():
+            base = str(store.attrs["base"])
+            labels = {key: store.attrs[key] for key in ("method", "position_basis", "k")}
+            labels["k"] = int(labels["k"])
+            model = SubspaceModel(str(labels["position_basis"]), columns[base], _samples(store))
+            models.append((labels, model))
+    return models
+
+
+def _columns(store) -> Columns:
+    atoms = list(store["atoms"].values()) if "atoms" in store else []
+    return Columns(
+        B=store["B"][...],
+        free=store["free"][...],
+        atoms=[a["vertices"][...] for a in atoms],
+        atom_columns=[a["columns"][...] for a in atoms],
+        modes=int(store.attrs["modes"]),
+    )
+
+
+def _samples(store) -> dict[str, Samples]:
+    if "samples" not in store:
+        return {}
+    return {
+        name: Samples(chosen["elements"][...], chosen["factors"][...])
+        for name, chosen in store["samples"].items()
+    }

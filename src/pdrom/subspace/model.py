@@ -1,0 +1,78 @@
+"""A hyper-reduced model of a scene: columns, sampled elements of every group, and its step loop."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pdrom.fom.stepper import State, Stepper
+from pdrom.scene import Scene
+from pdrom.subspace.atoms import atoms
+from pdrom.subspace.columns import Columns, build_columns, displacement_modes
+from pdrom.subspace.ecsw import ecsw_elements
+from pdrom.subspace.local_step import SubspaceLocalStep
+from pdrom.subspace.skinning import skinning_modes
+from pdrom.subspace.space import ReducedSpace, coordinates, reduced_state
+
+# Training states that the element sampling looks at, at most.
+STATES = 40
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Sampled elements (m,) and their factors (m,); all elements with factor one if empty."""
+
+    elements: np.ndarray | None = None
+    factors: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class SubspaceModel:
+    """Position basis ("pod" or "skinning"), its columns, and the samples of each group."""
+
+    position_basis: str
+    columns: Columns
+    samples: dict[str, Samples] = field(default_factory=dict)
+
+    def loop(self, scene: Scene) -> tuple[Stepper, State]:
+        """Step loop in the coordinates of the subspace, and the initial state."""
+        steps = []
+        for group in scene.groups:
+            chosen = self.samples.get(group.name, Samples())
+            steps.append(
+                SubspaceLocalStep(group, self.columns, chosen.elements, chosen.factors)
+            )
+        space = ReducedSpace(scene, self.columns, sum(step.matrix for step in steps))
+        config = scene.config
+        loop = Stepper(space, config.time_step, config.iterations, steps, track_objective=False)
+        return loop, reduced_state(scene, self.columns)
+
+    def positions(self, z: np.ndarray) -> np.ndarray:
+        """Vertex positions (N, 3) m of coordinates (K, 3)."""
+        return self.columns.B @ z
+
+
+def make_columns(scene: Scene, training: np.ndarray, kind: str, k: int) -> Columns:
+    """Columns of a position subspace of ``kind`` with k modes (fewer if there are fewer).
+
+    Parameters
+    ----------
+    training : (n, N, 3) positions of the training frames
+    """
+    points, masses = scene.mesh.points, scene.masses
+    if kind == "pod":
+        modes = displacement_modes(training, points, masses, k)
+    else:
+        modes = skinning_modes(points, masses, k)
+    return build_columns(modes, points, masses, atoms(scene.boundaries, len(points)), training)
+
+
+def sample_elements(
+    scene: Scene, columns: Columns, training: np.ndarray, tolerance: float
+) -> dict[str, Samples]:
+    """Energy-conserving samples of every group, trained on states of the subspace."""
+    chosen = training[np.unique(np.linspace(0, len(training) - 1, STATES).round().astype(int))]
+    states = np.stack([columns.B @ coordinates(columns, scene.masses, q) for q in chosen])
+    return {
+        group.name: Samples(*ecsw_elements(group, columns, states, tolerance))
+        for group in scene.groups
+    }

@@ -1,0 +1,13 @@
+from pdrom.logs import job_log
+from pdrom.stages.hyper import run_hyper
+
+with job_log(snakemake.log[0]):
+    run_hyper(
+        snakemake.params.scene,
+        snakemake.params.settings,
+        snakemake.params.blowup_extent,
+        snakemake.input.mesh,
+        snakemake.input.fom,
+        snakemake.output.runs,
+        snakemake.output.table,
+    )
