@@ -77,6 +77,7 @@ class StudySettings(_Model):
     scenes: Annotated[tuple[str, ...], Field(min_length=1)]
     methods: Annotated[tuple[str, ...], Field(min_length=1)]
     ranks: Annotated[tuple[Rank, ...], Field(min_length=1)] = (6, 10, 20, "full")
+    heldout_ranks: tuple[Rank, ...] = (20, "full")
     sweep: Sweep = Sweep()
     solver: str = "cholespy"
     blowup_extent: Annotated[float, Field(gt=1.0)] = 100.0

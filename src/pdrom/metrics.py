@@ -30,6 +30,10 @@ def relative_errors(p: np.ndarray, p_hat: np.ndarray, roundoff: float) -> list[f
     ]
 
 
-def trajectory_error(difference: np.ndarray, displacement: np.ndarray) -> float:
-    """|| Q_red - Q_fom ||_F / || Q_fom - rest ||_F from the norms of each frame (F,)."""
-    return float(np.linalg.norm(difference) / np.linalg.norm(displacement))
+def trajectory_error(difference: np.ndarray, displacement: np.ndarray) -> float | None:
+    """|| Q_red - Q_fom ||_F / || Q_fom - rest ||_F from the norms of each frame (F,).
+
+    None where the full-order run never leaves its initial state, or no frame is given.
+    """
+    moved = float(np.linalg.norm(displacement))
+    return float(np.linalg.norm(difference)) / moved if moved > 0.0 else None

@@ -17,7 +17,7 @@ PUBLISHED = Path("config/reference/published_code")
 REFERENCE_BASIS = "none-none-vectorised"
 TABLES = (
     "singular_values", "reconstruction_error", "reduced_reruns", "accuracy_cost", "local_share",
-    "sensitivity", "claims",
+    "sensitivity", "heldout_reruns", "claims",
 )  # fmt: skip
 
 
@@ -98,19 +98,19 @@ class Plan:
 
     def samplings_of(self, scene: str) -> list[str]:
         """All sampling files of a scene."""
-        return self._per_method("sampling", "h5", scene)
+        return self._per_method("sampling", ".h5", scene)
 
-    def per_experiment(self, stage: str, suffix: str) -> list[str]:
+    def per_experiment(self, stage: str, tail: str) -> list[str]:
         """Files of a stage over all scenes, groups and methods, in configuration order."""
-        return [p for scene in self.study.scenes for p in self._per_method(stage, suffix, scene)]
+        return [p for scene in self.study.scenes for p in self._per_method(stage, tail, scene)]
 
-    def per_scene(self, stage: str, suffix: str) -> list[str]:
-        """Files of a stage over all scenes."""
-        return [f"{RESULTS}/{stage}/{scene}.{suffix}" for scene in self.study.scenes]
+    def per_scene(self, stage: str, tail: str) -> list[str]:
+        """Files of a stage over all scenes; ``tail`` follows the scene's name."""
+        return [f"{RESULTS}/{stage}/{scene}{tail}" for scene in self.study.scenes]
 
-    def _per_method(self, stage: str, suffix: str, scene: str) -> list[str]:
+    def _per_method(self, stage: str, tail: str, scene: str) -> list[str]:
         return [
-            f"{RESULTS}/{stage}/{scene}/{group}/{method}.{suffix}"
+            f"{RESULTS}/{stage}/{scene}/{group}/{method}{tail}"
             for group in self.study.scenes[scene].reduce
             for method in self.study.methods
         ]

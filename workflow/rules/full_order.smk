@@ -41,6 +41,7 @@ rule sensitivity:
     params:
         scene=lambda w: PLAN.scene_config(w.scene),
         perturbations=list(PLAN.settings.sensitivity.perturbations),
+        reference=PLAN.settings.sensitivity.reference,
         seeds=list(PLAN.settings.sensitivity.seeds),
         code=lambda w: PLAN.scene_code("pdrom.stages.sensitivity", w.scene),
     message:

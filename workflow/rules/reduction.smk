@@ -39,17 +39,20 @@ rule reruns:
     input:
         mesh=lambda w: PLAN.mesh_path(w.scene),
         fom="results/fom/{scene}/train.h5",
+        heldout="results/fom/{scene}/heldout.h5",
         basis=lambda w: PLAN.basis_path(w.scene, w.group, w.method),
         sampling="results/sampling/{scene}/{group}/{method}.h5",
     output:
         runs="results/reruns/{scene}/{group}/{method}.h5",
         table="results/reruns/{scene}/{group}/{method}.csv",
+        heldout="results/reruns/{scene}/{group}/{method}_heldout.csv",
     log:
         "results/logs/reruns/{scene}_{group}_{method}.log",
     params:
         scene=lambda w: PLAN.scene_config(w.scene),
         spec=lambda w: PLAN.method_spec(w.method),
         ranks=list(PLAN.settings.ranks),
+        heldout_ranks=list(PLAN.settings.heldout_ranks),
         blowup_extent=PLAN.settings.blowup_extent,
         solver=PLAN.settings.solver,
         code=lambda w: PLAN.scene_code("pdrom.stages.reruns", w.scene),
@@ -63,9 +66,11 @@ rule hyper:
     input:
         mesh=lambda w: PLAN.mesh_path(w.scene),
         fom="results/fom/{scene}/train.h5",
+        heldout="results/fom/{scene}/heldout.h5",
     output:
-        runs="results/hyper/{scene}.h5",
-        table="results/hyper/{scene}.csv",
+        runs="results/hyper/{scene}/models.h5",
+        table="results/hyper/{scene}/models.csv",
+        heldout="results/hyper/{scene}/models_heldout.csv",
     log:
         "results/logs/hyper/{scene}.log",
     params:

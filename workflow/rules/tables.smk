@@ -17,7 +17,7 @@ rule singular_values_table:
 
 rule reconstruction_error_table:
     input:
-        errors=PLAN.per_experiment("sampling", "csv"),
+        errors=PLAN.per_experiment("sampling", ".csv"),
     output:
         report("results/tables/reconstruction_error.csv", category="Tables"),
     log:
@@ -33,7 +33,7 @@ rule reconstruction_error_table:
 
 rule sensitivity_table:
     input:
-        scenes=PLAN.per_scene("sensitivity", "csv"),
+        scenes=PLAN.per_scene("sensitivity", ".csv"),
     output:
         report("results/tables/sensitivity.csv", category="Tables"),
     log:
@@ -49,7 +49,7 @@ rule sensitivity_table:
 
 rule local_share_table:
     input:
-        timings=PLAN.per_scene("timings", "csv"),
+        timings=PLAN.per_scene("timings", ".csv"),
     output:
         report("results/tables/local_share.csv", category="Tables"),
     log:
@@ -65,11 +65,11 @@ rule local_share_table:
 
 rule reduced_reruns_table:
     input:
-        runs=PLAN.per_experiment("reruns", "h5"),
-        tables=PLAN.per_experiment("reruns", "csv"),
-        hyper=PLAN.per_scene("hyper", "h5"),
-        hyper_tables=PLAN.per_scene("hyper", "csv"),
-        timings=PLAN.per_scene("timings", "csv"),
+        runs=PLAN.per_experiment("reruns", ".h5"),
+        tables=PLAN.per_experiment("reruns", ".csv"),
+        hyper=PLAN.per_scene("hyper", "/models.h5"),
+        hyper_tables=PLAN.per_scene("hyper", "/models.csv"),
+        timings=PLAN.per_scene("timings", ".csv"),
         sensitivity="results/tables/sensitivity.csv",
     output:
         report("results/tables/reduced_reruns.csv", category="Tables"),
@@ -82,6 +82,27 @@ rule reduced_reruns_table:
         code=PLAN.code("pdrom.tables.reduced_reruns"),
     message:
         "Table of reduced reruns"
+    script:
+        "../scripts/table.py"
+
+
+rule heldout_reruns_table:
+    input:
+        runs=PLAN.per_experiment("reruns", ".h5"),
+        tables=PLAN.per_experiment("reruns", "_heldout.csv"),
+        hyper=PLAN.per_scene("hyper", "/models.h5"),
+        hyper_tables=PLAN.per_scene("hyper", "/models_heldout.csv"),
+        sensitivity="results/tables/sensitivity.csv",
+    output:
+        report("results/tables/heldout_reruns.csv", category="Tables"),
+    log:
+        "results/logs/tables/heldout_reruns.log",
+    params:
+        name="heldout_reruns",
+        threshold=PLAN.settings.sensitivity.threshold,
+        code=PLAN.code("pdrom.tables.reduced_reruns"),
+    message:
+        "Table of reruns on held-out motions"
     script:
         "../scripts/table.py"
 

@@ -7,7 +7,7 @@ with job_log(snakemake.log[0]):
         snakemake.params.settings,
         snakemake.params.blowup_extent,
         snakemake.input.mesh,
-        snakemake.input.fom,
+        {"train": snakemake.input.fom, "heldout": snakemake.input.heldout},
         snakemake.output.runs,
-        snakemake.output.table,
+        {"train": snakemake.output.table, "heldout": snakemake.output.heldout},
     )

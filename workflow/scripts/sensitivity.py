@@ -6,6 +6,7 @@ with job_log(snakemake.log[0]):
         snakemake.params.scene,
         snakemake.input.mesh,
         snakemake.params.perturbations,
+        snakemake.params.reference,
         snakemake.params.seeds,
         snakemake.output[0],
     )

@@ -24,6 +24,7 @@ class Basis:
     rank : number of singular values above round-off; V has no further columns
     roundoff : absolute size of a singular value that is noise
     active_axes : whether an axis carries anything above round-off
+    origin : what error messages call the basis: its file
     """
 
     V: np.ndarray
@@ -34,6 +35,7 @@ class Basis:
     rows_per_element: int
     separate_axes: bool
     active_axes: tuple[bool, bool, bool]
+    origin: str = "basis"
 
     @property
     def elements(self) -> int:
@@ -44,7 +46,7 @@ class Basis:
         """First r modes (3 e p, r); RankError if there are fewer."""
         if not 1 <= r <= self.rank:
             raise RankError(
-                f"r = {r}: the snapshots have numerical rank {self.rank} "
+                f"{self.origin}: r = {r}, the snapshots have numerical rank {self.rank} "
                 f"(round-off {self.roundoff:.1e}), allowed are 1 to {self.rank}"
             )
         return self.V[:, :r]
@@ -73,4 +75,5 @@ def load_basis(path: str | os.PathLike[str]) -> Basis:
             rows_per_element=int(file.attrs["rows_per_element"]),
             separate_axes=bool(file.attrs["separate_axes"]),
             active_axes=tuple(bool(a) for a in file.attrs["active_axes"]),
+            origin=str(path),
         )

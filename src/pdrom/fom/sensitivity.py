@@ -33,6 +33,19 @@ def perturbation_field(scene: Scene, size: float, seed: int) -> np.ndarray:
     return size * scene.mesh.extent * field / np.linalg.norm(field, axis=1, keepdims=True)
 
 
+HELDOUT = "heldout"
+
+
+def heldout_floor(heldout: Scene, size: float, seeds: tuple[int, ...]) -> pd.DataFrame:
+    """Rows of the held-out motion, whose horizon is its own; perturbation "heldout"."""
+    base = trajectory(heldout)
+    runs = [trajectory(heldout, perturbation_field(heldout, size, seed)) for seed in seeds]
+    return pd.concat(
+        _rows(heldout, HELDOUT, seed, relative_difference(run, base))
+        for seed, run in zip(seeds, runs, strict=True)
+    )
+
+
 def sensitivity(
     scene: Scene, perturbations: tuple[float, ...], seeds: tuple[int, ...]
 ) -> pd.DataFrame:

@@ -9,13 +9,14 @@ def joint_rows(v: np.ndarray, active: tuple[bool, bool, bool], repeat: bool) -> 
     For mode k each axis a has its own system (P^T V_a) c_a = P^T v_{k,a}; the row with the largest
     sum of the squared residuals of the three axes is taken for all of them. A singular system is
     solved in the least-squares sense: the row was chosen for the joint norm and may be useless for
-    one axis. The published code does not exclude rows that it has already (``repeat``).
+    one axis. The published code does not exclude rows that it has already (``repeat``); otherwise
+    there are fewer than r rows if the basis has no more.
     """
     rows = len(v) // 3
     axes = np.flatnonzero(active)
     by_axis = v.reshape(rows, 3, -1)
     picked: list[int] = []
-    for k in range(v.shape[1]):
+    for k in range(v.shape[1] if repeat else min(v.shape[1], rows)):
         norm = np.zeros(rows)
         for axis in axes:
             basis, mode = by_axis[:, axis, :k], by_axis[:, axis, k]

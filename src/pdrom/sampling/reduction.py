@@ -36,7 +36,8 @@ class Reduction:
 
     An axis in which the training data are round-off carries nothing: its coefficients are zero and
     it does not count for the gain. That is kinder to methods with separate systems per axis than
-    their text, which would divide noise by noise.
+    their text, which would divide noise by noise. An axis that does carry something but whose
+    system is singular is a failure of the method: gain inf, reconstruction nan.
     """
 
     def __init__(self, basis: Basis, sampling: Sampling, spec: MethodSpec, r: int) -> None:
@@ -76,7 +77,11 @@ class Reduction:
         """|| (P^T V)^+ ||_2, the largest over the coefficient blocks; inf if one is singular.
 
         For orthonormal V: || p - p^ || <= gain || (I - V V^T)(p - mean) || (Chaturantabut and
-        Sorensen 2010, lemma 3.2).
+        Sorensen 2010, lemma 3.2). It holds for separate axes too, where the parts V_a of V have
+        norm at most 1, but not for the Tikhonov solve, which is no projection: its gain is the
+        norm of its operator. With mass weighting V is orthonormal in the mass inner product and
+        the factor of the error in that norm is || (P^T V)^+ P^T M^(-1/2) ||_2 instead; the gain
+        stays the amplification of sampled values, as for the other methods.
         """
         return self._norms[0]
 

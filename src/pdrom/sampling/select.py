@@ -7,6 +7,7 @@ import numpy as np
 from pdrom.basis.types import Basis
 from pdrom.method import MethodSpec
 from pdrom.sampling.block import block_elements
+from pdrom.sampling.block_qdeim import block_qdeim_elements
 from pdrom.sampling.deim import deim_entries
 from pdrom.sampling.joint import joint_rows
 from pdrom.sampling.qdeim import qdeim_entries
@@ -24,8 +25,11 @@ def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[in
     Raises
     ------
     RankError
-        If an r exceeds the numerical rank of the basis.
+        If an r is below 1 or exceeds the numerical rank of the basis.
     """
+    if not ranks:
+        return {}
+    basis.truncated(min(ranks))
     v = basis.truncated(max(ranks))
     if spec.rows == "all":
         everything = Sampling.of_elements(
@@ -33,9 +37,7 @@ def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[in
         )
         return dict.fromkeys(ranks, everything)
     if spec.rows == "element":
-        elements = block_elements(v, 3 * basis.rows_per_element)
-        counts = (basis.rows_per_element, basis.elements)
-        return {r: Sampling.of_elements(elements[:r], *counts) for r in ranks}
+        return _element_path(basis, spec, v, ranks)
     if spec.rows == "joint":
         path = 3 * joint_rows(v, basis.active_axes, spec.repeat_rows)
         return {r: _of_entries(path[:r], basis, spec) for r in ranks}
@@ -43,6 +45,19 @@ def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[in
         path = deim_entries(v)
         return {r: _of_entries(path[:r], basis, spec) for r in ranks}
     return {r: _of_entries(qdeim_entries(v[:, :r]), basis, spec) for r in ranks}
+
+
+def _element_path(
+    basis: Basis, spec: MethodSpec, v: np.ndarray, ranks: Sequence[int]
+) -> dict[int, Sampling]:
+    size = 3 * basis.rows_per_element
+    if spec.selection == "greedy":
+        path = block_elements(v, size)
+        chosen = {r: path[:r] for r in ranks}
+    else:
+        chosen = {r: block_qdeim_elements(v[:, :r], size) for r in ranks}
+    counts = (basis.rows_per_element, basis.elements)
+    return {r: Sampling.of_elements(elements, *counts) for r, elements in chosen.items()}
 
 
 def _of_entries(entries: np.ndarray, basis: Basis, spec: MethodSpec) -> Sampling:

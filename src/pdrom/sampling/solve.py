@@ -9,8 +9,9 @@ from pdrom.method import Solve
 def solution_operator(a: np.ndarray, solve: Solve, tikhonov: float) -> np.ndarray:
     """Matrix (r, m) that maps sampled values b to coefficients c.
 
-    square : A^-1; nan where A is exactly singular (the interpolation does not exist)
-    qr : least squares A^+ by a QR factorisation
+    square : A^-1; nan where A is singular to working precision or not square: the interpolation
+        does not exist, a run with it ends in its first frame
+    qr : least squares A^+ by a QR factorisation; nan where A has no full column rank
     tikhonov : (A^T A + t I)^-1 A^T, the normal equations of the published code
     """
     if solve == "tikhonov":
@@ -25,6 +26,8 @@ def solution_operator(a: np.ndarray, solve: Solve, tikhonov: float) -> np.ndarra
 
 
 def _inverse(a: np.ndarray) -> np.ndarray:
+    if a.shape[0] != a.shape[1]:
+        return np.full(a.shape[::-1], np.nan)
     lu, pivots, info = linalg.lapack.dgetrf(a)
     if info > 0 or _singular(np.abs(np.diag(lu))):
         return np.full(a.shape, np.nan)

@@ -11,7 +11,7 @@ from pdrom.provenance import attributes
 from pdrom.rom.rerun import displacement_norms
 from pdrom.scene import Scene
 from pdrom.snapshots import training_frames
-from pdrom.stages.scenes import scene_of
+from pdrom.stages.scenes import RUNS, scene_of
 from pdrom.store import open_hdf5, write_hdf5, write_table
 from pdrom.subspace.columns import Columns
 from pdrom.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
@@ -29,20 +29,19 @@ def run_hyper(
     settings: dict[str, Any],
     blowup_extent: float,
     mesh: str,
-    fom: str,
+    runs: dict[str, str],
     runs_output: str,
-    table_output: str,
+    tables: dict[str, str],
 ) -> None:
-    """Build and run every model of ``settings`` (bases, sizes, tolerances) of a scene."""
-    bound = scene_of(scene, mesh)
-    with open_hdf5(fom) as file:
-        reference = file["positions"][...]
-    training = _training(bound, reference)
-    displacement = displacement_norms(reference)
-    rows = []
+    """Build every model of ``settings`` (bases, sizes, tolerances) and run both motions with it."""
+    motions = {motion: _Motion(scene_of(scene, mesh, motion), runs[motion]) for motion in RUNS}
+    bound = motions["train"].scene
+    training = _training(bound, motions["train"].reference)
+    rows: dict[str, list[dict[str, Any]]] = {motion: [] for motion in RUNS}
     with write_hdf5(runs_output) as file:
         file.attrs.update(attributes({"scene": scene, "settings": settings}))
-        file["displacement"] = displacement
+        for motion, case in motions.items():
+            file[f"displacement/{motion}"] = case.displacement
         for kind in settings["bases"]:
             for k in settings["sizes"]:
                 columns = make_columns(bound, training, kind, k)
@@ -50,13 +49,17 @@ def run_hyper(
                 _store_columns(file.create_group(f"columns/{base}"), columns)
                 for method, samples in _samplings(bound, columns, training, kind, settings):
                     model = SubspaceModel(kind, columns, samples)
-                    outcome = _run(bound, model, reference, blowup_extent)
                     labels = {"method": method, "position_basis": kind, "k": k, "base": base}
                     store = file.create_group(f"models/{base}_{method}")
-                    _store(store, labels, samples, outcome)
-                    rows.append(_row(bound, labels, samples, outcome, displacement))
-                    log.info("%s %s: error %s", base, method, rows[-1]["relative_error"])
-    write_table(pd.DataFrame(rows, columns=COLUMNS), table_output)
+                    _store_model(store, labels, samples)
+                    for motion, case in motions.items():
+                        outcome = case.run(model, blowup_extent)
+                        for name in ("coordinates", "difference", "extent"):
+                            store[f"{motion}/{name}"] = outcome[name]
+                        rows[motion].append(case.row(labels, samples, outcome))
+                    log.info("%s %s: error %s", base, method, rows["train"][-1]["relative_error"])
+    for motion in RUNS:
+        write_table(pd.DataFrame(rows[motion], columns=COLUMNS), tables[motion])
 
 
 def _training(scene: Scene, reference: np.ndarray) -> np.ndarray:
@@ -73,28 +76,58 @@ def _samplings(scene, columns, training, kind, settings):
             yield f"ecsw-{tolerance:.0e}", sample_elements(scene, columns, training, tolerance)
 
 
-def _run(scene: Scene, model: SubspaceModel, reference: np.ndarray, limit: float) -> dict[str, Any]:
-    loop, state = model.loop(scene)
-    coordinates, difference, extents, blowup = [state.positions], [], [], None
-    for frame in range(scene.config.frames):
-        with np.errstate(over="ignore", invalid="ignore"):
-            state, _ = loop.step(state, frame)
-            q = model.positions(state.positions)
-        if not np.isfinite(q).all():
-            blowup = frame
-            break
-        coordinates.append(state.positions)
-        difference.append(float(np.linalg.norm(q - reference[frame + 1])))
-        extents.append(float(np.ptp(q, axis=0).max()) / scene.mesh.extent)
-        if extents[-1] > limit:
-            blowup = frame
-            break
-    return {
-        "coordinates": np.stack(coordinates),
-        "difference": np.array(difference),
-        "extent": np.array(extents),
-        "blowup_frame": blowup,
-    }
+class _Motion:
+    """The training or the held-out motion of a scene, with its full-order run."""
+
+    def __init__(self, scene: Scene, fom: str) -> None:
+        self.scene = scene
+        with open_hdf5(fom) as file:
+            self.reference = file["positions"][...]
+        self.displacement = displacement_norms(self.reference)
+
+    def run(self, model: SubspaceModel, limit: float) -> dict[str, Any]:
+        """Run a model; a blow-up ends the run and is recorded."""
+        loop, state = model.loop(self.scene)
+        coordinates, difference, extents, blowup = [state.positions], [], [], None
+        for frame in range(self.scene.config.frames):
+            with np.errstate(over="ignore", invalid="ignore"):
+                state, _ = loop.step(state, frame)
+                q = model.positions(state.positions)
+            if not np.isfinite(q).all():
+                blowup = frame
+                break
+            coordinates.append(state.positions)
+            difference.append(float(np.linalg.norm(q - self.reference[frame + 1])))
+            extents.append(float(np.ptp(q, axis=0).max()) / self.scene.mesh.extent)
+            if extents[-1] > limit:
+                blowup = frame
+                break
+        return {
+            "coordinates": np.stack(coordinates),
+            "difference": np.array(difference),
+            "extent": np.array(extents),
+            "blowup_frame": blowup,
+        }
+
+    def row(
+        self, labels: dict[str, Any], samples: dict[str, Samples], outcome: dict[str, Any]
+    ) -> dict[str, Any]:
+        """Row of the table of this motion."""
+        full = sum(group.elements for group in self.scene.groups)
+        sampled = sum(len(chosen.elements) for chosen in samples.values()) if samples else full
+        whole = outcome["blowup_frame"] is None
+        error = trajectory_error(outcome["difference"], self.displacement) if whole else None
+        return {
+            "scene": self.scene.config.name,
+            "group": "all",
+            **labels,
+            "r": sampled,
+            "frames": len(outcome["difference"]),
+            "finite": whole,
+            "blowup_frame": outcome["blowup_frame"],
+            "max_extent": float(outcome["extent"].max(initial=0.0)),
+            "relative_error": error,
+        }
 
 
 def _store_columns(store, columns: Columns) -> None:
@@ -104,28 +137,8 @@ def _store_columns(store, columns: Columns) -> None:
         store[f"atoms/{i:04d}/vertices"], store[f"atoms/{i:04d}/columns"] = atom, own
 
 
-def _store(store, labels: dict, samples: dict[str, Samples], outcome: dict[str, Any]) -> None:
+def _store_model(store, labels: dict[str, Any], samples: dict[str, Samples]) -> None:
     store.attrs.update(labels)
     for name, chosen in samples.items():
         store[f"samples/{name}/elements"] = chosen.elements
         store[f"samples/{name}/factors"] = chosen.factors
-    for name in ("coordinates", "difference", "extent"):
-        store[name] = outcome[name]
-
-
-def _row(scene, labels, samples, outcome, displacement) -> dict[str, Any]:
-    full = sum(group.elements for group in scene.groups)
-    sampled = sum(len(chosen.elements) for chosen in samples.values()) if samples else full
-    whole = outcome["blowup_frame"] is None
-    error = trajectory_error(outcome["difference"], displacement) if whole else None
-    return {
-        "scene": scene.config.name,
-        "group": "all",
-        **labels,
-        "r": sampled,
-        "frames": len(outcome["difference"]),
-        "finite": whole,
-        "blowup_frame": outcome["blowup_frame"],
-        "max_extent": float(outcome["extent"].max(initial=0.0)),
-        "relative_error": error,
-    }

@@ -1,12 +1,15 @@
 """Rule reruns: the scene again, with one group's projections reduced, for every asked r."""
 
 import logging
+from dataclasses import dataclass
 from typing import Any
 
+import h5py
 import numpy as np
 import pandas as pd
 
-from pdrom.basis import load_basis
+from pdrom.basis import Basis, load_basis
+from pdrom.fom.stepper import LocalStep
 from pdrom.method import MethodSpec
 from pdrom.metrics import trajectory_error
 from pdrom.provenance import attributes
@@ -14,7 +17,8 @@ from pdrom.rom.local_step import ReducedLocalStep
 from pdrom.rom.ranks import resolve_ranks
 from pdrom.rom.rerun import Rerun, displacement_norms, replace_group, rerun
 from pdrom.sampling.load import load_reduction
-from pdrom.stages.scenes import scene_of
+from pdrom.scene import Scene
+from pdrom.stages.scenes import RUNS, scene_of
 from pdrom.store import open_hdf5, write_hdf5, write_table
 
 log = logging.getLogger(__name__)
@@ -29,42 +33,70 @@ def run_reduced(
     labels: dict[str, str],
     scene: dict[str, Any],
     spec: dict[str, Any],
-    ranks: list[int | str],
+    ranks: dict[str, list[int | str]],
     blowup_extent: float,
     solver: str,
     mesh: str,
-    fom: str,
+    runs: dict[str, str],
     basis: str,
     sampling: str,
     runs_output: str,
-    table_output: str,
+    tables: dict[str, str],
 ) -> None:
-    """Rerun the scene for every r; an r beyond the numerical rank is a marked row."""
+    """Rerun the scene for every r, on the training motion and on the held-out one.
+
+    Parameters
+    ----------
+    ranks, runs, tables : for "train" and "heldout" the sizes to run, the full-order run to compare
+        with, and the table to write
+    """
     method, space = MethodSpec.model_validate(spec), load_basis(basis)
-    bound = scene_of(scene, mesh)
-    system = bound.system_with(solver)
-    group = bound.group(labels["group"])
-    with open_hdf5(fom) as file:
-        reference = file["positions"][...]
-    displacement = displacement_norms(reference)
-    rows = []
     with write_hdf5(runs_output) as file:
         file.attrs.update(attributes({**labels, "spec": spec, "scene": scene}))
+        for motion in RUNS:
+            case = _Case(scene_of(scene, mesh, motion), labels, method, space, sampling)
+            store = file if motion == "train" else file.create_group(motion)
+            rows = case.run(store, ranks[motion], runs[motion], blowup_extent, solver)
+            write_table(pd.DataFrame(rows, columns=COLUMNS), tables[motion])
+
+
+@dataclass(frozen=True)
+class _Case:
+    """One motion of a scene with one method."""
+
+    scene: Scene
+    labels: dict[str, str]
+    method: MethodSpec
+    basis: Basis
+    sampling: str
+
+    def run(
+        self, file: h5py.Group, ranks: list[int | str], fom: str, limit: float, solver: str
+    ) -> list[dict[str, Any]]:
+        """Rerun for every r and return the rows; an r beyond the rank is a marked row."""
+        with open_hdf5(fom) as full_order:
+            reference = full_order["positions"][...]
+        displacement = displacement_norms(reference)
         file["displacement"] = displacement
-        for r in resolve_ranks(ranks, space.rank):
+        system = self.scene.system_with(solver)
+        rows = []
+        for r in resolve_ranks(ranks, self.basis.rank):
             store = file.create_group(f"r{r:04d}")
-            store.attrs.update(r=r, full=r == space.rank, marked=r > space.rank)
-            if r > space.rank:
-                log.warning("r = %d exceeds the numerical rank %d: not run", r, space.rank)
-                rows.append({**labels, "r": r, "frames": 0})
+            store.attrs.update(r=r, full=r == self.basis.rank, marked=r > self.basis.rank)
+            if r > self.basis.rank:
+                log.warning("r = %d exceeds the numerical rank %d: not run", r, self.basis.rank)
+                rows.append({**self.labels, "r": r, "frames": 0})
                 continue
-            local = ReducedLocalStep(group, load_reduction(space, sampling, method, r))
-            steps = replace_group(bound, group.name, local)
-            outcome = rerun(bound, system, steps, reference, blowup_extent)
+            outcome = rerun(self.scene, system, self._local_steps(r), reference, limit)
             _store(store, outcome, displacement)
-            rows.append({**labels, "r": r, **_row(outcome, displacement)})
+            rows.append({**self.labels, "r": r, **_row(outcome, displacement)})
             log.info("r = %d: %d frames, blow-up %s", r, outcome.frames, outcome.blowup_frame)
-    write_table(pd.DataFrame(rows, columns=COLUMNS), table_output)
+        return rows
+
+    def _local_steps(self, r: int) -> list[LocalStep]:
+        group = self.scene.group(self.labels["group"])
+        reduction = load_reduction(self.basis, self.sampling, self.method, r)
+        return replace_group(self.scene, group.name, ReducedLocalStep(group, reduction))
 
 
 def _store(store, outcome: Rerun, displacement: np.ndarray) -> None:

@@ -2,7 +2,9 @@
 
 from typing import Any
 
-from pdrom.fom.sensitivity import sensitivity
+import pandas as pd
+
+from pdrom.fom.sensitivity import heldout_floor, sensitivity
 from pdrom.stages.scenes import scene_of
 from pdrom.store import write_table
 
@@ -11,9 +13,11 @@ def measure_sensitivity(
     config: dict[str, Any],
     mesh: str,
     perturbations: list[float],
+    reference: float,
     seeds: list[int],
     output: str,
 ) -> None:
-    """Write the sensitivity table of a scene (all seeds)."""
-    scene = scene_of(config, mesh)
-    write_table(sensitivity(scene, tuple(perturbations), tuple(seeds)), output)
+    """Write the sensitivity table of a scene (all seeds), with the floor of its held-out motion."""
+    table = sensitivity(scene_of(config, mesh), tuple(perturbations), tuple(seeds))
+    heldout = heldout_floor(scene_of(config, mesh, "heldout"), reference, tuple(seeds))
+    write_table(pd.concat([table, heldout], ignore_index=True), output)

@@ -7,7 +7,7 @@ from pdrom.store import read_table, write_table
 from pdrom.tables.accuracy_cost import accuracy_cost
 from pdrom.tables.local_share import local_share
 from pdrom.tables.reconstruction_error import reconstruction_error
-from pdrom.tables.reduced_reruns import reduced_reruns
+from pdrom.tables.reduced_reruns import heldout_reruns, reduced_reruns
 from pdrom.tables.sensitivity import sensitivity
 from pdrom.tables.singular_values import singular_values
 
@@ -26,6 +26,9 @@ def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
             read_table(inputs.sensitivity),
             params.perturbation,
             params.threshold,
+        ),
+        "heldout_reruns": lambda: heldout_reruns(
+            inputs.runs, inputs.hyper, read_table(inputs.sensitivity), params.threshold
         ),
         "accuracy_cost": lambda: accuracy_cost(read_table(inputs.reruns), params.iterations),
     }

@@ -17,6 +17,11 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "max_extent", "relative_error", "relative_error_within_horizon", "horizon_frame",
         "sensitivity_floor", "ms_per_frame", "local_ms", "global_ms", "speedup",
     ),
+    "heldout_reruns": (
+        "scene", "group", "method", "position_basis", "k", "r", "frames", "finite", "blowup_frame",
+        "max_extent", "relative_error", "relative_error_within_horizon", "horizon_frame",
+        "sensitivity_floor",
+    ),
     "accuracy_cost": (
         "scene", "method", "position_basis", "k", "r", "iterations",
         "relative_error_within_horizon", "ms_per_frame", "pareto",

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from pdrom.fom.sensitivity import HELDOUT
 from pdrom.metrics import trajectory_error
 from pdrom.store import open_hdf5, read_table
 from pdrom.tables.columns import conform
@@ -26,48 +27,77 @@ def reduced_reruns(
     """One row per scene, group, method and r, then the runs in position subspaces.
 
     ``reruns`` are the HDF5 files ``.../{scene}/{group}/{method}.h5``, ``hyper`` those of the
-    subspaces ``.../{scene}.h5``, each with a table of the same name beside it. In a subspace all
+    subspaces ``.../{scene}/models.h5``, each with a table of the same name beside it. In a subspace all
     groups are reduced, and r counts the evaluated elements. The error within the horizon uses the
     frames before the horizon only; a run that blew up before has none.
     """
+    table = _collect(reruns, hyper, sensitivity, perturbation, threshold, "train")
+    return conform(_with_times(table, timings), "reduced_reruns")
+
+
+def heldout_reruns(
+    reruns: Iterable[str],
+    hyper: Iterable[str],
+    sensitivity: pd.DataFrame,
+    threshold: float,
+) -> pd.DataFrame:
+    """The same for the held-out motions, which no basis and no sampling has seen."""
+    table = _collect(reruns, hyper, sensitivity, HELDOUT, threshold, "heldout")
+    return conform(table, "heldout_reruns")
+
+
+def _collect(
+    reruns: Iterable[str],
+    hyper: Iterable[str],
+    sensitivity: pd.DataFrame,
+    perturbation: float | str,
+    threshold: float,
+    motion: str,
+) -> pd.DataFrame:
+    """All runs of a motion with errors, horizons and floors."""
     ends = horizons(sensitivity, perturbation, threshold)
-    parts = [_local_only(path, ends) for path in reruns] + [_subspace(path, ends) for path in hyper]
+    parts = [_local_only(path, ends, motion) for path in reruns]
+    parts += [_subspace(path, ends, motion) for path in hyper]
     table = pd.concat(parts, ignore_index=True)
     table["horizon_frame"] = table.scene.map(ends)
     floors = {s: floor_of(sensitivity, s, perturbation)[:end] for s, end in ends.items()}
     table["sensitivity_floor"] = table.scene.map(
         {scene: float(floor.max(initial=0.0)) for scene, floor in floors.items()}
     )
-    table = _with_times(table, timings)
     for column in ("k", "r", "frames", "blowup_frame", "horizon_frame"):
         table[column] = table[column].astype("Int64")
     table["finite"] = table["finite"].astype("boolean")
-    return conform(table, "reduced_reruns")
+    return table
 
 
-def _local_only(path: str, ends: dict[str, int]) -> pd.DataFrame:
+def _table_beside(path: str, motion: str) -> pd.DataFrame:
+    """The table that belongs to a file of runs."""
+    suffix = "" if motion == "train" else f"_{motion}"
+    return read_table(Path(path).with_name(f"{Path(path).stem}{suffix}.csv"))
+
+
+def _local_only(path: str, ends: dict[str, int], motion: str) -> pd.DataFrame:
     """Rows of runs whose positions are not reduced."""
-    table = read_table(Path(path).with_suffix(".csv"))
+    table = _table_beside(path, motion)
     end = ends[Path(path).parent.parent.name]
     with open_hdf5(path) as file:
-        displacement = file["displacement"][...]
+        runs = file if motion == "train" else file[motion]
+        displacement = runs["displacement"][...]
         table["relative_error_within_horizon"] = [
-            _error_within(file[f"r{r:04d}"], displacement, end) for r in table.r
+            _error_within(runs[f"r{r:04d}"], displacement, end) for r in table.r
         ]
     return table.assign(position_basis="full", k=None)
 
 
-def _subspace(path: str, ends: dict[str, int]) -> pd.DataFrame:
+def _subspace(path: str, ends: dict[str, int], motion: str) -> pd.DataFrame:
     """Rows of runs in position subspaces."""
-    table = read_table(Path(path).with_suffix(".csv"))
-    end = ends[Path(path).stem]
+    table = _table_beside(path, motion)
+    end = ends[Path(path).parent.name]
     with open_hdf5(path) as file:
-        displacement = file["displacement"][...]
+        displacement = file[f"displacement/{motion}"][...]
+        models = [f"{t.position_basis}_k{t.k:03d}_{t.method}" for t in table.itertuples()]
         table["relative_error_within_horizon"] = [
-            _error_within(
-                file[f"models/{row.position_basis}_k{row.k:03d}_{row.method}"], displacement, end
-            )
-            for row in table.itertuples()
+            _error_within(file[f"models/{model}/{motion}"], displacement, end) for model in models
         ]
     return table
 

@@ -18,13 +18,16 @@ def sensitivity(paths: Iterable[str]) -> pd.DataFrame:
     return conform(table, "sensitivity")
 
 
-def floor_of(table: pd.DataFrame, scene: str, perturbation: float) -> np.ndarray:
-    """Sensitivity floor (F,) of a scene at one size of the perturbation."""
-    rows = table[(table.scene == scene) & (table.perturbation == f"{perturbation:g}")]
+def floor_of(table: pd.DataFrame, scene: str, perturbation: float | str) -> np.ndarray:
+    """Sensitivity floor (F,) of a scene at one size (or under one label) of the perturbation."""
+    label = perturbation if isinstance(perturbation, str) else f"{perturbation:g}"
+    rows = table[(table.scene == scene) & (table.perturbation == label)]
     return rows.sort_values("frame").relative_difference.to_numpy()
 
 
-def horizons(table: pd.DataFrame, perturbation: float, threshold: float) -> dict[str, int]:
+def horizons(
+    table: pd.DataFrame, perturbation: float | str, threshold: float
+) -> dict[str, int]:
     """First frame of each scene at which the floor exceeds ``threshold`` (else the frame count)."""
     scenes = table.scene.unique()
     return {s: horizon(floor_of(table, s, perturbation), threshold) for s in scenes}
