@@ -55,17 +55,22 @@ class Sensitivity(_Model):
 
 
 class Timing(_Model):
-    """Protocol of the timing jobs: ``frames`` of each run, warm, interleaved, median."""
+    """Protocol of the timing jobs: ``frames`` of each run, warm, interleaved, median.
 
-    frames: Annotated[int, Field(ge=1)] = 40
+    The slow implementations of the full-order run are timed over fewer frames.
+    """
+
+    frames: Annotated[int, Field(ge=1)] = 15
     warmup: Annotated[int, Field(ge=0)] = 1
     repeats: Annotated[int, Field(ge=1)] = 5
+    numpy_frames: Annotated[int, Field(ge=1)] = 4
     interpreted_frames: Annotated[int, Field(ge=1)] = 1
 
 
 class Subspace(_Model):
-    """Position subspaces: kinds of basis, numbers of modes, tolerances of the element sampling."""
+    """Position subspaces: scenes, kinds of basis, numbers of modes, tolerances of the sampling."""
 
+    scenes: tuple[str, ...] = ()
     bases: tuple[Literal["pod", "skinning"], ...] = ("pod", "skinning")
     sizes: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = (10, 20, 40)
     tolerances: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (3e-2, 1e-2, 1e-3)

@@ -68,6 +68,10 @@ class Plan:
         names = [m for m, spec in self.study.methods.items() if spec.basis_id == basis]
         return {k: self.method_spec(names[0])[k] for k in ("weighting", "centring", "layout")}
 
+    def subspace_settings(self) -> dict[str, Any]:
+        """Plain settings of the position subspaces; which scenes have them is no parameter."""
+        return self.settings.subspace.model_dump(mode="json", exclude={"scenes"})
+
     def _method(self, method: str) -> MethodSpec:
         return self.study.methods[method]
 
@@ -107,6 +111,16 @@ class Plan:
     def per_scene(self, stage: str, tail: str) -> list[str]:
         """Files of a stage over all scenes; ``tail`` follows the scene's name."""
         return [f"{RESULTS}/{stage}/{scene}{tail}" for scene in self.study.scenes]
+
+    def hyper(self, tail: str) -> list[str]:
+        """Files of the position subspaces over the scenes that have them."""
+        scenes = [s for s in self.study.scenes if s in self.settings.subspace.scenes]
+        return [f"{RESULTS}/hyper/{scene}/{tail}" for scene in scenes]
+
+    def hyper_of(self, scene: str) -> list[str]:
+        """The models of one scene, an empty list if it has none."""
+        path = f"{RESULTS}/hyper/{scene}/models.h5"
+        return [path] if path in self.hyper("models.h5") else []
 
     def _per_method(self, stage: str, tail: str, scene: str) -> list[str]:
         return [

@@ -75,7 +75,7 @@ rule hyper:
         "results/logs/hyper/{scene}.log",
     params:
         scene=lambda w: PLAN.scene_config(w.scene),
-        settings=PLAN.settings.subspace.model_dump(mode="json"),
+        settings=PLAN.subspace_settings(),
         blowup_extent=PLAN.settings.blowup_extent,
         code=lambda w: PLAN.scene_code("pdrom.stages.hyper", w.scene),
     message:

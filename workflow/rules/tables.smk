@@ -67,8 +67,8 @@ rule reduced_reruns_table:
     input:
         runs=PLAN.per_experiment("reruns", ".h5"),
         tables=PLAN.per_experiment("reruns", ".csv"),
-        hyper=PLAN.per_scene("hyper", "/models.h5"),
-        hyper_tables=PLAN.per_scene("hyper", "/models.csv"),
+        hyper=PLAN.hyper("models.h5"),
+        hyper_tables=PLAN.hyper("models.csv"),
         timings=PLAN.per_scene("timings", ".csv"),
         sensitivity="results/tables/sensitivity.csv",
     output:
@@ -90,8 +90,8 @@ rule heldout_reruns_table:
     input:
         runs=PLAN.per_experiment("reruns", ".h5"),
         tables=PLAN.per_experiment("reruns", "_heldout.csv"),
-        hyper=PLAN.per_scene("hyper", "/models.h5"),
-        hyper_tables=PLAN.per_scene("hyper", "/models_heldout.csv"),
+        hyper=PLAN.hyper("models.h5"),
+        hyper_tables=PLAN.hyper("models_heldout.csv"),
         sensitivity="results/tables/sensitivity.csv",
     output:
         report("results/tables/heldout_reruns.csv", category="Tables"),

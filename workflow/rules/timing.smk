@@ -4,7 +4,7 @@ rule timing:
         mesh=lambda w: PLAN.mesh_path(w.scene),
         bases=lambda w: PLAN.bases_of(w.scene),
         samplings=lambda w: PLAN.samplings_of(w.scene),
-        hyper="results/hyper/{scene}/models.h5",
+        hyper=lambda w: PLAN.hyper_of(w.scene),
     output:
         "results/timings/{scene}.csv",
     log:

@@ -33,7 +33,7 @@ def compute_basis(
     Raises
     ------
     SnapshotError
-        Fewer than two snapshots, a wrong shape, NaN or Inf; with mass weighting, a row without mass.
+        Fewer than two snapshots, a wrong shape, NaN or Inf, a row without mass where it weighs.
     """
     _check(snapshots, row_mass, rows_per_element, spec)
     matrix = snapshots.reshape(len(snapshots), -1).T
@@ -81,7 +81,8 @@ def _check(
     rows = snapshots.shape[1]
     if rows == 0 or rows % rows_per_element:
         raise SnapshotError(
-            f"snapshots of {rows} rows, required: a multiple of rows_per_element = {rows_per_element}"
+            f"snapshots of {rows} rows, required: a multiple of rows_per_element "
+            f"= {rows_per_element}"
         )
     if row_mass.shape != (rows,):
         raise SnapshotError(f"row_mass of shape {row_mass.shape}, required: ({rows},)")
@@ -113,8 +114,9 @@ def _mean_error(matrix: np.ndarray, spec: BasisSpec) -> float:
     """Bound on what a computed mean leaves in the centred matrix, as a Frobenius norm.
 
     A sum of n terms is wrong by at most n eps/2 times the sum of their magnitudes (Higham 2002,
-    eq. 4.4), the same in every column. Without it constant snapshots, whose centred matrix is this
-    error and nothing else, would get a basis made of it. The first snapshot is subtracted exactly.
+    section 4.2), the same in every column. Without this bound constant snapshots, whose centred
+    matrix is that error and nothing else, would get a basis made of it. Subtracting the first
+    snapshot makes no such error.
     """
     if spec.centring != "affine":
         return 0.0

@@ -7,7 +7,7 @@ from pdrom.sampling.reduction import Reduction
 
 
 class ReducedLocalStep:
-    """Evaluates the sampled elements of a group and lifts their coefficients to the right-hand side.
+    """Evaluates sampled elements of a group and lifts their coefficients to the right-hand side.
 
     Precomputed: the offset S^T W mean (N, 3), the lift S^T W V for each coefficient block, and the
     solution operators. Online: the projections of the sampled elements, a small dense product for

@@ -23,7 +23,7 @@ class Sampling:
     def of_entries(
         cls, entries: np.ndarray, rows_per_element: int, elements: int, repeats: bool = False
     ) -> "Sampling":
-        """Sampling of entries; SamplingError if one is out of range or, unless allowed, repeated."""
+        """Sampling of entries; SamplingError for one out of range or, unless allowed, repeated."""
         entries = np.asarray(entries, dtype=np.int64)
         size = 3 * rows_per_element
         if len(entries) == 0 or entries.min() < 0 or entries.max() >= size * elements:

@@ -43,7 +43,7 @@ def time_scene(
     mesh: str,
     bases: list[str],
     samplings: list[str],
-    hyper: str,
+    hyper: str | None,
     output: str,
 ) -> None:
     """Measure one scene and write its timing table."""
@@ -51,13 +51,13 @@ def time_scene(
     system = bound.system_with(solver)
     frames = min(protocol["frames"], bound.config.frames)
     make = partial(_variant, bound, system, frames)
-    variants = _full_order(bound, make, protocol["interpreted_frames"])
+    variants = _full_order(bound, make, protocol)
     for path in samplings:
         group, method = Path(path).parent.name, Path(path).stem
         spec = MethodSpec.model_validate(methods[method])
         basis = next(b for b in bases if Path(b).parent.name == group and Path(b).stem == spec.basis_id)
         variants += _reduced(bound, group, method, spec, ranks, basis, path, make)
-    for labels, model in load_models(hyper):
+    for labels, model in load_models(hyper) if hyper else ():
         labels = {"group": "all", **labels, "implementation": "compiled"}
         variants.append(Variant(labels, *model.loop(bound), frames))
     slow = [v for v in variants if v.labels["implementation"] == "interpreted"]
@@ -83,13 +83,12 @@ def _variant(
     return Variant(labels, loop, scene.initial_state(), frames)
 
 
-def _full_order(scene: Scene, make: Make, interpreted_frames: int) -> list[Variant]:
+def _full_order(scene: Scene, make: Make, protocol: dict[str, int]) -> list[Variant]:
     variants = [make({"implementation": "compiled"}, scene.groups)]
     for name, step in IMPLEMENTATIONS.items():
         variant = make({"implementation": name}, [step(g) for g in scene.groups])
-        if name == "interpreted":
-            variant = replace(variant, frames=min(variant.frames, interpreted_frames))
-        variants.append(variant)
+        frames = min(variant.frames, protocol[f"{name}_frames"])
+        variants.append(replace(variant, frames=frames))
     return variants
 
 

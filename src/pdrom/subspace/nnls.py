@@ -35,8 +35,8 @@ def nnls_early_stop(
     """
     norms = np.linalg.norm(g, axis=0)
     scaled = g / np.where(norms > 0.0, norms, 1.0)
-    state = _ActiveSet(scaled, b)
     most = min(g.shape) if most is None else min(most, *g.shape)
+    state = _ActiveSet(scaled, b, most)
     size = float(np.linalg.norm(b))
     banned = norms == 0.0
     residual = b.copy()
@@ -52,7 +52,7 @@ def nnls_early_stop(
         # a column that depends on the others, or left at once, would be picked for ever
         if new not in state.active:
             banned[new] = True
-        residual = b - scaled[:, state.active] @ state.values
+        residual = state.residual
     error = np.linalg.norm(residual) / size if size else 0.0
     log.info("NNLS: %d of %d columns, residual %.2e", len(state.active), g.shape[1], error)
     support = np.argsort(state.active)
@@ -63,25 +63,29 @@ def nnls_early_stop(
 class _ActiveSet:
     """Active columns, their values, and the Cholesky factor of their Gram matrix."""
 
-    def __init__(self, g: np.ndarray, b: np.ndarray) -> None:
+    def __init__(self, g: np.ndarray, b: np.ndarray, most: int) -> None:
         self._g, self._b = g, b
+        self._columns = np.empty((len(b), most), order="F")
+        self._factor = np.zeros((most, most), order="F")
+        self._target = np.empty(most)
         self.active: list[int] = []
         self.values = np.zeros(0)
-        self._factor = np.zeros((0, 0))
+
+    @property
+    def residual(self) -> np.ndarray:
+        """b - G x."""
+        return self._b - self._columns[:, : len(self.active)] @ self.values
 
     def add(self, column: int) -> bool:
         """Append a column; False (and nothing happens) if it depends on the active ones."""
-        new = self._g[:, column]
-        n = len(self.active)
-        cross = linalg.solve_triangular(
-            self._factor, self._g[:, self.active].T @ new, lower=True, check_finite=False
-        ) if n else np.zeros(0)  # fmt: skip
+        n, new = len(self.active), self._g[:, column]
+        cross = self._forward(self._columns[:, :n].T @ new)
         rest = float(new @ new - cross @ cross)
         if rest <= DEPENDENT**2:
             return False
-        factor = np.zeros((n + 1, n + 1))
-        factor[:n, :n], factor[n, :n], factor[n, n] = self._factor, cross, np.sqrt(rest)
-        self._factor = factor
+        self._columns[:, n] = new
+        self._factor[n, :n], self._factor[n, n] = cross, np.sqrt(rest)
+        self._target[n] = new @ self._b
         self.active.append(column)
         self.values = np.append(self.values, 0.0)
         return True
@@ -89,8 +93,7 @@ class _ActiveSet:
     def solve(self) -> None:
         """Least squares on the active columns; columns that turn negative are taken out."""
         while self.active:
-            target = self._g[:, self.active].T @ self._b
-            z = linalg.cho_solve((self._factor, True), target, check_finite=False)
+            z = self._least_squares()
             if (z > 0.0).all():
                 self.values = z
                 return
@@ -101,9 +104,28 @@ class _ActiveSet:
             keep = x > 1e-14 * max(float(np.abs(x).max()), np.finfo(float).tiny)
             if keep.all():
                 keep[np.argmin(np.where(negative, x, np.inf))] = False
-            self.active = [a for a, k in zip(self.active, keep, strict=True) if k]
-            self.values = x[keep]
-            columns = self._g[:, self.active]
-            self._factor = linalg.cholesky(columns.T @ columns, lower=True) if self.active else (
-                np.zeros((0, 0))
-            )  # fmt: skip
+            self._keep(keep, x)
+
+    def _least_squares(self) -> np.ndarray:
+        n = len(self.active)
+        half = self._forward(self._target[:n])
+        factor = self._factor[:n, :n]
+        return linalg.solve_triangular(factor, half, lower=True, trans="T", check_finite=False)
+
+    def _forward(self, rhs: np.ndarray) -> np.ndarray:
+        n = len(rhs)
+        if n == 0:
+            return rhs
+        return linalg.solve_triangular(self._factor[:n, :n], rhs, lower=True, check_finite=False)
+
+    def _keep(self, keep: np.ndarray, x: np.ndarray) -> None:
+        """Leave the columns of ``keep`` only, with values ``x``."""
+        kept = np.flatnonzero(keep)
+        n = len(kept)
+        self._columns[:, :n] = self._columns[:, kept]
+        self._target[:n] = self._target[kept]
+        self.active = [self.active[i] for i in kept]
+        self.values = x[kept]
+        if n:
+            columns = self._columns[:, :n]
+            self._factor[:n, :n] = linalg.cholesky(columns.T @ columns, lower=True)
