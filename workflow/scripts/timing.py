@@ -11,6 +11,6 @@ with job_log(snakemake.log[0]):
         snakemake.input.mesh,
         list(snakemake.input.bases),
         list(snakemake.input.samplings),
-        snakemake.input.get("hyper") or None,
+        list(snakemake.input.hyper),
         snakemake.output[0],
     )

@@ -4,6 +4,7 @@ import logging
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +44,7 @@ def time_scene(
     mesh: str,
     bases: list[str],
     samplings: list[str],
-    hyper: str | None,
+    hyper: list[str],
     output: str,
 ) -> None:
     """Measure one scene and write its timing table."""
@@ -57,7 +58,7 @@ def time_scene(
         spec = MethodSpec.model_validate(methods[method])
         basis = next(b for b in bases if Path(b).parent.name == group and Path(b).stem == spec.basis_id)
         variants += _reduced(bound, group, method, spec, ranks, basis, path, make)
-    for labels, model in load_models(hyper) if hyper else ():
+    for labels, model in chain.from_iterable(load_models(path) for path in hyper):
         labels = {"group": "all", **labels, "implementation": "compiled"}
         variants.append(Variant(labels, *model.loop(bound), frames))
     slow = [v for v in variants if v.labels["implementation"] == "interpreted"]
