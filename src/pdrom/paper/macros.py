@@ -65,7 +65,8 @@ def resolve(key: str, tables: Mapping[str, pd.DataFrame]) -> str:
     for entry in filters:
         field, _, value = entry.partition("=")
         _require(field, rows, key)
-        rows = rows[rows[field].map(lambda cell, value=value: _same(cell, value))]
+        matches = rows[field].map(lambda cell, value=value: _same(cell, value))
+        rows = rows[matches.astype(bool)]
     _require(column, rows, key)
     cells = rows[column].dropna()
     if aggregate is not None:
