@@ -110,6 +110,7 @@ rule heldout_reruns_table:
 rule accuracy_cost_table:
     input:
         reruns="results/tables/reduced_reruns.csv",
+        timings=PLAN.per_scene("timings", ".csv"),
     output:
         report("results/tables/accuracy_cost.csv", category="Tables"),
     log:

@@ -14,7 +14,7 @@ from pdrom.figures.spec import FigureSpec
 from pdrom.store import read_table
 
 COLUMNS = [
-    "scene", "method", "relative_error_within_horizon", "ms_per_frame", "pareto",
+    "scene", "method", "position_basis", "relative_error_within_horizon", "ms_per_frame", "pareto",
 ]  # fmt: skip
 LOW, HIGH = 1e-6, 1e2  # errors outside are drawn on the limit
 RATES = (60, 30)  # frames per second
@@ -24,7 +24,7 @@ RATES = (60, 30)  # frames per second
 def draw(sources: Sources, spec: FigureSpec) -> Figure:
     """A panel per scene, a dot per reduced model; the best trade-offs are joined and ringed.
 
-    Errors outside the axis lie on its rim.
+    Errors outside the axis lie on its rim. A vertical line marks the compiled full-order run.
 
     Raises
     ------
@@ -33,26 +33,39 @@ def draw(sources: Sources, spec: FigureSpec) -> Figure:
     """
     table = read_table(sources.table("accuracy_cost"), COLUMNS)
     table = table.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
-    table = table[(table.relative_error_within_horizon > 0.0) & (table.ms_per_frame > 0.0)]
+    own = (table.method == "full") & (table.position_basis == "full")
+    full_order = table[own].set_index("scene").ms_per_frame
+    table = table[(table.relative_error_within_horizon > 0.0) & (table.ms_per_frame > 0.0) & ~own]
+    table["method"] = [_name(row) for row in table.itertuples()]
     if spec.methods:
         table = table[table.method.isin(spec.methods)]
     held = list(dict.fromkeys(s for s, _ in sources.holdings.experiments(spec.scenes)))
     scenes = [scene for scene in held if (table.scene == scene).any()]
     if not scenes:
         return style.no_data("no reduced model with both an error and a time")
-    figure, axes = small_multiples(len(scenes), spec.columns, legend_rows=2, height=1.8)
+    figure, axes = small_multiples(len(scenes), spec.columns, legend_rows=4, height=1.8)
     table = table[table.scene.isin(scenes)]
     methods = list(dict.fromkeys(table.method))
     styles = style.method_styles(methods)
     for ax, scene in zip(axes, scenes, strict=True):
-        _draw_scene(ax, table[table.scene == scene], styles)
+        _draw_scene(ax, table[table.scene == scene], styles, full_order.get(scene))
         ax.set_title(style.words(scene))
     label_outer(axes, spec.columns, "time per frame (ms)", "relative error")
     _legend(figure, sources, styles)
     return figure
 
 
-def _draw_scene(ax: Axes, rows: pd.DataFrame, styles: dict[str, tuple[str, str]]) -> None:
+def _name(row) -> str:
+    """Method of a row; in a position subspace its kind comes first."""
+    if row.position_basis == "full":
+        return str(row.method)
+    subspace = f"{row.position_basis} subspace"
+    return subspace if row.method == "full" else f"{subspace}, {row.method}"
+
+
+def _draw_scene(
+    ax: Axes, rows: pd.DataFrame, styles: dict[str, tuple[str, str]], full_order: float | None
+) -> None:
     ax.set_xscale("log")
     log_axis(ax, LOW, HIGH)
     error = clipped(rows.relative_error_within_horizon.to_numpy(float), LOW, HIGH)
@@ -78,6 +91,9 @@ def _draw_scene(ax: Axes, rows: pd.DataFrame, styles: dict[str, tuple[str, str]]
                 limit, height, f"{rate} fps ", transform=ax.get_xaxis_transform(), fontsize=7,
                 va="top", ha="right", color="#6B675F",
             )  # fmt: skip
+    if full_order is not None:
+        ax.axvline(full_order, color=style.GREY, linewidth=1.2, zorder=0)
+        time = np.append(time, full_order)
     low, high = np.log10(time.min()), np.log10(time.max())
     pad = max(0.1, 0.08 * (high - low))
     ax.set_xlim(10 ** (low - pad), 10 ** (high + pad))
@@ -103,4 +119,5 @@ def _legend(figure: Figure, sources: Sources, styles: dict[str, tuple[str, str]]
     ]  # fmt: skip
     ring = {"marker": "o", "markersize": 7, "markerfacecolor": "none"}
     handles.append(Line2D([], [], color="#333333", label="best trade-offs", **ring))
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    handles.append(Line2D([], [], color=style.GREY, linewidth=1.2, label="full order"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)

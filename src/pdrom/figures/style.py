@@ -28,10 +28,12 @@ METHODS: dict[str, tuple[str, str]] = {
     "block-deim": (BLUE, "P"),
     "block-qdeim": (GREEN, "X"),
     "gappy": ("#7A5C00", "<"),
-    "ecsw": ("#5E3C99", ">"),
-    "hrpd": ("#5A5A5A", "*"),
+    "pod subspace": ("#5E3C99", "p"),
+    "pod subspace, ecsw-1e-02": ("#1B6E6E", ">"),
+    "pod subspace, ecsw-1e-03": (GREEN, "d"),
+    "skinning subspace": ("#8B1A4A", "h"),
 }
-_RESERVE = (("#1B6E6E", "h"), ("#8B1A4A", "p"), ("#3F6B00", "d"), ("#2B2B80", "8"))
+_RESERVE = (("#5A5A5A", "*"), ("#9A6A00", "8"), ("#3F6B00", "H"), ("#2B2B80", "1"))
 
 GROUPS: dict[str, tuple[str, str]] = {
     "bending": (GREEN, "^"),

@@ -11,8 +11,8 @@ def block_qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
     that belong to one element. The group with the largest Frobenius norm is taken, and the
     direction in R^r that dominates it is removed from all groups. Removing the whole group at once
     would exhaust R^r after about r / size elements; one direction an element gives as many elements
-    as modes, to be compared with the greedy at equal cost. The removed directions are orthonormal and
-    lie in the span of the taken groups, so that the sampled rows of V have full column rank.
+    as modes, to be compared with the greedy at equal cost. The removed directions are orthonormal
+    and lie in the span of the taken groups, so the sampled rows of V have full column rank.
 
     Not nested in r. Cost O(n r^2), n = size e.
     """

@@ -30,6 +30,8 @@ def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
         "heldout_reruns": lambda: heldout_reruns(
             inputs.runs, inputs.hyper, read_table(inputs.sensitivity), params.threshold
         ),
-        "accuracy_cost": lambda: accuracy_cost(read_table(inputs.reruns), params.iterations),
+        "accuracy_cost": lambda: accuracy_cost(
+            read_table(inputs.reruns), inputs.timings, params.iterations
+        ),
     }
     write_table(makers[name](), Path(output))
