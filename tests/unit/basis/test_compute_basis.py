@@ -285,7 +285,7 @@ def test_truncation_names_the_rank():
     basis = basis_of(snapshots(37)[0], BasisSpec())
     np.testing.assert_array_equal(basis.truncated(3), basis.V[:, :3])
     for r in (0, -1, 8):
-        with pytest.raises(RankError, match=f"r = {r}, .* rank 7 .* allowed are 1 to 7"):
+        with pytest.raises(RankError, match=rf"r = {r}, .* rank 7 .* allowed are 1 to 7"):
             basis.truncated(r)
 
 
@@ -297,7 +297,7 @@ def test_file_round_trip(spec, tmp_path):
     for field in dataclasses.fields(Basis):
         if field.name != "origin":
             assert np.array_equal(getattr(basis, field.name), getattr(loaded, field.name))
-    with pytest.raises(RankError, match=f"scene/group/{spec.basis_id}.h5: r = 99"):
+    with pytest.raises(RankError, match=rf"scene/group/{spec.basis_id}\.h5: r = 99"):
         loaded.truncated(99)
 
 
@@ -310,5 +310,5 @@ def test_damaged_file_is_named(tmp_path):
     path = tmp_path / "b.h5"
     save_basis(basis_of(snapshots(43)[0], BasisSpec()), path, {})
     path.write_bytes(path.read_bytes()[:-500])
-    with pytest.raises(StorageError, match="b.h5"):
+    with pytest.raises(StorageError, match=r"b\.h5"):
         load_basis(path)

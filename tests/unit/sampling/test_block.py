@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from pdrom.sampling.block import block_elements
@@ -63,7 +63,9 @@ def test_greedy_is_nested(size):
 
 @given(SIZES)
 def test_single_entries_as_elements_are_the_scalar_methods(size):
+    """A square V is left out: its rows all have norm 1, pivots are ties."""
     v = modes((size[0], 1, size[2], size[3]))
+    assume(v.shape[0] > v.shape[1])
     np.testing.assert_array_equal(block_elements(v, 1), deim_entries(v))
     np.testing.assert_array_equal(block_qdeim_elements(v, 1), qdeim_entries(v))
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from pymor.algorithms.ei import deim as pymor_deim
 from pymor.vectorarrays.numpy import NumpyVectorSpace
@@ -100,8 +100,12 @@ def test_qdeim_takes_the_pivots_of_a_permuted_triangular_factorisation(size):
 
 @given(SIZES)
 def test_qdeim_does_not_depend_on_the_basis_of_the_space(size):
-    """Drmac and Gugercin 2016: V Q with orthogonal Q gives the same norms, hence the same gain."""
+    """Drmac and Gugercin 2016: V Q with orthogonal Q gives the same norms, hence the same pivots.
+
+    A square V is left out: its rows all have norm 1, and round-off would decide among them.
+    """
     v = orthonormal(size)
+    assume(v.shape[0] > v.shape[1])
     q = np.linalg.qr(np.random.default_rng(size[2] + 1).standard_normal((v.shape[1],) * 2))[0]
     np.testing.assert_array_equal(qdeim_entries(v @ q), qdeim_entries(v))
 

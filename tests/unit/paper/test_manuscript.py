@@ -1,0 +1,87 @@
+"""The manuscript types no result: every number of its prose comes from a table."""
+
+import re
+
+import pytest
+from conftest import ROOT
+
+from pdrom.config import Study
+from pdrom.paper.bibliography import bibliography, cited_keys
+from pdrom.paper.macros import keys_of
+from pdrom.paper.tex import packages_of
+from pdrom.plan import TABLES, Plan
+from pdrom.tables.columns import COLUMNS
+from pdrom.yamlfile import read_yaml
+
+SOURCE = (ROOT / "paper" / "main.tex").read_text(encoding="utf-8")
+
+# What may hold digits without stating a result: mathematics, keys, lengths, names of claims.
+_NOT_PROSE = [
+    r"(?<!\\)%.*",
+    r"\\begin\{(equation|align)\*?\}.*?\\end\{\1\*?\}",
+    r"(?<!\\)\$.*?(?<!\\)\$",
+    r"\\(val|cite|label|ref|eqref|input|includegraphics|scene|method|figureof|fontsize)"
+    r"(\[[^\]]*\])?\{[^{}]*\}",
+    r"\\(setlength|vspace|hspace)\{[^{}]*\}(\{[^{}]*\})?",
+    r"\{fig:[a-z]+\}|\\begin\{[a-z]+\}(\[[^\]]*\])?(\{[^{}]*\})?",
+    r"\bC\d+(?=[:.\s])",
+]
+
+
+def prose(source: str) -> str:
+    """Body text without mathematics, keys, lengths and the names of claims."""
+    text = source.split(r"\begin{document}", 1)[1]
+    for pattern in _NOT_PROSE:
+        text = re.sub(pattern, " ", text, flags=re.S if "begin" in pattern else 0)
+    return text
+
+
+def typed_numbers(source: str) -> list[str]:
+    """Numbers typed in the prose, with the words around them."""
+    return [m.group(0) for m in re.finditer(r".{0,30}\d[\d.,]*.{0,20}", prose(source))]
+
+
+def test_no_result_is_typed():
+    assert typed_numbers(SOURCE) == []
+
+
+@pytest.mark.parametrize(
+    "sentence",
+    ["The error is 0.03.", "It blew up at frame 12.", "A speed-up of 50 times.", r"5\,\% remain"],
+)
+def test_a_typed_result_is_found(sentence):
+    changed = SOURCE.replace(r"\section{Limitations}", rf"\section{{Limitations}} {sentence}")
+    assert len(typed_numbers(changed)) == 1
+
+
+def test_only_packages_of_both_tex_systems():
+    allowed = {
+        "fontenc", "inputenc", "lmodern", "amsmath", "geometry", "graphicx", "xcolor", "array",
+        "longtable", "enumitem", "microtype", "hyperref", "tabularx", "rotating", "url",
+    }  # fmt: skip
+    assert set(packages_of(SOURCE)) <= allowed
+
+
+def test_every_key_names_a_column_of_a_table():
+    study = Study.load(read_yaml(ROOT / "config" / "default.yaml"), ROOT)
+    facts = Plan(study).facts()
+    columns = {name: set(COLUMNS[name]) for name in TABLES}
+    columns |= {name: set(rows[0]) for name, rows in facts.items()}
+    for key in keys_of(SOURCE):
+        table, *parts = key.split("|")
+        if table == "machine":
+            continue
+        fields = [part.partition("=")[0] for part in parts]
+        unknown = set(fields) - columns[table] - {"max", "min", "median", "count"}
+        assert not unknown, key
+
+
+def test_every_figure_of_the_study_is_shown():
+    shown = set(re.findall(r"\\figureof\{([a-z_]+)\}", SOURCE))
+    missing = set(read_yaml(ROOT / "config" / "figures.yaml")) - shown
+    assert missing <= {"reconstruction_error_sound"}
+
+
+def test_every_citation_has_an_entry():
+    text = bibliography(SOURCE, ROOT / "paper" / "references.bib")
+    assert text.count(r"\bibitem") == len(cited_keys(SOURCE)) > 10
