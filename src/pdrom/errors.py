@@ -1,4 +1,4 @@
-"""Named errors. Each carries one line that names the file or object, the key, the value and what is allowed."""
+"""Named errors; each carries one line: file or object, key, value, and what is allowed."""
 
 
 class PdromError(Exception):
@@ -18,7 +18,7 @@ class DegenerateElementError(MeshError):
 
 
 class SceneError(PdromError):
-    """A scene contradicts itself or its mesh: an empty selection, no constraint, a wrong element."""
+    """A scene contradicts itself or its mesh: an empty selection, a wrong element."""
 
 
 class SolverError(PdromError):

@@ -82,10 +82,15 @@ def _imports(path: Path, module: str) -> tuple[str, ...]:
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
             found.add(node.module)
             found |= {f"{node.module}.{alias.name}" for alias in node.names}
-    parents = {".".join(name.split(".")[:i]) for name in found for i in range(1, name.count(".") + 1)}
+    parents = {parent for name in found for parent in _packages_above(name)}
     known = {name for name in found | parents if _locate(name) is not None}
     # the package's own __init__ holds the version only
     return tuple(sorted(known - {PACKAGE, module}))
+
+
+def _packages_above(name: str) -> list[str]:
+    parts = name.split(".")
+    return [".".join(parts[:i]) for i in range(1, len(parts))]
 
 
 @cache

@@ -8,12 +8,12 @@ from typing import Any
 from pdrom.config import Study, StudySettings
 from pdrom.errors import PdromError
 from pdrom.figures import FIGURES, FigureSpec, Holdings, figure_inputs, load_figures
+from pdrom.figures.sources import PUBLISHED
 from pdrom.fingerprint import fingerprint
 from pdrom.method import MethodSpec
 from pdrom.paper.textables import TEX_TABLES
 
 RESULTS = "results"
-PUBLISHED = Path("config/reference/published_code")
 REFERENCE_BASIS = "none-none-vectorised"
 TABLES = (
     "singular_values", "reconstruction_error", "reduced_reruns", "accuracy_cost", "local_share",
@@ -92,7 +92,7 @@ class Plan:
         return sorted(set(paths))
 
     def reference_bases(self) -> list[str]:
-        """One basis file per experiment for the decay of its singular values: uncentred if there."""
+        """One basis file per experiment, for its singular values: uncentred if there."""
         paths = []
         for scene, group in self.study.experiments:
             ids = [spec.basis_id for spec in self.study.methods.values()]

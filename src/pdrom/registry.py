@@ -23,9 +23,7 @@ class Registry(Mapping[str, str]):
             return self._entries[name]
         except KeyError:
             allowed = ", ".join(sorted(self._entries))
-            raise ConfigurationError(
-                f"unknown {self.kind} '{name}' (allowed: {allowed})"
-            ) from None
+            raise ConfigurationError(f"unknown {self.kind} '{name}' (allowed: {allowed})") from None
 
     def __contains__(self, name: object) -> bool:
         return name in self._entries

@@ -90,8 +90,7 @@ class SceneConfig(_Model):
             even = (self.frames + 1) // 2
             if plan.train > even:
                 raise ValueError(
-                    f"reduce.{group}.train = {plan.train}: only {even} even frames "
-                    f"in {self.frames}"
+                    f"reduce.{group}.train = {plan.train}: only {even} even frames in {self.frames}"
                 )
         return self
 

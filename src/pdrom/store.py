@@ -73,9 +73,7 @@ def write_table(table: pd.DataFrame, path: str | os.PathLike[str]) -> None:
         table.to_csv(temporary, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
 
 
-def read_table(
-    path: str | os.PathLike[str], columns: Sequence[str] | None = None
-) -> pd.DataFrame:
+def read_table(path: str | os.PathLike[str], columns: Sequence[str] | None = None) -> pd.DataFrame:
     """Read a CSV table; StorageError if it is missing, empty or lacks one of ``columns``."""
     if not Path(path).is_file():
         raise StorageError(f"{path}: no such file")

@@ -1,6 +1,7 @@
 """Honest timings: in-process, warm, interleaved between the compared variants, median.
 
-A variant makes a step loop and its initial state. Every repeat runs each variant once, from there, so that drifts of the machine's clock hit all variants alike.
+A variant makes a step loop and its initial state. Every repeat runs each variant once, from there,
+so that drifts of the machine's clock hit all variants alike.
 """
 
 from collections.abc import Callable, Sequence

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from conftest import make_scene
 
 STEP = 1e-6
@@ -33,7 +34,7 @@ def test_energy_gradient_is_the_elastic_force(group_scene, rng):
 
 
 def test_bending_operator_is_the_gradient_of_area(rng):
-    """A_v H_v = d(total area)/dq_v at rest (Pinkall and Polthier 1993): H from S, area from cross."""
+    """A_v H_v = d(total area)/dq_v at rest (Pinkall and Polthier 1993)."""
     mesh = {"kind": "cloth", "rows": 7, "columns": 6, "wave": 0.1}
     scene = make_scene({"effect": "bending", "weight": 1.0}, mesh=mesh)
     group, points, triangles = scene.groups[0], scene.mesh.points, scene.mesh.triangles

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from conftest import make_scene, random_rotation
 
+from conftest import make_scene, random_rotation
 from pdrom.fom.run import simulate, trajectory
 from pdrom.fom.stepper import State
 

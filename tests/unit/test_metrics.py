@@ -23,9 +23,7 @@ def test_known_errors():
 def test_agrees_with_norms_of_matrices(seed):
     rng = np.random.default_rng(seed)
     p, p_hat = rng.standard_normal((2, 4, 5, 3))
-    axes = [
-        np.linalg.norm(p[..., a] - p_hat[..., a]) / np.linalg.norm(p[..., a]) for a in range(3)
-    ]
+    axes = [np.linalg.norm(p[..., a] - p_hat[..., a]) / np.linalg.norm(p[..., a]) for a in range(3)]
     total = np.linalg.norm(p - p_hat) / np.linalg.norm(p)
     assert relative_errors(p, p_hat, 0.0) == pytest.approx([total, *axes])
 

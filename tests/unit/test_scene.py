@@ -5,9 +5,9 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import ROOT, make_scene
 from pydantic import ValidationError
 
+from conftest import ROOT, make_scene
 from pdrom.config import Coarsen, Study, load_scene
 from pdrom.errors import ConfigurationError, SceneError
 from pdrom.fom.run import run, trajectory
@@ -138,7 +138,7 @@ def test_coarsening_scales_every_frame_number():
 def test_held_out_run_differs_in_speed_direction_and_seed():
     scene = load_scene(ROOT, "bar_twist")
     held = scene.held_out_variant()
-    turn = [e for e in held.effects if e.effect == "rotate"][0]
+    turn = next(e for e in held.effects if e.effect == "rotate")
     assert (turn.degrees, turn.over) == (-90.0, 125)
     assert held.frames == scene.frames
     assert load_scene(ROOT, "bar_release").held_out_variant().effects[-1].effect == "kick"

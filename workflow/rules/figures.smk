@@ -21,8 +21,6 @@ for figure in PLAN.figure_specs:
             name=figure,
             spec=PLAN.figure_spec(figure),
             holdings=PLAN.figure_holdings(figure),
-            results="results",
-            published="config/reference/published_code",
             code=PLAN.figure_code(figure),
         message:
             f"Figure {figure}"

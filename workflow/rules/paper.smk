@@ -28,8 +28,6 @@ rule paper:
     log:
         "results/logs/paper/main.log",
     params:
-        figures="results/figures",
-        inputs="results/paper",
         code=PLAN.code("pdrom.stages.paper"),
     message:
         "Manuscript paper/main.pdf"

@@ -9,6 +9,7 @@ rule timing:
         "results/timings/{scene}.csv",
     log:
         "results/logs/timing/{scene}.log",
+    threads: workflow.cores or 1
     params:
         scene=lambda w: PLAN.scene_config(w.scene),
         methods=PLAN.method_specs(),
@@ -16,7 +17,6 @@ rule timing:
         protocol=PLAN.settings.timing.model_dump(),
         solver=PLAN.settings.solver,
         code=lambda w: PLAN.scene_code("pdrom.stages.timing", w.scene),
-    threads: workflow.cores or 1
     message:
         "Timings of {wildcards.scene} (alone on the machine)"
     script:

@@ -1,3 +1,6 @@
+from pathlib import Path
+
+from pdrom.figures.sources import PUBLISHED
 from pdrom.logs import job_log
 from pdrom.stages.figures import draw
 
@@ -6,8 +9,8 @@ with job_log(snakemake.log[0]):
         snakemake.params.name,
         snakemake.params.spec,
         snakemake.params.holdings,
-        snakemake.params.results,
-        snakemake.params.published,
+        str(Path(snakemake.output.pdf).parents[1]),
+        str(PUBLISHED),
         snakemake.output.pdf,
         snakemake.output.png,
     )

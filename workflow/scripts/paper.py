@@ -1,10 +1,12 @@
+from pathlib import Path
+
 from pdrom.logs import job_log
 from pdrom.stages.paper import build
 
 with job_log(snakemake.log[0]):
     build(
         snakemake.input.source,
-        snakemake.params.figures,
-        snakemake.params.inputs,
+        str(Path(snakemake.input.figures[0]).parent),
+        str(Path(snakemake.input.inputs[0]).parent),
         snakemake.output[0],
     )

@@ -1,1 +1,1 @@
-"""Constraint groups of projective dynamics, one a module, loaded through `pdrom.effects.EFFECTS`."""
+"""Constraint groups of projective dynamics, one a module (see `pdrom.effects`)."""

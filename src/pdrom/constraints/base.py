@@ -125,9 +125,7 @@ class StencilGroup(ConstraintGroup):
         e, p, m = self.operator.shape
         rows = np.repeat(np.arange(e * p), m)
         columns = np.repeat(self.stencil[:, None, :], p, axis=1).ravel()
-        self.S = sparse.csr_array(
-            (self.operator.ravel(), (rows, columns)), shape=(e * p, vertices)
-        )
+        self.S = sparse.csr_array((self.operator.ravel(), (rows, columns)), shape=(e * p, vertices))
 
 
 def require_cells(mesh: Mesh, kind: str, effect: str) -> np.ndarray:

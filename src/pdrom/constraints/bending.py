@@ -68,9 +68,7 @@ class VertexBending(ConstraintGroup):
         if len(curved) == 0:
             return
         normals = np.zeros((len(curved), 3))
-        _fan_normals(
-            q, self.vertices[curved], self._fan_start, self._fan, self._triangles, normals
-        )
+        _fan_normals(q, self.vertices[curved], self._fan_start, self._fan, self._triangles, normals)
         self.normals[curved] = normals
 
     def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:

@@ -23,9 +23,7 @@ class TetrahedronGroup(StencilGroup):
         self.weights = self.config.weight * np.abs(np.linalg.det(edges)) / 6.0
         # F = [q1 - q0, q2 - q0, q3 - q0] D^-1, hence F^T = D^-T [q1 - q0; q2 - q0; q3 - q0]
         transposed = np.linalg.inv(edges).transpose(0, 2, 1)
-        self.operator = np.concatenate(
-            [-transposed.sum(axis=2, keepdims=True), transposed], axis=2
-        )
+        self.operator = np.concatenate([-transposed.sum(axis=2, keepdims=True), transposed], axis=2)
         self._assemble(mesh.vertices)
 
     def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:

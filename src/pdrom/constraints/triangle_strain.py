@@ -45,9 +45,7 @@ class TriangleStrain(StencilGroup):
         self.weights = config.weight * area
         # F = [q1 - q0, q2 - q0] D^-1, hence F^T = D^-T [q1 - q0; q2 - q0]
         transposed = rest_inverse.transpose(0, 2, 1)
-        self.operator = np.concatenate(
-            [-transposed.sum(axis=2, keepdims=True), transposed], axis=2
-        )
+        self.operator = np.concatenate([-transposed.sum(axis=2, keepdims=True), transposed], axis=2)
         self._assemble(mesh.vertices)
 
     def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:
@@ -131,10 +129,9 @@ def _gradient(y, vertices, operator, f):
     """Rows of F^T of one triangle."""
     for row in range(2):
         for axis in range(3):
-            f[row, axis] = (
-                operator[row, 1] * (y[vertices[1], axis] - y[vertices[0], axis])
-                + operator[row, 2] * (y[vertices[2], axis] - y[vertices[0], axis])
-            )
+            f[row, axis] = operator[row, 1] * (
+                y[vertices[1], axis] - y[vertices[0], axis]
+            ) + operator[row, 2] * (y[vertices[2], axis] - y[vertices[0], axis])
 
 
 @njit(cache=True, error_model="numpy")

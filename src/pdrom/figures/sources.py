@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from pdrom.config import Study
 
 
+# Output of the paper's published code, drawn beside ours and never used as our result.
+PUBLISHED = Path("config/reference/published_code")
+
+
 class SceneHolding(BaseModel):
     """A scene that was run: its mesh and the groups that are reduced in it."""
 

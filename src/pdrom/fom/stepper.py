@@ -76,7 +76,7 @@ class Stepper:
         frame: int,
         on_last_iterate: Callable[[np.ndarray], None] | None = None,
     ) -> tuple[State, FrameReport]:
-        """Do one frame (``frame`` is 0-based); ``on_last_iterate`` sees the last local iterate y."""
+        """Do one frame (0-based ``frame``); ``on_last_iterate`` sees the last local iterate y."""
         space, h = self.space, self.time_step
         seconds = np.zeros(len(PHASES))
         started = perf_counter()

@@ -71,7 +71,7 @@ class GlobalSystem:
         return len(self._cache)
 
     def eliminate(self, fixed: np.ndarray) -> Elimination:
-        """The system without the vertices ``fixed`` (ascending indices), from the cache if known."""
+        """The system without the vertices ``fixed`` (ascending), from the cache if known."""
         key = np.ascontiguousarray(fixed, dtype=np.int64).tobytes()
         if key not in self._cache:
             self._cache[key] = Elimination(self.matrix, fixed, self._solver)

@@ -54,10 +54,11 @@ def _check_vertices(mesh: Mesh, cells: np.ndarray, name: str) -> None:
         unused = np.flatnonzero(~used)
         raise MeshError(f"{name}: {len(unused)} vertices in no element, the first is {unused[0]}")
     _, first, inverse = np.unique(mesh.points, axis=0, return_index=True, return_inverse=True)
+    original = first[inverse.ravel()]
     if len(first) < mesh.vertices:
-        repeated = np.flatnonzero(first[inverse.ravel()] != np.arange(mesh.vertices))[0]
+        repeated = np.flatnonzero(original != np.arange(mesh.vertices))[0]
         raise MeshError(
-            f"{name}: vertex {repeated} repeats the position of vertex {first[inverse.ravel()[repeated]]}"
+            f"{name}: vertex {repeated} repeats the position of vertex {original[repeated]}"
         )
 
 

@@ -66,7 +66,7 @@ def bar(nx: int, ny: int, nz: int, extent: float = 1.0, lift: float = 2.0) -> Me
     return Mesh(points, boundary(tetrahedra), tetrahedra)
 
 
-# Corners of a cell are numbered by the bits of (di, dj, dk); the first tetrahedron is the inner one.
+# Corners of a cell are numbered by the bits of (di, dj, dk); the inner tetrahedron comes first.
 _EVEN = ((0, 3, 5, 6), (1, 0, 3, 5), (2, 0, 6, 3), (4, 0, 5, 6), (7, 3, 6, 5))
 _ODD = ((1, 2, 4, 7), (0, 1, 2, 4), (3, 1, 7, 2), (5, 1, 4, 7), (6, 2, 7, 4))
 

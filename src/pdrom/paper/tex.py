@@ -1,4 +1,4 @@
-"""Building the PDF with a system TeX that has the needed packages, else with the pip-installed one."""
+"""Building the PDF with a system TeX that has the packages, else with the pip-installed one."""
 
 import logging
 import os

@@ -20,7 +20,7 @@ class Rerun:
     positions : (F' + 1, N, 3) m, the initial ones first; only finite frames
     difference : (F',) || Q_red - Q_fom ||_F of each frame, m
     extent : (F',) longest side of the bounding box over the rest extent
-    blowup_frame : first frame whose extent exceeds the limit or is not finite; None if there is none
+    blowup_frame : first frame whose extent exceeds the limit or is not finite, else None
     """
 
     positions: np.ndarray

@@ -37,9 +37,7 @@ class Sampling:
         return cls(entries, touched[first])
 
     @classmethod
-    def of_elements(
-        cls, elements: np.ndarray, rows_per_element: int, total: int
-    ) -> "Sampling":
+    def of_elements(cls, elements: np.ndarray, rows_per_element: int, total: int) -> "Sampling":
         """Sampling of all 3p entries of whole elements."""
         elements = np.asarray(elements, dtype=np.int64)
         size = 3 * rows_per_element

@@ -56,7 +56,8 @@ def time_scene(
     for path in samplings:
         group, method = Path(path).parent.name, Path(path).stem
         spec = MethodSpec.model_validate(methods[method])
-        basis = next(b for b in bases if Path(b).parent.name == group and Path(b).stem == spec.basis_id)
+        place = (group, spec.basis_id)
+        basis = next(b for b in bases if (Path(b).parent.name, Path(b).stem) == place)
         variants += _reduced(bound, group, method, spec, ranks, basis, path, make)
     for labels, model in chain.from_iterable(load_models(path) for path in hyper):
         labels = {"group": "all", **labels, "implementation": "compiled"}

@@ -13,7 +13,6 @@ from pdrom.constraints.base import ConstraintGroup
 from pdrom.subspace.columns import Columns
 from pdrom.subspace.nnls import nnls_early_stop
 
-
 # Rows that the training equations are hashed to.
 SKETCH = 1500
 SEED = 0

@@ -38,9 +38,7 @@ class SubspaceModel:
         steps = []
         for group in scene.groups:
             chosen = self.samples.get(group.name, Samples())
-            steps.append(
-                SubspaceLocalStep(group, self.columns, chosen.elements, chosen.factors)
-            )
+            steps.append(SubspaceLocalStep(group, self.columns, chosen.elements, chosen.factors))
         space = ReducedSpace(scene, self.columns, sum(step.matrix for step in steps))
         config = scene.config
         loop = Stepper(space, config.time_step, config.iterations, steps, track_objective=False)

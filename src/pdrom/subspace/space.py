@@ -5,8 +5,6 @@ arrays have the length of the subspace, of the held vertices, or (for a scene wi
 probe vertices.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy import linalg
 

@@ -1,4 +1,4 @@
-"""Table accuracy_cost: each method and size as a point (error, time), Pareto-optimal ones marked."""
+"""Table accuracy_cost: each method and size as a point (error, time), and the best."""
 
 from collections.abc import Iterable, Sequence
 

@@ -12,7 +12,6 @@ from pdrom.store import open_hdf5, read_table
 from pdrom.tables.columns import conform
 from pdrom.tables.sensitivity import floor_of, horizons
 
-
 KEYS = ["scene", "group", "method", "position_basis", "k", "r"]
 
 
@@ -27,8 +26,8 @@ def reduced_reruns(
     """One row per scene, group, method and r, then the runs in position subspaces.
 
     ``reruns`` are the HDF5 files ``.../{scene}/{group}/{method}.h5``, ``hyper`` those of the
-    subspaces ``.../{scene}/models.h5``, each with a table of the same name beside it. In a subspace all
-    groups are reduced, and r counts the evaluated elements. The error within the horizon uses the
+    subspaces ``.../{scene}/models.h5``, each with a table of the same name beside it. In a subspace
+    all groups are reduced, and r counts the evaluated elements. The error within the horizon uses the
     frames before the horizon only; a run that blew up before has none.
     """
     table = _collect(reruns, hyper, sensitivity, perturbation, threshold, "train")

@@ -25,9 +25,7 @@ def floor_of(table: pd.DataFrame, scene: str, perturbation: float | str) -> np.n
     return rows.sort_values("frame").relative_difference.to_numpy()
 
 
-def horizons(
-    table: pd.DataFrame, perturbation: float | str, threshold: float
-) -> dict[str, int]:
+def horizons(table: pd.DataFrame, perturbation: float | str, threshold: float) -> dict[str, int]:
     """First frame of each scene at which the floor exceeds ``threshold`` (else the frame count)."""
     scenes = table.scene.unique()
     return {s: horizon(floor_of(table, s, perturbation), threshold) for s in scenes}

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from conftest import GROUPS, make_scene, random_rotation
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from conftest import GROUPS, make_scene, random_rotation
 from pdrom.constraints.implementations import IMPLEMENTATIONS
 
 STATES = {

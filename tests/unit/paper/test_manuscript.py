@@ -3,8 +3,8 @@
 import re
 
 import pytest
-from conftest import ROOT
 
+from conftest import ROOT
 from pdrom.config import Study
 from pdrom.paper.bibliography import bibliography, cited_keys
 from pdrom.paper.macros import keys_of

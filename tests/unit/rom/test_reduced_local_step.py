@@ -136,9 +136,7 @@ def test_failed_method_spoils_its_axis_and_raises_nothing():
     v = basis.V.copy()
     v[2::3] = 0.0
     flat = Basis(**{**vars(basis), "V": v})
-    step = ReducedLocalStep(
-        InventedGroup(p[0]), Reduction(flat, select(flat, spec, R), spec, R)
-    )
+    step = ReducedLocalStep(InventedGroup(p[0]), Reduction(flat, select(flat, spec, R), spec, R))
     rhs = added(step)
     assert np.isnan(rhs[:, 2]).all()
     assert np.isfinite(rhs[:, :2]).all()
