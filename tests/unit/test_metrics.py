@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pdrom.metrics import relative_errors, squared_norms, trajectory_error
@@ -19,6 +19,7 @@ def test_known_errors():
     assert relative_errors(p, p_hat, 0.0) == pytest.approx([total, 0.6, 0.4, 0.0])
 
 
+@settings(deadline=None)
 @given(SEEDS)
 def test_agrees_with_norms_of_matrices(seed):
     rng = np.random.default_rng(seed)
@@ -28,6 +29,7 @@ def test_agrees_with_norms_of_matrices(seed):
     assert relative_errors(p, p_hat, 0.0) == pytest.approx([total, *axes])
 
 
+@settings(deadline=None)
 @given(SEEDS, st.floats(1e-6, 1e6))
 def test_relative_errors_have_no_unit(seed, unit):
     rng = np.random.default_rng(seed)

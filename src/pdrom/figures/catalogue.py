@@ -32,7 +32,7 @@ FIGURES = Registry(
 )
 
 # Kinds are methods of `Sources`; "table:name" is a file of results/tables.
-_RUNS = ("mesh", "run", "rerun")
+_RUNS = ("mesh", "run", "rerun", "table:sensitivity")
 READS: dict[str, tuple[str, ...]] = {
     "snapshots_and_modes": ("mesh", "run", "snapshots", "basis"),
     "deim_iterations": ("mesh", "basis", "sampling"),

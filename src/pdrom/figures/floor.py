@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.figures.sources import Sources
+from pdrom.figures.spec import FigureSpec
 from pdrom.store import read_table
 
 COLUMNS = ["scene", "perturbation", "frame", "relative_difference"]
@@ -28,3 +29,9 @@ def horizon(floor: pd.Series, threshold: float) -> int | None:
     """First frame at which the floor exceeds ``threshold``; None if it never does."""
     above = floor[~(floor <= threshold)]
     return int(above.index[0]) if len(above) else None
+
+
+def instant(sources: Sources, spec: FigureSpec, scene: str, frame: int) -> str:
+    """Label of a frame; one past the scene's horizon says so: there no run can be judged."""
+    end = horizon(floor_of(read_sensitivity(sources), scene, spec.perturbation), spec.threshold)
+    return f"frame {frame}" if end is None or frame <= end else f"frame {frame}, past horizon"

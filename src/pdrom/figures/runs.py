@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from pdrom.figures import style
 from pdrom.figures.camera import Camera, Window
+from pdrom.figures.floor import instant
 from pdrom.figures.panels import SLACK, RunPanel, centre_note, draw_run, fit_aspect, shared_window
 from pdrom.figures.read import (
     RerunInfo,
@@ -102,7 +103,7 @@ def draw_grid(sources: Sources, spec: FigureSpec) -> Figure:
     mesh = load_mesh(sources.mesh(scene))
     frames, full = positions_at(sources.run(scene), spec.frames)
     first = [
-        RunPanel(f"frame {f}", style.FULL_ORDER, q, reference=True)
+        RunPanel(instant(sources, spec, scene, f), style.FULL_ORDER, q, reference=True)
         for f, q in zip(frames, full, strict=True)
     ]
     table = [("full order", first, None)]
@@ -143,6 +144,7 @@ def _experiment_rows(
 ) -> list[Row]:
     frames, full = positions_at(sources.run(scene), spec.frames[-1:])
     frame, mesh = frames[0], load_mesh(sources.mesh(scene))
+    when = instant(sources, spec, scene, frame).replace(", ", "\n")
     reference = RunPanel("full order", style.FULL_ORDER, full[0], reference=True)
     runs = {}
     for method in methods:
@@ -155,11 +157,11 @@ def _experiment_rows(
     title = sources.title(scene, group)
     reference = reference.seen_by(camera)
     if all(panel.positions is None and not panel.failure for panel in everything):
-        label = f"{title}\nany method\nframe {frame}"
+        label = f"{title}\nany method\n{when}"
         return [Row(label, mesh, [reference], [window], full, NOTHING_RAN)]
     return [
         Row(
-            f"{title}\n{sources.holdings.title(method)}\nframe {frame}",
+            f"{title}\n{sources.holdings.title(method)}\n{when}",
             mesh,
             [reference, *panels],
             [window] * (len(panels) + 1),

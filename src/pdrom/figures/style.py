@@ -30,10 +30,10 @@ METHODS: dict[str, tuple[str, str]] = {
     "gappy": ("#7A5C00", "<"),
     "pod subspace": ("#5E3C99", "p"),
     "pod subspace, ecsw-1e-02": ("#1B6E6E", ">"),
-    "pod subspace, ecsw-1e-03": (GREEN, "d"),
+    "pod subspace, ecsw-1e-03": ("#3F6B00", "d"),
     "skinning subspace": ("#8B1A4A", "h"),
 }
-_RESERVE = (("#5A5A5A", "*"), ("#9A6A00", "8"), ("#3F6B00", "H"), ("#2B2B80", "1"))
+_RESERVE = (("#5A5A5A", "*"), ("#9A6A00", "8"), ("#6B3F00", "H"), ("#2B2B80", "1"))
 
 GROUPS: dict[str, tuple[str, str]] = {
     "bending": (GREEN, "^"),

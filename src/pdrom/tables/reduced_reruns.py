@@ -27,8 +27,8 @@ def reduced_reruns(
 
     ``reruns`` are the HDF5 files ``.../{scene}/{group}/{method}.h5``, ``hyper`` those of the
     subspaces ``.../{scene}/models.h5``, each with a table of the same name beside it. In a subspace
-    all groups are reduced, and r counts the evaluated elements. The error within the horizon uses the
-    frames before the horizon only; a run that blew up before has none.
+    all groups are reduced, and r counts the evaluated elements. The error within the horizon uses
+    the frames before it only; a run that blew up before has none.
     """
     table = _collect(reruns, hyper, sensitivity, perturbation, threshold, "train")
     return conform(_with_times(table, timings), "reduced_reruns")

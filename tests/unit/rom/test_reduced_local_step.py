@@ -76,7 +76,7 @@ def spec(request: pytest.FixtureRequest) -> MethodSpec:
 
 def test_adds_the_lifted_reconstruction(spec):
     """S^T W of `Reduction.reconstruct`, for projections that are not in the space."""
-    p, reduction = reduction_of(spec)
+    _, reduction = reduction_of(spec)
     other = np.random.default_rng(5).standard_normal((3, ROWS, 3))
     group = InventedGroup(other[0])
     step = ReducedLocalStep(group, reduction)

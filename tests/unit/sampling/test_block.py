@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from pdrom.sampling.block import block_elements
@@ -20,7 +20,10 @@ both = pytest.mark.parametrize("algorithm", [block_elements, block_qdeim_element
 
 
 def modes(size: tuple[int, int, int, int]) -> np.ndarray:
-    """Random orthonormal modes (rows * elements, r)."""
+    """Random orthonormal modes (rows * elements, r).
+
+    A square one has rows of norm 1 only: pivots are ties there, and tests of their order skip it.
+    """
     elements, rows, r, seed = size
     rng = np.random.default_rng(seed)
     n = elements * rows
@@ -33,6 +36,7 @@ def sampled(v: np.ndarray, elements: np.ndarray, size: int) -> np.ndarray:
 
 
 @both
+@settings(deadline=None)
 @given(size=SIZES)
 def test_one_distinct_element_per_mode_of_full_rank(algorithm: Select, size):
     v = modes(size)
@@ -44,14 +48,17 @@ def test_one_distinct_element_per_mode_of_full_rank(algorithm: Select, size):
 
 
 @both
+@settings(deadline=None)
 @given(size=SIZES, seed=st.integers(0, 2**32 - 1))
 def test_permuted_elements_are_picked_in_the_same_order(algorithm: Select, size, seed):
     v = modes(size)
+    assume(v.shape[0] > v.shape[1])
     order = np.random.default_rng(seed).permutation(size[0])
     permuted = v.reshape(size[0], size[1], -1)[order].reshape(v.shape)
     np.testing.assert_array_equal(order[algorithm(permuted, size[1])], algorithm(v, size[1]))
 
 
+@settings(deadline=None)
 @given(SIZES)
 def test_greedy_is_nested(size):
     v = modes(size)
@@ -61,9 +68,9 @@ def test_greedy_is_nested(size):
         np.testing.assert_array_equal(nested, elements[: len(nested)])
 
 
+@settings(deadline=None)
 @given(SIZES)
 def test_single_entries_as_elements_are_the_scalar_methods(size):
-    """A square V is left out: its rows all have norm 1, pivots are ties."""
     v = modes((size[0], 1, size[2], size[3]))
     assume(v.shape[0] > v.shape[1])
     np.testing.assert_array_equal(block_elements(v, 1), deim_entries(v))
@@ -71,6 +78,7 @@ def test_single_entries_as_elements_are_the_scalar_methods(size):
 
 
 @both
+@settings(deadline=None)
 @given(size=SIZES)
 def test_more_elements_have_a_smaller_gain(algorithm: Select, size):
     """sigma_min of a matrix does not fall when rows are added."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from pymor.algorithms.ei import deim as pymor_deim
 from pymor.vectorarrays.numpy import NumpyVectorSpace
@@ -32,6 +32,7 @@ def pymor_entries(v: np.ndarray) -> np.ndarray:
     return pymor_deim(NumpyVectorSpace(len(v)).from_numpy(v.copy()), pod=False)[0]
 
 
+@settings(deadline=None)
 @given(SIZES)
 def test_picks_the_entries_of_pymor(size):
     v = orthonormal(size)
@@ -43,6 +44,7 @@ def test_picks_the_entries_of_pymor_for_a_decaying_basis():
     np.testing.assert_array_equal(deim_entries(v), pymor_entries(v))
 
 
+@settings(deadline=None)
 @given(SIZES)
 def test_selection_is_nested_distinct_and_keeps_its_input(size):
     v = orthonormal(size)
@@ -54,6 +56,7 @@ def test_selection_is_nested_distinct_and_keeps_its_input(size):
         np.testing.assert_array_equal(deim_entries(v[:, :r]), entries[:r])
 
 
+@settings(deadline=None)
 @given(SIZES)
 def test_system_is_regular_and_follows_the_growth_bound(size):
     """|| (P^T V)^-1 || <= (1 + sqrt(2 n))^(r-1) / || v_1 ||_inf (lemma 3.2)."""
@@ -63,6 +66,7 @@ def test_system_is_regular_and_follows_the_growth_bound(size):
     assert gain <= (1.0 + np.sqrt(2.0 * n)) ** (r - 1) / np.abs(v[:, 0]).max() * (1.0 + 1e-10)
 
 
+@settings(deadline=None)
 @given(SIZES, st.integers(0, 2**32 - 1))
 def test_permuted_rows_are_picked_in_the_same_order(size, seed):
     v = orthonormal(size)
@@ -70,6 +74,7 @@ def test_permuted_rows_are_picked_in_the_same_order(size, seed):
     np.testing.assert_array_equal(order[deim_entries(v[order])], deim_entries(v))
 
 
+@settings(deadline=None)
 @given(SIZES, st.integers(0, 2**32 - 1))
 def test_signs_of_the_modes_do_not_matter(size, seed):
     v = orthonormal(size)
@@ -84,6 +89,7 @@ def test_known_selection():
     np.testing.assert_array_equal(deim_entries(np.eye(4)[:, [3, 1]]), [3, 1])
 
 
+@settings(deadline=None)
 @given(SIZES)
 def test_qdeim_takes_the_pivots_of_a_permuted_triangular_factorisation(size):
     """The pivots are distinct and give V^T P = Q R with |R_kk| >= the norm of what is left."""
@@ -98,6 +104,7 @@ def test_qdeim_takes_the_pivots_of_a_permuted_triangular_factorisation(size):
         assert abs(factor[k, k]) == pytest.approx(left, rel=1e-8)
 
 
+@settings(deadline=None)
 @given(SIZES)
 def test_qdeim_does_not_depend_on_the_basis_of_the_space(size):
     """Drmac and Gugercin 2016: V Q with orthogonal Q gives the same norms, hence the same pivots.

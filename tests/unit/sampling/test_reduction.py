@@ -76,7 +76,7 @@ def test_the_presets_are_those_of_the_study():
     assert len(EVERY) > 50
 
 
-@settings(max_examples=5)
+@settings(max_examples=5, deadline=None)
 @given(seed=SEEDS)
 @pytest.mark.parametrize("name", PROJECTIONS)
 def test_what_is_in_the_span_is_reproduced(name, seed):
@@ -88,7 +88,7 @@ def test_what_is_in_the_span_is_reproduced(name, seed):
     np.testing.assert_allclose(reduction.reconstruct(inside), inside, atol=tolerance)
 
 
-@settings(max_examples=5)
+@settings(max_examples=5, deadline=None)
 @given(seed=SEEDS)
 @pytest.mark.parametrize("name", EVERY)
 def test_reconstruction_stays_in_the_space_and_keeps_its_input(name, seed):
@@ -104,7 +104,7 @@ def test_reconstruction_stays_in_the_space_and_keeps_its_input(name, seed):
     np.testing.assert_allclose(result, inside, atol=1e-10 * np.abs(result).max())
 
 
-@settings(max_examples=5)
+@settings(max_examples=5, deadline=None)
 @given(seed=SEEDS)
 @pytest.mark.parametrize("name", UNWEIGHTED)
 def test_error_is_at_most_gain_times_that_of_the_best_approximation(name, seed):
@@ -120,7 +120,7 @@ def test_error_is_at_most_gain_times_that_of_the_best_approximation(name, seed):
     assert (np.linalg.norm(error, axis=(1, 2)) <= bound * (1.0 + 1e-10)).all()
 
 
-@settings(max_examples=20)
+@settings(max_examples=20, deadline=None)
 @given(seed=SEEDS)
 @pytest.mark.parametrize("name", [n for n in UNWEIGHTED if UNWEIGHTED[n].rows != "all"])
 def test_gain_is_the_norm_of_the_pseudo_inverse_and_attained(name, seed):
@@ -136,7 +136,7 @@ def test_gain_is_the_norm_of_the_pseudo_inverse_and_attained(name, seed):
     assert reduction.gain >= 1.0 - 1e-12
 
 
-@settings(max_examples=20)
+@settings(max_examples=20, deadline=None)
 @given(seed=SEEDS)
 @pytest.mark.parametrize("rows", ["scalar", "element"])
 def test_error_with_mass_weighting_has_its_factor_in_the_mass_norm(rows, seed):
@@ -288,7 +288,7 @@ def test_path_holds_the_selection_of_every_rank(name):
 
 
 def test_selection_is_what_the_specification_says():
-    """Each algorithm is reached: the four methods with single or whole rows pick differently."""
+    """Each algorithm is reached: no two methods pick the same entries."""
     p, mass = data(21)
     names = ("deim", "qdeim", "deim-joint", "block-deim", "block-qdeim")
     picks = set()
