@@ -1,0 +1,64 @@
+"""What a job leaves in its log, and what the user sees when it fails."""
+
+import logging
+
+import pytest
+
+from pdrom.errors import MeshError
+from pdrom.logs import job_log
+
+LOGGER = logging.getLogger("pdrom")
+
+
+@pytest.fixture
+def path(tmp_path):
+    """A log in a folder that does not exist yet."""
+    return tmp_path / "logs" / "rule" / "job.log"
+
+
+def test_messages_of_the_package_are_in_the_log(path):
+    with job_log(str(path)):
+        logging.getLogger("pdrom.mesh").info("made %d", 3)
+        logging.getLogger("pdrom.mesh").debug("hidden")
+        logging.getLogger("other").error("elsewhere")
+    text = path.read_text()
+    assert "INFO" in text
+    assert text.rstrip().endswith("pdrom.mesh: made 3")
+    assert len(text.splitlines()) == 1
+
+
+def test_a_new_job_starts_a_new_log(path):
+    for message in ("first", "second"):
+        with job_log(str(path)) as logger:
+            logger.info(message)
+    assert "second" in path.read_text()
+    assert "first" not in path.read_text()
+
+
+def test_a_mistake_of_the_user_is_one_line_without_traceback(path):
+    with pytest.raises(SystemExit) as caught, job_log(str(path)):
+        raise MeshError("a.obj: vertex 3 is nan")
+    assert caught.value.code == "pdrom: a.obj: vertex 3 is nan"
+    assert "MeshError: a.obj: vertex 3 is nan" in path.read_text()
+    assert "Traceback" not in path.read_text()
+
+
+def test_any_other_failure_keeps_its_traceback_in_the_log(path):
+    with pytest.raises(SystemExit) as caught, job_log(str(path)):
+        raise ZeroDivisionError("by zero")
+    assert caught.value.code == f"pdrom: ZeroDivisionError: by zero (traceback in {path})"
+    assert "Traceback" in path.read_text()
+    assert "test_logs.py" in path.read_text()
+
+
+@pytest.mark.parametrize("failure", [None, MeshError("x"), ValueError("x"), KeyboardInterrupt()])
+def test_logger_is_as_before_whatever_happened(path, failure):
+    before = (list(LOGGER.handlers), LOGGER.level)
+    try:
+        with job_log(str(path)):
+            assert len(LOGGER.handlers) == len(before[0]) + 1
+            if failure is not None:
+                raise failure
+    except (SystemExit, KeyboardInterrupt):
+        assert failure is not None
+    assert (list(LOGGER.handlers), LOGGER.level) == before
