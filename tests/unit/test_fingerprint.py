@@ -80,10 +80,10 @@ def test_strings_that_are_used_count():
     assert digest_of_source("f('a')") != digest_of_source("f('b')")
 
 
-def test_closure_follows_imports_also_inside_functions():
+def test_closure_follows_imports():
     found = closure("pdrom.fom.solvers")
-    assert found == ["pdrom.errors", "pdrom.fom", "pdrom.fom.solvers", "pdrom.registry"]
-    assert "pdrom.store" in closure("pdrom.fom.system")
+    assert found == ["pdrom.errors", "pdrom.fom.solvers", "pdrom.registry"]
+    assert {"pdrom.store", "pdrom.constraints.base"} < set(closure("pdrom.fom.system"))
     assert "pdrom.basis.pod" in closure("pdrom.subspace.model")
 
 
