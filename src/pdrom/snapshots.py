@@ -75,12 +75,17 @@ def collect(
     Raises
     ------
     SnapshotError
-        A split is empty or holds NaN or Inf.
+        A split is empty, lacks a training frame, or holds NaN or Inf.
     """
     p, frames, roundoff = _read(training_run, group.name)
     held, held_frames, _ = _read(heldout_run, group.name)
     is_train = np.isin(frames, train)
     odd = frames % 2 == 1
+    if not odd.any() or not len(train) or np.count_nonzero(is_train) < len(train):
+        raise SnapshotError(
+            f"{training_run}: snapshots of '{group.name}': stored are {len(frames)} frames, "
+            f"{np.count_nonzero(is_train)} of {len(train)} train frames and {odd.sum()} test frames"
+        )
     return SnapshotSet(
         train=p[is_train],
         test=p[odd],

@@ -57,8 +57,9 @@ def test_row_masses_hand_out_all_mass(group_scene, rng):
 
 def test_row_mass_of_springs_by_hand():
     """A vertex of valence v gives a v-th of its mass to each of its edges."""
-    scene = make_scene({"effect": "spring", "weight": 1.0}, mesh={"kind": "cloth", "rows": 3,
-                                                                   "columns": 3})
+    scene = make_scene(
+        {"effect": "spring", "weight": 1.0}, mesh={"kind": "cloth", "rows": 3, "columns": 3}
+    )
     group = scene.groups[0]
     ends = abs(group.S.toarray()) > 0
     valence = ends.sum(axis=0)
@@ -127,9 +128,9 @@ def test_file_round_trip(runs, tmp_path):
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda p: np.where(np.arange(p.size).reshape(p.shape) == 4, np.nan, p), "nan, finite"),
-        (lambda p: np.full_like(p, np.inf), "inf, finite"),
-        (lambda p: p[:0], "group 'spring' has no snapshots"),
+        (lambda p: np.where(np.arange(p.size).reshape(p.shape) == 4, np.nan, p), "is nan, finite"),
+        (lambda p: np.full_like(p, np.inf), "is inf, finite"),
+        (lambda p: p[:0], "has no snapshots"),
     ],
 )
 @pytest.mark.parametrize("which", ["train", "held"])
@@ -145,7 +146,7 @@ def test_faulty_snapshots_name_file_and_group(runs, tmp_path, spoil, message, wh
         file["snapshots/spring/p"] = p
         file["snapshots/spring/frames"] = store["frames"][: len(p)]
         file["snapshots/spring/roundoff"] = roundoff[: len(p)]
-    with pytest.raises(SnapshotError, match=rf"spoilt\.h5.*spring.*{message}|{message}"):
+    with pytest.raises(SnapshotError, match=rf"spoilt\.h5: .*'spring'.*{message}"):
         collect(paths["train"], paths["held"], scene.groups[0], scene.masses, np.array([0]))
 
 
@@ -159,9 +160,9 @@ def test_missing_group_is_named(runs, tmp_path):
         )
 
 
-@pytest.mark.parametrize("train", [np.array([], dtype=int), np.array([2])])
+@pytest.mark.parametrize("train", [np.array([], dtype=int), np.array([0, 2])])
 def test_training_frames_that_were_not_stored_are_an_error(runs, train):
     """The docstring promises a SnapshotError for an empty split."""
     scene, folder = runs
-    with pytest.raises(SnapshotError, match="train"):
+    with pytest.raises(SnapshotError, match=r"train\.h5: snapshots of 'spring'.* train frames"):
         collect(folder / "train.h5", folder / "held.h5", scene.groups[0], scene.masses, train)

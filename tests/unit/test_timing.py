@@ -74,9 +74,7 @@ def test_time_is_per_frame():
 
 def test_assembly_is_taken_out_of_the_local_step():
     steps = [Assembling(), Assembling()]
-    (result,) = measure(
-        [variant("a", [], [0.1] * 4, 2, local_steps=steps)], warmup=1, repeats=1
-    )
+    (result,) = measure([variant("a", [], [0.1] * 4, 2, local_steps=steps)], warmup=1, repeats=1)
     assert result.assembly == pytest.approx(2.0)
     assert result.local == pytest.approx(50.0 - 2.0)
     assert result.frame == pytest.approx(100.0)

@@ -18,6 +18,9 @@ from pdrom.basis.pod import fix_signs, pod
 # Columns that add less than this (relative) to the span are dropped.
 DEPENDENT = 1e-9
 
+# Motion below this fraction of the positions is round-off.
+ROUNDOFF = 100.0 * np.finfo(float).eps
+
 
 @dataclass(frozen=True)
 class Columns:
@@ -56,7 +59,9 @@ def displacement_modes(
     rest = weight * displacements
     rest = rest - affine @ (affine.T @ rest)
     modes, sigma = pod(rest)
-    useful = int(np.count_nonzero(sigma > DEPENDENT * max(sigma[0], np.finfo(float).tiny)))
+    # a motion that is affine altogether leaves nothing but round-off
+    noise = ROUNDOFF * float(np.linalg.norm(weight[:, :, None] * trajectory.transpose(1, 0, 2)))
+    useful = int(np.count_nonzero(sigma > max(DEPENDENT * sigma[0], noise)))
     return modes[:, : min(k, useful)] / weight
 
 

@@ -113,9 +113,25 @@ def test_modes_that_live_on_few_elements_do_not_stop_the_selection(algorithm: Se
 
 
 def test_greedy_residual_uses_all_entries_of_the_picked_element():
-    """The picked element determines two modes; a residual from one entry would pick it wrongly."""
+    """All entries of element 0 give coefficient 0, its first one alone 1 and then element 1."""
     v = np.zeros((9, 2))
-    v[0:3, 0], v[3:6, 0] = [2.0, 1.0, 0.0], [1.0, 0.0, 0.0]
-    v[0:3, 1], v[3:6, 1], v[6:9, 1] = [2.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.1]
-    # v_2 = v_1 + something on element 2 only
+    v[0:3, 0], v[0:3, 1] = [2.0, 1.0, 0.0], [2.0, -4.0, 0.0]
+    v[3, 0], v[8, 1] = 1.0, 0.1
     assert block_elements(v, 3).tolist() == [0, 2]
+
+
+@settings(deadline=None)
+@given(SIZES)
+def test_greedy_follows_its_definition(size):
+    """Residual of each mode with dense pseudo-inverses, element by element."""
+    v = modes(size)
+    picked: list[int] = []
+    for k in range(min(v.shape[1], size[0])):
+        residual = v[:, k]
+        if k:
+            rows = sampled(v, np.array(picked), size[1])
+            residual = residual - v[:, :k] @ (np.linalg.pinv(rows[:, :k]) @ rows[:, k])
+        norms = np.linalg.norm(residual.reshape(size[0], size[1]), axis=1)
+        norms[picked] = -1.0
+        picked.append(int(np.argmax(norms)))
+    assert block_elements(v, size[1]).tolist() == picked

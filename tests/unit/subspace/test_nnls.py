@@ -1,0 +1,111 @@
+"""Non-negative least squares with early stop, against SciPy and against all supports."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import nnls
+
+from pdrom.subspace.nnls import nnls_early_stop
+
+
+def dense(support, values, size) -> np.ndarray:
+    x = np.zeros(size)
+    x[support] = values
+    return x
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    m=st.integers(1, 25), e=st.integers(1, 25), seed=st.integers(0, 2**31), scale=st.floats(-6, 6)
+)
+def test_without_tolerance_it_is_the_method_of_lawson_and_hanson(m, e, seed, scale):
+    rng = np.random.default_rng(seed)
+    g = 10.0**scale * rng.standard_normal((m, e)) * 10.0 ** rng.uniform(-2, 2, e)
+    b = rng.standard_normal(m)
+    support, values = nnls_early_stop(g, b, 0.0)
+    x = dense(support, values, e)
+    best, norm = nnls(g, b)
+    assert (values > 0.0).all()
+    assert (np.diff(support) > 0).all()
+    assert np.linalg.norm(g @ x - b) <= norm + 1e-7 * np.linalg.norm(b)
+    np.testing.assert_allclose(g @ x, g @ best, atol=1e-5 * np.linalg.norm(b))
+
+
+@settings(max_examples=30, deadline=None)
+@given(m=st.integers(2, 6), e=st.integers(1, 6), seed=st.integers(0, 2**31))
+def test_no_other_support_is_better(m, e, seed):
+    """Least squares on every subset of columns whose solution is not negative."""
+    rng = np.random.default_rng(seed)
+    g, b = rng.standard_normal((m, e)), rng.standard_normal(m)
+    support, values = nnls_early_stop(g, b, 0.0)
+    mine = np.linalg.norm(g @ dense(support, values, e) - b)
+    best = np.linalg.norm(b)
+    for size in range(1, min(m, e) + 1):
+        for subset in combinations(range(e), size):
+            z = np.linalg.lstsq(g[:, subset], b, rcond=None)[0]
+            if (z >= 0.0).all():
+                best = min(best, np.linalg.norm(g[:, subset] @ z - b))
+    assert mine == pytest.approx(best, abs=1e-9)
+
+
+@pytest.mark.parametrize("tolerance", [0.5, 0.1, 1e-2, 1e-4])
+def test_stops_at_the_tolerance_with_few_columns(tolerance):
+    """Sum of many smooth columns: far fewer of them suffice."""
+    t = np.linspace(0.0, 1.0, 60)
+    g = np.exp(-np.outer(t, np.linspace(0.1, 5.0, 200)))
+    b = g.sum(axis=1)
+    support, values = nnls_early_stop(g, b, tolerance)
+    assert np.linalg.norm(g[:, support] @ values - b) <= tolerance * np.linalg.norm(b)
+    assert 0 < len(support) < 15
+    finer = nnls_early_stop(g, b, tolerance / 10.0)[0]
+    assert len(finer) >= len(support)
+
+
+def test_support_is_bounded(rng):
+    g = np.abs(rng.standard_normal((40, 60)))
+    b = g.sum(axis=1)
+    assert len(nnls_early_stop(g, b, 0.0)[0]) > 7
+    assert len(nnls_early_stop(g, b, 0.0, most=7)[0]) == 7
+    assert len(nnls_early_stop(g, b, 0.0, most=10**6)[0]) <= 40
+
+
+def test_exact_sparse_combination_is_found(rng):
+    g = rng.standard_normal((50, 20))
+    truth = dense([3, 7, 15], [2.0, 0.5, 1.0], 20)
+    support, values = nnls_early_stop(g, g @ truth, 1e-9)
+    np.testing.assert_allclose(dense(support, values, 20), truth, atol=1e-8)
+    assert support.tolist() == [3, 7, 15]
+
+
+@pytest.mark.parametrize(
+    ("g", "b", "expected"),
+    [
+        (np.eye(3), np.array([1.0, -1.0, 2.0]), {0: 1.0, 2: 2.0}),
+        (np.eye(3), -np.ones(3), {}),
+        (np.eye(3), np.zeros(3), {}),
+        (np.zeros((3, 4)), np.ones(3), {}),
+        (np.column_stack([np.zeros(2), [2.0, 0.0]]), np.array([4.0, 0.0]), {1: 2.0}),
+    ],
+)
+def test_known_solutions(g, b, expected):
+    support, values = nnls_early_stop(g, b, 0.0)
+    assert dict(zip(support.tolist(), values.tolist(), strict=True)) == pytest.approx(expected)
+
+
+def test_repeated_columns_end(rng):
+    column = np.abs(rng.standard_normal(30))
+    g = np.column_stack([column] * 10 + [2.0 * column] * 5)
+    support, values = nnls_early_stop(g, 3.0 * column + 1e-3, 0.0)
+    assert len(support) == 1
+    assert g[:, support] @ values == pytest.approx(3.0 * column, rel=0.1)
+
+
+def test_inputs_are_kept(rng):
+    g, b = rng.standard_normal((9, 7)), rng.standard_normal(9)
+    before = g.copy(), b.copy()
+    nnls_early_stop(g, b, 0.0)
+    np.testing.assert_array_equal(g, before[0])
+    np.testing.assert_array_equal(b, before[1])
