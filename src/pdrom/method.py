@@ -48,6 +48,8 @@ class MethodSpec(BasisSpec):
     selection : "greedy" residual (DEIM) or "pivoted-qr" (Q-DEIM)
     solve : of the sampled equations: "square", least squares by "qr", or normal equations with
         Tikhonov term ("tikhonov", the published code)
+    oversampling : elements per mode ("element" rows, greedy selection); see `sampling.oversample`
+    coefficients : "shared" by the axes or "per-axis"; None takes what the rows and the basis imply
     repeat_rows : whether the greedy may pick a row again (the published code does not exclude it)
     title : what the method is called in figures and tables
     """
@@ -57,6 +59,8 @@ class MethodSpec(BasisSpec):
     selection: Selection = "greedy"
     solve: Solve = "qr"
     repeat_rows: bool = False
+    oversampling: Annotated[int, Field(ge=1, le=100)] = 1
+    coefficients: Literal["shared", "per-axis"] | None = None
     tikhonov: Annotated[float, Field(gt=0.0, le=1.0)] = 1e-8
 
     @model_validator(mode="after")
@@ -65,14 +69,30 @@ class MethodSpec(BasisSpec):
             raise ValueError(f"rows = 'joint' with selection = '{self.selection}': only 'greedy'")
         if self.rows == "element" and self.solve == "square":
             raise ValueError("rows = 'element' with solve = 'square': allowed are qr, tikhonov")
-        if self.separate_axes and self.rows in ("scalar", "element"):
+        if self.oversampling > 1 and (self.rows, self.selection) != ("element", "greedy"):
             raise ValueError(
-                f"rows = '{self.rows}' with {self.layout}, {self.centring}: separate bases per "
-                "axis need rows = 'all' or 'joint'"
+                f"oversampling = {self.oversampling} with rows = '{self.rows}', selection = "
+                f"'{self.selection}': only rows = 'element' with selection = 'greedy'"
+            )
+        if self.separate_axes and self.coefficients == "shared":
+            raise ValueError(
+                f"coefficients = 'shared' with {self.layout}, {self.centring}: per-axis"
+            )
+        if self.per_axis and self.rows == "scalar":
+            raise ValueError(
+                f"rows = 'scalar' with {self.layout}, {self.centring}: separate coefficients per "
+                "axis need rows = 'all', 'joint' or 'element'"
             )
         if self.repeat_rows and self.solve == "square":
             raise ValueError("repeat_rows with solve = 'square': a repeated row is singular")
         return self
+
+    @property
+    def per_axis(self) -> bool:
+        """Whether each axis has coefficients of its own."""
+        if self.coefficients is not None:
+            return self.coefficients == "per-axis"
+        return self.rows == "joint" or self.separate_axes
 
     @property
     def separate_axes(self) -> bool:

@@ -10,6 +10,7 @@ from pdrom.errors import PdromError
 from pdrom.figures import FIGURES, FigureSpec, Holdings, figure_inputs, load_figures
 from pdrom.figures.sources import PUBLISHED
 from pdrom.fingerprint import fingerprint
+from pdrom.ladder import LadderSpec, load_ladder
 from pdrom.method import MethodSpec
 from pdrom.paper.textables import TEX_TABLES
 
@@ -17,7 +18,8 @@ RESULTS = "results"
 REFERENCE_BASIS = "none-none-vectorised"
 TABLES = (
     "singular_values", "reconstruction_error", "reduced_reruns", "accuracy_cost", "local_share",
-    "sensitivity", "heldout_reruns", "claims",
+    "sensitivity",
+    "ladder", "heldout_reruns", "claims",
 )  # fmt: skip
 
 
@@ -133,6 +135,22 @@ class Plan:
     def tables(self) -> list[str]:
         """All tables."""
         return [f"{RESULTS}/tables/{name}.csv" for name in TABLES]
+
+    # Ladder ---------------------------------------------------------------------------------
+
+    @cached_property
+    def ladder(self) -> LadderSpec:
+        """Ladder of config/ladder.yaml."""
+        return load_ladder(self.root / "config" / "ladder.yaml")
+
+    def ladder_rungs(self) -> dict[str, Any]:
+        """Plain ladder; which scenes climb it is no parameter of one climb."""
+        return {**self.ladder.model_dump(mode="json"), "scenes": []}
+
+    def ladder_files(self) -> list[str]:
+        """Files of the scenes that climb the ladder and are in this configuration."""
+        pairs = [(s, g) for s, g in self.study.experiments if s in self.ladder.scenes]
+        return [f"{RESULTS}/ladder/{scene}/{group}.csv" for scene, group in pairs]
 
     # Figures --------------------------------------------------------------------------------
 

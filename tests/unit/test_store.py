@@ -16,12 +16,17 @@ from pdrom.store import (
 )
 
 
+def fail_after(function, *args, **settings):
+    """A job that dies when it has written something."""
+    function(*args, **settings)
+    raise ZeroDivisionError
+
+
 def test_failure_leaves_the_old_file_and_no_other(tmp_path):
     path = tmp_path / "result.txt"
     path.write_text("old")
     with pytest.raises(ZeroDivisionError), atomic_path(path) as temporary:
-        temporary.write_text("half")
-        raise ZeroDivisionError
+        fail_after(temporary.write_text, "half")
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
 
@@ -43,8 +48,7 @@ def test_failed_hdf5_leaves_the_old_file(tmp_path):
         file["x"] = np.arange(3)
     before = path.read_bytes()
     with pytest.raises(ZeroDivisionError), write_hdf5(path) as file:
-        file["x"] = np.arange(9)
-        raise ZeroDivisionError
+        fail_after(file.create_dataset, "x", data=np.arange(9))
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
 

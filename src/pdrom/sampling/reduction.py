@@ -43,8 +43,7 @@ class Reduction:
     def __init__(self, basis: Basis, sampling: Sampling, spec: MethodSpec, r: int) -> None:
         self.basis, self.sampling, self.spec, self.r = basis, sampling, spec, r
         self.v = basis.truncated(r)
-        per_axis = spec.rows == "joint" or basis.separate_axes
-        axes = [int(a) for a in np.flatnonzero(basis.active_axes)] if per_axis else [None]
+        axes = [int(a) for a in np.flatnonzero(basis.active_axes)] if spec.per_axis else [None]
         self.blocks = [self._block(axis) for axis in axes]
 
     @property
@@ -57,10 +56,7 @@ class Reduction:
             entries = np.arange(len(self.v))[slice(None) if axis is None else slice(axis, None, 3)]
             matrix = self.v[entries]
             return Block(axis, entries, matrix, _orthogonal_operator(matrix))
-        entries = self.sampling.entries
-        if axis is not None:
-            rows = entries // 3
-            entries = 3 * rows + axis
+        entries = _entries_of(self.sampling.entries, self.spec.rows, axis)
         matrix = self.v[entries]
         operator = solution_operator(matrix, self.spec.solve, self.spec.tikhonov)
         return Block(axis, entries, matrix, operator)
@@ -103,6 +99,15 @@ class Reduction:
             sampled = matrix[:, block.entries] - self.basis.mean[block.entries]
             result[:, block.output] += (sampled @ block.operator.T) @ self.v[block.output].T
         return result.reshape(snapshots.shape)
+
+
+def _entries_of(entries: np.ndarray, rows: str, axis: int | None) -> np.ndarray:
+    """Entries that determine the coefficients of ``axis`` (None: of all axes)."""
+    if rows == "joint":
+        # one index stands for the whole row
+        axes = np.arange(3) if axis is None else np.array([axis])
+        return (3 * (entries // 3)[:, None] + axes).ravel()
+    return entries if axis is None else entries[entries % 3 == axis]
 
 
 def _orthogonal_operator(matrix: np.ndarray) -> np.ndarray:

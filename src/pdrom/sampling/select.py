@@ -10,6 +10,7 @@ from pdrom.sampling.block import block_elements
 from pdrom.sampling.block_qdeim import block_qdeim_elements
 from pdrom.sampling.deim import deim_entries
 from pdrom.sampling.joint import joint_rows
+from pdrom.sampling.oversample import extend_elements
 from pdrom.sampling.qdeim import qdeim_entries
 from pdrom.sampling.types import Sampling
 
@@ -53,7 +54,9 @@ def _element_path(
     size = 3 * basis.rows_per_element
     if spec.selection == "greedy":
         path = block_elements(v, size)
-        chosen = {r: path[:r] for r in ranks}
+        chosen = {
+            r: extend_elements(v[:, :r], size, path[:r], spec.oversampling * r) for r in ranks
+        }
     else:
         chosen = {r: block_qdeim_elements(v[:, :r], size) for r in ranks}
     counts = (basis.rows_per_element, basis.elements)

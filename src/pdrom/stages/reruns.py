@@ -54,7 +54,7 @@ def run_reduced(
     with write_hdf5(runs_output) as file:
         file.attrs.update(attributes({**labels, "spec": spec, "scene": scene}))
         for motion in RUNS:
-            case = _Case(scene_of(scene, mesh, motion), labels, method, space, sampling)
+            case = _Case(scene_of(scene, mesh, motion), motion, labels, method, space, sampling)
             store = file if motion == "train" else file.create_group(motion)
             rows = case.run(store, ranks[motion], runs[motion], blowup_extent, solver)
             write_table(pd.DataFrame(rows, columns=COLUMNS), tables[motion])
@@ -65,6 +65,7 @@ class _Case:
     """One motion of a scene with one method."""
 
     scene: Scene
+    motion: str
     labels: dict[str, str]
     method: MethodSpec
     basis: Basis
@@ -89,6 +90,8 @@ class _Case:
                 continue
             outcome = rerun(self.scene, system, self._local_steps(r), reference, limit)
             _store(store, outcome, displacement)
+            if self.motion == "train":
+                store["positions"] = outcome.positions.astype(np.float32)
             rows.append({**self.labels, "r": r, **_row(outcome, displacement)})
             log.info("r = %d: %d frames, blow-up %s", r, outcome.frames, outcome.blowup_frame)
         return rows
@@ -100,7 +103,6 @@ class _Case:
 
 
 def _store(store, outcome: Rerun, displacement: np.ndarray) -> None:
-    store["positions"] = outcome.positions.astype(np.float32)
     store["difference"] = outcome.difference
     store["error"] = outcome.difference / np.sqrt(np.mean(displacement**2))
     store["extent"] = outcome.extent

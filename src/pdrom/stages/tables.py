@@ -5,6 +5,7 @@ from typing import Any
 
 from pdrom.store import read_table, write_table
 from pdrom.tables.accuracy_cost import accuracy_cost
+from pdrom.tables.ladder import ladder
 from pdrom.tables.local_share import local_share
 from pdrom.tables.reconstruction_error import reconstruction_error
 from pdrom.tables.reduced_reruns import heldout_reruns, reduced_reruns
@@ -30,6 +31,7 @@ def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
         "heldout_reruns": lambda: heldout_reruns(
             inputs.runs, inputs.hyper, read_table(inputs.sensitivity), params.threshold
         ),
+        "ladder": lambda: ladder(inputs.parts),
         "accuracy_cost": lambda: accuracy_cost(
             read_table(inputs.reruns), inputs.timings, params.iterations
         ),

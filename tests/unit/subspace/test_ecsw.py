@@ -104,11 +104,11 @@ def test_a_finer_tolerance_gives_a_better_run(pulled):
     assert coarse > fine
 
 
-def test_training_equations_are_the_elements_forces_and_stiffness(pulled):
+def test_training_equations_are_the_elements_forces_and_stiffness(rng):
     """Element by element from the definition; hashing adds each equation to one row, signed."""
-    scene, run, columns = pulled
-    group = scene.group("strain")
-    states = in_space(scene, columns, run[6:7])
+    scene = SCENES["strain"]
+    group, columns = scene.groups[0], random_columns(scene, rng, 3)
+    states = rng.standard_normal((1, *scene.mesh.points.shape))
     y, p, k = states[0], group.rows_per_element, columns.B.shape[1]
     group.begin_frame(y)
     force, stiffness = np.zeros((2, 3 * k, group.elements))

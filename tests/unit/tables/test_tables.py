@@ -1,0 +1,357 @@
+"""Tables of the study from small files, against values worked out by hand."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pdrom.basis import Basis, save_basis
+from pdrom.errors import StorageError
+from pdrom.store import write_hdf5, write_table
+from pdrom.tables import COLUMNS, TIMING_COLUMNS
+from pdrom.tables.accuracy_cost import accuracy_cost, pareto
+from pdrom.tables.columns import conform
+from pdrom.tables.local_share import local_share
+from pdrom.tables.reconstruction_error import reconstruction_error
+from pdrom.tables.reduced_reruns import heldout_reruns, reduced_reruns
+from pdrom.tables.sensitivity import floor_of, horizons, sensitivity
+from pdrom.tables.singular_values import singular_values
+
+TIMING = [
+    "scene", "group", "method", "position_basis", "k", "r", "vertices", "implementation",
+    "ms_per_frame", "local_ms", "assembly_ms", "global_ms", "spread_ms", "repeats",
+]  # fmt: skip
+RERUN = [
+    "scene", "group", "method", "r", "frames", "finite", "blowup_frame", "max_extent",
+    "relative_error",
+]  # fmt: skip
+HYPER = [
+    "scene", "group", "method", "position_basis", "k", "r", "frames", "finite", "blowup_frame",
+    "max_extent", "relative_error",
+]  # fmt: skip
+
+
+def written(path, columns, *rows) -> str:
+    """CSV of rows given as mappings; missing cells stay empty."""
+    write_table(pd.DataFrame(list(rows), columns=columns), path)
+    return str(path)
+
+
+# Columns ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", COLUMNS)
+def test_conform_orders_and_drops(name):
+    table = pd.DataFrame([{c: i for i, c in enumerate(reversed(COLUMNS[name]))} | {"more": 1}])
+    result = conform(table.set_axis([5]), name)
+    assert tuple(result.columns) == COLUMNS[name]
+    assert list(result.index) == [0]
+
+
+def test_conform_names_what_is_missing():
+    with pytest.raises(StorageError, match=r"sensitivity: lacks the column\(s\) scene, frame"):
+        conform(pd.DataFrame({"perturbation": [1], "relative_difference": [2]}), "sensitivity")
+
+
+def test_timing_columns_exist():
+    for name, columns in TIMING_COLUMNS.items():
+        assert set(columns) <= set(COLUMNS[name])
+
+
+# Singular values ----------------------------------------------------------------------------------
+
+
+def basis_file(path, sigma, rank) -> str:
+    basis = Basis(
+        np.zeros((6, rank)), np.zeros(6), np.array(sigma), rank, 1e-9, 1, False, (True,) * 3
+    )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    save_basis(basis, path, {})
+    return str(path)
+
+
+def test_singular_values_with_their_share_and_round_off(tmp_path):
+    paths = [
+        basis_file(tmp_path / "b_scene" / "spring" / "x.h5", [4.0, 1.0, 1e-12], 2),
+        basis_file(tmp_path / "a_scene" / "bending" / "x.h5", [0.0, 0.0], 0),
+    ]
+    table = singular_values(paths)
+    assert tuple(table.columns) == COLUMNS["singular_values"]
+    assert table.scene.tolist() == ["b_scene"] * 3 + ["a_scene"] * 2
+    assert table.group.tolist() == ["spring"] * 3 + ["bending"] * 2
+    assert table.component.tolist() == [1, 2, 3, 1, 2]
+    assert table.relative[:3].tolist() == [1.0, 0.25, 2.5e-13]
+    assert table.relative[3:].isna().all()
+    assert table.above_roundoff.tolist() == [True, True, False, False, False]
+
+
+# Reconstruction -----------------------------------------------------------------------------------
+
+
+def test_reconstruction_keeps_order_and_empty_cells(tmp_path):
+    columns = COLUMNS["reconstruction_error"]
+    row = dict.fromkeys(columns, 1.0) | {"scene": "s", "group": "g", "method": "deim"}
+    empty = row | {"rows_sampled": None, "elements_sampled": None, "relative_error_z": None}
+    paths = [
+        written(tmp_path / "one.csv", columns, row | {"r": 20}, empty | {"r": 30}),
+        written(tmp_path / "two.csv", columns, row | {"r": 6}),
+    ]
+    table = reconstruction_error(paths)
+    assert table.r.tolist() == [20, 30, 6]
+    assert table.rows_sampled.dtype == "Int64"
+    assert table.elements_sampled.isna().tolist() == [False, True, False]
+    write_table(table, tmp_path / "t.csv")
+    cells = (tmp_path / "t.csv").read_text().splitlines()[2].split(",")
+    assert cells[columns.index("rows_sampled")] == cells[columns.index("relative_error_z")] == ""
+
+
+# Sensitivity --------------------------------------------------------------------------------------
+
+
+def sensitivity_files(tmp_path) -> list[str]:
+    """Scene a leaves the threshold in frame 2 (held out: 1), scene b never does."""
+    columns = ["scene", "perturbation", "seed", "frame", "relative_difference"]
+    values = {
+        ("a", "1e-10", 1): [0.0, 1e-9, 5e-3, 1e-9],
+        ("a", "1e-10", 2): [0.0, 2e-9, 1e-9, 1.0],
+        ("a", "1e-06", 1): [1.0] * 4,
+        ("a", "heldout", 1): [1e-12, 1.0, 1.0, 1.0],
+        ("b", "1e-10", 1): [1e-12, 3e-12, 2e-12, 1e-12],
+        ("b", "heldout", 1): [1e-12] * 4,
+    }
+    paths = []
+    for scene in ("a", "b"):
+        rows = [
+            dict(zip(columns, (*key, frame, v), strict=True))
+            for key, series in values.items()
+            if key[0] == scene
+            for frame, v in enumerate(series)
+        ]
+        paths.append(written(tmp_path / f"sensitivity_{scene}.csv", columns, *rows))
+    return paths
+
+
+def test_floor_is_the_largest_over_the_seeds(tmp_path):
+    table = sensitivity(sensitivity_files(tmp_path))
+    assert tuple(table.columns) == COLUMNS["sensitivity"]
+    assert floor_of(table, "a", 1e-10).tolist() == [0.0, 2e-9, 5e-3, 1.0]
+    assert floor_of(table, "a", "heldout").tolist() == [1e-12, 1.0, 1.0, 1.0]
+    shuffled = table.sample(frac=1.0, random_state=3)
+    assert floor_of(shuffled, "a", 1e-10).tolist() == [0.0, 2e-9, 5e-3, 1.0]
+
+
+def test_horizons_of_every_scene(tmp_path):
+    table = sensitivity(sensitivity_files(tmp_path))
+    assert horizons(table, 1e-10, 1e-3) == {"a": 2, "b": 4}
+    assert horizons(table, 1e-10, 1e-2) == {"a": 3, "b": 4}
+    assert horizons(table, 1e-6, 1e-3)["a"] == 0
+    assert horizons(table, "heldout", 1e-3) == {"a": 1, "b": 4}
+
+
+def test_floor_survives_a_file(tmp_path):
+    """Labels stay text when the table is read back."""
+    from pdrom.store import read_table
+
+    table = sensitivity(sensitivity_files(tmp_path))
+    write_table(table, tmp_path / "sensitivity.csv")
+    assert horizons(read_table(tmp_path / "sensitivity.csv"), 1e-10, 1e-3) == {"a": 2, "b": 4}
+
+
+# Reruns -------------------------------------------------------------------------------------------
+
+DISPLACEMENT = np.array([1.0, 2.0, 3.0, 4.0])
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Reruns of scene a (horizon 2) and b (whole), subspace runs of b, and their timings."""
+    reruns, hyper = [], []
+    cases = {
+        # differences of each run by frame; short ones blew up
+        "a": {6: [0.1, 0.2, 9.0, 9.0], 10: [0.5], 20: None},
+        "b": {6: [0.1, 0.1, 0.1, 0.1], 10: [0.2, 0.2]},
+    }
+    for scene, runs in cases.items():
+        folder = tmp_path / "reruns" / scene / "spring"
+        folder.mkdir(parents=True)
+        rows = []
+        with write_hdf5(folder / "deim.h5") as file:
+            for store in (file, file.create_group("heldout")):
+                store["displacement"] = DISPLACEMENT
+                for r, difference in runs.items():
+                    run = store.create_group(f"r{r:04d}")
+                    if difference is not None:
+                        run["difference"] = difference
+        for r, difference in runs.items():
+            row = {"scene": scene, "group": "spring", "method": "deim", "r": r, "frames": 0}
+            if difference is not None:
+                whole = len(difference) == 4
+                row |= {
+                    "frames": len(difference), "finite": whole, "max_extent": 1.5,
+                    "blowup_frame": None if whole else len(difference),
+                    "relative_error": 0.5 if whole else None,
+                }  # fmt: skip
+            rows.append(row)
+        for name in ("deim.csv", "deim_heldout.csv"):
+            written(folder / name, RERUN, *rows)
+        reruns.append(str(folder / "deim.h5"))
+    folder = tmp_path / "hyper" / "b"
+    folder.mkdir(parents=True)
+    models = {("pod", 8, "full"): [0.4] * 4, ("pod", 8, "ecsw-1e-02"): [0.8] * 4}
+    with write_hdf5(folder / "models.h5") as file:
+        for motion in ("train", "heldout"):
+            file[f"displacement/{motion}"] = DISPLACEMENT
+        for (base, k, method), difference in models.items():
+            for motion in ("train", "heldout"):
+                file[f"models/{base}_k{k:03d}_{method}/{motion}/difference"] = difference
+    rows = [
+        {"scene": "b", "group": "all", "method": m, "position_basis": p, "k": k, "r": 33,
+         "frames": 4, "finite": True, "max_extent": 1.0, "relative_error": 0.1}
+        for p, k, m in models
+    ]  # fmt: skip
+    for name in ("models.csv", "models_heldout.csv"):
+        written(folder / name, HYPER, *rows)
+    hyper.append(str(folder / "models.h5"))
+
+    def time(scene, implementation="compiled", ms=8.0, **labels):
+        return {
+            "scene": scene, "implementation": implementation, "ms_per_frame": ms,
+            "local_ms": ms / 2, "assembly_ms": 0.0, "global_ms": ms / 4, "vertices": 9, **labels,
+        }  # fmt: skip
+
+    local = {"group": "spring", "method": "deim"}
+    timings = [
+        written(
+            tmp_path / "timing_a.csv", TIMING, time("a"), time("a", "numpy", 80.0),
+            time("a", "interpreted", 900.0), time("a", ms=4.0, r=6, **local),
+            time("a", ms=5.0, r=10, **local),
+        ),
+        written(
+            tmp_path / "timing_b.csv", TIMING, time("b", ms=10.0), time("b", ms=2.0, r=6, **local),
+            time("b", ms=1.0, group="all", method="full", position_basis="pod", k=8),
+            time("b", ms=0.5, group="all", method="ecsw-1e-02", position_basis="pod", k=8),
+        ),
+    ]  # fmt: skip
+    table = sensitivity(sensitivity_files(tmp_path))
+    return reruns, hyper, timings, table
+
+
+def error(difference, end) -> float:
+    return np.linalg.norm(difference[:end]) / np.linalg.norm(DISPLACEMENT[:end])
+
+
+def test_errors_within_the_horizon(files):
+    reruns, hyper, timings, floor = files
+    table = reduced_reruns(reruns, hyper, timings, floor, 1e-10, 1e-3)
+    assert tuple(table.columns) == COLUMNS["reduced_reruns"]
+    within = table.relative_error_within_horizon
+    assert table.scene.tolist() == ["a", "a", "a", "b", "b", "b", "b"]
+    assert within[0] == pytest.approx(error([0.1, 0.2], 2))
+    assert within[[1, 2, 4]].isna().all()
+    assert within[3] == pytest.approx(error([0.1] * 4, 4))
+    assert within[5] == pytest.approx(error([0.4] * 4, 4))
+    assert within[6] == pytest.approx(error([0.8] * 4, 4))
+    assert table.horizon_frame.tolist() == [2, 2, 2, 4, 4, 4, 4]
+    assert table.sensitivity_floor[0] == 2e-9
+    assert table.sensitivity_floor[3] == 3e-12
+    assert table.position_basis.tolist() == ["full"] * 5 + ["pod"] * 2
+    assert table.k.isna().tolist() == [True] * 5 + [False] * 2
+    assert table.blowup_frame.isna().tolist() == [True, False, True, True, False, True, True]
+    assert table.finite.isna().tolist() == [False, False, True, False, False, False, False]
+
+
+def test_times_go_to_their_runs(files):
+    reruns, hyper, timings, floor = files
+    table = reduced_reruns(reruns, hyper, timings, floor, 1e-10, 1e-3)
+    expected = [4.0, 5.0, np.nan, 2.0, np.nan, 1.0, 0.5]
+    np.testing.assert_array_equal(table.ms_per_frame, expected)
+    np.testing.assert_allclose(table.speedup, [2.0, 1.6, np.nan, 5.0, np.nan, 10.0, 20.0])
+    np.testing.assert_allclose(table.local_ms, np.array(expected) / 2)
+    np.testing.assert_allclose(table.global_ms, np.array(expected) / 4)
+
+
+def test_there_need_be_no_subspace(files):
+    reruns, _, timings, floor = files
+    table = reduced_reruns(reruns, [], timings[:1] + timings[1:], floor, 1e-10, 1e-3)
+    assert len(table) == 5
+    assert table.k.isna().all()
+    assert table.ms_per_frame.notna().sum() == 3
+
+
+def test_held_out_runs_are_judged_by_their_own_horizon(files):
+    reruns, hyper, _, floor = files
+    table = heldout_reruns(reruns, hyper, floor, 1e-3)
+    assert tuple(table.columns) == COLUMNS["heldout_reruns"]
+    assert table.horizon_frame.tolist() == [1, 1, 1, 4, 4, 4, 4]
+    assert table.relative_error_within_horizon[0] == pytest.approx(0.1)
+    # it blew up in frame 1, which is behind the horizon
+    assert table.relative_error_within_horizon[1] == pytest.approx(0.5)
+
+
+def test_damaged_runs_are_named(files):
+    reruns, hyper, timings, floor = files
+    with open(reruns[0], "r+b") as file:
+        file.truncate(100)
+    with pytest.raises(StorageError, match=r"deim\.h5"):
+        reduced_reruns(reruns, hyper, timings, floor, 1e-10, 1e-3)
+
+
+# Accuracy against cost ----------------------------------------------------------------------------
+
+
+def test_pareto_by_hand():
+    assert pareto([0.0, 1.0, 2.0, 1.0], [5.0, 3.0, 1.0, 4.0]) == [True, True, True, False]
+    assert pareto([1.0, 1.0], [2.0, 2.0]) == [True, True]
+    assert pareto([1.0, 1.0], [2.0, 3.0]) == [True, False]
+    assert pareto([], []) == []
+
+
+POINTS = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=12)
+
+
+@given(POINTS)
+def test_pareto_keeps_what_nothing_beats(points):
+    error, cost = zip(*points, strict=True)
+    kept = pareto(np.array(error, float), np.array(cost, float))
+    front = [p for p, keep in zip(points, kept, strict=True) if keep]
+    assert front
+    for point, keep in zip(points, kept, strict=True):
+        beaten = any(q != point and q[0] <= point[0] and q[1] <= point[1] for q in front)
+        assert keep != beaten
+
+
+def test_accuracy_cost_holds_full_runs_and_reruns(files):
+    reruns, hyper, timings, floor = files
+    runs = reduced_reruns(reruns, hyper, timings, floor, 1e-10, 1e-3)
+    table = accuracy_cost(runs, timings, {"a": 10, "b": 20})
+    assert tuple(table.columns) == COLUMNS["accuracy_cost"]
+    points = list(zip(table.scene, table.method, table.ms_per_frame, strict=True))
+    assert points == [
+        ("a", "full", 8.0), ("a", "deim", 4.0),
+        ("b", "full", 10.0), ("b", "deim", 2.0), ("b", "full", 1.0), ("b", "ecsw-1e-02", 0.5),
+    ]  # fmt: skip
+    assert table.position_basis.tolist() == ["full", "full", "full", "full", "pod", "pod"]
+    assert table.iterations.tolist() == [10, 10, 20, 20, 20, 20]
+    assert table.relative_error_within_horizon[[0, 2]].tolist() == [0.0, 0.0]
+    assert table.pareto.tolist() == [True] * 6
+    slow = runs.assign(ms_per_frame=100.0)
+    assert accuracy_cost(slow, timings, {"a": 1, "b": 1}).pareto.tolist() == [
+        True, False, True, False, False, False,
+    ]  # fmt: skip
+
+
+# Local share --------------------------------------------------------------------------------------
+
+
+def test_local_share_counts_assembly_with_the_local_step(tmp_path, files):
+    _, _, timings, _ = files
+    table = local_share(timings)
+    assert tuple(table.columns) == COLUMNS["local_share"]
+    assert table.scene.tolist() == ["a", "a", "a", "b"]
+    assert table.implementation.tolist() == ["interpreted", "numpy", "compiled", "compiled"]
+    assert table.local_share.tolist() == pytest.approx([2 / 3] * 4)
+    row = {"scene": "c", "implementation": "numpy", "vertices": 4, "local_ms": 2.0,
+           "assembly_ms": 1.0, "global_ms": 1.0}  # fmt: skip
+    path = written(tmp_path / "c.csv", TIMING, row)
+    assert local_share([path]).local_share.tolist() == [0.75]

@@ -1,0 +1,78 @@
+"""Copies of the repository on which Snakemake plans."""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PARTS = ("Snakefile", "config", "paper/main.tex", "paper/references.bib", "src", "workflow")
+
+
+@dataclass(frozen=True)
+class Checkout:
+    """A clean copy of the parts of the repository that the workflow reads."""
+
+    folder: Path
+
+    def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run snakemake in the copy, on the copy's package."""
+        return subprocess.run(
+            [sys.executable, "-m", "snakemake", "--cores", "1", *arguments],
+            cwd=self.folder,
+            env={
+                **os.environ,
+                "PYTHONPATH": str(self.folder / "src"),
+                "PYTHONDONTWRITEBYTECODE": "1",
+                "XDG_CACHE_HOME": str(self.folder / ".cache"),
+            },
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+
+    def planned(self, *arguments: str) -> set[str]:
+        """Files that a run would make, by Snakemake's own summary of the plan."""
+        done = self.snakemake("-n", "--summary", *arguments)
+        assert done.returncode == 0, done.stderr
+        rows = [line.split("\t") for line in done.stdout.splitlines() if "\t" in line]
+        return {row[0] for row in rows[1:] if row[-1] == "update pending"}
+
+    def edit(self, path: str, old: str, new: str) -> None:
+        """Replace ``old``, which must be there, in one file."""
+        file = self.folder / path
+        text = file.read_text(encoding="utf-8")
+        assert old in text, f"{path} has no {old!r}"
+        file.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+@pytest.fixture(scope="session")
+def checkout_in() -> Callable[[Path], Checkout]:
+    """Copies the files that git knows (all files without caches, where there is no git)."""
+
+    def copy(folder: Path) -> Checkout:
+        for path in _files():
+            target = folder / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(ROOT / path, target)
+        return Checkout(folder)
+
+    return copy
+
+
+def _files() -> list[str]:
+    listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "--", *PARTS]
+    try:
+        done = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True)
+        files = [name for name in done.stdout.split("\0") if name]
+    except (OSError, subprocess.CalledProcessError):
+        found = [p for part in PARTS for p in ((ROOT / part), *(ROOT / part).rglob("*"))]
+        files = [str(p.relative_to(ROOT)) for p in found if "__pycache__" not in p.parts]
+    return [name for name in files if (ROOT / name).is_file()]
