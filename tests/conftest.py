@@ -5,8 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from pdrom.scene import Scene, SceneConfig
+
+# The same examples in every run: a failure can be repeated, and no run depends on the clock.
+settings.register_profile("pdrom", derandomize=True, deadline=None)
+settings.load_profile("pdrom")
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -5,6 +5,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from pdrom.claims import load_claims
 from pdrom.config import Study, StudySettings
 from pdrom.errors import PdromError
 from pdrom.figures import FIGURES, FigureSpec, Holdings, figure_inputs, load_figures
@@ -26,7 +27,9 @@ TABLES = (
 def load_plan(config: dict[str, Any], root: Path) -> "Plan":
     """Plan of a configuration; a faulty one ends the process with one line, before any job."""
     try:
-        return Plan(Study.load(config, root))
+        plan = Plan(Study.load(config, root))
+        plan.check()
+        return plan
     except PdromError as error:
         sys.exit(f"pdrom: {error}")
 
@@ -42,6 +45,10 @@ class Plan:
     def settings(self) -> StudySettings:
         """Checked settings of the study."""
         return self.study.settings
+
+    def check(self) -> None:
+        """Read the configuration of figures, ladder and claims, so that a fault shows early."""
+        _ = self.figure_specs, self.ladder, load_claims(self.root / "config" / "claims.yaml")
 
     # Parameters -----------------------------------------------------------------------------
 

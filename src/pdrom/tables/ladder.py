@@ -9,7 +9,7 @@ from pdrom.tables.columns import COLUMNS, conform
 
 
 def ladder(paths: Iterable[str]) -> pd.DataFrame:
-    """Concatenation of the per-scene files, in order; no row if a configuration has no such scene."""
+    """Concatenation of the per-scene files, in order; empty if there is none."""
     parts = [read_table(path) for path in paths]
     if not parts:
         return pd.DataFrame(columns=COLUMNS["ladder"])
