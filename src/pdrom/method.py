@@ -76,7 +76,7 @@ class MethodSpec(BasisSpec):
             )
         if self.separate_axes and self.coefficients == "shared":
             raise ValueError(
-                f"coefficients = 'shared' with {self.layout}, {self.centring}: per-axis"
+                f"coefficients = 'shared' with {self.layout}, {self.centring}: only 'per-axis'"
             )
         if self.per_axis and self.rows == "scalar":
             raise ValueError(

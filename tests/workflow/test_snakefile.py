@@ -1,12 +1,15 @@
-"""What the workflow plans: from nothing, for one figure, after edits, and with a faulty configuration."""
+"""What the workflow plans: from nothing, for one figure, after edits, with faults."""
 
+import os
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 import yaml
 
-from .conftest import Checkout
+from pdrom.plan import TABLES
+from workflow.conftest import Checkout
 
 MICRO = {
     "scenes": ["spring_oop", "strain_oop", "bar_release"],
@@ -59,10 +62,160 @@ def finished(finished_once: Checkout) -> Iterator[Checkout]:
     for path, (content, stat) in before.items():
         if path.read_bytes() != content:
             path.write_bytes(content)
-            _set_time(path, stat.st_mtime_ns)
+            os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
 
 
-def _set_time(path: Path, nanoseconds: int) -> None:
-    import os
+def test_a_fresh_clone_plans_the_whole_study(clean: Checkout) -> None:
+    done = clean.snakemake("-n")
+    assert done.returncode == 0, done.stderr
+    log = done.stdout + done.stderr
+    assert "Nothing to be done" not in log
+    assert "Manuscript paper/main.pdf" in log
+    assert int(re.search(r"^total +(\d+)$", log, re.MULTILINE)[1]) > 100
 
-    os.utime(path, ns=(nanoseconds, nanoseconds))
+
+def test_the_default_target_is_the_manuscript_with_all_tables_and_figures(clean: Checkout) -> None:
+    planned = clean.planned()
+    figures = yaml.safe_load((clean.folder / "config" / "figures.yaml").read_text())
+    wanted = {f"results/tables/{name}.csv" for name in TABLES}
+    wanted |= {f"results/figures/{name}.{kind}" for name in figures for kind in ("pdf", "png")}
+    assert wanted | {"paper/main.pdf"} <= planned
+
+
+def test_one_figure_needs_no_more_than_its_own_inputs(clean: Checkout) -> None:
+    figure = "results/figures/singular_values.pdf"
+    stages = {_stage(path) for path in clean.planned(figure)}
+    assert stages == {"meshes", "fom", "snapshots", "pod", "tables", "figures"}
+    planned = clean.planned(figure)
+    assert {p for p in planned if _stage(p) == "figures"} == {figure, figure[:-3] + "png"}
+    assert {p for p in planned if _stage(p) == "tables"} == {"results/tables/singular_values.csv"}
+
+
+def test_the_study_is_planned_without_thread_numbers_in_its_parameters(clean: Checkout) -> None:
+    assert clean.planned("--cores", "2") == clean.planned("--cores", "1")
+
+
+def test_nothing_to_do_when_finished(finished: Checkout) -> None:
+    done = finished.snakemake("-n", *MICRO_ARGUMENTS)
+    assert "Nothing to be done" in done.stdout + done.stderr
+
+
+def test_comments_and_docstrings_rerun_nothing(finished: Checkout) -> None:
+    spring = "src/pdrom/constraints/spring.py"
+    finished.edit(spring, '"""Edge springs:', '"""Springs along edges:')
+    finished.edit(spring, "    # scaled by", "    # divided by")
+    assert finished.planned(*MICRO_ARGUMENTS) == set()
+
+
+def test_a_kernel_reruns_the_scenes_that_use_it_and_what_follows(finished: Checkout) -> None:
+    finished.edit("src/pdrom/constraints/spring.py", "if largest == 0.0:", "if largest <= 0.0:")
+    planned = finished.planned(*MICRO_ARGUMENTS)
+    per_scene = {p for p in planned if _stage(p) not in ("tables", "figures", "paper")}
+    assert {p.split("/")[2].removesuffix(".csv") for p in per_scene} == {"spring_oop"}
+    stages = {"fom", "snapshots", "pod", "sampling", "reruns", "sensitivity", "timings"}
+    assert {_stage(p) for p in per_scene} == stages
+    assert "paper/main.pdf" in planned
+
+
+def test_a_threshold_of_a_claim_reruns_verdicts_and_manuscript_only(finished: Checkout) -> None:
+    finished.edit("config/claims.yaml", "threshold: 0.7", "threshold: 0.71")
+    planned = finished.planned(*MICRO_ARGUMENTS)
+    assert "paper/main.pdf" in planned
+    others = {p for p in planned if _stage(p) != "paper"}
+    assert others == {"results/tables/claims.csv"}
+
+
+def test_a_caption_rerenders_its_figure_and_the_manuscript_only(finished: Checkout) -> None:
+    finished.edit("config/figures.yaml", "Decay of the singular values", "Singular values")
+    planned = finished.planned(*MICRO_ARGUMENTS)
+    figure = {f"results/figures/singular_values.{kind}" for kind in ("pdf", "png")}
+    assert planned == {*figure, "paper/main.pdf"}
+
+
+def test_a_scene_reruns_alone(finished: Checkout) -> None:
+    finished.edit("config/scenes/strain_oop.yaml", "weight: 1.0e+7", "weight: 2.0e+7")
+    planned = finished.planned(*MICRO_ARGUMENTS)
+    per_scene = {p for p in planned if _stage(p) not in ("tables", "figures", "paper")}
+    assert {p.split("/")[2].removesuffix(".csv") for p in per_scene} == {"strain_oop"}
+
+
+SCENE = "config/scenes/spring_oop.yaml"
+FAULTS = {
+    "unknown key of the study": (
+        "config/default.yaml", "solver: cholespy", "sovler: cholespy",
+        ("config/default.yaml", "unknown key 'sovler'", "allowed: scenes, methods"),
+    ),
+    "unknown key of a scene": (
+        SCENE, "frames: 220", "frames: 220\nfriction: 1",
+        (SCENE, "unknown key 'friction'", "allowed: name, title, mesh"),
+    ),
+    "wrong type": (
+        SCENE, "frames: 220", "frames: many",
+        (SCENE, "frames = 'many'", "valid integer"),
+    ),
+    "pin that selects nothing": (
+        SCENE, "select: left", "select: []",
+        (SCENE, "pins", "selects no vertex"),
+    ),
+    "unknown side": (
+        SCENE, "select: left", "select: middle",
+        (SCENE, "pins", "middle", "left, right, bottom, top, back, front"),
+    ),
+    "unknown group": (
+        SCENE, "effect: spring, weight: 1.0e+6", "effect: rubber, weight: 1.0e+6",
+        (SCENE, "effects[3]", "'rubber'", "allowed: ", "tetrahedron_strain"),
+    ),
+    "unknown group to reduce": (
+        SCENE, "  spring: {train: 100}", "  strain: {train: 100}",
+        (SCENE, "reduce.strain", "allowed: spring"),
+    ),
+    "no basis vector": (
+        "config/default.yaml", "ranks: [6, 10, 20, full]", "ranks: [0, 10, 20, full]",
+        ("config/default.yaml", "ranks.0", "= 0", "greater than or equal to 1"),
+    ),
+    "negative weight": (
+        SCENE, "weight: 1.0e+6", "weight: -1.0",
+        (SCENE, "spring", "weight = -1.0", "greater than"),
+    ),
+    "missing mesh file": (
+        SCENE, "{kind: cloth, rows: 20, columns: 20, plane: xz}", "{kind: file, path: no.obj}",
+        (SCENE, "no.obj", "no such"),
+    ),
+    "unknown scene": (
+        "config/default.yaml", "  - cloth_all\n", "  - cloth_some\n",
+        ("scenes", "'cloth_some'", "allowed: bar_release"),
+    ),
+    "unknown method": (
+        "config/default.yaml", "methods: [pod,", "methods: [pood,",
+        ("methods", "'pood'", "allowed: pod"),
+    ),
+    "impossible combination": (
+        "config/methods.yaml", "rows: element, selection: greedy, solve: qr",
+        "rows: element, selection: greedy, solve: square",
+        ("config/methods.yaml", "block-deim", "allowed are qr, tikhonov"),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_faulty_configuration_ends_with_one_line_before_any_job(
+    fault: str, clean: Checkout
+) -> None:
+    path, old, new, expected = FAULTS[fault]
+    original = (clean.folder / path).read_text(encoding="utf-8")
+    try:
+        clean.edit(path, old, new)
+        done = clean.snakemake()
+    finally:
+        (clean.folder / path).write_text(original, encoding="utf-8")
+    assert done.returncode != 0
+    assert "Traceback" not in done.stdout + done.stderr
+    assert "Job stats" not in done.stdout + done.stderr
+    assert not (clean.folder / "results").exists()
+    (line,) = [line for line in done.stderr.splitlines() if line.startswith("pdrom:")]
+    assert [part for part in expected if part not in line] == [], line
+
+
+def _stage(path: str) -> str:
+    """Folder below results, "paper" for the manuscript."""
+    return path.removeprefix("results/").split("/")[0]

@@ -26,7 +26,7 @@ def bibliography(source: str, references: Path) -> str:
     Raises
     ------
     PaperError
-        A cited key is not in ``references``, or the file is not BibTeX.
+        A cited key is not in ``references`` or lacks a field, or the file is not BibTeX.
     """
     keys = cited_keys(source)
     set_strict_mode(False)
@@ -37,7 +37,10 @@ def bibliography(source: str, references: Path) -> str:
     missing = [key for key in keys if key not in database.entries]
     if missing:
         raise PaperError(f"{references}: no entry for {', '.join(missing)}")
-    formatted = list(Style().format_entries([database.entries[key] for key in keys]))
+    try:
+        formatted = list(Style().format_entries([database.entries[key] for key in keys]))
+    except PybtexError as error:
+        raise PaperError(f"{references}: {error}") from error
     backend = Backend(encoding="utf-8")
     lines = [r"\begin{thebibliography}{99}"]
     for entry in formatted:

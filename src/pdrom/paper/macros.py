@@ -13,6 +13,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from pdrom.errors import PaperError
@@ -96,13 +97,13 @@ def format_number(value: Any) -> str:
     """A cell as TeX: text escaped, integers plain, other numbers with two significant digits."""
     if isinstance(value, str):
         return escape(value)
-    if isinstance(value, bool):
+    if isinstance(value, bool | np.bool_):
         return "yes" if value else "no"
     number = float(value)
     if number != number:
         return MISSING
     if number in (float("inf"), float("-inf")):
-        return r"\ensuremath{\infty}"
+        return r"\ensuremath{\infty}" if number > 0.0 else r"\ensuremath{-\infty}"
     if number == int(number) and abs(number) < 1e6:
         return str(int(number))
     mantissa, exponent = f"{number:.1e}".split("e")

@@ -16,9 +16,10 @@ from pdrom.rom.rerun import Rerun, displacement_norms, replace_group, rerun
 from pdrom.sampling import Reduction, select
 from pdrom.snapshots import SPLITS, SnapshotSet, load_snapshots
 from pdrom.stages.scenes import scene_of
-from pdrom.store import open_hdf5, read_table, write_table
+from pdrom.store import open_hdf5, write_table
 from pdrom.tables.columns import COLUMNS
 from pdrom.tables.sensitivity import floor_of
+from pdrom.tables.sensitivity import sensitivity as largest_over_seeds
 
 log = logging.getLogger(__name__)
 
@@ -44,7 +45,7 @@ def climb(
     bound, data = scene_of(scene, mesh), load_snapshots(snapshots)
     with open_hdf5(fom) as file:
         reference = file["positions"][...]
-    spread = floor_of(read_table(sensitivity), labels["scene"], floor["perturbation"])
+    spread = floor_of(largest_over_seeds([sensitivity]), labels["scene"], floor["perturbation"])
     end = horizon(spread, floor["threshold"])
     displacement = displacement_norms(reference)
     system = bound.system

@@ -43,7 +43,7 @@ TABLES = {
         ("runs|error|count", "3"),
         ("study|scenes", "14"),
         ("study|ranks", "6, 10"),
-        ("study|threshold", "0.0010"),
+        ("study|threshold", r"\ensuremath{1.0\cdot 10^{-3}}"),
     ],
 )
 def test_keys_by_hand(key, expected):

@@ -8,6 +8,8 @@ from pdrom.errors import PaperError
 from pdrom.paper.tex import build_pdf, packages_of
 
 DOCUMENT = r"""\documentclass{article}
+\usepackage[T1]{fontenc}
+\usepackage{lmodern}
 \begin{document}
 \section{One}\label{sec:one}
 Section \ref{sec:one} and \cite{key}. \input{part}
@@ -61,7 +63,7 @@ def test_other_text_gives_other_bytes(built, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("Section", r"\nosuchcommand Section", r"! Undefined control sequence.* l\.4"),
+        ("Section", r"\nosuchcommand Section", r"! Undefined control sequence.* l\.6"),
         (r"\input{part}", r"\input{gone}", r"! LaTeX Error: File `gone.tex' not found"),
         (r"\ref{sec:one}", r"\ref{sec:two}", r"undefined references: sec:two"),
         (r"\cite{key}", r"\cite{other} \ref{a}", r"undefined references: a, other"),
