@@ -28,6 +28,7 @@ def test_presets_are_the_methods_of_the_literature():
         ),
         "block-deim": (*affine, "element", "greedy", "qr", False),
         "block-qdeim": (*affine, "element", "pivoted-qr", "qr", False),
+        "gappy": (*affine, "element", "greedy", "qr", False),
     }  # fmt: skip
     assert load_methods(PATH)["pod"].rows == "all"
     assert load_methods(PATH)["published"].tikhonov == 1e-8
@@ -45,7 +46,9 @@ def test_methods_with_the_same_basis_share_its_name():
         {"rows": "joint", "selection": "pivoted-qr"},
         {"rows": "element", "solve": "square"},
         {"rows": "scalar", "layout": "per-axis"},
-        {"rows": "element", "centring": "mean-in-modes"},
+        {"rows": "element", "centring": "mean-in-modes", "coefficients": "shared"},
+        {"rows": "scalar", "coefficients": "per-axis"},
+        {"rows": "element", "selection": "pivoted-qr", "oversampling": 2},
         {"rows": "joint", "solve": "square", "repeat_rows": True},
         {"rows": "vertices"},
         {"rows": "all", "oversampling": 3},

@@ -42,6 +42,17 @@ def test_name_appears_only_when_complete(tmp_path):
     assert list(path.parent.iterdir()) == [path]
 
 
+def test_who_reads_the_old_file_keeps_it(tmp_path):
+    """The new file takes the name, it is not written into the old one."""
+    path = tmp_path / "result.txt"
+    path.write_text("old")
+    with open(path) as reader:
+        with atomic_path(path) as temporary:
+            temporary.write_text("new and longer")
+        assert reader.read() == "old"
+    assert path.read_text() == "new and longer"
+
+
 def test_failed_hdf5_leaves_the_old_file(tmp_path):
     path = tmp_path / "result.h5"
     with write_hdf5(path) as file:

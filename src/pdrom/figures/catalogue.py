@@ -27,6 +27,7 @@ FIGURES = Registry(
         "local_share": f"{_PACKAGE}.local_share:draw",
         "sensitivity_floor": f"{_PACKAGE}.sensitivity_floor:draw",
         "run_error": f"{_PACKAGE}.run_error:draw",
+        "ladder": f"{_PACKAGE}.ladder:draw",
         "accuracy_cost": f"{_PACKAGE}.accuracy_cost:draw",
     },
 )
@@ -48,6 +49,7 @@ READS: dict[str, tuple[str, ...]] = {
     "local_share": ("table:local_share",),
     "sensitivity_floor": ("table:sensitivity",),
     "run_error": ("rerun", "table:sensitivity"),
+    "ladder": ("table:ladder",),
     "accuracy_cost": ("table:accuracy_cost",),
 }
 # Figures of the first experiment and the first method that a configuration holds.

@@ -38,7 +38,9 @@ SCENES = {
 FLAT = ("bend_fall",)  # scenes whose projections are round-off
 BLOWN_UP = ("spring_twist", "deim-joint", 10)  # scene, method, r of a run that fails
 BLOWUP_FRAME = 4
-TABLES = ("reconstruction_error", "singular_values", "local_share", "sensitivity", "accuracy_cost")
+TABLES = (
+    "reconstruction_error", "singular_values", "local_share", "sensitivity", "accuracy_cost", "ladder",
+)  # fmt: skip
 
 
 @dataclass
@@ -189,10 +191,17 @@ def _write_tables(sources, scenes, methods, rng) -> None:
         for frame in range(FRAMES)
     ]
     costs = [
-        (scene, method, "none", np.nan, r, 10, 1.0 / r, 0.2 * r, r == 14)
+        (scene, method, "full", np.nan, r, 10, 1.0 / r, 0.2 * r, r == 14)
         for scene in scenes
         for method in methods
         for r in (6, 14)
+    ]
+    costs += [(scene, "full", "full", np.nan, np.nan, 10, 0.0, 4.0, True) for scene in scenes]
+    rungs = [("up", "published code"), ("up", "+ affine"), ("down", "- QR"), ("signs", "signs 1")]
+    ladder = [
+        (scene, direction, rung, 10.0**i if i < 2 else np.inf, 0.1 * i if i else np.nan)
+        for scene in scenes
+        for i, (direction, rung) in enumerate(rungs)
     ]
     columns = {
         "singular_values": "scene group component singular_value relative above_roundoff",
@@ -201,8 +210,9 @@ def _write_tables(sources, scenes, methods, rng) -> None:
         "sensitivity": "scene perturbation frame relative_difference",
         "accuracy_cost": "scene method position_basis k r iterations relative_error_within_horizon"
         " ms_per_frame pareto",
+        "ladder": "scene direction rung gain relative_error_within_horizon",
     }
-    rows = dict(zip(columns, (values, errors, times, floors, costs), strict=True))
+    rows = dict(zip(columns, (values, errors, times, floors, costs, ladder), strict=True))
     for name, header in columns.items():
         write_table(pd.DataFrame(rows[name], columns=header.split()), sources.table(name))
 

@@ -74,8 +74,11 @@ def test_inputs_follow_the_configuration(specs):
         "results/meshes/sheet.h5",
         "results/fom/spring_twist/train.h5",
         "results/reruns/spring_twist/spring/block-deim.h5",
+        "results/tables/sensitivity.csv",
     ]
-    assert figure_inputs("bar_runs", specs["bar_runs"], holdings) == []
+    assert figure_inputs("bar_runs", specs["bar_runs"], holdings) == [
+        "results/tables/sensitivity.csv"
+    ]
     with pytest.raises(ConfigurationError, match="unknown figure"):
         figure_inputs("surprise", specs["bar_runs"], holdings)
 

@@ -35,8 +35,8 @@ def test_cited_entries_only_in_order(references):
     assert text.index(r"\bibitem{beta}") < text.index(r"\bibitem{alpha}")
     assert text.count(r"\bibitem") == 2
     assert "Unused" not in text
-    for piece in ("Béta", "DEIM", "2011", "Gamma", "2001"):
-        assert piece in text.replace(r"B{\'e}ta", "Béta").replace(r"B\'eta", "Béta")
+    for piece in ("Bea B{é}ta", "{DEIM}", "2011", "Cy~Gamma", r"Alpha \& more", "2001"):
+        assert piece in text
     assert text == bibliography(r"\cite{beta} \cite{alpha,beta}", references)
 
 

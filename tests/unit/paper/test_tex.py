@@ -10,6 +10,7 @@ from pdrom.paper.tex import build_pdf, packages_of
 DOCUMENT = r"""\documentclass{article}
 \usepackage[T1]{fontenc}
 \usepackage{lmodern}
+\pdftrailerid{}
 \begin{document}
 \section{One}\label{sec:one}
 Section \ref{sec:one} and \cite{key}. \input{part}
@@ -63,7 +64,7 @@ def test_other_text_gives_other_bytes(built, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("Section", r"\nosuchcommand Section", r"! Undefined control sequence.* l\.6"),
+        ("Section", r"\nosuchcommand Section", r"! Undefined control sequence.* l\.7"),
         (r"\input{part}", r"\input{gone}", r"! LaTeX Error: File `gone.tex' not found"),
         (r"\ref{sec:one}", r"\ref{sec:two}", r"undefined references: sec:two"),
         (r"\cite{key}", r"\cite{other} \ref{a}", r"undefined references: a, other"),

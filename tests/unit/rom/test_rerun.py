@@ -107,14 +107,17 @@ def test_a_small_basis_differs():
 def test_growth_beyond_the_limit_ends_the_run_with_its_last_frame():
     scene = scene_with("spring", frames=30)
     reference = trajectory(scene)
-    push = np.linspace(-1e5, 1e5, scene.mesh.vertices)[:, None] * [1.0, 0.0, 0.0]
-    result = rerun(scene, scene.system, [Pushing(push)], reference, 2.0)
-    assert 0 <= result.blowup_frame < 29
-    assert result.frames == result.blowup_frame + 1 == len(result.extent)
-    assert len(result.positions) == result.frames + 1
-    assert result.extent[-1] > 2.0
-    assert (result.extent[:-1] <= 2.0).all()
-    assert np.isfinite(result.positions).all()
+    push = np.linspace(-2e5, 2e5, scene.mesh.vertices)[:, None] * [1.0, 0.0, 0.0]
+    whole = rerun(scene, scene.system, [Pushing(push)], reference, np.inf)
+    assert (whole.blowup_frame, whole.frames) == (None, 30)
+    limit = float(np.median(whole.extent))
+    result = rerun(scene, scene.system, [Pushing(push)], reference, limit)
+    first = int(np.flatnonzero(whole.extent > limit)[0])
+    assert 0 < first < 29
+    assert result.blowup_frame == first
+    assert result.frames == first + 1 == len(result.extent)
+    np.testing.assert_array_equal(result.positions, whole.positions[: first + 2])
+    np.testing.assert_array_equal(result.difference, whole.difference[: first + 1])
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e308])

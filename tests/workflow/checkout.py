@@ -4,11 +4,8 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-
-import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PARTS = ("Snakefile", "config", "paper/main.tex", "paper/references.bib", "src", "workflow")
@@ -53,18 +50,13 @@ class Checkout:
         file.write_text(text.replace(old, new, 1), encoding="utf-8")
 
 
-@pytest.fixture(scope="session")
-def checkout_in() -> Callable[[Path], Checkout]:
-    """Copies the files that git knows (all files without caches, where there is no git)."""
-
-    def copy(folder: Path) -> Checkout:
-        for path in _files():
-            target = folder / path
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(ROOT / path, target)
-        return Checkout(folder)
-
-    return copy
+def copy_repository(folder: Path) -> Checkout:
+    """Copy the files that git knows (all but caches, where there is no git)."""
+    for path in _files():
+        target = folder / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(ROOT / path, target)
+    return Checkout(folder)
 
 
 def _files() -> list[str]:
