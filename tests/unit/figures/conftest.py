@@ -39,7 +39,8 @@ FLAT = ("bend_fall",)  # scenes whose projections are round-off
 BLOWN_UP = ("spring_twist", "deim-joint", 10)  # scene, method, r of a run that fails
 BLOWUP_FRAME = 4
 TABLES = (
-    "reconstruction_error", "singular_values", "local_share", "sensitivity", "accuracy_cost", "ladder",
+    "reconstruction_error", "singular_values", "local_share", "sensitivity", "accuracy_cost",
+    "ladder",
 )  # fmt: skip
 
 
