@@ -51,7 +51,7 @@ def measure(
             sample = _time_once(variant)
             if repeat >= 0:
                 samples[index].append(sample)
-        progress(repeat + 1, repeats)
+        progress(max(0, repeat + 1), repeats)
     return [_summary(v.labels, np.array(s)) for v, s in zip(variants, samples, strict=True)]
 
 
