@@ -1,0 +1,34 @@
+"""The scenes that verdicts rest on are well posed: round-off does not decide their motion."""
+
+import pytest
+from conftest import ROOT
+
+from pdrom.config import load_bound_scene
+from pdrom.fom.run import trajectory
+from pdrom.fom.sensitivity import perturbation_field, relative_difference
+
+WELL_POSED = sorted(
+    path.stem
+    for path in (ROOT / "config" / "scenes").glob("*.yaml")
+    if path.stem.endswith(("_twin", "_oop")) or path.stem == "bend_curved"
+)
+CHAOTIC = ["cloth_all", "spring_stretch", "spring_twist", "strain_stretch", "strain_twist"]
+
+
+def floor(name: str) -> float:
+    """Largest relative difference of a run that started 1e-10 of the extent apart."""
+    scene = load_bound_scene(ROOT, name)
+    other = trajectory(scene, perturbation_field(scene, 1e-10, seed=1))
+    return float(relative_difference(other, trajectory(scene)).max())
+
+
+@pytest.mark.parametrize("name", WELL_POSED)
+def test_floor_stays_below_one_in_ten_thousand(name):
+    assert floor(name) < 1e-4
+
+
+@pytest.mark.parametrize("name", CHAOTIC)
+def test_scenes_with_a_twin_need_one(name):
+    """Otherwise the twin would be there for nothing."""
+    assert f"{name}_twin" in WELL_POSED
+    assert floor(name) > 1e-3
