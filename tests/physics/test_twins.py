@@ -1,8 +1,8 @@
 """The scenes that verdicts rest on are well posed: round-off does not decide their motion."""
 
 import pytest
-from conftest import ROOT
 
+from conftest import ROOT
 from pdrom.config import load_bound_scene
 from pdrom.fom.run import trajectory
 from pdrom.fom.sensitivity import perturbation_field, relative_difference
