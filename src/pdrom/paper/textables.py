@@ -97,7 +97,7 @@ def reruns(tables: Tables) -> str:
         cells = [_rerun_cell(part[part.method == method]) for method in order]
         rows.append([name(scene), escape(group.replace("_", " ")), *cells])
     header = ["scene", "group", *(escape(m) for m in order)]
-    return longtable(header, rows, "ll" + "r" * len(order))
+    return tabular(header, rows, "ll" + "r" * len(order))
 
 
 def _rerun_cell(part: pd.DataFrame) -> str:

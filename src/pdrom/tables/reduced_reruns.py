@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pandas as pd
 
@@ -83,7 +84,7 @@ def _local_only(path: str, ends: dict[str, int], motion: str) -> pd.DataFrame:
         runs = file if motion == "train" else file[motion]
         displacement = runs["displacement"][...]
         table["relative_error_within_horizon"] = [
-            _error_within(runs[f"r{r:04d}"], displacement, end) for r in table.r
+            error_within(runs[f"r{r:04d}"], displacement, end) for r in table.r
         ]
     return table.assign(position_basis="full", k=None)
 
@@ -96,12 +97,12 @@ def _subspace(path: str, ends: dict[str, int], motion: str) -> pd.DataFrame:
         displacement = file[f"displacement/{motion}"][...]
         models = [f"{t.position_basis}_k{t.k:03d}_{t.method}" for t in table.itertuples()]
         table["relative_error_within_horizon"] = [
-            _error_within(file[f"models/{model}/{motion}"], displacement, end) for model in models
+            error_within(file[f"models/{model}/{motion}"], displacement, end) for model in models
         ]
     return table
 
 
-def _error_within(run, displacement: np.ndarray, end: int) -> float | None:
+def error_within(run: h5py.Group, displacement: np.ndarray, end: int) -> float | None:
     """Relative error over the frames before ``end``; None if the run did not get there."""
     if "difference" not in run or len(run["difference"]) < end:
         return None
