@@ -50,8 +50,7 @@ class MethodSpec(BasisSpec):
         Tikhonov term ("tikhonov", the published code)
     oversampling : elements per mode ("element" rows, greedy selection); see `sampling.oversample`
     coefficients : "shared" by the axes or "per-axis"; None takes what the rows and the basis imply
-    repeat_rows : whether the greedy may pick a row, or an element, again (the published code does
-        not exclude it); for "joint" and "element" rows
+    repeat_rows : whether the greedy may pick a row again (the published code does not exclude it)
     title : what the method is called in figures and tables
     """
 
@@ -86,13 +85,6 @@ class MethodSpec(BasisSpec):
             )
         if self.repeat_rows and self.solve == "square":
             raise ValueError("repeat_rows with solve = 'square': a repeated row is singular")
-        if self.repeat_rows and (
-            self.rows not in ("joint", "element") or self.selection != "greedy"
-        ):
-            raise ValueError(
-                f"repeat_rows with rows = '{self.rows}', selection = '{self.selection}': only "
-                "rows = 'joint' or 'element' with selection = 'greedy'"
-            )
         return self
 
     @property

@@ -7,7 +7,7 @@ from typing import Any
 
 from pdrom.claims import load_claims
 from pdrom.config import Study, StudySettings
-from pdrom.errors import ConfigurationError, PdromError
+from pdrom.errors import PdromError
 from pdrom.figures import FIGURES, FigureSpec, Holdings, figure_inputs, load_figures
 from pdrom.figures.sources import PUBLISHED
 from pdrom.fingerprint import fingerprint
@@ -48,8 +48,7 @@ class Plan:
 
     def check(self) -> None:
         """Read the configuration of figures, ladder and claims, so that a fault shows early."""
-        _ = self.figure_specs, self.ladder_files(".csv")
-        load_claims(self.root / "config" / "claims.yaml")
+        _ = self.figure_specs, self.ladder, load_claims(self.root / "config" / "claims.yaml")
 
     # Parameters -----------------------------------------------------------------------------
 
@@ -153,25 +152,12 @@ class Plan:
 
     def ladder_rungs(self) -> dict[str, Any]:
         """Plain ladder; which scenes climb it is no parameter of one climb."""
-        return {**self.ladder.model_dump(mode="json"), "scenes": {}}
+        return {**self.ladder.model_dump(mode="json"), "scenes": []}
 
-    def ladder_files(self, tail: str) -> list[str]:
-        """Files of the groups that climb the ladder and are in this configuration.
-
-        Raises
-        ------
-        ConfigurationError
-            The ladder names a group that its scene does not reduce.
-        """
-        pairs = self.study.experiments
-        for scene, groups in self.ladder.scenes.items():
-            missing = [g for g in groups if (scene, g) not in pairs and scene in self.study.scenes]
-            if missing:
-                raise ConfigurationError(
-                    f"config/ladder.yaml: {scene} does not reduce group '{missing[0]}' "
-                    f"(allowed: {', '.join(self.study.scenes[scene].reduce)})"
-                )
-        return [f"{RESULTS}/ladder/{s}/{g}{tail}" for s, g in pairs if self.ladder.climbs(s, g)]
+    def ladder_files(self) -> list[str]:
+        """Files of the scenes that climb the ladder and are in this configuration."""
+        pairs = [(s, g) for s, g in self.study.experiments if s in self.ladder.scenes]
+        return [f"{RESULTS}/ladder/{scene}/{group}.csv" for scene, group in pairs]
 
     # Figures --------------------------------------------------------------------------------
 

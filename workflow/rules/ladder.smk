@@ -4,16 +4,19 @@ rule ladder:
         mesh=lambda w: PLAN.mesh_path(w.scene),
         fom="results/fom/{scene}/train.h5",
         snapshots="results/snapshots/{scene}/{group}.h5",
+        sensitivity="results/sensitivity/{scene}.csv",
     output:
-        table="results/ladder/{scene}/{group}.csv",
-        runs="results/ladder/{scene}/{group}.h5",
+        "results/ladder/{scene}/{group}.csv",
     log:
         "results/logs/ladder/{scene}_{group}.log",
     params:
         scene=lambda w: PLAN.scene_config(w.scene),
         ladder=PLAN.ladder_rungs(),
+        floor={
+            "perturbation": PLAN.settings.sensitivity.reference,
+            "threshold": PLAN.settings.sensitivity.threshold,
+        },
         blowup_extent=PLAN.settings.blowup_extent,
-        solver=PLAN.settings.solver,
         code=lambda w: PLAN.scene_code("pdrom.stages.ladder", w.scene),
     message:
         "Ladder of {wildcards.group} in {wildcards.scene}"
@@ -23,17 +26,13 @@ rule ladder:
 
 rule ladder_table:
     input:
-        runs=PLAN.ladder_files(".h5"),
-        tables=PLAN.ladder_files(".csv"),
-        sensitivity="results/tables/sensitivity.csv",
+        parts=PLAN.ladder_files(),
     output:
         report("results/tables/ladder.csv", category="Tables"),
     log:
         "results/logs/tables/ladder.log",
     params:
         name="ladder",
-        perturbation=PLAN.settings.sensitivity.reference,
-        threshold=PLAN.settings.sensitivity.threshold,
         code=PLAN.code("pdrom.tables.ladder"),
     message:
         "Table of the ladder"

@@ -3,13 +3,11 @@
 import numpy as np
 
 
-def block_elements(v: np.ndarray, size: int, repeat: bool = False) -> np.ndarray:
+def block_elements(v: np.ndarray, size: int) -> np.ndarray:
     """Element indices (r,) of the basis ``v`` (size e, r), one per mode, nested in r.
 
     Mode k is fitted by the earlier modes on the entries of the elements taken so far (least
     squares, more equations than unknowns); the element with the largest residual norm follows.
-    With more equations than unknowns the residual does not vanish where it was sampled, so that an
-    element may come again; it does so only with ``repeat``.
     """
     blocks = v.reshape(-1, size, v.shape[1])
     taken = np.zeros(len(blocks), dtype=bool)
@@ -21,11 +19,10 @@ def block_elements(v: np.ndarray, size: int, repeat: bool = False) -> np.ndarray
             fit = np.linalg.lstsq(small[:, :k], small[:, k], rcond=None)[0]
             residual = residual - blocks[:, :, :k] @ fit
         norm = np.einsum("ei,ei->e", residual, residual)
-        if not repeat:
-            norm[taken] = -1.0
+        norm[taken] = -1.0
         element = int(np.argmax(norm))
         taken[element] = True
         elements.append(element)
-        if taken.all() and not repeat:
+        if taken.all():
             break
     return np.array(elements, dtype=np.int64)

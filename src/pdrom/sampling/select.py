@@ -53,18 +53,14 @@ def _element_path(
 ) -> dict[int, Sampling]:
     size = 3 * basis.rows_per_element
     if spec.selection == "greedy":
-        path = block_elements(v, size, spec.repeat_rows)
+        path = block_elements(v, size)
         chosen = {
-            r: extend_elements(v[:, :r], size, path[:r], spec.oversampling * r, spec.repeat_rows)
-            for r in ranks
+            r: extend_elements(v[:, :r], size, path[:r], spec.oversampling * r) for r in ranks
         }
     else:
         chosen = {r: block_qdeim_elements(v[:, :r], size) for r in ranks}
     counts = (basis.rows_per_element, basis.elements)
-    return {
-        r: Sampling.of_elements(elements, *counts, repeats=spec.repeat_rows)
-        for r, elements in chosen.items()
-    }
+    return {r: Sampling.of_elements(elements, *counts) for r, elements in chosen.items()}
 
 
 def _of_entries(entries: np.ndarray, basis: Basis, spec: MethodSpec) -> Sampling:

@@ -37,11 +37,9 @@ class Sampling:
         return cls(entries, touched[first])
 
     @classmethod
-    def of_elements(
-        cls, elements: np.ndarray, rows_per_element: int, total: int, repeats: bool = False
-    ) -> "Sampling":
-        """Sampling of all 3p entries of whole elements; SamplingError as in `of_entries`."""
+    def of_elements(cls, elements: np.ndarray, rows_per_element: int, total: int) -> "Sampling":
+        """Sampling of all 3p entries of whole elements."""
         elements = np.asarray(elements, dtype=np.int64)
         size = 3 * rows_per_element
         entries = (size * elements[:, None] + np.arange(size)).ravel()
-        return cls.of_entries(entries, rows_per_element, total, repeats)
+        return cls.of_entries(entries, rows_per_element, total)

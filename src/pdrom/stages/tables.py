@@ -31,9 +31,7 @@ def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
         "heldout_reruns": lambda: heldout_reruns(
             inputs.runs, inputs.hyper, read_table(inputs.sensitivity), params.threshold
         ),
-        "ladder": lambda: ladder(
-            inputs.runs, read_table(inputs.sensitivity), params.perturbation, params.threshold
-        ),
+        "ladder": lambda: ladder(inputs.parts),
         "accuracy_cost": lambda: accuracy_cost(
             read_table(inputs.reruns), inputs.timings, params.iterations
         ),

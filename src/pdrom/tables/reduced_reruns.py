@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pandas as pd
 
@@ -84,7 +83,7 @@ def _local_only(path: str, ends: dict[str, int], motion: str) -> pd.DataFrame:
         runs = file if motion == "train" else file[motion]
         displacement = runs["displacement"][...]
         table["relative_error_within_horizon"] = [
-            error_within(runs[f"r{r:04d}"], displacement, end) for r in table.r
+            _error_within(runs[f"r{r:04d}"], displacement, end) for r in table.r
         ]
     return table.assign(position_basis="full", k=None)
 
@@ -97,12 +96,12 @@ def _subspace(path: str, ends: dict[str, int], motion: str) -> pd.DataFrame:
         displacement = file[f"displacement/{motion}"][...]
         models = [f"{t.position_basis}_k{t.k:03d}_{t.method}" for t in table.itertuples()]
         table["relative_error_within_horizon"] = [
-            error_within(file[f"models/{model}/{motion}"], displacement, end) for model in models
+            _error_within(file[f"models/{model}/{motion}"], displacement, end) for model in models
         ]
     return table
 
 
-def error_within(run: h5py.Group, displacement: np.ndarray, end: int) -> float | None:
+def _error_within(run, displacement: np.ndarray, end: int) -> float | None:
     """Relative error over the frames before ``end``; None if the run did not get there."""
     if "difference" not in run or len(run["difference"]) < end:
         return None
