@@ -3,12 +3,13 @@
 import re
 
 import pytest
+from matplotlib.figure import Figure
 
 from conftest import ROOT
 from pdrom.config import Study
 from pdrom.paper.bibliography import bibliography, cited_keys
 from pdrom.paper.macros import keys_of
-from pdrom.paper.tex import packages_of
+from pdrom.paper.tex import build_pdf, packages_of
 from pdrom.plan import TABLES, Plan
 from pdrom.tables.columns import COLUMNS
 from pdrom.yamlfile import read_yaml
@@ -85,3 +86,23 @@ def test_every_figure_of_the_study_is_shown():
 def test_every_citation_has_an_entry():
     text = bibliography(SOURCE, ROOT / "paper" / "references.bib")
     assert text.count(r"\bibitem") == len(cited_keys(SOURCE)) > 10
+
+
+def test_the_same_inputs_give_the_same_bytes_in_every_folder(tmp_path):
+    """An included PDF brings the name of its file along unless the preamble suppresses it."""
+    settings = [line for line in SOURCE.splitlines() if line.startswith(r"\pdf")]
+    document = "\n".join(
+        [r"\documentclass{article}", r"\usepackage{graphicx}", *settings, r"\begin{document}",
+         r"\includegraphics{picture.pdf}", r"\end{document}"]
+    )  # fmt: skip
+    made = []
+    for name in ("one", "another"):
+        folder = tmp_path / name / "paper"
+        folder.mkdir(parents=True)
+        figure = Figure()
+        figure.subplots().plot([0, 1])
+        figure.savefig(folder / "picture.pdf", metadata={"CreationDate": None})
+        (folder / "main.tex").write_text(document, encoding="utf-8")
+        build_pdf(folder / "main.tex", tmp_path / name / "main.pdf", [])
+        made.append((tmp_path / name / "main.pdf").read_bytes())
+    assert made[0] == made[1]
