@@ -92,7 +92,8 @@ def test_the_same_inputs_give_the_same_bytes_in_every_folder(tmp_path):
     """An included PDF brings the name of its file along unless the preamble suppresses it."""
     settings = [line for line in SOURCE.splitlines() if line.startswith(r"\pdf")]
     document = "\n".join(
-        [r"\documentclass{article}", r"\usepackage{graphicx}", *settings, r"\begin{document}",
+        [r"\documentclass{article}", r"\usepackage[T1]{fontenc}", r"\usepackage{lmodern}",
+         r"\usepackage{graphicx}", *settings, r"\begin{document}",
          r"\includegraphics{picture.pdf}", r"\end{document}"]
     )  # fmt: skip
     made = []
