@@ -96,12 +96,21 @@ def _filter(table: pd.DataFrame, where: Mapping[str, tuple[Value, ...]]) -> pd.D
 
 
 def _full_rank_only(table: pd.DataFrame, where: dict) -> tuple[pd.DataFrame, dict]:
-    """Handles ``r: [full]``: the largest size that ran for each scene, group and method."""
+    """Handles ``r: [full]``: the largest size tried for each scene, group and method.
+
+    A run that blew up before its first frame was tried, too: leaving it out would put a smaller
+    size, which survived, in the place of full rank.
+    """
     if "r" not in where or "full" not in where["r"]:
         return table, where
-    ran = table[table.frames > 0]
+    ran = _tried(table)
     largest = ran.groupby(["scene", "group", "method"]).r.transform("max")
     return ran[ran.r == largest], {k: v for k, v in where.items() if k != "r"}
+
+
+def _tried(rows: pd.DataFrame) -> pd.DataFrame:
+    """Reruns that started: not the marked ones, whose size exceeds the numerical rank."""
+    return rows[(rows.frames > 0) | rows.blowup_frame.notna()]
 
 
 def _local_share(tables: Tables, where: dict) -> pd.Series:
@@ -111,19 +120,19 @@ def _local_share(tables: Tables, where: dict) -> pd.Series:
 def _rerun_error(tables: Tables, where: dict) -> pd.Series:
     """Error within the horizon; a run that blew up before its horizon counts as infinite."""
     table, where = _full_rank_only(tables["reduced_reruns"], where)
-    rows = _filter(table, where)
-    ran = rows[(rows.frames > 0) | rows.blowup_frame.notna()]
-    return ran.relative_error_within_horizon.fillna(np.inf)
+    return _tried(_filter(table, where)).relative_error_within_horizon.fillna(np.inf)
 
 
 def _error_growth(tables: Tables, where: dict) -> pd.Series:
-    """Error at the largest size over the error at the smallest one, per scene and method."""
-    rows = _filter(tables["reduced_reruns"], where)
-    rows = rows[(rows.frames > 0) | rows.blowup_frame.notna()]
+    """Error at the largest size over the error at the smallest one, per scene and method.
+
+    Zero where only the smallest size blew up; where both did there is no ratio.
+    """
+    rows = _tried(_filter(tables["reduced_reruns"], where))
     ratios = []
     for _, run in rows.groupby(["scene", "group", "method"], sort=False):
         ordered = run.sort_values("r").relative_error_within_horizon.fillna(np.inf).to_numpy()
-        if len(ordered) > 1 and np.isfinite(ordered[0]):
+        if len(ordered) > 1 and np.isfinite(ordered[[0, -1]]).any():
             ratios.append(ordered[-1] / ordered[0])
     return pd.Series(ratios, dtype=float)
 
@@ -182,13 +191,22 @@ def evaluate(test: TestRule, tables: Tables) -> Outcome:
     """Compare the rows of a test with its threshold."""
     values = METRICS[test.metric](tables, dict(test.where)).to_numpy(float)
     if len(values) == 0:
-        return Outcome(None, "no data", f"{test.what}: nothing to compare in this configuration")
+        return Outcome(None, "no data", f"{test.what}: {_why_empty(test, tables)}")
     passed = values >= test.threshold if test.compare == ">=" else values <= test.threshold
     good, total = int(passed.sum()), len(values)
     spread = _range(values)
     sign = "at least" if test.compare == ">=" else "at most"
     sentence = f"{test.what}: {good} of {total} {sign} {test.threshold:g} (measured {spread})"
     return Outcome(good >= test.share * total, spread, sentence)
+
+
+def _why_empty(test: TestRule, tables: Tables) -> str:
+    """Why a test has no values: reruns that could not start, or none in this configuration."""
+    if test.metric == "rerun_error":
+        where = {k: v for k, v in test.where.items() if k != "r"}
+        if len(_filter(tables["reduced_reruns"], where)):
+            return "no size can run, the numerical rank allows none"
+    return "nothing to compare in this configuration"
 
 
 def _range(values: np.ndarray) -> str:

@@ -19,6 +19,11 @@ RERUNS = [
     ("b", "spring", "deim", "full", None, 6, 10, None, 0.2, 1.0),
     ("b", "spring", "deim", "full", None, 30, 3, 2, None, 3.0),
     ("b", "spring", "pod", "full", None, 6, 0, 0, None, None),
+    ("c", "spring", "deim", "full", None, 6, 0, 0, None, None),
+    ("c", "spring", "deim", "full", None, 20, 10, None, 0.3, None),
+    ("c", "spring", "deim-joint", "full", None, 6, 10, None, 0.7, None),
+    ("c", "spring", "deim-joint", "full", None, 20, 0, 0, None, None),
+    ("c", "spring", "qdeim", "full", None, 6, 0, None, None, None),
     ("b", "all", "full", "pod", 8, 99, 10, None, 0.02, 1.0),
     ("b", "all", "full", "skinning", 8, 99, 10, None, 0.2, 1.0),
     ("b", "all", "full", "pod", 16, 99, 10, None, 0.01, 1.0),
@@ -87,6 +92,10 @@ def measured(metric: str, **where) -> list[float]:
         ("error_growth", {"scene": "a", "method": "deim"}, [4.0]),
         ("error_growth", {"scene": "b", "method": "deim"}, [np.inf]),
         ("error_growth", {"method": "pod"}, []),
+        ("error_growth", {"scene": "c", "method": "deim"}, [0.0]),
+        # full rank blew up at once: the smaller size must not stand in for it
+        ("rerun_error", {"scene": "c", "method": "deim-joint", "r": "full"}, [np.inf]),
+        ("rerun_error", {"scene": "c", "method": "qdeim"}, []),
         # a group whose singular values are all round-off has no decay
         ("singular_value_decay", {"component": 2}, [1e-2]),
         ("reconstruction_error", {}, [0.3, np.inf]),
@@ -120,7 +129,8 @@ def test_share_of_rows_that_must_pass(compare, threshold, share, passed):
 
 
 def test_sentence_counts_and_shows_the_spread():
-    outcome = evaluated(rule("rerun_error", "<=", 0.3, where={"method": ["deim"]}), tables())
+    where = {"method": ["deim"], "scene": ["a", "b"]}
+    outcome = evaluated(rule("rerun_error", "<=", 0.3, where=where), tables())
     assert outcome.sentence == "rows: 2 of 4 at most 0.3 (measured 0.1 to blow-up)"
     one = evaluated(rule("position_basis_ratio", "<=", 1.0), tables())
     assert one.sentence == "rows: 1 of 1 at most 1 (measured 0.1)"
@@ -186,6 +196,17 @@ def test_missing_data_are_said_to_be_missing(tmp_path):
     assert row.verdict == "cannot be decided"
     assert row.measured == "no data"
     assert row["why"] == "rows: nothing to compare in this configuration."
+
+
+def test_a_group_of_rank_zero_is_no_missing_scene():
+    """The run is in the configuration; it is the data that hold nothing to reduce."""
+    where = {"scene": ["c"], "method": ["qdeim"]}
+    outcome = evaluated(rule("rerun_error", where=where), tables())
+    assert outcome.passed is None
+    assert outcome.sentence == "rows: no size can run, the numerical rank allows none"
+    where = {"scene": ["absent"], "method": ["qdeim"]}
+    outcome = evaluated(rule("rerun_error", where=where), tables())
+    assert outcome.sentence == "rows: nothing to compare in this configuration"
 
 
 def test_a_threshold_flips_the_verdict(tmp_path):
