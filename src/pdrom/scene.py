@@ -21,6 +21,7 @@ from pdrom.constraints.base import ConstraintGroup, GroupConfig
 from pdrom.effects import EFFECTS
 from pdrom.effects.base import Boundary, Contact, Effect, EffectConfig, Force, Start
 from pdrom.errors import ConfigurationError, SceneError
+from pdrom.fom.anderson import Anderson
 from pdrom.fom.space import VertexSpace
 from pdrom.fom.stepper import LocalStep, State, Stepper
 from pdrom.fom.system import DEFAULT_SOLVER, GlobalSystem
@@ -64,6 +65,7 @@ class SceneConfig(_Model):
     mesh: MeshConfig
     time_step: Annotated[float, Field(gt=0.0, le=10.0)] = 0.016
     iterations: Annotated[int, Field(ge=1, le=10_000)] = 10
+    anderson_window: Annotated[int, Field(ge=0, le=50)] = 0
     frames: Annotated[int, Field(ge=1, le=1_000_000)]
     vertex_mass: Positive = 10.0
     effects: tuple[SerializeAsAny[EffectConfig], ...]
@@ -220,7 +222,13 @@ class Scene:
             self.config.iterations,
             self.groups if local_steps is None else local_steps,
             track_objective,
+            self.acceleration(),
         )
+
+    def acceleration(self) -> Anderson | None:
+        """Acceleration of the iterations, None if the scene asks for none."""
+        window = self.config.anderson_window
+        return Anderson(window) if window else None
 
     def space(self, system: GlobalSystem) -> VertexSpace:
         """Vertex positions as the coordinates of the step loop."""

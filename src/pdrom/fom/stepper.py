@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
+from pdrom.fom.anderson import Anderson
 from pdrom.fom.space import Space
 
 PHASES = ("inertia", "local", "global", "finish")
@@ -44,8 +45,8 @@ class State:
 class FrameReport:
     """What a frame did.
 
-    objective : (K,) value of 1/(2 h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) at the K local iterates;
-        empty if it was not tracked
+    objective : (K,) value of 1/(2 h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) at the K local iterates
+        (at a refused one the value of the last accepted); empty if it was not tracked
     seconds : (4,) time of each of `PHASES`
     """
 
@@ -63,11 +64,13 @@ class Stepper:
         iterations: int,
         local_steps: Sequence[LocalStep],
         track_objective: bool = True,
+        acceleration: Anderson | None = None,
     ) -> None:
         self.space = space
         self.time_step = time_step
         self.iterations = iterations
         self.local_steps = list(local_steps)
+        self._acceleration = acceleration
         self._track = track_objective
 
     def step(
@@ -89,6 +92,9 @@ class Stepper:
         for local in self.local_steps:
             local.begin_frame(state.positions)
         y, rhs = s.copy(), np.empty_like(s)
+        acceleration = self._acceleration
+        if acceleration is not None:
+            acceleration.begin_frame(y)
         objective = np.zeros(self.iterations if self._track else 0)
         seconds[0] = perf_counter() - started
         for k in range(self.iterations):
@@ -100,12 +106,20 @@ class Stepper:
             for local in self.local_steps:
                 energy += local.accumulate(y, rhs)
             between = perf_counter()
+            seconds[1] += between - before
             if self._track:
                 objective[k] = energy + space.inertia_energy(y - s)
-            tracked = perf_counter()
-            elimination.solve(rhs, y)
-            seconds[1] += between - before
-            seconds[2] += perf_counter() - tracked
+            before = perf_counter()
+            if acceleration is None:
+                elimination.solve(rhs, y)
+            elif acceleration.refuse(y, energy + space.inertia_energy(y - s)):
+                objective[k : k + 1] = objective[k - 1 : k]
+            else:
+                elimination.solve(rhs, y)
+                # the last image stays as it is: its objective is known not to rise
+                if k < self.iterations - 1:
+                    acceleration.combine(y)
+            seconds[2] += perf_counter() - before
         before = perf_counter()
         space.correct(y)
         velocities = (y - state.positions) / h

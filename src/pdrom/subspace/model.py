@@ -41,7 +41,9 @@ class SubspaceModel:
             steps.append(SubspaceLocalStep(group, self.columns, chosen.elements, chosen.factors))
         space = ReducedSpace(scene, self.columns, sum(step.matrix for step in steps))
         config = scene.config
-        loop = Stepper(space, config.time_step, config.iterations, steps, track_objective=False)
+        loop = Stepper(
+            space, config.time_step, config.iterations, steps, False, scene.acceleration()
+        )
         return loop, reduced_state(scene, self.columns)
 
     def positions(self, z: np.ndarray) -> np.ndarray:
