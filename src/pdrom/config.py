@@ -76,6 +76,26 @@ class Subspace(_Model):
     tolerances: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (3e-2, 1e-2, 1e-3)
 
 
+class Scaling(_Model):
+    """Cost against mesh size: factors on the vertices along a side for each scene.
+
+    ``training_frames`` frames train ``method`` with r modes (only the local step reduced) and
+    energy-conserving sampling to ``tolerance`` with k modes; ``frames`` are timed.
+    """
+
+    scenes: dict[str, tuple[Annotated[float, Field(gt=0.0, le=100.0)], ...]] = Field(
+        default_factory=dict
+    )
+    method: str = "block-deim"
+    r: Annotated[int, Field(ge=1, le=1000)] = 10
+    k: Annotated[int, Field(ge=1, le=1000)] = 20
+    tolerance: Annotated[float, Field(gt=0.0, lt=1.0)] = 1e-2
+    training_frames: Annotated[int, Field(ge=3, le=1000)] = 16
+    frames: Annotated[int, Field(ge=1)] = 3
+    warmup: Annotated[int, Field(ge=0)] = 1
+    repeats: Annotated[int, Field(ge=1)] = 5
+
+
 class StudySettings(_Model):
     """Content of config/default.yaml, possibly overridden by --configfile."""
 
@@ -90,6 +110,7 @@ class StudySettings(_Model):
     sensitivity: Sensitivity = Sensitivity()
     timing: Timing = Timing()
     subspace: Subspace = Subspace()
+    scaling: Scaling = Scaling()
 
     @model_validator(mode="after")
     def _known(self) -> Self:

@@ -20,7 +20,7 @@ REFERENCE_BASIS = "none-none-vectorised"
 TABLES = (
     "singular_values", "reconstruction_error", "reduced_reruns", "accuracy_cost", "local_share",
     "sensitivity",
-    "ladder", "heldout_reruns", "claims",
+    "ladder", "heldout_reruns", "scaling", "scaling_fit", "claims",
 )  # fmt: skip
 
 
@@ -158,6 +158,21 @@ class Plan:
         """Files of the scenes that climb the ladder and are in this configuration."""
         pairs = [(s, g) for s, g in self.study.experiments if s in self.ladder.scenes]
         return [f"{RESULTS}/ladder/{scene}/{group}.csv" for scene, group in pairs]
+
+    # Scaling --------------------------------------------------------------------------------
+
+    def scaling_files(self) -> list[str]:
+        """Parts of the table scaling, of the scenes that are in this configuration."""
+        return [
+            f"{RESULTS}/scaling/{scene}/x{factor:g}.csv"
+            for scene, factors in self.settings.scaling.scenes.items()
+            if scene in self.study.scenes
+            for factor in factors
+        ]
+
+    def scaling_settings(self) -> dict[str, Any]:
+        """Plain settings of a mesh size; which sizes there are is no parameter of one."""
+        return self.settings.scaling.model_dump(mode="json", exclude={"scenes"})
 
     # Figures --------------------------------------------------------------------------------
 

@@ -125,6 +125,38 @@ rule accuracy_cost_table:
         "../scripts/table.py"
 
 
+rule scaling_table:
+    input:
+        parts=PLAN.scaling_files(),
+    output:
+        report("results/tables/scaling.csv", category="Tables"),
+    log:
+        "results/logs/tables/scaling.log",
+    params:
+        name="scaling",
+        code=PLAN.code("pdrom.tables.scaling"),
+    message:
+        "Table of cost against mesh size"
+    script:
+        "../scripts/table.py"
+
+
+rule scaling_fit_table:
+    input:
+        table="results/tables/scaling.csv",
+    output:
+        report("results/tables/scaling_fit.csv", category="Tables"),
+    log:
+        "results/logs/tables/scaling_fit.log",
+    params:
+        name="scaling_fit",
+        code=PLAN.code("pdrom.tables.scaling"),
+    message:
+        "Exponents of cost against mesh size"
+    script:
+        "../scripts/table.py"
+
+
 rule claims_table:
     input:
         rules="config/claims.yaml",

@@ -23,6 +23,27 @@ rule timing:
         "../scripts/timing.py"
 
 
+rule scaling:
+    output:
+        "results/scaling/{scene}/x{factor}.csv",
+    log:
+        "results/logs/scaling/{scene}_x{factor}.log",
+    threads: workflow.cores or 1
+    params:
+        scene=lambda w: PLAN.scene_config(w.scene),
+        method=PLAN.settings.scaling.method,
+        spec=PLAN.method_spec(PLAN.settings.scaling.method),
+        settings=PLAN.scaling_settings(),
+        solver=PLAN.settings.solver,
+        root=str(PLAN.root),
+        factor=lambda w: float(w.factor),
+        code=lambda w: PLAN.scene_code("pdrom.stages.scaling", w.scene),
+    message:
+        "Cost of {wildcards.scene} on a mesh with {wildcards.factor} times the vertices along a side (alone)"
+    script:
+        "../scripts/scaling.py"
+
+
 rule machine:
     output:
         "results/machine.json",

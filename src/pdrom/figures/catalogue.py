@@ -29,6 +29,7 @@ FIGURES = Registry(
         "run_error": f"{_PACKAGE}.run_error:draw",
         "ladder": f"{_PACKAGE}.ladder:draw",
         "accuracy_cost": f"{_PACKAGE}.accuracy_cost:draw",
+        "scaling": f"{_PACKAGE}.scaling:draw",
     },
 )
 
@@ -51,6 +52,7 @@ READS: dict[str, tuple[str, ...]] = {
     "run_error": ("rerun", "table:sensitivity"),
     "ladder": ("table:ladder",),
     "accuracy_cost": ("table:accuracy_cost",),
+    "scaling": ("table:scaling", "table:scaling_fit"),
 }
 # Figures of the first experiment and the first method that a configuration holds.
 FIRST_ONLY = ("snapshots_and_modes", "deim_iterations")

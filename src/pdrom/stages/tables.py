@@ -9,6 +9,7 @@ from pdrom.tables.ladder import ladder
 from pdrom.tables.local_share import local_share
 from pdrom.tables.reconstruction_error import reconstruction_error
 from pdrom.tables.reduced_reruns import heldout_reruns, reduced_reruns
+from pdrom.tables.scaling import scaling, scaling_fit
 from pdrom.tables.sensitivity import sensitivity
 from pdrom.tables.singular_values import singular_values
 
@@ -31,6 +32,8 @@ def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
         "heldout_reruns": lambda: heldout_reruns(
             inputs.runs, inputs.hyper, read_table(inputs.sensitivity), params.threshold
         ),
+        "scaling": lambda: scaling(inputs.parts),
+        "scaling_fit": lambda: scaling_fit(read_table(inputs.table)),
         "ladder": lambda: ladder(inputs.parts),
         "accuracy_cost": lambda: accuracy_cost(
             read_table(inputs.reruns), inputs.timings, params.iterations

@@ -35,6 +35,12 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "scene", "group", "direction", "rung", "r", "condition", "gain", "error_train",
         "error_test", "error_heldout", "finite", "blowup_frame", "relative_error_within_horizon",
     ),
+    "scaling": (
+        "scene", "method", "vertices", "elements", "r", "k", "elements_sampled",
+        "factorisation_ms", "memory_mb", "ms_per_iteration", "local_ms", "global_ms",
+        "local_share",
+    ),
+    "scaling_fit": ("scene", "method", "quantity", "exponent", "points"),
     "claims": (
         "claim", "source", "paper", "measured", "verdict", "why", "figure_or_table",
     ),
@@ -45,8 +51,13 @@ TIMING_COLUMNS: dict[str, tuple[str, ...]] = {
     "reduced_reruns": ("ms_per_frame", "local_ms", "global_ms", "speedup"),
     "accuracy_cost": ("ms_per_frame", "pareto"),
     "local_share": ("local_ms", "assembly_ms", "global_ms", "local_share"),
+    "scaling": (
+        "factorisation_ms", "memory_mb", "ms_per_iteration", "local_ms", "global_ms",
+        "local_share",
+    ),
+    "scaling_fit": ("exponent",),
     "claims": ("measured", "verdict", "why"),
-}
+}  # fmt: skip
 
 
 def conform(table: pd.DataFrame, name: str) -> pd.DataFrame:

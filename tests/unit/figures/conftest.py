@@ -17,6 +17,7 @@ from pdrom.mesh.types import Mesh, save_mesh
 from pdrom.sampling.block import block_elements
 from pdrom.sampling.deim import deim_entries
 from pdrom.store import write_table
+from pdrom.tables.scaling import scaling_fit
 
 ROOT = Path(__file__).resolve().parents[3]
 FRAMES = 20
@@ -40,7 +41,7 @@ BLOWN_UP = ("spring_twist", "deim-joint", 10)  # scene, method, r of a run that 
 BLOWUP_FRAME = 4
 TABLES = (
     "reconstruction_error", "singular_values", "local_share", "sensitivity", "accuracy_cost",
-    "ladder",
+    "ladder", "scaling", "scaling_fit",
 )  # fmt: skip
 
 
@@ -216,6 +217,24 @@ def _write_tables(sources, scenes, methods, rng) -> None:
     rows = dict(zip(columns, (values, errors, times, floors, costs, ladder), strict=True))
     for name, header in columns.items():
         write_table(pd.DataFrame(rows[name], columns=header.split()), sources.table(name))
+    _write_scaling(sources, scenes)
+
+
+def _write_scaling(sources, scenes) -> None:
+    header = "scene method vertices ms_per_iteration local_ms global_ms factorisation_ms memory_mb"
+    rows = [
+        (scene, method, n, n * cost, 0.6 * n * cost, 0.4 * n * cost, *extra)
+        for scene in scenes
+        for n in (400, 1600, 10000)
+        for method, cost, extra in (
+            ("fom", 1e-4, (0.01 * n, 0.001 * n)),
+            ("block-deim", 5e-5, (np.nan, np.nan)),
+            ("ecsw", 1e-2 / n, (np.nan, np.nan)),
+        )
+    ]
+    table = pd.DataFrame(rows, columns=header.split())
+    write_table(table, sources.table("scaling"))
+    write_table(scaling_fit(table), sources.table("scaling_fit"))
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,14 @@
+from pdrom.logs import job_log
+from pdrom.stages.scaling import scale_scene
+
+with job_log(snakemake.log[0]):
+    scale_scene(
+        snakemake.params.scene,
+        snakemake.params.factor,
+        snakemake.params.method,
+        snakemake.params.spec,
+        snakemake.params.settings,
+        snakemake.params.solver,
+        snakemake.params.root,
+        snakemake.output[0],
+    )
