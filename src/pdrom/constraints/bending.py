@@ -139,7 +139,7 @@ class VertexBending(ConstraintGroup):
         effect: Literal["bending"] = "bending"
 
     rows_per_element = 1
-    split_from = 4096
+    split_from = 8192
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)

@@ -10,7 +10,7 @@ branches, only selections. No fast-math: an element gives the same bits in every
 import numpy as np
 from numba import njit
 
-LANES = 16
+LANES = 32
 
 # added to a scale: keeps it away from numbers whose reciprocal overflows
 SMALLEST = 1e-300

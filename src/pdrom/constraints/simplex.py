@@ -15,15 +15,14 @@ from pdrom.constraints.lanes import (
     blocks,
     lane_function,
     load,
-    mix3,
     pack,
     save,
     workspace,
 )
 from pdrom.constraints.parts import Parts
 
-# numbers of a lane in the working array: edges, S q, p, forces on the corners, energy
-EDGE, F, P, FORCE, ENERGY, OWN = 0, 9, 18, 27, 39, 40
+# numbers of a lane in the working array: edges, S q, p, forces on the corners but 0, energy
+EDGE, F, P, FORCE, ENERGY, OWN = 0, 9, 18, 27, 36, 37
 # number of a lane in the packed geometry, before the operator and what else a group has
 WEIGHT, OPERATOR = 0, 1
 
@@ -49,10 +48,13 @@ class SimplexGroup(StencilGroup):
         super()._assemble(vertices)
         e, m = self.stencil.shape
         self._corners = pack(np.asarray(self.stencil, dtype=np.int32))
-        self._numbers = np.column_stack([self.weights, *self._extra()])
-        self._geometry = pack(self._numbers)
+        numbers = np.column_stack([self.weights, *self._extra()])
+        self._geometry = pack(numbers)
+        # the copies that fill up the last block have no energy
+        by_lane = self._geometry.reshape(-1, numbers.shape[1], LANES)
+        by_lane[-1, WEIGHT, e - LANES * (blocks(e) - 1) :] = 0.0
         self._work = [workspace(self.work_size) for _ in range(2)]
-        self._taken = (np.empty(m * LANES, np.int32), workspace(self._numbers.shape[1]))
+        self._taken = (np.empty(m * LANES, np.int32), workspace(numbers.shape[1]))
         self._parts = Parts(
             blocks(e), e >= self.split_from, vertices, lambda block: self.stencil[block * LANES :]
         )
@@ -94,28 +96,41 @@ def gather_edges(y, corners, block, rows, work):
 
 
 @lane_function
-def store_forces(work, lane, first, second, third):
-    """Forces on the corners 1, 2 and 3; corner 0 gets what makes their sum zero."""
-    save(work, FORCE, lane, mix3(-1.0, first, -1.0, second, -1.0, third))
-    save(work, FORCE + 3, lane, first)
-    save(work, FORCE + 6, lane, second)
-    save(work, FORCE + 9, lane, third)
+def scatter(work, corners, block, rows, elements, rhs):
+    """Add the forces of a block, of ``elements`` in all, to the vertices.
+
+    Forces on the corners 1, 2, ... are given; corner 0 gets what makes their sum zero.
+    """
+    for lane in range(min(LANES, elements - block * LANES)):
+        base = block * (rows + 1) * LANES + lane
+        x, y, z = 0.0, 0.0, 0.0
+        for i in range(rows):
+            v = corners[base + (i + 1) * LANES]
+            fx, fy, fz = load(work, FORCE + 3 * i, lane)
+            rhs[v, 0] += fx
+            rhs[v, 1] += fy
+            rhs[v, 2] += fz
+            x, y, z = x + fx, y + fy, z + fz
+        v = corners[base]
+        rhs[v, 0] -= x
+        rhs[v, 1] -= y
+        rhs[v, 2] -= z
 
 
 @lane_function
-def scatter(work, corners, block, rows, elements, rhs):
-    """Add the forces of a block, of ``elements`` in all, to the vertices; its energy, twice."""
-    energy = 0.0
-    for lane in range(min(LANES, elements - block * LANES)):
-        base = block * (rows + 1) * LANES + lane
-        for i in range(rows + 1):
-            v = corners[base + i * LANES]
-            force = load(work, FORCE + 3 * i, lane)
-            rhs[v, 0] += force[0]
-            rhs[v, 1] += force[1]
-            rhs[v, 2] += force[2]
-        energy += work[ENERGY * LANES + lane]
-    return energy
+def start_energy(work):
+    """Set the sums of w |S q - p|^2 to zero."""
+    for lane in range(LANES):
+        work[ENERGY * LANES + lane] = 0.0
+
+
+@lane_function
+def energy(work):
+    """Energy of all blocks since `start_energy`."""
+    total = 0.0
+    for lane in range(LANES):
+        total += work[ENERGY * LANES + lane]
+    return 0.5 * total
 
 
 @lane_function

@@ -22,12 +22,14 @@ from pdrom.constraints.lanes import (
 from pdrom.constraints.simplex import (
     EDGE,
     ENERGY,
+    FORCE,
     WEIGHT,
     P,
     SimplexGroup,
+    energy,
     gather_edges,
     scatter,
-    store_forces,
+    start_energy,
     store_projections,
 )
 from pdrom.mesh.types import Mesh
@@ -52,12 +54,12 @@ def _rest_lengths(work, geometry, block):
 
 @lane_function
 def _forces(work, geometry, block):
-    """Weighted forces S^T W p on both ends, and w |S q - p|^2."""
+    """Weighted forces S^T W p on the end, and w |S q - p|^2."""
     weight = (block * GEOMETRY + WEIGHT) * LANES
     for lane in range(LANES):
-        p, w, zero = load(work, P, lane), geometry[weight + lane], (0.0, 0.0, 0.0)
-        store_forces(work, lane, scaled(w, p), zero, zero)
-        work[ENERGY * LANES + lane] = w * square_distance(load(work, EDGE, lane), p)
+        p, w = load(work, P, lane), geometry[weight + lane]
+        save(work, FORCE, lane, scaled(w, p))
+        work[ENERGY * LANES + lane] += w * square_distance(load(work, EDGE, lane), p)
 
 
 @kernel
@@ -72,13 +74,13 @@ def _project(y, corners, geometry, elements, taken, taken_geometry, work, p):
 
 @kernel
 def _accumulate(y, corners, geometry, first, last, elements, work, rhs):
-    energy = 0.0
+    start_energy(work)
     for block in range(first, last):
         gather_edges(y, corners, block, 1, work)
         _rest_lengths(work, geometry, block)
         _forces(work, geometry, block)
-        energy += scatter(work, corners, block, 1, elements, rhs)
-    return 0.5 * energy
+        scatter(work, corners, block, 1, elements, rhs)
+    return energy(work)
 
 
 class EdgeSpring(SimplexGroup):
@@ -95,7 +97,7 @@ class EdgeSpring(SimplexGroup):
 
     rows_per_element = 1
     per_element = ("rest",)
-    split_from = 8192
+    split_from = 16384
     project_kernel = staticmethod(_project)
     accumulate_kernel = staticmethod(_accumulate)
 

@@ -19,15 +19,17 @@ from pdrom.constraints.polar3 import rotation_block, within_range_block
 from pdrom.constraints.simplex import (
     EDGE,
     ENERGY,
+    FORCE,
     OPERATOR,
     OWN,
     WEIGHT,
     F,
     P,
     SimplexGroup,
+    energy,
     gather_edges,
     scatter,
-    store_forces,
+    start_energy,
     store_projections,
 )
 from pdrom.mesh.types import Mesh
@@ -75,14 +77,10 @@ def _forces(work, geometry, block):
             load(geometry, start + 6, lane),
         )  # fmt: skip
         w = geometry[weight * LANES + lane]
-        store_forces(
-            work,
-            lane,
-            scaled(w, mix3(r0[0], p0, r1[0], p1, r2[0], p2)),
-            scaled(w, mix3(r0[1], p0, r1[1], p1, r2[1], p2)),
-            scaled(w, mix3(r0[2], p0, r1[2], p1, r2[2], p2)),
-        )
-        work[ENERGY * LANES + lane] = w * (
+        for corner in range(3):
+            force = mix3(r0[corner], p0, r1[corner], p1, r2[corner], p2)
+            save(work, FORCE + 3 * corner, lane, scaled(w, force))
+        work[ENERGY * LANES + lane] += w * (
             square_distance(load(work, F, lane), p0)
             + square_distance(load(work, F + 3, lane), p1)
             + square_distance(load(work, F + 6, lane), p2)
@@ -102,14 +100,14 @@ def _project(y, corners, geometry, low, high, elements, taken, taken_geometry, w
 
 @kernel
 def _accumulate(y, corners, geometry, low, high, first, last, elements, work, rhs):
-    energy = 0.0
+    start_energy(work)
     for block in range(first, last):
         gather_edges(y, corners, block, 3, work)
         _gradients(work, geometry, block)
         _nearest(work, low, high)
         _forces(work, geometry, block)
-        energy += scatter(work, corners, block, 3, elements, rhs)
-    return 0.5 * energy
+        scatter(work, corners, block, 3, elements, rhs)
+    return energy(work)
 
 
 class TetrahedronGroup(SimplexGroup):
@@ -117,7 +115,7 @@ class TetrahedronGroup(SimplexGroup):
 
     rows_per_element = 3
     work_size = FOUND + 1
-    split_from = 1024
+    split_from = 2048
     project_kernel = staticmethod(_project)
     accumulate_kernel = staticmethod(_accumulate)
     minimum: float

@@ -29,14 +29,16 @@ from pdrom.constraints.lanes import (
 from pdrom.constraints.simplex import (
     EDGE,
     ENERGY,
+    FORCE,
     OPERATOR,
     WEIGHT,
     F,
     P,
     SimplexGroup,
+    energy,
     gather_edges,
     scatter,
-    store_forces,
+    start_energy,
     store_projections,
 )
 from pdrom.constraints.svd3 import jacobi_rotation, orthonormal_pair
@@ -104,9 +106,9 @@ def _forces(work, geometry, block):
         w, at = geometry[weight + lane], first + lane
         r00, r01 = geometry[at], geometry[at + LANES]
         r10, r11 = geometry[at + 2 * LANES], geometry[at + 3 * LANES]
-        force1, force2 = scaled(w, mix(r00, p0, r10, p1)), scaled(w, mix(r01, p0, r11, p1))
-        store_forces(work, lane, force1, force2, (0.0, 0.0, 0.0))
-        work[ENERGY * LANES + lane] = w * (
+        save(work, FORCE, lane, scaled(w, mix(r00, p0, r10, p1)))
+        save(work, FORCE + 3, lane, scaled(w, mix(r01, p0, r11, p1)))
+        work[ENERGY * LANES + lane] += w * (
             square_distance(load(work, F, lane), p0) + square_distance(load(work, F + 3, lane), p1)
         )
 
@@ -124,14 +126,14 @@ def _project(y, corners, geometry, low, high, elements, taken, taken_geometry, w
 
 @kernel
 def _accumulate(y, corners, geometry, low, high, first, last, elements, work, rhs):
-    energy = 0.0
+    start_energy(work)
     for block in range(first, last):
         gather_edges(y, corners, block, 2, work)
         _gradients(work, geometry, block)
         _clamp_columns(work, low, high)
         _forces(work, geometry, block)
-        energy += scatter(work, corners, block, 2, elements, rhs)
-    return 0.5 * energy
+        scatter(work, corners, block, 2, elements, rhs)
+    return energy(work)
 
 
 def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -158,7 +160,7 @@ class TriangleStrain(SimplexGroup):
         effect: Literal["strain"] = "strain"
 
     rows_per_element = 2
-    split_from = 4096
+    split_from = 8192
     project_kernel = staticmethod(_project)
     accumulate_kernel = staticmethod(_accumulate)
 
