@@ -105,6 +105,7 @@ class StudySettings(_Model):
     heldout_ranks: tuple[Rank, ...] = (20, "full")
     sweep: Sweep = Sweep()
     solver: str = "cholespy"
+    threads: Literal[1, 2] = 1
     blowup_extent: Annotated[float, Field(gt=1.0)] = 100.0
     coarsen: Coarsen = Coarsen()
     sensitivity: Sensitivity = Sensitivity()

@@ -166,8 +166,8 @@ class Scene:
     starts: list[Start]
 
     @classmethod
-    def build(cls, config: SceneConfig, mesh: Mesh) -> "Scene":
-        """Bind ``config`` to ``mesh``.
+    def build(cls, config: SceneConfig, mesh: Mesh, threads: int = 1) -> "Scene":
+        """Bind ``config`` to ``mesh``; ``threads`` (1 or 2) share the local step of large groups.
 
         Raises
         ------
@@ -181,6 +181,8 @@ class Scene:
         by_role = [[e for e in effects if isinstance(e, role)] for role in roles]
         scene = cls(config, mesh, masses, *by_role)
         _check_holds(scene.boundaries, config)
+        for group in scene.groups:
+            group.threads = threads
         return scene
 
     def group(self, name: str) -> ConstraintGroup:

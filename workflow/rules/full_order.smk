@@ -21,6 +21,7 @@ rule fom:
         "results/fom/{scene}/{run}.h5",
     log:
         "results/logs/fom/{scene}_{run}.log",
+    threads: PLAN.settings.threads
     params:
         scene=lambda w: PLAN.scene_config(w.scene),
         solver=PLAN.settings.solver,

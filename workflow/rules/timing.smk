@@ -16,6 +16,7 @@ rule timing:
         ranks=list(PLAN.settings.ranks),
         protocol=PLAN.settings.timing.model_dump(),
         solver=PLAN.settings.solver,
+        threads=PLAN.settings.threads,
         code=lambda w: PLAN.scene_code("pdrom.stages.timing", w.scene),
     message:
         "Timings of {wildcards.scene} (alone on the machine)"

@@ -7,5 +7,6 @@ with job_log(snakemake.log[0]):
         snakemake.input.mesh,
         snakemake.wildcards.run,
         snakemake.params.solver,
+        snakemake.threads,
         snakemake.output[0],
     )

@@ -8,6 +8,7 @@ with job_log(snakemake.log[0]):
         snakemake.params.ranks,
         snakemake.params.protocol,
         snakemake.params.solver,
+        snakemake.params.threads,
         snakemake.input.mesh,
         list(snakemake.input.bases),
         list(snakemake.input.samplings),

@@ -37,8 +37,12 @@ class ConstraintGroup(Effect):
     """
 
     rows_per_element: int
+    split_from: int
+    """Elements from which the group has two parts (`pdrom.constraints.parts`)."""
     S: sparse.csr_array
     weights: np.ndarray
+    threads: int = 1
+    """Threads of `accumulate`, 1 or 2; the result is the same bit for bit."""
 
     @property
     def elements(self) -> int:

@@ -4,16 +4,122 @@ from copy import copy
 from typing import Literal
 
 import numpy as np
-from numba import njit
 from scipy import sparse
 
 from pdrom.constraints.base import ConstraintGroup, GroupConfig, require_cells
-from pdrom.constraints.vectors import perpendicular
+from pdrom.constraints.lanes import (
+    LANES,
+    SMALLEST,
+    absolute_sum,
+    choose,
+    dot,
+    kernel,
+    lane_function,
+    load,
+    mix,
+    perpendicular,
+    save,
+    scaled,
+    square_distance,
+    workspace,
+)
+from pdrom.constraints.parts import Parts
 from pdrom.errors import SceneError
 from pdrom.mesh.types import Mesh
 
 # Rest curvature below this (relative to the cancelling terms) is flat: it has no side to keep.
 FLAT = 1e-9
+# A rim direction below this has been lost to round-off.
+RIM = 1e-15
+
+# numbers of a lane in the working array: curvature, side times normal, magnitude, p, weight, energy
+H, NORMAL, MAGNITUDE, P, WEIGHT, ENERGY, SIZE = 0, 3, 6, 7, 10, 11, 12
+
+
+@lane_function
+def _gather(y, e, lane, operator, manifold, work):
+    """Curvature vector and manifold of element e."""
+    indptr, indices, data = operator
+    magnitude, side, normals, weights = manifold
+    hx, hy, hz = 0.0, 0.0, 0.0
+    for k in range(indptr[e], indptr[e + 1]):
+        v = indices[k]
+        hx += data[k] * y[v, 0]
+        hy += data[k] * y[v, 1]
+        hz += data[k] * y[v, 2]
+    save(work, H, lane, (hx, hy, hz))
+    save(work, NORMAL, lane, scaled(side[e], (normals[e, 0], normals[e, 1], normals[e, 2])))
+    work[MAGNITUDE * LANES + lane] = magnitude[e]
+    work[WEIGHT * LANES + lane] = weights[e]
+
+
+@lane_function
+def _half_spheres(work):
+    """Nearest points of the half spheres to the curvature vectors of a block."""
+    for lane in range(LANES):
+        h, n = load(work, H, lane), load(work, NORMAL, lane)
+        # scaled: neither overflow nor underflow of the squares
+        scale = absolute_sum(h)
+        unit = scaled(1.0 / (scale + SMALLEST), h)
+        unit = scaled(1.0 / np.sqrt(dot(unit, unit)), unit)
+        height = dot(unit, n)
+        rim = mix(1.0, unit, -height, n)
+        length = np.sqrt(dot(rim, rim))
+        rim = choose(length > RIM, scaled(1.0 / length, rim), perpendicular(n))
+        unit = choose(height < 0.0, rim, unit)
+        p = scaled(work[MAGNITUDE * LANES + lane], choose(scale == 0.0, n, unit))
+        save(work, P, lane, p)
+        work[ENERGY * LANES + lane] = work[WEIGHT * LANES + lane] * square_distance(h, p)
+
+
+@kernel
+def _project(y, elements, operator, manifold, work, p):
+    count = elements.shape[0]
+    for start in range(0, count, LANES):
+        for lane in range(LANES):
+            _gather(y, elements[min(start + lane, count - 1)], lane, operator, manifold, work)
+        _half_spheres(work)
+        for lane in range(min(LANES, count - start)):
+            i = start + lane
+            p[i, 0], p[i, 1], p[i, 2] = load(work, P, lane)
+
+
+@kernel
+def _accumulate(y, operator, manifold, first, last, work, rhs):
+    indptr, indices, data = operator
+    energy = 0.0
+    for start in range(first, last, LANES):
+        for lane in range(LANES):
+            _gather(y, min(start + lane, last - 1), lane, operator, manifold, work)
+        _half_spheres(work)
+        for lane in range(min(LANES, last - start)):
+            px, py, pz = scaled(work[WEIGHT * LANES + lane], load(work, P, lane))
+            for k in range(indptr[start + lane], indptr[start + lane + 1]):
+                v = indices[k]
+                rhs[v, 0] += data[k] * px
+                rhs[v, 1] += data[k] * py
+                rhs[v, 2] += data[k] * pz
+            energy += work[ENERGY * LANES + lane]
+    return 0.5 * energy
+
+
+@kernel
+def _fan_normals(q, vertices, start, fan, triangles, normals):
+    """Area-weighted unit normals of ``vertices``; zero where the fan has no area."""
+    for i in range(vertices.shape[0]):
+        nx, ny, nz = 0.0, 0.0, 0.0
+        for k in range(start[vertices[i]], start[vertices[i] + 1]):
+            a, b, c = triangles[fan[k], 0], triangles[fan[k], 1], triangles[fan[k], 2]
+            ux, uy, uz = q[b, 0] - q[a, 0], q[b, 1] - q[a, 1], q[b, 2] - q[a, 2]
+            vx, vy, vz = q[c, 0] - q[a, 0], q[c, 1] - q[a, 1], q[c, 2] - q[a, 2]
+            nx += uy * vz - uz * vy
+            ny += uz * vx - ux * vz
+            nz += ux * vy - uy * vx
+        scale = absolute_sum((nx, ny, nz))
+        if scale > 0.0:
+            unit = scaled(1.0 / (scale + SMALLEST), (nx, ny, nz))
+            nx, ny, nz = scaled(1.0 / np.sqrt(dot(unit, unit)), unit)
+        normals[i, 0], normals[i, 1], normals[i, 2] = nx, ny, nz
 
 
 class VertexBending(ConstraintGroup):
@@ -33,6 +139,7 @@ class VertexBending(ConstraintGroup):
         effect: Literal["bending"] = "bending"
 
     rows_per_element = 1
+    split_from = 8192
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
@@ -46,6 +153,7 @@ class VertexBending(ConstraintGroup):
         self.S = sparse.csr_array(laplacian.multiply(0.5 / area[:, None]))
         self.S.sort_indices()
         self._set_rest(mesh.points)
+        self._set_buffers()
 
     def _set_rest(self, points: np.ndarray) -> None:
         curvature = self.S @ points
@@ -73,13 +181,16 @@ class VertexBending(ConstraintGroup):
 
     def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:
         p = np.empty((len(elements), 3))
-        _project(y, elements, *self._operator(), self.magnitude, self.side, self.normals, p)
+        _project(y, elements, self._operator(), self._manifold(), self._work[0], p)
         return p
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        return _accumulate(
-            y, *self._operator(), self.magnitude, self.side, self.normals, self.weights, rhs
-        )
+        operator, manifold = self._operator(), self._manifold()
+
+        def part(first: int, last: int, part: int, target: np.ndarray) -> float:
+            return _accumulate(y, operator, manifold, first, last, self._work[part], target)
+
+        return self._parts.accumulate(part, rhs, self.threads)
 
     def restricted(
         self, elements: np.ndarray, factors: np.ndarray
@@ -99,10 +210,23 @@ class VertexBending(ConstraintGroup):
         part.magnitude, part.side = self.magnitude[elements], self.side[elements]
         part.normals = self.normals[elements].copy()
         part._curved = np.flatnonzero(part.side)
+        part._set_buffers()
         return part, vertices
 
     def _operator(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return self.S.indptr, self.S.indices, self.S.data
+
+    def _manifold(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        return self.magnitude, self.side, self.normals, self.weights
+
+    def _set_buffers(self) -> None:
+        self._work = [workspace(SIZE) for _ in range(2)]
+        self._parts = Parts(
+            self.elements,
+            self.elements >= self.split_from,
+            self.S.shape[1],
+            lambda element: self.S.indices[self.S.indptr[element] :],
+        )
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         h, n = d[:, 0], self.normals[elements] * self.side[elements, None]
@@ -168,74 +292,3 @@ def vertex_fans(triangles: np.ndarray, vertices: int) -> tuple[np.ndarray, np.nd
     counts = np.bincount(triangles.ravel(), minlength=vertices)
     start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     return start, (order // 3).astype(np.int64)
-
-
-@njit(cache=True, error_model="numpy")
-def _fan_normals(q, vertices, start, fan, triangles, normals):
-    """Area-weighted unit normals of ``vertices``; zero where the fan has no area."""
-    for i in range(vertices.shape[0]):
-        nx, ny, nz = 0.0, 0.0, 0.0
-        for k in range(start[vertices[i]], start[vertices[i] + 1]):
-            a, b, c = triangles[fan[k], 0], triangles[fan[k], 1], triangles[fan[k], 2]
-            ux, uy, uz = q[b, 0] - q[a, 0], q[b, 1] - q[a, 1], q[b, 2] - q[a, 2]
-            vx, vy, vz = q[c, 0] - q[a, 0], q[c, 1] - q[a, 1], q[c, 2] - q[a, 2]
-            nx += uy * vz - uz * vy
-            ny += uz * vx - ux * vz
-            nz += ux * vy - uy * vx
-        length = np.sqrt(nx * nx + ny * ny + nz * nz)
-        if length > 0.0:
-            nx, ny, nz = nx / length, ny / length, nz / length
-        normals[i, 0], normals[i, 1], normals[i, 2] = nx, ny, nz
-
-
-@njit(cache=True, error_model="numpy")
-def _curvature(y, e, indptr, indices, data):
-    hx, hy, hz = 0.0, 0.0, 0.0
-    for k in range(indptr[e], indptr[e + 1]):
-        hx += data[k] * y[indices[k], 0]
-        hy += data[k] * y[indices[k], 1]
-        hz += data[k] * y[indices[k], 2]
-    return hx, hy, hz
-
-
-@njit(cache=True, error_model="numpy")
-def _half_sphere(hx, hy, hz, magnitude, side, normal):
-    """Nearest point of the half sphere to (hx, hy, hz)."""
-    nx, ny, nz = side * normal[0], side * normal[1], side * normal[2]
-    length = np.sqrt(hx * hx + hy * hy + hz * hz)
-    if length == 0.0:
-        return magnitude * nx, magnitude * ny, magnitude * nz
-    dx, dy, dz = hx / length, hy / length, hz / length
-    height = dx * nx + dy * ny + dz * nz
-    if height < 0.0:
-        dx, dy, dz = dx - height * nx, dy - height * ny, dz - height * nz
-        length = np.sqrt(dx * dx + dy * dy + dz * dz)
-        if length > 1e-15:
-            dx, dy, dz = dx / length, dy / length, dz / length
-        else:
-            dx, dy, dz = perpendicular(nx, ny, nz)
-    return magnitude * dx, magnitude * dy, magnitude * dz
-
-
-@njit(cache=True, error_model="numpy")
-def _project(y, elements, indptr, indices, data, magnitude, side, normals, p):
-    for i in range(elements.shape[0]):
-        e = elements[i]
-        hx, hy, hz = _curvature(y, e, indptr, indices, data)
-        p[i, 0], p[i, 1], p[i, 2] = _half_sphere(hx, hy, hz, magnitude[e], side[e], normals[e])
-
-
-@njit(cache=True, error_model="numpy")
-def _accumulate(y, indptr, indices, data, magnitude, side, normals, weights, rhs):
-    energy = 0.0
-    for e in range(weights.shape[0]):
-        hx, hy, hz = _curvature(y, e, indptr, indices, data)
-        px, py, pz = _half_sphere(hx, hy, hz, magnitude[e], side[e], normals[e])
-        w = weights[e]
-        for k in range(indptr[e], indptr[e + 1]):
-            scaled = w * data[k]
-            rhs[indices[k], 0] += scaled * px
-            rhs[indices[k], 1] += scaled * py
-            rhs[indices[k], 2] += scaled * pz
-        energy += w * ((hx - px) ** 2 + (hy - py) ** 2 + (hz - pz) ** 2)
-    return 0.5 * energy

@@ -1,75 +1,104 @@
-"""Compiled nearest rotation of a well-conditioned 3 x 3 matrix by Newton's iteration.
+"""The cheap cases of 3 x 3 projections, for blocks of matrices.
 
-X <- (X + X^-T) / 2 converges quadratically to the orthogonal polar factor (Higham 1986). It is only
-used for matrices far from singular and with positive determinant; `pdrom.constraints.svd3` does the
-others.
+X <- (X + X^-T) / 2 converges quadratically to the orthogonal polar factor (Higham 1986). It serves
+matrices far from singular with positive determinant; `pdrom.constraints.svd3` does the others. A
+matrix whose singular values lie in the range already is its own projection.
 """
 
 import numpy as np
-from numba import njit
+
+from pdrom.constraints.lanes import (
+    LANES,
+    choose,
+    cross,
+    dot,
+    lane_function,
+    load,
+    mix,
+    save,
+    scaled,
+    square_distance,
+)
 
 STEPS = 16
 # det F relative to the cube of the mean singular value: below it the SVD takes over
 WELL_CONDITIONED = 1e-2
+# square of a Newton step: quadratic convergence, a step of 1e-9 leaves an error of 1e-18
+LAST_STEP = 1e-18
+
+_OPEN, _FOUND, _UNSUITED = 0.0, 1.0, 2.0
 
 
-@njit(cache=True, error_model="numpy")
-def newton_rotation(f, p):
-    """Write the nearest rotation of ``f`` (3, 3) to ``p``; False if ``f`` is not suited."""
-    a, b, c = f[0, 0], f[0, 1], f[0, 2]
-    d, e, g = f[1, 0], f[1, 1], f[1, 2]
-    h, i, j = f[2, 0], f[2, 1], f[2, 2]
-    square = (a * a + b * b + c * c + d * d + e * e + g * g + h * h + i * i + j * j) / 3.0
-    determinant = a * (e * j - g * i) - b * (d * j - g * h) + c * (d * i - e * h)
-    if not determinant > WELL_CONDITIONED * square * np.sqrt(square):
-        return False
-    scale = 1.0 / np.cbrt(determinant)
-    a, b, c, d, e, g, h, i, j = (
-        a * scale, b * scale, c * scale, d * scale, e * scale,
-        g * scale, h * scale, i * scale, j * scale,
-    )  # fmt: skip
+@lane_function
+def _newton_step(x0, x1, x2):
+    c0, c1, c2 = cross(x1, x2), cross(x2, x0), cross(x0, x1)
+    inverse = 0.5 / dot(x0, c0)
+    return mix(0.5, x0, inverse, c0), mix(0.5, x1, inverse, c1), mix(0.5, x2, inverse, c2)
+
+
+@lane_function
+def _start(f, at_f, p, at_p, state):
+    for lane in range(LANES):
+        f0, f1, f2 = load(f, at_f, lane), load(f, at_f + 3, lane), load(f, at_f + 6, lane)
+        square = (dot(f0, f0) + dot(f1, f1) + dot(f2, f2)) / 3.0
+        mean = np.sqrt(square)
+        suited = dot(f0, cross(f1, f2)) > WELL_CONDITIONED * square * mean
+        save(p, at_p, lane, scaled(1.0 / mean, f0))
+        save(p, at_p + 3, lane, scaled(1.0 / mean, f1))
+        save(p, at_p + 6, lane, scaled(1.0 / mean, f2))
+        state[lane] = _OPEN if suited else _UNSUITED
+
+
+@lane_function
+def _advance(p, at_p, state):
+    """One Newton step of the open lanes; the others stay, so that neighbours change no bits."""
+    for lane in range(LANES):
+        x0, x1, x2 = load(p, at_p, lane), load(p, at_p + 3, lane), load(p, at_p + 6, lane)
+        n0, n1, n2 = _newton_step(x0, x1, x2)
+        step = square_distance(n0, x0) + square_distance(n1, x1) + square_distance(n2, x2)
+        is_open = state[lane] == _OPEN
+        save(p, at_p, lane, choose(is_open, n0, x0))
+        save(p, at_p + 3, lane, choose(is_open, n1, x1))
+        save(p, at_p + 6, lane, choose(is_open, n2, x2))
+        state[lane] = _FOUND if is_open and step < LAST_STEP else state[lane]
+
+
+@lane_function
+def rotation_block(f, at_f, p, at_p, found):
+    """Write the nearest rotations of the suited matrices to P.
+
+    Parameters
+    ----------
+    f, at_f, p, at_p : blocks of matrices and the number at which F and P begin in them
+    found : (LANES,) set to 1 where P is the rotation and to 0 where F is not suited
+    """
+    _start(f, at_f, p, at_p, found)
     for _ in range(STEPS):
-        ca, cb, cc = e * j - g * i, g * h - d * j, d * i - e * h
-        cd, ce, cg = c * i - b * j, a * j - c * h, b * h - a * i
-        ch, ci, cj = b * g - c * e, c * d - a * g, a * e - b * d
-        inverse = 0.5 / (a * ca + b * cb + c * cc)
-        na, nb, nc = 0.5 * a + inverse * ca, 0.5 * b + inverse * cb, 0.5 * c + inverse * cc
-        nd, ne, ng = 0.5 * d + inverse * cd, 0.5 * e + inverse * ce, 0.5 * g + inverse * cg
-        nh, ni, nj = 0.5 * h + inverse * ch, 0.5 * i + inverse * ci, 0.5 * j + inverse * cj
-        change = (
-            (na - a) ** 2 + (nb - b) ** 2 + (nc - c) ** 2 + (nd - d) ** 2 + (ne - e) ** 2
-            + (ng - g) ** 2 + (nh - h) ** 2 + (ni - i) ** 2 + (nj - j) ** 2
-        )  # fmt: skip
-        a, b, c, d, e, g, h, i, j = na, nb, nc, nd, ne, ng, nh, ni, nj
-        # quadratic convergence: a change of 1e-9 leaves an error of 1e-18
-        if change < 1e-18:
-            p[0, 0], p[0, 1], p[0, 2] = a, b, c
-            p[1, 0], p[1, 1], p[1, 2] = d, e, g
-            p[2, 0], p[2, 1], p[2, 2] = h, i, j
-            return True
-    return False
+        _advance(p, at_p, found)
+        open_lanes = 0.0
+        for lane in range(LANES):
+            open_lanes += 1.0 if found[lane] == _OPEN else 0.0
+        if open_lanes == 0.0:
+            break
+    for lane in range(LANES):
+        found[lane] = 1.0 if found[lane] == _FOUND else 0.0
 
 
-@njit(cache=True, error_model="numpy")
-def within_range(f, low, high):
-    """True if all singular values surely lie in [low, high] and det F > 0 (a sufficient test).
+@lane_function
+def within_range_block(f, at_f, p, at_p, low, high, found):
+    """Copy F to P, and set ``found`` to 1 where its singular values surely lie in the range.
 
-    |F^T F - I|_F bounds the distance of every squared singular value from 1.
+    Sufficient: |F^T F - I|_F bounds the distance of every squared singular value from 1, and
+    det F > 0.
     """
     slack = min(1.0 - low * low, high * high - 1.0)
-    total = 0.0
-    for i in range(3):
-        for k in range(i, 3):
-            gram = f[i, 0] * f[k, 0] + f[i, 1] * f[k, 1] + f[i, 2] * f[k, 2]
-            if i == k:
-                total += (gram - 1.0) ** 2
-            else:
-                total += 2.0 * gram * gram
-    if not total < slack * slack:
-        return False
-    determinant = (
-        f[0, 0] * (f[1, 1] * f[2, 2] - f[1, 2] * f[2, 1])
-        - f[0, 1] * (f[1, 0] * f[2, 2] - f[1, 2] * f[2, 0])
-        + f[0, 2] * (f[1, 0] * f[2, 1] - f[1, 1] * f[2, 0])
-    )
-    return determinant > 0.0
+    for lane in range(LANES):
+        f0, f1, f2 = load(f, at_f, lane), load(f, at_f + 3, lane), load(f, at_f + 6, lane)
+        g0, g1, g2 = dot(f0, f0) - 1.0, dot(f1, f1) - 1.0, dot(f2, f2) - 1.0
+        h0, h1, h2 = dot(f1, f2), dot(f2, f0), dot(f0, f1)
+        distance = g0 * g0 + g1 * g1 + g2 * g2 + 2.0 * (h0 * h0 + h1 * h1 + h2 * h2)
+        inside = distance < slack * slack and dot(f0, cross(f1, f2)) > 0.0
+        save(p, at_p, lane, f0)
+        save(p, at_p + 3, lane, f1)
+        save(p, at_p + 6, lane, f2)
+        found[lane] = 1.0 if inside else 0.0

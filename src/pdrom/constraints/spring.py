@@ -3,13 +3,87 @@
 from typing import Literal
 
 import numpy as np
-from numba import njit
 
-from pdrom.constraints.base import GroupConfig, StencilGroup
+from pdrom.constraints.base import GroupConfig
+from pdrom.constraints.lanes import (
+    LANES,
+    SMALLEST,
+    absolute_sum,
+    choose,
+    dot,
+    kernel,
+    lane_function,
+    load,
+    save,
+    scaled,
+    square_distance,
+    take,
+)
+from pdrom.constraints.simplex import (
+    EDGE,
+    ENERGY,
+    FORCE,
+    WEIGHT,
+    P,
+    SimplexGroup,
+    energy,
+    gather_edges,
+    scatter,
+    start_energy,
+    store_projections,
+)
 from pdrom.mesh.types import Mesh
 
+# numbers of a lane in the packed geometry: weight, rest edge, rest length
+REST, LENGTH, GEOMETRY = 1, 4, 5
 
-class EdgeSpring(StencilGroup):
+
+@lane_function
+def _rest_lengths(work, geometry, block):
+    """Edges of a block with their rest length."""
+    first = block * GEOMETRY
+    for lane in range(LANES):
+        d, rest = load(work, EDGE, lane), load(geometry, first + REST, lane)
+        length = geometry[(first + LENGTH) * LANES + lane]
+        # scaled: neither overflow nor underflow of the squares
+        scale = absolute_sum(d)
+        unit = scaled(1.0 / (scale + SMALLEST), d)
+        unit = scaled(length / np.sqrt(dot(unit, unit)), unit)
+        save(work, P, lane, choose(scale == 0.0, rest, unit))
+
+
+@lane_function
+def _forces(work, geometry, block):
+    """Weighted forces S^T W p on the end, and w |S q - p|^2."""
+    weight = (block * GEOMETRY + WEIGHT) * LANES
+    for lane in range(LANES):
+        p, w = load(work, P, lane), geometry[weight + lane]
+        save(work, FORCE, lane, scaled(w, p))
+        work[ENERGY * LANES + lane] += w * square_distance(load(work, EDGE, lane), p)
+
+
+@kernel
+def _project(y, corners, geometry, elements, taken, taken_geometry, work, p):
+    for start in range(0, elements.shape[0], LANES):
+        take(corners, 2, elements, start, taken)
+        take(geometry, GEOMETRY, elements, start, taken_geometry)
+        gather_edges(y, taken, 0, 1, work)
+        _rest_lengths(work, taken_geometry, 0)
+        store_projections(work, 1, start, p)
+
+
+@kernel
+def _accumulate(y, corners, geometry, first, last, elements, work, rhs):
+    start_energy(work)
+    for block in range(first, last):
+        gather_edges(y, corners, block, 1, work)
+        _rest_lengths(work, geometry, block)
+        _forces(work, geometry, block)
+        scatter(work, corners, block, 1, elements, rhs)
+    return energy(work)
+
+
+class EdgeSpring(SimplexGroup):
     """One constraint per edge of the mesh (of a volume: every edge of its tetrahedra).
 
     p keeps the direction of the edge and takes its rest length. An edge of length zero has no
@@ -23,6 +97,9 @@ class EdgeSpring(StencilGroup):
 
     rows_per_element = 1
     per_element = ("rest",)
+    split_from = 16384
+    project_kernel = staticmethod(_project)
+    accumulate_kernel = staticmethod(_accumulate)
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
@@ -32,13 +109,8 @@ class EdgeSpring(StencilGroup):
         self.operator = np.tile(np.array([[[-1.0, 1.0]]]), (len(self.stencil), 1, 1))
         self._assemble(mesh.vertices)
 
-    def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:
-        p = np.empty((len(elements), 3))
-        _project(y, elements, self.stencil, self.rest, p)
-        return p
-
-    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        return _accumulate(y, self.stencil, self.rest, self.weights, rhs)
+    def _extra(self) -> list[np.ndarray]:
+        return [self.rest, np.linalg.norm(self.rest, axis=1)]
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         rest = self.rest[elements, None, :]
@@ -46,44 +118,3 @@ class EdgeSpring(StencilGroup):
         rest_length = np.linalg.norm(rest, axis=2, keepdims=True)
         safe = np.where(length > 0.0, length, 1.0)
         return np.where(length > 0.0, d / safe * rest_length, rest)
-
-
-@njit(cache=True, error_model="numpy")
-def _spring(dx, dy, dz, rest):
-    """Projection of one edge vector: (px, py, pz)."""
-    # scaled by the largest component: neither overflow nor underflow of the squares
-    largest = max(abs(dx), abs(dy), abs(dz))
-    if largest == 0.0:
-        return rest[0], rest[1], rest[2]
-    sx, sy, sz = dx / largest, dy / largest, dz / largest
-    rest_length = np.sqrt(rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2])
-    factor = rest_length / np.sqrt(sx * sx + sy * sy + sz * sz)
-    return sx * factor, sy * factor, sz * factor
-
-
-@njit(cache=True, error_model="numpy")
-def _project(y, elements, stencil, rest, p):
-    for i in range(elements.shape[0]):
-        e = elements[i]
-        a, b = stencil[e, 0], stencil[e, 1]
-        p[i, 0], p[i, 1], p[i, 2] = _spring(
-            y[b, 0] - y[a, 0], y[b, 1] - y[a, 1], y[b, 2] - y[a, 2], rest[e]
-        )
-
-
-@njit(cache=True, error_model="numpy")
-def _accumulate(y, stencil, rest, weights, rhs):
-    energy = 0.0
-    for e in range(stencil.shape[0]):
-        a, b = stencil[e, 0], stencil[e, 1]
-        dx, dy, dz = y[b, 0] - y[a, 0], y[b, 1] - y[a, 1], y[b, 2] - y[a, 2]
-        px, py, pz = _spring(dx, dy, dz, rest[e])
-        w = weights[e]
-        rhs[b, 0] += w * px
-        rhs[b, 1] += w * py
-        rhs[b, 2] += w * pz
-        rhs[a, 0] -= w * px
-        rhs[a, 1] -= w * py
-        rhs[a, 2] -= w * pz
-        energy += w * ((dx - px) ** 2 + (dy - py) ** 2 + (dz - pz) ** 2)
-    return 0.5 * energy

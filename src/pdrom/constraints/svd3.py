@@ -1,131 +1,160 @@
-"""Compiled 3 x 3 kernels: signed singular value decomposition and nearest rotation.
+"""Compiled 3 x 3 projection: signed singular values clamped to a range, for blocks of matrices.
 
-Matrices are stored as in S q = F^T: ``f[k]`` is column k of F.
+One-sided Jacobi (Hestenes 1958; Demmel and Veselic 1992): rotations V make the columns of B = F V
+orthogonal, their norms are the singular values. It works on F, never on F^T F, so that small
+singular values and their directions keep their relative accuracy. Matrices are stored as in
+S q = F^T: vector k of a matrix is column k of F. See `pdrom.constraints.lanes` for the layout.
 """
 
 import numpy as np
-from numba import njit
 
-from pdrom.constraints.vectors import perpendicular
+from pdrom.constraints.lanes import (
+    LANES,
+    SMALLEST,
+    absolute_sum,
+    choose,
+    clamp,
+    cross,
+    dot,
+    lane_function,
+    load,
+    mix,
+    mix3,
+    perpendicular,
+    save,
+    scaled,
+)
 
 SWEEPS = 12
-TOLERANCE = 1e-15
+# columns whose cosine is below are orthogonal
+ORTHOGONAL = 1e-15
+# after a sweep of smaller rotations than this the cosines are of the size of its square
+LAST_TANGENT = 1e-8
+# a second singular value below this fraction of the first has no direction
+RANK = 1e-15
 
 
-@njit(cache=True, error_model="numpy")
-def _rotate_columns(b, v, i, j):
-    """One-sided Jacobi rotation that makes columns i and j orthogonal; True if it did something."""
-    alpha = b[i, 0] * b[i, 0] + b[i, 1] * b[i, 1] + b[i, 2] * b[i, 2]
-    beta = b[j, 0] * b[j, 0] + b[j, 1] * b[j, 1] + b[j, 2] * b[j, 2]
-    gamma = b[i, 0] * b[j, 0] + b[i, 1] * b[j, 1] + b[i, 2] * b[j, 2]
-    if gamma == 0.0 or abs(gamma) <= TOLERANCE * np.sqrt(alpha * beta):
-        return False
-    zeta = (beta - alpha) / (2.0 * gamma)
-    t = 1.0 / (abs(zeta) + np.sqrt(1.0 + zeta * zeta))
-    if zeta < 0.0:
-        t = -t
-    c = 1.0 / np.sqrt(1.0 + t * t)
-    s = c * t
-    for a in range(3):
-        b[i, a], b[j, a] = c * b[i, a] - s * b[j, a], s * b[i, a] + c * b[j, a]
-        v[i, a], v[j, a] = c * v[i, a] - s * v[j, a], s * v[i, a] + c * v[j, a]
-    return True
+# numbers of a lane in the working array of `clamp_block`
+B, V, SCALE, DONE = 0, 9, 18, 19
+SIZE = 20
 
 
-@njit(cache=True, error_model="numpy")
-def _norm(x):
-    return np.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
+@lane_function
+def jacobi_rotation(a, b, done):
+    """Cosine, sine, |tangent| of the rotation that makes columns a and b orthogonal."""
+    alpha, beta, gamma = dot(a, a), dot(b, b), dot(a, b)
+    half = 0.5 * (beta - alpha)
+    root = abs(half) + np.sqrt(half * half + gamma * gamma)
+    idle = done or gamma * gamma <= ORTHOGONAL * ORTHOGONAL * alpha * beta or root == 0.0
+    tangent = 0.0 if idle else gamma / root
+    cosine = 1.0 / np.sqrt(1.0 + tangent * tangent)
+    sine = cosine * tangent
+    return cosine, -sine if half < 0.0 else sine, abs(tangent)
 
 
-@njit(cache=True, error_model="numpy")
-def _scale_of(f):
-    largest = 0.0
-    for i in range(3):
-        for a in range(3):
-            largest = max(largest, abs(f[i, a]))
-    return largest
+@lane_function
+def _sweep(work):
+    """Rotate all pairs of columns once in the lanes that are not done; number of lanes left."""
+    left = 0.0
+    for lane in range(LANES):
+        b0, b1, b2 = load(work, B, lane), load(work, B + 3, lane), load(work, B + 6, lane)
+        v0, v1, v2 = load(work, V, lane), load(work, V + 3, lane), load(work, V + 6, lane)
+        done = work[DONE * LANES + lane] != 0.0
+        c, s, t01 = jacobi_rotation(b0, b1, done)
+        b0, b1 = mix(c, b0, -s, b1), mix(s, b0, c, b1)
+        v0, v1 = mix(c, v0, -s, v1), mix(s, v0, c, v1)
+        c, s, t02 = jacobi_rotation(b0, b2, done)
+        b0, b2 = mix(c, b0, -s, b2), mix(s, b0, c, b2)
+        v0, v2 = mix(c, v0, -s, v2), mix(s, v0, c, v2)
+        c, s, t12 = jacobi_rotation(b1, b2, done)
+        b1, b2 = mix(c, b1, -s, b2), mix(s, b1, c, b2)
+        v1, v2 = mix(c, v1, -s, v2), mix(s, v1, c, v2)
+        save(work, B, lane, b0)
+        save(work, B + 3, lane, b1)
+        save(work, B + 6, lane, b2)
+        save(work, V, lane, v0)
+        save(work, V + 3, lane, v1)
+        save(work, V + 6, lane, v2)
+        more = 1.0 if t01 > LAST_TANGENT or t02 > LAST_TANGENT or t12 > LAST_TANGENT else 0.0
+        work[DONE * LANES + lane] = 1.0 - more
+    for lane in range(LANES):
+        left += 1.0 - work[DONE * LANES + lane]
+    return left
 
 
-@njit(cache=True, error_model="numpy")
-def signed_svd(f, u, sigma, v):
-    """F = sum_k sigma_k u_k v_k^T with U and V rotations (det +1).
+@lane_function
+def _larger_first(a, v, b, w):
+    """Swap two columns and their right vectors if the second is longer; one turns its sign.
 
-    Rows of ``u`` and ``v`` are the singular vectors. sigma is not sorted; the entry smallest in
-    magnitude carries the sign of det F, the others are non-negative (Irving et al. 2004). Rank
-    deficient matrices get a deterministic completion of U.
+    The sign keeps V a rotation.
     """
-    scale = _scale_of(f)
-    b = u  # becomes U column by column
-    for i in range(3):
-        for a in range(3):
-            b[i, a] = f[i, a] / scale if scale > 0.0 else 0.0
-            v[i, a] = 1.0 if i == a else 0.0
+    swap = dot(a, a) < dot(b, b)
+    return (
+        choose(swap, b, a),
+        choose(swap, w, v),
+        choose(swap, scaled(-1.0, a), b),
+        choose(swap, scaled(-1.0, v), w),
+    )
+
+
+@lane_function
+def orthonormal_pair(b0, b1):
+    """Directions and norms of two orthogonal columns, the longer first.
+
+    A column that vanishes gets a direction in a fixed way.
+    """
+    s0 = np.sqrt(dot(b0, b0))
+    u0 = choose(s0 > 0.0, scaled(1.0 / s0, b0), (1.0, 0.0, 0.0))
+    # what rounding left of the large column in the small one would tilt its direction
+    b1 = mix(1.0, b1, -dot(u0, b1), u0)
+    s1 = np.sqrt(dot(b1, b1))
+    u1 = choose(s1 > RANK * s0, scaled(1.0 / s1, b1), perpendicular(u0))
+    return u0, u1, s0, s1
+
+
+@lane_function
+def clamp_block(f, at_f, p, at_p, keep, low, high, work):
+    """Write the matrix nearest to F with signed singular values in [low, high] to P.
+
+    Parameters
+    ----------
+    f, at_f, p, at_p : blocks of matrices and the number at which F and P begin in them
+    keep : (LANES,) lanes with a non-zero entry keep their P
+    work : `SIZE` numbers a lane
+
+    A matrix with an entry that is not finite gives nan.
+    """
+    for lane in range(LANES):
+        f0, f1, f2 = load(f, at_f, lane), load(f, at_f + 3, lane), load(f, at_f + 6, lane)
+        scale = absolute_sum(f0) + absolute_sum(f1) + absolute_sum(f2) + SMALLEST
+        save(work, B, lane, scaled(1.0 / scale, f0))
+        save(work, B + 3, lane, scaled(1.0 / scale, f1))
+        save(work, B + 6, lane, scaled(1.0 / scale, f2))
+        save(work, V, lane, (1.0, 0.0, 0.0))
+        save(work, V + 3, lane, (0.0, 1.0, 0.0))
+        save(work, V + 6, lane, (0.0, 0.0, 1.0))
+        work[SCALE * LANES + lane] = scale
+        work[DONE * LANES + lane] = keep[lane]
     for _ in range(SWEEPS):
-        moved = _rotate_columns(b, v, 0, 1)
-        moved = _rotate_columns(b, v, 0, 2) or moved
-        moved = _rotate_columns(b, v, 1, 2) or moved
-        if not moved:
+        if _sweep(work) == 0.0:
             break
-    for i in range(3):
-        sigma[i] = _norm(b[i])
-    first, second, third = _order(sigma)
-    _complete(b, sigma, first, second, third)
-    for i in range(3):
-        sigma[i] *= scale
-
-
-@njit(cache=True, error_model="numpy")
-def _order(sigma):
-    """Indices of the largest, middle and smallest entry."""
-    first, second, third = 0, 1, 2
-    if sigma[first] < sigma[second]:
-        first, second = second, first
-    if sigma[second] < sigma[third]:
-        second, third = third, second
-    if sigma[first] < sigma[second]:
-        first, second = second, first
-    return first, second, third
-
-
-@njit(cache=True, error_model="numpy")
-def _complete(b, sigma, first, second, third):
-    """Turn orthogonal columns of norms sigma into a rotation; sigma[third] becomes signed."""
-    if sigma[first] > 0.0:
-        for a in range(3):
-            b[first, a] /= sigma[first]
-    else:
-        for a in range(3):
-            b[first, a] = 1.0 if a == first else 0.0
-    overlap = b[first, 0] * b[second, 0] + b[first, 1] * b[second, 1] + b[first, 2] * b[second, 2]
-    for a in range(3):
-        b[second, a] -= overlap * b[first, a]
-    length = _norm(b[second])
-    if length > TOLERANCE * sigma[first]:
-        for a in range(3):
-            b[second, a] /= length
-    else:
-        x0, x1, x2 = perpendicular(b[first, 0], b[first, 1], b[first, 2])
-        b[second, 0], b[second, 1], b[second, 2] = x0, x1, x2
-    old0, old1, old2 = b[third, 0], b[third, 1], b[third, 2]
-    # (first, second, third) is an even permutation exactly if second follows first cyclically
-    parity = 1.0 if (second - first) % 3 == 1 else -1.0
-    x, y = b[first], b[second]
-    b[third, 0] = parity * (x[1] * y[2] - x[2] * y[1])
-    b[third, 1] = parity * (x[2] * y[0] - x[0] * y[2])
-    b[third, 2] = parity * (x[0] * y[1] - x[1] * y[0])
-    sigma[third] = b[third, 0] * old0 + b[third, 1] * old1 + b[third, 2] * old2
-
-
-@njit(cache=True, error_model="numpy")
-def clamp_singular_values(f, low, high, u, sigma, v, p):
-    """Nearest matrix whose signed singular values lie in [low, high]; u, sigma, v are buffers."""
-    signed_svd(f, u, sigma, v)
-    for k in range(3):
-        sigma[k] = min(max(sigma[k], low), high)
-    for i in range(3):
-        for a in range(3):
-            p[i, a] = (
-                sigma[0] * u[0, a] * v[0, i]
-                + sigma[1] * u[1, a] * v[1, i]
-                + sigma[2] * u[2, a] * v[2, i]
-            )
+    for lane in range(LANES):
+        b0, b1, b2 = load(work, B, lane), load(work, B + 3, lane), load(work, B + 6, lane)
+        v0, v1, v2 = load(work, V, lane), load(work, V + 3, lane), load(work, V + 6, lane)
+        b0, v0, b1, v1 = _larger_first(b0, v0, b1, v1)
+        b1, v1, b2, v2 = _larger_first(b1, v1, b2, v2)
+        b0, v0, b1, v1 = _larger_first(b0, v0, b1, v1)
+        u0, u1, s0, s1 = orthonormal_pair(b0, b1)
+        # U has det +1, so that the last singular value takes the sign of det F (Irving et al. 2004)
+        u2 = cross(u0, u1)
+        s2 = dot(u2, b2)
+        scale = work[SCALE * LANES + lane]
+        s0, s1, s2 = (
+            clamp(scale * s0, low, high), clamp(scale * s1, low, high), clamp(scale * s2, low, high)
+        )  # fmt: skip
+        u0 = scaled(s0 + 0.0 * scale, u0)
+        u1, u2 = scaled(s1, u1), scaled(s2, u2)
+        kept = keep[lane] != 0.0
+        for i in range(3):
+            column = mix3(v0[i], u0, v1[i], u1, v2[i], u2)
+            save(p, at_p + 3 * i, lane, choose(kept, load(p, at_p + 3 * i, lane), column))

@@ -1,18 +1,123 @@
 """What the two tetrahedron groups share: the operator S q = F^T and the fused kernels."""
 
 import numpy as np
-from numba import njit
 
-from pdrom.constraints.base import StencilGroup, require_cells
-from pdrom.constraints.polar3 import newton_rotation, within_range
-from pdrom.constraints.svd3 import clamp_singular_values
+from pdrom.constraints import svd3
+from pdrom.constraints.base import require_cells
+from pdrom.constraints.lanes import (
+    LANES,
+    kernel,
+    lane_function,
+    load,
+    mix3,
+    save,
+    scaled,
+    square_distance,
+    take,
+)
+from pdrom.constraints.polar3 import rotation_block, within_range_block
+from pdrom.constraints.simplex import (
+    EDGE,
+    ENERGY,
+    FORCE,
+    OPERATOR,
+    OWN,
+    WEIGHT,
+    F,
+    P,
+    SimplexGroup,
+    energy,
+    gather_edges,
+    scatter,
+    start_energy,
+    store_projections,
+)
 from pdrom.mesh.types import Mesh
 
+# numbers of a lane in the packed geometry
+GEOMETRY = 10
+# where the working array of svd3 and the marks of finished lanes begin
+SVD, FOUND = OWN, OWN + svd3.SIZE
 
-class TetrahedronGroup(StencilGroup):
+
+@lane_function
+def _gradients(work, geometry, block):
+    """S q = F^T of a block from its edges."""
+    start = block * GEOMETRY + OPERATOR
+    for lane in range(LANES):
+        e0, e1, e2 = load(work, EDGE, lane), load(work, EDGE + 3, lane), load(work, EDGE + 6, lane)
+        for i in range(3):
+            row = load(geometry, start + 3 * i, lane)
+            save(work, F + 3 * i, lane, mix3(row[0], e0, row[1], e1, row[2], e2))
+
+
+@lane_function
+def _nearest(work, low, high):
+    """Projections of a block: the cheap cases first, the SVD where a lane is left."""
+    found = work[FOUND * LANES : (FOUND + 1) * LANES]
+    if low == high == 1.0:
+        rotation_block(work, F, work, P, found)
+    else:
+        within_range_block(work, F, work, P, low, high, found)
+    left = 0.0
+    for lane in range(LANES):
+        left += 1.0 - found[lane]
+    if left > 0.0:
+        svd3.clamp_block(work, F, work, P, found, low, high, work[SVD * LANES :])
+
+
+@lane_function
+def _forces(work, geometry, block):
+    """Weighted forces S^T W p on the corners, and w |S q - p|^2."""
+    weight, start = block * GEOMETRY + WEIGHT, block * GEOMETRY + OPERATOR
+    for lane in range(LANES):
+        p0, p1, p2 = load(work, P, lane), load(work, P + 3, lane), load(work, P + 6, lane)
+        r0, r1, r2 = (
+            load(geometry, start, lane), load(geometry, start + 3, lane),
+            load(geometry, start + 6, lane),
+        )  # fmt: skip
+        w = geometry[weight * LANES + lane]
+        for corner in range(3):
+            force = mix3(r0[corner], p0, r1[corner], p1, r2[corner], p2)
+            save(work, FORCE + 3 * corner, lane, scaled(w, force))
+        work[ENERGY * LANES + lane] += w * (
+            square_distance(load(work, F, lane), p0)
+            + square_distance(load(work, F + 3, lane), p1)
+            + square_distance(load(work, F + 6, lane), p2)
+        )
+
+
+@kernel
+def _project(y, corners, geometry, low, high, elements, taken, taken_geometry, work, p):
+    for start in range(0, elements.shape[0], LANES):
+        take(corners, 4, elements, start, taken)
+        take(geometry, GEOMETRY, elements, start, taken_geometry)
+        gather_edges(y, taken, 0, 3, work)
+        _gradients(work, taken_geometry, 0)
+        _nearest(work, low, high)
+        store_projections(work, 3, start, p)
+
+
+@kernel
+def _accumulate(y, corners, geometry, low, high, first, last, elements, work, rhs):
+    start_energy(work)
+    for block in range(first, last):
+        gather_edges(y, corners, block, 3, work)
+        _gradients(work, geometry, block)
+        _nearest(work, low, high)
+        _forces(work, geometry, block)
+        scatter(work, corners, block, 3, elements, rhs)
+    return energy(work)
+
+
+class TetrahedronGroup(SimplexGroup):
     """One constraint per tetrahedron on the signed singular values of F, weight w V_t."""
 
     rows_per_element = 3
+    work_size = FOUND + 1
+    split_from = 2048
+    project_kernel = staticmethod(_project)
+    accumulate_kernel = staticmethod(_accumulate)
     minimum: float
     maximum: float
 
@@ -26,15 +131,8 @@ class TetrahedronGroup(StencilGroup):
         self.operator = np.concatenate([-transposed.sum(axis=2, keepdims=True), transposed], axis=2)
         self._assemble(mesh.vertices)
 
-    def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:
-        p = np.empty((3 * len(elements), 3))
-        _project(y, elements, self.stencil, self.operator, self.minimum, self.maximum, p)
-        return p
-
-    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        return _accumulate(
-            y, self.stencil, self.operator, self.weights, self.minimum, self.maximum, rhs
-        )
+    def _constants(self) -> tuple[float, ...]:
+        return (self.minimum, self.maximum)
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         u, sigma, vt = np.linalg.svd(d)
@@ -43,66 +141,3 @@ class TetrahedronGroup(StencilGroup):
         signed = sigma * np.stack([np.ones_like(flip), np.ones_like(flip), flip], axis=1)
         u = u * np.stack([np.ones_like(flip), np.ones_like(flip), flip], axis=1)[:, None, :]
         return (u * np.clip(signed, self.minimum, self.maximum)[:, None, :]) @ vt
-
-
-@njit(cache=True, error_model="numpy")
-def _gradient(y, vertices, operator, f):
-    """Rows of F^T of one tetrahedron."""
-    for axis in range(3):
-        origin = y[vertices[0], axis]
-        e1 = y[vertices[1], axis] - origin
-        e2 = y[vertices[2], axis] - origin
-        e3 = y[vertices[3], axis] - origin
-        for row in range(3):
-            f[row, axis] = operator[row, 1] * e1 + operator[row, 2] * e2 + operator[row, 3] * e3
-
-
-@njit(cache=True, error_model="numpy")
-def _nearest(f, low, high, u, sigma, v, p):
-    """Projection of one tetrahedron: the cheap cases first, the SVD for what they leave."""
-    if low == high:
-        if low == 1.0 and newton_rotation(f, p):
-            return
-    elif within_range(f, low, high):
-        for i in range(3):
-            for a in range(3):
-                p[i, a] = f[i, a]
-        return
-    clamp_singular_values(f, low, high, u, sigma, v, p)
-
-
-@njit(cache=True, error_model="numpy")
-def _project(y, elements, stencil, operator, low, high, p):
-    f, u, v, sigma = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
-    for i in range(elements.shape[0]):
-        e = elements[i]
-        _gradient(y, stencil[e], operator[e], f)
-        _nearest(f, low, high, u, sigma, v, p[3 * i : 3 * i + 3])
-
-
-@njit(cache=True, error_model="numpy")
-def _accumulate(y, stencil, operator, weights, low, high, rhs):
-    energy = 0.0
-    f, p, u, v = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    sigma = np.empty(3)
-    for e in range(stencil.shape[0]):
-        _gradient(y, stencil[e], operator[e], f)
-        _nearest(f, low, high, u, sigma, v, p)
-        w = weights[e]
-        for axis in range(3):
-            total = 0.0
-            for corner in range(1, 4):
-                force = w * (
-                    operator[e, 0, corner] * p[0, axis]
-                    + operator[e, 1, corner] * p[1, axis]
-                    + operator[e, 2, corner] * p[2, axis]
-                )
-                rhs[stencil[e, corner], axis] += force
-                total += force
-            rhs[stencil[e, 0], axis] -= total
-            energy += w * (
-                (f[0, axis] - p[0, axis]) ** 2
-                + (f[1, axis] - p[1, axis]) ** 2
-                + (f[2, axis] - p[2, axis]) ** 2
-            )
-    return 0.5 * energy

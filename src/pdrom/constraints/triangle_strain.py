@@ -7,12 +7,45 @@ the constraint is invariant under rotations, also out of the plane. S q = F^T, t
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numba import njit
 from pydantic import Field, model_validator
 
-from pdrom.constraints.base import GroupConfig, StencilGroup, require_cells
-from pdrom.constraints.vectors import perpendicular
+from pdrom.constraints.base import GroupConfig, require_cells
+from pdrom.constraints.lanes import (
+    LANES,
+    SMALLEST,
+    absolute_sum,
+    choose,
+    clamp,
+    dot,
+    kernel,
+    lane_function,
+    load,
+    mix,
+    save,
+    scaled,
+    square_distance,
+    take,
+)
+from pdrom.constraints.simplex import (
+    EDGE,
+    ENERGY,
+    FORCE,
+    OPERATOR,
+    WEIGHT,
+    F,
+    P,
+    SimplexGroup,
+    energy,
+    gather_edges,
+    scatter,
+    start_energy,
+    store_projections,
+)
+from pdrom.constraints.svd3 import jacobi_rotation, orthonormal_pair
 from pdrom.mesh.types import Mesh
+
+# numbers of a lane in the packed geometry
+GEOMETRY = 5
 
 
 class StrainConfig(GroupConfig):
@@ -28,40 +61,79 @@ class StrainConfig(GroupConfig):
         return self
 
 
-class TriangleStrain(StencilGroup):
-    """One constraint per triangle, weight w A_t."""
+@lane_function
+def _gradients(work, geometry, block):
+    """S q = F^T of a block from its edges."""
+    first = (block * GEOMETRY + OPERATOR) * LANES
+    for lane in range(LANES):
+        e0, e1 = load(work, EDGE, lane), load(work, EDGE + 3, lane)
+        at = first + lane
+        save(work, F, lane, mix(geometry[at], e0, geometry[at + LANES], e1))
+        at += 2 * LANES
+        save(work, F + 3, lane, mix(geometry[at], e0, geometry[at + LANES], e1))
 
-    class Config(StrainConfig):
-        """Weight w per area, N/m (times the clamped strain)."""
 
-        effect: Literal["strain"] = "strain"
+@lane_function
+def _clamp_columns(work, low, high):
+    """Clamp the singular values of the 3 x 2 matrices F of a block.
 
-    rows_per_element = 2
+    One-sided Jacobi: a single rotation makes two columns orthogonal, their norms are the singular
+    values. Working on F, not on F^T F, keeps small singular values accurate.
+    """
+    for lane in range(LANES):
+        f0, f1 = load(work, F, lane), load(work, F + 3, lane)
+        scale = absolute_sum(f0) + absolute_sum(f1) + SMALLEST
+        f0, f1 = scaled(1.0 / scale, f0), scaled(1.0 / scale, f1)
+        c, s, _ = jacobi_rotation(f0, f1, False)
+        a, b = mix(c, f0, -s, f1), mix(s, f0, c, f1)
+        swapped = dot(a, a) < dot(b, b)
+        u0, u1, s0, s1 = orthonormal_pair(choose(swapped, b, a), choose(swapped, a, b))
+        # not finite where F is not
+        u0 = scaled(clamp(scale * s0, low, high) + 0.0 * scale, u0)
+        u1 = scaled(clamp(scale * s1, low, high), u1)
+        a, b = choose(swapped, u1, u0), choose(swapped, u0, u1)
+        save(work, P, lane, mix(c, a, s, b))
+        save(work, P + 3, lane, mix(c, b, -s, a))
 
-    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
-        super().__init__(config, mesh, masses)
-        self.stencil = require_cells(mesh, "triangles", self.name)
-        rest_inverse, area = rest_frames(mesh.points, self.stencil)
-        self.weights = config.weight * area
-        # F = [q1 - q0, q2 - q0] D^-1, hence F^T = D^-T [q1 - q0; q2 - q0]
-        transposed = rest_inverse.transpose(0, 2, 1)
-        self.operator = np.concatenate([-transposed.sum(axis=2, keepdims=True), transposed], axis=2)
-        self._assemble(mesh.vertices)
 
-    def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:
-        p = np.empty((2 * len(elements), 3))
-        low, high = self.config.minimum, self.config.maximum
-        _project(y, elements, self.stencil, self.operator, low, high, p)
-        return p
+@lane_function
+def _forces(work, geometry, block):
+    """Weighted forces S^T W p on the corners, and w |S q - p|^2."""
+    weight = (block * GEOMETRY + WEIGHT) * LANES
+    first = (block * GEOMETRY + OPERATOR) * LANES
+    for lane in range(LANES):
+        p0, p1 = load(work, P, lane), load(work, P + 3, lane)
+        w, at = geometry[weight + lane], first + lane
+        r00, r01 = geometry[at], geometry[at + LANES]
+        r10, r11 = geometry[at + 2 * LANES], geometry[at + 3 * LANES]
+        save(work, FORCE, lane, scaled(w, mix(r00, p0, r10, p1)))
+        save(work, FORCE + 3, lane, scaled(w, mix(r01, p0, r11, p1)))
+        work[ENERGY * LANES + lane] += w * (
+            square_distance(load(work, F, lane), p0) + square_distance(load(work, F + 3, lane), p1)
+        )
 
-    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        low, high = self.config.minimum, self.config.maximum
-        return _accumulate(y, self.stencil, self.operator, self.weights, low, high, rhs)
 
-    def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
-        u, sigma, vt = np.linalg.svd(d, full_matrices=False)
-        clamped = np.clip(sigma, self.config.minimum, self.config.maximum)
-        return (u * clamped[:, None, :]) @ vt
+@kernel
+def _project(y, corners, geometry, low, high, elements, taken, taken_geometry, work, p):
+    for start in range(0, elements.shape[0], LANES):
+        take(corners, 3, elements, start, taken)
+        take(geometry, GEOMETRY, elements, start, taken_geometry)
+        gather_edges(y, taken, 0, 2, work)
+        _gradients(work, taken_geometry, 0)
+        _clamp_columns(work, low, high)
+        store_projections(work, 2, start, p)
+
+
+@kernel
+def _accumulate(y, corners, geometry, low, high, first, last, elements, work, rhs):
+    start_energy(work)
+    for block in range(first, last):
+        gather_edges(y, corners, block, 2, work)
+        _gradients(work, geometry, block)
+        _clamp_columns(work, low, high)
+        _forces(work, geometry, block)
+        scatter(work, corners, block, 2, elements, rhs)
+    return energy(work)
 
 
 def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -79,84 +151,33 @@ def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, 
     return inverse, area
 
 
-@njit(cache=True, error_model="numpy")
-def _clamp_columns(f, low, high, p):
-    """Clamp the singular values of the 3 x 2 matrix with columns f[0], f[1]; columns of p.
+class TriangleStrain(SimplexGroup):
+    """One constraint per triangle, weight w A_t."""
 
-    One-sided Jacobi: a single rotation makes two columns orthogonal, their norms are the singular
-    values. Working on F, not on F^T F, keeps small singular values accurate.
-    """
-    alpha = f[0, 0] * f[0, 0] + f[0, 1] * f[0, 1] + f[0, 2] * f[0, 2]
-    beta = f[1, 0] * f[1, 0] + f[1, 1] * f[1, 1] + f[1, 2] * f[1, 2]
-    gamma = f[0, 0] * f[1, 0] + f[0, 1] * f[1, 1] + f[0, 2] * f[1, 2]
-    c, s = 1.0, 0.0
-    if abs(gamma) > 1e-16 * np.sqrt(alpha * beta):
-        zeta = (beta - alpha) / (2.0 * gamma)
-        t = 1.0 / (abs(zeta) + np.sqrt(1.0 + zeta * zeta))
-        if zeta < 0.0:
-            t = -t
-        c = 1.0 / np.sqrt(1.0 + t * t)
-        s = c * t
-    a0, a1, a2 = c * f[0, 0] - s * f[1, 0], c * f[0, 1] - s * f[1, 1], c * f[0, 2] - s * f[1, 2]
-    b0, b1, b2 = s * f[0, 0] + c * f[1, 0], s * f[0, 1] + c * f[1, 1], s * f[0, 2] + c * f[1, 2]
-    swapped = a0 * a0 + a1 * a1 + a2 * a2 < b0 * b0 + b1 * b1 + b2 * b2
-    if swapped:
-        a0, a1, a2, b0, b1, b2 = b0, b1, b2, a0, a1, a2
-    sigma_a = np.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
-    if sigma_a > 0.0:
-        a0, a1, a2 = a0 / sigma_a, a1 / sigma_a, a2 / sigma_a
-    else:
-        a0, a1, a2 = 1.0, 0.0, 0.0
-    # what rounding left of the large column in the small one would tilt its direction
-    overlap = a0 * b0 + a1 * b1 + a2 * b2
-    b0, b1, b2 = b0 - overlap * a0, b1 - overlap * a1, b2 - overlap * a2
-    sigma_b = np.sqrt(b0 * b0 + b1 * b1 + b2 * b2)
-    if sigma_b > 1e-15 * sigma_a:
-        b0, b1, b2 = b0 / sigma_b, b1 / sigma_b, b2 / sigma_b
-    else:
-        b0, b1, b2 = perpendicular(a0, a1, a2)
-    clamped_a, clamped_b = min(max(sigma_a, low), high), min(max(sigma_b, low), high)
-    a0, a1, a2 = a0 * clamped_a, a1 * clamped_a, a2 * clamped_a
-    b0, b1, b2 = b0 * clamped_b, b1 * clamped_b, b2 * clamped_b
-    if swapped:
-        a0, a1, a2, b0, b1, b2 = b0, b1, b2, a0, a1, a2
-    p[0, 0], p[0, 1], p[0, 2] = c * a0 + s * b0, c * a1 + s * b1, c * a2 + s * b2
-    p[1, 0], p[1, 1], p[1, 2] = c * b0 - s * a0, c * b1 - s * a1, c * b2 - s * a2
+    class Config(StrainConfig):
+        """Weight w per area, N/m (times the clamped strain)."""
 
+        effect: Literal["strain"] = "strain"
 
-@njit(cache=True, error_model="numpy")
-def _gradient(y, vertices, operator, f):
-    """Rows of F^T of one triangle."""
-    for row in range(2):
-        for axis in range(3):
-            f[row, axis] = operator[row, 1] * (
-                y[vertices[1], axis] - y[vertices[0], axis]
-            ) + operator[row, 2] * (y[vertices[2], axis] - y[vertices[0], axis])
+    rows_per_element = 2
+    split_from = 8192
+    project_kernel = staticmethod(_project)
+    accumulate_kernel = staticmethod(_accumulate)
 
+    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
+        super().__init__(config, mesh, masses)
+        self.stencil = require_cells(mesh, "triangles", self.name)
+        rest_inverse, area = rest_frames(mesh.points, self.stencil)
+        self.weights = config.weight * area
+        # F = [q1 - q0, q2 - q0] D^-1, hence F^T = D^-T [q1 - q0; q2 - q0]
+        transposed = rest_inverse.transpose(0, 2, 1)
+        self.operator = np.concatenate([-transposed.sum(axis=2, keepdims=True), transposed], axis=2)
+        self._assemble(mesh.vertices)
 
-@njit(cache=True, error_model="numpy")
-def _project(y, elements, stencil, operator, low, high, p):
-    f = np.empty((2, 3))
-    for i in range(elements.shape[0]):
-        e = elements[i]
-        _gradient(y, stencil[e], operator[e], f)
-        _clamp_columns(f, low, high, p[2 * i : 2 * i + 2])
+    def _constants(self) -> tuple[float, ...]:
+        return (self.config.minimum, self.config.maximum)
 
-
-@njit(cache=True, error_model="numpy")
-def _accumulate(y, stencil, operator, weights, low, high, rhs):
-    energy = 0.0
-    f = np.empty((2, 3))
-    p = np.empty((2, 3))
-    for e in range(stencil.shape[0]):
-        _gradient(y, stencil[e], operator[e], f)
-        _clamp_columns(f, low, high, p)
-        w = weights[e]
-        for axis in range(3):
-            first = w * (operator[e, 0, 1] * p[0, axis] + operator[e, 1, 1] * p[1, axis])
-            second = w * (operator[e, 0, 2] * p[0, axis] + operator[e, 1, 2] * p[1, axis])
-            rhs[stencil[e, 1], axis] += first
-            rhs[stencil[e, 2], axis] += second
-            rhs[stencil[e, 0], axis] -= first + second
-            energy += w * ((f[0, axis] - p[0, axis]) ** 2 + (f[1, axis] - p[1, axis]) ** 2)
-    return 0.5 * energy
+    def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
+        u, sigma, vt = np.linalg.svd(d, full_matrices=False)
+        clamped = np.clip(sigma, self.config.minimum, self.config.maximum)
+        return (u * clamped[:, None, :]) @ vt

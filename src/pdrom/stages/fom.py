@@ -8,9 +8,11 @@ from pdrom.snapshots import stored_frames, test_frames
 from pdrom.stages.scenes import scene_of
 
 
-def run_fom(config: dict[str, Any], mesh: str, run: str, solver: str, output: str) -> None:
+def run_fom(
+    config: dict[str, Any], mesh: str, run: str, solver: str, threads: int, output: str
+) -> None:
     """Simulate ``run`` of a scene; the held-out run stores the odd frames only."""
-    scene = scene_of(config, mesh, run)
+    scene = scene_of(config, mesh, run, threads)
     frames = scene.config.frames
     wanted = {
         group: test_frames(frames) if run == "heldout" else stored_frames(frames, plan.train)

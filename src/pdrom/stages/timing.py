@@ -41,6 +41,7 @@ def time_scene(
     ranks: list[int | str],
     protocol: dict[str, int],
     solver: str,
+    threads: int,
     mesh: str,
     bases: list[str],
     samplings: list[str],
@@ -48,7 +49,7 @@ def time_scene(
     output: str,
 ) -> None:
     """Measure one scene and write its timing table."""
-    bound = scene_of(scene, mesh)
+    bound = scene_of(scene, mesh, threads=threads)
     system = bound.system_with(solver)
     frames = min(protocol["frames"], bound.config.frames)
     make = partial(_variant, bound, system, frames)
