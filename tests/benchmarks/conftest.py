@@ -1,0 +1,33 @@
+"""What the saved benchmarks keep: statistics, processor and libraries, not every single time."""
+
+from typing import Any
+
+from pdrom.provenance import machine
+
+
+def pytest_benchmark_update_json(
+    config: Any, benchmarks: list[Any], output_json: dict[str, Any]
+) -> None:
+    """Shorten the file that `--benchmark-json` writes."""
+    for benchmark in output_json["benchmarks"]:
+        benchmark["stats"] = {
+            key: _short(v) for key, v in benchmark["stats"].items() if key != "data"
+        }
+        benchmark["options"] = {}
+
+
+def _short(value: Any) -> Any:
+    return float(f"{value:.4g}") if isinstance(value, float) else value
+
+
+def pytest_benchmark_update_machine_info(config: Any, machine_info: dict[str, Any]) -> None:
+    """Replace the record of the machine by the study's own."""
+    machine_info.clear()
+    machine_info.update(machine())
+
+
+def pytest_benchmark_update_commit_info(config: Any, commit_info: dict[str, Any]) -> None:
+    """The commit is in the record of the machine."""
+    for key in list(commit_info):
+        if key not in ("id", "dirty"):
+            del commit_info[key]
