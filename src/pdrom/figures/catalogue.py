@@ -29,6 +29,8 @@ FIGURES = Registry(
         "run_error": f"{_PACKAGE}.run_error:draw",
         "ladder": f"{_PACKAGE}.ladder:draw",
         "accuracy_cost": f"{_PACKAGE}.accuracy_cost:draw",
+        "stability_map": f"{_PACKAGE}.stability_map:draw",
+        "stability_sweep": f"{_PACKAGE}.stability_sweep:draw",
     },
 )
 
@@ -51,6 +53,8 @@ READS: dict[str, tuple[str, ...]] = {
     "run_error": ("rerun", "table:sensitivity"),
     "ladder": ("table:ladder",),
     "accuracy_cost": ("table:accuracy_cost",),
+    "stability_map": ("table:stability",),
+    "stability_sweep": ("table:stability",),
 }
 # Figures of the first experiment and the first method that a configuration holds.
 FIRST_ONLY = ("snapshots_and_modes", "deim_iterations")

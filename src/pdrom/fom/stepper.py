@@ -44,8 +44,8 @@ class State:
 class FrameReport:
     """What a frame did.
 
-    objective : (K,) value of 1/(2 h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) at the K local iterates;
-        empty if it was not tracked
+    objective : (K,) value of 1/(2 h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) at the K local iterates,
+        nan where a local step does not know its energy; empty if it was not tracked
     seconds : (4,) time of each of `PHASES`
     """
 
@@ -89,7 +89,7 @@ class Stepper:
         for local in self.local_steps:
             local.begin_frame(state.positions)
         y, rhs = s.copy(), np.empty_like(s)
-        objective = np.zeros(self.iterations if self._track else 0)
+        objective = np.full(self.iterations if self._track else 0, np.nan)
         seconds[0] = perf_counter() - started
         for k in range(self.iterations):
             if on_last_iterate is not None and k == self.iterations - 1:
@@ -100,7 +100,7 @@ class Stepper:
             for local in self.local_steps:
                 energy += local.accumulate(y, rhs)
             between = perf_counter()
-            if self._track:
+            if self._track and energy == energy:
                 objective[k] = energy + space.inertia_energy(y - s)
             tracked = perf_counter()
             elimination.solve(rhs, y)

@@ -11,6 +11,7 @@ from pdrom.tables.reconstruction_error import reconstruction_error
 from pdrom.tables.reduced_reruns import heldout_reruns, reduced_reruns
 from pdrom.tables.sensitivity import sensitivity
 from pdrom.tables.singular_values import singular_values
+from pdrom.tables.stability import stability
 
 
 def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
@@ -32,6 +33,16 @@ def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
             inputs.runs, inputs.hyper, read_table(inputs.sensitivity), params.threshold
         ),
         "ladder": lambda: ladder(inputs.parts),
+        "stability": lambda: stability(
+            inputs.fom,
+            inputs.reruns,
+            inputs.hyper,
+            inputs.sweeps,
+            read_table(inputs.reduced_reruns),
+            params.time_steps,
+            params.wrong,
+            params.left,
+        ),
         "accuracy_cost": lambda: accuracy_cost(
             read_table(inputs.reruns), inputs.timings, params.iterations
         ),

@@ -35,6 +35,16 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "scene", "group", "direction", "rung", "r", "condition", "gain", "error_train",
         "error_test", "error_heldout", "finite", "blowup_frame", "relative_error_within_horizon",
     ),
+    "stability": (
+        "scene", "method", "r", "h", "stiffness_ratio", "finite", "blowup_frame", "max_extent",
+        "energy_ratio", "gain", "group", "position_basis", "k", "experiment", "relative_error",
+        "outcome",
+    ),
+    "guard": (
+        "scene", "group", "method", "r", "action", "frames", "finite", "blowup_frame",
+        "relative_error", "energy_ratio", "guard_frame", "guard_reason", "guard_count",
+        "fallback_frames", "fallback_share", "ms_per_frame", "relative_cost",
+    ),
     "claims": (
         "claim", "source", "paper", "measured", "verdict", "why", "figure_or_table",
     ),
@@ -45,6 +55,7 @@ TIMING_COLUMNS: dict[str, tuple[str, ...]] = {
     "reduced_reruns": ("ms_per_frame", "local_ms", "global_ms", "speedup"),
     "accuracy_cost": ("ms_per_frame", "pareto"),
     "local_share": ("local_ms", "assembly_ms", "global_ms", "local_share"),
+    "guard": ("ms_per_frame", "relative_cost"),
     "claims": ("measured", "verdict", "why"),
 }
 
