@@ -11,6 +11,7 @@ from matplotlib.patches import Patch, Rectangle
 from pdrom.figures import style
 
 GAP = 0.45  # between blocks, in cells
+DENSE = 30  # cells across, from which on labels stand upright and titles take two lines
 
 
 @dataclass(frozen=True)
@@ -60,9 +61,11 @@ def draw_cells(
         for a cell that stays empty
     """
     x, ticks, labels = 0.0, [], []
+    dense = sum(len(block.labels) for block in blocks) > DENSE
     for j, block in enumerate(blocks):
         width = len(block.labels)
-        ax.text(x + 0.5 * width, -0.25, block.title, ha="center", va="bottom", fontsize=6.5)
+        title = block.title.replace("-", "-\n", 1) if dense else block.title
+        ax.text(x + 0.5 * width, -0.25, title, ha="center", va="bottom", fontsize=6.5)
         for k, label in enumerate(block.labels):
             ticks.append(x + k + 0.5)
             labels.append(label)
@@ -73,7 +76,7 @@ def draw_cells(
         x += width + GAP
     ax.set_xlim(0.0, x - GAP)
     ax.set_ylim(len(rows), 0.0)
-    ax.set_xticks(ticks, labels, fontsize=6)
+    ax.set_xticks(ticks, labels, fontsize=6, rotation=90 if dense else 0)
     ax.set_yticks([i + 0.5 for i in range(len(rows))], rows, fontsize=6.5)
     ax.tick_params(length=0, pad=2)
     for spine in ax.spines.values():

@@ -12,7 +12,7 @@ from pdrom.store import read_table
 COLUMNS = [
     "scene", "group", "method", "position_basis", "k", "r", "experiment", "outcome", "blowup_frame",
 ]  # fmt: skip
-CELLS = 27  # of one strip; more blocks make another strip
+CELLS = 48  # of one strip; more blocks make another strip
 ROW = 0.145  # inches
 
 
@@ -81,7 +81,7 @@ def _local_strips(table: pd.DataFrame, sources: Sources, spec: FigureSpec) -> li
     blocks, lookups = [], []
     for method in dict.fromkeys(part.method):
         own = part[part.method == method]
-        blocks.append(Block(_short(method), [_size(r) for r in spec.ranks]))
+        blocks.append(Block(method, [_size(r) for r in spec.ranks]))
         lookups.append([_by_experiment(_at_size(own, r)) for r in spec.ranks])
     return _wrapped(rows, blocks, lookups, "number of modes r (full: numerical rank)")
 
@@ -94,8 +94,8 @@ def _subspace_strips(table: pd.DataFrame, sources: Sources, spec: FigureSpec) ->
     for basis, method in dict.fromkeys(zip(part.position_basis, part.method, strict=True)):
         own = part[(part.position_basis == basis) & (part.method == method)]
         sizes = sorted(own.k.dropna().unique())
-        title = f"{basis} subspace" + ("" if method == "full" else f"\n{_short(method)}")
-        blocks.append(Block(title, [str(int(k)) for k in sizes]))
+        sampled = "all projections" if method == "full" else method
+        blocks.append(Block(f"{basis} subspace\n{sampled}", [str(int(k)) for k in sizes]))
         lookups.append([_by_experiment(own[own.k == k]) for k in sizes])
     return _wrapped(rows, blocks, lookups, "number of position modes k")
 
@@ -127,8 +127,3 @@ def _by_experiment(rows: pd.DataFrame) -> dict[tuple[str, str], pd.Series]:
 
 def _size(rank: int | str) -> str:
     return "full" if rank == "full" else str(rank)
-
-
-def _short(method: str) -> str:
-    """A method's name, broken where it is long for the width of its block."""
-    return method if len(method) < 14 else method.replace("-", "-\n", 1)

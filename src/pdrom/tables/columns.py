@@ -38,7 +38,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "stability": (
         "scene", "method", "r", "h", "stiffness_ratio", "finite", "blowup_frame", "max_extent",
         "energy_ratio", "gain", "group", "position_basis", "k", "experiment", "relative_error",
-        "outcome",
+        "outcome", "guard_frame", "guard_reason", "guard_count",
     ),
     "guard": (
         "scene", "group", "method", "r", "action", "frames", "finite", "blowup_frame",

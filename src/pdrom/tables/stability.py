@@ -26,6 +26,9 @@ def stability(
 ) -> pd.DataFrame:
     """Rows of the study's reruns (experiment "rerun"), then of the short runs ("sweep").
 
+    What the guard saw (first frame and reason, number of frames) is known for reruns with unreduced
+    positions; nobody watches the others.
+
     Method "full" with position basis "full" is the full-order run. The error of a rerun is the one
     within the horizon, that of a short run is over all of it.
 
@@ -46,7 +49,7 @@ def stability(
     # a file in which nothing ran brings a column of floats
     flags = [None if pd.isna(cell) else bool(cell) for cell in table.finite]
     table["finite"] = pd.array(flags, dtype="boolean")
-    for column in ("k", "r", "blowup_frame"):
+    for column in ("k", "r", "blowup_frame", "guard_frame", "guard_count"):
         table[column] = table[column].astype("Int64")
     table["outcome"] = outcomes(table, wrong, left)
     return conform(table, "stability")
