@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pdrom.errors import ConfigurationError, PdromError
 from pdrom.fom.solvers import SOLVERS
 from pdrom.method import MethodSpec, load_methods
+from pdrom.rom.guard_settings import GuardSettings
 from pdrom.scene import Scene, SceneConfig
 from pdrom.yamlfile import read_yaml, validate
 
@@ -96,6 +97,61 @@ class Scaling(_Model):
     repeats: Annotated[int, Field(ge=1)] = 5
 
 
+class Stability(_Model):
+    """Short runs over the time step and over the stiffness of the reduced groups.
+
+    The bases and samplings are those of the scene's own setting.
+
+    scenes, ranks : where, and basis sizes, as far as the study holds them; position subspaces run
+        at their largest size
+    time_steps : h in seconds, beside the scene's own
+    stiffness_ratios : factors on the weights of the reduced groups, beside 1
+    duration : seconds of simulated time, within ``min_frames`` and ``max_frames``
+    wrong : relative error above which a run is finite but wrong
+    left : multiple of the full-order run's largest extent above which a run has left the scene
+    """
+
+    scenes: tuple[str, ...] = ()
+    ranks: tuple[Rank, ...] = ()
+    time_steps: tuple[Annotated[float, Field(gt=0.0, le=10.0)], ...] = ()
+    stiffness_ratios: tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...] = ()
+    duration: Annotated[float, Field(gt=0.0)] = 1.0
+    min_frames: Annotated[int, Field(ge=2)] = 30
+    max_frames: Annotated[int, Field(ge=2)] = 160
+    wrong: Annotated[float, Field(gt=0.0)] = 0.1
+    left: Annotated[float, Field(gt=1.0)] = 2.0
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.max_frames < self.min_frames:
+            raise ValueError(
+                f"max_frames = {self.max_frames}: at least min_frames = {self.min_frames}"
+            )
+        return self
+
+
+class GuardCase(_Model):
+    """A reduction on which the guard is tried, if the study holds scene, method and size."""
+
+    scene: str
+    method: str
+    r: Rank
+
+
+class Guard(GuardSettings):
+    """Guard of the reruns, and ``cases`` that compare its actions, each timed ``repeats`` times."""
+
+    cases: tuple[GuardCase, ...] = ()
+    repeats: Annotated[int, Field(ge=1)] = 3
+
+    @property
+    def watching(self) -> GuardSettings:
+        """The settings of the guard alone."""
+        return GuardSettings.model_validate(
+            self.model_dump(include=set(GuardSettings.model_fields))
+        )
+
+
 class StudySettings(_Model):
     """Content of config/default.yaml, possibly overridden by --configfile."""
 
@@ -112,6 +168,8 @@ class StudySettings(_Model):
     timing: Timing = Timing()
     subspace: Subspace = Subspace()
     scaling: Scaling = Scaling()
+    stability: Stability = Stability()
+    guard: Guard = Guard()
 
     @model_validator(mode="after")
     def _known(self) -> Self:

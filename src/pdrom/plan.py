@@ -20,7 +20,7 @@ REFERENCE_BASIS = "none-none-vectorised"
 TABLES = (
     "singular_values", "reconstruction_error", "reduced_reruns", "accuracy_cost", "local_share",
     "sensitivity",
-    "ladder", "heldout_reruns", "scaling", "scaling_fit", "claims",
+    "ladder", "heldout_reruns", "scaling", "scaling_fit", "stability", "guard", "claims",
 )  # fmt: skip
 
 
@@ -143,6 +143,66 @@ class Plan:
         """All tables."""
         return [f"{RESULTS}/tables/{name}.csv" for name in TABLES]
 
+    # Stability and guard --------------------------------------------------------------------
+
+    @property
+    def sweeps(self) -> list[str]:
+        """Files of the short runs over time step and stiffness."""
+        scenes = [s for s in self.study.scenes if s in self.settings.stability.scenes]
+        return [f"{RESULTS}/stability/{scene}.csv" for scene in scenes]
+
+    def stability_settings(self) -> dict[str, Any]:
+        """Plain settings of the short runs; which scenes have them is no parameter."""
+        settings = self.settings.stability
+        ranks = [r for r in settings.ranks if r in self.settings.ranks]
+        other = {"scenes", "wrong", "left"}
+        return {**settings.model_dump(mode="json", exclude=other), "ranks": ranks}
+
+    def time_steps(self) -> dict[str, float]:
+        """Time step of every scene in seconds."""
+        return {name: scene.time_step for name, scene in self.study.scenes.items()}
+
+    def guard_settings(self) -> dict[str, Any]:
+        """Plain settings of the guard of the reruns."""
+        return self.settings.guard.watching.model_dump(mode="json")
+
+    @cached_property
+    def _guard_cases(self) -> list[tuple[str, str, str, int | str]]:
+        """(scene, group, method, r) of the guard's cases that this configuration holds."""
+        held = [c for c in self.settings.guard.cases if c.scene in self.study.scenes]
+        held = [c for c in held if c.method in self.study.methods and c.r in self.settings.ranks]
+        return [
+            (c.scene, group, c.method, c.r)
+            for c in held
+            for group in self.study.scenes[c.scene].reduce
+        ]
+
+    def guard_cases(self) -> list[dict[str, Any]]:
+        """Plain cases of the guard."""
+        return [
+            {"scene": self.scene_config(scene), "group": group, "name": method, "r": r,
+             "method": self.method_spec(method)}
+            for scene, group, method, r in self._guard_cases
+        ]  # fmt: skip
+
+    def guard_files(self, kind: str) -> list[str]:
+        """Mesh, fom, basis or sampling file of each case, in order."""
+        places = {
+            "mesh": lambda scene, group, method: self.mesh_path(scene),
+            "fom": lambda scene, group, method: f"{RESULTS}/fom/{scene}/train.h5",
+            "basis": self.basis_path,
+            "sampling": lambda scene, group, method: (
+                f"{RESULTS}/sampling/{scene}/{group}/{method}.h5"
+            ),
+        }
+        return [places[kind](*case[:3]) for case in self._guard_cases]
+
+    def guard_code(self) -> str:
+        """Fingerprint of the guard's stage with the effects of its scenes."""
+        scenes = dict.fromkeys(case[0] for case in self._guard_cases)
+        modules = [m for scene in scenes for m in self.study.scenes[scene].modules]
+        return fingerprint("pdrom.stages.guard", *modules)
+
     # Ladder ---------------------------------------------------------------------------------
 
     @cached_property
@@ -236,6 +296,12 @@ class Plan:
             "timed_frames": settings.timing.frames,
             "blowup_extent": settings.blowup_extent,
             "ranks": ", ".join(str(r) for r in settings.ranks),
+            "wrong": settings.stability.wrong,
+            "left": settings.stability.left,
+            "guard_action": settings.guard.action,
+            "guard_margin": settings.guard.margin,
+            "guard_extent": settings.guard.extent,
+            "guard_rise": settings.guard.rise,
         }
         methods = [{"method": m, **self.method_spec(m)} for m in self.study.methods]
         scenes = [self._scene_facts(name) for name in self.study.scenes]

@@ -54,6 +54,7 @@ rule reruns:
         ranks=list(PLAN.settings.ranks),
         heldout_ranks=list(PLAN.settings.heldout_ranks),
         blowup_extent=PLAN.settings.blowup_extent,
+        guard=PLAN.guard_settings(),
         solver=PLAN.settings.solver,
         code=lambda w: PLAN.scene_code("pdrom.stages.reruns", w.scene),
     message:

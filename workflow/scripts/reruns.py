@@ -8,6 +8,7 @@ with job_log(snakemake.log[0]):
         snakemake.params.spec,
         {"train": snakemake.params.ranks, "heldout": snakemake.params.heldout_ranks},
         snakemake.params.blowup_extent,
+        snakemake.params.guard,
         snakemake.params.solver,
         snakemake.input.mesh,
         {"train": snakemake.input.fom, "heldout": snakemake.input.heldout},

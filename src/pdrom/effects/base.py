@@ -90,6 +90,10 @@ class Force(Effect):
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
         """Acceleration of the frame, (3,) or (N, 3) m/s^2."""
 
+    def potential(self, positions: np.ndarray, masses: np.ndarray) -> float:
+        """Potential energy in joule up to a constant; a force that has none (damping) adds none."""
+        return 0.0
+
 
 class Boundary(Effect):
     """Prescribes positions. Held vertices are eliminated from the system, not penalised."""

@@ -23,3 +23,6 @@ class Gravity(Force):
 
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
         return self._acceleration
+
+    def potential(self, positions: np.ndarray, masses: np.ndarray) -> float:
+        return -float(self._acceleration @ (masses @ positions))

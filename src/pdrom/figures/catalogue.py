@@ -30,6 +30,8 @@ FIGURES = Registry(
         "ladder": f"{_PACKAGE}.ladder:draw",
         "accuracy_cost": f"{_PACKAGE}.accuracy_cost:draw",
         "scaling": f"{_PACKAGE}.scaling:draw",
+        "stability_map": f"{_PACKAGE}.stability_map:draw",
+        "stability_sweep": f"{_PACKAGE}.stability_sweep:draw",
     },
 )
 
@@ -53,6 +55,8 @@ READS: dict[str, tuple[str, ...]] = {
     "ladder": ("table:ladder",),
     "accuracy_cost": ("table:accuracy_cost",),
     "scaling": ("table:scaling", "table:scaling_fit"),
+    "stability_map": ("table:stability",),
+    "stability_sweep": ("table:stability",),
 }
 # Figures of the first experiment and the first method that a configuration holds.
 FIRST_ONLY = ("snapshots_and_modes", "deim_iterations")

@@ -46,7 +46,8 @@ class FrameReport:
     """What a frame did.
 
     objective : (K,) value of 1/(2 h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) at the K local iterates
-        (at a refused one the value of the last accepted); empty if it was not tracked
+        (at a refused one the value of the last accepted), nan where a local step does not know its
+        energy; empty if it was not tracked
     seconds : (4,) time of each of `PHASES`
     """
 
@@ -95,7 +96,7 @@ class Stepper:
         acceleration = self._acceleration
         if acceleration is not None:
             acceleration.begin_frame(y)
-        objective = np.zeros(self.iterations if self._track else 0)
+        objective = np.full(self.iterations if self._track else 0, np.nan)
         seconds[0] = perf_counter() - started
         for k in range(self.iterations):
             if on_last_iterate is not None and k == self.iterations - 1:
@@ -107,7 +108,7 @@ class Stepper:
                 energy += local.accumulate(y, rhs)
             between = perf_counter()
             seconds[1] += between - before
-            if self._track:
+            if self._track and energy == energy:
                 objective[k] = energy + space.inertia_energy(y - s)
             before = perf_counter()
             if acceleration is None:

@@ -106,6 +106,8 @@ def _rerun_cell(part: pd.DataFrame) -> str:
     if ran.empty:
         return "--"
     last = ran.iloc[-1]
+    if pd.isna(last.relative_error_within_horizon) and pd.isna(last.blowup_frame):
+        return "stopped"
     if pd.isna(last.relative_error_within_horizon):
         return rf"\textcolor{{okred}}{{blow-up, {int(last.blowup_frame)}}}"
     return format_number(last.relative_error_within_horizon)
@@ -127,6 +129,49 @@ def local_share(tables: Tables) -> str:
     return longtable(header, rows, "lrrrrrr")
 
 
+_OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up")
+
+
+def stability(tables: Tables) -> str:
+    """How many runs of each method ended how: the study's reruns, then those at other settings."""
+    table = tables["stability"]
+    table = table[(table.outcome != "not run") & ~_full_order(table)]
+    rows = []
+    for (basis, method), part in table.groupby(["position_basis", "method"], sort=False):
+        reruns, sweep = (part[part.experiment == kind] for kind in ("rerun", "sweep"))
+        row = [name(method) if basis == "full" else name(f"{method}, {basis} subspace")]
+        row += [str((reruns.outcome == outcome).sum()) for outcome in _OUTCOMES]
+        row += [format_number(value) for value in (reruns.energy_ratio.median(),
+                                                   reruns.energy_ratio.max())]  # fmt: skip
+        row += [f"{(sweep.outcome == 'accurate').sum()} of {len(sweep)}"]
+        rows.append([*row, format_number(sweep.energy_ratio.max())])
+    header = ["method", *_OUTCOMES, "energy (median)", "(max)", "$h$, stiffness: accurate",
+              "energy (max)"]  # fmt: skip
+    narrow = r">{\raggedleft\arraybackslash}p{1.25cm}"
+    return tabular(header, rows, "l" + narrow * 8)
+
+
+def _full_order(table: pd.DataFrame) -> pd.Series:
+    return (table.method == "full") & (table.position_basis == "full")
+
+
+def guard(tables: Tables) -> str:
+    """What watching costs and what falling back buys."""
+    rows = []
+    for row in tables["guard"].itertuples():
+        full = row.method == "full"
+        action = "full order" if full else row.action
+        method = "" if full else name(f"{row.method}, r = {int(row.r)}")
+        share = "--" if pd.isna(row.fallback_share) else format_number(row.fallback_share)
+        first = "--" if pd.isna(row.guard_frame) else f"{int(row.guard_frame)}, {row.guard_reason}"
+        error = "blow-up" if pd.isna(row.relative_error) else format_number(row.relative_error)
+        cells = [error, format_number(row.energy_ratio), first, share]
+        rows.append([name(row.scene), method, action, *cells, format_number(row.ms_per_frame)])
+    header = ["scene", "method", "guard", "error", "energy", "first frame, reason", "fallen back",
+              "ms per frame"]  # fmt: skip
+    return tabular(header, rows, "lllrrlrr")
+
+
 TEX_TABLES = {
     "tab_claims": claims,
     "tab_scenes": scenes,
@@ -134,4 +179,6 @@ TEX_TABLES = {
     "tab_ranks": ranks,
     "tab_reruns": reruns,
     "tab_local_share": local_share,
+    "tab_stability": stability,
+    "tab_guard": guard,
 }

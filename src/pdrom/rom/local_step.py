@@ -39,13 +39,17 @@ class ReducedLocalStep:
         """Add the reduced S^T W p(y) to ``rhs`` (N, 3); the energy is unknown: nan."""
         sampled = self._group.project_elements(y, self._elements).ravel()
         rhs += self._offset
-        for axis, positions, operator, shift, lifted in self._blocks:
+        for index, (axis, positions, operator, shift, lifted) in enumerate(self._blocks):
             coefficients = operator @ sampled[positions] - shift
+            self._observe(index, coefficients)
             if axis is None:
                 rhs += (lifted @ coefficients).reshape(rhs.shape)
             else:
                 rhs[:, axis] += lifted @ coefficients
         return float("nan")
+
+    def _observe(self, block: int, coefficients: np.ndarray) -> None:
+        """Called with the coefficients of every block; a watched step looks at them."""
 
 
 def _local_positions(reduction: Reduction):

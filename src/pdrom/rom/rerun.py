@@ -8,6 +8,7 @@ import numpy as np
 
 from pdrom.fom.stepper import LocalStep
 from pdrom.fom.system import GlobalSystem
+from pdrom.rom.guard import Guard
 from pdrom.scene import Scene
 
 log = logging.getLogger(__name__)
@@ -51,6 +52,7 @@ def rerun(
     local_steps: Sequence[LocalStep],
     reference: np.ndarray,
     blowup_extent: float,
+    guard: Guard | None = None,
 ) -> Rerun:
     """Run a scene with other local steps and compare it with its full-order trajectory.
 
@@ -58,14 +60,15 @@ def rerun(
     ----------
     reference : (F + 1, N, 3) positions of the full-order run
     blowup_extent : the run ends when the extent exceeds this multiple of the rest extent
+    guard : watches steps among ``local_steps``, and may end the run or repeat its frames
     """
-    loop = scene.stepper(system, local_steps, track_objective=False)
+    loop = scene.stepper(system, local_steps, track_objective=guard is not None)
     state = scene.initial_state()
     positions, difference, extents = [state.positions], [], []
     blowup = None
     for frame in range(scene.config.frames):
         with np.errstate(over="ignore", invalid="ignore"):
-            state, _ = loop.step(state, frame)
+            state, _ = guard.step(loop, state, frame) if guard else loop.step(state, frame)
             extent = float(np.ptp(state.positions, axis=0).max()) / scene.mesh.extent
         if not np.isfinite(state.positions).all():
             blowup = frame
@@ -75,6 +78,8 @@ def rerun(
         extents.append(extent)
         if extent > blowup_extent:
             blowup = frame
+            break
+        if guard is not None and guard.record.stopped:
             break
     return Rerun(np.stack(positions), np.array(difference), np.array(extents), blowup)
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pdrom.energy import EnergyScale
 from pdrom.metrics import trajectory_error
 from pdrom.provenance import attributes
 from pdrom.rom.rerun import displacement_norms
@@ -15,12 +16,13 @@ from pdrom.stages.scenes import RUNS, scene_of
 from pdrom.store import open_hdf5, write_hdf5, write_table
 from pdrom.subspace.columns import Columns
 from pdrom.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
+from pdrom.subspace.rerun import rerun_model
 
 log = logging.getLogger(__name__)
 
 COLUMNS = [
     "scene", "group", "method", "position_basis", "k", "r", "frames", "finite", "blowup_frame",
-    "max_extent", "relative_error",
+    "max_extent", "relative_error", "energy_ratio",
 ]  # fmt: skip
 
 
@@ -84,29 +86,17 @@ class _Motion:
         with open_hdf5(fom) as file:
             self.reference = file["positions"][...]
         self.displacement = displacement_norms(self.reference)
+        self.scale = EnergyScale.of(scene, self.reference)
 
     def run(self, model: SubspaceModel, limit: float) -> dict[str, Any]:
         """Run a model; a blow-up ends the run and is recorded."""
-        loop, state = model.loop(self.scene)
-        coordinates, difference, extents, blowup = [state.positions], [], [], None
-        for frame in range(self.scene.config.frames):
-            with np.errstate(over="ignore", invalid="ignore"):
-                state, _ = loop.step(state, frame)
-                q = model.positions(state.positions)
-            if not np.isfinite(q).all():
-                blowup = frame
-                break
-            coordinates.append(state.positions)
-            difference.append(float(np.linalg.norm(q - self.reference[frame + 1])))
-            extents.append(float(np.ptp(q, axis=0).max()) / self.scene.mesh.extent)
-            if extents[-1] > limit:
-                blowup = frame
-                break
+        outcome, coordinates = rerun_model(self.scene, model, self.reference, limit)
         return {
-            "coordinates": np.stack(coordinates),
-            "difference": np.array(difference),
-            "extent": np.array(extents),
-            "blowup_frame": blowup,
+            "coordinates": coordinates,
+            "difference": outcome.difference,
+            "extent": outcome.extent,
+            "blowup_frame": outcome.blowup_frame,
+            "energy_ratio": self.scale.ratio(outcome.positions),
         }
 
     def row(
@@ -127,6 +117,7 @@ class _Motion:
             "blowup_frame": outcome["blowup_frame"],
             "max_extent": float(outcome["extent"].max(initial=0.0)),
             "relative_error": error,
+            "energy_ratio": outcome["energy_ratio"],
         }
 
 

@@ -9,13 +9,15 @@ import numpy as np
 import pandas as pd
 
 from pdrom.basis import Basis, load_basis
-from pdrom.fom.stepper import LocalStep
+from pdrom.energy import EnergyScale
 from pdrom.method import MethodSpec
 from pdrom.metrics import trajectory_error
 from pdrom.provenance import attributes
-from pdrom.rom.local_step import ReducedLocalStep
+from pdrom.rom.guard import GUARD_COLUMNS, GuardRecord, largest_extent
+from pdrom.rom.guard_settings import GuardSettings
+from pdrom.rom.guarded import guarded_rerun
 from pdrom.rom.ranks import resolve_ranks
-from pdrom.rom.rerun import Rerun, displacement_norms, replace_group, rerun
+from pdrom.rom.rerun import Rerun, displacement_norms
 from pdrom.sampling.load import load_reduction
 from pdrom.scene import Scene
 from pdrom.stages.scenes import RUNS, scene_of
@@ -25,7 +27,7 @@ log = logging.getLogger(__name__)
 
 COLUMNS = [
     "scene", "group", "method", "r", "frames", "finite", "blowup_frame", "max_extent",
-    "relative_error",
+    "relative_error", "energy_ratio", "gain", *GUARD_COLUMNS,
 ]  # fmt: skip
 
 
@@ -35,6 +37,7 @@ def run_reduced(
     spec: dict[str, Any],
     ranks: dict[str, list[int | str]],
     blowup_extent: float,
+    guard: dict[str, Any],
     solver: str,
     mesh: str,
     runs: dict[str, str],
@@ -51,13 +54,19 @@ def run_reduced(
         with, and the table to write
     """
     method, space = MethodSpec.model_validate(spec), load_basis(basis)
+    watch = GuardSettings.model_validate(guard)
+    with open_hdf5(runs["train"]) as file:
+        trained_extent = largest_extent(file["positions"][...])
     with write_hdf5(runs_output) as file:
         file.attrs.update(attributes({**labels, "spec": spec, "scene": scene}))
         for motion in RUNS:
-            case = _Case(scene_of(scene, mesh, motion), motion, labels, method, space, sampling)
+            bound = scene_of(scene, mesh, motion)
+            case = _Case(bound, motion, labels, method, space, sampling, watch, trained_extent)
             store = file if motion == "train" else file.create_group(motion)
             rows = case.run(store, ranks[motion], runs[motion], blowup_extent, solver)
-            write_table(pd.DataFrame(rows, columns=COLUMNS), tables[motion])
+            table = pd.DataFrame(rows, columns=COLUMNS)
+            whole = ["guard_frame", "guard_count", "fallback_frames"]
+            write_table(table.astype(dict.fromkeys(whole, "Int64")), tables[motion])
 
 
 @dataclass(frozen=True)
@@ -70,6 +79,8 @@ class _Case:
     method: MethodSpec
     basis: Basis
     sampling: str
+    guard: GuardSettings
+    trained_extent: float
 
     def run(
         self, file: h5py.Group, ranks: list[int | str], fom: str, limit: float, solver: str
@@ -78,6 +89,7 @@ class _Case:
         with open_hdf5(fom) as full_order:
             reference = full_order["positions"][...]
         displacement = displacement_norms(reference)
+        scale = EnergyScale.of(self.scene, reference)
         file["displacement"] = displacement
         system = self.scene.system_with(solver)
         rows = []
@@ -88,21 +100,22 @@ class _Case:
                 log.warning("r = %d exceeds the numerical rank %d: not run", r, self.basis.rank)
                 rows.append({**self.labels, "r": r, "frames": 0})
                 continue
-            outcome = rerun(self.scene, system, self._local_steps(r), reference, limit)
-            _store(store, outcome, displacement)
+            reduction = load_reduction(self.basis, self.sampling, self.method, r)
+            outcome, seen = guarded_rerun(
+                self.scene, system, self.labels["group"], reduction, reference, limit,
+                self.guard, self.trained_extent,
+            )  # fmt: skip
+            energy = scale.ratio(outcome.positions)
+            _store(store, outcome, displacement, seen)
             if self.motion == "train":
                 store["positions"] = outcome.positions.astype(np.float32)
-            rows.append({**self.labels, "r": r, **_row(outcome, displacement)})
+            measured = {"energy_ratio": energy, "gain": reduction.gain, **seen.columns()}
+            rows.append({**self.labels, "r": r, **_row(outcome, displacement), **measured})
             log.info("r = %d: %d frames, blow-up %s", r, outcome.frames, outcome.blowup_frame)
         return rows
 
-    def _local_steps(self, r: int) -> list[LocalStep]:
-        group = self.scene.group(self.labels["group"])
-        reduction = load_reduction(self.basis, self.sampling, self.method, r)
-        return replace_group(self.scene, group.name, ReducedLocalStep(group, reduction))
 
-
-def _store(store, outcome: Rerun, displacement: np.ndarray) -> None:
+def _store(store, outcome: Rerun, displacement: np.ndarray, seen: GuardRecord) -> None:
     store["difference"] = outcome.difference
     store["error"] = outcome.difference / np.sqrt(np.mean(displacement**2))
     store["extent"] = outcome.extent
@@ -110,13 +123,15 @@ def _store(store, outcome: Rerun, displacement: np.ndarray) -> None:
     store.attrs.update(
         finite=outcome.blowup_frame is None, blowup_frame=blowup, max_extent=outcome.max_extent
     )
+    store.attrs.update({k: v for k, v in seen.columns().items() if v is not None})
 
 
 def _row(outcome: Rerun, displacement: np.ndarray) -> dict[str, Any]:
-    whole = outcome.blowup_frame is None
+    finite = outcome.blowup_frame is None
+    whole = finite and outcome.frames == len(displacement)
     return {
         "frames": outcome.frames,
-        "finite": whole,
+        "finite": finite,
         "blowup_frame": outcome.blowup_frame,
         "max_extent": outcome.max_extent,
         "relative_error": trajectory_error(outcome.difference, displacement) if whole else None,

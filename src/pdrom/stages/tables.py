@@ -12,6 +12,7 @@ from pdrom.tables.reduced_reruns import heldout_reruns, reduced_reruns
 from pdrom.tables.scaling import scaling, scaling_fit
 from pdrom.tables.sensitivity import sensitivity
 from pdrom.tables.singular_values import singular_values
+from pdrom.tables.stability import stability
 
 
 def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
@@ -35,6 +36,16 @@ def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
         "scaling": lambda: scaling(inputs.parts),
         "scaling_fit": lambda: scaling_fit(read_table(inputs.table)),
         "ladder": lambda: ladder(inputs.parts),
+        "stability": lambda: stability(
+            inputs.fom,
+            inputs.reruns,
+            inputs.hyper,
+            inputs.sweeps,
+            read_table(inputs.reduced_reruns),
+            params.time_steps,
+            params.wrong,
+            params.left,
+        ),
         "accuracy_cost": lambda: accuracy_cost(
             read_table(inputs.reruns), inputs.timings, params.iterations
         ),

@@ -41,6 +41,16 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "local_share",
     ),
     "scaling_fit": ("scene", "method", "quantity", "exponent", "points"),
+    "stability": (
+        "scene", "method", "r", "h", "stiffness_ratio", "finite", "blowup_frame", "max_extent",
+        "energy_ratio", "gain", "group", "position_basis", "k", "experiment", "relative_error",
+        "outcome", "guard_frame", "guard_reason", "guard_count",
+    ),
+    "guard": (
+        "scene", "group", "method", "r", "action", "frames", "finite", "blowup_frame",
+        "relative_error", "energy_ratio", "guard_frame", "guard_reason", "guard_count",
+        "fallback_frames", "fallback_share", "ms_per_frame", "relative_cost",
+    ),
     "claims": (
         "claim", "source", "paper", "measured", "verdict", "why", "figure_or_table",
     ),
@@ -56,6 +66,7 @@ TIMING_COLUMNS: dict[str, tuple[str, ...]] = {
         "local_share",
     ),
     "scaling_fit": ("exponent",),
+    "guard": ("ms_per_frame", "relative_cost"),
     "claims": ("measured", "verdict", "why"),
 }  # fmt: skip
 

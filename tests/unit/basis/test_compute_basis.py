@@ -312,3 +312,19 @@ def test_damaged_file_is_named(tmp_path):
     path.write_bytes(path.read_bytes()[:-500])
     with pytest.raises(StorageError, match=r"b\.h5"):
         load_basis(path)
+
+
+def test_the_trained_range_holds_every_snapshot_and_is_reached(spec):
+    """The least box around the coefficients that reconstruct the snapshots (full rank)."""
+    p, mass = snapshots(47)
+    basis = basis_of(p, spec, mass=mass)
+    parts = [slice(a, None, 3) for a in range(3)] if basis.separate_axes else [slice(None)]
+    assert basis.trained.shape == (len(parts), 2, basis.rank)
+    offsets = p.reshape(len(p), -1) - basis.mean
+    weights = np.sqrt(np.repeat(mass, 3)) if spec.weighting == "mass" else np.ones(3 * ROWS)
+    for part, (low, high) in zip(parts, basis.trained, strict=True):
+        # an independent way: weighted least squares, unique because the modes are independent
+        scaled = weights[part, None] * basis.V[part]
+        c = linalg.lstsq(scaled, (weights * offsets)[:, part].T)[0]
+        np.testing.assert_allclose(low, c.min(axis=1), atol=1e-10)
+        np.testing.assert_allclose(high, c.max(axis=1), atol=1e-10)

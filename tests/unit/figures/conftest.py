@@ -42,6 +42,7 @@ BLOWUP_FRAME = 4
 TABLES = (
     "reconstruction_error", "singular_values", "local_share", "sensitivity", "accuracy_cost",
     "ladder", "scaling", "scaling_fit",
+    "ladder", "stability",
 )  # fmt: skip
 
 
@@ -205,6 +206,26 @@ def _write_tables(sources, scenes, methods, rng) -> None:
         for scene in scenes
         for i, (direction, rung) in enumerate(rungs)
     ]
+    outcome = {6: "wrong", 14: "accurate", 20: "not run"}
+    runs = [
+        (scene, group, method, "full", np.nan, r, "rerun", outcome[r], np.nan, 0.016, 1.0)
+        for scene, group in pairs
+        for method in methods
+        for r in outcome
+        if scene not in FLAT
+    ]
+    runs += [
+        (scene, "all", "full", "pod", 10, 99, "rerun", "left the scene", np.nan, 0.016, 1.0)
+        for scene in scenes
+    ]
+    failed = {0.016: "accurate", 0.2: "blow-up"}
+    runs += [
+        (scene, group, method, "full", np.nan, 6, "sweep", failed[h],
+         np.nan if h < 0.1 else BLOWUP_FRAME, h, ratio)
+        for scene, group in pairs
+        for method in methods
+        for h, ratio in ((0.016, 1.0), (0.2, 1.0), (0.016, 100.0))
+    ]  # fmt: skip
     columns = {
         "singular_values": "scene group component singular_value relative above_roundoff",
         "reconstruction_error": "scene group method r split relative_error",
@@ -213,8 +234,10 @@ def _write_tables(sources, scenes, methods, rng) -> None:
         "accuracy_cost": "scene method position_basis k r iterations relative_error_within_horizon"
         " ms_per_frame pareto",
         "ladder": "scene direction rung gain relative_error_within_horizon",
+        "stability": "scene group method position_basis k r experiment outcome blowup_frame h"
+        " stiffness_ratio",
     }
-    rows = dict(zip(columns, (values, errors, times, floors, costs, ladder), strict=True))
+    rows = dict(zip(columns, (values, errors, times, floors, costs, ladder, runs), strict=True))
     for name, header in columns.items():
         write_table(pd.DataFrame(rows[name], columns=header.split()), sources.table(name))
     _write_scaling(sources, scenes)

@@ -3,7 +3,17 @@
 import pandas as pd
 import pytest
 
-from pdrom.paper.textables import TEX_TABLES, claims, local_share, longtable, ranks, reruns, tabular
+from pdrom.paper.textables import (
+    TEX_TABLES,
+    claims,
+    guard,
+    local_share,
+    longtable,
+    ranks,
+    reruns,
+    stability,
+    tabular,
+)
 from pdrom.paper.textables import scenes as scene_table
 
 COLUMNS = [
@@ -50,6 +60,37 @@ TABLES = {
             "relative": [1.0, 0.5, 0.01, 1e-15],
             "above_roundoff": [True, True, True, False],
         }
+    ),
+    "stability": pd.DataFrame(
+        [
+            ("full", "full", "rerun", "accurate", 1.0),
+            ("pod", "full", "rerun", "accurate", 1.0),
+            ("pod", "full", "rerun", "blow-up", float("inf")),
+            ("pod", "full", "rerun", "not run", None),
+            ("pod", "full", "rerun", "wrong", 3.0),
+            ("pod", "full", "sweep", "wrong", 2.0),
+            ("ecsw", "pod", "rerun", "accurate", 0.5),
+        ],
+        columns=["method", "position_basis", "experiment", "outcome", "energy_ratio"],
+    ),
+    "guard": pd.DataFrame(
+        [
+            ("bar_a", "full", None, "none", 0.0, 1.0, None, None, None, 2.0),
+            ("bar_a", "deim_x", 20, "none", 0.5, 4.0, None, None, None, 1.0),
+            ("bar_a", "deim_x", 20, "fall-back", None, 1.0, 3, "extent", 0.25, 1.5),
+        ],
+        columns=[
+            "scene",
+            "method",
+            "r",
+            "action",
+            "relative_error",
+            "energy_ratio",
+            "guard_frame",
+            "guard_reason",
+            "fallback_share",
+            "ms_per_frame",
+        ],
     ),
     "local_share": pd.DataFrame(
         {
@@ -130,3 +171,18 @@ def test_verdicts_have_their_colour():
     assert r"\textcolor{okred}{does not hold}" in fails
     assert r"70 \% or more" in holds
     assert r"0.1; \newline 0.2" in holds
+
+
+def test_stability_counts_what_ran():
+    first, second = rows(stability(TABLES))
+    cells = [cell.strip() for cell in first.removesuffix(r"\\").split("&")]
+    assert cells[1:5] == ["1", "1", "0", "1"]
+    assert cells[5:] == ["3", r"\ensuremath{\infty}", "0 of 1", "2"]
+    assert second.startswith(r"\texttt{ecsw, pod subspace} & 1 & 0 & 0 & 0 & 0.50 & 0.50 & 0 of 0")
+
+
+def test_guard_shows_what_was_seen_and_repeated():
+    full, plain, fallen = rows(guard(TABLES))
+    assert full == r"\texttt{bar\_a} &  & full order & 0 & 1 & -- & -- & 2 \\"
+    assert plain.endswith(r"& none & 0.50 & 4 & -- & -- & 1 \\")
+    assert fallen.endswith(r"& fall-back & blow-up & 1 & 3, extent & 0.25 & 1.5 \\")
