@@ -24,7 +24,9 @@ class VertexBending(ConstraintGroup):
     is the half sphere { |p| = m, s p.n >= 0 }; n is the normal at the beginning of the frame, so
     that the manifold is fixed during the iterations and the objective cannot rise. On the right
     side p has the direction of H; on the wrong side it is the nearest point of the rim, which pulls
-    the vertex back: no flip. A flat rest shape has m = 0 up to round-off and needs no side.
+    the vertex back: no flip. A flat rest shape has m = 0 up to round-off and needs no side. Where
+    H = 0 the nearest point is the pole; where the fan has no area either there is no pole, and p is
+    the rest vector.
     """
 
     class Config(GroupConfig):
@@ -49,6 +51,7 @@ class VertexBending(ConstraintGroup):
 
     def _set_rest(self, points: np.ndarray) -> None:
         curvature = self.S @ points
+        self.rest = curvature
         self.magnitude = np.linalg.norm(curvature, axis=1)
         cancelling = np.linalg.norm(abs(self.S) @ np.abs(points), axis=1)
         normals = np.zeros_like(curvature)
@@ -73,13 +76,11 @@ class VertexBending(ConstraintGroup):
 
     def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:
         p = np.empty((len(elements), 3))
-        _project(y, elements, *self._operator(), self.magnitude, self.side, self.normals, p)
+        _project(y, elements, *self._operator(), *self._manifold(), p)
         return p
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        return _accumulate(
-            y, *self._operator(), self.magnitude, self.side, self.normals, self.weights, rhs
-        )
+        return _accumulate(y, *self._operator(), *self._manifold(), self.weights, rhs)
 
     def restricted(
         self, elements: np.ndarray, factors: np.ndarray
@@ -96,13 +97,17 @@ class VertexBending(ConstraintGroup):
         part.S = sparse.csr_array(rows[:, vertices])
         part.S.sort_indices()
         part.weights = self.weights[elements] * factors
-        part.magnitude, part.side = self.magnitude[elements], self.side[elements]
+        part.rest, part.magnitude = self.rest[elements], self.magnitude[elements]
+        part.side = self.side[elements]
         part.normals = self.normals[elements].copy()
         part._curved = np.flatnonzero(part.side)
         return part, vertices
 
     def _operator(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return self.S.indptr, self.S.indices, self.S.data
+
+    def _manifold(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        return self.rest, self.magnitude, self.side, self.normals
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         h, n = d[:, 0], self.normals[elements] * self.side[elements, None]
@@ -116,7 +121,8 @@ class VertexBending(ConstraintGroup):
         )
         unit = np.where((height < 0.0) & (n != 0.0).any(axis=1)[:, None], rim, direction)
         unit = np.where(length > 0.0, unit, n)
-        return (unit * self.magnitude[elements, None])[:, None, :]
+        p = unit * self.magnitude[elements, None]
+        return np.where((unit != 0.0).any(axis=1)[:, None], p, self.rest[elements])[:, None, :]
 
 
 def _crossing(n: np.ndarray) -> np.ndarray:
@@ -199,13 +205,18 @@ def _curvature(y, e, indptr, indices, data):
 
 
 @njit(cache=True, error_model="numpy")
-def _half_sphere(hx, hy, hz, magnitude, side, normal):
+def _half_sphere(hx, hy, hz, rest, magnitude, side, normal):
     """Nearest point of the half sphere to (hx, hy, hz)."""
     nx, ny, nz = side * normal[0], side * normal[1], side * normal[2]
-    length = np.sqrt(hx * hx + hy * hy + hz * hz)
-    if length == 0.0:
+    # scaled by the largest component: neither overflow nor underflow of the squares
+    largest = max(abs(hx), abs(hy), abs(hz))
+    if largest == 0.0:
+        if nx == 0.0 and ny == 0.0 and nz == 0.0:
+            return rest[0], rest[1], rest[2]
         return magnitude * nx, magnitude * ny, magnitude * nz
-    dx, dy, dz = hx / length, hy / length, hz / length
+    dx, dy, dz = hx / largest, hy / largest, hz / largest
+    length = np.sqrt(dx * dx + dy * dy + dz * dz)
+    dx, dy, dz = dx / length, dy / length, dz / length
     height = dx * nx + dy * ny + dz * nz
     if height < 0.0:
         dx, dy, dz = dx - height * nx, dy - height * ny, dz - height * nz
@@ -218,19 +229,21 @@ def _half_sphere(hx, hy, hz, magnitude, side, normal):
 
 
 @njit(cache=True, error_model="numpy")
-def _project(y, elements, indptr, indices, data, magnitude, side, normals, p):
+def _project(y, elements, indptr, indices, data, rest, magnitude, side, normals, p):
     for i in range(elements.shape[0]):
         e = elements[i]
         hx, hy, hz = _curvature(y, e, indptr, indices, data)
-        p[i, 0], p[i, 1], p[i, 2] = _half_sphere(hx, hy, hz, magnitude[e], side[e], normals[e])
+        p[i, 0], p[i, 1], p[i, 2] = _half_sphere(
+            hx, hy, hz, rest[e], magnitude[e], side[e], normals[e]
+        )
 
 
 @njit(cache=True, error_model="numpy")
-def _accumulate(y, indptr, indices, data, magnitude, side, normals, weights, rhs):
+def _accumulate(y, indptr, indices, data, rest, magnitude, side, normals, weights, rhs):
     energy = 0.0
     for e in range(weights.shape[0]):
         hx, hy, hz = _curvature(y, e, indptr, indices, data)
-        px, py, pz = _half_sphere(hx, hy, hz, magnitude[e], side[e], normals[e])
+        px, py, pz = _half_sphere(hx, hy, hz, rest[e], magnitude[e], side[e], normals[e])
         w = weights[e]
         for k in range(indptr[e], indptr[e + 1]):
             scaled = w * data[k]

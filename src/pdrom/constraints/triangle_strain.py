@@ -79,6 +79,23 @@ def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, 
     return inverse, area
 
 
+# Fourth powers of entries between these neither overflow nor vanish.
+TINY, HUGE = 1e-70, 1e70
+
+
+@njit(cache=True, error_model="numpy")
+def _safe_factor(f):
+    """Power of two that brings the entries of ``f`` (2, 3) into range; 1 for almost all."""
+    largest = 0.0
+    for axis in range(3):
+        largest = max(largest, abs(f[0, axis]), abs(f[1, axis]))
+    if largest > HUGE:
+        return 2.0**-600
+    if 0.0 < largest < TINY:
+        return 2.0**600
+    return 1.0
+
+
 @njit(cache=True, error_model="numpy")
 def _clamp_columns(f, low, high, p):
     """Clamp the singular values of the 3 x 2 matrix with columns f[0], f[1]; columns of p.
@@ -86,9 +103,12 @@ def _clamp_columns(f, low, high, p):
     One-sided Jacobi: a single rotation makes two columns orthogonal, their norms are the singular
     values. Working on F, not on F^T F, keeps small singular values accurate.
     """
-    alpha = f[0, 0] * f[0, 0] + f[0, 1] * f[0, 1] + f[0, 2] * f[0, 2]
-    beta = f[1, 0] * f[1, 0] + f[1, 1] * f[1, 1] + f[1, 2] * f[1, 2]
-    gamma = f[0, 0] * f[1, 0] + f[0, 1] * f[1, 1] + f[0, 2] * f[1, 2]
+    factor = _safe_factor(f)
+    x0, x1, x2 = factor * f[0, 0], factor * f[0, 1], factor * f[0, 2]
+    y0, y1, y2 = factor * f[1, 0], factor * f[1, 1], factor * f[1, 2]
+    alpha = x0 * x0 + x1 * x1 + x2 * x2
+    beta = y0 * y0 + y1 * y1 + y2 * y2
+    gamma = x0 * y0 + x1 * y1 + x2 * y2
     c, s = 1.0, 0.0
     if abs(gamma) > 1e-16 * np.sqrt(alpha * beta):
         zeta = (beta - alpha) / (2.0 * gamma)
@@ -97,8 +117,8 @@ def _clamp_columns(f, low, high, p):
             t = -t
         c = 1.0 / np.sqrt(1.0 + t * t)
         s = c * t
-    a0, a1, a2 = c * f[0, 0] - s * f[1, 0], c * f[0, 1] - s * f[1, 1], c * f[0, 2] - s * f[1, 2]
-    b0, b1, b2 = s * f[0, 0] + c * f[1, 0], s * f[0, 1] + c * f[1, 1], s * f[0, 2] + c * f[1, 2]
+    a0, a1, a2 = c * x0 - s * y0, c * x1 - s * y1, c * x2 - s * y2
+    b0, b1, b2 = s * x0 + c * y0, s * x1 + c * y1, s * x2 + c * y2
     swapped = a0 * a0 + a1 * a1 + a2 * a2 < b0 * b0 + b1 * b1 + b2 * b2
     if swapped:
         a0, a1, a2, b0, b1, b2 = b0, b1, b2, a0, a1, a2
@@ -115,7 +135,8 @@ def _clamp_columns(f, low, high, p):
         b0, b1, b2 = b0 / sigma_b, b1 / sigma_b, b2 / sigma_b
     else:
         b0, b1, b2 = perpendicular(a0, a1, a2)
-    clamped_a, clamped_b = min(max(sigma_a, low), high), min(max(sigma_b, low), high)
+    clamped_a = min(max(sigma_a / factor, low), high)
+    clamped_b = min(max(sigma_b / factor, low), high)
     a0, a1, a2 = a0 * clamped_a, a1 * clamped_a, a2 * clamped_a
     b0, b1, b2 = b0 * clamped_b, b1 * clamped_b, b2 * clamped_b
     if swapped:

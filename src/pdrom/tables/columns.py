@@ -35,6 +35,14 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "scene", "group", "direction", "rung", "r", "condition", "gain", "error_train",
         "error_test", "error_heldout", "finite", "blowup_frame", "relative_error_within_horizon",
     ),
+    "hard_cases": (
+        "case", "method", "k", "r", "gain", "frames", "finite", "blowup_frame", "max_extent",
+        "objective_rise", "outcome", "why",
+    ),
+    "kernel_accuracy": (
+        "group", "matrix_class", "cases", "condition", "worst_relative_error",
+        "worst_over_condition",
+    ),
     "claims": (
         "claim", "source", "paper", "measured", "verdict", "why", "figure_or_table",
     ),
