@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from pdrom.errors import ConfigurationError, PdromError
 from pdrom.fom.solvers import SOLVERS
+from pdrom.hardcases.catalogue import CASES
 from pdrom.method import MethodSpec, load_methods
 from pdrom.rom.guard_settings import GuardSettings
 from pdrom.scene import Scene, SceneConfig
@@ -152,6 +153,20 @@ class Guard(GuardSettings):
         )
 
 
+class HardCases(_Model):
+    """Hard cases of the reductions (all that are not slow if empty), matrices a class."""
+
+    cases: tuple[str, ...] = ()
+    matrices: Annotated[int, Field(ge=1, le=10_000)] = 40
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        for name in self.cases:
+            if name not in CASES:
+                raise ValueError(f"cases: unknown case '{name}' (allowed: {', '.join(CASES)})")
+        return self
+
+
 class StudySettings(_Model):
     """Content of config/default.yaml, possibly overridden by --configfile."""
 
@@ -170,6 +185,7 @@ class StudySettings(_Model):
     scaling: Scaling = Scaling()
     stability: Stability = Stability()
     guard: Guard = Guard()
+    hard_cases: HardCases = HardCases()
 
     @model_validator(mode="after")
     def _known(self) -> Self:

@@ -7,21 +7,36 @@ from typing import Any
 
 from pdrom.claims import load_claims
 from pdrom.config import Study, StudySettings
+from pdrom.effects import EFFECTS
 from pdrom.errors import PdromError
 from pdrom.figures import FIGURES, FigureSpec, Holdings, figure_inputs, load_figures
 from pdrom.figures.sources import PUBLISHED
 from pdrom.fingerprint import fingerprint
+from pdrom.hardcases.catalogue import reducible_cases
+from pdrom.hardcases.expectations import load_expectations
 from pdrom.ladder import LadderSpec, load_ladder
-from pdrom.method import MethodSpec
+from pdrom.method import MethodSpec, load_methods
 from pdrom.paper.textables import TEX_TABLES
 
 RESULTS = "results"
 REFERENCE_BASIS = "none-none-vectorised"
 TABLES = (
-    "singular_values", "reconstruction_error", "reduced_reruns", "accuracy_cost", "local_share",
+    "singular_values",
+    "reconstruction_error",
+    "reduced_reruns",
+    "heldout_reruns",
+    "accuracy_cost",
+    "local_share",
     "sensitivity",
-    "ladder", "heldout_reruns", "scaling", "scaling_fit", "stability", "guard", "claims",
-)  # fmt: skip
+    "ladder",
+    "scaling",
+    "scaling_fit",
+    "stability",
+    "guard",
+    "hard_cases",
+    "kernel_accuracy",
+    "claims",
+)
 
 
 def load_plan(config: dict[str, Any], root: Path) -> "Plan":
@@ -49,6 +64,7 @@ class Plan:
     def check(self) -> None:
         """Read the configuration of figures, ladder and claims, so that a fault shows early."""
         _ = self.figure_specs, self.ladder, load_claims(self.root / "config" / "claims.yaml")
+        load_expectations(self.root / "config" / "hard_cases.yaml")
 
     # Parameters -----------------------------------------------------------------------------
 
@@ -233,6 +249,22 @@ class Plan:
     def scaling_settings(self) -> dict[str, Any]:
         """Plain settings of a mesh size; which sizes there are is no parameter of one."""
         return self.settings.scaling.model_dump(mode="json", exclude={"scenes"})
+
+    # Hard cases -----------------------------------------------------------------------------
+
+    def hard_cases(self) -> dict[str, Any]:
+        """Parameters of the hard cases: every method of config/methods.yaml runs in them."""
+        settings = self.settings.hard_cases
+        methods = load_methods(self.root / "config" / "methods.yaml")
+        return {
+            "methods": {name: spec.model_dump(mode="json") for name, spec in methods.items()},
+            "cases": list(settings.cases or reducible_cases()),
+            "matrices": settings.matrices,
+        }
+
+    def hard_cases_code(self) -> str:
+        """Fingerprint of the hard cases, which use every effect there is."""
+        return fingerprint("pdrom.stages.hard_cases", *map(EFFECTS.module, EFFECTS))
 
     # Figures --------------------------------------------------------------------------------
 

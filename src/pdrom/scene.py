@@ -86,6 +86,8 @@ class SceneConfig(_Model):
             raise ValueError("effects list no constraint group: there is nothing to project")
         if len(set(groups)) < len(groups):
             raise ValueError(f"effects list a constraint group twice: {', '.join(groups)}")
+        for effect in self.effects:
+            effect.check_step(self.time_step)
         for group, plan in self.reduce.items():
             if group not in groups:
                 raise ValueError(f"reduce.{group}: not in effects (allowed: {', '.join(groups)})")

@@ -32,15 +32,16 @@ FLAT = 1e-9
 # A rim direction below this has been lost to round-off.
 RIM = 1e-15
 
-# numbers of a lane in the working array: curvature, side times normal, magnitude, p, weight, energy
-H, NORMAL, MAGNITUDE, P, WEIGHT, ENERGY, SIZE = 0, 3, 6, 7, 10, 11, 12
+# numbers of a lane in the working array: curvature, side times normal, magnitude, p, weight,
+# energy, rest curvature
+H, NORMAL, MAGNITUDE, P, WEIGHT, ENERGY, REST, SIZE = 0, 3, 6, 7, 10, 11, 12, 15
 
 
 @lane_function
 def _gather(y, e, lane, operator, manifold, work):
     """Curvature vector and manifold of element e."""
     indptr, indices, data = operator
-    magnitude, side, normals, weights = manifold
+    rest, magnitude, side, normals, weights = manifold
     hx, hy, hz = 0.0, 0.0, 0.0
     for k in range(indptr[e], indptr[e + 1]):
         v = indices[k]
@@ -49,6 +50,7 @@ def _gather(y, e, lane, operator, manifold, work):
         hz += data[k] * y[v, 2]
     save(work, H, lane, (hx, hy, hz))
     save(work, NORMAL, lane, scaled(side[e], (normals[e, 0], normals[e, 1], normals[e, 2])))
+    save(work, REST, lane, (rest[e, 0], rest[e, 1], rest[e, 2]))
     work[MAGNITUDE * LANES + lane] = magnitude[e]
     work[WEIGHT * LANES + lane] = weights[e]
 
@@ -67,7 +69,9 @@ def _half_spheres(work):
         length = np.sqrt(dot(rim, rim))
         rim = choose(length > RIM, scaled(1.0 / length, rim), perpendicular(n))
         unit = choose(height < 0.0, rim, unit)
-        p = scaled(work[MAGNITUDE * LANES + lane], choose(scale == 0.0, n, unit))
+        magnitude = work[MAGNITUDE * LANES + lane]
+        pole = choose(dot(n, n) == 0.0, load(work, REST, lane), scaled(magnitude, n))
+        p = choose(scale == 0.0, pole, scaled(magnitude, unit))
         save(work, P, lane, p)
         work[ENERGY * LANES + lane] = work[WEIGHT * LANES + lane] * square_distance(h, p)
 
@@ -131,6 +135,8 @@ class VertexBending(ConstraintGroup):
     that the manifold is fixed during the iterations and the objective cannot rise. On the right
     side p has the direction of H; on the wrong side it is the nearest point of the rim, which pulls
     the vertex back: no flip. A flat rest shape has m = 0 up to round-off and needs no side.
+    Where H = 0 the nearest point is the pole; where the fan has no area either there is no pole,
+    and p is the rest vector.
     """
 
     class Config(GroupConfig):
@@ -157,6 +163,7 @@ class VertexBending(ConstraintGroup):
 
     def _set_rest(self, points: np.ndarray) -> None:
         curvature = self.S @ points
+        self.rest = curvature
         self.magnitude = np.linalg.norm(curvature, axis=1)
         cancelling = np.linalg.norm(abs(self.S) @ np.abs(points), axis=1)
         normals = np.zeros_like(curvature)
@@ -207,7 +214,8 @@ class VertexBending(ConstraintGroup):
         part.S = sparse.csr_array(rows[:, vertices])
         part.S.sort_indices()
         part.weights = self.weights[elements] * factors
-        part.magnitude, part.side = self.magnitude[elements], self.side[elements]
+        part.rest, part.magnitude = self.rest[elements], self.magnitude[elements]
+        part.side = self.side[elements]
         part.normals = self.normals[elements].copy()
         part._curved = np.flatnonzero(part.side)
         part._set_buffers()
@@ -216,8 +224,8 @@ class VertexBending(ConstraintGroup):
     def _operator(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return self.S.indptr, self.S.indices, self.S.data
 
-    def _manifold(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        return self.magnitude, self.side, self.normals, self.weights
+    def _manifold(self) -> tuple[np.ndarray, ...]:
+        return self.rest, self.magnitude, self.side, self.normals, self.weights
 
     def _set_buffers(self) -> None:
         self._work = [workspace(SIZE) for _ in range(2)]
@@ -240,7 +248,8 @@ class VertexBending(ConstraintGroup):
         )
         unit = np.where((height < 0.0) & (n != 0.0).any(axis=1)[:, None], rim, direction)
         unit = np.where(length > 0.0, unit, n)
-        return (unit * self.magnitude[elements, None])[:, None, :]
+        p = unit * self.magnitude[elements, None]
+        return np.where((unit != 0.0).any(axis=1)[:, None], p, self.rest[elements])[:, None, :]
 
 
 def _crossing(n: np.ndarray) -> np.ndarray:

@@ -50,6 +50,9 @@ class EffectConfig(BaseModel):
                 changes[name] = max(1, round(value * factor))
         return self.model_copy(update=changes)
 
+    def check_step(self, time_step: float) -> None:
+        """Raise ValueError if the effect is unstable with this time step (s)."""
+
     def reversed(self) -> Self:
         """The motion in the opposite direction; an effect that does not move stays as it is."""
         return self

@@ -1,6 +1,6 @@
 """The global system (M / h^2 + sum_j S_j^T W_j S_j) y = rhs with exactly eliminated vertices."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy import sparse
@@ -11,6 +11,9 @@ from pdrom.fom.solvers import SOLVERS, SparseSolver
 from pdrom.store import require_finite
 
 DEFAULT_SOLVER = "cholespy"
+
+# A solve that keeps fewer digits than this would move a body that nothing pushes.
+ACCURACY = 1e-6
 
 
 class Elimination:
@@ -27,6 +30,7 @@ class Elimination:
         if len(self.free):
             block = matrix if not len(fixed) else matrix[self.free][:, self.free]
             self._solver = SOLVERS.load(solver)(sparse.csr_array(block))
+            require_accurate(block, self._solver.solve)
 
     def set_targets(self, targets: np.ndarray) -> None:
         """Positions (n_fixed, 3) of the fixed vertices for the solves that follow."""
@@ -44,6 +48,25 @@ class Elimination:
         self._rhs -= self._load
         self._solver.solve(self._rhs, self._solution)
         y[self.free] = self._solution
+
+
+def require_accurate(matrix, solve: Callable[[np.ndarray, np.ndarray], None]) -> None:
+    """Raise SolverError if the factored ``matrix`` (n, n) does not return a known solution.
+
+    The known solution is a translation: all springs and elements cancel in it and nothing but
+    inertia (and pins) is left, which rounding in the matrix loses first.
+    """
+    if matrix.shape[0] == 0:
+        return
+    known = np.ones((matrix.shape[0], 3))
+    found = np.empty_like(known)
+    solve(np.ascontiguousarray(matrix @ known), found)
+    error = float(np.abs(found - known).max())
+    if not error <= ACCURACY:
+        raise SolverError(
+            f"global system of size {len(known)}: a solve is wrong by {error:.1e}, allowed is "
+            f"{ACCURACY:g}: masses over the squared time step are round-off beside the weights"
+        )
 
 
 class GlobalSystem:

@@ -65,10 +65,16 @@ def _check_vertices(mesh: Mesh, cells: np.ndarray, name: str) -> None:
 def _check_measures(mesh: Mesh, cells: np.ndarray, kind: str, name: str) -> None:
     corner = mesh.points[cells]
     edges = corner[:, 1:] - corner[:, :1]
-    gram = np.einsum("eia,eja->eij", edges, edges)
-    measure = np.sqrt(np.maximum(np.linalg.det(gram), 0.0))
-    longest = np.sqrt(np.einsum("eii->ei", gram).max(axis=1))
-    flat = np.flatnonzero(measure <= RELATIVE_MEASURE * longest ** edges.shape[1])
+    longest = np.linalg.norm(edges, axis=2).max(axis=1)
+    # of edges of length one: the measure itself, not a Gram determinant, which is its square and
+    # drowns in round-off below 1e-8
+    edges = edges / longest[:, None, None]
+    normal = np.cross(edges[:, 0], edges[:, 1])
+    if kind == "triangle":
+        measure = np.linalg.norm(normal, axis=1)
+    else:
+        measure = np.abs(np.einsum("ij,ij->i", normal, edges[:, 2]))
+    flat = np.flatnonzero(measure <= RELATIVE_MEASURE)
     if len(flat):
         what = "volume" if kind == "tetrahedron" else "area"
         raise DegenerateElementError(

@@ -9,9 +9,10 @@ import numpy as np
 from scipy import linalg
 
 from pdrom.effects.base import Boundary, Contact
-from pdrom.errors import SceneError
+from pdrom.errors import SceneError, SolverError
 from pdrom.fom.space import Solve, Space
 from pdrom.fom.stepper import State
+from pdrom.fom.system import require_accurate
 from pdrom.scene import Scene
 from pdrom.subspace.columns import Columns
 
@@ -24,8 +25,13 @@ class DenseElimination:
 
     def __init__(self, matrix: np.ndarray, fixed: np.ndarray) -> None:
         self.free = np.setdiff1d(np.arange(len(matrix)), fixed)
-        factor = linalg.cho_factor(matrix[np.ix_(self.free, self.free)])
+        block = matrix[np.ix_(self.free, self.free)]
+        try:
+            factor = linalg.cho_factor(block)
+        except linalg.LinAlgError as error:
+            raise SolverError(f"reduced system of size {len(self.free)}: {error}") from error
         self._inverse = np.ascontiguousarray(linalg.cho_solve(factor, np.eye(len(self.free))))
+        require_accurate(block, lambda rhs, out: np.matmul(self._inverse, rhs, out=out))
         self._coupling = np.ascontiguousarray(matrix[np.ix_(self.free, fixed)])
         self._load = np.zeros((len(self.free), 3))
 
@@ -93,8 +99,18 @@ class ReducedSpace(Space):
 
 def coordinates(columns: Columns, masses: np.ndarray, field: np.ndarray) -> np.ndarray:
     """Mass-orthogonal projection of a field (N, 3) on the subspace, (K, 3)."""
-    weighted = columns.B * masses[:, None]
-    return linalg.solve(columns.B.T @ weighted, weighted.T @ field, assume_a="pos")
+    return _mass_solve(columns, masses, columns.B.T @ (masses[:, None] * field))
+
+
+def _mass_solve(columns: Columns, masses: np.ndarray, rhs: np.ndarray) -> np.ndarray:
+    """(B^T M B)^-1 ``rhs``.
+
+    Equilibrated: columns of held vertices are not mass-orthonormal, so that masses far from 1 kg
+    would make the matrix ill-conditioned by their scale alone.
+    """
+    mass = columns.B.T @ (masses[:, None] * columns.B)
+    scale = 1.0 / np.sqrt(np.diag(mass))[:, None]
+    return scale * linalg.solve(scale * mass * scale.T, scale * rhs, assume_a="pos")
 
 
 def reduced_state(scene: Scene, columns: Columns) -> State:
@@ -160,7 +176,7 @@ class _ReducedContact:
         self._probes = np.ascontiguousarray(columns.B[probes])
         self._columns = columns
         weighted = columns.B * scene.masses[:, None]
-        self._project = linalg.solve(columns.B.T @ weighted, weighted.T, assume_a="pos")
+        self._project = _mass_solve(columns, scene.masses, weighted.T)
 
     def correct(self, y: np.ndarray) -> None:
         probed = self._probes @ y

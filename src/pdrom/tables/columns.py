@@ -51,6 +51,14 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "relative_error", "energy_ratio", "guard_frame", "guard_reason", "guard_count",
         "fallback_frames", "fallback_share", "ms_per_frame", "relative_cost",
     ),
+    "hard_cases": (
+        "case", "method", "k", "r", "gain", "frames", "finite", "blowup_frame", "max_extent",
+        "objective_rise", "outcome", "why",
+    ),
+    "kernel_accuracy": (
+        "group", "matrix_class", "cases", "condition", "worst_relative_error",
+        "worst_over_condition",
+    ),
     "claims": (
         "claim", "source", "paper", "measured", "verdict", "why", "figure_or_table",
     ),

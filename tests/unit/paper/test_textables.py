@@ -111,6 +111,26 @@ TABLES = {
             "figure_or_table": ["local_share", "a", "b"],
         }
     ),
+    "hard_cases": pd.DataFrame(
+        [
+            ("torn", "pod", 1.0, None, 1.0, "holds", None),
+            ("torn", "deim_x", float("inf"), 0, 1.0, "singular", "a % reason"),
+            ("kicked", "pod", None, None, None, "nothing to reduce", None),
+            ("kicked", "deim_x", 25.0, 7, 300.0, "blow-up", "a % reason"),
+            ("folded", "deim_x", 25.0, None, 4.0, "distorted", "a % reason"),
+        ],
+        columns=["case", "method", "gain", "blowup_frame", "max_extent", "outcome", "why"],
+    ),
+    "kernel_accuracy": pd.DataFrame(
+        {
+            "group": ["spring", "strain", "strain"],
+            "matrix_class": ["random", "zero", "huge (1e150)"],
+            "cases": [4, 5, 6],
+            "condition": [1.0, 1.0, 1e6],
+            "worst_relative_error": [1e-16, 3e-16, 1e-12],
+            "worst_over_condition": [1e-16, 3e-16, 1e-18],
+        }
+    ),
 }
 
 
@@ -162,6 +182,29 @@ def test_horizon_of_a_calm_scene_is_its_run():
     assert first.endswith(r"& 400 & 722 & 10 & run \\")
     assert second.endswith(r"& 9 & 12 & 20 & 7 \\")
     assert r"triangle\_strain (1e+07)" in first
+
+
+def test_hard_cases_show_failures_only():
+    torn, kicked, folded = rows(TEX_TABLES["tab_hard_cases"](TABLES))
+    assert r"\texttt{deim\_x}" in TEX_TABLES["tab_hard_cases"](TABLES)
+    assert "pod" not in TEX_TABLES["tab_hard_cases"](TABLES)
+    assert torn.endswith(r"and lets go & singular \\")
+    assert kicked.endswith(r"& blow-up, 7; gain 25 \\")
+    assert folded.endswith(r"& 4\,$\times$ the extent; gain 25 \\")
+
+
+def test_hard_reductions_count_outcomes():
+    pod, deim = rows(TEX_TABLES["tab_hard_reductions"](TABLES))
+    assert pod == r"\texttt{pod} & 1 & 1 & 0 & 0 & 0 & -- \\"
+    assert deim == r"\texttt{deim\_x} & 0 & 0 & 1 & 1 & 1 & a \% reason \\"
+
+
+def test_kernel_accuracy_names_the_worst_class():
+    spring, strain = rows(TEX_TABLES["tab_kernel_accuracy"](TABLES))
+    assert spring.startswith("spring & 1 & 4 & ")
+    assert strain.startswith("strain & 2 & 11 & ")
+    assert "& zero &" in strain
+    assert "& huge (1e150) &" in strain
 
 
 def test_verdicts_have_their_colour():

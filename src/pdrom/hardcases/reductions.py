@@ -1,0 +1,131 @@
+"""Every reduction, made from a hard case's own run: what it was trained on is what it repeats."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdrom.basis import Basis, compute_basis
+from pdrom.constraints.base import ConstraintGroup
+from pdrom.fom.stepper import State, Stepper
+from pdrom.hardcases.case import HardCase
+from pdrom.hardcases.record import Record, Watched, record
+from pdrom.hardcases.roundoff import Roundoff
+from pdrom.hardcases.runs import full_order
+from pdrom.method import MethodSpec
+from pdrom.rom.local_step import ReducedLocalStep
+from pdrom.rom.rerun import replace_group
+from pdrom.sampling import Reduction, select
+from pdrom.scene import Scene
+from pdrom.snapshots import row_masses
+from pdrom.subspace.columns import Columns
+from pdrom.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
+from pdrom.subspace.space import coordinates
+
+R, K, TOLERANCE = 10, 6, 1e-2
+
+# Hyper-reductions in a position subspace: scene, columns, training states -> samples by group.
+HYPER: dict[str, Callable[[Scene, Columns, np.ndarray], dict[str, Samples]]] = {
+    "full": lambda scene, columns, training: {},
+    "ecsw": lambda scene, columns, training: sample_elements(scene, columns, training, TOLERANCE),
+}
+BASES = {"pod": ("full", "ecsw"), "skinning": ("full",)}
+
+
+class Training:
+    """The full-order run of a case with the snapshots of its first group (the reduced one)."""
+
+    def __init__(self, case: HardCase) -> None:
+        self.case = case
+        self.scene = case.scene()
+        self.group: ConstraintGroup = self.scene.groups[0]
+        self._snapshots: list[np.ndarray] = []
+        self._roundoff: list[float] = []
+        self.run = full_order(case, self.scene, self._observe)
+        self._bases: dict[str, Basis] = {}
+
+    def _observe(self, frame: int, y: np.ndarray) -> None:
+        if frame % 2 == 0 or self.scene.config.frames == 1:
+            self._snapshots.append(self.group.project(y))
+            self._roundoff.append(self.group.roundoff(y))
+
+    def basis(self, spec: MethodSpec) -> Basis:
+        """Basis of the snapshots of the even frames."""
+        if spec.basis_id not in self._bases:
+            self._bases[spec.basis_id] = compute_basis(
+                np.stack(self._snapshots),
+                row_masses(self.group, self.scene.masses),
+                float(np.linalg.norm(self._roundoff)),
+                self.group.rows_per_element,
+                spec,
+            )
+        return self._bases[spec.basis_id]
+
+    def state(self) -> State:
+        """The start of the case."""
+        return self.case.start(self.scene)
+
+
+@dataclass(frozen=True)
+class ReducedRun:
+    """Outcome of a reduced run; ``run`` is None where there is no basis.
+
+    r : basis size, in a subspace the number of evaluated elements
+    k : columns of the position subspace, None for vertices
+    gain : of the interpolation, None where there is none
+    """
+
+    run: Record | None
+    r: int
+    k: int | None
+    gain: float | None
+
+
+def names(methods: Mapping[str, MethodSpec]) -> list[str]:
+    """All reductions: the methods, then the position subspaces with their hyper-reductions."""
+    return [*methods, *(f"{basis}-{hyper}" for basis in BASES for hyper in BASES[basis])]
+
+
+def reduced_run(
+    training: Training, name: str, methods: Mapping[str, MethodSpec], limit: float
+) -> ReducedRun:
+    """Run the case again with one reduction; ``limit`` is the extent of a blow-up, m.
+
+    Raises
+    ------
+    PdromError
+        Where the reduction itself refuses.
+    """
+    if name in methods:
+        return _local(training, methods[name], limit)
+    basis, _, hyper = name.partition("-")
+    return _subspace(training, basis, hyper, limit)
+
+
+def _local(training: Training, spec: MethodSpec, limit: float) -> ReducedRun:
+    scene, basis = training.scene, training.basis(spec)
+    r = min(R, basis.rank)
+    if r == 0:
+        return ReducedRun(None, 0, None, None)
+    reduction = Reduction(basis, select(basis, spec, r), spec, r)
+    step = Watched(ReducedLocalStep(training.group, reduction), training.group)
+    loop = scene.stepper(local_steps=replace_group(scene, training.group.name, step))
+    run = record(scene, loop, training.state(), Roundoff(scene, loop), limit=limit)
+    return ReducedRun(run, r, None, reduction.gain)
+
+
+def _subspace(training: Training, kind: str, hyper: str, limit: float) -> ReducedRun:
+    scene, positions = training.scene, training.run.positions
+    columns = make_columns(scene, positions[1::2], kind, K)
+    samples = HYPER[hyper](scene, columns, positions[1::2])
+    model = SubspaceModel(kind, columns, samples)
+    untracked, _ = model.loop(scene)
+    steps = untracked.local_steps
+    loop = Stepper(untracked.space, untracked.time_step, untracked.iterations, steps)
+    start = training.state()
+    fields = (start.positions, start.velocities)
+    state = State(*(coordinates(columns, scene.masses, field) for field in fields))
+    roundoff = Roundoff(scene, loop, columns)
+    run = record(scene, loop, state, roundoff, model.positions, limit)
+    sampled = sum(step.group.elements for step in steps)
+    return ReducedRun(run, sampled, columns.B.shape[1], None)

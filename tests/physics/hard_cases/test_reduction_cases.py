@@ -1,0 +1,35 @@
+"""Every reduction in every hard case: it holds, or an entry of config/hard_cases.yaml says why."""
+
+import numpy as np
+import pytest
+
+from hard_cases import EXPECTED, METHODS, parameters, training
+from pdrom.hardcases.catalogue import reducible_cases
+from pdrom.hardcases.expectations import FAILURES, surprise
+from pdrom.hardcases.outcomes import row
+from pdrom.hardcases.reductions import names, reduced_run
+
+CASES = [*reducible_cases(), *reducible_cases(slow=True)]
+
+
+@pytest.mark.parametrize("name", parameters(CASES))
+@pytest.mark.parametrize("reduction", names(METHODS))
+def test_outcome_is_as_expected(name, reduction):
+    found = row(training(name), reduction, METHODS, EXPECTED)
+    assert surprise(found["outcome"], name, EXPECTED.get(reduction)) == ""
+    if found["outcome"] in FAILURES:
+        assert found["why"]
+    else:
+        assert found["frames"] in (0, training(name).scene.config.frames)
+
+
+@pytest.mark.parametrize("reduction", names(METHODS))
+@pytest.mark.parametrize("name", ["scrambled_sheet", "bar_plane_rotation"])
+def test_two_runs_give_the_same_bits(name, reduction):
+    first, again = (reduced_run(training(name), reduction, METHODS, 1e3).run for _ in range(2))
+    assert np.array_equal(first.positions, again.positions)
+
+
+def test_expectations_name_reductions_that_exist():
+    assert set(EXPECTED) <= set(names(METHODS))
+    assert all(set(e.fails) | set(e.may_fail) <= set(CASES) for e in EXPECTED.values())
