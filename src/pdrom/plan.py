@@ -21,6 +21,7 @@ TABLES = (
     "singular_values", "reconstruction_error", "reduced_reruns", "accuracy_cost", "local_share",
     "sensitivity",
     "ladder", "heldout_reruns", "claims",
+    "budget", "breakeven", "effects_cost", "effects_left_out",
 )  # fmt: skip
 
 
@@ -221,6 +222,7 @@ class Plan:
             "timed_frames": settings.timing.frames,
             "blowup_extent": settings.blowup_extent,
             "ranks": ", ".join(str(r) for r in settings.ranks),
+            "tolerance": settings.iterations.tolerance,
         }
         methods = [{"method": m, **self.method_spec(m)} for m in self.study.methods]
         scenes = [self._scene_facts(name) for name in self.study.scenes]

@@ -6,11 +6,13 @@ with job_log(snakemake.log[0]):
         snakemake.params.scene,
         snakemake.params.methods,
         snakemake.params.ranks,
+        snakemake.params.counts,
         snakemake.params.protocol,
         snakemake.params.solver,
-        snakemake.input.mesh,
-        list(snakemake.input.bases),
-        list(snakemake.input.samplings),
-        list(snakemake.input.hyper),
-        snakemake.output[0],
+        {
+            "mesh": snakemake.input.mesh,
+            "fom": snakemake.input.fom,
+            **{k: list(snakemake.input[k]) for k in ("bases", "samplings", "hyper")},
+        },
+        {k: snakemake.output[k] for k in ("frames", "breakeven", "effects", "left_out")},
     )

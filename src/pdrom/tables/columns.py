@@ -35,6 +35,18 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "scene", "group", "direction", "rung", "r", "condition", "gain", "error_train",
         "error_test", "error_heldout", "finite", "blowup_frame", "relative_error_within_horizon",
     ),
+    "budget": (
+        "scene", "budget_ms", "reference", "method", "position_basis", "k", "r", "iterations",
+        "relative_error_within_horizon", "ms_per_frame",
+    ),
+    "breakeven": (
+        "scene", "group", "method", "vertices", "elements", "threads", "r", "local_ms", "full_ms",
+        "ratio", "breakeven_r",
+    ),
+    "effects_cost": ("scene", "effect", "elements", "ms_per_frame", "share"),
+    "effects_left_out": (
+        "scene", "left_out", "groups", "elements", "ms_per_frame", "saved_ms", "own_ms",
+    ),
     "claims": (
         "claim", "source", "paper", "measured", "verdict", "why", "figure_or_table",
     ),
@@ -45,6 +57,18 @@ TIMING_COLUMNS: dict[str, tuple[str, ...]] = {
     "reduced_reruns": ("ms_per_frame", "local_ms", "global_ms", "speedup"),
     "accuracy_cost": ("ms_per_frame", "pareto"),
     "local_share": ("local_ms", "assembly_ms", "global_ms", "local_share"),
+    "budget": (
+        "method",
+        "position_basis",
+        "k",
+        "r",
+        "iterations",
+        "relative_error_within_horizon",
+        "ms_per_frame",
+    ),
+    "breakeven": ("local_ms", "full_ms", "ratio", "breakeven_r"),
+    "effects_cost": ("ms_per_frame", "share"),
+    "effects_left_out": ("ms_per_frame", "saved_ms", "own_ms"),
     "claims": ("measured", "verdict", "why"),
 }
 
