@@ -29,6 +29,9 @@ FIGURES = Registry(
         "run_error": f"{_PACKAGE}.run_error:draw",
         "ladder": f"{_PACKAGE}.ladder:draw",
         "accuracy_cost": f"{_PACKAGE}.accuracy_cost:draw",
+        "budget": f"{_PACKAGE}.budget:draw",
+        "break_even": f"{_PACKAGE}.break_even:draw",
+        "effects_cost": f"{_PACKAGE}.effects_cost:draw",
     },
 )
 
@@ -51,6 +54,9 @@ READS: dict[str, tuple[str, ...]] = {
     "run_error": ("rerun", "table:sensitivity"),
     "ladder": ("table:ladder",),
     "accuracy_cost": ("table:accuracy_cost",),
+    "budget": ("table:budget",),
+    "break_even": ("table:breakeven",),
+    "effects_cost": ("table:effects_cost", "table:effects_left_out"),
 }
 # Figures of the first experiment and the first method that a configuration holds.
 FIRST_ONLY = ("snapshots_and_modes", "deim_iterations")
