@@ -123,18 +123,20 @@ def _rerun_error(tables: Tables, where: dict) -> pd.Series:
     return _tried(_filter(table, where)).relative_error_within_horizon.fillna(np.inf)
 
 
-def _error_growth(tables: Tables, where: dict) -> pd.Series:
-    """Error at the largest size over the error at the smallest one, per scene and method.
+def _error_trend(tables: Tables, where: dict) -> pd.Series:
+    """Spearman's rank correlation of error and size, per scene, group and method.
 
-    Zero where only the smallest size blew up; where both did there is no ratio.
+    1 where the error rises with every size, -1 where it falls; blow-ups share the highest rank.
+    Fewer than three sizes have no trend; errors that are all equal have the trend 0.
     """
     rows = _tried(_filter(tables["reduced_reruns"], where))
-    ratios = []
+    trends = []
     for _, run in rows.groupby(["scene", "group", "method"], sort=False):
-        ordered = run.sort_values("r").relative_error_within_horizon.fillna(np.inf).to_numpy()
-        if len(ordered) > 1 and np.isfinite(ordered[[0, -1]]).any():
-            ratios.append(ordered[-1] / ordered[0])
-    return pd.Series(ratios, dtype=float)
+        error = run.relative_error_within_horizon.fillna(np.inf)
+        if len(run) >= 3:
+            trend = 0.0 if error.nunique() == 1 else error.rank().corr(run.r.rank())
+            trends.append(trend)
+    return pd.Series(trends, dtype=float)
 
 
 def _decay(tables: Tables, where: dict) -> pd.Series:
@@ -156,12 +158,14 @@ def _elements_per_entry(tables: Tables, where: dict) -> pd.Series:
 
 
 def _local_ratio(tables: Tables, where: dict) -> pd.Series:
-    """Time of the reduced local step over that of the full compiled one, per rerun."""
-    full = tables["local_share"]
-    full = full[full.implementation == "compiled"].set_index("scene").local_ms
-    rows = _filter(tables["reduced_reruns"], where)
-    rows = rows[rows.local_ms.notna()]
-    return (rows.local_ms / rows.scene.map(full)).dropna()
+    """Time of the reduced local step over that of the full compiled one, at the largest size.
+
+    One value per scene, group and method: whether the dense solve costs more from some size on
+    shows at the largest size that the basis has.
+    """
+    rows = _filter(tables["breakeven"], where).dropna(subset=["ratio"]).sort_values("r")
+    largest = rows.groupby(["scene", "group", "method"], sort=False).tail(1)
+    return largest.sort_index().ratio
 
 
 def _position_basis_ratio(tables: Tables, where: dict) -> pd.Series:
@@ -178,7 +182,7 @@ def _position_basis_ratio(tables: Tables, where: dict) -> pd.Series:
 METRICS: dict[str, Callable[[Tables, dict], pd.Series]] = {
     "local_share": _local_share,
     "rerun_error": _rerun_error,
-    "error_growth": _error_growth,
+    "error_trend": _error_trend,
     "singular_value_decay": _decay,
     "reconstruction_error": _reconstruction,
     "elements_per_entry": _elements_per_entry,

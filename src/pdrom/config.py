@@ -56,10 +56,24 @@ class Sensitivity(_Model):
         return self
 
 
+class IterationSweep(_Model):
+    """Full-order runs with K in ``counts``, against one whose every frame is converged.
+
+    A frame is converged when one more iteration moves no vertex by more than ``tolerance`` times
+    the extent; ``limit`` bounds the evaluations it may take.
+    """
+
+    counts: tuple[Annotated[int, Field(ge=1, le=10_000)], ...] = (1, 2, 5, 10, 20, 40)
+    tolerance: Annotated[float, Field(gt=0.0, lt=1.0)] = 1e-8
+    limit: Annotated[int, Field(ge=2)] = 4000
+
+
 class Timing(_Model):
     """Protocol of the timing jobs: ``frames`` of each run, warm, interleaved, median.
 
-    The slow implementations of the full-order run are timed over fewer frames.
+    The slow implementations of the full-order run are timed over fewer frames, the interpreted one
+    over fewer iterations, too. ``breakeven`` are the sizes r of the reduced local steps that are
+    timed alone, in ``breakeven_repeats`` short repeats.
     """
 
     frames: Annotated[int, Field(ge=1)] = 15
@@ -67,6 +81,9 @@ class Timing(_Model):
     repeats: Annotated[int, Field(ge=1)] = 5
     numpy_frames: Annotated[int, Field(ge=1)] = 4
     interpreted_frames: Annotated[int, Field(ge=1)] = 1
+    interpreted_iterations: Annotated[int, Field(ge=1)] = 2
+    breakeven: tuple[Rank, ...] = (5, 10, 20, 40, 60, 80, "full")
+    breakeven_repeats: Annotated[int, Field(ge=5)] = 30
 
 
 class Subspace(_Model):
@@ -180,7 +197,9 @@ class StudySettings(_Model):
     blowup_extent: Annotated[float, Field(gt=1.0)] = 100.0
     coarsen: Coarsen = Coarsen()
     sensitivity: Sensitivity = Sensitivity()
+    iterations: IterationSweep = IterationSweep()
     timing: Timing = Timing()
+    budgets: tuple[Annotated[float, Field(gt=0.0)], ...] = (0.1, 1.0, 10.0)
     subspace: Subspace = Subspace()
     scaling: Scaling = Scaling()
     stability: Stability = Stability()

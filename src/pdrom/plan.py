@@ -35,6 +35,10 @@ TABLES = (
     "guard",
     "hard_cases",
     "kernel_accuracy",
+    "budget",
+    "breakeven",
+    "effects_cost",
+    "effects_left_out",
     "claims",
 )
 
@@ -334,6 +338,7 @@ class Plan:
             "guard_margin": settings.guard.margin,
             "guard_extent": settings.guard.extent,
             "guard_rise": settings.guard.rise,
+            "tolerance": settings.iterations.tolerance,
         }
         methods = [{"method": m, **self.method_spec(m)} for m in self.study.methods]
         scenes = [self._scene_facts(name) for name in self.study.scenes]

@@ -4,45 +4,82 @@ A variant makes a step loop and its initial state. Every repeat runs each varian
 so that drifts of the machine's clock hit all variants alike.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from time import perf_counter
 
 import numpy as np
 
 from pdrom.fom.stepper import State, Stepper
+from pdrom.rom.local_step import ReducedLocalStep
+
+Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
 class Variant:
-    """What is timed: labels for the table, the loop with its first state, and how many frames."""
+    """What is timed: labels for the table, the loop with its first state, and how many frames.
+
+    ``share`` is the part of a frame's iterations that the loop does; the times of the phases that
+    repeat with the iterations are divided by it.
+    """
 
     labels: dict[str, object]
     loop: Stepper
     start: State
     frames: int
+    share: float = 1.0
 
 
 @dataclass(frozen=True)
 class Measurement:
     """The repeat with the median time per frame: its mean times per frame in ms, by phase.
 
-    ``spread`` is the interquartile range of the time per frame over the repeats.
+    inertia : prediction at the beginning of a frame, contacts and velocities at its end
+    local : projections of all groups, and coefficients of reduced ones
+    assembly : product with S^T W, where an implementation does it apart from the projections
+    lift : from coefficients to the right-hand side
+    solve : global step
+    spread : interquartile range of the time per frame over the repeats
     """
 
     labels: dict[str, object]
     frame: float
+    inertia: float
     local: float
     assembly: float
+    lift: float
     solve: float
     spread: float
     repeats: int
+
+
+class LiftTimed:
+    """A reduced local step whose lift is timed apart; used in timings only."""
+
+    def __init__(self, step: ReducedLocalStep) -> None:
+        self.name = step.name
+        self.lift_seconds = 0.0
+        self._step = step
+
+    def begin_frame(self, q: np.ndarray) -> None:
+        """See `LocalStep`."""
+        self._step.begin_frame(q)
+
+    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
+        """See `LocalStep`."""
+        coefficients = self._step.coefficients(y)
+        before = perf_counter()
+        self._step.lift(coefficients, rhs)
+        self.lift_seconds += perf_counter() - before
+        return float("nan")
 
 
 def measure(
     variants: Sequence[Variant],
     warmup: int,
     repeats: int,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: Progress = lambda done, total: None,
 ) -> list[Measurement]:
     """Time all variants; factorisations are cached by the first run, the warm-up."""
     samples: list[list[np.ndarray]] = [[] for _ in variants]
@@ -55,27 +92,52 @@ def measure(
     return [_summary(v.labels, np.array(s)) for v, s in zip(variants, samples, strict=True)]
 
 
+def measure_calls(
+    calls: Mapping[Hashable, Callable[[], object]], warmup: int, repeats: int
+) -> dict[Hashable, float]:
+    """Median time of each call over the repeats, interleaved, in ms."""
+    samples: dict[Hashable, list[float]] = {key: [] for key in calls}
+    for repeat in range(-warmup, repeats):
+        for key, call in calls.items():
+            before = perf_counter()
+            call()
+            seconds = perf_counter() - before
+            if repeat >= 0:
+                samples[key].append(1e3 * seconds)
+    return {key: float(np.median(values)) for key, values in samples.items()}
+
+
+_INNER = ("assembly_seconds", "lift_seconds")
+
+
 def _time_once(variant: Variant) -> np.ndarray:
-    """Mean milliseconds per frame: total, local, assembly, global."""
+    """Mean milliseconds per frame: total, inertia, local, assembly, lift, global."""
     loop, state = variant.loop, variant.start
     for step in loop.local_steps:
-        if hasattr(step, "assembly_seconds"):
-            step.assembly_seconds = 0.0
-    seconds, done = 0.0, 0
+        for name in _INNER:
+            if hasattr(step, name):
+                setattr(step, name, 0.0)
+    seconds, done = np.zeros(4), 0
     with np.errstate(over="ignore", invalid="ignore"):
         for frame in range(variant.frames):
             state, report = loop.step(state, frame)
             seconds, done = seconds + report.seconds, done + 1
             if not np.isfinite(state.positions).all():
                 break
-    assembly = sum(getattr(step, "assembly_seconds", 0.0) for step in loop.local_steps)
-    local = seconds[1] - assembly
-    return 1e3 / done * np.array([seconds.sum(), local, assembly, seconds[2]])
+    assembly, lift = (sum(getattr(step, name, 0.0) for step in loop.local_steps) for name in _INNER)
+    inertia = seconds[0] + seconds[3]
+    repeated = np.array([seconds[1] - assembly - lift, assembly, lift, seconds[2]]) / variant.share
+    return 1e3 / done * np.array([inertia + repeated.sum(), inertia, *repeated])
 
 
 def _summary(labels: dict[str, object], samples: np.ndarray) -> Measurement:
-    # the phases of one repeat belong together, medians of each phase would not
-    middle = np.argsort(samples[:, 0], kind="stable")[len(samples) // 2]
-    frame, local, assembly, solve = samples[middle]
     spread = float(np.subtract(*np.percentile(samples[:, 0], [75, 25])))
-    return Measurement(labels, frame, local, assembly, solve, spread, len(samples))
+    return Measurement(labels, *median_repeat(samples), spread, len(samples))
+
+
+def median_repeat(samples: np.ndarray) -> np.ndarray:
+    """The row of ``samples`` (repeats, phases) with the median total, which is the first column.
+
+    The phases of one repeat belong together, medians of each phase would not.
+    """
+    return samples[np.argsort(samples[:, 0], kind="stable")[len(samples) // 2]]

@@ -1,10 +1,12 @@
 """Timings: interleaved, warm, started afresh, and the phases of one repeat."""
 
+import time
+
 import numpy as np
 import pytest
 
 from pdrom.fom.stepper import FrameReport, State
-from pdrom.timing import Variant, measure
+from pdrom.timing import LiftTimed, Variant, measure, measure_calls
 
 
 class Clock:
@@ -78,6 +80,67 @@ def test_assembly_is_taken_out_of_the_local_step():
     assert result.assembly == pytest.approx(2.0)
     assert result.local == pytest.approx(50.0 - 2.0)
     assert result.frame == pytest.approx(100.0)
+
+
+class Lifting(Assembling):
+    """A local step that measures its lift, too."""
+
+    lift_seconds = 55.0
+
+
+def test_phases_add_up_to_the_frame():
+    (result,) = measure([variant("a", [], [0.1, 0.1], local_steps=[Lifting()])], 1, 1)
+    assert result.inertia == pytest.approx(20.0)
+    assert result.lift == 0.0  # set back before the run, and this step never lifts
+    phases = result.inertia + result.local + result.assembly + result.lift + result.solve
+    assert phases == pytest.approx(result.frame) == pytest.approx(100.0)
+
+
+def test_a_part_of_the_iterations_stands_for_all():
+    """Inertia is paid once a frame, the other phases with every iteration."""
+    clock = Clock("a", [], seconds(1.0))
+    (result,) = measure([Variant({}, clock, START, 1, share=0.25)], 0, 1)
+    assert result.inertia == pytest.approx(200.0)
+    assert result.local == pytest.approx(2000.0)
+    assert result.solve == pytest.approx(1200.0)
+    assert result.frame == pytest.approx(3400.0)
+
+
+class Halves:
+    """A reduced local step in two halves, the second of which takes its time."""
+
+    name = "spring"
+
+    def __init__(self) -> None:
+        self.begun: list[float] = []
+
+    def begin_frame(self, q: np.ndarray) -> None:
+        self.begun.append(float(q.sum()))
+
+    def coefficients(self, y: np.ndarray) -> list[np.ndarray]:
+        return [2.0 * y]
+
+    def lift(self, coefficients: list[np.ndarray], rhs: np.ndarray) -> None:
+        time.sleep(0.01)
+        rhs += coefficients[0]
+
+
+def test_the_lift_is_timed_apart_and_changes_nothing():
+    inner, rhs = Halves(), np.ones((2, 3))
+    step = LiftTimed(inner)
+    step.begin_frame(np.ones((2, 3)))
+    assert np.isnan(step.accumulate(np.full((2, 3), 4.0), rhs))
+    assert (rhs == 9.0).all()
+    assert inner.begun == [6.0]
+    assert step.lift_seconds >= 0.01
+
+
+def test_calls_take_turns():
+    calls = []
+    times = measure_calls({"a": lambda: calls.append("a"), "b": lambda: calls.append("b")}, 1, 3)
+    assert calls == ["a", "b"] * 4
+    assert set(times) == {"a", "b"}
+    assert all(value >= 0.0 for value in times.values())
 
 
 def test_a_run_that_blows_up_is_timed_up_to_there():

@@ -51,6 +51,30 @@ rule sensitivity:
         "../scripts/sensitivity.py"
 
 
+rule iterations:
+    input:
+        mesh=lambda w: PLAN.mesh_path(w.scene),
+        fom="results/fom/{scene}/train.h5",
+        sensitivity="results/sensitivity/{scene}.csv",
+    output:
+        "results/iterations/{scene}.csv",
+    log:
+        "results/logs/iterations/{scene}.log",
+    params:
+        scene=lambda w: PLAN.scene_config(w.scene),
+        settings=PLAN.settings.iterations.model_dump(mode="json"),
+        floor={
+            "perturbation": PLAN.settings.sensitivity.reference,
+            "threshold": PLAN.settings.sensitivity.threshold,
+        },
+        solver=PLAN.settings.solver,
+        code=lambda w: PLAN.scene_code("pdrom.stages.iterations", w.scene),
+    message:
+        "Accuracy of {wildcards.scene} against the number of iterations"
+    script:
+        "../scripts/iterations.py"
+
+
 rule snapshots:
     input:
         mesh=lambda w: PLAN.mesh_path(w.scene),

@@ -111,6 +111,7 @@ rule accuracy_cost_table:
     input:
         reruns="results/tables/reduced_reruns.csv",
         timings=PLAN.per_scene("timings", ".csv"),
+        iterations=PLAN.per_scene("iterations", ".csv"),
     output:
         report("results/tables/accuracy_cost.csv", category="Tables"),
     log:
@@ -141,6 +142,23 @@ rule scaling_table:
         "../scripts/table.py"
 
 
+rule budget_table:
+    input:
+        points="results/tables/accuracy_cost.csv",
+    output:
+        report("results/tables/budget.csv", category="Tables"),
+    log:
+        "results/logs/tables/budget.log",
+    params:
+        name="budget",
+        budgets=list(PLAN.settings.budgets),
+        code=PLAN.code("pdrom.tables.budget"),
+    message:
+        "Table of what a frame's budget buys"
+    script:
+        "../scripts/table.py"
+
+
 rule scaling_fit_table:
     input:
         table="results/tables/scaling.csv",
@@ -157,11 +175,60 @@ rule scaling_fit_table:
         "../scripts/table.py"
 
 
+rule breakeven_table:
+    input:
+        parts=PLAN.per_scene("breakeven", ".csv"),
+    output:
+        report("results/tables/breakeven.csv", category="Tables"),
+    log:
+        "results/logs/tables/breakeven.log",
+    params:
+        name="breakeven",
+        code=PLAN.code("pdrom.tables.breakeven"),
+    message:
+        "Table of break-even sizes"
+    script:
+        "../scripts/table.py"
+
+
+rule effects_cost_table:
+    input:
+        parts=PLAN.per_scene("effects", ".csv"),
+    output:
+        report("results/tables/effects_cost.csv", category="Tables"),
+    log:
+        "results/logs/tables/effects_cost.log",
+    params:
+        name="effects_cost",
+        code=PLAN.code("pdrom.tables.effects_cost"),
+    message:
+        "Table of the cost of each effect"
+    script:
+        "../scripts/table.py"
+
+
+rule effects_left_out_table:
+    input:
+        parts=PLAN.per_scene("left_out", ".csv"),
+    output:
+        report("results/tables/effects_left_out.csv", category="Tables"),
+    log:
+        "results/logs/tables/effects_left_out.log",
+    params:
+        name="effects_left_out",
+        code=PLAN.code("pdrom.tables.effects_cost"),
+    message:
+        "Table of scenes without some of their effects"
+    script:
+        "../scripts/table.py"
+
+
 rule claims_table:
     input:
         rules="config/claims.yaml",
         tables=[
             "results/tables/local_share.csv",
+            "results/tables/breakeven.csv",
             "results/tables/reduced_reruns.csv",
             "results/tables/singular_values.csv",
             "results/tables/reconstruction_error.csv",

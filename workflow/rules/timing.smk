@@ -2,11 +2,15 @@
 rule timing:
     input:
         mesh=lambda w: PLAN.mesh_path(w.scene),
+        fom="results/fom/{scene}/train.h5",
         bases=lambda w: PLAN.bases_of(w.scene),
         samplings=lambda w: PLAN.samplings_of(w.scene),
         hyper=lambda w: PLAN.hyper_of(w.scene),
     output:
-        "results/timings/{scene}.csv",
+        frames="results/timings/{scene}.csv",
+        breakeven="results/breakeven/{scene}.csv",
+        effects="results/effects/{scene}.csv",
+        left_out="results/left_out/{scene}.csv",
     log:
         "results/logs/timing/{scene}.log",
     threads: workflow.cores or 1
@@ -14,6 +18,7 @@ rule timing:
         scene=lambda w: PLAN.scene_config(w.scene),
         methods=PLAN.method_specs(),
         ranks=list(PLAN.settings.ranks),
+        counts=list(PLAN.settings.iterations.counts),
         protocol=PLAN.settings.timing.model_dump(),
         solver=PLAN.settings.solver,
         threads=PLAN.settings.threads,

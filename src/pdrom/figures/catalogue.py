@@ -32,6 +32,9 @@ FIGURES = Registry(
         "scaling": f"{_PACKAGE}.scaling:draw",
         "stability_map": f"{_PACKAGE}.stability_map:draw",
         "stability_sweep": f"{_PACKAGE}.stability_sweep:draw",
+        "budget": f"{_PACKAGE}.budget:draw",
+        "break_even": f"{_PACKAGE}.break_even:draw",
+        "effects_cost": f"{_PACKAGE}.effects_cost:draw",
     },
 )
 
@@ -57,6 +60,9 @@ READS: dict[str, tuple[str, ...]] = {
     "scaling": ("table:scaling", "table:scaling_fit"),
     "stability_map": ("table:stability",),
     "stability_sweep": ("table:stability",),
+    "budget": ("table:budget",),
+    "break_even": ("table:breakeven",),
+    "effects_cost": ("table:effects_cost", "table:effects_left_out"),
 }
 # Figures of the first experiment and the first method that a configuration holds.
 FIRST_ONLY = ("snapshots_and_modes", "deim_iterations")

@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from pdrom.fom.anderson import Anderson
-from pdrom.fom.space import Space
+from pdrom.fom.space import Solve, Space
 
 PHASES = ("inertia", "local", "global", "finish")
 
@@ -81,17 +81,10 @@ class Stepper:
         on_last_iterate: Callable[[np.ndarray], None] | None = None,
     ) -> tuple[State, FrameReport]:
         """Do one frame (0-based ``frame``); ``on_last_iterate`` sees the last local iterate y."""
-        space, h = self.space, self.time_step
+        space = self.space
         seconds = np.zeros(len(PHASES))
         started = perf_counter()
-        s = state.positions + h * state.velocities
-        s += h**2 * space.acceleration(state.positions, state.velocities)
-        fixed, targets = space.fixed(frame, state.positions)
-        s[fixed] = targets
-        elimination = space.eliminate(fixed, targets)
-        base = space.inertia(s)
-        for local in self.local_steps:
-            local.begin_frame(state.positions)
+        s, elimination, base = self._begin(state, frame)
         y, rhs = s.copy(), np.empty_like(s)
         acceleration = self._acceleration
         if acceleration is not None:
@@ -122,7 +115,24 @@ class Stepper:
                     acceleration.combine(y)
             seconds[2] += perf_counter() - before
         before = perf_counter()
-        space.correct(y)
-        velocities = (y - state.positions) / h
+        after = self._finish(state, y)
         seconds[3] = perf_counter() - before
-        return State(y, velocities), FrameReport(objective, seconds)
+        return after, FrameReport(objective, seconds)
+
+    def _begin(self, state: State, frame: int) -> tuple[np.ndarray, Solve, np.ndarray]:
+        """Inertial prediction s with held coordinates at their targets, the system, (M/h^2) s."""
+        space, h = self.space, self.time_step
+        s = state.positions + h * state.velocities
+        s += h**2 * space.acceleration(state.positions, state.velocities)
+        fixed, targets = space.fixed(frame, state.positions)
+        s[fixed] = targets
+        elimination = space.eliminate(fixed, targets)
+        base = space.inertia(s)
+        for local in self.local_steps:
+            local.begin_frame(state.positions)
+        return s, elimination, base
+
+    def _finish(self, state: State, y: np.ndarray) -> State:
+        """State after the frame: contacts, then the velocities."""
+        self.space.correct(y)
+        return State(y, (y - state.positions) / self.time_step)

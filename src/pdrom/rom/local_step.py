@@ -37,19 +37,31 @@ class ReducedLocalStep:
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         """Add the reduced S^T W p(y) to ``rhs`` (N, 3); the energy is unknown: nan."""
-        sampled = self._group.project_elements(y, self._elements).ravel()
-        rhs += self._offset
-        for index, (axis, positions, operator, shift, lifted) in enumerate(self._blocks):
-            coefficients = operator @ sampled[positions] - shift
-            self._observe(index, coefficients)
-            if axis is None:
-                rhs += (lifted @ coefficients).reshape(rhs.shape)
-            else:
-                rhs[:, axis] += lifted @ coefficients
+        coefficients = self.coefficients(y)
+        for block, values in enumerate(coefficients):
+            self._observe(block, values)
+        self.lift(coefficients, rhs)
         return float("nan")
 
     def _observe(self, block: int, coefficients: np.ndarray) -> None:
         """Called with the coefficients of every block; a watched step looks at them."""
+
+    def coefficients(self, y: np.ndarray) -> list[np.ndarray]:
+        """Coefficients (r,) of each block, from the projections of the sampled elements."""
+        sampled = self._group.project_elements(y, self._elements).ravel()
+        return [
+            operator @ sampled[positions] - shift
+            for _, positions, operator, shift, _ in self._blocks
+        ]
+
+    def lift(self, coefficients: list[np.ndarray], rhs: np.ndarray) -> None:
+        """Add S^T W (mean + V c) to ``rhs`` (N, 3)."""
+        rhs += self._offset
+        for (axis, *_, lifted), c in zip(self._blocks, coefficients, strict=True):
+            if axis is None:
+                rhs += (lifted @ c).reshape(rhs.shape)
+            else:
+                rhs[:, axis] += lifted @ c
 
 
 def _local_positions(reduction: Reduction):

@@ -5,6 +5,9 @@ from typing import Any
 
 from pdrom.store import read_table, write_table
 from pdrom.tables.accuracy_cost import accuracy_cost
+from pdrom.tables.breakeven import breakeven
+from pdrom.tables.budget import budget
+from pdrom.tables.effects_cost import effects_cost, effects_left_out
 from pdrom.tables.ladder import ladder
 from pdrom.tables.local_share import local_share
 from pdrom.tables.reconstruction_error import reconstruction_error
@@ -47,7 +50,11 @@ def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
             params.left,
         ),
         "accuracy_cost": lambda: accuracy_cost(
-            read_table(inputs.reruns), inputs.timings, params.iterations
+            read_table(inputs.reruns), inputs.timings, inputs.iterations, params.iterations
         ),
+        "budget": lambda: budget(read_table(inputs.points), params.budgets),
+        "breakeven": lambda: breakeven(inputs.parts),
+        "effects_cost": lambda: effects_cost(inputs.parts),
+        "effects_left_out": lambda: effects_left_out(inputs.parts),
     }
     write_table(makers[name](), Path(output))

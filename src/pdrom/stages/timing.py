@@ -1,4 +1,4 @@
-"""Rule timing: milliseconds per frame of the full-order run and of every reduced local step."""
+"""Rule timing: ms per frame of full-order and reduced runs, of local steps and of effects."""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -8,11 +8,14 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from pdrom.basis import load_basis
+from pdrom.constraints.base import ConstraintGroup
 from pdrom.constraints.implementations import IMPLEMENTATIONS
-from pdrom.fom.stepper import LocalStep
+from pdrom.effect_costs import effect_costs, left_out
+from pdrom.fom.stepper import LocalStep, Stepper
 from pdrom.fom.system import GlobalSystem
 from pdrom.method import MethodSpec
 from pdrom.rom.local_step import ReducedLocalStep
@@ -21,58 +24,103 @@ from pdrom.rom.rerun import replace_group
 from pdrom.sampling.load import load_reduction
 from pdrom.scene import Scene
 from pdrom.stages.scenes import scene_of
-from pdrom.store import write_table
+from pdrom.store import open_hdf5, write_table
 from pdrom.subspace.load import load_models
-from pdrom.timing import Measurement, Variant, measure
+from pdrom.timing import LiftTimed, Measurement, Variant, measure, measure_calls
 
 log = logging.getLogger(__name__)
 
 Make = Callable[[dict[str, Any], Sequence[LocalStep]], Variant]
 
 COLUMNS = [
-    "scene", "group", "method", "position_basis", "k", "r", "vertices", "implementation",
-    "ms_per_frame", "local_ms", "assembly_ms", "global_ms", "spread_ms", "repeats",
+    "scene", "group", "method", "position_basis", "k", "r", "iterations", "vertices",
+    "implementation", "ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms",
+    "global_ms", "spread_ms", "repeats",
 ]  # fmt: skip
+BREAKEVEN = [
+    "scene", "group", "method", "vertices", "elements", "threads", "r", "local_ms", "full_ms",
+]  # fmt: skip
+STATES = 5  # states of the full-order run at which local steps are timed alone
+THREADS = 1  # kernels and libraries run on one
 
 
 def time_scene(
     scene: dict[str, Any],
     methods: dict[str, dict[str, Any]],
     ranks: list[int | str],
-    protocol: dict[str, int],
+    counts: list[int],
+    protocol: dict[str, Any],
     solver: str,
     threads: int,
-    mesh: str,
-    bases: list[str],
-    samplings: list[str],
-    hyper: list[str],
-    output: str,
+    inputs: dict[str, Any],
+    outputs: dict[str, str],
 ) -> None:
-    """Measure one scene and write its timing table."""
-    bound = scene_of(scene, mesh, threads=threads)
+    """Measure one scene and write its tables: frames, local steps over r, cost of effects.
+
+    Parameters
+    ----------
+    counts : numbers of iterations K of the full-order run that are timed beside the scene's own
+    protocol : settings of `pdrom.config.Timing`
+    inputs : mesh, fom (full-order run), and lists of bases, samplings, hyper
+    outputs : frames, breakeven, effects, left_out
+    """
+    bound = scene_of(scene, inputs["mesh"], threads=threads)
     system = bound.system_with(solver)
+    warmup, repeats = protocol["warmup"], protocol["repeats"]
     frames = min(protocol["frames"], bound.config.frames)
     make = partial(_variant, bound, system, frames)
-    variants = _full_order(bound, make, protocol)
-    for path in samplings:
+    variants = _full_order(bound, make, protocol) + _other_counts(bound, system, frames, counts)
+    alone: dict[tuple[Any, ...], LocalStep] = {}
+    for path in inputs["samplings"]:
         group, method = Path(path).parent.name, Path(path).stem
-        spec = MethodSpec.model_validate(methods[method])
-        place = (group, spec.basis_id)
-        basis = next(b for b in bases if (Path(b).parent.name, Path(b).stem) == place)
-        variants += _reduced(bound, group, method, spec, ranks, basis, path, make)
-    for labels, model in chain.from_iterable(load_models(path) for path in hyper):
+        source = _Source(bound.group(group), method, methods[method], inputs["bases"], path)
+        for r in source.sizes(ranks):
+            step, labels = source.step(r), {"group": group, "method": method, "r": r}
+            steps = replace_group(bound, group, LiftTimed(step))
+            variants.append(make({**labels, "implementation": "compiled"}, steps))
+        if source.spec.rows != "all":
+            for r in source.sizes(protocol["breakeven"]):
+                alone[group, method, r] = source.step(r)
+    for labels, model in chain.from_iterable(load_models(path) for path in inputs["hyper"]):
         labels = {"group": "all", **labels, "implementation": "compiled"}
         variants.append(Variant(labels, *model.loop(bound), frames))
     slow = [v for v in variants if v.labels["implementation"] == "interpreted"]
     quick = [v for v in variants if v.labels["implementation"] != "interpreted"]
-    results = measure(
-        quick,
-        protocol["warmup"],
-        protocol["repeats"],
-        lambda done, total: log.info("%s: repeat %d of %d", bound.config.name, done, total),
-    )
-    results += measure(slow, 0, protocol["repeats"])
-    write_table(pd.DataFrame([_row(bound, m) for m in results], columns=COLUMNS), output)
+    name = bound.config.name
+    told = partial(log.info, f"{name}: repeat %d of %d")
+    results = measure(quick, warmup, repeats, told) + measure(slow, 0, repeats)
+    write_table(pd.DataFrame([_row(bound, m) for m in results], columns=COLUMNS), outputs["frames"])
+    log.info("%s: %d reduced local steps alone", name, len(alone))
+    states = _states(inputs["fom"])
+    write_table(_break_even(bound, alone, states, protocol), outputs["breakeven"])
+    log.info("%s: effects", name)
+    costs = effect_costs(bound, system, frames, warmup, repeats)
+    write_table(costs, outputs["effects"])
+    without = left_out(bound, costs, frames, warmup, repeats, solver)
+    write_table(without, outputs["left_out"])
+
+
+class _Source:
+    """Reduced local steps of one group and method, by size."""
+
+    def __init__(
+        self, group: ConstraintGroup, method: str, spec: dict[str, Any], bases: list[str], path: str
+    ) -> None:
+        self.spec = MethodSpec.model_validate(spec)
+        place = (group.name, self.spec.basis_id)
+        file = next(b for b in bases if (Path(b).parent.name, Path(b).stem) == place)
+        self._group, self._path, self._space = group, path, load_basis(file)
+        with open_hdf5(path) as stored:
+            self._stored = {int(key[1:]) for key in stored if key.startswith("r")}
+
+    def sizes(self, asked: Sequence[int | str]) -> list[int]:
+        """The asked sizes that the basis can have and the file holds."""
+        return [r for r in resolve_ranks(asked, self._space.rank) if r in self._stored]
+
+    def step(self, r: int) -> ReducedLocalStep:
+        """Local step of size r."""
+        reduction = load_reduction(self._space, self._path, self.spec, r)
+        return ReducedLocalStep(self._group, reduction)
 
 
 def _variant(
@@ -83,38 +131,76 @@ def _variant(
     local_steps: Sequence[LocalStep],
 ) -> Variant:
     loop = scene.stepper(system, local_steps, track_objective=False)
+    labels = {"iterations": scene.config.iterations, **labels}
     return Variant(labels, loop, scene.initial_state(), frames)
 
 
-def _full_order(scene: Scene, make: Make, protocol: dict[str, int]) -> list[Variant]:
+def _full_order(scene: Scene, make: Make, protocol: dict[str, Any]) -> list[Variant]:
+    """The full-order run in every implementation; the slowest does only some iterations."""
     variants = [make({"implementation": "compiled"}, scene.groups)]
     for name, step in IMPLEMENTATIONS.items():
         variant = make({"implementation": name}, [step(g) for g in scene.groups])
         frames = min(variant.frames, protocol[f"{name}_frames"])
         variants.append(replace(variant, frames=frames))
+    slow = variants[-1]
+    whole = scene.config.iterations
+    slow.loop.iterations = min(whole, protocol["interpreted_iterations"])
+    variants[-1] = replace(slow, share=slow.loop.iterations / whole)
     return variants
 
 
-def _reduced(
-    scene: Scene,
-    group: str,
-    method: str,
-    spec: MethodSpec,
-    ranks: list[int | str],
-    basis: str,
-    sampling: str,
-    make: Make,
+def _other_counts(
+    scene: Scene, system: GlobalSystem, frames: int, counts: list[int]
 ) -> list[Variant]:
-    space = load_basis(basis)
+    """The compiled full-order run with other numbers of iterations, method "fom"."""
     variants = []
-    for r in resolve_ranks(ranks, space.rank):
-        if r > space.rank:
+    for count in counts:
+        if count == scene.config.iterations:
             continue
-        reduction = load_reduction(space, sampling, spec, r)
-        local = ReducedLocalStep(scene.group(group), reduction)
-        labels = {"group": group, "method": method, "r": r, "implementation": "compiled"}
-        variants.append(make(labels, replace_group(scene, group, local)))
+        space = scene.space(system)
+        loop = Stepper(space, scene.config.time_step, count, scene.groups, track_objective=False)
+        labels = {"method": "fom", "iterations": count, "implementation": "compiled"}
+        variants.append(Variant(labels, loop, scene.initial_state(), frames))
     return variants
+
+
+def _states(fom: str) -> np.ndarray:
+    """Positions (n, N, 3) spread over a full-order run."""
+    with open_hdf5(fom) as file:
+        positions = file["positions"]
+        return np.stack([positions[i * (len(positions) - 1) // STATES] for i in range(STATES)])
+
+
+def _break_even(
+    scene: Scene,
+    alone: dict[tuple[Any, ...], LocalStep],
+    states: np.ndarray,
+    protocol: dict[str, Any],
+) -> pd.DataFrame:
+    """Time of one local step, reduced and full, mean over some states, interleaved."""
+    rhs = np.zeros_like(states[0])
+
+    def call(step: LocalStep) -> Callable[[], None]:
+        step.begin_frame(states[0])
+
+        def all_states() -> None:
+            for y in states:
+                step.accumulate(y, rhs)
+
+        return all_states
+
+    groups = {group: scene.group(group) for group, _, _ in alone}
+    calls = {key: call(step) for key, step in (groups | alone).items()}
+    with np.errstate(over="ignore", invalid="ignore"):
+        times = measure_calls(calls, protocol["warmup"], protocol["breakeven_repeats"])
+    rows = [
+        (
+            scene.config.name, group, method, scene.mesh.vertices, groups[group].elements, THREADS,
+            r, times[group, method, r] / len(states), times[group] / len(states),
+        )
+        for group, method, r in alone
+    ]  # fmt: skip
+    return pd.DataFrame(rows, columns=BREAKEVEN)
 
 
 def _row(scene: Scene, measurement: Measurement) -> dict[str, Any]:
@@ -123,8 +209,10 @@ def _row(scene: Scene, measurement: Measurement) -> dict[str, Any]:
         "vertices": scene.mesh.vertices,
         **measurement.labels,
         "ms_per_frame": measurement.frame,
+        "inertia_ms": measurement.inertia,
         "local_ms": measurement.local,
         "assembly_ms": measurement.assembly,
+        "lift_ms": measurement.lift,
         "global_ms": measurement.solve,
         "spread_ms": measurement.spread,
         "repeats": measurement.repeats,

@@ -1,6 +1,19 @@
-"""Table accuracy_cost: each method and size as a point (error, time), and the best."""
+"""Table accuracy_cost: each method and size as a point (error, time), and the best.
 
-from collections.abc import Iterable, Sequence
+Errors have one of two references, and only rows with the same one may be compared:
+
+=================  ==================================================================
+method             error against
+=================  ==================================================================
+fom                the full-order run whose frames are converged (K -> infinity)
+every other        the scene's own full-order run, which has finitely many iterations
+=================  ==================================================================
+
+Among the others, ``full`` without a position subspace is that own run (error zero by definition),
+and ``fewer-iterations`` is the full-order run stopped earlier: what a reduction has to beat.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -8,33 +21,66 @@ import pandas as pd
 from pdrom.store import read_table
 from pdrom.tables.columns import conform
 
+FOM, FEWER = "fom", "fewer-iterations"
+CONVERGED, OWN = "converged", "own iterations"
+
 
 def accuracy_cost(
-    reruns: pd.DataFrame, timings: Iterable[str], iterations: dict[str, int]
+    reruns: pd.DataFrame,
+    timings: Iterable[str],
+    sweeps: Iterable[str],
+    iterations: Mapping[str, int],
 ) -> pd.DataFrame:
-    """Points of the reruns whose error within the horizon and time exist, and the full-order runs.
+    """Points of the reruns whose error within the horizon and time exist, and full-order runs.
 
-    A compiled full-order run is its own reference: method and position basis "full", error zero.
+    A point is Pareto-optimal among those of its scene with the same reference.
 
     Parameters
     ----------
     reruns : the table reduced_reruns
     timings : timing tables of the scenes
-    iterations : scene -> local/global iterations K per frame
+    sweeps : tables of the scenes' full-order runs with other numbers of iterations
+    iterations : scene -> its own local/global iterations K per frame
     """
     times = pd.concat([read_table(path) for path in timings], ignore_index=True)
-    full = times[times.method.isna() & (times.implementation == "compiled")].copy()
+    times = times[times.implementation == "compiled"]
+    full = times[times.method.isna()].copy()
     full = full.assign(method="full", position_basis="full", relative_error_within_horizon=0.0)
+    sweep = _sweep(pd.concat([read_table(path) for path in sweeps], ignore_index=True), times)
     points = reruns.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
-    points = pd.concat([full, points], ignore_index=True)
-    points["k"], points["r"] = points["k"].astype("Int64"), points["r"].astype("Int64")
-    points["iterations"] = points.scene.map(iterations)
+    points = points.assign(iterations=points.scene.map(iterations))
+    parts = [full.assign(iterations=full.scene.map(iterations)), points, sweep]
+    points = pd.concat([part for part in parts if len(part)], ignore_index=True)
+    for column in ("k", "r", "iterations"):
+        points[column] = points[column].astype("Int64")
     points["pareto"] = False
-    for _, rows in points.groupby("scene", sort=False):
+    for _, rows in points.groupby(["scene", reference_of(points)], sort=False):
         error = rows.relative_error_within_horizon.to_numpy(float)
         points.loc[rows.index, "pareto"] = pareto(error, rows.ms_per_frame.to_numpy(float))
-    order = points.scene.map({scene: i for i, scene in enumerate(reruns.scene.unique())})
+    order = points.scene.map({scene: i for i, scene in enumerate(iterations)})
     return conform(points.iloc[np.argsort(order, kind="stable")], "accuracy_cost")
+
+
+def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
+    """Full-order runs of every K against the converged one, and those stopped early."""
+    full = times[times.method.isna() | (times.method == FOM)]
+    cost = full[["scene", "iterations", "ms_per_frame"]].astype({"iterations": "Int64"})
+    errors = errors.dropna(subset=["iterations"]).astype({"iterations": "Int64"})
+    errors = errors.merge(cost, on=["scene", "iterations"])
+    own = cost[full.method.isna()].set_index("scene").iterations
+    early = errors[(errors.iterations < errors.scene.map(own)).astype(bool)]
+    parts = [(FOM, errors, "error_converged"), (FEWER, early, "error_scene")]
+    named = [
+        rows.assign(method=method, relative_error_within_horizon=rows[column])
+        for method, rows, column in parts
+    ]
+    table = pd.concat(named, ignore_index=True).assign(position_basis="full", k=None, r=None)
+    return table.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
+
+
+def reference_of(points: pd.DataFrame) -> pd.Series:
+    """What the error of each row of the table is taken against: `CONVERGED` or `OWN`."""
+    return (points.method == FOM).map({True: CONVERGED, False: OWN})
 
 
 def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:

@@ -59,6 +59,18 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "group", "matrix_class", "cases", "condition", "worst_relative_error",
         "worst_over_condition",
     ),
+    "budget": (
+        "scene", "budget_ms", "reference", "method", "position_basis", "k", "r", "iterations",
+        "relative_error_within_horizon", "ms_per_frame",
+    ),
+    "breakeven": (
+        "scene", "group", "method", "vertices", "elements", "threads", "r", "local_ms", "full_ms",
+        "ratio", "breakeven_r",
+    ),
+    "effects_cost": ("scene", "effect", "elements", "ms_per_frame", "share"),
+    "effects_left_out": (
+        "scene", "left_out", "groups", "elements", "ms_per_frame", "saved_ms", "own_ms",
+    ),
     "claims": (
         "claim", "source", "paper", "measured", "verdict", "why", "figure_or_table",
     ),
@@ -75,6 +87,18 @@ TIMING_COLUMNS: dict[str, tuple[str, ...]] = {
     ),
     "scaling_fit": ("exponent",),
     "guard": ("ms_per_frame", "relative_cost"),
+    "budget": (
+        "method",
+        "position_basis",
+        "k",
+        "r",
+        "iterations",
+        "relative_error_within_horizon",
+        "ms_per_frame",
+    ),
+    "breakeven": ("local_ms", "full_ms", "ratio", "breakeven_r"),
+    "effects_cost": ("ms_per_frame", "share"),
+    "effects_left_out": ("ms_per_frame", "saved_ms", "own_ms"),
     "claims": ("measured", "verdict", "why"),
 }  # fmt: skip
 

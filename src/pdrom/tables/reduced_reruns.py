@@ -115,6 +115,7 @@ def _with_times(table: pd.DataFrame, paths: Iterable[str]) -> pd.DataFrame:
     reference = full.set_index("scene").ms_per_frame
     reduced = times[times.method.notna()].copy()
     reduced["position_basis"] = reduced.position_basis.fillna("full")
+    reduced["local_ms"] += reduced.assembly_ms + reduced.lift_ms
     reduced["speedup"] = reduced.scene.map(reference) / reduced.ms_per_frame
     measured = ["ms_per_frame", "local_ms", "global_ms", "speedup"]
     inside = reduced.position_basis != "full"

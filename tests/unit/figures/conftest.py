@@ -41,8 +41,8 @@ BLOWN_UP = ("spring_twist", "deim-joint", 10)  # scene, method, r of a run that 
 BLOWUP_FRAME = 4
 TABLES = (
     "reconstruction_error", "singular_values", "local_share", "sensitivity", "accuracy_cost",
-    "ladder", "scaling", "scaling_fit",
-    "ladder", "stability",
+    "ladder", "scaling", "scaling_fit", "stability", "budget", "breakeven", "effects_cost",
+    "effects_left_out",
 )  # fmt: skip
 
 
@@ -200,6 +200,47 @@ def _write_tables(sources, scenes, methods, rng) -> None:
         for r in (6, 14)
     ]
     costs += [(scene, "full", "full", np.nan, np.nan, 10, 0.0, 4.0, True) for scene in scenes]
+    for k, time in ((2, 1.0), (5, 2.0), (10, 4.0), (40, 16.0)):
+        costs += [
+            (scene, "fom", "full", np.nan, np.nan, k, 1.0 / k**2, time, True) for scene in scenes
+        ]
+        if k < 10:
+            early = ("fewer-iterations", "full", np.nan, np.nan, k, 0.5 / k, time, k == 2)
+            costs += [(scene, *early) for scene in scenes]
+    bought = [
+        (scene, limit, reference, *best)
+        for scene in scenes
+        for limit, reference, best in (
+            (0.1, "own iterations", (None, None, np.nan, np.nan, np.nan, np.nan)),
+            (0.1, "converged", (None, None, np.nan, np.nan, np.nan, np.nan)),
+            (1.0, "own iterations", (methods[0], "full", np.nan, 14, 10, 0.02)),
+            (1.0, "converged", ("fom", "full", np.nan, np.nan, 2, 0.25)),
+            (3.0, "own iterations", ("ecsw-1e-02", "pod", 8, 33, 10, 1e-9)),
+            (3.0, "converged", ("fom", "full", np.nan, np.nan, 5, 0.04)),
+            (10.0, "own iterations", ("full", "full", np.nan, np.nan, 10, 0.0)),
+            (10.0, "converged", ("fom", "full", np.nan, np.nan, 10, 0.01)),
+        )
+    ]
+    ratios = [
+        (scene, group, method, r, 0.05 * r, 20)
+        for scene, group in pairs
+        for method in methods
+        for r in (6, 14, 40)
+    ]
+    shares = [
+        (scene, effect, time, time / 4.0)
+        for scene, groups in scenes.items()
+        for effect, time in (
+            *((group, 2.0 / len(groups)) for group in groups), ("gravity", 0.5), ("pins", 0.5),
+            ("global solve", 0.7), ("rest of the frame", 0.3),
+        )
+    ]  # fmt: skip
+    removed = [
+        (scene, name, number, time, 4.0 - time)
+        for scene, groups in scenes.items()
+        if len(groups) > 1
+        for name, number, time in (("nothing", 3, 4.0), ("gravity", 3, 3.5), ("a + b", 1, 2.0))
+    ]
     rungs = [("up", "published code"), ("up", "+ affine"), ("down", "- QR"), ("signs", "signs 1")]
     ladder = [
         (scene, direction, rung, 10.0**i if i < 2 else np.inf, 0.1 * i if i else np.nan)
@@ -236,8 +277,14 @@ def _write_tables(sources, scenes, methods, rng) -> None:
         "ladder": "scene direction rung gain relative_error_within_horizon",
         "stability": "scene group method position_basis k r experiment outcome blowup_frame h"
         " stiffness_ratio",
+        "budget": "scene budget_ms reference method position_basis k r iterations"
+        " relative_error_within_horizon",
+        "breakeven": "scene group method r ratio breakeven_r",
+        "effects_cost": "scene effect ms_per_frame share",
+        "effects_left_out": "scene left_out groups ms_per_frame own_ms",
     }
-    rows = dict(zip(columns, (values, errors, times, floors, costs, ladder, runs), strict=True))
+    made = (values, errors, times, floors, costs, ladder, runs, bought, ratios, shares, removed)
+    rows = dict(zip(columns, made, strict=True))
     for name, header in columns.items():
         write_table(pd.DataFrame(rows[name], columns=header.split()), sources.table(name))
     _write_scaling(sources, scenes)

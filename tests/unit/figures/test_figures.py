@@ -212,3 +212,54 @@ def test_a_mesh_that_does_not_fit_is_refused(small_study):
     save_mesh(cloth(4, 4), study.sources.mesh("strain_oop"))
     with pytest.raises(StorageError, match="elements of 'strain'"):
         draw(study, "deim_iterations")
+
+
+# Cost -------------------------------------------------------------------------------------------
+
+
+def test_points_with_another_reference_are_no_dots(study):
+    """Errors against the converged run are one line; no dot or ring lies at their times."""
+    figure = draw(study, "accuracy_cost", scenes=("strain_oop",))
+    (ax,) = figure.axes
+    lines = [line for line in ax.lines if line.get_linestyle() == "-."]
+    assert [line.get_ydata()[0] for line in lines] == [0.01]  # fom, K = 10
+    times = {float(x) for line in ax.lines if line.get_marker() == "o" for x in line.get_xdata()}
+    assert 16.0 not in times  # fom, K = 40
+    (fewer,) = [line for line in ax.lines if line.get_marker() == "x"]
+    assert list(fewer.get_xdata()) == [1.0, 2.0]
+
+
+def test_rates_out_of_reach_are_named(study):
+    figure = draw(study, "accuracy_cost", scenes=("strain_oop",))
+    assert "60, 30 fps \N{RIGHTWARDS ARROW}" in texts(figure)
+    (ax,) = figure.axes
+    assert ax.get_xlim()[1] < 1e3 / 60.0
+
+
+def test_a_budget_says_what_it_buys(study):
+    figure = draw(study, "budget", scenes=("strain_oop",))
+    found = texts(figure)
+    assert [ax.get_title() for ax in figure.axes] == [
+        "0.1 ms a frame", "1 ms a frame", "3 ms a frame", "10 ms a frame",
+    ]  # fmt: skip
+    assert found.count("nothing fits") == 1
+    assert found.count("full order fits") == 1
+    assert {"r=14", "k=8, 33 el.", "K=2", "K=5", "K=10"} <= set(found)
+
+
+def test_break_even_has_a_panel_per_group(study):
+    figure = draw(study, "break_even")
+    assert {ax.get_title() for ax in figure.axes} == {
+        "bending", "spring", "strain", "tetrahedron strain", "deformation gradient",
+    }  # fmt: skip
+
+
+def test_a_scene_without_effects_ends_at_the_tick(study):
+    figure = draw(study, "effects_cost", scenes=("strain_oop", "cloth_all"))
+    shares, without = figure.axes
+    assert [t.get_text() for t in shares.get_yticklabels()] == ["strain oop", "cloth all"]
+    assert [t.get_text() for t in without.get_yticklabels()] == [
+        "whole", "without gravity", "without a + b",
+    ]  # fmt: skip
+    assert [bar.get_width() for bar in without.patches] == [4.0, 3.5, 2.0]
+    assert [line.get_xdata()[0] for line in without.lines] == [3.5, 2.0]

@@ -10,7 +10,7 @@ from pdrom.basis import Basis, save_basis
 from pdrom.errors import StorageError
 from pdrom.store import write_hdf5, write_table
 from pdrom.tables import COLUMNS, TIMING_COLUMNS
-from pdrom.tables.accuracy_cost import accuracy_cost, pareto
+from pdrom.tables.accuracy_cost import accuracy_cost, pareto, reference_of
 from pdrom.tables.columns import conform
 from pdrom.tables.local_share import local_share
 from pdrom.tables.reconstruction_error import reconstruction_error
@@ -19,9 +19,11 @@ from pdrom.tables.sensitivity import floor_of, horizons, sensitivity
 from pdrom.tables.singular_values import singular_values
 
 TIMING = [
-    "scene", "group", "method", "position_basis", "k", "r", "vertices", "implementation",
-    "ms_per_frame", "local_ms", "assembly_ms", "global_ms", "spread_ms", "repeats",
+    "scene", "group", "method", "position_basis", "k", "r", "iterations", "vertices",
+    "implementation", "ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms",
+    "global_ms", "spread_ms", "repeats",
 ]  # fmt: skip
+SWEEP = ["scene", "iterations", "frames", "error_converged", "error_scene", "residual"]
 RERUN = [
     "scene", "group", "method", "r", "frames", "finite", "blowup_frame", "max_extent",
     "relative_error",
@@ -218,7 +220,8 @@ def files(tmp_path):
     def time(scene, implementation="compiled", ms=8.0, **labels):
         return {
             "scene": scene, "implementation": implementation, "ms_per_frame": ms,
-            "local_ms": ms / 2, "assembly_ms": 0.0, "global_ms": ms / 4, "vertices": 9, **labels,
+            "local_ms": ms / 4, "assembly_ms": ms / 8, "lift_ms": ms / 8, "global_ms": ms / 4,
+            "vertices": 9, "iterations": 10, **labels,
         }  # fmt: skip
 
     local = {"group": "spring", "method": "deim"}
@@ -226,7 +229,8 @@ def files(tmp_path):
         written(
             tmp_path / "timing_a.csv", TIMING, time("a"), time("a", "numpy", 80.0),
             time("a", "interpreted", 900.0), time("a", ms=4.0, r=6, **local),
-            time("a", ms=5.0, r=10, **local),
+            time("a", ms=5.0, r=10, **local), time("a", ms=2.5, method="fom", iterations=2),
+            time("a", ms=24.0, method="fom", iterations=40),
         ),
         written(
             tmp_path / "timing_b.csv", TIMING, time("b", ms=10.0), time("b", ms=2.0, r=6, **local),
@@ -322,10 +326,14 @@ def test_pareto_keeps_what_nothing_beats(points):
         assert keep != beaten
 
 
-def test_accuracy_cost_holds_full_runs_and_reruns(files):
+def no_sweep(folder) -> str:
+    return written(folder / "sweep.csv", SWEEP, {"scene": "absent"})
+
+
+def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
     reruns, hyper, timings, floor = files
     runs = reduced_reruns(reruns, hyper, timings, floor, 1e-10, 1e-3)
-    table = accuracy_cost(runs, timings, {"a": 10, "b": 20})
+    table = accuracy_cost(runs, timings, [no_sweep(tmp_path)], {"a": 10, "b": 20})
     assert tuple(table.columns) == COLUMNS["accuracy_cost"]
     points = list(zip(table.scene, table.method, table.ms_per_frame, strict=True))
     assert points == [
@@ -337,9 +345,50 @@ def test_accuracy_cost_holds_full_runs_and_reruns(files):
     assert table.relative_error_within_horizon[[0, 2]].tolist() == [0.0, 0.0]
     assert table.pareto.tolist() == [True] * 6
     slow = runs.assign(ms_per_frame=100.0)
-    assert accuracy_cost(slow, timings, {"a": 1, "b": 1}).pareto.tolist() == [
-        True, False, True, False, False, False,
-    ]  # fmt: skip
+    table = accuracy_cost(slow, timings, [no_sweep(tmp_path)], {"a": 1, "b": 1})
+    assert table.pareto.tolist() == [True, False, True, False, False, False]
+
+
+def sweep(folder, **changes) -> str:
+    """Scene a with K = 2, 10 (its own) and 40, and the converged run."""
+    rows = [
+        {"iterations": 2, "error_converged": 0.4, "error_scene": 0.3},
+        {"iterations": 10, "error_converged": 0.1, "error_scene": 0.0},
+        {"iterations": 40, "error_converged": 0.02, "error_scene": 0.09},
+        {"error_converged": 0.0, "error_scene": 0.1, "residual": 1e-9},
+    ]
+    rows = [{"scene": "a", "frames": 2} | row | changes for row in rows]
+    return written(folder / "sweep.csv", SWEEP, *rows)
+
+
+def test_runs_with_other_iterations_have_their_own_reference(files, tmp_path):
+    reruns, hyper, timings, floor = files
+    runs = reduced_reruns(reruns, hyper, timings, floor, 1e-10, 1e-3)
+    table = accuracy_cost(runs, timings, [sweep(tmp_path)], {"a": 10, "b": 20})
+    fom = table[table.method == "fom"]
+    assert fom.iterations.tolist() == [2, 10, 40]
+    assert fom.relative_error_within_horizon.tolist() == [0.4, 0.1, 0.02]
+    assert fom.ms_per_frame.tolist() == [2.5, 8.0, 24.0]
+    assert fom.pareto.tolist() == [True] * 3
+    early = table[table.method == "fewer-iterations"]
+    assert early.iterations.tolist() == [2]
+    assert early.relative_error_within_horizon.tolist() == [0.3]
+    # 0.3 in 2.5 ms beats no point with the same reference: the reduced run has 0.1 in 4 ms
+    assert early.pareto.tolist() == [True]
+    # against the converged run 0.1 takes 8 ms; the reduced run, 0.1 in 4 ms, is no rival of it
+    assert fom.position_basis.unique().tolist() == ["full"]
+    assert reference_of(table).tolist() == [
+        "converged" if m == "fom" else "own iterations" for m in table.method
+    ]
+
+
+def test_without_a_converged_run_there_is_no_point_against_it(files, tmp_path):
+    reruns, hyper, timings, floor = files
+    runs = reduced_reruns(reruns, hyper, timings, floor, 1e-10, 1e-3)
+    sweeps = [sweep(tmp_path, error_converged=None)]
+    table = accuracy_cost(runs, timings, sweeps, {"a": 10, "b": 20})
+    assert "fom" not in set(table.method)
+    assert (table.method == "fewer-iterations").sum() == 1
 
 
 # Local share --------------------------------------------------------------------------------------
@@ -351,7 +400,7 @@ def test_local_share_counts_assembly_with_the_local_step(tmp_path, files):
     assert tuple(table.columns) == COLUMNS["local_share"]
     assert table.scene.tolist() == ["a", "a", "a", "b"]
     assert table.implementation.tolist() == ["interpreted", "numpy", "compiled", "compiled"]
-    assert table.local_share.tolist() == pytest.approx([2 / 3] * 4)
+    assert table.local_share.tolist() == pytest.approx([0.6] * 4)
     row = {"scene": "c", "implementation": "numpy", "vertices": 4, "local_ms": 2.0,
            "assembly_ms": 1.0, "global_ms": 1.0}  # fmt: skip
     path = written(tmp_path / "c.csv", TIMING, row)

@@ -1,0 +1,86 @@
+"""Rule iterations: what K costs in accuracy, against the limit K -> infinity."""
+
+import logging
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pdrom.fom.converged import ConvergedStepper
+from pdrom.fom.sensitivity import horizon
+from pdrom.fom.stepper import Stepper
+from pdrom.metrics import trajectory_error
+from pdrom.rom.rerun import displacement_norms
+from pdrom.scene import Scene
+from pdrom.stages.scenes import scene_of
+from pdrom.store import open_hdf5, write_table
+from pdrom.tables.sensitivity import floor_of, sensitivity
+
+log = logging.getLogger(__name__)
+
+COLUMNS = ["scene", "iterations", "frames", "error_converged", "error_scene", "residual"]
+
+
+def sweep_iterations(
+    config: dict[str, Any],
+    settings: dict[str, Any],
+    floor: dict[str, float],
+    solver: str,
+    mesh: str,
+    fom: str,
+    sensitivity_table: str,
+    output: str,
+) -> None:
+    """Run a scene with every K of ``settings`` up to its horizon, and once to convergence.
+
+    Each row has the error of a K against the converged run and against the scene's own K; the
+    last row is the converged run itself (``iterations`` empty) with its largest residual: the
+    change by one more iteration, relative to the extent. If a frame stays above the tolerance
+    there is no converged reference, and the errors against it are empty.
+
+    Parameters
+    ----------
+    settings : counts, tolerance, limit (see `pdrom.config.IterationSweep`)
+    floor : perturbation and threshold that define the horizon
+    """
+    scene = scene_of(config, mesh)
+    system = scene.system_with(solver)
+    name = scene.config.name
+    spread = floor_of(sensitivity([sensitivity_table]), name, floor["perturbation"])
+    frames = max(1, horizon(spread, floor["threshold"]))
+    with open_hdf5(fom) as file:
+        own = file["positions"][: frames + 1]
+    best = ConvergedStepper(scene, system, settings["tolerance"], settings["limit"])
+    limit = _run(best, scene, frames)
+    if not best.converged:
+        log.warning("%s: no convergence in %d evaluations", name, settings["limit"])
+    log.info("%s: %.0f evaluations a frame", name, np.mean(best.evaluations))
+    rows = []
+    for count in sorted({*settings["counts"], scene.config.iterations}):
+        run = own
+        if count != scene.config.iterations:
+            space = scene.space(system)
+            loop = Stepper(space, scene.config.time_step, count, scene.groups, False)
+            run = _run(loop, scene, frames)
+        converged = _error(run, limit) if best.converged else None
+        rows.append((name, count, frames, converged, _error(run, own), None))
+    residual = max(best.changes) / scene.mesh.extent
+    converged = 0.0 if best.converged else None
+    rows.append((name, None, frames, converged, _error(limit, own), residual))
+    table = pd.DataFrame(rows, columns=COLUMNS).astype({"iterations": "Int64"})
+    write_table(table, output)
+
+
+def _run(loop: Stepper, scene: Scene, frames: int) -> np.ndarray:
+    """Positions (frames + 1, N, 3), the initial ones first."""
+    state = scene.initial_state()
+    positions = [state.positions]
+    for frame in range(frames):
+        state, _ = loop.step(state, frame)
+        positions.append(state.positions)
+    return np.stack(positions)
+
+
+def _error(run: np.ndarray, reference: np.ndarray) -> float | None:
+    difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
+    return trajectory_error(difference, displacement_norms(reference))

@@ -1,0 +1,27 @@
+"""Table breakeven: reduced local steps over the full one, and where they stop paying."""
+
+from collections.abc import Iterable
+
+import pandas as pd
+
+from pdrom.rom.break_even import break_even
+from pdrom.store import read_table
+from pdrom.tables.columns import conform
+
+CURVE = ["scene", "group", "method", "vertices", "threads"]
+
+
+def breakeven(paths: Iterable[str]) -> pd.DataFrame:
+    """One row per size; ``breakeven_r`` belongs to a whole curve (scene, group, method).
+
+    It is empty where the reduction still pays at the largest size, the numerical rank.
+    """
+    parts = [part for part in map(read_table, paths) if len(part)]
+    table = pd.concat(parts, ignore_index=True)
+    table["ratio"] = table.local_ms / table.full_ms
+    sizes = [
+        pd.Series(break_even(*curve.sort_values("r")[["r", "ratio"]].to_numpy().T), curve.index)
+        for _, curve in table.groupby(CURVE, sort=False)
+    ]
+    table["breakeven_r"] = pd.concat(sizes).astype("Float64").round().astype("Int64")
+    return conform(table, "breakeven")

@@ -1,0 +1,124 @@
+"""Tables of budgets, break-even sizes and effects, against brute force and synthetic data."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pdrom.store import write_table
+from pdrom.tables.breakeven import breakeven
+from pdrom.tables.budget import budget
+from pdrom.tables.columns import COLUMNS
+from pdrom.tables.effects_cost import effects_cost, effects_left_out
+
+METHODS = ("fom", "fewer-iterations", "full", "block-deim")
+
+
+def points(rows) -> pd.DataFrame:
+    """Table accuracy_cost of (scene, method, error, time)."""
+    table = pd.DataFrame(
+        rows, columns=["scene", "method", "relative_error_within_horizon", "ms_per_frame"]
+    )
+    return table.assign(position_basis="full", k=None, r=range(len(table)), iterations=10)
+
+
+ROWS = st.lists(
+    st.tuples(
+        st.sampled_from("ab"), st.sampled_from(METHODS), st.integers(0, 4), st.integers(1, 5)
+    ),
+    min_size=1,
+    max_size=15,
+)
+
+
+@given(ROWS)
+def test_a_budget_buys_the_smallest_error_that_fits(rows):
+    limits = (0.5, 2.0, 9.0)
+    table = budget(points(rows), limits)
+    assert tuple(table.columns) == COLUMNS["budget"]
+    for row in table.itertuples():
+        rivals = [
+            (error, cost)
+            for scene, method, error, cost in rows
+            if scene == row.scene
+            and (method == "fom") == (row.reference == "converged")
+            and cost <= row.budget_ms
+        ]
+        if not rivals:
+            assert pd.isna(row.method)
+            continue
+        assert (row.relative_error_within_horizon, row.ms_per_frame) == min(rivals)
+    pairs = {(scene, method == "fom") for scene, method, _, _ in rows}
+    assert len(table) == len(limits) * len(pairs)
+
+
+def test_a_budget_that_buys_nothing_is_a_row():
+    table = budget(points([("a", "block-deim", 0.1, 5.0)]), [1.0, 10.0])
+    assert table.budget_ms.tolist() == [1.0, 10.0]
+    assert table.method.isna().tolist() == [True, False]
+    assert table.reference.tolist() == ["own iterations"] * 2
+
+
+# Break-even ---------------------------------------------------------------------------------------
+
+
+def curve(folder, scene: str, offset: float, slope: float, full: float, sizes, shuffle=0) -> str:
+    """A local step that costs offset + slope r, as a file."""
+    r = np.array(sizes)
+    table = pd.DataFrame({"r": r, "local_ms": offset + slope * r}).sample(
+        frac=1.0, random_state=shuffle
+    )
+    table = table.assign(
+        scene=scene, group="spring", method="block-deim", vertices=9, elements=20, threads=1,
+        full_ms=full,
+    )  # fmt: skip
+    write_table(table, folder / f"{scene}.csv")
+    return str(folder / f"{scene}.csv")
+
+
+@pytest.mark.parametrize(
+    ("offset", "slope", "full", "expected"),
+    [
+        (1.0, 0.1, 4.0, 30),  # 1 + 0.1 r = 4
+        (1.0, 0.1, 4.05, 31),  # r = 30.5
+        (1.0, 0.1, 100.0, None),
+        (5.0, 0.1, 4.0, 5),  # it never pays
+        (1.0, 0.03, 4.0, 100),  # exactly at the last size
+    ],
+)
+def test_break_even_of_a_line(tmp_path, offset, slope, full, expected):
+    path = curve(tmp_path, "a", offset, slope, full, [5, 10, 20, 40, 100])
+    table = breakeven([path])
+    assert tuple(table.columns) == COLUMNS["breakeven"]
+    np.testing.assert_allclose(table.ratio, (offset + slope * table.r) / full)
+    if expected is None:
+        assert table.breakeven_r.isna().all()
+    else:
+        assert table.breakeven_r.tolist() == [expected] * 5
+
+
+def test_every_curve_has_its_own_break_even(tmp_path):
+    paths = [
+        curve(tmp_path, "a", 1.0, 0.1, 4.0, [5, 20, 40]),
+        curve(tmp_path, "b", 1.0, 0.1, 2.0, [5, 20, 40]),
+    ]
+    table = breakeven(paths)
+    assert table.groupby("scene").breakeven_r.unique().map(list).to_dict() == {"a": [30], "b": [10]}
+
+
+# Effects ------------------------------------------------------------------------------------------
+
+
+def test_effects_are_joined_and_scenes_without_rows_left_out(tmp_path):
+    cost = {"scene": "a", "effect": "spring", "elements": 3, "ms_per_frame": 1.0, "share": 1.0}
+    write_table(pd.DataFrame([cost]), tmp_path / "a.csv")
+    write_table(pd.DataFrame([cost | {"scene": "b"}]), tmp_path / "b.csv")
+    table = effects_cost([str(tmp_path / "a.csv"), str(tmp_path / "b.csv")])
+    assert tuple(table.columns) == COLUMNS["effects_cost"]
+    assert table.scene.tolist() == ["a", "b"]
+    empty = pd.DataFrame(columns=list(COLUMNS["effects_left_out"]))
+    write_table(empty, tmp_path / "none.csv")
+    table = effects_left_out([str(tmp_path / "none.csv")])
+    assert tuple(table.columns) == COLUMNS["effects_left_out"]
+    assert len(table) == 0
