@@ -20,7 +20,7 @@ REFERENCE_BASIS = "none-none-vectorised"
 TABLES = (
     "singular_values", "reconstruction_error", "reduced_reruns", "accuracy_cost", "local_share",
     "sensitivity",
-    "ladder", "heldout_reruns", "claims",
+    "ladder", "heldout_reruns", "targets", "gain_prediction", "claims",
 )  # fmt: skip
 
 

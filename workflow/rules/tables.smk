@@ -125,6 +125,40 @@ rule accuracy_cost_table:
         "../scripts/table.py"
 
 
+rule targets_table:
+    input:
+        reruns="results/tables/reduced_reruns.csv",
+        reconstruction="results/tables/reconstruction_error.csv",
+    output:
+        report("results/tables/targets.csv", category="Tables"),
+    log:
+        "results/logs/tables/targets.log",
+    params:
+        name="targets",
+        code=PLAN.code("pdrom.tables.targets"),
+    message:
+        "Table of sampled methods against the orthogonal projection"
+    script:
+        "../scripts/table.py"
+
+
+rule gain_prediction_table:
+    input:
+        reruns="results/tables/reduced_reruns.csv",
+        reconstruction="results/tables/reconstruction_error.csv",
+    output:
+        report("results/tables/gain_prediction.csv", category="Tables"),
+    log:
+        "results/logs/tables/gain_prediction.log",
+    params:
+        name="gain_prediction",
+        code=PLAN.code("pdrom.tables.gain_prediction"),
+    message:
+        "Table of what the gain predicts"
+    script:
+        "../scripts/table.py"
+
+
 rule claims_table:
     input:
         rules="config/claims.yaml",

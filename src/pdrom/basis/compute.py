@@ -61,6 +61,7 @@ def compute_basis(
     if spec.centring == "mean-in-modes":
         v = _mean_in_modes(v, centred, mean * scale, active, signs)
         mean = np.zeros_like(mean)
+    separate = spec.layout == "per-axis" or spec.centring == "mean-in-modes"
     return Basis(
         V=np.ascontiguousarray(v / scale[:, None]),
         mean=mean,
@@ -68,8 +69,9 @@ def compute_basis(
         rank=rank,
         roundoff=noise,
         rows_per_element=rows_per_element,
-        separate_axes=spec.layout == "per-axis" or spec.centring == "mean-in-modes",
+        separate_axes=separate,
         active_axes=active,
+        coefficient_range=_coefficient_range(v, centred, separate),
     )
 
 
@@ -145,6 +147,17 @@ def _per_axis(centred: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray
         modes[axis::3, :own] = u[:, :own]
         ranks.append(own)
     return modes, np.linalg.norm(sigma, axis=0), ranks
+
+
+def _coefficient_range(v: np.ndarray, centred: np.ndarray, separate: bool) -> np.ndarray:
+    """Smallest and largest coefficient of the training snapshots, (2, rank).
+
+    Without limits where each axis has coefficients of its own.
+    """
+    if separate:
+        return np.array([[-np.inf], [np.inf]]) * np.ones(v.shape[1])
+    coefficients = v.T @ centred
+    return np.stack([coefficients.min(axis=1), coefficients.max(axis=1)])
 
 
 def _mean_in_modes(

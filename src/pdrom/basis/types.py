@@ -24,6 +24,8 @@ class Basis:
     rank : number of singular values above round-off; V has no further columns
     roundoff : absolute size of a singular value that is noise
     active_axes : whether an axis carries anything above round-off
+    coefficient_range : (2, rank) smallest and largest coefficient of a training snapshot; -inf
+        and inf if ``separate_axes``
     origin : what error messages call the basis: its file
     """
 
@@ -35,6 +37,7 @@ class Basis:
     rows_per_element: int
     separate_axes: bool
     active_axes: tuple[bool, bool, bool]
+    coefficient_range: np.ndarray
     origin: str = "basis"
 
     @property
@@ -52,6 +55,7 @@ class Basis:
         return self.V[:, :r]
 
 
+_ARRAYS = ("V", "mean", "singular_values", "coefficient_range")
 _ATTRIBUTES = ("rank", "roundoff", "rows_per_element", "separate_axes", "active_axes")
 
 
@@ -59,7 +63,7 @@ def save_basis(basis: Basis, path: str | os.PathLike[str], attributes: dict[str,
     """Write a basis to HDF5."""
     with write_hdf5(path) as file:
         file.attrs.update(attributes)
-        for name in ("V", "mean", "singular_values"):
+        for name in _ARRAYS:
             file[name] = getattr(basis, name)
         for name in _ATTRIBUTES:
             file.attrs[name] = getattr(basis, name)
@@ -69,7 +73,7 @@ def load_basis(path: str | os.PathLike[str]) -> Basis:
     """Read what `save_basis` wrote; StorageError if the file is damaged."""
     with open_hdf5(path) as file:
         return Basis(
-            **{name: file[name][...] for name in ("V", "mean", "singular_values")},
+            **{name: file[name][...] for name in _ARRAYS},
             rank=int(file.attrs["rank"]),
             roundoff=float(file.attrs["roundoff"]),
             rows_per_element=int(file.attrs["rows_per_element"]),

@@ -22,6 +22,7 @@ class ReducedLocalStep:
         mean = reduction.basis.mean.reshape(-1, 3)
         lift = group.S.T.multiply(group.row_weights[None, :]).tocsr()
         self._offset = lift @ mean
+        self._limited = reduction.limited
         place = _local_positions(reduction)
         self._blocks = []
         for block in reduction.blocks:
@@ -40,7 +41,7 @@ class ReducedLocalStep:
         sampled = self._group.project_elements(y, self._elements).ravel()
         rhs += self._offset
         for axis, positions, operator, shift, lifted in self._blocks:
-            coefficients = operator @ sampled[positions] - shift
+            coefficients = self._limited(operator @ sampled[positions] - shift)
             if axis is None:
                 rhs += (lifted @ coefficients).reshape(rhs.shape)
             else:

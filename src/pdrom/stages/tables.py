@@ -5,12 +5,14 @@ from typing import Any
 
 from pdrom.store import read_table, write_table
 from pdrom.tables.accuracy_cost import accuracy_cost
+from pdrom.tables.gain_prediction import gain_prediction
 from pdrom.tables.ladder import ladder
 from pdrom.tables.local_share import local_share
 from pdrom.tables.reconstruction_error import reconstruction_error
 from pdrom.tables.reduced_reruns import heldout_reruns, reduced_reruns
 from pdrom.tables.sensitivity import sensitivity
 from pdrom.tables.singular_values import singular_values
+from pdrom.tables.targets import targets
 
 
 def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
@@ -32,6 +34,10 @@ def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
             inputs.runs, inputs.hyper, read_table(inputs.sensitivity), params.threshold
         ),
         "ladder": lambda: ladder(inputs.parts),
+        "targets": lambda: targets(read_table(inputs.reruns), read_table(inputs.reconstruction)),
+        "gain_prediction": lambda: gain_prediction(
+            read_table(inputs.reruns), read_table(inputs.reconstruction)
+        ),
         "accuracy_cost": lambda: accuracy_cost(
             read_table(inputs.reruns), inputs.timings, params.iterations
         ),

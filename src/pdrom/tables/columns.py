@@ -35,6 +35,14 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "scene", "group", "direction", "rung", "r", "condition", "gain", "error_train",
         "error_test", "error_heldout", "finite", "blowup_frame", "relative_error_within_horizon",
     ),
+    "targets": (
+        "scene", "group", "method", "r", "error", "orthogonal_error", "ratio", "within", "gain",
+        "elements_sampled", "elements_share", "spread",
+    ),
+    "gain_prediction": (
+        "predictor", "lower", "upper", "runs", "failed", "failed_share", "median_error",
+        "rank_correlation", "threshold", "misclassified_share", "failures_ordered",
+    ),
     "claims": (
         "claim", "source", "paper", "measured", "verdict", "why", "figure_or_table",
     ),

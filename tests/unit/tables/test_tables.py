@@ -64,7 +64,15 @@ def test_timing_columns_exist():
 
 def basis_file(path, sigma, rank) -> str:
     basis = Basis(
-        np.zeros((6, rank)), np.zeros(6), np.array(sigma), rank, 1e-9, 1, False, (True,) * 3
+        np.zeros((6, rank)),
+        np.zeros(6),
+        np.array(sigma),
+        rank,
+        1e-9,
+        1,
+        False,
+        (True,) * 3,
+        np.zeros((2, rank)),
     )
     path.parent.mkdir(parents=True, exist_ok=True)
     save_basis(basis, path, {})
