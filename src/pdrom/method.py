@@ -85,9 +85,9 @@ class MethodSpec(BasisSpec):
             )
         if self.gain_bound is not None and (not self.may_oversample or self.per_axis):
             raise ValueError(
-                f"gain_bound = {self.gain_bound} with rows = '{self.rows}', solve = '{self.solve}': "
-                "only rows = 'scalar' or 'element' with solve = 'qr', 'tikhonov' and coefficients "
-                "that the axes share"
+                f"gain_bound = {self.gain_bound} with rows = '{self.rows}', solve = "
+                f"'{self.solve}': only rows = 'scalar' or 'element' with solve = 'qr', "
+                "'tikhonov' and coefficients that the axes share"
             )
         if self.bounds != "none" and self.per_axis:
             raise ValueError(

@@ -17,7 +17,7 @@ KINDS = ("orthonormal", "scaled", "dependent")
 
 
 def modes(size: tuple[int, int, int, int], kind: str = "orthonormal") -> np.ndarray:
-    """Random modes (rows * elements, r): orthonormal, of very different length, nearly dependent."""
+    """Random modes (rows * elements, r): orthonormal, of unlike lengths, nearly dependent."""
     elements, rows, r, seed = size
     v = np.random.default_rng(seed).standard_normal((elements * rows, r))
     if kind == "scaled":

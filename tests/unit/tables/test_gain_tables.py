@@ -62,7 +62,8 @@ def test_targets_compare_with_the_orthogonal_projection():
     assert "pod" not in set(table.method)
     assert rows.ratio["calm", "bounded"] == pytest.approx(1.4)
     assert rows.ratio["calm", "block-deim"] == pytest.approx(10.0)
-    assert rows.within["calm", "bounded"] and not rows.within["calm", "block-deim"]
+    assert rows.within["calm", "bounded"]
+    assert not rows.within["calm", "block-deim"]
     # one mode more than the orthogonal projection has: compared with its largest size
     assert np.isinf(rows.ratio["calm", "deim-joint"])
     assert rows.orthogonal_error["calm", "deim-joint"] == 1e-3
@@ -90,7 +91,8 @@ def test_prediction_counts_decades_and_judges_predictors():
     assert decades.failed_share["10"] == 0.25
     whole = table[table.lower == "all"].set_index("predictor")
     assert list(whole.index) == ["gain", "reconstruction error", "gain x best error"]
-    assert (whole.runs == 6).all() and (whole.failed == 3).all()
+    assert (whole.runs == 6).all()
+    assert (whole.failed == 3).all()
     # gains 2, 2, 8 | 9, 50, 500
     assert whole.threshold["gain"] == 8.0
     assert whole.misclassified_share["gain"] == 0.0
@@ -112,7 +114,8 @@ def test_a_singular_interpolation_has_a_row_of_its_own():
 def test_no_runs_give_an_empty_table():
     reruns, reconstruction = tables()
     table = gain_prediction(reruns[reruns.method == "pod"], reconstruction)
-    assert table.empty and tuple(table.columns) == COLUMNS["gain_prediction"]
+    assert table.empty
+    assert tuple(table.columns) == COLUMNS["gain_prediction"]
 
 
 @given(st.lists(st.tuples(st.floats(0.1, 1e3), st.booleans()), min_size=1, max_size=12))
