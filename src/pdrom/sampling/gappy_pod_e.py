@@ -11,8 +11,6 @@ from scipy import linalg
 
 from pdrom.errors import SamplingError
 
-_CHUNK = 32  # candidates whose bound is computed at once; doubled from chunk to chunk
-
 
 def oversample(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np.ndarray:
     """``elements`` followed by others, ``count`` in all (or as many as there are).
@@ -49,7 +47,8 @@ class _Growing:
     """Sampled elements and the Gram matrix G = (P^T V)^T P^T V of their rows."""
 
     def __init__(self, v: np.ndarray, size: int, elements: np.ndarray) -> None:
-        self._blocks = np.ascontiguousarray(v).reshape(-1, size, v.shape[1])
+        self._rows = np.ascontiguousarray(v)
+        self._blocks = self._rows.reshape(-1, size, v.shape[1])
         self._picked = [int(e) for e in elements]
         self._check()
         rows = self._blocks[self._picked].reshape(-1, v.shape[1])
@@ -105,23 +104,23 @@ class _Growing:
     def _strongest(self) -> int:
         """Element that is not sampled yet with the largest `eigenvalue_growth`.
 
-        The growth is at most |B u|^2: candidates are tried by falling |B u|^2 until it is below the
-        best bound. If the smallest eigenvalue is double, all bounds are zero and the largest
-        |B u|^2 decides.
+        The growth is at most |B u|^2: candidates are those where this is larger than the bound of
+        the element with the largest |B u|^2, which wins ties: if the smallest eigenvalue is double,
+        all bounds are zero.
         """
-        products = self._blocks @ self._weakest
+        products = (self._rows @ self._weakest).reshape(self.total, -1)
         strength = np.einsum("es,es->e", products, products)
         strength[self._picked] = -1.0
-        order = np.argsort(-strength, kind="stable")[: self.total - self.count]
-        best, element = 0.0, int(order[0])
-        start, stop = 0, _CHUNK
-        while start < len(order) and strength[order[start]] > best:
-            part = order[start:stop]
-            start, stop = stop, stop + 2 * (stop - start)
-            growth = eigenvalue_growth(self._blocks[part], products[part], self._gap)
-            if growth.max() > best:
-                best, element = float(growth.max()), int(part[np.argmax(growth)])
-        return element
+        first = int(np.argmax(strength))
+        bound = self._growth(np.array([first]), products)[0]
+        if bound == 0.0:
+            return first
+        others = np.flatnonzero(strength > bound)
+        growth = self._growth(others, products)
+        return int(others[np.argmax(growth)]) if growth.max(initial=0.0) > bound else first
+
+    def _growth(self, elements: np.ndarray, products: np.ndarray) -> np.ndarray:
+        return eigenvalue_growth(self._blocks[elements], products[elements], self._gap)
 
 
 def eigenvalue_growth(blocks: np.ndarray, products: np.ndarray, gap: float) -> np.ndarray:

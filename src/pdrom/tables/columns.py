@@ -36,8 +36,8 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "error_test", "error_heldout", "finite", "blowup_frame", "relative_error_within_horizon",
     ),
     "targets": (
-        "scene", "group", "method", "r", "error", "orthogonal_error", "ratio", "within", "gain",
-        "elements_sampled", "elements_share", "spread",
+        "scene", "group", "method", "r", "error", "orthogonal_error", "ratio", "asked", "within",
+        "gain", "elements_sampled", "elements_share", "spread",
     ),
     "gain_prediction": (
         "predictor", "lower", "upper", "runs", "failed", "failed_share", "median_error",

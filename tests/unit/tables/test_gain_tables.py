@@ -62,6 +62,7 @@ def test_targets_compare_with_the_orthogonal_projection():
     assert "pod" not in set(table.method)
     assert rows.ratio["calm", "bounded"] == pytest.approx(1.4)
     assert rows.ratio["calm", "block-deim"] == pytest.approx(10.0)
+    assert table.asked.all()
     assert rows.within["calm", "bounded"]
     assert not rows.within["calm", "block-deim"]
     # one mode more than the orthogonal projection has: compared with its largest size
