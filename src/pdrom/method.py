@@ -12,8 +12,9 @@ Weighting = Literal["none", "mass"]
 Centring = Literal["none", "affine", "mean-in-modes"]
 Layout = Literal["vectorised", "per-axis"]
 Rows = Literal["all", "scalar", "joint", "element"]
-Selection = Literal["greedy", "pivoted-qr"]
+Selection = Literal["greedy", "pivoted-qr", "s-opt"]
 Solve = Literal["square", "qr", "tikhonov"]
+Bounds = Literal["none", "training"]
 
 
 class BasisSpec(BaseModel):
@@ -45,10 +46,15 @@ class MethodSpec(BasisSpec):
     rows : "all" is the orthogonal projection, "scalar" samples single entries (classical DEIM),
         "joint" one row for x, y and z with separate coefficients (the paper's variant), "element"
         all 3p entries of an element
-    selection : "greedy" residual (DEIM) or "pivoted-qr" (Q-DEIM)
+    selection : "greedy" residual (DEIM), "pivoted-qr" (Q-DEIM) or "s-opt" (S-OPT)
     solve : of the sampled equations: "square", least squares by "qr", or normal equations with
         Tikhonov term ("tikhonov", the published code)
-    oversampling : elements per mode ("element" rows, greedy selection); see `sampling.oversample`
+    oversampling : samples per mode; further ones by S-OPT after selection "s-opt", otherwise by
+        GappyPOD+E
+    gain_bound : samples are added (GappyPOD+E) until the gain is at most this, so that the error of
+        a projection is at most this multiple of the best approximation's; None: no bound
+    bounds : "training" keeps the coefficients in the range of the training snapshots
+    margin : by how much of its width that range is extended at both ends
     coefficients : "shared" by the axes or "per-axis"; None takes what the rows and the basis imply
     repeat_rows : whether the greedy may pick a row again (the published code does not exclude it)
     title : what the method is called in figures and tables
@@ -60,6 +66,9 @@ class MethodSpec(BasisSpec):
     solve: Solve = "qr"
     repeat_rows: bool = False
     oversampling: Annotated[int, Field(ge=1, le=100)] = 1
+    gain_bound: Annotated[float, Field(gt=1.0, le=1e6)] | None = None
+    bounds: Bounds = "none"
+    margin: Annotated[float, Field(ge=0.0, le=10.0)] = 0.1
     coefficients: Literal["shared", "per-axis"] | None = None
     tikhonov: Annotated[float, Field(gt=0.0, le=1.0)] = 1e-8
 
@@ -69,10 +78,20 @@ class MethodSpec(BasisSpec):
             raise ValueError(f"rows = 'joint' with selection = '{self.selection}': only 'greedy'")
         if self.rows == "element" and self.solve == "square":
             raise ValueError("rows = 'element' with solve = 'square': allowed are qr, tikhonov")
-        if self.oversampling > 1 and (self.rows, self.selection) != ("element", "greedy"):
+        if self.oversampling > 1 and not self.may_oversample:
             raise ValueError(
-                f"oversampling = {self.oversampling} with rows = '{self.rows}', selection = "
-                f"'{self.selection}': only rows = 'element' with selection = 'greedy'"
+                f"oversampling = {self.oversampling} with rows = '{self.rows}', solve = "
+                f"'{self.solve}': only rows = 'scalar' or 'element' with solve = 'qr', 'tikhonov'"
+            )
+        if self.gain_bound is not None and (not self.may_oversample or self.per_axis):
+            raise ValueError(
+                f"gain_bound = {self.gain_bound} with rows = '{self.rows}', solve = "
+                f"'{self.solve}': only rows = 'scalar' or 'element' with solve = 'qr', "
+                "'tikhonov' and coefficients that the axes share"
+            )
+        if self.bounds != "none" and self.per_axis:
+            raise ValueError(
+                f"bounds = '{self.bounds}' with coefficients per axis: only with shared ones"
             )
         if self.separate_axes and self.coefficients == "shared":
             raise ValueError(
@@ -86,6 +105,11 @@ class MethodSpec(BasisSpec):
         if self.repeat_rows and self.solve == "square":
             raise ValueError("repeat_rows with solve = 'square': a repeated row is singular")
         return self
+
+    @property
+    def may_oversample(self) -> bool:
+        """Whether there can be more samples than modes."""
+        return self.rows in ("scalar", "element") and self.solve != "square"
 
     @property
     def per_axis(self) -> bool:

@@ -39,6 +39,8 @@ TABLES = (
     "breakeven",
     "effects_cost",
     "effects_left_out",
+    "targets",
+    "gain_prediction",
     "claims",
 )
 

@@ -29,6 +29,10 @@ def test_presets_are_the_methods_of_the_literature():
         "block-deim": (*affine, "element", "greedy", "qr", False),
         "block-qdeim": (*affine, "element", "pivoted-qr", "qr", False),
         "gappy": (*affine, "element", "greedy", "qr", False),
+        "bounded": (*affine, "element", "greedy", "qr", False),
+        "bounded-range": (*affine, "element", "greedy", "qr", False),
+        "s-opt": (*affine, "scalar", "s-opt", "square", False),
+        "block-s-opt": (*affine, "element", "s-opt", "qr", False),
     }  # fmt: skip
     assert load_methods(PATH)["pod"].rows == "all"
     assert load_methods(PATH)["published"].tikhonov == 1e-8
@@ -48,7 +52,15 @@ def test_methods_with_the_same_basis_share_its_name():
         {"rows": "scalar", "layout": "per-axis"},
         {"rows": "element", "centring": "mean-in-modes", "coefficients": "shared"},
         {"rows": "scalar", "coefficients": "per-axis"},
-        {"rows": "element", "selection": "pivoted-qr", "oversampling": 2},
+        {"rows": "joint", "selection": "s-opt"},
+        {"rows": "scalar", "solve": "square", "oversampling": 2},
+        {"rows": "scalar", "solve": "square", "gain_bound": 2.0},
+        {"rows": "all", "gain_bound": 2.0},
+        {"rows": "joint", "gain_bound": 2.0},
+        {"rows": "element", "coefficients": "per-axis", "gain_bound": 2.0},
+        {"rows": "element", "gain_bound": 1.0},
+        {"rows": "element", "coefficients": "per-axis", "bounds": "training"},
+        {"rows": "element", "bounds": "training", "margin": -0.1},
         {"rows": "joint", "solve": "square", "repeat_rows": True},
         {"rows": "vertices"},
         {"rows": "all", "oversampling": 3},

@@ -15,34 +15,17 @@ rule pod:
         "../scripts/pod.py"
 
 
-rule sampling:
-    input:
-        snapshots="results/snapshots/{scene}/{group}.h5",
-        basis=lambda w: PLAN.basis_path(w.scene, w.group, w.method),
-    output:
-        sampling="results/sampling/{scene}/{group}/{method}.h5",
-        errors="results/sampling/{scene}/{group}/{method}.csv",
-    log:
-        "results/logs/sampling/{scene}_{group}_{method}.log",
-    params:
-        spec=lambda w: PLAN.method_spec(w.method),
-        sweep=PLAN.settings.sweep.model_dump(),
-        ranks=list(PLAN.settings.ranks),
-        code=PLAN.code("pdrom.stages.sampling"),
-    message:
-        "Sampling by {wildcards.method} of {wildcards.group} in {wildcards.scene}"
-    script:
-        "../scripts/sampling.py"
-
-
+# One job for both: starting another process takes longer than the sampling.
 rule reruns:
     input:
         mesh=lambda w: PLAN.mesh_path(w.scene),
         fom="results/fom/{scene}/train.h5",
         heldout="results/fom/{scene}/heldout.h5",
+        snapshots="results/snapshots/{scene}/{group}.h5",
         basis=lambda w: PLAN.basis_path(w.scene, w.group, w.method),
-        sampling="results/sampling/{scene}/{group}/{method}.h5",
     output:
+        sampling="results/sampling/{scene}/{group}/{method}.h5",
+        errors="results/sampling/{scene}/{group}/{method}.csv",
         runs="results/reruns/{scene}/{group}/{method}.h5",
         table="results/reruns/{scene}/{group}/{method}.csv",
         heldout="results/reruns/{scene}/{group}/{method}_heldout.csv",
@@ -51,14 +34,15 @@ rule reruns:
     params:
         scene=lambda w: PLAN.scene_config(w.scene),
         spec=lambda w: PLAN.method_spec(w.method),
+        sweep=PLAN.settings.sweep.model_dump(),
         ranks=list(PLAN.settings.ranks),
         heldout_ranks=list(PLAN.settings.heldout_ranks),
         blowup_extent=PLAN.settings.blowup_extent,
         guard=PLAN.guard_settings(),
         solver=PLAN.settings.solver,
-        code=lambda w: PLAN.scene_code("pdrom.stages.reruns", w.scene),
+        code=lambda w: PLAN.scene_code("pdrom.stages.reduction", w.scene),
     message:
-        "Reduced reruns of {wildcards.scene}, {wildcards.group} by {wildcards.method}"
+        "Sampling and reruns of {wildcards.scene}, {wildcards.group} by {wildcards.method}"
     script:
         "../scripts/reruns.py"
 

@@ -1,4 +1,6 @@
 # Tables of the study, columns as in src/pdrom/tables/columns.py
+
+
 rule singular_values_table:
     input:
         bases=PLAN.reference_bases(),
@@ -142,6 +144,23 @@ rule scaling_table:
         "../scripts/table.py"
 
 
+rule targets_table:
+    input:
+        reruns="results/tables/reduced_reruns.csv",
+        reconstruction="results/tables/reconstruction_error.csv",
+    output:
+        report("results/tables/targets.csv", category="Tables"),
+    log:
+        "results/logs/tables/targets.log",
+    params:
+        name="targets",
+        code=PLAN.code("pdrom.tables.targets"),
+    message:
+        "Table of sampled methods against the orthogonal projection"
+    script:
+        "../scripts/table.py"
+
+
 rule budget_table:
     input:
         points="results/tables/accuracy_cost.csv",
@@ -219,6 +238,23 @@ rule effects_left_out_table:
         code=PLAN.code("pdrom.tables.effects_cost"),
     message:
         "Table of scenes without some of their effects"
+    script:
+        "../scripts/table.py"
+
+
+rule gain_prediction_table:
+    input:
+        reruns="results/tables/reduced_reruns.csv",
+        reconstruction="results/tables/reconstruction_error.csv",
+    output:
+        report("results/tables/gain_prediction.csv", category="Tables"),
+    log:
+        "results/logs/tables/gain_prediction.log",
+    params:
+        name="gain_prediction",
+        code=PLAN.code("pdrom.tables.gain_prediction"),
+    message:
+        "Table of what the gain predicts"
     script:
         "../scripts/table.py"
 

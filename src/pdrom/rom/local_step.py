@@ -22,6 +22,7 @@ class ReducedLocalStep:
         mean = reduction.basis.mean.reshape(-1, 3)
         lift = group.S.T.multiply(group.row_weights[None, :]).tocsr()
         self._offset = lift @ mean
+        self._limited = reduction.limited
         place = _local_positions(reduction)
         self._blocks = []
         for block in reduction.blocks:
@@ -50,7 +51,7 @@ class ReducedLocalStep:
         """Coefficients (r,) of each block, from the projections of the sampled elements."""
         sampled = self._group.project_elements(y, self._elements).ravel()
         return [
-            operator @ sampled[positions] - shift
+            self._limited(operator @ sampled[positions] - shift)
             for _, positions, operator, shift, _ in self._blocks
         ]
 

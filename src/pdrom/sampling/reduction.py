@@ -45,11 +45,23 @@ class Reduction:
         self.v = basis.truncated(r)
         axes = [int(a) for a in np.flatnonzero(basis.active_axes)] if spec.per_axis else [None]
         self.blocks = [self._block(axis) for axis in axes]
+        self._limits = _limits(basis, spec, r)
 
     @property
     def elements(self) -> np.ndarray:
         """Elements to evaluate, in the order that `coefficients` expects."""
         return self.sampling.elements
+
+    def limited(self, coefficients: np.ndarray) -> np.ndarray:
+        """Coefficients (..., r) in the range of the training snapshots, if the method asks for it.
+
+        Each one is clipped: for orthonormal modes the nearest admissible point to V c. It brings c
+        nearer to every admissible c*, so that it cannot hurt where the true ones are in range.
+        Bounded least squares would fit the samples better, but needs an iteration per evaluation.
+        """
+        if self._limits is None:
+            return coefficients
+        return np.clip(coefficients, *self._limits)
 
     def _block(self, axis: int | None) -> Block:
         if self.spec.rows == "all":
@@ -97,8 +109,18 @@ class Reduction:
         result = np.tile(self.basis.mean, (len(matrix), 1))
         for block in self.blocks:
             sampled = matrix[:, block.entries] - self.basis.mean[block.entries]
-            result[:, block.output] += (sampled @ block.operator.T) @ self.v[block.output].T
+            coefficients = self.limited(sampled @ block.operator.T)
+            result[:, block.output] += coefficients @ self.v[block.output].T
         return result.reshape(snapshots.shape)
+
+
+def _limits(basis: Basis, spec: MethodSpec, r: int) -> np.ndarray | None:
+    """Smallest and largest admissible coefficients (2, r); None if they are free."""
+    if spec.bounds == "none":
+        return None
+    lower, upper = basis.trained[0, :, :r]
+    extra = spec.margin * (upper - lower)
+    return np.stack([lower - extra, upper + extra])
 
 
 def _entries_of(entries: np.ndarray, rows: str, axis: int | None) -> np.ndarray:

@@ -9,9 +9,11 @@ from pdrom.method import MethodSpec
 from pdrom.sampling.block import block_elements
 from pdrom.sampling.block_qdeim import block_qdeim_elements
 from pdrom.sampling.deim import deim_entries
+from pdrom.sampling.gappy_pod_e import bound_gain, oversample
 from pdrom.sampling.joint import joint_rows
-from pdrom.sampling.oversample import extend_elements
 from pdrom.sampling.qdeim import qdeim_entries
+from pdrom.sampling.s_opt import extend as extend_s_opt
+from pdrom.sampling.s_opt import s_opt_path
 from pdrom.sampling.types import Sampling
 
 
@@ -37,30 +39,50 @@ def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[in
             np.arange(basis.elements), basis.rows_per_element, basis.elements
         )
         return dict.fromkeys(ranks, everything)
-    if spec.rows == "element":
-        return _element_path(basis, spec, v, ranks)
     if spec.rows == "joint":
         path = 3 * joint_rows(v, basis.active_axes, spec.repeat_rows)
         return {r: _of_entries(path[:r], basis, spec) for r in ranks}
-    if spec.selection == "greedy":
-        path = deim_entries(v)
-        return {r: _of_entries(path[:r], basis, spec) for r in ranks}
-    return {r: _of_entries(qdeim_entries(v[:, :r]), basis, spec) for r in ranks}
+    if spec.rows == "element":
+        counts = (basis.rows_per_element, basis.elements)
+        chosen = _sampled_blocks(v, 3 * basis.rows_per_element, spec, ranks)
+        return {r: Sampling.of_elements(elements, *counts) for r, elements in chosen.items()}
+    chosen = _sampled_blocks(v, 1, spec, ranks)
+    return {r: _of_entries(entries, basis, spec) for r, entries in chosen.items()}
 
 
-def _element_path(
-    basis: Basis, spec: MethodSpec, v: np.ndarray, ranks: Sequence[int]
-) -> dict[int, Sampling]:
-    size = 3 * basis.rows_per_element
-    if spec.selection == "greedy":
-        path = block_elements(v, size)
-        chosen = {
-            r: extend_elements(v[:, :r], size, path[:r], spec.oversampling * r) for r in ranks
-        }
+def _sampled_blocks(
+    v: np.ndarray, size: int, spec: MethodSpec, ranks: Sequence[int]
+) -> dict[int, np.ndarray]:
+    """Blocks of ``size`` rows (elements, or entries for size 1) for every r: one a mode, then more.
+
+    Blocks beyond the modes are not nested in r: they depend on where the first r modes are weak.
+    """
+    chosen = {}
+    for r, start in _one_a_mode(v, size, spec, ranks).items():
+        add = extend_s_opt if spec.selection == "s-opt" else oversample
+        if spec.oversampling > 1:
+            start = add(v[:, :r], size, start, spec.oversampling * r)
+        if spec.gain_bound is not None:
+            start = bound_gain(v[:, :r], size, start, spec.gain_bound)
+        chosen[r] = start
+    return chosen
+
+
+def _one_a_mode(
+    v: np.ndarray, size: int, spec: MethodSpec, ranks: Sequence[int]
+) -> dict[int, np.ndarray]:
+    """As many blocks as modes (or as there are), by the method's selection."""
+    if spec.selection == "pivoted-qr":
+        return {r: _pivots(v[:, :r], size) for r in ranks}
+    if spec.selection == "s-opt":
+        path = s_opt_path(v, size)
     else:
-        chosen = {r: block_qdeim_elements(v[:, :r], size) for r in ranks}
-    counts = (basis.rows_per_element, basis.elements)
-    return {r: Sampling.of_elements(elements, *counts) for r, elements in chosen.items()}
+        path = deim_entries(v) if size == 1 else block_elements(v, size)
+    return {r: path[:r] for r in ranks}
+
+
+def _pivots(v: np.ndarray, size: int) -> np.ndarray:
+    return qdeim_entries(v) if size == 1 else block_qdeim_elements(v, size)
 
 
 def _of_entries(entries: np.ndarray, basis: Basis, spec: MethodSpec) -> Sampling:

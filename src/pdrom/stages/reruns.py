@@ -1,4 +1,4 @@
-"""Rule reruns: the scene again, with one group's projections reduced, for every asked r."""
+"""Rule reruns, second part: the scene with one group's projections reduced, for every asked r."""
 
 import logging
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Rule sampling: basis -> sampled entries and reconstruction errors over the sweep of r."""
+"""Rule reruns, first part: basis -> sampled entries, reconstruction errors over the sweep of r."""
 
 import logging
 from typing import Any

@@ -8,6 +8,7 @@ from pdrom.tables.accuracy_cost import accuracy_cost
 from pdrom.tables.breakeven import breakeven
 from pdrom.tables.budget import budget
 from pdrom.tables.effects_cost import effects_cost, effects_left_out
+from pdrom.tables.gain_prediction import gain_prediction
 from pdrom.tables.ladder import ladder
 from pdrom.tables.local_share import local_share
 from pdrom.tables.reconstruction_error import reconstruction_error
@@ -16,6 +17,7 @@ from pdrom.tables.scaling import scaling, scaling_fit
 from pdrom.tables.sensitivity import sensitivity
 from pdrom.tables.singular_values import singular_values
 from pdrom.tables.stability import stability
+from pdrom.tables.targets import targets
 
 
 def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
@@ -48,6 +50,10 @@ def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
             params.time_steps,
             params.wrong,
             params.left,
+        ),
+        "targets": lambda: targets(read_table(inputs.reruns), read_table(inputs.reconstruction)),
+        "gain_prediction": lambda: gain_prediction(
+            read_table(inputs.reruns), read_table(inputs.reconstruction)
         ),
         "accuracy_cost": lambda: accuracy_cost(
             read_table(inputs.reruns), inputs.timings, inputs.iterations, params.iterations

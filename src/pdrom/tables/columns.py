@@ -71,6 +71,14 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "effects_left_out": (
         "scene", "left_out", "groups", "elements", "ms_per_frame", "saved_ms", "own_ms",
     ),
+    "targets": (
+        "scene", "group", "method", "r", "error", "orthogonal_error", "ratio", "asked", "within",
+        "gain", "elements_sampled", "elements_share", "spread",
+    ),
+    "gain_prediction": (
+        "predictor", "lower", "upper", "runs", "failed", "failed_share", "median_error",
+        "rank_correlation", "threshold", "misclassified_share", "failures_ordered",
+    ),
     "claims": (
         "claim", "source", "paper", "measured", "verdict", "why", "figure_or_table",
     ),

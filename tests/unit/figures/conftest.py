@@ -42,7 +42,7 @@ BLOWUP_FRAME = 4
 TABLES = (
     "reconstruction_error", "singular_values", "local_share", "sensitivity", "accuracy_cost",
     "ladder", "scaling", "scaling_fit", "stability", "budget", "breakeven", "effects_cost",
-    "effects_left_out",
+    "effects_left_out", "reduced_reruns", "gain_prediction",
 )  # fmt: skip
 
 
@@ -169,6 +169,14 @@ def _write_reruns(sources, scene, group, method, positions, rank, rng) -> None:
             store.attrs.update(finite=not failed, blowup_frame=blowup, max_extent=1.1)
 
 
+def _outcome(scene: str, method: str, r: int) -> tuple[float, float, float]:
+    """Frame of a blow-up, error of the run, error within the horizon."""
+    if (scene, method) == BLOWN_UP[:2]:
+        return BLOWUP_FRAME, np.nan, np.nan
+    error = 1e-3 if method == "pod" else 1e-2 * r
+    return np.nan, error, error
+
+
 def _write_tables(sources, scenes, methods, rng) -> None:
     pairs = [(scene, group) for scene, groups in scenes.items() for group in groups]
     values, errors = [], []
@@ -181,7 +189,8 @@ def _write_tables(sources, scenes, methods, rng) -> None:
             for r in (1, 2, 4, 8, 14):
                 for split in ("train", "test", "heldout"):
                     error = np.nan if flat else 1e5 / 10.0**r
-                    errors.append((scene, group, method, r, split, error))
+                    gain = 1.0 if method == "pod" else 3.0 * r
+                    errors.append((scene, group, method, r, split, error, gain, r))
     times = [
         (scene, implementation, 42, local, 0.1, 1.0, local / (local + 1.1))
         for scene in scenes
@@ -267,9 +276,21 @@ def _write_tables(sources, scenes, methods, rng) -> None:
         for method in methods
         for h, ratio in ((0.016, 1.0), (0.2, 1.0), (0.016, 100.0))
     ]  # fmt: skip
+    reruns = [
+        (scene, group, method, r, "full", 1.0, *_outcome(scene, method, r))
+        for scene, group in pairs
+        if scene not in FLAT
+        for method in methods
+        for r in (8, 14)
+    ]
+    predictions = [
+        ("gain", "10", "100", 40, 0.25, np.nan),
+        ("gain", "inf", "inf", 2, 1.0, np.nan),
+        ("gain", "all", "all", 42, 0.3, 30.0),
+    ]
     columns = {
         "singular_values": "scene group component singular_value relative above_roundoff",
-        "reconstruction_error": "scene group method r split relative_error",
+        "reconstruction_error": "scene group method r split relative_error gain elements_sampled",
         "local_share": "scene implementation vertices local_ms assembly_ms global_ms local_share",
         "sensitivity": "scene perturbation frame relative_difference",
         "accuracy_cost": "scene method position_basis k r iterations relative_error_within_horizon"
@@ -282,8 +303,14 @@ def _write_tables(sources, scenes, methods, rng) -> None:
         "breakeven": "scene group method r ratio breakeven_r",
         "effects_cost": "scene effect ms_per_frame share",
         "effects_left_out": "scene left_out groups ms_per_frame own_ms",
+        "reduced_reruns": "scene group method r position_basis max_extent blowup_frame"
+        " relative_error relative_error_within_horizon",
+        "gain_prediction": "predictor lower upper runs failed_share threshold",
     }
-    made = (values, errors, times, floors, costs, ladder, runs, bought, ratios, shares, removed)
+    made = (
+        values, errors, times, floors, costs, ladder, runs, bought, ratios, shares, removed, reruns,
+        predictions,
+    )  # fmt: skip
     rows = dict(zip(columns, made, strict=True))
     for name, header in columns.items():
         write_table(pd.DataFrame(rows[name], columns=header.split()), sources.table(name))

@@ -128,6 +128,19 @@ def test_a_failed_run_is_marked_and_never_drawn_with_nan(study):
     assert f"drawn: frame {BLOWUP_FRAME - 1}" in marked[0]
 
 
+def test_a_run_that_ended_early_lies_on_the_rim(study):
+    """Error against gain: as high as the axis goes, and counted among the runs."""
+    scene, method, _ = BLOWN_UP
+    figure = draw(study, "error_against_gain", scenes=(scene,), methods=(method,))
+    left, right = figure.axes
+    (dots,) = (
+        line for line in left.lines if len(line.get_xdata()) > 0 and line.get_marker() == "D"
+    )
+    assert (dots.get_ydata() == left.get_ylim()[1]).all()
+    assert dots.get_xdata().tolist() == [24.0, 42.0]
+    assert [bar.get_height() for bar in right.patches] == [25.0, 100.0]
+
+
 def test_a_failure_later_than_the_drawn_instant_is_no_failure(study):
     figure = draw(study, "spring_runs", scenes=(BLOWN_UP[0],), frames=(0.1,))
     assert not any("blew up" in text for text in texts(figure))
@@ -161,7 +174,7 @@ def test_missing_scenes_and_methods_leave_their_panels_out(small_study, figure_n
     for ax in figure.axes:
         assert "spring" not in ax.get_title()
     empty = {"cloth_all_grid", "bending_runs", "spring_runs", "strain_runs", "bar_runs",
-             "reconstruction_error", "deim_entries"}  # fmt: skip
+             "reconstruction_error", "deim_entries", "error_against_gain"}  # fmt: skip
     noted = any("no data in this configuration" in text for text in texts(figure))
     assert noted == (figure_name in empty)
 

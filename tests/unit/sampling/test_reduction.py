@@ -25,7 +25,7 @@ INGREDIENTS = {
     "centring": ("none", "affine", "mean-in-modes"),
     "layout": ("vectorised", "per-axis"),
     "rows": ("all", "scalar", "joint", "element"),
-    "selection": ("greedy", "pivoted-qr"),
+    "selection": ("greedy", "pivoted-qr", "s-opt"),
     "solve": ("square", "qr", "tikhonov"),
 }
 
@@ -71,7 +71,8 @@ def span_part(basis: Basis, v: np.ndarray, p: np.ndarray, per_axis: bool) -> np.
 
 def test_the_presets_are_those_of_the_study():
     assert set(PRESETS) == {
-        "pod", "deim", "qdeim", "deim-joint", "published", "block-deim", "block-qdeim", "gappy"
+        "pod", "deim", "qdeim", "deim-joint", "published", "block-deim", "block-qdeim", "gappy",
+        "bounded", "bounded-range", "s-opt", "block-s-opt",
     }  # fmt: skip
     assert len(EVERY) > 50
 
@@ -176,7 +177,7 @@ def test_pod_is_the_best_approximation_of_all_shared_methods():
     pod = errors.pop("pod")
     basis = compute_basis(p, mass, 0.0, P, PRESETS["pod"])
     assert pod == pytest.approx(np.linalg.norm(basis.singular_values[4:]), rel=1e-12)
-    assert len(errors) == 5
+    assert len(errors) == 9
     assert all(error > pod for error in errors.values())
 
 

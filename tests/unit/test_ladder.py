@@ -1,4 +1,4 @@
-"""Oversampling of element blocks, and the ladder's combinations."""
+"""The ladder's combinations."""
 
 import numpy as np
 import pytest
@@ -7,48 +7,8 @@ from conftest import ROOT
 from pdrom.basis import compute_basis
 from pdrom.ladder import load_ladder
 from pdrom.sampling import Reduction, select
-from pdrom.sampling.block import block_elements
-from pdrom.sampling.oversample import extend_elements
 
 LADDER = load_ladder(ROOT / "config" / "ladder.yaml")
-
-
-def orthonormal(rng, n, r):
-    return np.linalg.qr(rng.standard_normal((n, r)))[0]
-
-
-def test_more_elements_never_raise_the_gain(rng):
-    """sigma_min of the sampled rows can only grow when rows are added (interlacing)."""
-    v = orthonormal(rng, 6 * 40, 8)
-    first = block_elements(v, 6)
-    path = extend_elements(v, 6, first, 30)
-    assert path[: len(first)].tolist() == first.tolist()
-    assert len(set(path.tolist())) == 30
-    blocks = v.reshape(40, 6, 8)
-    smallest = [
-        np.linalg.svd(blocks[path[:m]].reshape(-1, 8), compute_uv=False)[-1] for m in range(8, 31)
-    ]
-    assert (np.diff(smallest) >= -1e-14).all()
-    assert smallest[-1] > 1.5 * smallest[0]
-
-
-def test_weakest_direction_beats_random_elements(rng):
-    """Compared with the median of random extensions of the same size."""
-    v = orthonormal(rng, 6 * 60, 10) * np.linspace(0.2, 2.0, 10)
-    first = block_elements(v, 6)
-    blocks = v.reshape(60, 6, 10)
-
-    def smallest(elements):
-        return np.linalg.svd(blocks[elements].reshape(-1, 10), compute_uv=False)[-1]
-
-    others = np.setdiff1d(np.arange(60), first)
-    drawn = [smallest([*first, *rng.permutation(others)[:10]]) for _ in range(50)]
-    assert smallest(extend_elements(v, 6, first, 20)) > np.median(drawn)
-
-
-def test_it_ends_when_every_element_is_taken(rng):
-    v = orthonormal(rng, 6 * 5, 3)
-    assert sorted(extend_elements(v, 6, block_elements(v, 6), 99).tolist()) == [0, 1, 2, 3, 4]
 
 
 @pytest.mark.parametrize("direction", ["up", "down"])

@@ -1,0 +1,113 @@
+"""Table gain_prediction: does a number known before the run say whether the run fails?"""
+
+import numpy as np
+import pandas as pd
+from scipy.stats import rankdata, spearmanr
+
+from pdrom.tables.columns import COLUMNS, conform
+from pdrom.tables.joined import ORTHOGONAL, reruns_with_gain
+
+FAILED = 0.1  # error within the horizon above which a run counts as failed
+EVERY = "all"
+PREDICTORS = {
+    "gain": lambda runs: runs.gain,
+    "reconstruction error": lambda runs: runs.reconstruction_error,
+    "gain x best error": lambda runs: runs.gain * runs.orthogonal_reconstruction,
+}
+
+
+def gain_prediction(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFrame:
+    """Failures by decade of the gain, then how well each predictor orders and separates the runs.
+
+    Counted are the runs of sampled methods whose basis suffices: the orthogonal projection on it
+    does not fail. A run fails if it ends before the horizon or its error there exceeds `FAILED`.
+
+    runs, failed, failed_share, median_error : of a decade ``lower`` < gain <= ``upper``, or of all
+    rank_correlation : of predictor and error (Spearman), early ends tied above all others
+    threshold, misclassified_share : the value that separates failed runs from others with the
+        fewest mistakes, and their share
+    failures_ordered : probability that a failed run has the larger value of a failed and a good one
+        drawn at random (area under the ROC curve; 0.5 says nothing)
+    """
+    runs = judged_runs(reruns, reconstruction)
+    if runs.empty:
+        return pd.DataFrame(columns=COLUMNS["gain_prediction"])
+    rows = [{"predictor": "gain", **row} for row in _decades(runs)]
+    for name, value in PREDICTORS.items():
+        rows.append(
+            {"predictor": name, "lower": EVERY, "upper": EVERY, **_judge(value(runs), runs)}
+        )
+    return conform(pd.DataFrame(rows, columns=COLUMNS["gain_prediction"]), "gain_prediction")
+
+
+def judged_runs(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFrame:
+    """Runs that count, with the column ``failed``; see `gain_prediction`."""
+    runs = reruns_with_gain(reruns, reconstruction)
+    fine = (runs.orthogonal_error <= FAILED) & (runs.method != ORTHOGONAL) & runs.error.notna()
+    runs = runs[fine & runs.gain.notna()].copy()
+    runs["failed"] = runs.error > FAILED
+    return runs
+
+
+def _decades(runs: pd.DataFrame) -> list[dict]:
+    """Rows of the decades 1..10, 10..100, ... and of singular interpolations."""
+    finite = runs[np.isfinite(runs.gain)]
+    decade = np.ceil(np.log10(finite.gain)).clip(lower=1).astype(int)
+    rows = [
+        {"lower": f"{10.0 ** (d - 1):g}", "upper": f"{10.0**d:g}", **_count(part)}
+        for d, part in finite.groupby(decade)
+    ]
+    singular = runs[np.isinf(runs.gain)]
+    if len(singular):
+        rows.append({"lower": "inf", "upper": "inf", **_count(singular)})
+    return rows
+
+
+def _count(runs: pd.DataFrame) -> dict:
+    failed = int(runs.failed.sum())
+    return {
+        "runs": len(runs),
+        "failed": failed,
+        "failed_share": failed / len(runs),
+        "median_error": float(runs.error.median()),
+    }
+
+
+def _judge(value: pd.Series, runs: pd.DataFrame) -> dict:
+    """Counts, rank correlation and the best threshold of one predictor."""
+    x, failed = value.to_numpy(float), runs.failed.to_numpy(bool)
+    x = np.where(np.isnan(x), np.inf, x)  # the reconstruction does not exist
+    threshold, mistakes = best_threshold(x, failed)
+    varies = len(runs) > 2 and len(np.unique(x)) > 1 and runs.error.nunique() > 1
+    return {
+        **_count(runs),
+        "rank_correlation": _ranks(x, runs.error.to_numpy(float)) if varies else None,
+        "threshold": threshold,
+        "misclassified_share": mistakes / len(runs),
+        "failures_ordered": _ordered(x, failed),
+    }
+
+
+def _ranks(x: np.ndarray, y: np.ndarray) -> float:
+    """Spearman's correlation; infinite values are tied."""
+    return float(spearmanr(rankdata(x), rankdata(y)).statistic)
+
+
+def best_threshold(x: np.ndarray, failed: np.ndarray) -> tuple[float, int]:
+    """Threshold t for which "x > t means failed" makes the fewest mistakes, and how many.
+
+    t is the largest value that is not above it: one of ``x``, or 0 if all runs count as failed.
+    The smallest of equally good ones is taken.
+    """
+    candidates = np.concatenate([[0.0], np.unique(x)])
+    mistakes = [int(np.sum((x > t) != failed)) for t in candidates]
+    best = int(np.argmin(mistakes))
+    return float(candidates[best]), mistakes[best]
+
+
+def _ordered(x: np.ndarray, failed: np.ndarray) -> float | None:
+    """Mann-Whitney statistic over the number of pairs; None without both kinds of runs."""
+    many, others = int(failed.sum()), int((~failed).sum())
+    if not many or not others:
+        return None
+    return float((rankdata(x)[failed].sum() - many * (many + 1) / 2) / (many * others))
