@@ -17,7 +17,7 @@ from pdrom.fom.space import VertexSpace
 from pdrom.fom.stepper import Stepper
 from pdrom.fom.system import GlobalSystem
 from pdrom.scene import Scene
-from pdrom.timing import Measurement, Variant, measure, median_repeat
+from pdrom.timing import Measurement, Variant, measure, median_frames
 
 GLOBAL, REST = "global solve", "rest of the frame"
 COSTS = ["scene", "effect", "elements", "ms_per_frame", "share"]
@@ -69,7 +69,7 @@ def effect_costs(
     stands = [stand for role in timed for stand in role]
     names = list(dict.fromkeys(stand.name for stand in stands))
     samples = [_profile(loop, scene, frames, stands, names) for _ in range(warmup + repeats)]
-    total, *parts = median_repeat(np.array(samples[warmup:]))
+    total, *parts = median_frames(np.array(samples[warmup:]))
     elements = [*(_elements(scene, name) for name in names), *(2 * [scene.mesh.vertices])]
     rows = zip([*names, GLOBAL, REST], elements, parts, strict=True)
     return pd.DataFrame([(config.name, *row, row[-1] / total) for row in rows], columns=COSTS)
@@ -77,18 +77,17 @@ def effect_costs(
 
 def _profile(
     loop: Stepper, scene: Scene, frames: int, stands: list[Timed], names: list[str]
-) -> list[float]:
-    """Milliseconds per frame: total, each effect, global solve, rest."""
-    for stand in stands:
-        stand.seconds = 0.0
-    state, seconds = scene.initial_state(), np.zeros(4)
+) -> list[list[float]]:
+    """Milliseconds of each frame: total, each effect, global solve, rest."""
+    state, rows = scene.initial_state(), []
     for frame in range(frames):
+        for stand in stands:
+            stand.seconds = 0.0
         state, report = loop.step(state, frame)
-        seconds = seconds + report.seconds
-    own = [sum(stand.seconds for stand in stands if stand.name == name) for name in names]
-    total, solve = float(seconds.sum()), float(seconds[2])
-    parts = [total, *own, solve, total - sum(own) - solve]
-    return [1e3 * part / frames for part in parts]
+        own = [sum(stand.seconds for stand in stands if stand.name == name) for name in names]
+        total, solve = float(report.seconds.sum()), float(report.seconds[2])
+        rows.append([1e3 * part for part in (total, *own, solve, total - sum(own) - solve)])
+    return rows
 
 
 def _elements(scene: Scene, name: str) -> int:

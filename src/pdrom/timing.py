@@ -1,7 +1,8 @@
 """Honest timings: in-process, warm, interleaved between the compared variants, median.
 
 A variant makes a step loop and its initial state. Every repeat runs each variant once, from there,
-so that drifts of the machine's clock hit all variants alike.
+so that drifts of the machine's clock hit all variants alike. Of each frame the repeat with the
+median time counts: an interruption hits one frame of one repeat, and is left out.
 """
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
@@ -33,14 +34,14 @@ class Variant:
 
 @dataclass(frozen=True)
 class Measurement:
-    """The repeat with the median time per frame: its mean times per frame in ms, by phase.
+    """Mean times per frame in ms, by phase, of the median repeat of each frame.
 
     inertia : prediction at the beginning of a frame, contacts and velocities at its end
     local : projections of all groups, and coefficients of reduced ones
     assembly : product with S^T W, where an implementation does it apart from the projections
     lift : from coefficients to the right-hand side
     solve : global step
-    spread : interquartile range of the time per frame over the repeats
+    spread : interquartile range over the repeats of the mean time per frame
     """
 
     labels: dict[str, object]
@@ -111,33 +112,45 @@ _INNER = ("assembly_seconds", "lift_seconds")
 
 
 def _time_once(variant: Variant) -> np.ndarray:
-    """Mean milliseconds per frame: total, inertia, local, assembly, lift, global."""
+    """Milliseconds of each frame that ran: total, inertia, local, assembly, lift, global."""
     loop, state = variant.loop, variant.start
+    rows = []
+    with np.errstate(over="ignore", invalid="ignore"):
+        for frame in range(variant.frames):
+            _reset(loop)
+            state, report = loop.step(state, frame)
+            rows.append([*report.seconds, *(_inner(loop, name) for name in _INNER)])
+            if not np.isfinite(state.positions).all():
+                break
+    start, local, solve, end, assembly, lift = np.array(rows).T
+    repeated = np.array([local - assembly - lift, assembly, lift, solve]) / variant.share
+    inertia = start + end
+    return 1e3 * np.vstack([inertia + repeated.sum(axis=0), inertia, repeated]).T
+
+
+def _reset(loop: Stepper) -> None:
     for step in loop.local_steps:
         for name in _INNER:
             if hasattr(step, name):
                 setattr(step, name, 0.0)
-    seconds, done = np.zeros(4), 0
-    with np.errstate(over="ignore", invalid="ignore"):
-        for frame in range(variant.frames):
-            state, report = loop.step(state, frame)
-            seconds, done = seconds + report.seconds, done + 1
-            if not np.isfinite(state.positions).all():
-                break
-    assembly, lift = (sum(getattr(step, name, 0.0) for step in loop.local_steps) for name in _INNER)
-    inertia = seconds[0] + seconds[3]
-    repeated = np.array([seconds[1] - assembly - lift, assembly, lift, seconds[2]]) / variant.share
-    return 1e3 / done * np.array([inertia + repeated.sum(), inertia, *repeated])
+
+
+def _inner(loop: Stepper, name: str) -> float:
+    """Seconds of a phase inside the local steps."""
+    return sum(getattr(step, name, 0.0) for step in loop.local_steps)
 
 
 def _summary(labels: dict[str, object], samples: np.ndarray) -> Measurement:
-    spread = float(np.subtract(*np.percentile(samples[:, 0], [75, 25])))
-    return Measurement(labels, *median_repeat(samples), spread, len(samples))
+    means = samples[:, :, 0].mean(axis=1)
+    spread = float(np.subtract(*np.percentile(means, [75, 25])))
+    return Measurement(labels, *median_frames(samples), spread, len(samples))
 
 
-def median_repeat(samples: np.ndarray) -> np.ndarray:
-    """The row of ``samples`` (repeats, phases) with the median total, which is the first column.
+def median_frames(samples: np.ndarray) -> np.ndarray:
+    """Mean over the frames of ``samples`` (repeats, frames, phases) at each one's median repeat.
 
-    The phases of one repeat belong together, medians of each phase would not.
+    The median is that of the total, the first phase. The phases of one repeat belong together,
+    medians of each phase would not.
     """
-    return samples[np.argsort(samples[:, 0], kind="stable")[len(samples) // 2]]
+    order = np.argsort(samples[:, :, 0], axis=0, kind="stable")[len(samples) // 2]
+    return samples[order, np.arange(samples.shape[1])].mean(axis=0)

@@ -69,6 +69,14 @@ def test_median_repeat_with_its_own_phases():
     assert result.spread == pytest.approx(1e3 * (3.5 - 1.5))
 
 
+def test_an_interruption_of_one_frame_is_left_out():
+    """Every repeat is interrupted once, in another frame."""
+    runs = [9.0, 2.0, 3.0, 1.0, 9.0, 3.0, 1.0, 2.0, 9.0]
+    (result,) = measure([variant("a", [], runs, 3)], warmup=0, repeats=3)
+    assert result.frame == pytest.approx(1e3 * (1.0 + 2.0 + 3.0) / 3)
+    assert result.local == pytest.approx(0.5 * result.frame)
+
+
 def test_time_is_per_frame():
     (result,) = measure([variant("a", [], [1.0, 3.0], 2)], warmup=0, repeats=1)
     assert result.frame == pytest.approx(2000.0)

@@ -125,12 +125,13 @@ def _draw_rates(ax: Axes) -> None:
     low, high = ax.get_xlim()
     limits = {rate: 1e3 / rate for rate in RATES}
     inside = [rate for rate in RATES if low < limits[rate] < high]
-    for height, rate in zip((0.98, 0.89), inside, strict=False):
+    heights = (0.98, 0.89, 0.8)
+    for height, rate in zip(heights, inside, strict=False):
         ax.axvline(limits[rate], zorder=0, **_RATE)
         _label_rate(ax, limits[rate], height, f"{rate} fps ")
     beyond = [str(rate) for rate in RATES if limits[rate] >= high]
     if beyond:
-        _label_rate(ax, high, 0.98, f"{', '.join(beyond)} fps \N{RIGHTWARDS ARROW}")
+        _label_rate(ax, high, heights[len(inside)], f"{', '.join(beyond)} fps \N{RIGHTWARDS ARROW}")
 
 
 def _label_rate(ax: Axes, x: float, height: float, text: str) -> None:

@@ -29,6 +29,7 @@ METHODS: dict[str, tuple[str, str]] = {
     "block-qdeim": (GREEN, "X"),
     "gappy": ("#7A5C00", "<"),
     "bounded": ("#1F9E89", "*"),
+    "fewer-iterations": (BLACK, "x"),
     "pod subspace": ("#5E3C99", "p"),
     "pod subspace, ecsw-1e-02": ("#1B6E6E", ">"),
     "pod subspace, ecsw-1e-03": ("#3F6B00", "d"),
