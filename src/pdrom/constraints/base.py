@@ -118,7 +118,7 @@ class StencilGroup(ConstraintGroup):
     ) -> tuple["ConstraintGroup", np.ndarray]:
         vertices, local = np.unique(self.stencil[elements], return_inverse=True)
         part = copy(self)
-        part.stencil = local.reshape(len(elements), -1).astype(np.int32)
+        part.stencil = local.reshape(len(elements), self.stencil.shape[1]).astype(np.int32)
         part.weights = self.weights[elements] * factors
         for name in ("operator", *self.per_element):
             setattr(part, name, np.ascontiguousarray(getattr(self, name)[elements]))

@@ -35,7 +35,7 @@ def pack(numbers: np.ndarray) -> np.ndarray:
     """Lay out the numbers (e, k) of e elements in blocks, flat."""
     e, k = numbers.shape
     padding = np.repeat(numbers[-1:], blocks(e) * LANES - e, axis=0)
-    padded = np.concatenate([numbers, padding]).reshape(-1, LANES, k)
+    padded = np.concatenate([numbers, padding]).reshape(blocks(e), LANES, k)
     return np.ascontiguousarray(padded.transpose(0, 2, 1)).ravel()
 
 

@@ -1,7 +1,7 @@
 """Groups on simplices: springs (1 row), triangles (2 rows), tetrahedra (3 rows).
 
 An element with p rows has p + 1 vertices, S q = D^-T [q_1 - q_0, ..., q_p - q_0]^T with the edge
-matrix D of the rest shape. What differs from group to group is the projection of a block; gather,
+matrix D of the rest shape (1 for springs). What differs from group to group is the projection of a block; gather,
 weighting and scatter are here, for blocks of elements (see `pdrom.constraints.lanes`).
 """
 
@@ -51,8 +51,8 @@ class SimplexGroup(StencilGroup):
         numbers = np.column_stack([self.weights, *self._extra()])
         self._geometry = pack(numbers)
         # the copies that fill up the last block have no energy
-        by_lane = self._geometry.reshape(-1, numbers.shape[1], LANES)
-        by_lane[-1, WEIGHT, e - LANES * (blocks(e) - 1) :] = 0.0
+        by_lane = self._geometry.reshape(blocks(e), numbers.shape[1], LANES)
+        by_lane[-1:, WEIGHT, e - LANES * (blocks(e) - 1) :] = 0.0
         self._work = [workspace(self.work_size) for _ in range(2)]
         self._taken = (np.empty(m * LANES, np.int32), workspace(numbers.shape[1]))
         self._parts = Parts(
@@ -61,7 +61,7 @@ class SimplexGroup(StencilGroup):
 
     def _extra(self) -> list[np.ndarray]:
         """Numbers of an element after its weight: the operator without the corner 0."""
-        return [self.operator[:, :, 1:].reshape(self.elements, -1)]
+        return [self.operator[:, :, 1:].reshape(self.elements, self.rows_per_element**2)]
 
     def _constants(self) -> tuple[float, ...]:
         """Further arguments of the kernels."""
@@ -89,10 +89,10 @@ def gather_edges(y, corners, block, rows, work):
     for lane in range(LANES):
         base = block * (rows + 1) * LANES + lane
         v0 = corners[base]
-        x, y_, z = y[v0, 0], y[v0, 1], y[v0, 2]
         for i in range(rows):
             v = corners[base + (i + 1) * LANES]
-            save(work, EDGE + 3 * i, lane, (y[v, 0] - x, y[v, 1] - y_, y[v, 2] - z))
+            edge = (y[v, 0] - y[v0, 0], y[v, 1] - y[v0, 1], y[v, 2] - y[v0, 2])
+            save(work, EDGE + 3 * i, lane, edge)
 
 
 @lane_function

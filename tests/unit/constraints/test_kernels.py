@@ -155,3 +155,14 @@ def test_flat_rest_shape_has_nothing_to_project(rng):
     group = scene.groups[0]
     assert np.abs(group.project(y)).max() < 1e-10
     assert np.linalg.norm(group.project(y)) < 100 * group.roundoff(scene.mesh.points)
+
+
+@pytest.mark.parametrize("name", sorted(set(GROUPS) - {"bending"}))
+def test_a_group_may_keep_no_element(name):
+    """A sampling may choose none of a group's elements."""
+    group = make_scene({"effect": name, "weight": 1.0}, mesh=GROUPS[name]).groups[0]
+    none = np.empty(0, dtype=np.int64)
+    part, vertices = group.restricted(none, np.empty(0))
+    assert group.project_elements(np.zeros((50, 3)), none).shape == (0, 3)
+    rhs = np.empty((len(vertices), 3))
+    assert part.accumulate(rhs.copy(), rhs) == 0.0
