@@ -70,7 +70,7 @@ def _draw_limits(ax: Axes, prediction: pd.DataFrame) -> None:
     ax.set_xlim(*GAINS)
     log_axis(ax, *ERRORS)
     ax.set_xlabel("gain of the interpolation")
-    ax.set_ylabel("error of the run within the horizon (relative)")
+    ax.set_ylabel("error within the horizon (relative)")
     ax.axhline(FAILED, color="#333333", linewidth=0.8, linestyle="--", zorder=0)
     ax.text(GAINS[1], FAILED * 1.1, "failed ", ha="right", va="bottom", fontsize=7)
     ax.text(GAINS[0] * 1.1, ERRORS[1] * 0.8, "ended early: upper rim", va="top", fontsize=7)
@@ -94,14 +94,15 @@ def _draw_decades(ax: Axes, decades: pd.DataFrame) -> None:
     ax.set_ylim(0, 112)
     ax.set_yticks([0, 25, 50, 75, 100])
     ax.tick_params(axis="x", labelrotation=35)
-    ax.set_xlabel("gain")
-    ax.set_ylabel("failed runs (%), number of runs above")
+    ax.set_xlabel("gain of the interpolation")
+    ax.set_ylabel("failed runs (%)")
+    ax.set_title("number of runs above each bar")
     style.grid(ax)
 
 
 def _span(lower: str, upper: str) -> str:
     """Name of a decade."""
-    if float(lower) == np.inf:
-        return "singular"
-    low, high = (round(np.log10(float(limit))) for limit in (lower, upper))
-    return rf"$10^{{{low}}}$ to $10^{{{high}}}$"
+    low = round(np.log10(float(lower)))
+    if np.isinf(float(upper)):
+        return rf"over $10^{{{low}}}$"
+    return rf"$10^{{{low}}}$ to $10^{{{low + 1}}}$"

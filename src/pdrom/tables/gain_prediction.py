@@ -9,6 +9,7 @@ from pdrom.tables.joined import ORTHOGONAL, reruns_with_gain
 
 FAILED = 0.1  # error within the horizon above which a run counts as failed
 EVERY = "all"
+DECADES = 4  # gains above 10^4 are counted together
 PREDICTORS = {
     "gain": lambda runs: runs.gain,
     "reconstruction error": lambda runs: runs.reconstruction_error,
@@ -50,17 +51,16 @@ def judged_runs(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFr
 
 
 def _decades(runs: pd.DataFrame) -> list[dict]:
-    """Rows of the decades 1..10, 10..100, ... and of singular interpolations."""
-    finite = runs[np.isfinite(runs.gain)]
-    decade = np.ceil(np.log10(finite.gain)).clip(lower=1).astype(int)
-    rows = [
-        {"lower": f"{10.0 ** (d - 1):g}", "upper": f"{10.0**d:g}", **_count(part)}
-        for d, part in finite.groupby(decade)
+    """Rows of the decades 1..10, 10..100, ..., and one of all that is above, singular ones too."""
+    exponent = np.ceil(np.log10(runs.gain.clip(upper=10.0**DECADES + 1.0))).clip(lower=1)
+    return [
+        {
+            "lower": f"{10.0 ** (d - 1):g}",
+            "upper": f"{10.0**d:g}" if d <= DECADES else "inf",
+            **_count(part),
+        }
+        for d, part in runs.groupby(exponent.astype(int))
     ]
-    singular = runs[np.isinf(runs.gain)]
-    if len(singular):
-        rows.append({"lower": "inf", "upper": "inf", **_count(singular)})
-    return rows
 
 
 def _count(runs: pd.DataFrame) -> dict:

@@ -285,7 +285,7 @@ def _write_tables(sources, scenes, methods, rng) -> None:
     ]
     predictions = [
         ("gain", "10", "100", 40, 0.25, np.nan),
-        ("gain", "inf", "inf", 2, 1.0, np.nan),
+        ("gain", "10000", "inf", 2, 1.0, np.nan),
         ("gain", "all", "all", 42, 0.3, 30.0),
     ]
     columns = {
