@@ -10,6 +10,9 @@ computed differs in two ways (u = eps, c a small constant for the length of the 
   theorem 10.4), hence at most |r|^2 / (2 lambda_min(A)). In a subspace the right-hand side is
   wrong by as much in the vertices, so that r <= c u |B|^T |A| |y|, and the explicit inverse adds
   d <= c u cond(A) |z|, where the scaling of the columns does not count.
+
+lambda_min is bounded by the smallest mass over h^2, as if nothing were held: where masses are
+round-off beside the weights and pins alone make the system solvable, the bound says little.
 """
 
 from dataclasses import dataclass
