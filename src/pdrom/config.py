@@ -7,7 +7,6 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from pdrom.errors import ConfigurationError, PdromError
 from pdrom.fom.solvers import SOLVERS
-from pdrom.hardcases.catalogue import CASES
 from pdrom.method import MethodSpec, load_methods
 from pdrom.rom.guard_settings import GuardSettings
 from pdrom.scene import Scene, SceneConfig
@@ -175,13 +174,6 @@ class HardCases(_Model):
 
     cases: tuple[str, ...] = ()
     matrices: Annotated[int, Field(ge=1, le=10_000)] = 40
-
-    @model_validator(mode="after")
-    def _known(self) -> Self:
-        for name in self.cases:
-            if name not in CASES:
-                raise ValueError(f"cases: unknown case '{name}' (allowed: {', '.join(CASES)})")
-        return self
 
 
 class StudySettings(_Model):

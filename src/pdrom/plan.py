@@ -8,7 +8,7 @@ from typing import Any
 from pdrom.claims import load_claims
 from pdrom.config import Study, StudySettings
 from pdrom.effects import EFFECTS
-from pdrom.errors import PdromError
+from pdrom.errors import ConfigurationError, PdromError
 from pdrom.figures import FIGURES, FigureSpec, Holdings, figure_inputs, load_figures
 from pdrom.figures.sources import PUBLISHED
 from pdrom.fingerprint import fingerprint
@@ -71,6 +71,7 @@ class Plan:
         """Read the configuration of figures, ladder and claims, so that a fault shows early."""
         _ = self.figure_specs, self.ladder, load_claims(self.root / "config" / "claims.yaml")
         load_expectations(self.root / "config" / "hard_cases.yaml")
+        self.hard_cases()
 
     # Parameters -----------------------------------------------------------------------------
 
@@ -260,11 +261,16 @@ class Plan:
 
     def hard_cases(self) -> dict[str, Any]:
         """Parameters of the hard cases: every method of config/methods.yaml runs in them."""
-        settings = self.settings.hard_cases
+        settings, known = self.settings.hard_cases, reducible_cases()
+        for name in settings.cases:
+            if name not in known:
+                raise ConfigurationError(
+                    f"hard_cases.cases: unknown case '{name}' (allowed: {', '.join(known)})"
+                )
         methods = load_methods(self.root / "config" / "methods.yaml")
         return {
             "methods": {name: spec.model_dump(mode="json") for name, spec in methods.items()},
-            "cases": list(settings.cases or reducible_cases()),
+            "cases": list(settings.cases or known),
             "matrices": settings.matrices,
         }
 

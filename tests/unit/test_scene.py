@@ -11,6 +11,7 @@ from conftest import ROOT, make_scene
 from pdrom.config import Coarsen, Study, load_scene
 from pdrom.errors import ConfigurationError, SceneError
 from pdrom.fom.run import run, trajectory
+from pdrom.fom.stepper import State
 from pdrom.store import open_hdf5
 
 SPRING = {"effect": "spring", "weight": 1e5}
@@ -165,3 +166,17 @@ def test_every_scene_file_is_valid():
 def test_faulty_studies_name_key_and_value(config, message):
     with pytest.raises(ConfigurationError, match=message):
         Study.load(config, ROOT)
+
+
+@pytest.mark.parametrize(("rate", "stable"), [(124.9, True), (125.0, False)])
+def test_explicit_drag_beyond_its_stability_limit_is_refused(rate, stable):
+    """Free flight multiplies the velocity by 1 - c h: it decays for c h < 2 only (h = 0.016 s)."""
+    effects = ({"effect": "spring", "weight": 1.0}, {"effect": "damping", "rate": rate})
+    if stable:
+        scene = make_scene(*effects, frames=1)
+        velocities = np.ones_like(scene.mesh.points)
+        after, _ = scene.stepper().step(State(scene.mesh.points.copy(), velocities), 0)
+        assert np.abs(after.velocities).max() < 1.0
+        return
+    with pytest.raises(ValueError, match="allowed are rates below 125"):
+        make_scene(*effects)

@@ -104,3 +104,22 @@ def test_numbers_that_are_none_are_refused():
 def test_unknown_solver_lists_the_known_ones():
     with pytest.raises(ConfigurationError, match=r"cholespy, splu"):
         SCENE.system_with("lu").eliminate(np.array([0]))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_masses_that_round_off_swallows_are_refused(name):
+    """A free body: nothing but inertia holds a translation, and inertia is lost in the matrix."""
+    scene = make_scene({"effect": "spring", "weight": 1e6}, vertex_mass=1e-12)
+    with pytest.raises(SolverError, match=r"beside the weights|not positive definite"):
+        scene.system_with(name).eliminate(np.empty(0, dtype=np.int64))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_masses_that_round_off_swallows_do_no_harm_to_a_held_body(name):
+    scene = make_scene({"effect": "spring", "weight": 1e6}, vertex_mass=1e-12)
+    elimination = scene.system_with(name).eliminate(np.arange(5))
+    elimination.set_targets(scene.mesh.points[:5])
+    y = scene.mesh.points.copy()
+    rhs = scene.groups[0].S.T @ (scene.groups[0].row_weights[:, None] * scene.groups[0].rest)
+    elimination.solve(rhs, y)
+    assert y == pytest.approx(scene.mesh.points, abs=1e-9)

@@ -7,8 +7,12 @@ computed differs in two ways (u = eps, c a small constant for the length of the 
   objective of these errors alone, a value E is wrong by at most 2 sqrt(E R) + R (Cauchy-Schwarz);
 - solution: y is no exact minimiser of the quadratic of the global step, and misses its minimum by
   d^T A d / 2 for an error d. A Cholesky solve leaves a residual |r| <= c u |A| |y| (Higham 2002,
-  theorem 10.4), hence at most |r|^2 / (2 lambda_min(A)); an explicit inverse leaves d <= c u
-  cond(A) |y|.
+  theorem 10.4), hence at most |r|^2 / (2 lambda_min(A)). In a subspace the right-hand side is
+  wrong by as much in the vertices, so that r <= c u |B|^T |A| |y|, and the explicit inverse adds
+  d <= c u cond(A) |z|, where the scaling of the columns does not count.
+
+lambda_min is bounded by the smallest mass over h^2, as if nothing were held: where masses are
+round-off beside the weights and pins alone make the system solvable, the bound says little.
 """
 
 from dataclasses import dataclass
@@ -45,7 +49,9 @@ class Roundoff:
         size = float(size.max()) + float(np.abs(self.scene.mesh.points).max())
         noise = self._noise(size)
         evaluation = 2.0 * np.sqrt(abs(first) * noise) + noise
-        return evaluation + (self._sparse(size) if self.columns is None else self._dense(largest))
+        if self.columns is None:
+            return evaluation + self._sparse(size)
+        return evaluation + self._dense(size, largest)
 
     def _noise(self, size: float) -> float:
         """R: the objective of rounding errors where all coordinates are of ``size``."""
@@ -57,19 +63,25 @@ class Roundoff:
             total += 1.5 * float(group.row_weights @ (2.0 * rows * unit) ** 2)
         return total
 
+    def _residual(self, size: float) -> np.ndarray:
+        """c u |A| |y| of the vertices, (N,)."""
+        rows = np.asarray(abs(self.scene.system.matrix).sum(axis=1)).ravel()
+        return OPERATIONS * EPS * size * rows
+
     def _sparse(self, size: float) -> float:
-        matrix = self.scene.system.matrix
-        residual = OPERATIONS * EPS * size * np.asarray(abs(matrix).sum(axis=1)).ravel()
+        residual = self._residual(size)
         smallest = float(self.scene.system.inertia.min())
         return 1.5 * float(residual @ residual) / smallest
 
-    def _dense(self, largest: np.ndarray) -> float:
+    def _dense(self, size: float, largest: np.ndarray) -> float:
         b = self.columns.B
         matrix = b.T @ (self.scene.masses[:, None] * b) / self.loop.time_step**2
         matrix = matrix + sum(step.matrix for step in self.loop.local_steps)
         # coordinates have sizes of their own: the scaling of columns must not count as condition
         scale = np.sqrt(np.diag(matrix))
         eigenvalues = np.linalg.eigvalsh(matrix / np.outer(scale, scale))
-        condition = eigenvalues[-1] / max(eigenvalues[0], EPS * eigenvalues[-1])
-        error = OPERATIONS * EPS * condition * float(np.linalg.norm(scale[:, None] * largest))
-        return 0.5 * float(eigenvalues[-1]) * error**2
+        smallest, greatest = max(eigenvalues[0], EPS * eigenvalues[-1]), eigenvalues[-1]
+        coordinates = float(np.linalg.norm(scale[:, None] * largest))
+        error = OPERATIONS * EPS * greatest / smallest * coordinates
+        residual = (np.abs(b).T @ self._residual(size)) / scale
+        return float(1.5 * (residual @ residual) / smallest + 0.5 * greatest * error**2)

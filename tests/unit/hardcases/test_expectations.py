@@ -2,8 +2,12 @@
 
 import pytest
 
+from conftest import ROOT
+from pdrom.config import Study
 from pdrom.errors import ConfigurationError
 from pdrom.hardcases.expectations import FAILURES, Expectation, load_expectations, surprise
+from pdrom.plan import Plan
+from pdrom.yamlfile import read_yaml
 
 ENTRY = Expectation(why="because of something that is long enough", fails=("a",), may_fail=("b",))
 
@@ -43,3 +47,18 @@ def test_a_faulty_file_is_named(tmp_path, text, message):
     with pytest.raises(ConfigurationError, match=message) as error:
         load_expectations(path)
     assert str(path) in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["no_such_case", "contradiction", "long_run"])
+def test_an_unknown_refused_or_slow_case_is_named(name):
+    """Only what a reduction can repeat, and in short, may be asked for."""
+    config = read_yaml(ROOT / "config" / "tiny.yaml") | {"hard_cases": {"cases": [name]}}
+    with pytest.raises(ConfigurationError, match=f"unknown case '{name}' .allowed: bar_plane"):
+        Plan(Study.load(config, ROOT)).check()
+
+
+def test_every_method_takes_part_not_only_those_of_the_study():
+    plan = Plan(Study.load(read_yaml(ROOT / "config" / "tiny.yaml"), ROOT))
+    asked = plan.hard_cases()
+    assert set(asked["methods"]) == set(read_yaml(ROOT / "config" / "methods.yaml"))
+    assert set(asked["methods"]) > set(plan.study.methods)
