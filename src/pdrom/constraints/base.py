@@ -5,7 +5,7 @@ Energy of a group (Bouaziz et al. 2014, eq. 4): W(q) = 1/2 sum_e w_e || S_e q - 
 
 from abc import abstractmethod
 from copy import copy
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -39,6 +39,10 @@ class ConstraintGroup(Effect):
     rows_per_element: int
     S: sparse.csr_array
     weights: np.ndarray
+    gradient_kernel: Any = None
+    """Compiled projection from S q (see `pdrom.constraints.gradient_kernel`), if there is one."""
+    frame_lagged: bool = False
+    """Whether ``begin_frame`` freezes anything."""
 
     @property
     def elements(self) -> int:
@@ -52,6 +56,13 @@ class ConstraintGroup(Effect):
 
     def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
         """Freeze what depends on the frame's first positions q (N, 3); most groups have nothing."""
+
+    def kernel_parameters(self) -> np.ndarray:
+        """Numbers (e, n) of the elements that ``gradient_kernel`` needs beside S q.
+
+        Frame-lagged ones are those of the last ``begin_frame``.
+        """
+        raise NotImplementedError(f"{self.name} has no gradient kernel")
 
     def project(self, y: np.ndarray) -> np.ndarray:
         """Projections p(y) of all elements, (e p, 3)."""

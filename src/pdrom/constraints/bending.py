@@ -8,6 +8,7 @@ from numba import njit
 from scipy import sparse
 
 from pdrom.constraints.base import ConstraintGroup, GroupConfig, require_cells
+from pdrom.constraints.gradient_kernel import carray, gradient_kernel
 from pdrom.constraints.vectors import perpendicular
 from pdrom.errors import SceneError
 from pdrom.mesh.types import Mesh
@@ -33,6 +34,7 @@ class VertexBending(ConstraintGroup):
         effect: Literal["bending"] = "bending"
 
     rows_per_element = 1
+    frame_lagged = True
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
@@ -100,6 +102,13 @@ class VertexBending(ConstraintGroup):
         part.normals = self.normals[elements].copy()
         part._curved = np.flatnonzero(part.side)
         return part, vertices
+
+    @property
+    def gradient_kernel(self):
+        return _project_gradients
+
+    def kernel_parameters(self) -> np.ndarray:
+        return np.column_stack([self.magnitude, self.side, self.normals])
 
     def _operator(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return self.S.indptr, self.S.indices, self.S.data
@@ -239,3 +248,13 @@ def _accumulate(y, indptr, indices, data, magnitude, side, normals, weights, rhs
             rhs[indices[k], 2] += scaled * pz
         energy += w * ((hx - px) ** 2 + (hy - py) ** 2 + (hz - pz) ** 2)
     return 0.5 * energy
+
+
+@gradient_kernel
+def _project_gradients(d_pointer, parameters_pointer, p_pointer, m):
+    d, p = carray(d_pointer, (m, 3)), carray(p_pointer, (m, 3))
+    of = carray(parameters_pointer, (m, 5))
+    for i in range(m):
+        p[i, 0], p[i, 1], p[i, 2] = _half_sphere(
+            d[i, 0], d[i, 1], d[i, 2], of[i, 0], of[i, 1], of[i, 2:]
+        )

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from pdrom.constraints.base import GroupConfig, StencilGroup
+from pdrom.constraints.gradient_kernel import carray, gradient_kernel
 from pdrom.mesh.types import Mesh
 
 
@@ -39,6 +40,13 @@ class EdgeSpring(StencilGroup):
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         return _accumulate(y, self.stencil, self.rest, self.weights, rhs)
+
+    @property
+    def gradient_kernel(self):
+        return _project_gradients
+
+    def kernel_parameters(self) -> np.ndarray:
+        return self.rest
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         rest = self.rest[elements, None, :]
@@ -87,3 +95,11 @@ def _accumulate(y, stencil, rest, weights, rhs):
         rhs[a, 2] -= w * pz
         energy += w * ((dx - px) ** 2 + (dy - py) ** 2 + (dz - pz) ** 2)
     return 0.5 * energy
+
+
+@gradient_kernel
+def _project_gradients(d_pointer, rest_pointer, p_pointer, m):
+    d, p = carray(d_pointer, (m, 3)), carray(p_pointer, (m, 3))
+    rest = carray(rest_pointer, (m, 3))
+    for i in range(m):
+        p[i, 0], p[i, 1], p[i, 2] = _spring(d[i, 0], d[i, 1], d[i, 2], rest[i])

@@ -4,6 +4,7 @@ import numpy as np
 from numba import njit
 
 from pdrom.constraints.base import StencilGroup, require_cells
+from pdrom.constraints.gradient_kernel import carray, gradient_kernel
 from pdrom.constraints.polar3 import newton_rotation, within_range
 from pdrom.constraints.svd3 import clamp_singular_values
 from pdrom.mesh.types import Mesh
@@ -35,6 +36,13 @@ class TetrahedronGroup(StencilGroup):
         return _accumulate(
             y, self.stencil, self.operator, self.weights, self.minimum, self.maximum, rhs
         )
+
+    @property
+    def gradient_kernel(self):
+        return _project_gradients
+
+    def kernel_parameters(self) -> np.ndarray:
+        return np.tile([self.minimum, self.maximum], (self.elements, 1))
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         u, sigma, vt = np.linalg.svd(d)
@@ -106,3 +114,12 @@ def _accumulate(y, stencil, operator, weights, low, high, rhs):
                 + (f[2, axis] - p[2, axis]) ** 2
             )
     return 0.5 * energy
+
+
+@gradient_kernel
+def _project_gradients(d_pointer, range_pointer, p_pointer, m):
+    d, p = carray(d_pointer, (m, 3, 3)), carray(p_pointer, (m, 3, 3))
+    allowed = carray(range_pointer, (m, 2))
+    u, v, sigma = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    for i in range(m):
+        _nearest(d[i], allowed[i, 0], allowed[i, 1], u, sigma, v, p[i])

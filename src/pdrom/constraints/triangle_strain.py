@@ -11,6 +11,7 @@ from numba import njit
 from pydantic import Field, model_validator
 
 from pdrom.constraints.base import GroupConfig, StencilGroup, require_cells
+from pdrom.constraints.gradient_kernel import carray, gradient_kernel
 from pdrom.constraints.vectors import perpendicular
 from pdrom.mesh.types import Mesh
 
@@ -57,6 +58,13 @@ class TriangleStrain(StencilGroup):
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         low, high = self.config.minimum, self.config.maximum
         return _accumulate(y, self.stencil, self.operator, self.weights, low, high, rhs)
+
+    @property
+    def gradient_kernel(self):
+        return _project_gradients
+
+    def kernel_parameters(self) -> np.ndarray:
+        return np.tile([self.config.minimum, self.config.maximum], (self.elements, 1))
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         u, sigma, vt = np.linalg.svd(d, full_matrices=False)
@@ -160,3 +168,11 @@ def _accumulate(y, stencil, operator, weights, low, high, rhs):
             rhs[stencil[e, 0], axis] -= first + second
             energy += w * ((f[0, axis] - p[0, axis]) ** 2 + (f[1, axis] - p[1, axis]) ** 2)
     return 0.5 * energy
+
+
+@gradient_kernel
+def _project_gradients(d_pointer, range_pointer, p_pointer, m):
+    d, p = carray(d_pointer, (m, 2, 3)), carray(p_pointer, (m, 2, 3))
+    allowed = carray(range_pointer, (m, 2))
+    for i in range(m):
+        _clamp_columns(d[i], allowed[i, 0], allowed[i, 1], p[i])

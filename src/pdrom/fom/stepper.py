@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from pdrom.fom.space import Space
+from pdrom.fom.space import Solve, Space
 
 PHASES = ("inertia", "local", "global", "finish")
 
@@ -88,9 +88,29 @@ class Stepper:
         base = space.inertia(s)
         for local in self.local_steps:
             local.begin_frame(state.positions)
+        seconds[0] = perf_counter() - started
+        y, objective = self._iterate(s, base, elimination, seconds, on_last_iterate)
+        before = perf_counter()
+        space.correct(y)
+        velocities = (y - state.positions) / h
+        seconds[3] = perf_counter() - before
+        return State(y, velocities), FrameReport(objective, seconds)
+
+    def _iterate(
+        self,
+        s: np.ndarray,
+        base: np.ndarray,
+        elimination: Solve,
+        seconds: np.ndarray,
+        on_last_iterate: Callable[[np.ndarray], None] | None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """All iterations of a frame, started at s: the last y and the objective at the iterates.
+
+        Their times are added to ``seconds``.
+        """
+        space = self.space
         y, rhs = s.copy(), np.empty_like(s)
         objective = np.zeros(self.iterations if self._track else 0)
-        seconds[0] = perf_counter() - started
         for k in range(self.iterations):
             if on_last_iterate is not None and k == self.iterations - 1:
                 on_last_iterate(y)
@@ -106,8 +126,4 @@ class Stepper:
             elimination.solve(rhs, y)
             seconds[1] += between - before
             seconds[2] += perf_counter() - tracked
-        before = perf_counter()
-        space.correct(y)
-        velocities = (y - state.positions) / h
-        seconds[3] = perf_counter() - before
-        return State(y, velocities), FrameReport(objective, seconds)
+        return y, objective
