@@ -76,6 +76,15 @@ class Subspace(_Model):
     tolerances: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (3e-2, 1e-2, 1e-3)
 
 
+class Online(_Model):
+    """Large scenes: their names, kinds of basis, numbers of modes, tolerances of the sampling."""
+
+    scenes: tuple[str, ...] = ()
+    bases: tuple[Literal["pod", "skinning"], ...] = ("pod",)
+    sizes: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = (20,)
+    tolerances: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (1e-2,)
+
+
 class StudySettings(_Model):
     """Content of config/default.yaml, possibly overridden by --configfile."""
 
@@ -90,6 +99,7 @@ class StudySettings(_Model):
     sensitivity: Sensitivity = Sensitivity()
     timing: Timing = Timing()
     subspace: Subspace = Subspace()
+    online: Online = Online()
 
     @model_validator(mode="after")
     def _known(self) -> Self:
@@ -112,6 +122,9 @@ class Study:
             name: load_bound_scene(root, name, settings.coarsen) for name in settings.scenes
         }
         self.scenes: dict[str, SceneConfig] = {n: s.config for n, s in self.bound.items()}
+        self.online: dict[str, SceneConfig] = {
+            name: load_scene(root, name, settings.coarsen) for name in settings.online.scenes
+        }
         self.methods: dict[str, MethodSpec] = _named_methods(root, settings.methods)
 
     @classmethod

@@ -20,7 +20,7 @@ REFERENCE_BASIS = "none-none-vectorised"
 TABLES = (
     "singular_values", "reconstruction_error", "reduced_reruns", "accuracy_cost", "local_share",
     "sensitivity",
-    "ladder", "heldout_reruns", "claims",
+    "ladder", "heldout_reruns", "online", "claims",
 )  # fmt: skip
 
 
@@ -158,6 +158,24 @@ class Plan:
         """Files of the scenes that climb the ladder and are in this configuration."""
         pairs = [(s, g) for s, g in self.study.experiments if s in self.ladder.scenes]
         return [f"{RESULTS}/ladder/{scene}/{group}.csv" for scene, group in pairs]
+
+    # Large scenes ---------------------------------------------------------------------------
+
+    def online_scene(self, scene: str) -> dict[str, Any]:
+        """Plain configuration of a large scene."""
+        return self.study.online[scene].model_dump(mode="json")
+
+    def online_settings(self) -> dict[str, Any]:
+        """Plain settings of the large scenes; which there are is no parameter of one."""
+        return self.settings.online.model_dump(mode="json", exclude={"scenes"})
+
+    def online_files(self) -> list[str]:
+        """Files of the large scenes of this configuration."""
+        return [f"{RESULTS}/online/{scene}.csv" for scene in self.study.online]
+
+    def online_code(self, scene: str) -> str:
+        """Fingerprint of the stage together with the effects that a large scene lists."""
+        return fingerprint("pdrom.stages.online", *self.study.online[scene].modules)
 
     # Figures --------------------------------------------------------------------------------
 

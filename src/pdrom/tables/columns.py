@@ -35,6 +35,11 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "scene", "group", "direction", "rung", "r", "condition", "gain", "error_train",
         "error_test", "error_heldout", "finite", "blowup_frame", "relative_error_within_horizon",
     ),
+    "online": (
+        "scene", "vertices", "elements", "position_basis", "k", "tau", "elements_sampled",
+        "relative_error_train", "relative_error_heldout", "ms_per_frame", "ms_per_iteration",
+        "fom_ms_per_frame", "speedup",
+    ),
     "claims": (
         "claim", "source", "paper", "measured", "verdict", "why", "figure_or_table",
     ),
@@ -45,6 +50,7 @@ TIMING_COLUMNS: dict[str, tuple[str, ...]] = {
     "reduced_reruns": ("ms_per_frame", "local_ms", "global_ms", "speedup"),
     "accuracy_cost": ("ms_per_frame", "pareto"),
     "local_share": ("local_ms", "assembly_ms", "global_ms", "local_share"),
+    "online": ("ms_per_frame", "ms_per_iteration", "fom_ms_per_frame", "speedup"),
     "claims": ("measured", "verdict", "why"),
 }
 
