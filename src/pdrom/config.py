@@ -176,6 +176,15 @@ class HardCases(_Model):
     matrices: Annotated[int, Field(ge=1, le=10_000)] = 40
 
 
+class Online(_Model):
+    """Large scenes: their names, kinds of basis, numbers of modes, tolerances of the sampling."""
+
+    scenes: tuple[str, ...] = ()
+    bases: tuple[Literal["pod", "skinning"], ...] = ("pod",)
+    sizes: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = (20,)
+    tolerances: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (1e-2,)
+
+
 class StudySettings(_Model):
     """Content of config/default.yaml, possibly overridden by --configfile."""
 
@@ -197,6 +206,7 @@ class StudySettings(_Model):
     stability: Stability = Stability()
     guard: Guard = Guard()
     hard_cases: HardCases = HardCases()
+    online: Online = Online()
 
     @model_validator(mode="after")
     def _known(self) -> Self:
@@ -219,6 +229,9 @@ class Study:
             name: load_bound_scene(root, name, settings.coarsen) for name in settings.scenes
         }
         self.scenes: dict[str, SceneConfig] = {n: s.config for n, s in self.bound.items()}
+        self.online: dict[str, SceneConfig] = {
+            name: load_scene(root, name, settings.coarsen) for name in settings.online.scenes
+        }
         self.methods: dict[str, MethodSpec] = _named_methods(root, settings.methods)
 
     @classmethod

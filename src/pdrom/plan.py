@@ -41,6 +41,7 @@ TABLES = (
     "effects_left_out",
     "targets",
     "gain_prediction",
+    "online",
     "claims",
 )
 
@@ -277,6 +278,24 @@ class Plan:
     def hard_cases_code(self) -> str:
         """Fingerprint of the hard cases, which use every effect there is."""
         return fingerprint("pdrom.stages.hard_cases", *map(EFFECTS.module, EFFECTS))
+
+    # Large scenes ---------------------------------------------------------------------------
+
+    def online_scene(self, scene: str) -> dict[str, Any]:
+        """Plain configuration of a large scene."""
+        return self.study.online[scene].model_dump(mode="json")
+
+    def online_settings(self) -> dict[str, Any]:
+        """Plain settings of the large scenes; which there are is no parameter of one."""
+        return self.settings.online.model_dump(mode="json", exclude={"scenes"})
+
+    def online_files(self) -> list[str]:
+        """Files of the large scenes of this configuration."""
+        return [f"{RESULTS}/online/{scene}.csv" for scene in self.study.online]
+
+    def online_code(self, scene: str) -> str:
+        """Fingerprint of the stage together with the effects that a large scene lists."""
+        return fingerprint("pdrom.stages.online", *self.study.online[scene].modules)
 
     # Figures --------------------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ Energy of a group (Bouaziz et al. 2014, eq. 4): W(q) = 1/2 sum_e w_e || S_e q - 
 
 from abc import abstractmethod
 from copy import copy
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -43,6 +43,10 @@ class ConstraintGroup(Effect):
     weights: np.ndarray
     threads: int = 1
     """Threads of `accumulate`, 1 or 2; the result is the same bit for bit."""
+    gradient_kernel: Any = None
+    """Compiled projection from S q (see `pdrom.constraints.gradient_kernel`), if there is one."""
+    frame_lagged: bool = False
+    """Whether ``begin_frame`` freezes anything."""
 
     @property
     def elements(self) -> int:
@@ -56,6 +60,13 @@ class ConstraintGroup(Effect):
 
     def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
         """Freeze what depends on the frame's first positions q (N, 3); most groups have nothing."""
+
+    def kernel_parameters(self) -> np.ndarray:
+        """Numbers that ``gradient_kernel`` needs beside S q, in the order that it expects.
+
+        Frame-lagged ones are those of the last ``begin_frame``.
+        """
+        raise NotImplementedError(f"{self.name} has no gradient kernel")
 
     def project(self, y: np.ndarray) -> np.ndarray:
         """Projections p(y) of all elements, (e p, 3)."""

@@ -7,6 +7,7 @@ import numpy as np
 from scipy import sparse
 
 from pdrom.constraints.base import ConstraintGroup, GroupConfig, require_cells
+from pdrom.constraints.gradient_kernel import carray, gradient_kernel
 from pdrom.constraints.lanes import (
     LANES,
     SMALLEST,
@@ -107,6 +108,24 @@ def _accumulate(y, operator, manifold, first, last, work, rhs):
     return 0.5 * energy
 
 
+@gradient_kernel
+def _project_gradients(d_pointer, manifold_pointer, p_pointer, m):
+    d, p = carray(d_pointer, (m, 3)), carray(p_pointer, (m, 3))
+    manifold = carray(manifold_pointer, (m, 7))
+    work = np.zeros(SIZE * LANES)
+    for start in range(0, m, LANES):
+        for lane in range(LANES):
+            e = min(start + lane, m - 1)
+            save(work, H, lane, (d[e, 0], d[e, 1], d[e, 2]))
+            save(work, NORMAL, lane, (manifold[e, 0], manifold[e, 1], manifold[e, 2]))
+            work[MAGNITUDE * LANES + lane] = manifold[e, 3]
+            save(work, REST, lane, (manifold[e, 4], manifold[e, 5], manifold[e, 6]))
+        _half_spheres(work)
+        for lane in range(min(LANES, m - start)):
+            i = start + lane
+            p[i, 0], p[i, 1], p[i, 2] = load(work, P, lane)
+
+
 @kernel
 def _fan_normals(q, vertices, start, fan, triangles, normals):
     """Area-weighted unit normals of ``vertices``; zero where the fan has no area."""
@@ -146,6 +165,7 @@ class VertexBending(ConstraintGroup):
 
     rows_per_element = 1
     split_from = 8192
+    frame_lagged = True
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
@@ -235,6 +255,13 @@ class VertexBending(ConstraintGroup):
             self.S.shape[1],
             lambda element: self.S.indices[self.S.indptr[element] :],
         )
+
+    @property
+    def gradient_kernel(self):
+        return _project_gradients
+
+    def kernel_parameters(self) -> np.ndarray:
+        return np.column_stack([self.side[:, None] * self.normals, self.magnitude, self.rest])
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         h, n = d[:, 0], self.normals[elements] * self.side[elements, None]

@@ -1,8 +1,8 @@
 """Groups on simplices: springs (1 row), triangles (2 rows), tetrahedra (3 rows).
 
 An element with p rows has p + 1 vertices, S q = D^-T [q_1 - q_0, ..., q_p - q_0]^T with the edge
-matrix D of the rest shape (1 for springs). What differs from group to group is the projection of a block; gather,
-weighting and scatter are here, for blocks of elements (see `pdrom.constraints.lanes`).
+matrix D of the rest shape (1 for springs). What differs from group to group is the projection of a
+block; gather, weighting and scatter are here, for blocks of elements (`pdrom.constraints.lanes`).
 """
 
 from collections.abc import Callable
@@ -93,6 +93,16 @@ def gather_edges(y, corners, block, rows, work):
             v = corners[base + (i + 1) * LANES]
             edge = (y[v, 0] - y[v0, 0], y[v, 1] - y[v0, 1], y[v, 2] - y[v0, 2])
             save(work, EDGE + 3 * i, lane, edge)
+
+
+@lane_function
+def copy_rows(d, rows, start, work, first):
+    """Copy S q (m rows, 3) of the elements ``start``, ... of m, the last one repeated."""
+    count = d.shape[0] // rows
+    for lane in range(LANES):
+        base = rows * min(start + lane, count - 1)
+        for i in range(rows):
+            save(work, first + 3 * i, lane, (d[base + i, 0], d[base + i, 1], d[base + i, 2]))
 
 
 @lane_function

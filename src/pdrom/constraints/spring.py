@@ -5,6 +5,7 @@ from typing import Literal
 import numpy as np
 
 from pdrom.constraints.base import GroupConfig
+from pdrom.constraints.gradient_kernel import carray, gradient_kernel
 from pdrom.constraints.lanes import (
     LANES,
     SMALLEST,
@@ -23,9 +24,11 @@ from pdrom.constraints.simplex import (
     EDGE,
     ENERGY,
     FORCE,
+    OWN,
     WEIGHT,
     P,
     SimplexGroup,
+    copy_rows,
     energy,
     gather_edges,
     scatter,
@@ -83,6 +86,17 @@ def _accumulate(y, corners, geometry, first, last, elements, work, rhs):
     return energy(work)
 
 
+@gradient_kernel
+def _project_gradients(d_pointer, geometry_pointer, p_pointer, m):
+    d, p = carray(d_pointer, (m, 3)), carray(p_pointer, (m, 3))
+    geometry = carray(geometry_pointer, ((m + LANES - 1) // LANES * GEOMETRY * LANES,))
+    work = np.zeros(OWN * LANES)
+    for start in range(0, m, LANES):
+        copy_rows(d, 1, start, work, EDGE)
+        _rest_lengths(work, geometry, start // LANES)
+        store_projections(work, 1, start, p)
+
+
 class EdgeSpring(SimplexGroup):
     """One constraint per edge of the mesh (of a volume: every edge of its tetrahedra).
 
@@ -111,6 +125,13 @@ class EdgeSpring(SimplexGroup):
 
     def _extra(self) -> list[np.ndarray]:
         return [self.rest, np.linalg.norm(self.rest, axis=1)]
+
+    @property
+    def gradient_kernel(self):
+        return _project_gradients
+
+    def kernel_parameters(self) -> np.ndarray:
+        return self._geometry
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         rest = self.rest[elements, None, :]

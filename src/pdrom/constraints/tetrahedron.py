@@ -4,6 +4,7 @@ import numpy as np
 
 from pdrom.constraints import svd3
 from pdrom.constraints.base import require_cells
+from pdrom.constraints.gradient_kernel import carray, gradient_kernel
 from pdrom.constraints.lanes import (
     LANES,
     kernel,
@@ -26,6 +27,7 @@ from pdrom.constraints.simplex import (
     F,
     P,
     SimplexGroup,
+    copy_rows,
     energy,
     gather_edges,
     scatter,
@@ -110,6 +112,17 @@ def _accumulate(y, corners, geometry, low, high, first, last, elements, work, rh
     return energy(work)
 
 
+@gradient_kernel
+def _project_gradients(d_pointer, range_pointer, p_pointer, m):
+    d, p = carray(d_pointer, (3 * m, 3)), carray(p_pointer, (3 * m, 3))
+    allowed = carray(range_pointer, (2,))
+    work = np.zeros((FOUND + 1) * LANES)
+    for start in range(0, m, LANES):
+        copy_rows(d, 3, start, work, F)
+        _nearest(work, allowed[0], allowed[1])
+        store_projections(work, 3, start, p)
+
+
 class TetrahedronGroup(SimplexGroup):
     """One constraint per tetrahedron on the signed singular values of F, weight w V_t."""
 
@@ -133,6 +146,13 @@ class TetrahedronGroup(SimplexGroup):
 
     def _constants(self) -> tuple[float, ...]:
         return (self.minimum, self.maximum)
+
+    @property
+    def gradient_kernel(self):
+        return _project_gradients
+
+    def kernel_parameters(self) -> np.ndarray:
+        return np.array([self.minimum, self.maximum])
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         u, sigma, vt = np.linalg.svd(d)

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from pdrom.constraints.base import GroupConfig, require_cells
+from pdrom.constraints.gradient_kernel import carray, gradient_kernel
 from pdrom.constraints.lanes import (
     LANES,
     SMALLEST,
@@ -31,10 +32,12 @@ from pdrom.constraints.simplex import (
     ENERGY,
     FORCE,
     OPERATOR,
+    OWN,
     WEIGHT,
     F,
     P,
     SimplexGroup,
+    copy_rows,
     energy,
     gather_edges,
     scatter,
@@ -151,6 +154,17 @@ def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, 
     return inverse, area
 
 
+@gradient_kernel
+def _project_gradients(d_pointer, range_pointer, p_pointer, m):
+    d, p = carray(d_pointer, (2 * m, 3)), carray(p_pointer, (2 * m, 3))
+    allowed = carray(range_pointer, (2,))
+    work = np.zeros(OWN * LANES)
+    for start in range(0, m, LANES):
+        copy_rows(d, 2, start, work, F)
+        _clamp_columns(work, allowed[0], allowed[1])
+        store_projections(work, 2, start, p)
+
+
 class TriangleStrain(SimplexGroup):
     """One constraint per triangle, weight w A_t."""
 
@@ -176,6 +190,13 @@ class TriangleStrain(SimplexGroup):
 
     def _constants(self) -> tuple[float, ...]:
         return (self.config.minimum, self.config.maximum)
+
+    @property
+    def gradient_kernel(self):
+        return _project_gradients
+
+    def kernel_parameters(self) -> np.ndarray:
+        return np.array([self.config.minimum, self.config.maximum])
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         u, sigma, vt = np.linalg.svd(d, full_matrices=False)

@@ -31,6 +31,7 @@ METHODS: dict[str, tuple[str, str]] = {
     "bounded": ("#1F9E89", "*"),
     "fewer-iterations": (BLACK, "x"),
     "pod subspace": ("#5E3C99", "p"),
+    "pod subspace, ecsw-3e-02": ("#00A19A", "8"),
     "pod subspace, ecsw-1e-02": ("#1B6E6E", ">"),
     "pod subspace, ecsw-1e-03": ("#3F6B00", "d"),
     "skinning subspace": ("#8B1A4A", "h"),

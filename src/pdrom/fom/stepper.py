@@ -81,16 +81,46 @@ class Stepper:
         on_last_iterate: Callable[[np.ndarray], None] | None = None,
     ) -> tuple[State, FrameReport]:
         """Do one frame (0-based ``frame``); ``on_last_iterate`` sees the last local iterate y."""
-        space = self.space
         seconds = np.zeros(len(PHASES))
         started = perf_counter()
         s, elimination, base = self._begin(state, frame)
+        seconds[0] = perf_counter() - started
+        y, objective = self._iterate(s, base, elimination, seconds, on_last_iterate)
+        before = perf_counter()
+        after = self._finish(state, y)
+        seconds[3] = perf_counter() - before
+        return after, FrameReport(objective, seconds)
+
+    def _begin(self, state: State, frame: int) -> tuple[np.ndarray, Solve, np.ndarray]:
+        """Inertial prediction s with held coordinates at their targets, the system, (M/h^2) s."""
+        space, h = self.space, self.time_step
+        s = state.positions + h * state.velocities
+        s += h**2 * space.acceleration(state.positions, state.velocities)
+        fixed, targets = space.fixed(frame, state.positions)
+        s[fixed] = targets
+        elimination = space.eliminate(fixed, targets)
+        base = space.inertia(s)
+        for local in self.local_steps:
+            local.begin_frame(state.positions)
+        return s, elimination, base
+
+    def _iterate(
+        self,
+        s: np.ndarray,
+        base: np.ndarray,
+        elimination: Solve,
+        seconds: np.ndarray,
+        on_last_iterate: Callable[[np.ndarray], None] | None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """All iterations of a frame, started at s: the last y and the objective at the iterates.
+
+        Their times are added to ``seconds``.
+        """
+        space, acceleration = self.space, self._acceleration
         y, rhs = s.copy(), np.empty_like(s)
-        acceleration = self._acceleration
         if acceleration is not None:
             acceleration.begin_frame(y)
         objective = np.full(self.iterations if self._track else 0, np.nan)
-        seconds[0] = perf_counter() - started
         for k in range(self.iterations):
             if on_last_iterate is not None and k == self.iterations - 1:
                 on_last_iterate(y)
@@ -114,23 +144,7 @@ class Stepper:
                 if k < self.iterations - 1:
                     acceleration.combine(y)
             seconds[2] += perf_counter() - before
-        before = perf_counter()
-        after = self._finish(state, y)
-        seconds[3] = perf_counter() - before
-        return after, FrameReport(objective, seconds)
-
-    def _begin(self, state: State, frame: int) -> tuple[np.ndarray, Solve, np.ndarray]:
-        """Inertial prediction s with held coordinates at their targets, the system, (M/h^2) s."""
-        space, h = self.space, self.time_step
-        s = state.positions + h * state.velocities
-        s += h**2 * space.acceleration(state.positions, state.velocities)
-        fixed, targets = space.fixed(frame, state.positions)
-        s[fixed] = targets
-        elimination = space.eliminate(fixed, targets)
-        base = space.inertia(s)
-        for local in self.local_steps:
-            local.begin_frame(state.positions)
-        return s, elimination, base
+        return y, objective
 
     def _finish(self, state: State, y: np.ndarray) -> State:
         """State after the frame: contacts, then the velocities."""

@@ -38,7 +38,8 @@ def run_hyper(
     """Build every model of ``settings`` (bases, sizes, tolerances) and run both motions with it."""
     motions = {motion: _Motion(scene_of(scene, mesh, motion), runs[motion]) for motion in RUNS}
     bound = motions["train"].scene
-    training = _training(bound, motions["train"].reference)
+    frames = _training_frames(bound)
+    training = motions["train"].reference[1:][frames]
     rows: dict[str, list[dict[str, Any]]] = {motion: [] for motion in RUNS}
     with write_hdf5(runs_output) as file:
         file.attrs.update(attributes({"scene": scene, "settings": settings}))
@@ -49,7 +50,7 @@ def run_hyper(
                 columns = make_columns(bound, training, kind, k)
                 base = f"{kind}_k{k:03d}"
                 _store_columns(file.create_group(f"columns/{base}"), columns)
-                for method, samples in _samplings(bound, columns, training, kind, settings):
+                for method, samples in _samplings(bound, columns, frames, kind, settings):
                     model = SubspaceModel(kind, columns, samples)
                     labels = {"method": method, "position_basis": kind, "k": k, "base": base}
                     store = file.create_group(f"models/{base}_{method}")
@@ -64,18 +65,20 @@ def run_hyper(
         write_table(pd.DataFrame(rows[motion], columns=COLUMNS), tables[motion])
 
 
-def _training(scene: Scene, reference: np.ndarray) -> np.ndarray:
-    """Positions after the training frames: the even ones that train the projections, too."""
+def _training_frames(scene: Scene) -> np.ndarray:
+    """The even frames that train the projections, too."""
     count = max(plan.train for plan in scene.config.reduce.values())
-    return reference[1:][training_frames(scene.config.frames, count)]
+    return training_frames(scene.config.frames, count)
 
 
-def _samplings(scene, columns, training, kind, settings):
+def _samplings(scene, columns, frames, kind, settings):
     """(method, samples) pairs: full projections, and element sampling on the snapshot basis."""
     yield "full", {}
     if kind == "pod":
-        for tolerance in settings["tolerances"]:
-            yield f"ecsw-{tolerance:.0e}", sample_elements(scene, columns, training, tolerance)
+        tolerances = settings["tolerances"]
+        found = sample_elements(scene, columns, frames, tolerances)
+        for tolerance, samples in zip(tolerances, found, strict=True):
+            yield f"ecsw-{tolerance:.0e}", samples
 
 
 class _Motion:

@@ -125,7 +125,8 @@ def _hyper(
     scene: Scene, training: Training, settings: dict[str, Any]
 ) -> tuple[Variant, dict[str, Any]]:
     columns = make_columns(scene, training.positions, "pod", settings["k"])
-    samples = sample_elements(scene, columns, training.positions, settings["tolerance"])
+    frames = np.arange(len(training.positions))
+    (samples,) = sample_elements(scene, columns, frames, [settings["tolerance"]])
     model = SubspaceModel("pod", columns, samples)
     labels = {
         "k": columns.modes,

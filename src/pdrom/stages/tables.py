@@ -11,6 +11,7 @@ from pdrom.tables.effects_cost import effects_cost, effects_left_out
 from pdrom.tables.gain_prediction import gain_prediction
 from pdrom.tables.ladder import ladder
 from pdrom.tables.local_share import local_share
+from pdrom.tables.online import online
 from pdrom.tables.reconstruction_error import reconstruction_error
 from pdrom.tables.reduced_reruns import heldout_reruns, reduced_reruns
 from pdrom.tables.scaling import scaling, scaling_fit
@@ -51,6 +52,7 @@ def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
             params.wrong,
             params.left,
         ),
+        "online": lambda: online(inputs.parts),
         "targets": lambda: targets(read_table(inputs.reruns), read_table(inputs.reconstruction)),
         "gain_prediction": lambda: gain_prediction(
             read_table(inputs.reruns), read_table(inputs.reconstruction)

@@ -31,9 +31,14 @@ class SubspaceLocalStep:
         self._rhs = np.empty((len(vertices), 3))
 
     @property
+    def strain(self) -> np.ndarray:
+        """S B of the sampled elements, (m p, K): all that an iteration needs of the mesh."""
+        return self.group.S @ self._rows
+
+    @property
     def matrix(self) -> np.ndarray:
         """B^T S^T W S B of the sampled elements, (K, K)."""
-        strain = self.group.S @ self._rows
+        strain = self.strain
         return strain.T @ (self.group.row_weights[:, None] * strain)
 
     def begin_frame(self, q: np.ndarray) -> None:

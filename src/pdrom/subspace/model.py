@@ -1,5 +1,6 @@
 """A hyper-reduced model of a scene: columns, sampled elements of every group, and its step loop."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,12 +10,14 @@ from pdrom.scene import Scene
 from pdrom.subspace.atoms import atoms
 from pdrom.subspace.columns import Columns, build_columns, displacement_modes
 from pdrom.subspace.ecsw import ecsw_elements
+from pdrom.subspace.fused import FusedStepper
 from pdrom.subspace.local_step import SubspaceLocalStep
 from pdrom.subspace.skinning import skinning_modes
-from pdrom.subspace.space import ReducedSpace, coordinates, reduced_state
+from pdrom.subspace.space import ReducedSpace, reduced_state
+from pdrom.subspace.training import training_run
 
-# Training states that the element sampling looks at, at most.
-STATES = 40
+# Training frames that the element sampling looks at, at most.
+FRAMES = 70
 
 
 @dataclass(frozen=True)
@@ -41,9 +44,7 @@ class SubspaceModel:
             steps.append(SubspaceLocalStep(group, self.columns, chosen.elements, chosen.factors))
         space = ReducedSpace(scene, self.columns, sum(step.matrix for step in steps))
         config = scene.config
-        loop = Stepper(
-            space, config.time_step, config.iterations, steps, False, scene.acceleration()
-        )
+        loop = FusedStepper(space, config.time_step, config.iterations, steps, scene.acceleration())
         return loop, reduced_state(scene, self.columns)
 
     def positions(self, z: np.ndarray) -> np.ndarray:
@@ -67,12 +68,19 @@ def make_columns(scene: Scene, training: np.ndarray, kind: str, k: int) -> Colum
 
 
 def sample_elements(
-    scene: Scene, columns: Columns, training: np.ndarray, tolerance: float
-) -> dict[str, Samples]:
-    """Energy-conserving samples of every group, trained on states of the subspace."""
-    chosen = training[np.unique(np.linspace(0, len(training) - 1, STATES).round().astype(int))]
-    states = np.stack([columns.B @ coordinates(columns, scene.masses, q) for q in chosen])
-    return {
-        group.name: Samples(*ecsw_elements(group, columns, states, tolerance))
-        for group in scene.groups
+    scene: Scene, columns: Columns, frames: np.ndarray, tolerances: Sequence[float]
+) -> list[dict[str, Samples]]:
+    """Energy-conserving samples of every group for each tolerance.
+
+    They are trained on iterates of the subspace with all projections, in some of the training
+    ``frames``.
+    """
+    chosen = frames[np.unique(np.linspace(0, len(frames) - 1, FRAMES).round().astype(int))]
+    training = training_run(scene, columns, chosen)
+    found = {
+        group.name: ecsw_elements(group, columns, training, tolerances) for group in scene.groups
     }
+    return [
+        {name: Samples(*solutions[i]) for name, solutions in found.items()}
+        for i in range(len(tolerances))
+    ]

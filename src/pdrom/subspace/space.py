@@ -33,15 +33,25 @@ class DenseElimination:
         self._inverse = np.ascontiguousarray(linalg.cho_solve(factor, np.eye(len(self.free))))
         require_accurate(block, lambda rhs, out: np.matmul(self._inverse, rhs, out=out))
         self._coupling = np.ascontiguousarray(matrix[np.ix_(self.free, fixed)])
+        self.fixed, self.targets = fixed, np.zeros((len(fixed), 3))
         self._load = np.zeros((len(self.free), 3))
 
     def set_targets(self, targets: np.ndarray) -> None:
         """Values (m, 3) of the fixed coordinates."""
+        self.targets = targets
         self._load = self._coupling @ targets
 
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
         """Overwrite the free coordinates of ``y``."""
-        y[self.free] = self._inverse @ (rhs[self.free] - self._load)
+        y[self.free] = self.solved(rhs)
+
+    def solved(self, rhs: np.ndarray) -> np.ndarray:
+        """Free coordinates that belong to ``rhs`` (K, 3)."""
+        return self._inverse @ (rhs[self.free] - self._load)
+
+    def lift(self, rows: np.ndarray) -> np.ndarray:
+        """What a unit force on each of ``rows`` (m, K) adds to the free coordinates, (m, K')."""
+        return rows[:, self.free] @ self._inverse
 
 
 class ReducedSpace(Space):
@@ -50,14 +60,18 @@ class ReducedSpace(Space):
     Parameters
     ----------
     matrix : (K, K) stiffness B^T (sum of the groups' S^T W S) B, possibly with sampled weights
+
+    Attributes
+    ----------
+    matrix : (K, K) system matrix A: inertia and stiffness
     """
 
     def __init__(self, scene: Scene, columns: Columns, matrix: np.ndarray) -> None:
         h = scene.config.time_step
         self.columns = columns
         mass = columns.B.T @ (scene.masses[:, None] * columns.B)
+        self.matrix = mass / h**2 + matrix
         self._inertia = mass / h**2
-        self._matrix = self._inertia + matrix
         self._forces = [_reduce_force(f, columns, mass, scene) for f in scene.forces]
         self._boundaries = [_ReducedBoundary(b, columns) for b in scene.boundaries]
         self._contacts = [_ReducedContact(c, columns, scene) for c in scene.contacts]
@@ -81,7 +95,7 @@ class ReducedSpace(Space):
     def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
         key = fixed.tobytes()
         if key not in self._cache:
-            self._cache[key] = DenseElimination(self._matrix, fixed)
+            self._cache[key] = DenseElimination(self.matrix, fixed)
         elimination = self._cache[key]
         elimination.set_targets(targets)
         return elimination

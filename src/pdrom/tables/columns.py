@@ -79,6 +79,11 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "predictor", "lower", "upper", "runs", "failed", "failed_share", "median_error",
         "rank_correlation", "threshold", "misclassified_share", "failures_ordered",
     ),
+    "online": (
+        "scene", "vertices", "elements", "position_basis", "k", "tau", "elements_sampled",
+        "relative_error_train", "relative_error_heldout", "ms_per_frame", "ms_per_iteration",
+        "fom_ms_per_frame", "speedup",
+    ),
     "claims": (
         "claim", "source", "paper", "measured", "verdict", "why", "figure_or_table",
     ),
@@ -107,6 +112,7 @@ TIMING_COLUMNS: dict[str, tuple[str, ...]] = {
     "breakeven": ("local_ms", "full_ms", "ratio", "breakeven_r"),
     "effects_cost": ("ms_per_frame", "share"),
     "effects_left_out": ("ms_per_frame", "saved_ms", "own_ms"),
+    "online": ("ms_per_frame", "ms_per_iteration", "fom_ms_per_frame", "speedup"),
     "claims": ("measured", "verdict", "why"),
 }  # fmt: skip
 

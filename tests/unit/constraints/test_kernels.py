@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba import njit
 
 from conftest import GROUPS, make_scene, random_rotation
+from pdrom.constraints.base import ConstraintGroup
+from pdrom.constraints.gradient_kernel import call
 from pdrom.constraints.implementations import IMPLEMENTATIONS
 
 STATES = {
@@ -29,6 +32,29 @@ def test_projection_is_finite_and_deterministic(group_scene, rng, state):
     first = group.project(y)
     assert np.isfinite(first).all()
     assert np.array_equal(first, group.project(y))
+
+
+@njit
+def _call_kernel(address, d, parameters, p, m):
+    call(address, d.ctypes.data, parameters.ctypes.data, p.ctypes.data, m)
+
+
+@pytest.mark.parametrize("state", ["rest", "near rest", "scrambled", "mirrored"])
+def test_gradient_kernels_equal_the_numpy_reference(group_scene, rng, state):
+    """The kernel sees S q and its parameters only, of some elements, called by its address."""
+    group = group_scene.groups[0]
+    y = STATES[state](group_scene.mesh.points, rng)
+    group.begin_frame(y)
+    elements = np.arange(0, group.elements, 3)
+    d = (group.S @ y).reshape(group.elements, -1, 3)[elements]
+    p = np.full_like(d, np.nan)
+    part, vertices = group.restricted(elements, np.ones(len(elements)))
+    part.begin_frame(y[vertices])
+    parameters = np.ascontiguousarray(part.kernel_parameters(), dtype=float)
+    _call_kernel(group.gradient_kernel.address, d, parameters, p, len(elements))
+    expected = group.project_elements(y, elements).reshape(p.shape)
+    np.testing.assert_allclose(p, expected, rtol=1e-10, atol=1e-12)
+    assert group.frame_lagged == (type(group).begin_frame is not ConstraintGroup.begin_frame)
 
 
 @pytest.mark.parametrize("state", ["rest", "near rest", "scrambled", "mirrored"])

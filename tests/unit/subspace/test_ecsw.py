@@ -10,11 +10,13 @@ from hypothesis import strategies as st
 from conftest import GROUPS, make_scene
 from pdrom.fom.run import trajectory
 from pdrom.fom.stepper import State, Stepper
+from pdrom.subspace import ecsw
 from pdrom.subspace.columns import build_columns
-from pdrom.subspace.ecsw import ecsw_elements, training_rows
+from pdrom.subspace.ecsw import ecsw_elements, training_equations
 from pdrom.subspace.local_step import SubspaceLocalStep
 from pdrom.subspace.model import SubspaceModel, make_columns, sample_elements
 from pdrom.subspace.space import ReducedSpace, coordinates
+from pdrom.subspace.training import TrainingFrame, training_run
 
 SCENES = {
     name: make_scene({"effect": name, "weight": 1e4}, {"effect": "gravity"}, mesh=GROUPS[name])
@@ -69,21 +71,64 @@ def pulled():
     return scene, run, make_columns(scene, run[1:], "pod", 4)
 
 
-def in_space(scene, columns, states) -> np.ndarray:
-    return np.stack([columns.B @ coordinates(columns, scene.masses, q) for q in states])
+def everything(group) -> np.ndarray:
+    return np.arange(group.elements)
 
 
-@pytest.mark.parametrize("tolerance", [0.3, 1e-2, 1e-3])
-def test_sampled_equations_meet_the_tolerance(pulled, tolerance):
-    scene, run, columns = pulled
-    states = in_space(scene, columns, run[1::3])
+def test_sampled_equations_meet_the_tolerance(pulled):
+    scene, _, columns = pulled
+    training = training_run(scene, columns, np.arange(0, 12, 3))
     for group in scene.groups:
-        elements, factors = ecsw_elements(group, columns, states, tolerance)
-        assert (factors > 0.0).all()
-        assert len(np.unique(elements)) == len(elements) < group.elements
-        rows = training_rows(group, columns, states)
-        left = rows[:, elements] @ factors - rows.sum(axis=1)
-        assert np.linalg.norm(left) <= tolerance * np.linalg.norm(rows.sum(axis=1)) * (1 + 1e-9)
+        rows, total = training_equations(group, columns, training, everything(group))
+        np.testing.assert_allclose(rows.sum(axis=1), total, atol=1e-9)
+        counts = []
+        tolerances = [0.3, 1e-2, 1e-3]
+        for tolerance, (elements, factors) in zip(
+            tolerances, ecsw_elements(group, columns, training, tolerances), strict=True
+        ):
+            assert (factors > 0.0).all()
+            assert len(np.unique(elements)) == len(elements) < group.elements
+            left = rows[:, elements] @ factors - total
+            assert np.linalg.norm(left) <= tolerance * np.linalg.norm(total) * (1 + 1e-9)
+            counts.append(len(elements))
+        assert counts == sorted(counts)
+
+
+def test_a_part_of_a_large_group_stands_for_all(pulled, monkeypatch):
+    scene, _, columns = pulled
+    group = scene.groups[1]
+    training = training_run(scene, columns, [2, 8])
+    rows, total = training_equations(group, columns, training, everything(group))
+    monkeypatch.setattr(ecsw, "CANDIDATES", group.elements // 2)
+    elements, factors = ecsw_elements(group, columns, training, [3e-2])[0]
+    left = rows[:, elements] @ factors - total
+    assert np.linalg.norm(left) <= 3e-2 * np.linalg.norm(total)
+
+
+def test_factors_of_one_repeat_the_iterations(pulled):
+    """What is trained on is an identity: all equations hold for the iterates of the run."""
+    scene, _, columns = pulled
+    steps = [SubspaceLocalStep(group, columns) for group in scene.groups]
+    space = ReducedSpace(scene, columns, sum(step.matrix for step in steps))
+    inertia = space.matrix - sum(step.matrix for step in steps)
+    frame = training_run(scene, columns, [5])[0]
+    fixed = np.concatenate(columns.atom_columns)
+    free = np.setdiff1d(np.arange(len(inertia)), fixed)
+    sums = []
+    for before, after in frame.pairs:
+        total = np.zeros_like(after)
+        for group in scene.groups:
+            d = group.S @ (columns.B @ after) - group.project(columns.B @ before)
+            total += columns.B.T @ (group.S.T @ (group.row_weights[:, None] * d))
+        # (M/h^2)(s - z') is the sum of all elements; s is that of the frame
+        sums.append((total + inertia @ after)[free])
+    for other in sums[1:]:
+        np.testing.assert_allclose(other, sums[0], rtol=1e-9, atol=1e-7 * abs(sums[0]).max())
+    energy = frame.measure[:, free]
+    np.testing.assert_allclose(
+        energy.T @ energy, np.linalg.inv(space.matrix[np.ix_(free, free)]), rtol=1e-8, atol=1e-16
+    )
+    assert not frame.measure[:, fixed].any()
 
 
 def test_a_finer_tolerance_gives_a_better_run(pulled):
@@ -100,57 +145,63 @@ def test_a_finer_tolerance_gives_a_better_run(pulled):
         return np.sqrt(off) / motion
 
     full = error({})
-    fine = error(sample_elements(scene, columns, run[1:], 1e-3))
-    coarse = error(sample_elements(scene, columns, run[1:], 0.5))
+    fine, coarse = map(error, sample_elements(scene, columns, np.arange(12), [1e-3, 0.5]))
     assert full < 0.05
     assert abs(fine - full) < 0.05
     assert coarse > fine
 
 
-def test_training_equations_are_the_elements_forces_and_stiffness(rng):
+def test_training_equations_are_those_of_the_elements(rng):
     """Element by element from the definition; hashing adds each equation to one row, signed."""
     scene = SCENES["strain"]
     group, columns = copy(scene.groups[0]), random_columns(scene, rng, 3)
     group.weights = group.weights * rng.uniform(0.2, 5.0, group.elements)
-    states = rng.standard_normal((1, *scene.mesh.points.shape))
-    y, p, k = states[0], group.rows_per_element, columns.B.shape[1]
-    group.begin_frame(y)
-    force, stiffness = np.zeros((2, 3 * k, group.elements))
-    projected, dense = group.project(y), group.S.toarray()
+    p, k = group.rows_per_element, columns.B.shape[1]
+    before, after = pair = rng.standard_normal((2, k, 3))
+    # the constant column has no strain, hence one equation an axis less
+    measure = rng.standard_normal((k - 1, k))
+    count = 3 * (k - 1)
+    projected, dense = group.project(columns.B @ before), group.S.toarray()
+    expected = np.zeros((count, group.elements))
     for e in range(group.elements):
         own = slice(p * e, p * (e + 1))
-        left = group.weights[e] * columns.B.T @ dense[own].T
-        force[:, e] = (left @ (dense[own] @ y - projected[own])).T.ravel()
-        stiffness[:, e] = (left @ (dense[own] @ y)).T.ravel()
-    force /= np.linalg.norm(force.sum(axis=1))
-    stiffness /= np.linalg.norm(stiffness.sum(axis=1))
-    rows = training_rows(group, columns, states)
-    assert rows.shape == (2 * 3 * k + 1, group.elements)
+        left = group.weights[e] * measure @ columns.B.T @ dense[own].T
+        difference = dense[own] @ columns.B @ after - projected[own]
+        expected[:, e] = (left @ difference).ravel()
+    expected /= np.linalg.norm(expected.sum(axis=1))
+    frame = TrainingFrame(before, pair[None], measure)
+    rows, total = training_equations(group, columns, [frame], np.arange(group.elements))
+    assert rows.shape == (count + 1, group.elements)
+    np.testing.assert_allclose(rows.sum(axis=1), total, atol=1e-12)
     np.testing.assert_allclose(rows[-1], group.weights / group.weights.sum(), rtol=1e-14)
-    # the equations of the constant column are empty, those of the others are independent
-    real = np.linalg.norm(stiffness, axis=1) > 1e-10
-    assert np.linalg.matrix_rank(stiffness[real]) == real.sum() < group.elements
-    hashing = rows[3 * k : -1] @ np.linalg.pinv(stiffness[real])
-    np.testing.assert_allclose(np.sort(abs(hashing), axis=0)[-1], 1.0, atol=1e-6)
-    np.testing.assert_allclose(np.sort(abs(hashing), axis=0)[:-1], 0.0, atol=1e-6)
+    assert np.linalg.matrix_rank(expected) == count < group.elements
+    hashing = rows[:-1] @ np.linalg.pinv(expected)
+    np.testing.assert_allclose(np.sort(abs(hashing), axis=0)[-1], 1.0, atol=1e-8)
+    np.testing.assert_allclose(np.sort(abs(hashing), axis=0)[:-1], 0.0, atol=1e-8)
     assert {-1.0, 1.0} <= set(hashing.round().ravel().tolist())
-    np.testing.assert_allclose(rows[: 3 * k], hashing.round() @ force[real], atol=1e-9)
+    some = np.array([3, 0])
+    np.testing.assert_array_equal(
+        training_equations(group, columns, [frame], some)[0], rows[:, some]
+    )
 
 
 def test_a_group_at_rest_keeps_its_stiffness(pulled):
     """No force at all in the training states, and still elements and weight."""
     scene, _, columns = pulled
+    rest = coordinates(columns, scene.masses, scene.mesh.points)
+    measure = np.eye(len(rest))
+    still = TrainingFrame(rest, np.stack([[rest, rest]]), measure)
     for group in scene.groups:
-        elements, factors = ecsw_elements(group, columns, scene.mesh.points[None], 1e-2)
+        elements, factors = ecsw_elements(group, columns, [still], [1e-2])[0]
         assert len(elements) > 0
         kept = factors @ group.weights[elements] / group.weights.sum()
         assert kept == pytest.approx(1.0, abs=0.2)
 
 
 def test_the_choice_is_repeatable(pulled):
-    scene, run, columns = pulled
-    states = in_space(scene, columns, run[1:4])
-    one, two = (ecsw_elements(scene.groups[0], columns, states, 1e-2) for _ in range(2))
+    scene, _, columns = pulled
+    training = training_run(scene, columns, [1, 2, 3])
+    one, two = (ecsw_elements(scene.groups[0], columns, training, [1e-2])[0] for _ in range(2))
     np.testing.assert_array_equal(one[0], two[0])
     np.testing.assert_array_equal(one[1], two[1])
-    assert len(ecsw_elements(scene.groups[0], columns, states, 0.0, most=5)[0]) == 5
+    assert len(ecsw_elements(scene.groups[0], columns, training, [0.0], most=5)[0][0]) == 5

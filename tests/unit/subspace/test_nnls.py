@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from pdrom.subspace.nnls import nnls_early_stop
+from pdrom.subspace.nnls import _remove_row, nnls_early_stop, nnls_path
 
 
 def dense(support, values, size) -> np.ndarray:
@@ -62,6 +62,43 @@ def test_stops_at_the_tolerance_with_few_columns(tolerance):
     assert 0 < len(support) < 15
     finer = nnls_early_stop(g, b, tolerance / 10.0)[0]
     assert len(finer) >= len(support)
+
+
+def test_blocks_of_columns_end_at_the_same_minimum(rng):
+    """Large enough that several columns join at a time and that columns leave."""
+    g = rng.standard_normal((150, 400)) + 0.2 * rng.standard_normal((150, 1))
+    b = g[:, :80].sum(axis=1) + 10.0 * rng.standard_normal(150)
+    support, values = nnls_early_stop(g, b, 0.0)
+    best, norm = nnls(g, b)
+    assert len(support) > 40
+    assert np.linalg.norm(g @ dense(support, values, 400) - b) == pytest.approx(norm, rel=1e-8)
+    np.testing.assert_allclose(dense(support, values, 400), best, atol=1e-6)
+
+
+def test_a_path_meets_each_of_its_tolerances():
+    t = np.linspace(0.0, 1.0, 60)
+    g = np.exp(-np.outer(t, np.linspace(0.1, 5.0, 200)))
+    b = g.sum(axis=1)
+    path = nnls_path(g, b, [1e-3, 0.5, 1e-2])
+    for (support, values), tolerance in zip(path, [1e-3, 0.5, 1e-2], strict=True):
+        assert (values > 0.0).all()
+        assert np.linalg.norm(g[:, support] @ values - b) <= tolerance * np.linalg.norm(b)
+    assert len(path[1][0]) <= len(path[2][0]) <= len(path[0][0])
+    for one, two in zip(path[1], nnls_early_stop(g, b, 0.5), strict=True):
+        np.testing.assert_array_equal(one, two)
+
+
+@settings(max_examples=30, deadline=None)
+@given(n=st.integers(1, 12), data=st.data())
+def test_a_removed_row_leaves_the_factor_of_the_rest(n, data):
+    removed = data.draw(st.integers(0, n - 1))
+    x = np.random.default_rng(data.draw(st.integers(0, 99))).standard_normal((n + 3, n))
+    matrix = x.T @ x
+    factor = np.asfortranarray(np.linalg.cholesky(matrix))
+    _remove_row(factor, n, removed)
+    rest = np.delete(np.delete(matrix, removed, 0), removed, 1)
+    left = np.tril(factor[: n - 1, : n - 1])
+    np.testing.assert_allclose(left @ left.T, rest, rtol=1e-9, atol=1e-9)
 
 
 def test_support_is_bounded(rng):

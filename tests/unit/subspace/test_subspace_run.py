@@ -6,9 +6,11 @@ import pytest
 from conftest import GROUPS, make_scene
 from pdrom.errors import SceneError
 from pdrom.fom.run import trajectory
+from pdrom.fom.stepper import Stepper
 from pdrom.store import write_hdf5
 from pdrom.subspace.atoms import atoms
 from pdrom.subspace.columns import build_columns
+from pdrom.subspace.fused import FusedStepper
 from pdrom.subspace.load import load_models
 from pdrom.subspace.local_step import SubspaceLocalStep
 from pdrom.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
@@ -233,6 +235,54 @@ def test_arrays_of_a_step_have_the_size_of_the_sample():
     assert sizes[0] == sizes[1]
 
 
+@pytest.mark.parametrize("name", ["free", "handles", "poke", "damped", "bending", "bar"])
+def test_fused_iterations_are_the_plain_ones(name):
+    """The compiled loop against the step loop with projections and solve one after the other."""
+    scene = SCENES[name]
+    reference = trajectory(scene)
+    columns = make_columns(scene, reference[1:], "pod", 4)
+    few = {
+        g.name: Samples(np.arange(0, g.elements, 3), np.full(len(range(0, g.elements, 3)), 3.0))
+        for g in scene.groups
+    }
+    loop, state = SubspaceModel("pod", columns, few).loop(scene)
+    assert isinstance(loop, FusedStepper)
+    plain = Stepper(loop.space, loop.time_step, loop.iterations, loop.local_steps)
+    other = state
+    for frame in range(scene.config.frames):
+        state, report = loop.step(state, frame)
+        other, _ = plain.step(other, frame)
+        assert len(report.objective) == 0
+        np.testing.assert_allclose(state.positions, other.positions, rtol=1e-8, atol=1e-8)
+    moved = other.positions - loop_start(scene, columns)
+    assert np.linalg.norm(moved) > 1e-3
+
+
+def loop_start(scene, columns) -> np.ndarray:
+    return coordinates(columns, scene.masses, scene.mesh.points)
+
+
+def test_a_group_without_a_gradient_kernel_iterates_plainly():
+    scene = SCENES["pins"]
+    columns = make_columns(scene, trajectory(scene)[1:], "pod", 4)
+    step = SubspaceLocalStep(scene.groups[0], columns)
+    model = SubspaceModel("pod", columns)
+    loop, state = model.loop(scene)
+    plain = FusedStepper(loop.space, 0.016, 10, [Plain(step)])
+    np.testing.assert_allclose(
+        loop.step(state, 0)[0].positions, plain.step(state, 0)[0].positions, rtol=1e-10, atol=1e-10
+    )
+
+
+class Plain:
+    """A local step of another kind."""
+
+    def __init__(self, step) -> None:
+        self.name, self.begin_frame, self.accumulate = (
+            step.name, step.begin_frame, step.accumulate,
+        )  # fmt: skip
+
+
 def test_forces_that_cannot_be_reduced_are_refused():
     scene = make_scene(SPRING, GRAVITY)
     force = scene.forces[0]
@@ -249,7 +299,7 @@ def test_models_survive_a_file(tmp_path):
     scene = SCENES["handles"]
     reference = trajectory(scene)
     columns = make_columns(scene, reference[1:], "pod", 4)
-    samples = sample_elements(scene, columns, reference[1:], 1e-2)
+    samples = sample_elements(scene, columns, np.arange(8), [1e-2])[0]
     with write_hdf5(tmp_path / "models.h5") as file:
         _store_columns(file.create_group("columns/pod_k004"), columns)
         for method, chosen in (("full", {}), ("ecsw", samples)):

@@ -1,0 +1,45 @@
+"""Projections from S q alone, as compiled functions that other compiled code calls by address.
+
+In a position subspace S q comes from a small dense product, not from vertices. A group states the
+projection of a batch as a function of S q and of a few numbers per element; the iterations of a
+subspace call it through its address, so that one compiled loop serves every mix of groups.
+"""
+
+from llvmlite import ir
+from numba import carray, cfunc, types
+from numba.extending import intrinsic
+
+_SIGNATURE = types.void(
+    types.CPointer(types.float64),
+    types.CPointer(types.float64),
+    types.CPointer(types.float64),
+    types.intp,
+)
+
+
+def gradient_kernel(function):
+    """Compile ``function(d, parameters, p, m)``; its attribute ``address`` is what `call` takes.
+
+    d : pointer to (m, rows, 3) values of S q
+    parameters : pointer to the numbers of `ConstraintGroup.kernel_parameters`
+    p : pointer to (m, rows, 3), where the projections go
+    """
+    return cfunc(_SIGNATURE, cache=True, error_model="numpy")(function)
+
+
+@intrinsic
+def call(typing_context, address, d, parameters, p, m):
+    """Call a gradient kernel by its address; arrays are given by the addresses of their data."""
+    integers = (types.intp,) * 5
+
+    def generate(context, builder, signature, arguments):
+        integer = ir.IntType(types.intp.bitwidth)
+        kind = ir.FunctionType(ir.VoidType(), [integer] * 4)
+        function = builder.inttoptr(arguments[0], kind.as_pointer())
+        builder.call(function, arguments[1:])
+        return context.get_dummy_value()
+
+    return types.void(*integers), generate
+
+
+__all__ = ["call", "carray", "gradient_kernel"]
