@@ -1,8 +1,8 @@
 """Groups on simplices: springs (1 row), triangles (2 rows), tetrahedra (3 rows).
 
 An element with p rows has p + 1 vertices, S q = D^-T [q_1 - q_0, ..., q_p - q_0]^T with the edge
-matrix D of the rest shape (1 for springs). What differs from group to group is the projection of a block; gather,
-weighting and scatter are here, for blocks of elements (see `pdrom.constraints.lanes`).
+matrix D of the rest shape (1 for springs). What differs from group to group is the projection of a
+block; gather and scatter are here, for blocks of elements (see `pdrom.constraints.lanes`).
 """
 
 from collections.abc import Callable
