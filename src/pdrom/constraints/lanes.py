@@ -7,6 +7,9 @@ its number i begins. Functions of one lane are inlined into the loop over the la
 branches, only selections. No fast-math: an element gives the same bits in every lane and company.
 """
 
+from pathlib import Path
+from zlib import crc32
+
 import numpy as np
 from numba import njit
 
@@ -16,14 +19,30 @@ LANES = 32
 SMALLEST = 1e-300
 
 
+def _checksum() -> str:
+    """Of the sources of all kernels."""
+    sources = sorted(Path(__file__).parent.glob("*.py"))
+    return f"{crc32(b''.join(path.read_bytes() for path in sources)):08x}"
+
+
+_SOURCES = _checksum()
+
+
+def _compiled(function, **options):
+    # numba's cache looks at the file of a function only, not at those of what it inlines: without
+    # the checksum an edit of this file would leave kernels of other files as they were
+    function.__qualname__ += f"_{_SOURCES}"
+    return njit(cache=True, error_model="numpy", **options)(function)
+
+
 def lane_function(function):
     """Compile a function of one lane: inlined, without division checks."""
-    return njit(cache=True, error_model="numpy", forceinline=True)(function)
+    return _compiled(function, forceinline=True)
 
 
 def kernel(function):
     """Compile a kernel that releases the interpreter lock."""
-    return njit(cache=True, error_model="numpy", nogil=True)(function)
+    return _compiled(function, nogil=True)
 
 
 def blocks(elements: int) -> int:

@@ -2,7 +2,7 @@
 
 An element with p rows has p + 1 vertices, S q = D^-T [q_1 - q_0, ..., q_p - q_0]^T with the edge
 matrix D of the rest shape (1 for springs). What differs from group to group is the projection of a
-block; gather, weighting and scatter are here, for blocks of elements (`pdrom.constraints.lanes`).
+block; gather and scatter are here, for blocks of elements (see `pdrom.constraints.lanes`).
 """
 
 from collections.abc import Callable
