@@ -63,11 +63,27 @@ def scenes(tables: Tables) -> str:
 def methods(tables: Tables) -> str:
     """Ingredients of each method."""
     rows = [
-        [name(row.method), escape(row.title), row.centring, row.rows, row.selection, row.solve]
+        [
+            name(row.method),
+            escape(row.title),
+            row.centring,
+            row.rows,
+            row.selection if row.rows != "all" else "--",
+            _samples(row),
+            row.solve,
+        ]
         for row in tables["methods"].itertuples()
     ]
-    header = ["method", "title", "centring", "rows", "selection", "solve"]
-    return tabular(header, rows, "llllll")
+    header = ["method", "title", "centring", "rows", "selection", "samples", "solve"]
+    return tabular(header, rows, "lllllll")
+
+
+def _samples(row) -> str:
+    """How many samples a method takes."""
+    if row.rows == "all":
+        return "--"
+    least = "one a mode" if row.oversampling == 1 else f"{row.oversampling} a mode"
+    return least if pd.isna(row.gain_bound) else rf"$\gamma \le {row.gain_bound:g}$"
 
 
 def ranks(tables: Tables) -> str:

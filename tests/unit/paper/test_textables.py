@@ -29,6 +29,8 @@ TABLES = {
             "rows": ["all", "scalar"],
             "selection": ["greedy", "greedy"],
             "solve": ["square", "qr"],
+            "oversampling": [1, 3],
+            "gain_bound": [None, None],
         }
     ),
     "scenes": pd.DataFrame(
@@ -165,6 +167,21 @@ def test_reruns_show_the_largest_size_that_ran():
     """Ranks beyond the data and subspaces are left out, a blow-up shows its frame."""
     (row,) = rows(reruns(TABLES))
     assert row == (r"\texttt{bar\_a} & edge spring & 0.25 & \textcolor{okred}{blow-up, 4} \\")
+
+
+@pytest.mark.parametrize(
+    ("changes", "samples"),
+    [
+        ({}, "3 a mode"),
+        ({"oversampling": 1}, "one a mode"),
+        ({"gain_bound": 2.5}, r"$\gamma \le 2.5$"),
+        ({"rows": "all"}, "--"),
+    ],
+)
+def test_methods_say_how_many_samples_they_take(changes, samples):
+    frame = TABLES["methods"][1:].assign(**changes)
+    (row,) = rows(TEX_TABLES["tab_methods"]({"methods": frame}))
+    assert row.split(" & ")[5] == samples
 
 
 def test_ranks_count_what_is_above_round_off():
