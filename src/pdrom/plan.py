@@ -14,13 +14,14 @@ from pdrom.fingerprint import fingerprint
 from pdrom.ladder import LadderSpec, load_ladder
 from pdrom.method import MethodSpec
 from pdrom.paper.textables import TEX_TABLES
+from pdrom.subspace_ablation import AblationSpec, load_ablation
 
 RESULTS = "results"
 REFERENCE_BASIS = "none-none-vectorised"
 TABLES = (
     "singular_values", "reconstruction_error", "reduced_reruns", "accuracy_cost", "local_share",
     "sensitivity",
-    "ladder", "heldout_reruns", "claims",
+    "ladder", "heldout_reruns", "subspace_ablation", "claims",
 )  # fmt: skip
 
 
@@ -48,7 +49,8 @@ class Plan:
 
     def check(self) -> None:
         """Read the configuration of figures, ladder and claims, so that a fault shows early."""
-        _ = self.figure_specs, self.ladder, load_claims(self.root / "config" / "claims.yaml")
+        _ = self.figure_specs, self.ladder, self.ablation
+        _ = load_claims(self.root / "config" / "claims.yaml")
 
     # Parameters -----------------------------------------------------------------------------
 
@@ -158,6 +160,22 @@ class Plan:
         """Files of the scenes that climb the ladder and are in this configuration."""
         pairs = [(s, g) for s, g in self.study.experiments if s in self.ladder.scenes]
         return [f"{RESULTS}/ladder/{scene}/{group}.csv" for scene, group in pairs]
+
+    # Ablation in position subspaces ---------------------------------------------------------
+
+    @cached_property
+    def ablation(self) -> AblationSpec:
+        """Ablation of config/subspace_ablation.yaml."""
+        return load_ablation(self.root / "config" / "subspace_ablation.yaml")
+
+    def ablation_settings(self) -> dict[str, Any]:
+        """Plain ablation; which scenes it runs on is no parameter of one run."""
+        return {**self.ablation.model_dump(mode="json", exclude_unset=True), "scenes": []}
+
+    def ablation_files(self) -> list[str]:
+        """Files of the scenes of the ablation that this configuration holds."""
+        scenes = [s for s in self.study.scenes if s in self.ablation.scenes]
+        return [f"{RESULTS}/subspace_ablation/{scene}.csv" for scene in scenes]
 
     # Figures --------------------------------------------------------------------------------
 

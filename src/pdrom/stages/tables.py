@@ -11,6 +11,7 @@ from pdrom.tables.reconstruction_error import reconstruction_error
 from pdrom.tables.reduced_reruns import heldout_reruns, reduced_reruns
 from pdrom.tables.sensitivity import sensitivity
 from pdrom.tables.singular_values import singular_values
+from pdrom.tables.subspace_ablation import subspace_ablation
 
 
 def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
@@ -32,6 +33,7 @@ def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
             inputs.runs, inputs.hyper, read_table(inputs.sensitivity), params.threshold
         ),
         "ladder": lambda: ladder(inputs.parts),
+        "subspace_ablation": lambda: subspace_ablation(inputs.parts),
         "accuracy_cost": lambda: accuracy_cost(
             read_table(inputs.reruns), inputs.timings, params.iterations
         ),

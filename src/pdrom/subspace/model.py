@@ -9,6 +9,7 @@ from pdrom.scene import Scene
 from pdrom.subspace.atoms import atoms
 from pdrom.subspace.columns import Columns, build_columns, displacement_modes
 from pdrom.subspace.ecsw import ecsw_elements
+from pdrom.subspace.interpolation import InterpolatedLocalStep, Interpolation
 from pdrom.subspace.local_step import SubspaceLocalStep
 from pdrom.subspace.skinning import skinning_modes
 from pdrom.subspace.space import ReducedSpace, coordinates, reduced_state
@@ -27,17 +28,20 @@ class Samples:
 
 @dataclass(frozen=True)
 class SubspaceModel:
-    """Position basis ("pod" or "skinning"), its columns, and the samples of each group."""
+    """Position basis ("pod" or "skinning"), its columns, and what is sampled of each group."""
 
     position_basis: str
     columns: Columns
-    samples: dict[str, Samples] = field(default_factory=dict)
+    samples: dict[str, Samples | Interpolation] = field(default_factory=dict)
 
     def loop(self, scene: Scene) -> tuple[Stepper, State]:
         """Step loop in the coordinates of the subspace, and the initial state."""
         steps = []
         for group in scene.groups:
             chosen = self.samples.get(group.name, Samples())
+            if isinstance(chosen, Interpolation):
+                steps.append(InterpolatedLocalStep(group, self.columns, chosen))
+                continue
             steps.append(SubspaceLocalStep(group, self.columns, chosen.elements, chosen.factors))
         space = ReducedSpace(scene, self.columns, sum(step.matrix for step in steps))
         config = scene.config

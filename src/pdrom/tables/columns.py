@@ -35,6 +35,10 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "scene", "group", "direction", "rung", "r", "condition", "gain", "error_train",
         "error_test", "error_heldout", "finite", "blowup_frame", "relative_error_within_horizon",
     ),
+    "subspace_ablation": (
+        "scene", "group", "position_basis", "k", "r", "variant", "elements_sampled", "gain",
+        "finite", "max_extent", "relative_error_within_horizon", "relative_error_full_projections",
+    ),
     "claims": (
         "claim", "source", "paper", "measured", "verdict", "why", "figure_or_table",
     ),
