@@ -3,6 +3,7 @@ rule subspace_ablation:
     input:
         mesh=lambda w: PLAN.mesh_path(w.scene),
         fom="results/fom/{scene}/train.h5",
+        heldout="results/fom/{scene}/heldout.h5",
         sensitivity="results/sensitivity/{scene}.csv",
     output:
         "results/subspace_ablation/{scene}.csv",

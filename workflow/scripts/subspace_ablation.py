@@ -8,7 +8,7 @@ with job_log(snakemake.log[0]):
         snakemake.params.floor,
         snakemake.params.blowup_extent,
         snakemake.input.mesh,
-        snakemake.input.fom,
+        {"train": snakemake.input.fom, "heldout": snakemake.input.heldout},
         snakemake.input.sensitivity,
         snakemake.output[0],
     )

@@ -28,6 +28,7 @@ FIGURES = Registry(
         "sensitivity_floor": f"{_PACKAGE}.sensitivity_floor:draw",
         "run_error": f"{_PACKAGE}.run_error:draw",
         "ladder": f"{_PACKAGE}.ladder:draw",
+        "subspace_ablation": f"{_PACKAGE}.subspace_ablation:draw",
         "accuracy_cost": f"{_PACKAGE}.accuracy_cost:draw",
     },
 )
@@ -50,6 +51,7 @@ READS: dict[str, tuple[str, ...]] = {
     "sensitivity_floor": ("table:sensitivity",),
     "run_error": ("rerun", "table:sensitivity"),
     "ladder": ("table:ladder",),
+    "subspace_ablation": ("table:subspace_ablation",),
     "accuracy_cost": ("table:accuracy_cost",),
 }
 # Figures of the first experiment and the first method that a configuration holds.

@@ -32,6 +32,10 @@ METHODS: dict[str, tuple[str, str]] = {
     "pod subspace, ecsw-1e-02": ("#1B6E6E", ">"),
     "pod subspace, ecsw-1e-03": ("#3F6B00", "d"),
     "skinning subspace": ("#8B1A4A", "h"),
+    "pod subspace, block-deim": ("#4FA3C7", "P"),
+    "pod subspace, gappy": ("#C08A00", "<"),
+    "pod subspace, hrpd": ("#B05CC6", "*"),
+    "skinning subspace, hrpd": ("#D98BA6", "*"),
 }
 _RESERVE = (("#5A5A5A", "*"), ("#9A6A00", "8"), ("#6B3F00", "H"), ("#2B2B80", "1"))
 

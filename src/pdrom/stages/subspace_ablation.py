@@ -3,17 +3,15 @@
 import logging
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from pdrom.errors import SamplingError
-from pdrom.fom.sensitivity import horizon
+from pdrom.fom.sensitivity import HELDOUT, horizon
 from pdrom.metrics import trajectory_error
 from pdrom.stages.hyper import Motion, training_positions
-from pdrom.stages.scenes import scene_of
+from pdrom.stages.scenes import RUNS, scene_of
 from pdrom.store import write_table
 from pdrom.subspace.columns import Columns
-from pdrom.subspace.interpolation import Interpolation
 from pdrom.subspace.model import SubspaceModel, make_columns
 from pdrom.subspace.specs import InterpolationSpec
 from pdrom.subspace.training import Training, interpolate
@@ -33,7 +31,7 @@ def ablate(
     floor: dict[str, float],
     blowup_extent: float,
     mesh: str,
-    fom: str,
+    runs: dict[str, str],
     sensitivity: str,
     output: str,
 ) -> None:
@@ -42,29 +40,26 @@ def ablate(
     Parameters
     ----------
     floor : perturbation and threshold that define the horizon
+    runs : full-order runs of the training and of the held-out motion
     """
     spec = AblationSpec.model_validate(ablation)
-    motion = Motion(scene_of(scene, mesh), fom)
-    name = motion.scene.config.name
-    spread = floor_of(largest_over_seeds([sensitivity]), name, floor["perturbation"])
-    end = horizon(spread, floor["threshold"])
-    training = training_positions(motion.scene, motion.reference)
+    study = _Study(scene, floor, blowup_extent, mesh, runs, sensitivity)
+    bound = study.motions["train"].scene
+    training = training_positions(bound, study.motions["train"].reference)
     rows = []
     for k in spec.sizes:
-        columns = make_columns(motion.scene, training, POSITION_BASIS, k)
-        trained = Training(motion.scene, columns, training)
-        whole = motion.run(SubspaceModel(POSITION_BASIS, columns), blowup_extent)
+        columns = make_columns(bound, training, POSITION_BASIS, k)
+        trained = Training(bound, columns, training)
         row = {
-            "scene": name,
-            "group": ", ".join(group.name for group in motion.scene.groups),
+            "scene": bound.config.name,
+            "group": ", ".join(group.name for group in bound.groups),
             "position_basis": POSITION_BASIS,
             "k": k,
-            "relative_error_full_projections": _error(motion, whole, end),
+            **study.full_projections(columns),
         }
         for variant, settings in spec.cases():
             row = row | {"r": settings.modes, "variant": variant}
-            found = _interpolations(motion, columns, trained, settings)
-            rows.append(row | _outcome(motion, columns, found, end, blowup_extent))
+            rows.append(row | study.outcome(columns, trained, settings))
             log.info("k = %d, r = %d, %s: %s", k, settings.modes, variant, rows[-1])
     table = pd.DataFrame(rows, columns=COLUMNS["subspace_ablation"])
     table["finite"] = table["finite"].astype("boolean")
@@ -72,40 +67,60 @@ def ablate(
     write_table(table, output)
 
 
-def _interpolations(
-    motion: Motion, columns: Columns, trained: Training, settings: InterpolationSpec
-) -> dict[str, Interpolation] | None:
-    """Interpolation of every group; None if a basis is refused."""
-    try:
-        return interpolate(motion.scene, columns, trained, settings)
-    except SamplingError as error:
-        log.info("refused: %s", error)
-        return None
+class _Study:
+    """Both motions of a scene with their horizons."""
 
+    def __init__(
+        self,
+        scene: dict[str, Any],
+        floor: dict[str, float],
+        blowup_extent: float,
+        mesh: str,
+        runs: dict[str, str],
+        sensitivity: str,
+    ) -> None:
+        self._limit = blowup_extent
+        self.motions = {m: Motion(scene_of(scene, mesh, m), runs[m]) for m in RUNS}
+        spread, name = largest_over_seeds([sensitivity]), scene["name"]
+        labels = {"train": floor["perturbation"], "heldout": HELDOUT}
+        self._ends = {
+            motion: horizon(floor_of(spread, name, label), floor["threshold"])
+            for motion, label in labels.items()
+        }
 
-def _outcome(
-    motion: Motion,
-    columns: Columns,
-    found: dict[str, Interpolation] | None,
-    end: int,
-    blowup_extent: float,
-) -> dict[str, Any]:
-    """What a variant did; a refused one has not run, and its cells are empty."""
-    if found is None:
-        return {}
-    run = motion.run(SubspaceModel(POSITION_BASIS, columns, found), blowup_extent)
-    return {
-        "elements_sampled": sum(len(chosen.elements) for chosen in found.values()),
-        "gain": max(chosen.gain for chosen in found.values()),
-        "finite": run["blowup_frame"] is None,
-        "max_extent": float(run["extent"].max(initial=0.0)),
-        "relative_error_within_horizon": _error(motion, run, end),
-    }
+    def full_projections(self, columns: Columns) -> dict[str, Any]:
+        """Errors of the runs without interpolation: what the subspace itself leaves."""
+        model = SubspaceModel(POSITION_BASIS, columns)
+        errors = {motion: self._run(motion, model)[1] for motion in RUNS}
+        return {
+            "relative_error_full_projections": errors["train"],
+            "heldout_error_full_projections": errors["heldout"],
+        }
 
+    def outcome(
+        self, columns: Columns, trained: Training, settings: InterpolationSpec
+    ) -> dict[str, Any]:
+        """What a variant did; a refused one has not run, and its cells are empty."""
+        try:
+            found = interpolate(self.motions["train"].scene, columns, trained, settings)
+        except SamplingError as error:
+            log.info("refused: %s", error)
+            return {}
+        model = SubspaceModel(POSITION_BASIS, columns, found)
+        run, error = self._run("train", model)
+        return {
+            "elements_sampled": sum(len(chosen.elements) for chosen in found.values()),
+            "gain": max(chosen.gain for chosen in found.values()),
+            "finite": run["blowup_frame"] is None,
+            "max_extent": float(run["extent"].max(initial=0.0)),
+            "relative_error_within_horizon": error,
+            "heldout_error_within_horizon": self._run("heldout", model)[1],
+        }
 
-def _error(motion: Motion, run: dict[str, Any], end: int) -> float | None:
-    """Relative error over the frames before ``end``; None if the run did not get there."""
-    difference: np.ndarray = run["difference"]
-    if len(difference) < end:
-        return None
-    return trajectory_error(difference[:end], motion.displacement[:end])
+    def _run(self, motion: str, model: SubspaceModel) -> tuple[dict[str, Any], float | None]:
+        """A run and its error before the horizon; None if it did not get there."""
+        case, end = self.motions[motion], self._ends[motion]
+        run = case.run(model, self._limit)
+        if len(run["difference"]) < end:
+            return run, None
+        return run, trajectory_error(run["difference"][:end], case.displacement[:end])

@@ -40,7 +40,7 @@ BLOWN_UP = ("spring_twist", "deim-joint", 10)  # scene, method, r of a run that 
 BLOWUP_FRAME = 4
 TABLES = (
     "reconstruction_error", "singular_values", "local_share", "sensitivity", "accuracy_cost",
-    "ladder",
+    "ladder", "subspace_ablation",
 )  # fmt: skip
 
 
@@ -204,6 +204,13 @@ def _write_tables(sources, scenes, methods, rng) -> None:
         for scene in scenes
         for i, (direction, rung) in enumerate(rungs)
     ]
+    variants = [("plain", 9.0, 0.5), ("refused", None, None), ("both + more", 2.0, None)]
+    ablation = [
+        (scene, "pod", 20, r, variant, gain, error, 0.01)
+        for scene in scenes
+        for r in (20, 50)
+        for variant, gain, error in variants
+    ]
     columns = {
         "singular_values": "scene group component singular_value relative above_roundoff",
         "reconstruction_error": "scene group method r split relative_error",
@@ -212,8 +219,11 @@ def _write_tables(sources, scenes, methods, rng) -> None:
         "accuracy_cost": "scene method position_basis k r iterations relative_error_within_horizon"
         " ms_per_frame pareto",
         "ladder": "scene direction rung gain relative_error_within_horizon",
+        "subspace_ablation": "scene position_basis k r variant gain relative_error_within_horizon"
+        " relative_error_full_projections",
     }
-    rows = dict(zip(columns, (values, errors, times, floors, costs, ladder), strict=True))
+    parts = (values, errors, times, floors, costs, ladder, ablation)
+    rows = dict(zip(columns, parts, strict=True))
     for name, header in columns.items():
         write_table(pd.DataFrame(rows[name], columns=header.split()), sources.table(name))
 

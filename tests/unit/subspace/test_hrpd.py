@@ -23,7 +23,7 @@ def test_centres_are_the_mean_of_the_elements_vertices(group_scene):
 
 def test_space_is_orthonormal_in_the_weights_and_starts_with_the_rest_vectors(group_scene):
     group, points = group_scene.groups[0], group_scene.mesh.points
-    space = sampled_space(group, points, HrpdSpec(dimension=10, samples=20))
+    space = sampled_space(group, points, HrpdSpec(dimension=10, samples=40))
     V = space.V
     assert V.shape[1] == 10
     np.testing.assert_allclose(V.T @ (group.row_weights[:, None] * V), np.eye(10), atol=1e-10)
