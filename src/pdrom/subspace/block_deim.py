@@ -74,7 +74,7 @@ def block_deim(
     offset = strain.T @ (group.row_weights[:, None] * mean.reshape(-1, 3))
     offset -= (modes @ (operator @ mean[entries])).reshape(-1, 3)
     lower, upper = coefficient_bounds(snapshots[:, entries] @ operator.T, spec.margin)
-    residual = spec.interpolates == "residual"
+    residual = spec.interpolates != "projection"
     return Interpolation(elements, operator, modes, offset, stiffness, gain, residual, lower, upper)
 
 

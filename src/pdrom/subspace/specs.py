@@ -26,13 +26,14 @@ class InterpolationSpec(BaseModel):
     modes : basis size r (the numerical rank where that is smaller)
     states : what the basis is trained on: "full-order" positions, these "projected" on the
         subspace, or the last iterates that a run with full projections in the subspace "visited"
-    interpolates : the "projection" p, or what it adds to the strain, the "residual" p - S q
+    interpolates : the "projection" p; what it adds to the strain, the "residual" p - S q; or
+        "both", p and S q by the same basis of projections: the same operator on both sides
     centring : "affine" subtracts the mean and adds it back online
     oversampling : elements per mode
     gain : bound up to which elements are added (beyond ``oversampling``); None for no bound
     refuse_above : gain above which the basis is refused with an error; None refuses nothing
     test : the space that the projections are tested with: the strains of the "subspace", or
-        "interpolated" strains, the same operator on both sides (Galerkin)
+        "interpolated" strains (Galerkin; symmetric together with "both")
     margin : online coefficients stay in the range seen in training, widened on both sides by this
         fraction of it; None for no bounds
     """
@@ -41,7 +42,7 @@ class InterpolationSpec(BaseModel):
 
     modes: Annotated[int, Field(ge=1, le=10_000)] = 20
     states: Literal["full-order", "projected", "visited"] = "full-order"
-    interpolates: Literal["projection", "residual"] = "projection"
+    interpolates: Literal["projection", "residual", "both"] = "projection"
     centring: Literal["none", "affine"] = "none"
     oversampling: Annotated[int, Field(ge=1, le=100)] = 1
     gain: Gain | None = None
@@ -53,4 +54,6 @@ class InterpolationSpec(BaseModel):
     def _combination_exists(self) -> Self:
         if self.test == "interpolated" and self.centring == "affine":
             raise ValueError("test = 'interpolated' with centring = 'affine': only 'none'")
+        if self.interpolates == "both" and (self.centring, self.margin) != ("none", None):
+            raise ValueError("interpolates = 'both' with centring or margin: neither is possible")
         return self

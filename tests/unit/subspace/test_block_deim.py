@@ -143,6 +143,7 @@ def test_no_states_are_an_error(pulled):
     "settings",
     [
         {"test": "interpolated", "centring": "affine"},
+        {"interpolates": "both", "margin": 0.1},
         {"gain": 1.0},
         {"modes": 0},
         {"margin": -0.1},

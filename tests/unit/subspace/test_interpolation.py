@@ -47,7 +47,14 @@ def interpolations_of(scene, columns, training, method):
 
 @pytest.mark.parametrize(
     "changes",
-    [{}, {"centring": "affine"}, {"interpolates": "residual"}, {"test": "interpolated"}],
+    [
+        {},
+        {"centring": "affine"},
+        {"interpolates": "residual"},
+        {"test": "interpolated"},
+        {"interpolates": "both"},
+        {"interpolates": "both", "test": "interpolated"},
+    ],
     ids=str,
 )
 def test_the_whole_space_from_all_elements_is_the_full_projection(group_scene, rng, changes):
@@ -252,3 +259,19 @@ def test_interpolations_survive_a_file(tmp_path, rng):
                 np.testing.assert_array_equal(getattr(loaded, name), value)
             else:
                 assert getattr(loaded, name) == value
+
+
+def test_both_sides_with_galerkin_are_a_symmetric_system(group_scene, rng):
+    """What the iteration converges to has the matrix (T^T W T), symmetric and semi-definite."""
+    scene, group = group_scene, group_scene.groups[0]
+    points = scene.mesh.points
+    states = [(points, points + 0.3 * rng.standard_normal(points.shape)) for _ in range(12)]
+    spec = InterpolationSpec(modes=5, oversampling=2, interpolates="both", test="interpolated")
+    columns = make_columns(scene, points[None], "skinning", 2)
+    found = block_deim(group, columns, train_basis(group, states, spec), spec)
+    size = 3 * group.rows_per_element
+    entries = np.concatenate([np.arange(size * e, size * (e + 1)) for e in found.elements])
+    strains = np.kron(group.S.toarray() @ columns.B, np.eye(3))
+    matrix = found.modes @ found.operator @ strains[entries]
+    np.testing.assert_allclose(matrix, matrix.T, atol=1e-9 * np.abs(matrix).max())
+    assert np.linalg.eigvalsh(matrix)[0] > -1e-9 * np.abs(matrix).max()
