@@ -108,6 +108,15 @@ def _full_rank_only(table: pd.DataFrame, where: dict) -> tuple[pd.DataFrame, dic
     return ran[ran.r == largest], {k: v for k, v in where.items() if k != "r"}
 
 
+def _reruns(tables: Tables, where: dict) -> pd.DataFrame:
+    """Reruns; only those whose positions are not reduced, unless ``where`` says otherwise.
+
+    A method may have the same name with full and with reduced positions.
+    """
+    table = tables["reduced_reruns"]
+    return table if "position_basis" in where else table[table.position_basis == "full"]
+
+
 def _tried(rows: pd.DataFrame) -> pd.DataFrame:
     """Reruns that started: not the marked ones, whose size exceeds the numerical rank."""
     return rows[(rows.frames > 0) | rows.blowup_frame.notna()]
@@ -119,7 +128,7 @@ def _local_share(tables: Tables, where: dict) -> pd.Series:
 
 def _rerun_error(tables: Tables, where: dict) -> pd.Series:
     """Error within the horizon; a run that blew up before its horizon counts as infinite."""
-    table, where = _full_rank_only(tables["reduced_reruns"], where)
+    table, where = _full_rank_only(_reruns(tables, where), where)
     return _tried(_filter(table, where)).relative_error_within_horizon.fillna(np.inf)
 
 
@@ -129,7 +138,7 @@ def _error_trend(tables: Tables, where: dict) -> pd.Series:
     1 where the error rises with every size, -1 where it falls; blow-ups share the highest rank.
     Fewer than three sizes have no trend; errors that are all equal have the trend 0.
     """
-    rows = _tried(_filter(tables["reduced_reruns"], where))
+    rows = _tried(_filter(_reruns(tables, where), where))
     trends = []
     for _, run in rows.groupby(["scene", "group", "method"], sort=False):
         error = run.relative_error_within_horizon.fillna(np.inf)

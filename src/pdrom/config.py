@@ -10,6 +10,7 @@ from pdrom.fom.solvers import SOLVERS
 from pdrom.method import MethodSpec, load_methods
 from pdrom.rom.guard_settings import GuardSettings
 from pdrom.scene import Scene, SceneConfig
+from pdrom.subspace.specs import HrpdSpec, InterpolationSpec
 from pdrom.yamlfile import read_yaml, validate
 
 Rank = Annotated[int, Field(ge=1, le=100_000)] | Literal["full"]
@@ -86,12 +87,19 @@ class Timing(_Model):
 
 
 class Subspace(_Model):
-    """Position subspaces: scenes, kinds of basis, numbers of modes, tolerances of the sampling."""
+    """Position subspaces: scenes, kinds of basis, numbers of modes, tolerances of the sampling.
+
+    At the ``interpolated_sizes`` the projections are interpolated, too: by ``hrpd`` (None leaves it
+    out), and on the snapshot basis by every method of ``interpolations``.
+    """
 
     scenes: tuple[str, ...] = ()
     bases: tuple[Literal["pod", "skinning"], ...] = ("pod", "skinning")
     sizes: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = (10, 20, 40)
     tolerances: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (3e-2, 1e-2, 1e-3)
+    interpolated_sizes: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = ()
+    hrpd: HrpdSpec | None = None
+    interpolations: dict[str, InterpolationSpec] = {}
 
 
 class Scaling(_Model):

@@ -17,6 +17,7 @@ from pdrom.hardcases.expectations import load_expectations
 from pdrom.ladder import LadderSpec, load_ladder
 from pdrom.method import MethodSpec, load_methods
 from pdrom.paper.textables import TEX_TABLES
+from pdrom.subspace_ablation import AblationSpec, load_ablation
 
 RESULTS = "results"
 REFERENCE_BASIS = "none-none-vectorised"
@@ -42,6 +43,7 @@ TABLES = (
     "targets",
     "gain_prediction",
     "online",
+    "subspace_ablation",
     "claims",
 )
 
@@ -73,6 +75,8 @@ class Plan:
         _ = self.figure_specs, self.ladder, load_claims(self.root / "config" / "claims.yaml")
         load_expectations(self.root / "config" / "hard_cases.yaml")
         self.hard_cases()
+        _ = self.figure_specs, self.ladder, self.ablation
+        _ = load_claims(self.root / "config" / "claims.yaml")
 
     # Parameters -----------------------------------------------------------------------------
 
@@ -296,6 +300,22 @@ class Plan:
     def online_code(self, scene: str) -> str:
         """Fingerprint of the stage together with the effects that a large scene lists."""
         return fingerprint("pdrom.stages.online", *self.study.online[scene].modules)
+
+    # Ablation in position subspaces ---------------------------------------------------------
+
+    @cached_property
+    def ablation(self) -> AblationSpec:
+        """Ablation of config/subspace_ablation.yaml."""
+        return load_ablation(self.root / "config" / "subspace_ablation.yaml")
+
+    def ablation_settings(self) -> dict[str, Any]:
+        """Plain ablation; which scenes it runs on is no parameter of one run."""
+        return {**self.ablation.model_dump(mode="json", exclude_unset=True), "scenes": []}
+
+    def ablation_files(self) -> list[str]:
+        """Files of the scenes of the ablation that this configuration holds."""
+        scenes = [s for s in self.study.scenes if s in self.ablation.scenes]
+        return [f"{RESULTS}/subspace_ablation/{scene}.csv" for scene in scenes]
 
     # Figures --------------------------------------------------------------------------------
 

@@ -35,8 +35,12 @@ METHODS: dict[str, tuple[str, str]] = {
     "pod subspace, ecsw-1e-02": ("#1B6E6E", ">"),
     "pod subspace, ecsw-1e-03": ("#3F6B00", "d"),
     "skinning subspace": ("#8B1A4A", "h"),
+    "pod subspace, block-deim": ("#4FA3C7", "H"),
+    "pod subspace, gappy": ("#C08A00", "8"),
+    "pod subspace, hrpd": ("#B05CC6", "*"),
+    "skinning subspace, hrpd": ("#D98BA6", "+"),
 }
-_RESERVE = (("#5A5A5A", "*"), ("#9A6A00", "8"), ("#6B3F00", "H"), ("#2B2B80", "1"))
+_RESERVE = (("#5A5A5A", "1"), ("#9A6A00", "2"), ("#6B3F00", "3"), ("#2B2B80", "4"))
 
 GROUPS: dict[str, tuple[str, str]] = {
     "bending": (GREEN, "^"),

@@ -1,6 +1,6 @@
 """Every reduction, made from a hard case's own run: what it was trained on is what it repeats."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,17 +19,36 @@ from pdrom.sampling import Reduction, select
 from pdrom.scene import Scene
 from pdrom.snapshots import row_masses
 from pdrom.subspace.columns import Columns
+from pdrom.subspace.hrpd import hrpd, sampled_space
+from pdrom.subspace.interpolation import Interpolation
+from pdrom.subspace.interpolation_training import Training as States
+from pdrom.subspace.interpolation_training import interpolate
 from pdrom.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
 from pdrom.subspace.space import coordinates
+from pdrom.subspace.specs import HrpdSpec, InterpolationSpec
 
 R, K, TOLERANCE = 10, 6, 1e-2
 
-# Hyper-reductions in a position subspace: scene, columns, training states -> samples by group.
-HYPER: dict[str, Callable[[Scene, Columns, np.ndarray], dict[str, Samples]]] = {
-    "full": lambda scene, columns, training: {},
-    "ecsw": lambda scene, columns, training: sample_elements(scene, columns, training, TOLERANCE),
+HRPD = HrpdSpec(dimension=20, samples=60)
+INTERPOLATIONS = {
+    "gappy": InterpolationSpec(modes=R, states="projected", oversampling=3, margin=0.1),
 }
-BASES = {"pod": ("full", "ecsw"), "skinning": ("full",)}
+BASES = {"pod": ("full", "ecsw", "hrpd", *INTERPOLATIONS), "skinning": ("full", "hrpd")}
+
+
+def _hyper(
+    hyper: str, scene: Scene, columns: Columns, positions: np.ndarray, start: State
+) -> dict[str, Samples | Interpolation]:
+    """What a hyper-reduction samples of each group, from a run's ``positions`` (n, N, 3) m."""
+    if hyper == "full":
+        return {}
+    if hyper == "ecsw":
+        frames = np.arange(scene.config.frames)
+        return sample_elements(scene, columns, frames, [TOLERANCE], start)[0]
+    if hyper == "hrpd":
+        points = scene.mesh.points
+        return {g.name: hrpd(g, columns, sampled_space(g, points, HRPD)) for g in scene.groups}
+    return interpolate(scene, columns, States(scene, columns, positions), INTERPOLATIONS[hyper])
 
 
 class Training:
@@ -117,15 +136,16 @@ def _local(training: Training, spec: MethodSpec, limit: float) -> ReducedRun:
 def _subspace(training: Training, kind: str, hyper: str, limit: float) -> ReducedRun:
     scene, positions = training.scene, training.run.positions
     columns = make_columns(scene, positions[1::2], kind, K)
-    samples = HYPER[hyper](scene, columns, positions[1::2])
+    start = training.state()
+    fields = (start.positions, start.velocities)
+    state = State(*(coordinates(columns, scene.masses, field) for field in fields))
+    samples = _hyper(hyper, scene, columns, positions[1::2], state)
     model = SubspaceModel(kind, columns, samples)
     untracked, _ = model.loop(scene)
     steps = untracked.local_steps
     loop = Stepper(untracked.space, untracked.time_step, untracked.iterations, steps)
-    start = training.state()
-    fields = (start.positions, start.velocities)
-    state = State(*(coordinates(columns, scene.masses, field) for field in fields))
     roundoff = Roundoff(scene, loop, columns)
     run = record(scene, loop, state, roundoff, model.positions, limit)
-    sampled = sum(step.group.elements for step in steps)
+    everything = sum(group.elements for group in scene.groups)
+    sampled = sum(len(chosen.elements) for chosen in samples.values()) if samples else everything
     return ReducedRun(run, sampled, columns.B.shape[1], None)

@@ -1,6 +1,7 @@
-"""Rule hyper: position subspaces with full projections and with sampled, weighted elements."""
+"""Rule hyper: position subspaces with full projections and with sampled elements."""
 
 import logging
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,12 @@ from pdrom.snapshots import training_frames
 from pdrom.stages.scenes import RUNS, scene_of
 from pdrom.store import open_hdf5, write_hdf5, write_table
 from pdrom.subspace.columns import Columns
+from pdrom.subspace.hrpd import hrpd, sampled_space
+from pdrom.subspace.interpolation import Interpolation
+from pdrom.subspace.interpolation_training import Training, interpolate
 from pdrom.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
 from pdrom.subspace.rerun import rerun_model
+from pdrom.subspace.specs import HrpdSpec, InterpolationSpec
 
 log = logging.getLogger(__name__)
 
@@ -36,10 +41,11 @@ def run_hyper(
     tables: dict[str, str],
 ) -> None:
     """Build every model of ``settings`` (bases, sizes, tolerances) and run both motions with it."""
-    motions = {motion: _Motion(scene_of(scene, mesh, motion), runs[motion]) for motion in RUNS}
+    motions = {motion: Motion(scene_of(scene, mesh, motion), runs[motion]) for motion in RUNS}
     bound = motions["train"].scene
     frames = _training_frames(bound)
-    training = motions["train"].reference[1:][frames]
+    training = training_positions(bound, motions["train"].reference)
+    spaces = _sampled_spaces(bound, settings)
     rows: dict[str, list[dict[str, Any]]] = {motion: [] for motion in RUNS}
     with write_hdf5(runs_output) as file:
         file.attrs.update(attributes({"scene": scene, "settings": settings}))
@@ -50,7 +56,11 @@ def run_hyper(
                 columns = make_columns(bound, training, kind, k)
                 base = f"{kind}_k{k:03d}"
                 _store_columns(file.create_group(f"columns/{base}"), columns)
-                for method, samples in _samplings(bound, columns, frames, kind, settings):
+                pairs = _samplings(bound, columns, frames, kind, settings)
+                if k in settings["interpolated_sizes"]:
+                    more = _interpolations(bound, columns, training, kind, settings, spaces)
+                    pairs = chain(pairs, more)
+                for method, samples in pairs:
                     model = SubspaceModel(kind, columns, samples)
                     labels = {"method": method, "position_basis": kind, "k": k, "base": base}
                     store = file.create_group(f"models/{base}_{method}")
@@ -65,8 +75,12 @@ def run_hyper(
         write_table(pd.DataFrame(rows[motion], columns=COLUMNS), tables[motion])
 
 
+def training_positions(scene: Scene, reference: np.ndarray) -> np.ndarray:
+    """Positions after the training frames: the even ones that train the projections, too."""
+    return reference[1:][_training_frames(scene)]
+
+
 def _training_frames(scene: Scene) -> np.ndarray:
-    """The even frames that train the projections, too."""
     count = max(plan.train for plan in scene.config.reduce.values())
     return training_frames(scene.config.frames, count)
 
@@ -81,7 +95,26 @@ def _samplings(scene, columns, frames, kind, settings):
             yield f"ecsw-{tolerance:.0e}", samples
 
 
-class _Motion:
+def _sampled_spaces(scene: Scene, settings: dict[str, Any]) -> dict[str, Any]:
+    """Spaces of projections for hrpd, by group; they depend on the rest shape only."""
+    if settings["hrpd"] is None:
+        return {}
+    spec = HrpdSpec.model_validate(settings["hrpd"])
+    return {group.name: sampled_space(group, scene.mesh.points, spec) for group in scene.groups}
+
+
+def _interpolations(scene, columns, training, kind, settings, spaces):
+    """(method, interpolations) pairs: hrpd, and the trained ones on the snapshot basis."""
+    if spaces:
+        yield "hrpd", {g.name: hrpd(g, columns, spaces[g.name]) for g in scene.groups}
+    if kind == "pod":
+        states = Training(scene, columns, training)
+        for method, plain in settings["interpolations"].items():
+            spec = InterpolationSpec.model_validate(plain)
+            yield method, interpolate(scene, columns, states, spec)
+
+
+class Motion:
     """The training or the held-out motion of a scene, with its full-order run."""
 
     def __init__(self, scene: Scene, fom: str) -> None:
@@ -103,7 +136,10 @@ class _Motion:
         }
 
     def row(
-        self, labels: dict[str, Any], samples: dict[str, Samples], outcome: dict[str, Any]
+        self,
+        labels: dict[str, Any],
+        samples: dict[str, Samples | Interpolation],
+        outcome: dict[str, Any],
     ) -> dict[str, Any]:
         """Row of the table of this motion."""
         full = sum(group.elements for group in self.scene.groups)
@@ -131,8 +167,13 @@ def _store_columns(store, columns: Columns) -> None:
         store[f"atoms/{i:04d}/vertices"], store[f"atoms/{i:04d}/columns"] = atom, own
 
 
-def _store_model(store, labels: dict[str, Any], samples: dict[str, Samples]) -> None:
+def _store_model(
+    store, labels: dict[str, Any], samples: dict[str, Samples | Interpolation]
+) -> None:
     store.attrs.update(labels)
     for name, chosen in samples.items():
+        if isinstance(chosen, Interpolation):
+            chosen.save(store.create_group(f"samples/{name}"))
+            continue
         store[f"samples/{name}/elements"] = chosen.elements
         store[f"samples/{name}/factors"] = chosen.factors

@@ -18,6 +18,7 @@ from pdrom.tables.scaling import scaling, scaling_fit
 from pdrom.tables.sensitivity import sensitivity
 from pdrom.tables.singular_values import singular_values
 from pdrom.tables.stability import stability
+from pdrom.tables.subspace_ablation import subspace_ablation
 from pdrom.tables.targets import targets
 
 
@@ -52,6 +53,7 @@ def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
             params.wrong,
             params.left,
         ),
+        "subspace_ablation": lambda: subspace_ablation(inputs.parts),
         "online": lambda: online(inputs.parts),
         "targets": lambda: targets(read_table(inputs.reruns), read_table(inputs.reconstruction)),
         "gain_prediction": lambda: gain_prediction(

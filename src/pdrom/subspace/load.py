@@ -4,6 +4,7 @@ import os
 
 from pdrom.store import open_hdf5
 from pdrom.subspace.columns import Columns
+from pdrom.subspace.interpolation import Interpolation
 from pdrom.subspace.model import Samples, SubspaceModel
 
 
@@ -32,10 +33,13 @@ def _columns(store) -> Columns:
     )
 
 
-def _samples(store) -> dict[str, Samples]:
+def _samples(store) -> dict[str, Samples | Interpolation]:
     if "samples" not in store:
         return {}
-    return {
-        name: Samples(chosen["elements"][...], chosen["factors"][...])
-        for name, chosen in store["samples"].items()
-    }
+    return {name: _sampled(chosen) for name, chosen in store["samples"].items()}
+
+
+def _sampled(chosen) -> Samples | Interpolation:
+    if "operator" in chosen:
+        return Interpolation.load(chosen)
+    return Samples(chosen["elements"][...], chosen["factors"][...])

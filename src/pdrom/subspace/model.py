@@ -11,6 +11,7 @@ from pdrom.subspace.atoms import atoms
 from pdrom.subspace.columns import Columns, build_columns, displacement_modes
 from pdrom.subspace.ecsw import ecsw_elements
 from pdrom.subspace.fused import FusedStepper
+from pdrom.subspace.interpolation import InterpolatedLocalStep, Interpolation
 from pdrom.subspace.local_step import SubspaceLocalStep
 from pdrom.subspace.skinning import skinning_modes
 from pdrom.subspace.space import ReducedSpace, reduced_state
@@ -30,17 +31,20 @@ class Samples:
 
 @dataclass(frozen=True)
 class SubspaceModel:
-    """Position basis ("pod" or "skinning"), its columns, and the samples of each group."""
+    """Position basis ("pod" or "skinning"), its columns, and what is sampled of each group."""
 
     position_basis: str
     columns: Columns
-    samples: dict[str, Samples] = field(default_factory=dict)
+    samples: dict[str, Samples | Interpolation] = field(default_factory=dict)
 
     def loop(self, scene: Scene) -> tuple[Stepper, State]:
         """Step loop in the coordinates of the subspace, and the initial state."""
         steps = []
         for group in scene.groups:
             chosen = self.samples.get(group.name, Samples())
+            if isinstance(chosen, Interpolation):
+                steps.append(InterpolatedLocalStep(group, self.columns, chosen))
+                continue
             steps.append(SubspaceLocalStep(group, self.columns, chosen.elements, chosen.factors))
         space = ReducedSpace(scene, self.columns, sum(step.matrix for step in steps))
         config = scene.config
@@ -68,15 +72,19 @@ def make_columns(scene: Scene, training: np.ndarray, kind: str, k: int) -> Colum
 
 
 def sample_elements(
-    scene: Scene, columns: Columns, frames: np.ndarray, tolerances: Sequence[float]
+    scene: Scene,
+    columns: Columns,
+    frames: np.ndarray,
+    tolerances: Sequence[float],
+    start: State | None = None,
 ) -> list[dict[str, Samples]]:
     """Energy-conserving samples of every group for each tolerance.
 
     They are trained on iterates of the subspace with all projections, in some of the training
-    ``frames``.
+    ``frames`` of a run that begins at ``start`` (coordinates) or where the scene does.
     """
     chosen = frames[np.unique(np.linspace(0, len(frames) - 1, FRAMES).round().astype(int))]
-    training = training_run(scene, columns, chosen)
+    training = training_run(scene, columns, chosen, start)
     found = {
         group.name: ecsw_elements(group, columns, training, tolerances) for group in scene.groups
     }

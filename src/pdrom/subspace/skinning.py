@@ -17,8 +17,8 @@ def skinning_weights(points: np.ndarray, handles: int) -> np.ndarray:
     chosen = farthest_points(points, np.arange(len(points)), handles)
     distance = np.linalg.norm(points[:, None, :] - points[chosen][None], axis=2)
     radius = 3.0 * distance.min(axis=1).max() if handles > 1 else 2.0 * distance.max()
-    # where every vertex is a handle the covering radius is zero
-    radius = max(radius, np.finfo(float).eps * distance.max())
+    # where every vertex is a handle the covering radius is zero, and all distances of a single one
+    radius = max(radius, np.finfo(float).eps * distance.max(), np.finfo(float).tiny)
     scaled = np.minimum(distance / radius, 1.0)
     kernel = (1.0 - scaled) ** 4 * (4.0 * scaled + 1.0)
     return kernel / kernel.sum(axis=1, keepdims=True)

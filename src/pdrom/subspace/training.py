@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from pdrom.fom.stepper import Stepper
+from pdrom.fom.stepper import State, Stepper
 from pdrom.scene import Scene
 from pdrom.subspace.columns import Columns
 from pdrom.subspace.local_step import SubspaceLocalStep
@@ -40,10 +40,13 @@ class TrainingFrame:
     measure: np.ndarray
 
 
-def training_run(scene: Scene, columns: Columns, frames: Sequence[int]) -> list[TrainingFrame]:
+def training_run(
+    scene: Scene, columns: Columns, frames: Sequence[int], start: State | None = None
+) -> list[TrainingFrame]:
     """Run the scene in the subspace with all projections; iterates of ``frames``, ascending.
 
-    Only the training motion is run, and only ``frames`` of it are kept.
+    Only the training motion is run, and only ``frames`` of it are kept. It begins at ``start``, in
+    coordinates (K, 3), or where the scene does.
     """
     steps = [SubspaceLocalStep(group, columns) for group in scene.groups]
     space = ReducedSpace(scene, columns, sum(step.matrix for step in steps))
@@ -53,7 +56,7 @@ def training_run(scene: Scene, columns: Columns, frames: Sequence[int]) -> list[
         space, config.time_step, config.iterations, [watch, *steps[1:]], track_objective=False
     )
     measures = _Measures(space)
-    state, kept = reduced_state(scene, columns), []
+    state, kept = start or reduced_state(scene, columns), []
     wanted = {int(frame) for frame in frames}
     for frame in range(max(wanted) + 1):
         watch.iterates = [] if frame in wanted else None
@@ -62,7 +65,8 @@ def training_run(scene: Scene, columns: Columns, frames: Sequence[int]) -> list[
         state, _ = loop.step(state, frame)
         if frame in wanted:
             iterates = watch.iterates
-            first = range(len(kept) % STRIDE, max(1, len(iterates) - 1), STRIDE)
+            count = max(1, len(iterates) - 1)
+            first = range(len(kept) % min(STRIDE, count), count, STRIDE)
             after = [*iterates[1:], state.positions]
             pairs = np.stack([(iterates[i], after[i]) for i in first])
             kept.append(TrainingFrame(start, pairs, measures.of(fixed)))

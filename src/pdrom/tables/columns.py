@@ -84,6 +84,11 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "relative_error_train", "relative_error_heldout", "ms_per_frame", "ms_per_iteration",
         "fom_ms_per_frame", "speedup",
     ),
+    "subspace_ablation": (
+        "scene", "group", "position_basis", "k", "r", "variant", "elements_sampled", "gain",
+        "finite", "max_extent", "relative_error_within_horizon", "relative_error_full_projections",
+        "heldout_error_within_horizon", "heldout_error_full_projections",
+    ),
     "claims": (
         "claim", "source", "paper", "measured", "verdict", "why", "figure_or_table",
     ),

@@ -43,6 +43,7 @@ TABLES = (
     "reconstruction_error", "singular_values", "local_share", "sensitivity", "accuracy_cost",
     "ladder", "scaling", "scaling_fit", "stability", "budget", "breakeven", "effects_cost",
     "effects_left_out", "reduced_reruns", "gain_prediction",
+    "subspace_ablation",
 )  # fmt: skip
 
 
@@ -288,6 +289,13 @@ def _write_tables(sources, scenes, methods, rng) -> None:
         ("gain", "10000", "inf", 2, 1.0, np.nan),
         ("gain", "all", "all", 42, 0.3, 30.0),
     ]
+    variants = [("plain", 9.0, 0.5), ("refused", None, None), ("both + more", 2.0, None)]
+    ablation = [
+        (scene, "pod", 20, r, variant, gain, error, 0.01)
+        for scene in scenes
+        for r in (20, 50)
+        for variant, gain, error in variants
+    ]
     columns = {
         "singular_values": "scene group component singular_value relative above_roundoff",
         "reconstruction_error": "scene group method r split relative_error gain elements_sampled",
@@ -306,10 +314,12 @@ def _write_tables(sources, scenes, methods, rng) -> None:
         "reduced_reruns": "scene group method r position_basis max_extent blowup_frame"
         " relative_error relative_error_within_horizon",
         "gain_prediction": "predictor lower upper runs failed_share threshold",
+        "subspace_ablation": "scene position_basis k r variant gain relative_error_within_horizon"
+        " relative_error_full_projections",
     }
     made = (
         values, errors, times, floors, costs, ladder, runs, bought, ratios, shares, removed, reruns,
-        predictions,
+        predictions, ablation,
     )  # fmt: skip
     rows = dict(zip(columns, made, strict=True))
     for name, header in columns.items():
