@@ -56,7 +56,8 @@ class Reduction:
         """Coefficients (..., r) in the range of the training snapshots, if the method asks for it.
 
         Each one is clipped: for orthonormal modes the nearest admissible point to V c. It brings c
-        nearer to every admissible c*, so that it cannot hurt where the true ones are in range.
+        nearer to every admissible c*, so that it cannot hurt where the true ones are in range;
+        where a run rightly leaves the range, it does.
         Bounded least squares would fit the samples better, but needs an iteration per evaluation.
         """
         if self._limits is None:

@@ -337,3 +337,27 @@ def test_reduction_from_files_is_the_same(preset, tmp_path):
     )
     with pytest.raises(StorageError, match=r"sampling\.h5"):
         load_reduction(basis, tmp_path / "sampling.h5", spec, 5)
+
+
+@pytest.mark.parametrize("selection", INGREDIENTS["selection"])
+@pytest.mark.parametrize("rows", ["scalar", "element"])
+def test_oversampling_starts_from_the_selection_and_lowers_the_gain(rows, selection):
+    """Single entries and elements, with three samples a mode and with a bound on the gain."""
+    p, mass = data(11)
+    start = MethodSpec(title="t", centring="affine", rows=rows, selection=selection, solve="qr")
+    reductions = {
+        key: reduction_of(p, mass, start.model_copy(update=changes), 4)
+        for key, changes in {
+            "start": {},
+            "three": {"oversampling": 3},
+            "bounded": {"oversampling": 2, "gain_bound": 1.5},
+        }.items()
+    }
+    first = reductions["start"].sampling.entries
+    for reduction in reductions.values():
+        np.testing.assert_array_equal(reduction.sampling.entries[: len(first)], first)
+        assert reduction.gain <= reductions["start"].gain * (1.0 + 1e-12)
+    per_sample = 1 if rows == "scalar" else 3 * P
+    assert len(reductions["three"].sampling.entries) == 12 * per_sample
+    assert len(reductions["bounded"].sampling.entries) >= 8 * per_sample
+    assert reductions["bounded"].gain <= 1.5
