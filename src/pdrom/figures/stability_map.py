@@ -78,11 +78,12 @@ def _local_strips(table: pd.DataFrame, sources: Sources, spec: FigureSpec) -> li
     held = set(zip(ran.scene, ran.group, strict=True))
     pairs = [p for p in sources.holdings.experiments(spec.scenes, spec.groups) if p in held]
     rows = {(scene, group): sources.title(scene, group) for scene, group in pairs}
+    ranks = [r for r in spec.ranks if r == "full" or r in set(part.r)]
     blocks, lookups = [], []
     for method in dict.fromkeys(part.method):
         own = part[part.method == method]
-        blocks.append(Block(method, [_size(r) for r in spec.ranks]))
-        lookups.append([_by_experiment(_at_size(own, r)) for r in spec.ranks])
+        blocks.append(Block(method, [str(r) for r in ranks]))
+        lookups.append([_by_experiment(_at_size(own, r)) for r in ranks])
     return _wrapped(rows, blocks, lookups, "number of modes r (full: numerical rank)")
 
 
@@ -123,7 +124,3 @@ def _at_size(rows: pd.DataFrame, size: int | str) -> pd.DataFrame:
 
 def _by_experiment(rows: pd.DataFrame) -> dict[tuple[str, str], pd.Series]:
     return {(row.scene, row.group): row for _, row in rows.iterrows()}
-
-
-def _size(rank: int | str) -> str:
-    return "full" if rank == "full" else str(rank)

@@ -98,7 +98,7 @@ class Guard:
                 step.full = False
 
     def _leaves(self, state: State, report: FrameReport) -> tuple[str, str] | None:
-        """(group, reason) if the frame left the trained range; "all" where no group is to blame."""
+        """(group, reason) if the frame left the trained range; "all" if it may be any group."""
         q = state.positions
         distances = [step.distance() for step in self.steps]
         # nan is farther out than anything
@@ -109,9 +109,11 @@ class Guard:
             return group, "not finite"
         if distances[worst] > self.settings.margin:
             return group, "coefficients"
+        if len(self.steps) > 1:
+            group = "all"
         if _extent(q) > self.settings.extent * self.trained_extent:
-            return "all", "extent"
-        return ("all", "objective") if self._rises(report.objective) else None
+            return group, "extent"
+        return (group, "objective") if self._rises(report.objective) else None
 
     def _rises(self, objective: np.ndarray) -> bool:
         known = objective[~np.isnan(objective)]

@@ -224,6 +224,13 @@ def test_what_stays_within_the_limits_is_no_news(changes):
     assert watch(**changes).count == 0
 
 
+@pytest.mark.parametrize(("steps", "group"), [(1, "spring"), (2, "all")])
+def test_a_group_is_named_where_only_it_is_reduced(steps, group):
+    guard = Guard(GuardSettings(), [Quiet() for _ in range(steps)], 1.0)
+    guard.step(Told({0: 9.0 * BOX}, {0: FALLING}), State(BOX, BOX), 0)
+    assert (guard.record.group, guard.record.reason) == (group, "extent")
+
+
 @given(st.floats(0.0, 5.0), st.floats(0.0, 5.0))
 def test_the_margin_decides(distance, margin):
     assert watch(distance=distance, margin=margin).count == int(distance > margin)
