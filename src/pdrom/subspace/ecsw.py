@@ -18,8 +18,9 @@ from pdrom.subspace.columns import Columns
 from pdrom.subspace.nnls import nnls_path
 from pdrom.subspace.training import TrainingFrame
 
-# Rows that the training equations are hashed to, per coordinate of the subspace.
-SKETCH = 30
+# Rows that the training equations are hashed to, per coordinate of the subspace: several times the
+# elements that are chosen, or the factors would fit the hashing and not the equations.
+SKETCH = 60
 # Elements that may be chosen, at most: neighbours are much alike.
 CANDIDATES = 5000
 SEED = 0

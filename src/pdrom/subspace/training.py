@@ -21,16 +21,13 @@ from pdrom.subspace.columns import Columns
 from pdrom.subspace.local_step import SubspaceLocalStep
 from pdrom.subspace.space import ReducedSpace, reduced_state
 
-# Iterations of a frame that train: every third one, from another first one in each frame.
-STRIDE = 3
-
 
 @dataclass(frozen=True)
 class TrainingFrame:
     """A frame of the training run.
 
     start : (K, 3) coordinates at its beginning, which frame-lagged data are frozen at
-    pairs : (n, 2, K, 3) coordinates before and after the chosen iterations
+    pairs : (n, 2, K, 3) coordinates before and after its iterations
     measure : (K', K) with |measure r|^2 = r^T A^-1 r for a residual r of the equations, J; held
         coordinates have no equation
     """
@@ -64,11 +61,11 @@ def training_run(
         start = state.positions
         state, _ = loop.step(state, frame)
         if frame in wanted:
-            iterates = watch.iterates
-            count = max(1, len(iterates) - 1)
-            first = range(len(kept) % min(STRIDE, count), count, STRIDE)
-            after = [*iterates[1:], state.positions]
-            pairs = np.stack([(iterates[i], after[i]) for i in first])
+            # a contact may have moved the end of the frame: then it is no iterate
+            iterates = watch.iterates or []
+            if len(iterates) == 1:
+                iterates = [*iterates, state.positions]
+            pairs = np.stack([iterates[:-1], iterates[1:]], axis=1)
             kept.append(TrainingFrame(start, pairs, measures.of(fixed)))
     return kept
 
