@@ -19,8 +19,8 @@ def test_an_indefinite_system_is_a_named_error():
 
 
 def test_a_system_without_enough_digits_is_a_named_error():
-    """A stiffness of 1 between two coordinates, and 1e-12 of it for both together."""
-    matrix = np.array([[1.0, -1.0], [-1.0, 1.0]]) + 1e-12 * np.eye(2)
+    """A stiffness of 1 between six coordinates, and 1e-12 of it for all of them together."""
+    matrix = np.eye(6) - np.full((6, 6), 1.0 / 6.0) + 1e-12 * np.eye(6)
     with pytest.raises(SolverError, match="a solve is wrong by"):
         DenseElimination(matrix, NOTHING)
 
