@@ -4,12 +4,19 @@ import logging
 import sys
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from pdrom.errors import PdromError
 
 FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
+
+
+class _LogFile(logging.FileHandler):
+    """A log whose disk is full is cut short; the job's own files say that there is no space."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Say nothing: the default prints a traceback for every message."""
 
 
 @contextmanager
@@ -19,9 +26,12 @@ def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
     A `PdromError` (a user's mistake) ends the job with one line on stderr; any other exception
     keeps its traceback in the log and one line on stderr that says where to look.
     """
-    Path(path).parent.mkdir(parents=True, exist_ok=True)
     logger = logging.getLogger("pdrom")
-    handler = logging.FileHandler(path, mode="w", encoding="utf-8")
+    try:
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        handler = _LogFile(path, mode="w", encoding="utf-8")
+    except OSError as error:
+        sys.exit(f"pdrom: {path}: cannot be written ({error.strerror})")
     handler.setFormatter(logging.Formatter(FORMAT))
     previous = logger.level
     logger.addHandler(handler)
@@ -37,4 +47,5 @@ def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
     finally:
         logger.removeHandler(handler)
         logger.setLevel(previous)
-        handler.close()
+        with suppress(OSError):
+            handler.close()

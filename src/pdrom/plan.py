@@ -1,18 +1,23 @@
 """The plan that the workflow rules ask: file names, parameters and code fingerprints."""
 
+import os
 import sys
+from collections.abc import Sequence
 from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 from pdrom.claims import load_claims
-from pdrom.config import Study, StudySettings
-from pdrom.errors import PdromError
+from pdrom.config import Study, StudySettings, require_scenes
+from pdrom.effects import EFFECTS
+from pdrom.errors import ConfigurationError, PdromError, choices
 from pdrom.figures import FIGURES, FigureSpec, Holdings, figure_inputs, load_figures
 from pdrom.figures.sources import PUBLISHED
 from pdrom.fingerprint import fingerprint
 from pdrom.ladder import LadderSpec, load_ladder
-from pdrom.method import MethodSpec
+from pdrom.mesh.config import MeshFile
+from pdrom.method import MethodSpec, load_methods
 from pdrom.paper.textables import TEX_TABLES
 
 RESULTS = "results"
@@ -24,10 +29,17 @@ TABLES = (
 )  # fmt: skip
 
 
-def load_plan(config: dict[str, Any], root: Path) -> "Plan":
-    """Plan of a configuration; a faulty one ends the process with one line, before any job."""
+def load_plan(config: dict[str, Any], root: Path, files: Sequence[str | Path] = ()) -> "Plan":
+    """Plan of a configuration; a faulty one ends the process with one line, before any job.
+
+    Parameters
+    ----------
+    files : where the configuration came from, for the messages
+    """
+    names = [os.path.relpath(path, root) for path in files] or ["config/default.yaml"]
+    source = f"configuration ({', '.join(sorted(set(names)))})"
     try:
-        plan = Plan(Study.load(config, root))
+        plan = Plan(Study.load(config, root, source))
         plan.check()
         return plan
     except PdromError as error:
@@ -48,7 +60,18 @@ class Plan:
 
     def check(self) -> None:
         """Read the configuration of figures, ladder and claims, so that a fault shows early."""
-        _ = self.figure_specs, self.ladder, load_claims(self.root / "config" / "claims.yaml")
+        folder = self.root / "config"
+        load_claims(folder / "claims.yaml")
+        ladder = f"{folder / 'ladder.yaml'}: scenes"
+        require_scenes(self.root, self.ladder.scenes, ladder)
+        require_scenes(self.root, self.settings.subspace.scenes, "subspace.scenes")
+        known = {"methods": load_methods(folder / "methods.yaml"), "groups": EFFECTS}
+        for figure, spec in self.figure_specs.items():
+            for key, names in known.items():
+                for name in getattr(spec, key):
+                    if name not in names:
+                        place = f"{folder / 'figures.yaml'}: {figure}.{key} = '{name}'"
+                        raise ConfigurationError(f"{place}: unknown{choices(name, names)}")
 
     # Parameters -----------------------------------------------------------------------------
 
@@ -63,6 +86,21 @@ class Plan:
     def mesh_config(self, mesh: str) -> dict[str, Any]:
         """Plain configuration of a mesh."""
         return self.study.meshes[mesh].model_dump(mode="json")
+
+    def mesh_file(self, mesh: str) -> list[str]:
+        """The file that a mesh is read from, an empty list for one that is generated."""
+        config = self.study.meshes[mesh]
+        return [config.path] if isinstance(config, MeshFile) else []
+
+    def digest(self, *paths: str) -> str:
+        """Checksum of files that people edit.
+
+        Snakemake compares times of files, which a copy, an archive or a wrong clock may set back;
+        as a parameter of a rule, the content itself decides.
+        """
+        files = [self.root / path for path in paths]
+        content = b"".join(sha256(f.read_bytes()).digest() for f in files if f.is_file())
+        return sha256(content).hexdigest()[:16]
 
     def method_spec(self, method: str) -> dict[str, Any]:
         """Plain specification of a method."""
