@@ -104,8 +104,10 @@ def _check_seal(path: Path) -> None:
         raise _damaged(path, "its checksum does not match its content")
 
 
-def _damaged(path: Path, fault: str) -> StorageError:
-    """Set a damaged file aside and say so."""
+def _damaged(path: Path, fault: str, result: bool = True) -> StorageError:
+    """Set a damaged result aside and say so."""
+    if not result:
+        return StorageError(f"{path}: damaged, {fault}")
     aside = path.with_name(f"{path.name}.damaged")
     try:
         os.replace(path, aside)
@@ -148,8 +150,13 @@ def write_table(table: pd.DataFrame, path: str | os.PathLike[str]) -> None:
         table.to_csv(temporary, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
 
 
-def read_table(path: str | os.PathLike[str], columns: Sequence[str] | None = None) -> pd.DataFrame:
-    """Read a CSV table; StorageError if it is missing, damaged or lacks one of ``columns``."""
+def read_table(
+    path: str | os.PathLike[str], columns: Sequence[str] | None = None, result: bool = True
+) -> pd.DataFrame:
+    """Read a CSV table; StorageError if it is missing, damaged or lacks one of ``columns``.
+
+    ``result`` says that a run can make the table anew, so that a damaged one is set aside.
+    """
     if not Path(path).is_file():
         raise StorageError(f"{path}: no such file")
     try:
@@ -158,10 +165,10 @@ def read_table(path: str | os.PathLike[str], columns: Sequence[str] | None = Non
     except OSError as error:
         raise StorageError(f"{path}: cannot be read ({_reason(error)})") from error
     except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
-        reason = " ".join(str(error).split())
-        raise _damaged(Path(path), f"not a readable table ({reason})") from error
+        fault = f"not a readable table ({' '.join(str(error).split())})"
+        raise _damaged(Path(path), fault, result) from error
     if not content.endswith(b"\n") or b"\0" in content:
-        raise _damaged(Path(path), "its end is missing or it is no text")
+        raise _damaged(Path(path), "its end is missing or it is no text", result)
     missing = [name for name in columns or () if name not in table.columns]
     if missing:
         raise StorageError(f"{path}: lacks the column(s) {', '.join(missing)}")

@@ -79,7 +79,7 @@ def read_yaml(path: Path) -> Any:
         return yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_PlainLoader)
     except (yaml.YAMLError, ValueError, TypeError, RecursionError) as error:
         # ValueError: no UTF-8, or a date that is none; TypeError: a key that cannot be one
-        message = " ".join(str(error).split())
+        message = " ".join(str(error).replace('in "<unicode string>", ', "in ").split())
         raise ConfigurationError(f"{path}: not valid YAML: {message}") from error
     except OSError as error:
         raise ConfigurationError(f"{path}: cannot be read ({error.strerror})") from error
@@ -98,11 +98,15 @@ def validate(model: type[M], data: Any, source: str) -> M:
 
 def describe(error: ValidationError, model: type[BaseModel]) -> str:
     """The first fault of a validation as ``key = value: what is allowed``."""
-    fault = error.errors()[0]
+    # a misspelt key is also a missing one: the first says more
+    faults = sorted(error.errors(), key=lambda fault: fault["type"] == "missing")
+    fault = faults[0]
     location = fault["loc"]
-    key = " ".join(".".join(str(part) for part in location).split()) or model.__name__
+    names = [str(part) for part in location if part != "constrained-int"]
+    key = " ".join(".".join(names).split()) or model.__name__
+    message = fault["msg"].removeprefix("Value error, ")
     # a tuple of Python is a list of YAML
-    message = fault["msg"].removeprefix("Value error, ").replace("valid tuple", "valid list")
+    message = message.replace("valid tuple", "valid list").replace("Tuple should", "List should")
     if fault["type"] == "extra_forbidden":
         owner = _model_at(model, location[:-1])
         return f"unknown key '{key}'{choices(location[-1], keys_of(owner)) if owner else ''}"
@@ -110,8 +114,11 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
         return f"{key}: the key is not a text"
     if fault["type"] == "missing":
         return f"key '{key}' is missing"
-    if fault["type"] == "value_error" and isinstance(fault["input"], (dict, BaseModel)):
-        return f"{key}: {message}" if location else message
+    if fault["type"] == "union_tag_not_found":
+        return f"{key}: key {fault['ctx']['discriminator']} is missing"
+    if fault["type"] == "value_error" and isinstance(fault["input"], (dict, list, BaseModel)):
+        # the message names what is wrong inside the whole value
+        return f"{key}: {message}" if location and not message.startswith(key) else message
     return f"{key} = {shown(fault['input'], 80)}: {message}"
 
 

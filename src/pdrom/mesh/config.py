@@ -10,6 +10,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from pdrom.errors import MeshError
+from pdrom.mesh.checks import check_mesh
 from pdrom.mesh.files import read_mesh_file
 from pdrom.mesh.generators import bar, cloth
 from pdrom.mesh.types import Mesh
@@ -121,12 +122,17 @@ class MeshFile(_Model):
     def build(self, root: Path) -> Mesh:
         """Read the mesh."""
         mesh = read_mesh_file(self.file(root))
-        return Mesh(mesh.points * self.scale, mesh.triangles, mesh.tetrahedra)
+        scaled = Mesh(mesh.points * self.scale, mesh.triangles, mesh.tetrahedra)
+        return check_mesh(scaled, self.path)
 
     def file(self, root: Path) -> Path:
         """The mesh file; MeshError if a link leads out of the project's folder."""
         path = root / self.path
-        if not path.resolve().is_relative_to(root.resolve()):
+        try:
+            inside = path.resolve().is_relative_to(root.resolve())
+        except (OSError, RuntimeError) as error:  # a circle of links
+            raise MeshError(f"mesh.path = '{self.path}': leads nowhere") from error
+        if not inside:
             raise MeshError(f"mesh.path = '{self.path}': a link that leads out of the project")
         return path
 
