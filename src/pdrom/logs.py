@@ -1,14 +1,18 @@
 """One log per rule, and what the user sees when a job fails."""
 
 import logging
+import re
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from pdrom.errors import PdromError
 
+_JOB = re.compile(r"^Error in rule (?P<rule>\w+):(?P<body>(?:\n .*)*)", re.MULTILINE)
+_FIELD = re.compile(r"^ +(?P<key>log|output): (?P<path>[^\s,]+)", re.MULTILINE)
+_ERROR = re.compile(r"^[-0-9]+ [0-9:,]+ ERROR +pdrom: (?P<text>.*)$", re.MULTILINE)
 FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
 
 
@@ -39,13 +43,44 @@ def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
     try:
         yield logger
     except PdromError as error:
-        logger.error("%s: %s", type(error).__name__, error)
+        logger.error("%s", error)
         sys.exit(f"pdrom: {error}")
     except Exception as error:
-        logger.error("unexpected failure\n%s", traceback.format_exc())
-        sys.exit(f"pdrom: {type(error).__name__}: {error} (traceback in {path})")
+        fault = f"{type(error).__name__}: {error}"
+        logger.error("%s (traceback in %s)\n%s", fault, path, traceback.format_exc())
+        sys.exit(f"pdrom: {fault} (traceback in {path})")
     finally:
         logger.removeHandler(handler)
         logger.setLevel(previous)
         with suppress(OSError):
             handler.close()
+
+
+def end_with_failures(workflow_logs: Sequence[str]) -> None:
+    """End a failed run with what went wrong: the last lines that the user reads.
+
+    Snakemake prints its own account after a job's message. Every failed job is named once more with
+    the error in its log, and the process ends as a failure.
+
+    Parameters
+    ----------
+    workflow_logs : Snakemake's logs of the run
+    """
+    text = "\n".join(_content(path) for path in workflow_logs)
+    lines = [_failure(found["rule"], found["body"]) for found in _JOB.finditer(text)]
+    advice = "pdrom: what is finished is kept; the same command goes on from there"
+    sys.exit("\n".join([*dict.fromkeys(lines), advice]))
+
+
+def _failure(rule: str, body: str) -> str:
+    fields = {found["key"]: found["path"] for found in _FIELD.finditer(body)}
+    errors = _ERROR.findall(_content(fields.get("log", "")))
+    if errors:
+        return f"pdrom: job {rule} failed: {errors[-1]}"
+    made = fields.get("output", "its result")
+    return f"pdrom: job {rule} ended without a word while making {made}: killed? out of memory?"
+
+
+def _content(path: str) -> str:
+    """Text of a log; nothing if it could not be written."""
+    return Path(path).read_text(encoding="utf-8", errors="replace") if Path(path).is_file() else ""

@@ -113,7 +113,8 @@ def _mutate(draw: Callable, owner: Any, key: Any) -> None:
     elif action == "wrap":
         owner[key] = [owner[key]]
     else:
-        owner[key] = draw(VALUES)
+        # a list that is drawn again must not show what a mutation did to it
+        owner[key] = copy.deepcopy(draw(VALUES))
 
 
 @pytest.fixture(scope="module")
