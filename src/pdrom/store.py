@@ -76,11 +76,51 @@ def _reason(error: OSError) -> str:
 def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
     """Yield a new HDF5 file that takes its name only when complete; no time stamps inside."""
     with atomic_path(path) as temporary:
-        with h5py.File(temporary, "w", track_order=True) as file:
-            yield file
+        with open(temporary, "w+b", buffering=0) as handle:
+            sink = _Sink(handle)
+            with h5py.File(sink, "w", track_order=True) as file:
+                yield file
+        if sink.error is not None:
+            raise sink.error
         seal = _SEAL % _checksum(temporary, temporary.stat().st_size)
         with open(temporary, "ab") as handle:
             handle.write(seal)
+
+
+class _Sink:
+    """File that HDF5 writes to; it never fails.
+
+    HDF5 does not survive an error while it writes: it cannot close the file and crashes when the
+    process ends. So the first error (no space, say) is kept for later and the rest thrown away.
+    """
+
+    def __init__(self, handle: io.FileIO) -> None:
+        self._handle = handle
+        self.error: OSError | None = None
+        for name in ("read", "seek", "tell", "flush"):
+            setattr(self, name, getattr(handle, name))
+
+    def write(self, data: memoryview) -> int:
+        left = memoryview(data)
+        while len(left) and self.error is None:
+            try:
+                left = left[self._handle.write(left) :]
+            except OSError as error:
+                self.error = error
+        return len(data)
+
+    def readinto(self, buffer: memoryview) -> int:
+        count = self._handle.readinto(buffer)
+        buffer[count:] = bytes(len(buffer) - count)  # what was thrown away
+        return len(buffer)
+
+    def truncate(self, size: int) -> int:
+        if self.error is None:
+            try:
+                return self._handle.truncate(size)
+            except OSError as error:
+                self.error = error
+        return size
 
 
 def _checksum(path: Path, size: int) -> int:

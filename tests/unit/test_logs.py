@@ -1,5 +1,6 @@
 """What a job leaves in its log, and what the user sees when it fails."""
 
+import io
 import logging
 
 import pytest
@@ -104,8 +105,12 @@ def test_a_log_that_cannot_be_written_is_named(tmp_path):
 
 def test_a_full_disk_prints_no_traceback_for_each_message(path, capfd, monkeypatch):
     """The log is cut short; what the job itself cannot write is another matter."""
-    with job_log(str(path)) as logger, open("/dev/full", "w") as full:
-        monkeypatch.setattr(logger.handlers[-1], "stream", full)
+    with (
+        job_log(str(path)) as logger,
+        open("/dev/full", "wb", buffering=0) as full,
+        monkeypatch.context() as patch,
+    ):
+        stream = io.TextIOWrapper(full, write_through=True)
+        patch.setattr(logger.handlers[-1], "stream", stream)
         logger.info("a message")
-        monkeypatch.undo()
     assert capfd.readouterr().err == ""

@@ -206,6 +206,7 @@ def test_a_full_disk(undisturbed: Sandbox, tmp_path: Path, mount: Callable[..., 
     assert no_leftovers(sandbox)
 
 
+@slow
 def test_a_write_that_fails_for_lack_of_space(undisturbed: Sandbox, sandbox: Sandbox) -> None:
     """The same without a file system: the system call of the job reports that there is no space."""
     sandbox.path(TABLE).unlink()
