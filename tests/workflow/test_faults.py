@@ -186,7 +186,7 @@ def mount() -> Iterator[Callable[..., None]]:
         pytest.skip("mounting needs root")
     yield do
     for folder in reversed(mounted):
-        subprocess.run(["umount", folder], check=True)
+        subprocess.run(["umount", "--lazy", folder], check=True)
 
 
 @slow
