@@ -11,6 +11,7 @@ from pathlib import Path
 from pdrom.errors import PdromError
 
 _JOB = re.compile(r"^Error in rule (?P<rule>\w+):(?P<body>(?:\n .*)*)", re.MULTILINE)
+_REFUSED = re.compile(r"^WorkflowError in rule (?P<rule>\w+) .*\n(?P<text>.*)", re.MULTILINE)
 _FIELD = re.compile(r"^ +(?P<key>log|output): (?P<path>[^\s,]+)", re.MULTILINE)
 _ERROR = re.compile(r"^[-0-9]+ [0-9:,]+ ERROR +pdrom: (?P<text>.*)$", re.MULTILINE)
 FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
@@ -68,6 +69,7 @@ def end_with_failures(workflow_logs: Sequence[str]) -> None:
     """
     text = "\n".join(_content(path) for path in workflow_logs)
     lines = [_failure(found["rule"], found["body"]) for found in _JOB.finditer(text)]
+    lines += [f"pdrom: job {found['rule']}: {found['text']}" for found in _REFUSED.finditer(text)]
     advice = "pdrom: what is finished is kept; the same command goes on from there"
     sys.exit("\n".join([*dict.fromkeys(lines), advice]))
 
