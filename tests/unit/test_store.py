@@ -179,6 +179,9 @@ def test_first_number_that_is_none_is_named(bad):
 # Faults ---------------------------------------------------------------------------------------
 
 
+SEAL_BYTES = len("pdrom-crc32:01234567\n")
+
+
 def write_one(path, kind):
     """Write ``path`` in one of the ways that the package has."""
     if kind == "hdf5":
@@ -293,7 +296,7 @@ def test_every_changed_bit_of_hdf5_is_noticed(tmp_path, position, bit):
         file["x"] = np.linspace(0.0, 1.0, 64)
         file["x"].attrs["unit"] = "m"
     content = bytearray(path.read_bytes())
-    content[int(position * len(content))] ^= 1 << bit
+    content[int(position * (len(content) - SEAL_BYTES))] ^= 1 << bit
     path.write_bytes(content)
     with pytest.raises(StorageError, match=r"a\.h5: damaged, .*set aside"), open_hdf5(path):
         pass
@@ -304,7 +307,7 @@ def test_every_changed_bit_of_hdf5_is_noticed(tmp_path, position, bit):
 def test_every_truncation_of_hdf5_is_noticed(tmp_path, kept):
     path = tmp_path / "a.h5"
     write_one(path, "hdf5")
-    os.truncate(path, int(kept * path.stat().st_size))
+    os.truncate(path, int(kept * (path.stat().st_size - SEAL_BYTES)))
     with pytest.raises(StorageError, match=r"a\.h5: damaged"), open_hdf5(path):
         pass
 
