@@ -11,19 +11,19 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import pandas as pd
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import Field, FiniteFloat, model_validator
 
-from pdrom.errors import ConfigurationError
+from pdrom.errors import ConfigurationError, choices
 from pdrom.tables.columns import COLUMNS
-from pdrom.yamlfile import read_yaml, validate
+from pdrom.yamlfile import ConfigModel, read_yaml, validate
 
 HOLDS, FAILS, UNDECIDED = "holds", "does not hold", "cannot be decided"
 Tables = Mapping[str, pd.DataFrame]
 Value = str | int | float
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+class _Model(ConfigModel):
+    """Base of the rules."""
 
 
 class TestRule(_Model):
@@ -49,6 +49,10 @@ class TestRule(_Model):
     def _metric_exists(self) -> Self:
         if self.metric not in METRICS:
             raise ValueError(f"metric = '{self.metric}': allowed are {', '.join(METRICS)}")
+        columns = COLUMNS[METRIC_TABLES[self.metric]]
+        for column in self.where:
+            if column not in columns:
+                raise ValueError(f"where: no column '{column}'{choices(column, columns)}")
         return self
 
 
@@ -197,6 +201,18 @@ METRICS: dict[str, Callable[[Tables, dict], pd.Series]] = {
     "elements_per_entry": _elements_per_entry,
     "local_time_ratio": _local_ratio,
     "position_basis_ratio": _position_basis_ratio,
+}
+
+# The table whose rows a metric compares.
+METRIC_TABLES = {
+    "local_share": "local_share",
+    "rerun_error": "reduced_reruns",
+    "error_growth": "reduced_reruns",
+    "singular_value_decay": "singular_values",
+    "reconstruction_error": "reconstruction_error",
+    "elements_per_entry": "reconstruction_error",
+    "local_time_ratio": "reduced_reruns",
+    "position_basis_ratio": "reduced_reruns",
 }
 
 

@@ -1,24 +1,28 @@
 """The study: which scenes, methods and settings one run of the pipeline covers."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from pdrom.errors import ConfigurationError, PdromError
+from pdrom.effects.base import Seed
+from pdrom.errors import ConfigurationError, PdromError, choices
 from pdrom.fom.solvers import SOLVERS
 from pdrom.method import MethodSpec, load_methods
 from pdrom.rom.guard_settings import GuardSettings
-from pdrom.scene import Scene, SceneConfig
+from pdrom.scene import SCENE_NAME, Scene, SceneConfig
 from pdrom.subspace.specs import HrpdSpec, InterpolationSpec
-from pdrom.yamlfile import read_yaml, validate
+from pdrom.yamlfile import ConfigModel, read_yaml, validate
 
 Rank = Annotated[int, Field(ge=1, le=100_000)] | Literal["full"]
 Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
+SceneName = Annotated[str, Field(pattern=SCENE_NAME)]
+Count = Annotated[int, Field(ge=1, le=100_000)]
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+class _Model(ConfigModel):
+    """Base of the sections of a study."""
 
 
 class Coarsen(_Model):
@@ -31,8 +35,8 @@ class Coarsen(_Model):
 class Sweep(_Model):
     """Basis sizes of the reconstruction error: all up to ``dense_to``, then every ``step``-th."""
 
-    dense_to: Annotated[int, Field(ge=1)] = 20
-    step: Annotated[int, Field(ge=1)] = 5
+    dense_to: Count = 20
+    step: Count = 5
 
     def ranks(self, largest: int) -> list[int]:
         """Sizes 1 .. ``largest``, which is always among them."""
@@ -46,8 +50,8 @@ class Sensitivity(_Model):
 
     perturbations: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (1e-12, 1e-10, 1e-8)
     reference: Annotated[float, Field(gt=0.0, lt=1.0)] = 1e-10
-    seeds: tuple[Annotated[int, Field(ge=0)], ...] = (1, 2, 3)
-    threshold: Annotated[float, Field(gt=0.0)] = 1e-3
+    seeds: Annotated[tuple[Seed, ...], Field(min_length=1)] = (1, 2, 3)
+    threshold: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1e-3
 
     @model_validator(mode="after")
     def _reference_is_run(self) -> Self:
@@ -84,6 +88,11 @@ class Timing(_Model):
     interpreted_iterations: Annotated[int, Field(ge=1)] = 2
     breakeven: tuple[Rank, ...] = (5, 10, 20, 40, 60, 80, "full")
     breakeven_repeats: Annotated[int, Field(ge=5)] = 30
+    frames: Count = 15
+    warmup: Annotated[int, Field(ge=0, le=1000)] = 1
+    repeats: Annotated[int, Field(ge=1, le=1000)] = 5
+    numpy_frames: Count = 4
+    interpreted_frames: Count = 1
 
 
 class Subspace(_Model):
@@ -93,13 +102,13 @@ class Subspace(_Model):
     out), and on the snapshot basis by every method of ``interpolations``.
     """
 
-    scenes: tuple[str, ...] = ()
+    scenes: tuple[SceneName, ...] = ()
     bases: tuple[Literal["pod", "skinning"], ...] = ("pod", "skinning")
     sizes: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = (10, 20, 40)
     tolerances: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (3e-2, 1e-2, 1e-3)
     interpolated_sizes: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = ()
     hrpd: HrpdSpec | None = None
-    interpolations: dict[str, InterpolationSpec] = {}
+    interpolations: dict[str, InterpolationSpec] = Field(default_factory=dict)
 
 
 class Scaling(_Model):
@@ -196,14 +205,15 @@ class Online(_Model):
 class StudySettings(_Model):
     """Content of config/default.yaml, possibly overridden by --configfile."""
 
-    scenes: Annotated[tuple[str, ...], Field(min_length=1)]
+    scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
     methods: Annotated[tuple[str, ...], Field(min_length=1)]
     ranks: Annotated[tuple[Rank, ...], Field(min_length=1)] = (6, 10, 20, "full")
-    heldout_ranks: tuple[Rank, ...] = (20, "full")
+    heldout_ranks: tuple[Rank, ...] = ("full",)
     sweep: Sweep = Sweep()
     solver: str = "cholespy"
     threads: Literal[1, 2] = 1
     blowup_extent: Annotated[float, Field(gt=1.0)] = 100.0
+    blowup_extent: Annotated[float, Field(gt=1.0, le=1e12)] = 100.0
     coarsen: Coarsen = Coarsen()
     sensitivity: Sensitivity = Sensitivity()
     iterations: IterationSweep = IterationSweep()
@@ -226,6 +236,15 @@ class StudySettings(_Model):
             raise ValueError(f"solver = '{self.solver}': allowed are {', '.join(SOLVERS)}")
         return self
 
+    @model_validator(mode="after")
+    def _heldout_ranks_are_run(self) -> Self:
+        """Samples exist for the ranks; those of the full rank always do."""
+        for rank in self.heldout_ranks:
+            if rank not in (*self.ranks, "full"):
+                allowed = ", ".join(map(str, self.ranks))
+                raise ValueError(f"heldout_ranks = {rank}: allowed are ranks ({allowed}) and full")
+        return self
+
 
 class Study:
     """Settings with the scenes and methods that they name, all checked."""
@@ -243,15 +262,20 @@ class Study:
         self.methods: dict[str, MethodSpec] = _named_methods(root, settings.methods)
 
     @classmethod
-    def load(cls, config: dict[str, Any], root: Path | str = ".") -> "Study":
-        """Study of a (merged) configuration.
+    def load(
+        cls,
+        config: dict[str, Any],
+        root: Path | str = ".",
+        source: str = "configuration (config/default.yaml)",
+    ) -> "Study":
+        """Study of a (merged) configuration; ``source`` opens the messages about it.
 
         Raises
         ------
         ConfigurationError
             Naming file, key, value and what is allowed, before anything is computed.
         """
-        settings = validate(StudySettings, config, "configuration (config/default.yaml)")
+        settings = validate(StudySettings, config, source)
         return cls(settings, Path(root))
 
     @property
@@ -283,9 +307,7 @@ def load_bound_scene(root: Path, name: str, coarsen: Coarsen | None = None) -> S
         Naming the file and the fault; also for faults of the held-out variant.
     """
     path = root / "config" / "scenes" / f"{name}.yaml"
-    if not path.is_file():
-        known = sorted(p.stem for p in path.parent.glob("*.yaml"))
-        raise ConfigurationError(f"scenes: unknown scene '{name}' (allowed: {', '.join(known)})")
+    require_scenes(root, [name], "scenes")
     scene = validate(SceneConfig, read_yaml(path), str(path))
     if scene.name != name:
         raise ConfigurationError(f"{path}: name = '{scene.name}', required: '{name}', as the file")
@@ -299,11 +321,18 @@ def load_bound_scene(root: Path, name: str, coarsen: Coarsen | None = None) -> S
         raise ConfigurationError(f"{path}: {error}") from error
 
 
+def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
+    """ConfigurationError, which ``key`` opens, for a name without a file in config/scenes."""
+    known = sorted(path.stem for path in (root / "config" / "scenes").glob("*.yaml"))
+    for name in names:
+        if name not in known:
+            raise ConfigurationError(f"{key}: unknown scene '{name}'{choices(name, known)}")
+
+
 def _named_methods(root: Path, names: tuple[str, ...]) -> dict[str, MethodSpec]:
     path = root / "config" / "methods.yaml"
     methods = load_methods(path)
     for name in names:
         if name not in methods:
-            allowed = ", ".join(methods)
-            raise ConfigurationError(f"methods: unknown method '{name}' (allowed: {allowed})")
+            raise ConfigurationError(f"methods: unknown method '{name}'{choices(name, methods)}")
     return {name: methods[name] for name in names}

@@ -1,5 +1,15 @@
 """Named errors; each carries one line: file or object, key, value, and what is allowed."""
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+def choices(value: object, allowed: Iterable[object]) -> str:
+    """The end of a message: what is allowed, and the name that was probably meant."""
+    names = [str(name) for name in allowed]
+    close = get_close_matches(str(value), names, n=1)
+    return f" (allowed: {', '.join(names)})" + (f", did you mean '{close[0]}'?" if close else "")
+
 
 class PdromError(Exception):
     """Base of every error that a user's input can cause; shown to the user without a traceback."""

@@ -3,15 +3,15 @@
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from pdrom.method import MethodSpec
-from pdrom.yamlfile import read_yaml, validate
+from pdrom.yamlfile import ConfigModel, read_yaml, validate
 
 Rungs = Annotated[tuple[MethodSpec, ...], Field(min_length=1)]
 
 
-class LadderSpec(BaseModel):
+class LadderSpec(ConfigModel):
     """Content of config/ladder.yaml.
 
     r : basis size of all rungs (the numerical rank where that is smaller)
@@ -20,9 +20,7 @@ class LadderSpec(BaseModel):
     up, down : methods, from the published one upwards, and the sound one less one ingredient
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    r: Annotated[int, Field(ge=1)]
+    r: Annotated[int, Field(ge=1, le=100_000)]
     signs: Annotated[int, Field(ge=0, le=100)]
     scenes: tuple[str, ...]
     up: Rungs

@@ -1,13 +1,15 @@
 """A reduction method is a combination of ingredients; the presets are named combinations."""
 
+import re
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from pdrom.errors import ConfigurationError
-from pdrom.yamlfile import read_yaml, validate
+from pdrom.yamlfile import ConfigModel, read_yaml, shown, validate
 
+METHOD_NAME = "[a-z0-9][a-z0-9-]{0,63}"
 Weighting = Literal["none", "mass"]
 Centring = Literal["none", "affine", "mean-in-modes"]
 Layout = Literal["vectorised", "per-axis"]
@@ -17,7 +19,7 @@ Solve = Literal["square", "qr", "tikhonov"]
 Bounds = Literal["none", "training"]
 
 
-class BasisSpec(BaseModel):
+class BasisSpec(ConfigModel):
     """How a basis is made from snapshots.
 
     weighting : "mass" makes the modes orthonormal in the lumped-mass inner product of the rows
@@ -27,8 +29,6 @@ class BasisSpec(BaseModel):
     layout : "vectorised" has one column per snapshot with coefficients shared by x, y, z;
         "per-axis" has one basis for each axis
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     weighting: Weighting = "none"
     centring: Centring = "none"
@@ -129,6 +129,11 @@ def load_methods(path: Path) -> dict[str, MethodSpec]:
     content = read_yaml(path)
     if not isinstance(content, dict) or not content:
         raise ConfigurationError(f"{path}: a mapping of method names is required")
+    for name in content:
+        if not isinstance(name, str) or not re.fullmatch(METHOD_NAME, name):
+            raise ConfigurationError(
+                f"{path}: method {shown(name, 60)}: allowed are small letters, digits and hyphens"
+            )
     return {
         str(name): validate(MethodSpec, spec, f"{path}: method '{name}'")
         for name, spec in content.items()

@@ -1,20 +1,24 @@
 """The plan that the workflow rules ask: file names, parameters and code fingerprints."""
 
+import os
 import sys
+from collections.abc import Sequence
 from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 from pdrom.claims import load_claims
-from pdrom.config import Study, StudySettings
+from pdrom.config import Study, StudySettings, require_scenes
 from pdrom.effects import EFFECTS
-from pdrom.errors import ConfigurationError, PdromError
+from pdrom.errors import ConfigurationError, PdromError, choices
 from pdrom.figures import FIGURES, FigureSpec, Holdings, figure_inputs, load_figures
 from pdrom.figures.sources import PUBLISHED
 from pdrom.fingerprint import fingerprint
 from pdrom.hardcases.catalogue import reducible_cases
 from pdrom.hardcases.expectations import load_expectations
 from pdrom.ladder import LadderSpec, load_ladder
+from pdrom.mesh.config import MeshFile
 from pdrom.method import MethodSpec, load_methods
 from pdrom.paper.textables import TEX_TABLES
 from pdrom.subspace_ablation import AblationSpec, load_ablation
@@ -48,10 +52,17 @@ TABLES = (
 )
 
 
-def load_plan(config: dict[str, Any], root: Path) -> "Plan":
-    """Plan of a configuration; a faulty one ends the process with one line, before any job."""
+def load_plan(config: dict[str, Any], root: Path, files: Sequence[str | Path] = ()) -> "Plan":
+    """Plan of a configuration; a faulty one ends the process with one line, before any job.
+
+    Parameters
+    ----------
+    files : where the configuration came from, for the messages
+    """
+    names = [os.path.relpath(path, root) for path in files] or ["config/default.yaml"]
+    source = f"configuration ({', '.join(sorted(set(names)))})"
     try:
-        plan = Plan(Study.load(config, root))
+        plan = Plan(Study.load(config, root, source))
         plan.check()
         return plan
     except PdromError as error:
@@ -71,12 +82,35 @@ class Plan:
         return self.study.settings
 
     def check(self) -> None:
-        """Read the configuration of figures, ladder and claims, so that a fault shows early."""
-        _ = self.figure_specs, self.ladder, load_claims(self.root / "config" / "claims.yaml")
-        load_expectations(self.root / "config" / "hard_cases.yaml")
-        self.hard_cases()
-        _ = self.figure_specs, self.ladder, self.ablation
-        _ = load_claims(self.root / "config" / "claims.yaml")
+        """Read every file of the configuration, so that a fault shows early."""
+        folder = self.root / "config"
+        load_claims(folder / "claims.yaml")
+        load_expectations(folder / "hard_cases.yaml")
+        self._check_scenes(folder)
+        self._check_figures(folder)
+        self.scaling_spec()
+
+    def _check_scenes(self, folder: Path) -> None:
+        settings = self.settings
+        named = {
+            f"{folder / 'ladder.yaml'}: scenes": self.ladder.scenes,
+            f"{folder / 'subspace_ablation.yaml'}: scenes": self.ablation.scenes,
+            "subspace.scenes": settings.subspace.scenes,
+            "scaling.scenes": tuple(settings.scaling.scenes),
+            "stability.scenes": settings.stability.scenes,
+            "guard.cases": tuple(case.scene for case in settings.guard.cases),
+        }
+        for place, scenes in named.items():
+            require_scenes(self.root, scenes, place)
+
+    def _check_figures(self, folder: Path) -> None:
+        known = {"methods": load_methods(folder / "methods.yaml"), "groups": EFFECTS}
+        for figure, spec in self.figure_specs.items():
+            for key, names in known.items():
+                for name in getattr(spec, key):
+                    if name not in names:
+                        place = f"{folder / 'figures.yaml'}: {figure}.{key} = '{name}'"
+                        raise ConfigurationError(f"{place}: unknown{choices(name, names)}")
 
     # Parameters -----------------------------------------------------------------------------
 
@@ -91,6 +125,21 @@ class Plan:
     def mesh_config(self, mesh: str) -> dict[str, Any]:
         """Plain configuration of a mesh."""
         return self.study.meshes[mesh].model_dump(mode="json")
+
+    def mesh_file(self, mesh: str) -> list[str]:
+        """The file that a mesh is read from, an empty list for one that is generated."""
+        config = self.study.meshes[mesh]
+        return [config.path] if isinstance(config, MeshFile) else []
+
+    def digest(self, *paths: str) -> str:
+        """Checksum of files that people edit.
+
+        Snakemake compares times of files, which a copy, an archive or a wrong clock may set back;
+        as a parameter of a rule, the content itself decides.
+        """
+        files = [self.root / path for path in paths]
+        content = b"".join(sha256(f.read_bytes()).digest() for f in files if f.is_file())
+        return sha256(content).hexdigest()[:16]
 
     def method_spec(self, method: str) -> dict[str, Any]:
         """Plain specification of a method."""
@@ -257,6 +306,14 @@ class Plan:
             if scene in self.study.scenes
             for factor in factors
         ]
+
+    def scaling_spec(self) -> dict[str, Any]:
+        """Plain specification of the method that is timed on growing meshes."""
+        path, name = self.root / "config" / "methods.yaml", self.settings.scaling.method
+        methods = load_methods(path)
+        if name not in methods:
+            raise ConfigurationError(f"scaling.method = '{name}': unknown{choices(name, methods)}")
+        return methods[name].model_dump(mode="json")
 
     def scaling_settings(self) -> dict[str, Any]:
         """Plain settings of a mesh size; which sizes there are is no parameter of one."""

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from importlib import import_module
 from typing import Any
 
-from pdrom.errors import ConfigurationError
+from pdrom.errors import ConfigurationError, choices
 
 
 class Registry(Mapping[str, str]):
@@ -22,8 +22,8 @@ class Registry(Mapping[str, str]):
         try:
             return self._entries[name]
         except KeyError:
-            allowed = ", ".join(sorted(self._entries))
-            raise ConfigurationError(f"unknown {self.kind} '{name}' (allowed: {allowed})") from None
+            allowed = choices(name, sorted(self._entries))
+            raise ConfigurationError(f"unknown {self.kind} '{name}'{allowed}") from None
 
     def __contains__(self, name: object) -> bool:
         return name in self._entries

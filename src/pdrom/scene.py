@@ -8,8 +8,6 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     Field,
     SerializeAsAny,
     ValidationError,
@@ -19,7 +17,7 @@ from pydantic import (
 
 from pdrom.constraints.base import ConstraintGroup, GroupConfig
 from pdrom.effects import EFFECTS
-from pdrom.effects.base import Boundary, Contact, Effect, EffectConfig, Force, Start
+from pdrom.effects.base import Boundary, Contact, Effect, EffectConfig, Force, Seed, Start
 from pdrom.errors import ConfigurationError, SceneError
 from pdrom.fom.anderson import Anderson
 from pdrom.fom.space import VertexSpace
@@ -28,13 +26,15 @@ from pdrom.fom.system import DEFAULT_SOLVER, GlobalSystem
 from pdrom.mesh.checks import check_mesh
 from pdrom.mesh.config import MeshConfig
 from pdrom.mesh.types import Mesh
-from pdrom.yamlfile import describe
+from pdrom.yamlfile import ConfigModel, describe, shown
 
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+SCENE_NAME = r"^[a-z][a-z0-9_]{0,63}$"
+# Positions and velocities of a longer run fill disk and memory: 1600 vertices for 100,000 frames.
+MAX_VERTEX_FRAMES = 160_000_000
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+class _Model(ConfigModel):
+    """Base of the sections of a scene."""
 
 
 class HeldOut(_Model):
@@ -44,11 +44,11 @@ class HeldOut(_Model):
     the handles' direction round, ``kick`` adds an initial velocity (m/s, seeded).
     """
 
-    frames_factor: Positive = 1.25
+    frames_factor: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.25
     reverse: bool = False
     kick: Annotated[float, Field(ge=0.0, le=1e3)] = 0.0
-    kick_axes: tuple[Literal["x", "y", "z"], ...] = ("x", "y", "z")
-    seed: Annotated[int, Field(ge=0)] = 1
+    kick_axes: Annotated[tuple[Literal["x", "y", "z"], ...], Field(min_length=1)] = ("x", "y", "z")
+    seed: Seed = 1
 
 
 class ReductionPlan(_Model):
@@ -60,14 +60,14 @@ class ReductionPlan(_Model):
 class SceneConfig(_Model):
     """Configuration of a scene (config/scenes/*.yaml). Units: seconds, metres, kilograms."""
 
-    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+    name: Annotated[str, Field(pattern=SCENE_NAME)]
     title: str
     mesh: MeshConfig
-    time_step: Annotated[float, Field(gt=0.0, le=10.0)] = 0.016
+    time_step: Annotated[float, Field(ge=1e-9, le=10.0)] = 0.016
     iterations: Annotated[int, Field(ge=1, le=10_000)] = 10
     anderson_window: Annotated[int, Field(ge=0, le=50)] = 0
     frames: Annotated[int, Field(ge=1, le=1_000_000)]
-    vertex_mass: Positive = 10.0
+    vertex_mass: Annotated[float, Field(ge=1e-12, le=1e12)] = 10.0
     effects: tuple[SerializeAsAny[EffectConfig], ...]
     reduce: dict[str, ReductionPlan] = Field(default_factory=dict)
     held_out: HeldOut = HeldOut()
@@ -142,7 +142,7 @@ def _effect_config(entry: Any, index: int) -> EffectConfig:
     if isinstance(entry, EffectConfig):
         return entry
     if not isinstance(entry, dict) or not isinstance(entry.get("effect"), str):
-        raise ValueError(f"effects[{index}] = {entry!r:.60}: a mapping with a key 'effect'")
+        raise ValueError(f"effects[{index}] = {shown(entry, 60)}: a mapping with a key 'effect'")
     try:
         model = EFFECTS.load(entry["effect"]).Config
     except ConfigurationError as error:
@@ -177,6 +177,7 @@ class Scene:
             Faulty mesh, an empty selection, or effects that hold a vertex in different places.
         """
         check_mesh(mesh, config.name)
+        _check_size(config, mesh)
         masses = np.full(mesh.vertices, config.vertex_mass)
         effects = [_bind(entry, config.name, mesh, masses) for entry in config.effects]
         roles = (ConstraintGroup, Force, Boundary, Contact, Start)
@@ -244,6 +245,15 @@ def _bind(config: EffectConfig, scene: str, mesh: Mesh, masses: np.ndarray) -> E
         return EFFECTS.load(config.effect)(config, mesh, masses)
     except SceneError as error:
         raise SceneError(f"scene '{scene}', effect '{config.effect}': {error}") from error
+
+
+def _check_size(config: SceneConfig, mesh: Mesh) -> None:
+    """A run that cannot be stored is refused before anything is allocated."""
+    if config.frames * mesh.vertices > MAX_VERTEX_FRAMES:
+        raise SceneError(
+            f"scene '{config.name}': frames = {config.frames} on {mesh.vertices} vertices: allowed "
+            f"are at most {MAX_VERTEX_FRAMES // mesh.vertices} frames"
+        )
 
 
 def _check_holds(boundaries: list[Boundary], config: SceneConfig) -> None:

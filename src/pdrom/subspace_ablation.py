@@ -3,15 +3,15 @@
 from pathlib import Path
 from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from pdrom.subspace.specs import InterpolationSpec
-from pdrom.yamlfile import read_yaml, validate
+from pdrom.yamlfile import ConfigModel, read_yaml, validate
 
 Sizes = Annotated[tuple[Annotated[int, Field(ge=1, le=1000)], ...], Field(min_length=1)]
 
 
-class AblationSpec(BaseModel):
+class AblationSpec(ConfigModel):
     """Content of config/subspace_ablation.yaml.
 
     scenes : where it runs, as far as a configuration holds them
@@ -19,8 +19,6 @@ class AblationSpec(BaseModel):
     modes : modes r of the projections; they replace those of the variants
     variants : name -> interpolation
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     scenes: tuple[str, ...]
     sizes: Sizes

@@ -1,9 +1,16 @@
 """Files: whole or not at all, equal bytes for equal content, faults that are named."""
 
+import errno
+import os
+import subprocess
+import sys
+
 import h5py
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from pdrom.errors import SceneError, StorageError
 from pdrom.store import (
@@ -167,3 +174,174 @@ def test_first_number_that_is_none_is_named(bad):
     array[1, 2] = array[2, 0] = bad
     with pytest.raises(SceneError, match=rf"x: entry \(1, 2\) is {bad}"):
         require_finite("x", array, SceneError)
+
+
+# Faults ---------------------------------------------------------------------------------------
+
+
+SEAL_BYTES = len("pdrom-crc32:01234567\n")
+
+
+def write_one(path, kind):
+    """Write ``path`` in one of the ways that the package has."""
+    if kind == "hdf5":
+        with write_hdf5(path) as file:
+            file["x"] = np.arange(100.0)
+    elif kind == "table":
+        write_table(TABLE, path)
+    else:
+        with atomic_path(path) as temporary:
+            temporary.write_text("new")
+
+
+@pytest.mark.parametrize("kind", ["hdf5", "table", "text"])
+@pytest.mark.parametrize("call", ["fsync", "replace"])
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO])
+def test_a_system_call_that_fails_leaves_the_old_file(tmp_path, monkeypatch, kind, call, number):
+    path = tmp_path / "result"
+    path.write_text("old")
+
+    def fail(*_):
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, call, fail)
+    with pytest.raises(StorageError) as caught:
+        write_one(path, kind)
+    assert str(caught.value) == f"{path}: cannot be written ({os.strerror(number)})"
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("kind", ["hdf5", "table", "text"])
+@pytest.mark.parametrize("interruption", [KeyboardInterrupt, SystemExit, MemoryError])
+def test_an_interruption_is_handed_on_and_leaves_the_old_file(
+    tmp_path, monkeypatch, kind, interruption
+):
+    path = tmp_path / "result"
+    path.write_text("old")
+
+    def interrupt(*_):
+        raise interruption
+
+    monkeypatch.setattr(os, "replace", interrupt)
+    with pytest.raises(interruption):
+        write_one(path, kind)
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_interruption_inside_hdf5_leaves_the_old_file(tmp_path):
+    path = tmp_path / "result.h5"
+    path.write_text("old")
+    with pytest.raises(KeyboardInterrupt), write_hdf5(path) as file:
+        file["x"] = np.arange(1000.0)
+        raise KeyboardInterrupt
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+KILLED = """
+import os, signal, sys
+import numpy as np
+from pdrom.store import write_hdf5
+with write_hdf5(sys.argv[1]) as file:
+    file["x"] = np.arange(1000.0)
+    file.flush()
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_what_a_killed_process_left_goes_with_the_next_write(tmp_path):
+    path = tmp_path / "result.h5"
+    other = tmp_path / ".results.0123456789ab.h5"
+    other.write_text("of another file")
+    subprocess.run([sys.executable, "-c", KILLED, path], check=False)
+    (left,) = [p for p in tmp_path.iterdir() if p != other]
+    assert left.name.startswith(".result.")
+    write_one(path, "hdf5")
+    assert sorted(tmp_path.iterdir()) == sorted([path, other])
+
+
+LIMITED = """
+import resource, sys
+import numpy as np
+from pdrom.errors import StorageError
+from pdrom.store import write_hdf5
+resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+try:
+    with write_hdf5(sys.argv[1]) as file:
+        data = file.create_dataset("x", (100, 1000), dtype="f8")
+        for i in range(100):
+            data[i] = i
+except StorageError as error:
+    sys.exit(str(error))
+"""
+
+
+def test_no_space_in_the_middle_of_a_file(tmp_path):
+    """By a limit on the size of files, in a process of its own."""
+    path = tmp_path / "result.h5"
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, path], capture_output=True, text=True, check=False
+    )
+    assert done.stderr == f"{path}: cannot be written ({os.strerror(errno.EFBIG)})\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+@given(position=st.floats(0.0, 1.0, exclude_max=True), bit=st.integers(0, 7))
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_every_changed_bit_of_hdf5_is_noticed(tmp_path, position, bit):
+    path = tmp_path / "a.h5"
+    with write_hdf5(path) as file:
+        file["x"] = np.linspace(0.0, 1.0, 64)
+        file["x"].attrs["unit"] = "m"
+    content = bytearray(path.read_bytes())
+    content[int(position * (len(content) - SEAL_BYTES))] ^= 1 << bit
+    path.write_bytes(content)
+    with pytest.raises(StorageError, match=r"a\.h5: damaged, .*set aside"), open_hdf5(path):
+        pass
+
+
+@given(kept=st.floats(0.0, 1.0, exclude_max=True))
+@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_every_truncation_of_hdf5_is_noticed(tmp_path, kept):
+    path = tmp_path / "a.h5"
+    write_one(path, "hdf5")
+    os.truncate(path, int(kept * (path.stat().st_size - SEAL_BYTES)))
+    with pytest.raises(StorageError, match=r"a\.h5: damaged"), open_hdf5(path):
+        pass
+
+
+def test_a_damaged_result_is_set_aside_so_that_it_is_made_anew(tmp_path):
+    path = tmp_path / "a.h5"
+    path.write_text("no HDF5")
+    with pytest.raises(StorageError, match=r"set aside as a\.h5\.damaged"), open_hdf5(path):
+        pass
+    assert list(tmp_path.iterdir()) == [tmp_path / "a.h5.damaged"]
+
+
+def test_a_damaged_table_that_no_run_makes_stays(tmp_path):
+    path = tmp_path / "reference.csv"
+    path.write_text("a,b\n1,2\n3,")
+    with pytest.raises(StorageError, match="its end is missing"):
+        read_table(path, result=False)
+    assert path.exists()
+
+
+def test_a_table_notices_a_missing_end_but_not_a_changed_digit(tmp_path):
+    """CSV carries no checksum: this is its limit, stated in the README."""
+    path = tmp_path / "t.csv"
+    write_table(TABLE, path)
+    content = path.read_bytes()
+    path.write_bytes(content.replace(b"0.1", b"0.2"))
+    assert read_table(path).error[0] == 0.2
+    path.write_bytes(content[:-3])
+    with pytest.raises(StorageError, match="its end is missing"):
+        read_table(path)
+
+
+def test_the_seal_leaves_the_file_readable_by_others(tmp_path):
+    path = tmp_path / "a.h5"
+    write_one(path, "hdf5")
+    with h5py.File(path, "r") as file:
+        assert file["x"][-1] == 99.0

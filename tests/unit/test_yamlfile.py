@@ -41,9 +41,14 @@ def test_reads_plain_yaml(tmp_path):
     assert read_yaml(path) == {"a": 1, "b": [1.5, "x", None], "c": {"d": True}}
 
 
+def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
+    assert read_yaml(written(tmp_path, b"\xef\xbb\xbfa: 1\n")) == {"a": 1}
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
+        ("a: &x [1]\nb: *x\n", r"alias '\*x' is not allowed"),
         ("a: 1\nb: 2\na: 3\n", "key 'a' is given twice"),
         ("x: {a: 1, a: 1}\n", "key 'a' is given twice"),
         ("- {b: {a: 1, a: 1}}\n", "key 'a' is given twice"),

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 SCRIPT = Path(__file__).resolve().parents[2] / "reproduce"
-TOOLS = ["cat", "chmod", "cksum", "cp", "dirname", "grep", "mkdir", "ps", "rm", "sed", "sh"]
+TOOLS = ["cat", "chmod", "cksum", "cp", "dirname", "find", "grep", "mkdir", "ps", "rm", "sed", "sh"]
 TOOLS += ["sleep", "tail", "touch", "tr"]
 LOCK_FILE = f"nowhere==1.0 --hash=sha256:{64 * '0'}\n"
 

@@ -1,5 +1,7 @@
 # scene -> mesh -> full-order run -> snapshots, and the sensitivity of the full-order run
 rule mesh:
+    input:
+        lambda w: PLAN.mesh_file(w.mesh),
     output:
         "results/meshes/{mesh}.h5",
     log:
@@ -7,6 +9,7 @@ rule mesh:
     params:
         config=lambda w: PLAN.mesh_config(w.mesh),
         root=lambda w: str(PLAN.root),
+        content=lambda w: PLAN.digest(*PLAN.mesh_file(w.mesh)),
         code=PLAN.code("pdrom.stages.mesh"),
     message:
         "Mesh {wildcards.mesh}"

@@ -11,6 +11,7 @@ rule paper_inputs:
         "results/logs/paper/inputs.log",
     params:
         facts=PLAN.facts(),
+        content=PLAN.digest("paper/main.tex", "paper/references.bib"),
         code=PLAN.code("pdrom.stages.paper"),
     message:
         "Numbers, tables and references of the manuscript"
@@ -28,6 +29,7 @@ rule paper:
     log:
         "results/logs/paper/main.log",
     params:
+        content=PLAN.digest("paper/main.tex"),
         code=PLAN.code("pdrom.stages.paper"),
     message:
         "Manuscript paper/main.pdf"

@@ -274,6 +274,7 @@ rule claims_table:
     log:
         "results/logs/tables/claims.log",
     params:
+        content=PLAN.digest("config/claims.yaml"),
         code=PLAN.code("pdrom.stages.claims"),
     message:
         "Verdicts on the claims of the paper"

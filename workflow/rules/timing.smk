@@ -38,7 +38,7 @@ rule scaling:
     params:
         scene=lambda w: PLAN.scene_config(w.scene),
         method=PLAN.settings.scaling.method,
-        spec=PLAN.method_spec(PLAN.settings.scaling.method),
+        spec=PLAN.scaling_spec(),
         settings=PLAN.scaling_settings(),
         solver=PLAN.settings.solver,
         root=str(PLAN.root),

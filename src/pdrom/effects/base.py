@@ -20,9 +20,10 @@ from abc import ABC, abstractmethod
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import Field
 
 from pdrom.mesh.types import Mesh
+from pdrom.yamlfile import ConfigModel, Length
 
 
 class ScaledWithFrames:
@@ -30,14 +31,13 @@ class ScaledWithFrames:
 
 
 FrameNumber = Annotated[int, Field(ge=0, le=1_000_000), ScaledWithFrames()]
-Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
+Vector = tuple[Length, Length, Length]
 Selection = str | tuple[int, ...]
 
 
-class EffectConfig(BaseModel):
+class EffectConfig(ConfigModel):
     """Base of an effect's configuration: unknown keys are refused, instances are frozen."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     effect: str
 

@@ -3,10 +3,10 @@
 from typing import Literal
 
 import numpy as np
-from pydantic import FiniteFloat
 
 from pdrom.effects.base import Contact, EffectConfig
 from pdrom.mesh.types import Mesh
+from pdrom.yamlfile import Length
 
 
 class Floor(Contact):
@@ -20,7 +20,7 @@ class Floor(Contact):
         """``height`` y of the floor in metres."""
 
         effect: Literal["floor"] = "floor"
-        height: FiniteFloat = 0.0
+        height: Length = 0.0
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)

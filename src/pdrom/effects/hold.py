@@ -4,7 +4,7 @@ from abc import abstractmethod
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, FiniteFloat, model_validator
+from pydantic import Field, model_validator
 
 from pdrom.effects.base import Boundary, EffectConfig, FrameNumber, Selection, Vector
 from pdrom.mesh.select import select_vertices
@@ -106,7 +106,7 @@ class Rotate(Hold):
 
         effect: Literal["rotate"] = "rotate"
         axis: Literal["x", "y", "z"]
-        degrees: FiniteFloat
+        degrees: Annotated[float, Field(ge=-1e6, le=1e6)]
 
         def reversed(self) -> Self:
             return self.model_copy(update={"degrees": -self.degrees})

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from pdrom.effects.base import EffectConfig, Start
+from pdrom.effects.base import EffectConfig, Seed, Start
 from pdrom.mesh.types import Mesh
 
 
@@ -21,8 +21,8 @@ class Kick(Start):
 
         effect: Literal["kick"] = "kick"
         speed: Annotated[float, Field(gt=0.0, le=1e3, allow_inf_nan=False)]
-        seed: Annotated[int, Field(ge=0)]
-        axes: tuple[Literal["x", "y", "z"], ...] = ("x", "y", "z")
+        seed: Seed
+        axes: Annotated[tuple[Literal["x", "y", "z"], ...], Field(min_length=1)] = ("x", "y", "z")
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)

@@ -3,13 +3,14 @@
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, FiniteFloat
+from pydantic import Field
 
 from pdrom.effects.base import Boundary, EffectConfig, FrameNumber, Selection
 from pdrom.effects.hold import AXES
 from pdrom.errors import SceneError
 from pdrom.mesh.select import farthest_points, select_vertices
 from pdrom.mesh.types import Mesh
+from pdrom.yamlfile import Length
 
 # displacement over amplitude at equally spaced times: 0 -> -z -> +z -> -z -> 0
 KNOTS = (0.0, -1.0, 1.0, -1.0, 0.0)
@@ -26,7 +27,7 @@ class Poke(Boundary):
         """``amplitude`` in metres along ``axis``; ``over`` frames of motion, ``rest`` between."""
 
         effect: Literal["poke"] = "poke"
-        amplitude: FiniteFloat = 0.2
+        amplitude: Length = 0.2
         axis: Literal["x", "y", "z"] = "z"
         over: Annotated[FrameNumber, Field(ge=1)] = 20
         rest: FrameNumber = 10

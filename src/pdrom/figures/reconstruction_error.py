@@ -98,7 +98,7 @@ def _published(sources: Sources) -> pd.DataFrame | None:
     if sources.published is None:
         return None
     columns = ["experiment", "group", "split", "num_points", "relative_error_x"]
-    return read_table(sources.published / "reconstruction_error.csv", columns)
+    return read_table(sources.published / "reconstruction_error.csv", columns, result=False)
 
 
 def _draw_published(ax: Axes, table: pd.DataFrame, experiment: str, group: str) -> bool:

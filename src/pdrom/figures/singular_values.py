@@ -86,7 +86,7 @@ def _published(sources: Sources) -> pd.DataFrame | None:
     if sources.published is None:
         return None
     columns = ["experiment", "group", "component", "singular_value"]
-    return read_table(sources.published / "singular_values.csv", columns)
+    return read_table(sources.published / "singular_values.csv", columns, result=False)
 
 
 def _draw_published(ax: Axes, table: pd.DataFrame, experiment: str, group: str) -> bool:

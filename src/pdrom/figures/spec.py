@@ -3,18 +3,18 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from pdrom.errors import ConfigurationError
+from pdrom.errors import ConfigurationError, choices
 from pdrom.figures.catalogue import FIGURES
-from pdrom.yamlfile import read_yaml, validate
+from pdrom.yamlfile import ConfigModel, read_yaml, validate
 
 Rank = Annotated[int, Field(ge=0)] | Literal["full"]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 Split = Literal["train", "test", "heldout"]
 
 
-class FigureSpec(BaseModel):
+class FigureSpec(ConfigModel):
     """One figure. Whatever a configuration does not hold is left out of the picture.
 
     number : number in the paper that is reproduced; None for a figure of this study
@@ -27,8 +27,6 @@ class FigureSpec(BaseModel):
     perturbation, threshold : relative size of the perturbed start, and the spread that ends the
         horizon (sensitivity only)
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     number: Annotated[int, Field(ge=1)] | None = None
     title: Annotated[str, Field(min_length=3)]
@@ -64,8 +62,7 @@ def load_figures(path: Path | str) -> dict[str, FigureSpec]:
     figures = {}
     for name, entry in content.items():
         if name not in list(FIGURES):
-            allowed = ", ".join(FIGURES)
-            raise ConfigurationError(f"{path}: unknown figure '{name}' (allowed: {allowed})")
+            raise ConfigurationError(f"{path}: unknown figure '{name}'{choices(name, FIGURES)}")
         figures[name] = validate(FigureSpec, entry, f"{path}: {name}")
         _check_scenes(path, name, figures[name])
     return figures
@@ -78,7 +75,6 @@ def _check_scenes(path: Path, name: str, spec: FigureSpec) -> None:
     known = sorted(p.stem for p in folder.glob("*.yaml"))
     for scene in (*spec.scenes, *spec.published):
         if scene not in known:
-            allowed = ", ".join(known)
             raise ConfigurationError(
-                f"{path}: {name}.scenes = '{scene}': no such scene (allowed: {allowed})"
+                f"{path}: {name}.scenes = '{scene}': no such scene{choices(scene, known)}"
             )

@@ -3,24 +3,22 @@
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from pdrom.errors import ConfigurationError
 from pdrom.hardcases.catalogue import CASES
-from pdrom.yamlfile import read_yaml, validate
+from pdrom.yamlfile import ConfigModel, read_yaml, validate
 
 HOLDS, NOTHING = "holds", "nothing to reduce"
 FAILURES = ("refused", "singular", "blow-up", "distorted", "objective rises", "momentum changes")
 
 
-class Expectation(BaseModel):
+class Expectation(ConfigModel):
     """Where a reduction fails, and why.
 
     fails : cases in which it must fail
     may_fail : cases in which round-off decides whether it fails
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     why: Annotated[str, Field(min_length=20)]
     fails: tuple[str, ...] = ()

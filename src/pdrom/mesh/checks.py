@@ -26,13 +26,14 @@ def check_mesh(mesh: Mesh, name: str) -> Mesh:
     if len(cells) == 0:
         raise MeshError(f"{name}: no triangles and no tetrahedra")
     require_finite(f"{name}: points", mesh.points, MeshError)
-    _check_indices(cells, mesh.vertices, kind, name)
+    check_indices(cells, mesh.vertices, kind, name)
     _check_vertices(mesh, cells, name)
     _check_measures(mesh, cells, kind, name)
     return mesh
 
 
-def _check_indices(cells: np.ndarray, vertices: int, kind: str, name: str) -> None:
+def check_indices(cells: np.ndarray, vertices: int, kind: str, name: str) -> None:
+    """MeshError for an index out of range, DegenerateElementError for one given twice."""
     outside = np.flatnonzero(((cells < 0) | (cells >= vertices)).any(axis=1))
     if len(outside):
         raise MeshError(

@@ -2,21 +2,34 @@
 
 import hashlib
 import json
+import re
+from math import prod
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, field_validator
+from pydantic import Field, field_validator, model_validator
 
+from pdrom.errors import MeshError
+from pdrom.mesh.checks import check_mesh
 from pdrom.mesh.files import read_mesh_file
 from pdrom.mesh.generators import bar, cloth
 from pdrom.mesh.types import Mesh
+from pdrom.yamlfile import ConfigModel, Length, PositiveLength
 
 Count = Annotated[int, Field(ge=2, le=2000)]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+# A cloth of this size needs about 1 GB while its operators are built.
+MAX_VERTICES = 1_000_000
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+def _check_size(**counts: int) -> None:
+    total = prod(counts.values())
+    if total > MAX_VERTICES:
+        product = " x ".join(f"{name} = {count}" for name, count in counts.items())
+        raise ValueError(f"{product} are {total} vertices, allowed: at most {MAX_VERTICES}")
+
+
+class _Model(ConfigModel):
+    """Base of the kinds of meshes."""
 
     @property
     def identifier(self) -> str:
@@ -32,9 +45,14 @@ class ClothMesh(_Model):
     rows: Count = 20
     columns: Count = 20
     plane: Literal["xy", "xz"] = "xy"
-    extent: Positive = 1.0
-    lift: FiniteFloat = 2.0
-    wave: FiniteFloat = 0.0
+    extent: PositiveLength = 1.0
+    lift: Length = 2.0
+    wave: Length = 0.0
+
+    @model_validator(mode="after")
+    def _not_too_large(self) -> Self:
+        _check_size(rows=self.rows, columns=self.columns)
+        return self
 
     def coarsened(self, factor: float) -> Self:
         """Same sheet with ``factor`` times the vertices along each side, at least 4."""
@@ -58,8 +76,13 @@ class BarMesh(_Model):
     nx: Count = 40
     ny: Count = 5
     nz: Count = 5
-    extent: Positive = 1.0
-    lift: FiniteFloat = 2.0
+    extent: PositiveLength = 1.0
+    lift: Length = 2.0
+
+    @model_validator(mode="after")
+    def _not_too_large(self) -> Self:
+        _check_size(nx=self.nx, ny=self.ny, nz=self.nz)
+        return self
 
     def coarsened(self, factor: float) -> Self:
         """Same bar with ``factor`` times the vertices along each side, at least 3."""
@@ -81,13 +104,15 @@ class MeshFile(_Model):
 
     kind: Literal["file"]
     path: str
-    scale: Positive = 1.0
+    scale: Annotated[float, Field(ge=1e-9, le=1e9)] = 1.0
 
     @field_validator("path")
     @classmethod
     def _inside(cls, value: str) -> str:
         if Path(value).is_absolute() or ".." in Path(value).parts:
             raise ValueError("a path below the project's folder is required, without '..'")
+        if not value.strip() or not value.isprintable():
+            raise ValueError("a path of printable characters is required")
         return value
 
     def coarsened(self, factor: float) -> Self:
@@ -96,13 +121,25 @@ class MeshFile(_Model):
 
     def build(self, root: Path) -> Mesh:
         """Read the mesh."""
-        mesh = read_mesh_file(root / self.path)
-        return Mesh(mesh.points * self.scale, mesh.triangles, mesh.tetrahedra)
+        mesh = read_mesh_file(self.file(root))
+        scaled = Mesh(mesh.points * self.scale, mesh.triangles, mesh.tetrahedra)
+        return check_mesh(scaled, self.path)
+
+    def file(self, root: Path) -> Path:
+        """The mesh file; MeshError if a link leads out of the project's folder."""
+        path = root / self.path
+        try:
+            inside = path.resolve().is_relative_to(root.resolve())
+        except (OSError, RuntimeError) as error:  # a circle of links
+            raise MeshError(f"mesh.path = '{self.path}': leads nowhere") from error
+        if not inside:
+            raise MeshError(f"mesh.path = '{self.path}': a link that leads out of the project")
+        return path
 
     @property
     def label(self) -> str:
         """Readable part of the mesh's file name."""
-        return Path(self.path).stem
+        return re.sub(r"[^A-Za-z0-9_-]", "_", Path(self.path).stem)[:40]
 
 
 MeshConfig = Annotated[ClothMesh | BarMesh | MeshFile, Field(discriminator="kind")]

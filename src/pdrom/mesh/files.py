@@ -1,16 +1,18 @@
 """Mesh files, read by meshio."""
 
 import io
-from contextlib import redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import meshio
 import numpy as np
 
 from pdrom.errors import MeshError
-from pdrom.mesh.generators import boundary
+from pdrom.mesh.checks import check_indices
+from pdrom.mesh.generators import boundary, orient
 from pdrom.mesh.types import Mesh
 
+MAX_BYTES = 500_000_000
 ALLOWED_CELLS = ("triangle", "tetra")
 
 
@@ -24,12 +26,14 @@ def read_mesh_file(path: Path) -> Mesh:
     """
     if not path.is_file():
         raise MeshError(f"{path}: no such mesh file")
+    if path.stat().st_size > MAX_BYTES:
+        raise MeshError(f"{path}: larger than {MAX_BYTES} bytes")
     try:
         # meshio reports some faults by printing and leaving the process
-        with redirect_stdout(io.StringIO()):
+        with redirect_stdout(io.StringIO()) as said, redirect_stderr(said):
             raw = meshio.read(path)
     except (SystemExit, Exception) as error:
-        raise MeshError(f"{path}: not a readable mesh ({error})") from error
+        raise MeshError(f"{path}: not a readable mesh ({_reason(error)})") from error
     cells = {block.type: [] for block in raw.cells}
     for block in raw.cells:
         cells[block.type].append(block.data)
@@ -39,10 +43,23 @@ def read_mesh_file(path: Path) -> Mesh:
             f"{path}: holds cells {kinds or 'of no kind'}, "
             f"allowed: only one of {', '.join(ALLOWED_CELLS)}"
         )
-    elements = np.concatenate(cells[kinds[0]]).astype(np.int32)
-    points = np.ascontiguousarray(raw.points, dtype=np.float64)
+    try:
+        elements = np.concatenate(cells[kinds[0]])
+        points = np.ascontiguousarray(raw.points, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise MeshError(f"{path}: not a readable mesh ({_reason(error)})") from error
     if points.ndim != 2 or points.shape[1] != 3:
         raise MeshError(f"{path}: points of shape {points.shape}, required: (N, 3)")
+    check_indices(elements, len(points), kinds[0], str(path))
     if kinds[0] == "triangle":
-        return Mesh(points, elements)
-    return Mesh(points, boundary(elements), elements)
+        return Mesh(points, elements.astype(np.int32))
+    # formats differ in how they number the corners
+    tetrahedra = orient(points, elements)
+    return Mesh(points, boundary(tetrahedra), tetrahedra)
+
+
+def _reason(error: BaseException) -> str:
+    """What went wrong, on one short line."""
+    if isinstance(error, SystemExit):
+        return "no reader takes it"
+    return f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"

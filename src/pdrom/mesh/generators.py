@@ -62,7 +62,7 @@ def bar(nx: int, ny: int, nz: int, extent: float = 1.0, lift: float = 2.0) -> Me
     axes = [(np.arange(n) - 0.5 * (n - 1)) * spacing for n in counts]
     points = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")], axis=1)
     points[:, 1] += lift
-    tetrahedra = _orient(points, _bar_tetrahedra(nx, ny, nz))
+    tetrahedra = orient(points, _bar_tetrahedra(nx, ny, nz))
     return Mesh(points, boundary(tetrahedra), tetrahedra)
 
 
@@ -83,8 +83,8 @@ def _bar_tetrahedra(nx: int, ny: int, nz: int) -> np.ndarray:
     return np.take_along_axis(index[:, None, :].repeat(5, axis=1), pattern, axis=2).reshape(-1, 4)
 
 
-def _orient(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
-    """Swap two vertices where the signed volume is negative."""
+def orient(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
+    """The tetrahedra (E, 4) int32, two corners swapped where the signed volume is negative."""
     a, b, c, d = (points[tetrahedra[:, i]] for i in range(4))
     negative = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0.0
     oriented = tetrahedra.astype(np.int32)

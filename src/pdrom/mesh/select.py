@@ -28,12 +28,12 @@ def select_vertices(mesh: Mesh, selection: str | tuple[int, ...] | list[int]) ->
     """
     if isinstance(selection, str):
         return _side(mesh, selection)
-    indices = np.unique(np.asarray(selection, dtype=np.int64))
-    if len(indices) == 0:
+    if len(selection) == 0:
         raise SceneError("selection []: selects no vertex")
-    if indices[0] < 0 or indices[-1] >= mesh.vertices:
-        raise SceneError(f"selection {list(selection)}: allowed are 0 to {mesh.vertices - 1}")
-    return indices
+    outside = [index for index in selection if not 0 <= index < mesh.vertices]
+    if outside:
+        raise SceneError(f"selection holds {outside[0]}: allowed are 0 to {mesh.vertices - 1}")
+    return np.unique(np.asarray(selection, dtype=np.int64))
 
 
 def _side(mesh: Mesh, side: str) -> np.ndarray:

@@ -2,13 +2,15 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from pdrom.yamlfile import ConfigModel
 
 Action = Literal["none", "report", "stop", "fall-back"]
 Margin = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
-class GuardSettings(BaseModel):
+class GuardSettings(ConfigModel):
     """What a reduced run does when it leaves the trained range, and where that range ends.
 
     action : "none" watches nothing, "report" logs and counts, "stop" ends the run, "fall-back"
@@ -18,8 +20,6 @@ class GuardSettings(BaseModel):
     extent : multiple of the largest bounding box of the training run
     rise : relative rise of the objective over the second half of a frame's iterations
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     action: Action = "report"
     margin: Margin = 0.1

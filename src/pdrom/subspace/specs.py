@@ -2,25 +2,25 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
+
+from pdrom.yamlfile import ConfigModel
 
 Gain = Annotated[float, Field(gt=1.0)]
 
 
-class HrpdSpec(BaseModel):
+class HrpdSpec(ConfigModel):
     """Sampled constraints with interpolation (Brandt et al. 2018).
 
     dimension : dimension of the space of projections (fewer if there are fewer)
     samples : sampled elements (all, if there are fewer)
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
     dimension: Annotated[int, Field(ge=1, le=10_000)] = 60
     samples: Annotated[int, Field(ge=1, le=1_000_000)] = 250
 
 
-class InterpolationSpec(BaseModel):
+class InterpolationSpec(ConfigModel):
     """Block DEIM in a position subspace; the default is the plain method.
 
     modes : basis size r (the numerical rank where that is smaller)
@@ -37,8 +37,6 @@ class InterpolationSpec(BaseModel):
     margin : online coefficients stay in the range seen in training, widened on both sides by this
         fraction of it; None for no bounds
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     modes: Annotated[int, Field(ge=1, le=10_000)] = 20
     states: Literal["full-order", "projected", "visited"] = "full-order"

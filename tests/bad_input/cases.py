@@ -1,0 +1,321 @@
+"""The corpus of broken input: what is broken, how it is fed in, and what the message must say."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from bad_input.project import MESH, SCENE, SMALL_SCENE, SMALL_STUDY, STUDY, Content, LinkTo, Replace
+
+METHODS, FIGURES = "config/methods.yaml", "config/figures.yaml"
+CLAIMS, LADDER = "config/claims.yaml", "config/ladder.yaml"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One fault.
+
+    changes : files of the small project and their broken content
+    parts : what the message must contain: file, key, value, what is allowed
+    overrides : what ``--config`` adds
+    """
+
+    name: str
+    changes: Mapping[str, Content]
+    parts: tuple[str, ...]
+    overrides: Mapping[str, Any] = field(default_factory=dict)
+
+
+def study(name: str, text: str | bytes, *parts: str) -> Case:
+    """The study's file with other content."""
+    return Case(name, {STUDY: text}, parts)
+
+
+def more(name: str, lines: str, *parts: str) -> Case:
+    """The study's file with further lines."""
+    return Case(name, {STUDY: SMALL_STUDY + lines}, parts)
+
+
+def override(name: str, key: str, value: Any, *parts: str) -> Case:
+    """A value that ``--config`` gives."""
+    return Case(name, {}, ("configuration", *parts), {key: value})
+
+
+def scene(name: str, old: str, new: str, *parts: str) -> Case:
+    """The scene's file with one text replaced."""
+    return Case(name, {SCENE: Replace(old, new)}, (SCENE, *parts))
+
+
+def mesh(name: str, content: Content, *parts: str, path: str = MESH) -> Case:
+    """A mesh file with broken content."""
+    use = Replace("{kind: cloth, rows: 5, columns: 4, plane: xz}", f"{{kind: file, path: {path}}}")
+    return Case(name, {SCENE: use, path: content}, (SCENE, path, *parts))
+
+
+def mesh_path(name: str, path: str, *parts: str, **changes: Content) -> Case:
+    """A mesh path that must not be followed."""
+    new = f'{{kind: file, path: "{path}"}}'
+    use = Replace("{kind: cloth, rows: 5, columns: 4, plane: xz}", new)
+    return Case(name, {SCENE: use, **changes}, (SCENE, *parts))
+
+
+def other(name: str, path: str, old: str, new: str, *parts: str) -> Case:
+    """Another configuration file with one text replaced."""
+    return Case(name, {path: Replace(old, new)}, (path, *parts))
+
+
+BOMB = "a: &a [x, x]\n" + "".join(
+    f"{b}: &{b} [{', '.join(['*' + a] * 9)}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True)
+)
+LONG_SCENE = SMALL_SCENE.replace("rows: 5", "rows: 500").replace("frames: 8", "frames: 100000")
+GROUND = "v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\n"
+PLY = "ply\nformat ascii 1.0\nelement vertex {n}\nproperty float x\nproperty float y\n"
+PLY += "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+TETRAHEDRA = """\
+$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$Nodes
+{n}
+{nodes}
+$EndNodes
+$Elements
+{m}
+{elements}
+$EndElements
+"""
+CORNERS = "1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1"
+
+STUDY_CASES = [
+    study("empty study", "", STUDY, "a mapping of keys is required", "nothing"),
+    study("study as a list", "- small\n", STUDY, "a mapping of keys", "['small']"),
+    study("study as a word", "small\n", STUDY, "a mapping of keys", "'small'"),
+    study("study of binary garbage", b"\x00\xff\xfe\x80" * 50, STUDY, "not valid YAML"),
+    study("study in Latin-1", "scenes: [sm\xe5ll]\n".encode("latin-1"), STUDY, "not valid YAML"),
+    study("study in UTF-16", SMALL_STUDY.encode("utf-16"), STUDY, "not valid YAML"),
+    study("tab in the indentation", "scenes:\n\t- small\n", STUDY, "not valid YAML", "line 2"),
+    study("bracket that is not closed", "scenes: [small\n", STUDY, "not valid YAML", "line"),
+    study("key given twice", SMALL_STUDY + "ranks: [3]\n", STUDY, "'ranks' is given twice"),
+    study("YAML bomb", BOMB, STUDY, "alias '*a' is not allowed"),
+    study("alias of itself", "a: &a [*a]\n", STUDY, "alias '*a' is not allowed"),
+    study("tag that runs code", "scenes: !!python/object/apply:os.system [id]\n",
+          STUDY, "could not determine a constructor", "python/object/apply"),
+    study("tag that imports", "scenes: !!python/name:os.system\n", STUDY, "python/name:os.system"),
+    study("template that runs code", SMALL_STUDY + "__use_yte__: true\n?ranks: 1\n",
+          STUDY, "__use_yte__", "not allowed"),
+    study("very deep nesting", "a: " + "[" * 5000, STUDY, "not valid YAML"),
+    study("very large file", "# " + "x" * 2_000_000, STUDY, "larger than 1000000 bytes"),
+    study("integer of many digits", SMALL_STUDY + "blowup_extent: " + "9" * 5000 + "\n",
+          STUDY, "not valid YAML", "limit"),
+    study("date that is none", SMALL_STUDY + "solver: 2026-13-45\n", STUDY, "not valid YAML"),
+    study("scenes missing", "methods: [pod]\n", STUDY, "'scenes' is missing"),
+    study("no scene at all", "scenes: []\nmethods: [pod]\n", STUDY, "scenes = []", "at least 1"),
+    more("misspelt key", "sovler: splu\n", "unknown key 'sovler'", "did you mean 'solver'?"),
+    more("misspelt key of a section", "sweep: {dens_to: 4}\n", "'sweep.dens_to'", "'dense_to'"),
+    more("key that is a number", "3: 4\n", "3: the key is not a text"),
+    more("unknown solver", "solver: lu\n", "solver = 'lu'", "cholespy, splu"),
+    more("section as a number", "coarsen: 0.5\n", "coarsen = 0.5", "valid dictionary"),
+    more("factor above one", "coarsen: {resolution: 2}\n", "coarsen.resolution = 2", "equal to 1"),
+    more("factor NaN", "coarsen: {frames: .nan}\n", "coarsen.frames = nan"),
+    more("infinite limit", "blowup_extent: .inf\n", "blowup_extent = inf", "1000000000000"),
+    more("truth value for a number", "timing: {repeats: yes}\n", "repeats = True", "truth value"),
+    more("huge number of repeats", "timing: {repeats: 1.0e+9}\n", "timing.repeats", "1000"),
+    more("negative seed", "sensitivity: {seeds: [-1]}\n", "sensitivity.seeds.0 = -1"),
+    more("reference that is not run", "sensitivity: {reference: 1.0e-5}\n",
+         "reference = 1e-05", "one of the perturbations"),
+    more("held-out rank without samples", "heldout_ranks: [7]\n", "heldout_ranks = 7", "full"),
+    more("position basis of unknown kind", "subspace: {bases: [svd]}\n",
+         "subspace.bases.0 = 'svd'", "'pod' or 'skinning'"),
+    more("position subspace of no scene", "subspace: {scenes: [smal]}\n",
+         "subspace.scenes", "'smal'", "did you mean 'small'?"),
+    override("ranks as a word", "ranks", "six", "ranks = 'six'", "valid list"),
+    override("ranks with a fraction", "ranks", [2.5], "ranks.0", "= 2.5"),
+    override("rank zero", "ranks", [0], "ranks.0", "= 0", "greater than or equal to 1"),
+    override("rank twice", "ranks", [3, 3], "ranks = [3, 3]", "twice"),
+    override("timing as a word", "timing", "fast", "timing = 'fast'", "valid dictionary"),
+    Case("unknown scene", {}, ("scenes: unknown scene 'smal'", "did you mean 'small'?"),
+         {"scenes": ["smal"]}),
+    override("scene that leaves the folder", "scenes", ["../scenes/small"], "scenes.0", "pattern"),
+    override("scene with an absolute path", "scenes", ["/etc/passwd"], "scenes.0 = '/etc/passwd'"),
+    override("scene with a zero byte", "scenes", ["a\0b"], "scenes.0 = 'a\\x00b'", "pattern"),
+    Case("unknown method", {}, ("methods: unknown method 'pood'", "did you mean 'pod'?"),
+         {"methods": ["pood"]}),
+]  # fmt: skip
+SCENE_CASES = [
+    Case("scene without a file", {SCENE: None}, ("scenes", "unknown scene 'small'", "allowed: ")),
+    Case("empty scene", {SCENE: ""}, (SCENE, "a mapping of keys is required, found nothing")),
+    Case("scene of binary garbage", {SCENE: bytes(range(256))}, (SCENE, "not valid YAML")),
+    Case("scene file that is a folder", {SCENE: None, SCENE + "/x": ""},
+         (SCENE, "no such configuration file")),
+    scene("name of another scene", "name: small", "name: large", "name = 'large'", "'small'"),
+    scene("misspelt key of a scene", "frames: 8", "frmes: 8", "'frmes'", "mean 'frames'?"),
+    scene("frames as a word", "frames: 8", "frames: many", "frames = 'many'", "valid integer"),
+    scene("frames with a unit", "frames: 8", "frames: 8 s", "frames = '8 s'", "valid integer"),
+    scene("frames as a truth value", "frames: 8", "frames: on", "frames = True", "truth value"),
+    scene("no frames", "frames: 8", "frames: 0", "frames = 0", "greater than or equal to 1"),
+    scene("negative frames", "frames: 8", "frames: -8", "frames = -8"),
+    scene("too many frames", "frames: 8", "frames: 1000001", "frames = 1000001", "1000000"),
+    Case("run that no disk holds", {SCENE: LONG_SCENE},
+         (SCENE, "frames = 100000 on 2000 vertices", "at most 80000 frames")),
+    scene("time step zero", "time_step: 0.016", "time_step: 0", "time_step = 0"),
+    scene("time step NaN", "time_step: 0.016", "time_step: .nan", "time_step = nan"),
+    scene("time step with a unit", "time_step: 0.016", "time_step: 16 ms", "time_step = '16 ms'"),
+    scene("time step of a denormal", "time_step: 0.016", "time_step: 1.0e-310", "time_step"),
+    scene("negative mass", "frames: 8", "frames: 8\nvertex_mass: -1", "vertex_mass = -1"),
+    scene("infinite mass", "frames: 8", "frames: 8\nvertex_mass: .inf", "vertex_mass = inf"),
+    scene("no effects", SMALL_SCENE[SMALL_SCENE.index("effects:"):SMALL_SCENE.index("reduce:")],
+          "effects: []\n", "no constraint group"),
+    scene("effects as a mapping", SMALL_SCENE[SMALL_SCENE.index("effects:"):],
+          "effects: {effect: gravity}\n", "a list of effects is required"),
+    scene("no constraint", "  - {effect: spring, weight: 1.0e+5}\n", "", "no constraint group"),
+    scene("effect as a word", "- {effect: gravity}", "- gravity", "effects[0] = 'gravity'"),
+    scene("unknown effect", "effect: spring", "effect: sprnig", "effects[2]", "unknown effect",
+          "did you mean 'spring'?"),
+    scene("unknown key of an effect", "select: left", "selct: left", "effects[1] (pins)", "selct"),
+    scene("weight zero", "weight: 1.0e+5", "weight: 0", "(spring)", "weight = 0", "greater than 0"),
+    scene("weight NaN", "weight: 1.0e+5", "weight: .nan", "(spring)", "weight = nan"),
+    scene("weight with a comma", "weight: 1.0e+5", "weight: '1,5'", "(spring)", "weight = '1,5'"),
+    scene("huge weight", "weight: 1.0e+5", "weight: 1.0e+300", "(spring)", "weight = 1e+300"),
+    scene("gravity of two axes", "effect: gravity", "effect: gravity, acceleration: [0, -9.81]",
+          "(gravity)", "acceleration"),
+    scene("huge gravity", "effect: gravity", "effect: gravity, acceleration: [0, -1.0e+300, 0]",
+          "(gravity)", "acceleration.1 = -1e+300"),
+    scene("effect given twice", "- {effect: gravity}", "- {effect: spring, weight: 1.0}", "twice"),
+    scene("pin of no side", "select: left", "select: middle", "pins", "'middle'", "left, right"),
+    scene("pin that selects nothing", "select: left", "select: []", "pins", "selects no vertex"),
+    scene("pin of a flat side", "select: left", "select: top", "pins", "selects nothing", "flat"),
+    scene("pin out of range", "select: left", "select: [0, 20]", "pins", "0 to 19"),
+    scene("pin before the first vertex", "select: left", "select: [-1]", "pins", "0 to 19"),
+    scene("pin of a huge index", "select: left", "select: [99999999999999999999]", "pins",
+          "0 to 19"),
+    scene("pin with fractions", "select: left", "select: [0.5]", "(pins)", "select"),
+    scene("pin that ends before it starts", "select: left", "select: left, start: 5, until: 5",
+          "(pins)", "until = 5"),
+    scene("handle against pin", "- {effect: gravity}",
+          "- {effect: translate, select: left, offset: [1, 0, 0], over: 3}",
+          "held by 'translate' and by 'pins'"),
+    scene("handle over no frames", "- {effect: gravity}",
+          "- {effect: translate, select: right, offset: [1, 0, 0], over: 0}", "(translate)",
+          "over = 0"),
+    scene("more pokes than vertices", "- {effect: gravity}", "- {effect: poke, count: 500}",
+          "count = 500", "20 vertices"),
+    scene("kick of no axis", "- {effect: gravity}",
+          "- {effect: kick, speed: 1, seed: 1, axes: []}", "(kick)", "axes = []"),
+    scene("group that is not there", "spring: {train: 4}", "strain: {train: 4}", "reduce.strain",
+          "allowed: spring"),
+    scene("more training than frames", "train: 4", "train: 5", "reduce.spring.train = 5", "4 even"),
+    scene("one training snapshot", "train: 4", "train: 1", "reduce.spring.train = 1"),
+    scene("held-out run at no speed", "kick: 0.5", "frames_factor: 0", "held_out.frames_factor"),
+    scene("held-out run at infinite speed", "kick: 0.5", "frames_factor: 1.0e+308",
+          "held_out.frames_factor = 1e+308"),
+    scene("held-out kick of no axis", "kick: 0.5", "kick: 0.5, kick_axes: []", "kick_axes = []"),
+    scene("mesh of no kind", "kind: cloth, ", "", "mesh", "kind"),
+    scene("mesh of unknown kind", "kind: cloth", "kind: sphere", "mesh", "'cloth', 'bar', 'file'"),
+    scene("sheet of one row", "rows: 5", "rows: 1", "mesh.cloth.rows = 1", "equal to 2"),
+    scene("sheet of too many rows", "rows: 5", "rows: 100000", "mesh.cloth.rows = 100000"),
+    scene("sheet of too many vertices", "rows: 5, columns: 4", "rows: 2000, columns: 2000",
+          "mesh.cloth", "rows = 2000 x columns = 2000", "4000000 vertices", "1000000"),
+    scene("bar of too many vertices", "kind: cloth, rows: 5, columns: 4, plane: xz",
+          "kind: bar, nx: 2000, ny: 2000, nz: 2000", "mesh.bar", "8000000000 vertices"),
+    scene("extent zero", "plane: xz", "plane: xz, extent: 0", "mesh.cloth.extent = 0"),
+    scene("extent NaN", "plane: xz", "plane: xz, extent: .nan", "mesh.cloth.extent = nan"),
+    scene("unknown plane", "plane: xz", "plane: zx", "mesh.cloth.plane = 'zx'", "'xy' or 'xz'"),
+    scene("tetrahedra on a sheet", "effect: spring, weight", "effect: tetrahedron_strain, weight",
+          "tetrahedron_strain"),
+]  # fmt: skip
+
+MESH_CASES = [
+    mesh("missing mesh", None, "no such mesh file", path="meshes/none.obj"),
+    mesh("empty mesh", "", "not a readable mesh|of no kind"),
+    mesh("mesh without cells", GROUND, "of no kind"),
+    mesh("mesh of quadrilaterals", GROUND + "f 1 2 3 4\n", "['quad']", "triangle, tetra"),
+    mesh("mesh of mixed cells", GROUND + "v 2 0 0\nf 1 2 3 4\nf 2 5 3\n", "quad", "only one of"),
+    mesh("mesh of binary garbage", bytes(range(256)) * 20, "not a readable mesh|of no kind"),
+    mesh("mesh with a wrong extension", "v 0 0 0\n", "not a readable mesh", path="meshes/a.xyzzy"),
+    mesh("mesh without an extension", "v 0 0 0\n", "not a readable mesh", path="meshes/a"),
+    mesh("mesh of another format", GROUND + "f 1 2 3\n", "not a readable mesh",
+         path="meshes/a.vtu"),
+    mesh("mesh that ends early", PLY.format(n=9) + "0 0 0\n", "not a readable mesh|allowed: 0 to",
+         path="meshes/a.ply"),
+    mesh("mesh that announces too much", PLY.format(n=10**15) + "0 0 0\n",
+         "not a readable mesh|allowed: 0 to", path="meshes/a.ply"),
+    mesh("index out of range", GROUND + "f 1 2 3\nf 1 3 9\n", "names vertex [0, 2, 8]", "0 to 3"),
+    mesh("index zero", GROUND + "f 0 1 2\nf 1 2 3\nf 1 3 4\n", "names vertex [-1, 0, 1]", "0 to 3"),
+    mesh("index that is a word", GROUND + "f one 2 3\n", "not a readable mesh"),
+    mesh("NaN among the points", GROUND.replace("v 1 0 0", "v nan 0 0") + "f 1 2 3\nf 1 3 4\n",
+         "nan"),
+    mesh("infinite point", GROUND.replace("v 1 0 0", "v inf 0 0") + "f 1 2 3\nf 1 3 4\n", "inf"),
+    mesh("vertex in no element", GROUND + "f 1 2 3\n", "in no element", "the first is 3"),
+    mesh("vertex given twice", GROUND + "v 1 0 1\nf 1 2 3\nf 1 5 4\n", "vertex 4", "vertex 2"),
+    mesh("triangle of one line", GROUND + "v 2 0 0\nf 1 2 5\nf 1 3 4\nf 1 2 3\n", "zero area",
+         "[0, 1, 4]"),
+    mesh("triangle that names a vertex twice", GROUND + "f 1 2 2\nf 1 3 4\n", "a vertex twice"),
+    mesh("flat tetrahedron",
+         TETRAHEDRA.format(n=4, nodes="1 0 0 0\n2 1 0 0\n3 0 1 0\n4 1 1 0", m=1,
+                           elements="1 4 2 0 1 1 2 3 4"), "zero volume", path="meshes/a.msh"),
+    mesh("tetrahedra beside triangles",
+         TETRAHEDRA.format(n=4, nodes=CORNERS, m=2,
+                           elements="1 4 2 0 1 1 2 3 4\n2 2 2 0 1 1 2 3"),
+         "tetra", "triangle", "only one of", path="meshes/a.msh"),
+    mesh_path("absolute mesh path", "/etc/passwd", "/etc/passwd", "below the project's folder"),
+    mesh_path("mesh path that leaves the project", "../../square.obj", "../../square.obj",
+              "without '..'"),
+    mesh_path("mesh path that leaves it in the middle", "meshes/../../x.obj", "..", "below"),
+    mesh_path("mesh path with a zero byte", "a\\0b.obj", "printable"),
+    mesh_path("empty mesh path", "", "mesh.file.path = ''", "printable"),
+    mesh_path("mesh path of a folder", "meshes", "meshes", "no such mesh file"),
+    mesh_path("link out of the project", "meshes/out.obj", "meshes/out.obj", "leads out",
+              **{"meshes/out.obj": LinkTo("/etc/passwd")}),
+    mesh_path("link to itself", "meshes/me.obj", "meshes/me.obj",
+              **{"meshes/me.obj": LinkTo("me.obj")}),
+    mesh_path("negative scale", 'x.obj", scale: -1, path2: "', "path2|scale"),
+]  # fmt: skip
+
+OTHER_CASES = [
+    Case("empty methods", {METHODS: ""}, (METHODS, "a mapping of method names is required")),
+    Case("methods as a list", {METHODS: "- pod\n"}, (METHODS, "a mapping of method names")),
+    Case("no methods file", {METHODS: None}, (METHODS, "no such configuration file")),
+    other("method with an unknown ingredient", METHODS, "rows: all", "rows: every",
+          "'pod'", "rows = 'every'", "'all', 'scalar', 'joint' or 'element'"),
+    other("interpolation of whole elements", METHODS, "selection: greedy, solve: qr}",
+          "selection: greedy, solve: square}", "'block-deim'", "allowed are qr, tikhonov"),
+    other("oversampled single entries", METHODS, "rows: scalar,", "rows: scalar, oversampling: 3,",
+          "oversampling = 3", "rows = 'scalar'"),
+    other("shared coefficients of separate axes", METHODS, "centring: mean-in-modes",
+          "centring: mean-in-modes\n  coefficients: shared", "'published'", "only 'per-axis'"),
+    other("Tikhonov term of the wrong sign", METHODS, "repeat_rows: true",
+          "repeat_rows: true\n  tikhonov: -1.0", "'published'", "tikhonov = -1.0"),
+    other("truth value where a word is needed", METHODS, "solve: square}", "solve: no}", "solve"),
+    other("method with a path as its name", METHODS, "pod: {", "../pod: {", "'../pod'", "letters"),
+    other("method that is a number", METHODS, "pod: {", "7: {", "method 7", "letters"),
+    Case("figures as a list", {FIGURES: "- run_error\n"}, (FIGURES, "a mapping of figure names")),
+    other("unknown figure", FIGURES, "singular_values:", "singular_value:", "'singular_value'",
+          "did you mean 'singular_values'?"),
+    other("unknown key of a figure", FIGURES, "  number: 1\n", "  nmber: 1\n",
+          "snapshots_and_modes", "unknown key 'nmber'", "did you mean 'number'?"),
+    other("figure of an unknown method", FIGURES, "methods: [deim, block-deim, pod]",
+          "methods: [diem]", "snapshots_and_modes.methods = 'diem'", "did you mean 'deim'?"),
+    other("figure of an unknown scene", FIGURES, "scenes: [strain_oop,", "scenes: [strain_op,",
+          "snapshots_and_modes", "'strain_op'", "did you mean 'strain_oop'?"),
+    other("frame beyond the run", FIGURES, "frames: [0.15,", "frames: [1.5,",
+          "snapshots_and_modes", "frames.0 = 1.5"),
+    other("camera at NaN", FIGURES, "elevation: 28", "elevation: .nan", "elevation = nan"),
+    Case("empty claims", {CLAIMS: ""}, (CLAIMS, "a mapping of claims is required")),
+    other("claim by an unknown metric", CLAIMS, "metric: local_share", "metric: local_shar",
+          "C1", "'local_shar'"),
+    other("claim about an unknown column", CLAIMS, "where: {implementation:",
+          "where: {implementaton:", "C1", "'implementaton'", "did you mean 'implementation'?"),
+    other("claim without a threshold", CLAIMS, ", threshold: 0.7", "", "C1", "threshold"),
+    other("claim at infinity", CLAIMS, "threshold: 0.7", "threshold: .inf", "C1", "threshold"),
+    other("claim with a wrong comparison", CLAIMS, 'compare: ">="', 'compare: ">"', "C1",
+          "'>=' or '<='"),
+    Case("ladder as a list", {LADDER: "- 20\n"}, (LADDER, "a mapping of keys is required")),
+    other("ladder without rungs", LADDER, "\ndown:", "\ndwn:", "unknown key 'dwn'",
+          "did you mean 'down'?"),
+    other("ladder of an unknown scene", LADDER, "scenes: [", "scenes: [nowhere, ", "scenes",
+          "'nowhere'"),
+    other("ladder of too many signs", LADDER, "signs: 5", "signs: 5000", "signs = 5000"),
+    other("rung that contradicts itself", LADDER, "rows: element, solve: qr}",
+          "rows: element, solve: square}", "up.6", "allowed are qr, tikhonov"),
+]  # fmt: skip
+
+CASES = STUDY_CASES + SCENE_CASES + MESH_CASES + OTHER_CASES

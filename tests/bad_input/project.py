@@ -1,0 +1,111 @@
+"""A small valid project that a test breaks in one place."""
+
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from pdrom.config import Study
+from pdrom.configfiles import check_files
+from pdrom.plan import Plan
+from pdrom.yamlfile import read_yaml
+
+CONFIG = Path(__file__).resolve().parents[2] / "config"
+STUDY = "config/default.yaml"
+SCENE = "config/scenes/small.yaml"
+MESH = "meshes/square.obj"
+
+SMALL_SCENE = """\
+name: small
+title: A small sheet
+mesh: {kind: cloth, rows: 5, columns: 4, plane: xz}
+time_step: 0.016
+frames: 8
+effects:
+  - {effect: gravity}
+  - {effect: pins, select: left}
+  - {effect: spring, weight: 1.0e+5}
+reduce:
+  spring: {train: 4}
+held_out: {kick: 0.5}
+"""
+SMALL_STUDY = """\
+scenes: [small]
+methods: [pod, block-deim]
+ranks: [2, full]
+"""
+SQUARE = """\
+v 0 0 0
+v 1 0 0
+v 1 0 1
+v 0 0 1
+f 1 2 3
+f 1 3 4
+"""
+
+
+@dataclass(frozen=True)
+class Replace:
+    """One text of a file in place of another."""
+
+    old: str
+    new: str
+
+
+@dataclass(frozen=True)
+class LinkTo:
+    """A symbolic link in place of a file."""
+
+    target: str
+
+
+Content = str | bytes | Replace | LinkTo | None
+"""New content of a file; None removes it."""
+
+
+def make_project(folder: Path, changes: Mapping[str, Content]) -> Path:
+    """The small project in ``folder``, with ``changes`` (path -> content)."""
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copytree(CONFIG, folder / "config", dirs_exist_ok=True)
+    files = {STUDY: SMALL_STUDY, SCENE: SMALL_SCENE, MESH: SQUARE}
+    for path, content in [*files.items(), *changes.items()]:
+        _write(folder / path, content)
+    return folder
+
+
+def _write(path: Path, content: Content) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if isinstance(content, Replace):
+        text = path.read_text(encoding="utf-8")
+        assert content.old in text, f"{path} has no {content.old!r}"
+        content = text.replace(content.old, content.new, 1)
+    if isinstance(content, LinkTo):
+        path.unlink(missing_ok=True)
+        path.symlink_to(content.target)
+    elif content is None:
+        path.unlink(missing_ok=True)
+    else:
+        path.unlink(missing_ok=True)
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def load_project(root: Path, overrides: Mapping[str, Any] | None = None) -> Plan:
+    """What the workflow does before its first job; ``overrides`` stand for ``--config``."""
+    check_files([root / STUDY])
+    config = {**read_yaml(root / STUDY), **(overrides or {})}
+    plan = Plan(Study.load(config, root))
+    plan.check()
+    return plan
+
+
+def small_scene() -> dict[str, Any]:
+    """The valid scene as plain data."""
+    return yaml.safe_load(SMALL_SCENE)
+
+
+def small_study() -> dict[str, Any]:
+    """The valid study as plain data."""
+    return yaml.safe_load(SMALL_STUDY)

@@ -1,0 +1,198 @@
+"""Mutated configurations: accepted, or refused with a named error; never anything else.
+
+Every example runs with little memory to spare, so that a needless allocation shows as a failure.
+``PDROM_FUZZ_EXAMPLES=1000 ./reproduce test tests/bad_input`` looks longer.
+"""
+
+import copy
+import os
+import resource
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from bad_input.project import (
+    CONFIG,
+    MESH,
+    SCENE,
+    SMALL_SCENE,
+    SQUARE,
+    STUDY,
+    load_project,
+    make_project,
+    small_study,
+)
+from pdrom.errors import PdromError
+
+EXAMPLES = int(os.environ.get("PDROM_FUZZ_EXAMPLES", "25"))
+SPARE_BYTES = 2_000_000_000
+FILES = ("methods", "figures", "claims", "ladder")
+# One of everything that a scene may list, so that every key can be hit.
+RICH_SCENE = """\
+name: small
+title: One of everything
+mesh: {kind: cloth, rows: 5, columns: 4, plane: xz, extent: 1.0, lift: 2.0, wave: 0.1}
+time_step: 0.016
+iterations: 3
+frames: 8
+vertex_mass: 10.0
+effects:
+  - {effect: gravity, acceleration: [0.0, -9.81, 0.0]}
+  - {effect: damping, rate: 1.0}
+  - {effect: floor, height: 0.0}
+  - {effect: kick, speed: 0.1, seed: 1, axes: [x, y]}
+  - {effect: pins, select: [0, 1], start: 0, until: 4}
+  - {effect: translate, select: right, offset: [0.1, 0.0, 0.0], over: 2, until: 4}
+  - {effect: rotate, select: [2], axis: x, degrees: 30.0, over: 3, start: 1}
+  - {effect: poke, amplitude: 0.1, axis: z, over: 2, rest: 1, count: 1, avoid: [left, right, [7]]}
+  - {effect: bending, weight: 1.0}
+  - {effect: spring, weight: 1.0e+5}
+  - {effect: strain, weight: 1.0e+3, minimum: 0.9, maximum: 1.1}
+reduce:
+  spring: {train: 4}
+  strain: {train: 3}
+held_out: {frames_factor: 1.25, reverse: true, kick: 0.5, kick_axes: [x], seed: 2}
+"""
+BAR_SCENE = SMALL_SCENE.replace(
+    "{kind: cloth, rows: 5, columns: 4, plane: xz}", "{kind: bar, nx: 4, ny: 3, nz: 3, extent: 1.0}"
+).replace("effect: spring, weight", "effect: tetrahedron_strain, minimum: 0.9, weight")
+BAR_SCENE = BAR_SCENE.replace("  spring:", "  tetrahedron_strain:")
+FILE_SCENE = SMALL_SCENE.replace(
+    "{kind: cloth, rows: 5, columns: 4, plane: xz}", f"{{kind: file, path: {MESH}, scale: 1.0}}"
+)
+
+EXTREME = st.sampled_from(
+    [None, True, False, 0, 1, -1, 2, 1999, 2**31, 2**64, -(2**64), 10**400, 0.0, -0.0, 0.5, 1e-320,
+     1e-5, 1e300, -1e300, float("nan"), float("inf"), float("-inf"), "", " ", "full", "x", "1e6",
+     "../x", "/etc/passwd", "a\0b", "ä\n", "{x}", "x" * 5000, [], [[]], [0], ["x"], {}, {"x": 1},
+     {"effect": "spring"}, [{}], list(range(300))]
+)  # fmt: skip
+VALUES = EXTREME | st.integers() | st.floats() | st.text(max_size=8)
+KEYS = st.text(max_size=8) | st.integers(0, 3) | st.none() | st.booleans()
+
+
+def places(data: Any, path: tuple = ()) -> Iterator[tuple]:
+    """Paths of all entries of nested mappings and lists."""
+    entries = data.items() if isinstance(data, dict) else enumerate(data)
+    for key, value in list(entries) if isinstance(data, (dict, list)) else ():
+        yield (*path, key)
+        if isinstance(value, (dict, list)):
+            yield from places(value, (*path, key))
+
+
+@st.composite
+def mutated(draw: Callable, data: Any) -> Any:
+    """``data`` with one to three entries deleted, renamed, repeated, swapped or replaced."""
+    result = copy.deepcopy(data)
+    for _ in range(draw(st.integers(1, 3))):
+        paths = list(places(result))
+        if not paths:
+            return result
+        path = draw(st.sampled_from(paths))
+        owner = result
+        for key in path[:-1]:
+            owner = owner[key]
+        _mutate(draw, owner, path[-1])
+    return result
+
+
+def _mutate(draw: Callable, owner: Any, key: Any) -> None:
+    action = draw(st.sampled_from(["delete", "rename", "repeat", "wrap", "replace", "replace"]))
+    if action == "delete":
+        del owner[key]
+    elif action == "rename" and isinstance(owner, dict):
+        owner[draw(KEYS)] = owner.pop(key)
+    elif action == "repeat" and isinstance(owner, list):
+        owner.append(copy.deepcopy(owner[key]))
+    elif action == "wrap":
+        owner[key] = [owner[key]]
+    else:
+        # a list that is drawn again must not show what a mutation did to it
+        owner[key] = copy.deepcopy(draw(VALUES))
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A project whose files each example overwrites."""
+    return make_project(tmp_path_factory.mktemp("fuzz"), {MESH: SQUARE})
+
+
+@pytest.fixture(autouse=True)
+def little_memory() -> Iterator[None]:
+    """No more than `SPARE_BYTES` beyond what the process has."""
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + SPARE_BYTES, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+def accepted_or_named(root: Path, overrides: dict | None = None) -> None:
+    """Load the project; the only failure is a named error on one short line."""
+    message = ""
+    try:
+        load_project(root, overrides)
+    except PdromError as error:
+        message = str(error)
+    assert "\n" not in message
+    assert len(message) < 2500
+
+
+FUZZ = settings(max_examples=EXAMPLES, suppress_health_check=list(HealthCheck))
+
+
+@FUZZ
+@given(data=st.data())
+@pytest.mark.parametrize("text", [RICH_SCENE, BAR_SCENE, FILE_SCENE], ids=["rich", "bar", "file"])
+def test_mutated_scenes(project: Path, text: str, data: st.DataObject) -> None:
+    scene = data.draw(mutated(yaml.safe_load(text)))
+    (project / SCENE).write_text(yaml.safe_dump(scene), encoding="utf-8")
+    accepted_or_named(project)
+
+
+@pytest.mark.parametrize("text", [RICH_SCENE, BAR_SCENE, FILE_SCENE], ids=["rich", "bar", "file"])
+def test_the_scenes_are_valid_before_they_are_mutated(project: Path, text: str) -> None:
+    (project / SCENE).write_text(text, encoding="utf-8")
+    assert load_project(project).study.bound["small"].mesh.vertices > 0
+
+
+@FUZZ
+@given(data=st.data())
+def test_mutated_studies(project: Path, data: st.DataObject) -> None:
+    full = yaml.safe_load((CONFIG / "default.yaml").read_text(encoding="utf-8"))
+    base = {**full, **small_study(), "subspace": {**full["subspace"], "scenes": ["small"]}}
+    (project / SCENE).write_text(SMALL_SCENE, encoding="utf-8")
+    accepted_or_named(project, data.draw(mutated(base)))
+
+
+@FUZZ
+@given(data=st.data())
+@pytest.mark.parametrize("name", FILES)
+def test_mutated_files(project: Path, name: str, data: st.DataObject) -> None:
+    (project / SCENE).write_text(SMALL_SCENE, encoding="utf-8")
+    original = CONFIG / f"{name}.yaml"
+    broken = data.draw(mutated(yaml.safe_load(original.read_text(encoding="utf-8"))))
+    target = project / "config" / original.name
+    try:
+        target.write_text(yaml.safe_dump(broken), encoding="utf-8")
+        accepted_or_named(project)
+    finally:
+        shutil.copyfile(original, target)
+
+
+@FUZZ
+@given(content=st.binary(max_size=200) | st.text(max_size=60).map(str.encode))
+@pytest.mark.parametrize("path", [STUDY, SCENE])
+def test_any_bytes_as_a_file(project: Path, path: str, content: bytes) -> None:
+    original = (project / path).read_bytes()
+    try:
+        (project / path).write_bytes(content)
+        accepted_or_named(project)
+    finally:
+        (project / path).write_bytes(original)

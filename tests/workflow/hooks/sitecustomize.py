@@ -1,0 +1,27 @@
+"""Faults on demand, for the jobs of a sandbox: see `sandbox.Sandbox.run`.
+
+Python imports this module at its start. ``PDROM_FAULT`` is ``kind:pattern``: when a result whose
+temporary file matches the pattern is complete but has not got its name yet, the process is killed
+("kill") or told that the disk is full ("full").
+"""
+
+import errno
+import os
+import re
+import signal
+
+_kind, _, _pattern = os.environ.get("PDROM_FAULT", "").partition(":")
+_fsync = os.fsync
+
+
+def _faulty_fsync(descriptor):
+    number = descriptor if isinstance(descriptor, int) else descriptor.fileno()
+    if re.search(_pattern, os.readlink(f"/proc/self/fd/{number}")):
+        if _kind == "kill":
+            os.kill(os.getpid(), signal.SIGKILL)
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    _fsync(descriptor)
+
+
+if _kind:
+    os.fsync = _faulty_fsync

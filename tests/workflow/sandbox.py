@@ -1,0 +1,154 @@
+"""A folder in which the real ``./reproduce`` runs a very small study, and faults are caused."""
+
+import hashlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import pandas as pd
+import yaml
+from checkout import ROOT, copy_repository
+
+from pdrom.tables.columns import TIMING_COLUMNS
+
+MICRO = {
+    "scenes": ["spring_oop"],
+    "methods": ["block-deim"],
+    "ranks": [2, "full"],
+    "coarsen": {"resolution": 0.25, "frames": 0.05},
+    "sensitivity": {"perturbations": [1e-10], "seeds": [1]},
+    "timing": {"frames": 1, "warmup": 0, "repeats": 1, "numpy_frames": 1},
+    "subspace": {"scenes": ["spring_oop"], "sizes": [4], "tolerances": [1e-2]},
+}
+MICRO_FILE = "micro.yaml"
+TIMED_FOLDERS = ("timings", "logs")
+TIMED_FIGURES = ("local_share", "accuracy_cost")
+SHIM = '#!/bin/sh\nPYTHONPATH="{hooks}" exec "{python}" {module} "$@"\n'
+
+
+@dataclass(frozen=True)
+class Sandbox:
+    """A copy of the repository with the tests' own environment as its ``.venv``."""
+
+    folder: Path
+
+    @classmethod
+    def make(cls, folder: Path) -> "Sandbox":
+        """A sandbox in which nothing was run."""
+        copy_repository(folder)
+        shutil.copy2(ROOT / "reproduce", folder)
+        shutil.copy2(ROOT / "requirements.lock", folder)
+        (folder / MICRO_FILE).write_text(yaml.safe_dump(MICRO), encoding="utf-8")
+        return cls(folder)._with_environment()
+
+    def copy(self, folder: Path) -> "Sandbox":
+        """The same state, times of files included, in another folder."""
+        shutil.copytree(self.folder, folder, symlinks=True)
+        return Sandbox(folder)._with_environment()
+
+    def _with_environment(self) -> "Sandbox":
+        programs = self.folder / ".venv" / "bin"
+        programs.mkdir(parents=True, exist_ok=True)
+        hooks = Path(__file__).parent / "hooks"
+        for name, module in (("python", ""), ("snakemake", "-m snakemake")):
+            shim = SHIM.format(hooks=hooks, python=sys.executable, module=module)
+            (programs / name).write_text(shim, encoding="utf-8")
+            (programs / name).chmod(0o755)
+        lock = (self.folder / "requirements.lock").read_bytes()
+        done = subprocess.run(["cksum"], input=lock, capture_output=True, check=True)
+        stamp = f"{done.stdout.decode().strip()} {self.folder.resolve()}\n"
+        (self.folder / ".venv" / "complete").write_text(stamp, encoding="utf-8")
+        # compiled kernels are shared with the repository, whose package the sandbox runs
+        compiled = ROOT / ".cache" / "numba"
+        compiled.mkdir(parents=True, exist_ok=True)
+        (self.folder / ".cache").mkdir(exist_ok=True)
+        if not (self.folder / ".cache" / "numba").exists():
+            (self.folder / ".cache" / "numba").symlink_to(compiled)
+        return self
+
+    def start(self, *targets: str, fault: str = "", **options: object) -> subprocess.Popen[str]:
+        """``./reproduce`` on the micro study, in a session of its own."""
+        command = ["./reproduce", "--cores", "2", "--configfile", MICRO_FILE, "--", *targets]
+        return subprocess.Popen(
+            command,
+            cwd=self.folder,
+            env={**os.environ, "PDROM_FAULT": fault},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+            **options,
+        )
+
+    def run(self, *targets: str, fault: str = "", **options: object) -> tuple[int, str]:
+        """Exit status and all that the user reads; ``fault`` as in ``hooks/sitecustomize.py``."""
+        process = self.start(*targets, fault=fault, **options)
+        output, _ = process.communicate(timeout=600)
+        return process.returncode, output
+
+    def finish(self, *targets: str) -> None:
+        """A run that must succeed."""
+        status, output = self.run(*targets)
+        assert status == 0, output
+
+    def path(self, name: str) -> Path:
+        """A file of the sandbox."""
+        return self.folder / name
+
+    def results(self) -> dict[str, str]:
+        """Digest of every result; what a clock measured is left out."""
+        files = [p for p in self.path("results").rglob("*") if p.is_file()]
+        files += [p for p in [self.path("paper/main.pdf")] if p.is_file()]
+        names = {str(p.relative_to(self.folder)): p for p in files}
+        return {name: _digest(path) for name, path in sorted(names.items()) if not _timed(path)}
+
+
+def _timed(path: Path) -> bool:
+    return path.parts[-2] in TIMED_FOLDERS or "logs" in path.parts or path.stem in TIMED_FIGURES
+
+
+def _digest(path: Path) -> str:
+    content = hashlib.sha256()
+    if path.suffix == ".h5":
+        with h5py.File(path) as file:
+            file.visititems(lambda name, item: _update(content, name, item))
+    elif path.suffix == ".csv" and path.stem in TIMING_COLUMNS:
+        table = pd.read_csv(path, dtype=str)
+        kept = table.drop(columns=[c for c in TIMING_COLUMNS[path.stem] if c in table])
+        content.update(kept.to_csv().encode())
+    else:
+        content.update(path.read_bytes())
+    return content.hexdigest()
+
+
+def _update(content, name: str, item: h5py.Dataset | h5py.Group) -> None:
+    if name == "timings":
+        return
+    content.update(name.encode())
+    for key in sorted(item.attrs):
+        content.update(f"{key}={item.attrs[key]!r}".encode())
+    if isinstance(item, h5py.Dataset):
+        content.update(item[()].tobytes())
+
+
+def wait_for(condition: Callable[[], bool], process: subprocess.Popen[str]) -> None:
+    """Wait until ``condition`` holds while ``process`` is at work."""
+    limit = time.monotonic() + 120
+    while not condition():
+        assert process.poll() is None, process.communicate()[0]
+        assert time.monotonic() < limit
+        time.sleep(0.01)
+
+
+def kill_all(process: subprocess.Popen[str]) -> str:
+    """``kill -9`` a run with all its jobs at once; return what it had said."""
+    os.killpg(process.pid, signal.SIGKILL)
+    return process.communicate(timeout=60)[0]

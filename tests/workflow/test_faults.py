@@ -1,0 +1,373 @@
+"""Faults lose nothing: after a plain rerun the results are those of an undisturbed run.
+
+The real ``./reproduce`` runs a very small study in a folder of its own; processes are killed, disks
+fill up, files are damaged, clocks jump. What a clock measured is not compared (`Sandbox.results`).
+The long ones are marked slow: ``./reproduce test -m slow``.
+"""
+
+import os
+import random
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from sandbox import Sandbox, kill_all, wait_for
+
+TABLE = "results/tables/reconstruction_error.csv"
+SNAPSHOTS = "results/snapshots/spring_oop/spring.h5"
+BASIS = "results/pod/spring_oop/spring/none-affine-vectorised.h5"
+SAMPLING = "results/sampling/spring_oop/spring/block-deim"
+RUN = "results/fom/spring_oop/train.h5"
+slow = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Sandbox:
+    """From the mesh to one table, without a fault."""
+    sandbox = Sandbox.make(tmp_path_factory.mktemp("undisturbed") / "run")
+    sandbox.finish(TABLE)
+    return sandbox
+
+
+@pytest.fixture
+def sandbox(undisturbed: Sandbox, tmp_path: Path) -> Sandbox:
+    """A copy of the finished run, to be disturbed."""
+    return undisturbed.copy(tmp_path / "run")
+
+
+@pytest.fixture(scope="module")
+def finished_study(tmp_path_factory: pytest.TempPathFactory) -> Sandbox:
+    """The whole micro study with its manuscript."""
+    sandbox = Sandbox.make(tmp_path_factory.mktemp("study") / "run")
+    sandbox.finish()
+    return sandbox
+
+
+def last_lines(output: str, count: int = 2) -> str:
+    """What the user reads last."""
+    return "\n".join(output.splitlines()[-count:])
+
+
+def no_leftovers(sandbox: Sandbox) -> bool:
+    """No temporary file stands among the results."""
+    return not list(sandbox.path("results").rglob(".*"))
+
+
+# Killed jobs and runs -------------------------------------------------------------------------
+
+
+def test_a_killed_job_is_named_and_made_again(undisturbed: Sandbox, sandbox: Sandbox) -> None:
+    sandbox.path(TABLE).unlink()
+    status, output = sandbox.run(TABLE, fault="kill:reconstruction_error")
+    assert status != 0
+    assert "job reconstruction_error_table ended without a word" in last_lines(output)
+    assert f"making {TABLE}: killed?" in last_lines(output)
+    assert not sandbox.path(TABLE).exists()
+    sandbox.finish(TABLE)
+    assert sandbox.results() == undisturbed.results()
+    assert no_leftovers(sandbox)
+
+
+# rule -> an output of it
+RULES = {
+    "mesh": "results/meshes/*.h5",
+    "fom": RUN,
+    "snapshots": SNAPSHOTS,
+    "pod": BASIS,
+    "sampling": f"{SAMPLING}.csv",
+    "reruns": "results/reruns/spring_oop/spring/block-deim_heldout.csv",
+    "reduced_reruns_table": "results/tables/reduced_reruns.csv",
+    "figure_singular_values": "results/figures/singular_values.png",
+    "paper_inputs": "results/paper/main.bbl",
+    "paper": "paper/main.pdf",
+}
+
+
+@slow
+@pytest.mark.parametrize("rule", RULES)
+def test_a_job_that_is_killed_in_any_rule(
+    rule: str, finished_study: Sandbox, tmp_path: Path
+) -> None:
+    sandbox = finished_study.copy(tmp_path / "run")
+    (output,) = sandbox.folder.glob(RULES[rule])
+    target = str(output.relative_to(sandbox.folder))
+    output.unlink()
+    status, said = sandbox.run(target, fault=f"kill:/\\.{re.escape(output.stem)}\\.[0-9a-f]{{12}}")
+    assert status != 0
+    assert f"job {rule} ended without a word" in last_lines(said)
+    sandbox.finish(target)
+    assert sandbox.results() == finished_study.results()
+    assert no_leftovers(sandbox)
+
+
+@slow
+def test_a_run_that_is_killed_with_all_its_jobs(undisturbed: Sandbox, tmp_path: Path) -> None:
+    """Half-written files and the locks of both programs are left, and nobody unlocks by hand."""
+    sandbox = Sandbox.make(tmp_path / "run")
+    for folder in ("fom", "snapshots", "pod", "sampling"):
+        process = sandbox.start(TABLE)
+        wait_for(lambda folder=folder: _written(sandbox, folder), process)
+        kill_all(process)
+        assert sandbox.path(".cache/running").is_dir()
+    sandbox.finish(TABLE)
+    assert sandbox.results() == undisturbed.results()
+    assert no_leftovers(sandbox)
+
+
+def _written(sandbox: Sandbox, folder: str) -> bool:
+    """Whether a job of a rule has begun a file."""
+    return any(sandbox.path("results").glob(f"{folder}/**/.*"))
+
+
+@slow
+def test_jobs_that_survive_their_run_do_no_harm(undisturbed: Sandbox, tmp_path: Path) -> None:
+    """``kill -9`` of the main process alone: its jobs go on beside those of the next run."""
+    sandbox = Sandbox.make(tmp_path / "run")
+    process = sandbox.start(TABLE)
+    wait_for(lambda: _written(sandbox, "fom"), process)
+    process.kill()
+    process.wait()
+    sandbox.finish(TABLE)
+    process.communicate(timeout=60)
+    assert sandbox.results() == undisturbed.results()
+
+
+@slow
+def test_an_interrupted_run_goes_on(undisturbed: Sandbox, tmp_path: Path) -> None:
+    sandbox = Sandbox.make(tmp_path / "run")
+    process = sandbox.start(TABLE)
+    wait_for(lambda: _written(sandbox, "fom"), process)
+    os.killpg(process.pid, signal.SIGINT)
+    process.communicate(timeout=60)
+    assert process.returncode != 0
+    assert no_leftovers(sandbox)
+    sandbox.finish(TABLE)
+    assert sandbox.results() == undisturbed.results()
+
+
+@slow
+def test_the_second_run_at_once_says_so_and_ends(undisturbed: Sandbox, tmp_path: Path) -> None:
+    sandbox = Sandbox.make(tmp_path / "run")
+    first = sandbox.start(TABLE)
+    wait_for(lambda: _written(sandbox, "fom"), first)
+    status, output = sandbox.run(TABLE)
+    assert status != 0
+    assert output.splitlines() == [
+        f"reproduce: another ./reproduce (process {first.pid}) is at work in this folder"
+    ]
+    said, _ = first.communicate(timeout=300)
+    assert first.returncode == 0, said
+    assert sandbox.results() == undisturbed.results()
+
+
+# Disks ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def mount() -> Iterator[Callable[..., None]]:
+    """Mounts, where this is permitted, and takes them back."""
+    mounted = []
+
+    def do(folder: Path, *options: str) -> None:
+        done = subprocess.run(["mount", *options, folder], capture_output=True, check=False)
+        if done.returncode != 0:
+            pytest.skip(f"mounting is not permitted: {done.stderr.decode().strip()}")
+        mounted.append(folder)
+
+    if os.geteuid() != 0 or shutil.which("mount") is None:
+        pytest.skip("mounting needs root")
+    yield do
+    for folder in reversed(mounted):
+        subprocess.run(["umount", "--lazy", folder], check=True)
+
+
+@slow
+def test_a_full_disk(undisturbed: Sandbox, tmp_path: Path, mount: Callable[..., None]) -> None:
+    """A file system of its own for the results, which fills up while the runs are simulated."""
+    sandbox = Sandbox.make(tmp_path / "run")
+    results = sandbox.path("results")
+    results.mkdir()
+    mount(results, "-t", "tmpfs", "-o", "size=96k", "tmpfs")
+    status, output = sandbox.run(TABLE)
+    assert status != 0
+    assert "cannot be written (No space left on device)" in last_lines(output, 3)
+    assert "Traceback" not in output
+    subprocess.run(["mount", "-o", "remount,size=64m", results], check=True)
+    sandbox.finish(TABLE)
+    assert sandbox.results() == undisturbed.results()
+    assert no_leftovers(sandbox)
+
+
+@slow
+def test_a_write_that_fails_for_lack_of_space(undisturbed: Sandbox, sandbox: Sandbox) -> None:
+    """The same without a file system: the system call of the job reports that there is no space."""
+    sandbox.path(TABLE).unlink()
+    status, output = sandbox.run(TABLE, fault="full:reconstruction_error")
+    assert status != 0
+    expected = f"job reconstruction_error_table failed: {TABLE}: cannot be written (No space left"
+    assert expected in last_lines(output)
+    assert no_leftovers(sandbox)
+    sandbox.finish(TABLE)
+    assert sandbox.results() == undisturbed.results()
+
+
+@slow
+def test_a_limit_on_the_size_of_files(undisturbed: Sandbox, sandbox: Sandbox) -> None:
+    """As by a quota; no mount is needed."""
+    sandbox.path(RUN).unlink()
+    limit = (20_000, 20_000)
+    status, output = sandbox.run(
+        RUN, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit)
+    )
+    assert status != 0
+    assert f"{RUN}: cannot be written (File too large)" in last_lines(output)
+    sandbox.finish(RUN)
+    assert sandbox.results() == undisturbed.results()
+
+
+@slow
+def test_results_that_are_read_only(
+    undisturbed: Sandbox, sandbox: Sandbox, mount: Callable[..., None]
+) -> None:
+    results = sandbox.path("results")
+    sandbox.path(TABLE).unlink()
+    mount(results, "--bind", str(results))
+    subprocess.run(["mount", "-o", "remount,ro,bind", results], check=True)
+    status, output = sandbox.run(TABLE)
+    assert status != 0
+    assert output.splitlines() == [f"reproduce: no write permission in {results}"]
+    subprocess.run(["mount", "-o", "remount,rw,bind", results], check=True)
+    sandbox.finish(TABLE)
+    assert sandbox.results() == undisturbed.results()
+
+
+def test_a_file_in_place_of_the_results(tmp_path: Path) -> None:
+    sandbox = Sandbox.make(tmp_path / "run")
+    sandbox.path("results").write_text("")
+    status, output = sandbox.run(TABLE)
+    assert status != 0
+    assert output.splitlines() == [f"reproduce: no write permission in {sandbox.path('results')}"]
+
+
+# Damaged files --------------------------------------------------------------------------------
+
+
+def flip_a_bit(path: Path, position: float = 0.6) -> None:
+    """Change one bit, keep the times: what a bad disk does."""
+    before = path.stat()
+    content = bytearray(path.read_bytes())
+    content[int(position * len(content))] ^= 4
+    path.write_bytes(content)
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+
+
+def truncate(path: Path, kept: float = 0.6) -> None:
+    """Cut the end off, keep the times."""
+    before = path.stat()
+    os.truncate(path, int(kept * before.st_size))
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+
+
+def damage_and_rerun(sandbox: Sandbox, damaged: str, missing: list[str], fault: str) -> None:
+    """The run that reads the damaged file names it and sets it aside, the next one mends it."""
+    for name in missing:
+        sandbox.path(name).unlink()
+    status, output = sandbox.run(TABLE)
+    assert status != 0
+    assert f"{damaged}: damaged, {fault}" in last_lines(output)
+    assert "set aside as" in last_lines(output)
+    aside = sandbox.path(f"{damaged}.damaged")
+    assert aside.is_file()
+    aside.unlink()
+    sandbox.finish(TABLE)
+
+
+def test_a_changed_bit_in_the_snapshots(undisturbed: Sandbox, sandbox: Sandbox) -> None:
+    flip_a_bit(sandbox.path(SNAPSHOTS))
+    missing = [f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE]
+    damage_and_rerun(sandbox, SNAPSHOTS, missing, "its checksum does not match")
+    assert sandbox.results() == undisturbed.results()
+
+
+@slow
+@pytest.mark.parametrize("name", [RUN, BASIS])
+@pytest.mark.parametrize("damage", [flip_a_bit, truncate])
+def test_damaged_hdf5(
+    name: str, damage: Callable[[Path], None], undisturbed: Sandbox, sandbox: Sandbox
+) -> None:
+    damage(sandbox.path(name))
+    # what lies between the damaged file and the table, or nothing would be read again
+    between = [SNAPSHOTS, BASIS] if name == RUN else []
+    missing = [*between, f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE]
+    damage_and_rerun(sandbox, name, missing, "its ")
+    assert sandbox.results() == undisturbed.results()
+
+
+@slow
+def test_a_truncated_table(undisturbed: Sandbox, sandbox: Sandbox) -> None:
+    truncate(sandbox.path(f"{SAMPLING}.csv"))
+    damage_and_rerun(sandbox, f"{SAMPLING}.csv", [TABLE], "its end is missing")
+    assert sandbox.results() == undisturbed.results()
+
+
+# Clocks and edited files ----------------------------------------------------------------------
+
+
+@slow
+@pytest.mark.parametrize("days", [-4000, 4000])
+def test_a_clock_that_jumped(days: int, undisturbed: Sandbox, sandbox: Sandbox) -> None:
+    """The files of a finished run bear the wrong date, in the order of the run."""
+    for path in sandbox.path("results").rglob("*"):
+        stat = path.stat()
+        os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + days * 86_400 * 10**9))
+    sandbox.finish(TABLE)
+    assert sandbox.results() == undisturbed.results()
+
+
+@slow
+def test_dates_in_no_order(undisturbed: Sandbox, sandbox: Sandbox) -> None:
+    """As after a copy that kept no dates, or a clock that jumped several times during a run."""
+    generator = random.Random(1)
+    for path in sandbox.path("results").rglob("*"):
+        date = time.time() + generator.uniform(-1e6, 1e6)
+        os.utime(path, (date, date))
+    sandbox.finish(TABLE)
+    assert sandbox.results() == undisturbed.results()
+
+
+MESH = "meshes/sheet.obj"
+
+
+def sheet(height: float) -> str:
+    """A sheet of 4 x 4 vertices in the plane xz, one corner lifted."""
+    points = [(i, height if i == j == 3 else 0.0, j) for i in range(4) for j in range(4)]
+    cells = [(4 * i + j + 1, 4 * i + j + 2, 4 * i + j + 5) for i in range(3) for j in range(3)]
+    cells += [(4 * i + j + 2, 4 * i + j + 6, 4 * i + j + 5) for i in range(3) for j in range(3)]
+    lines = [f"v {x} {y} {z}" for x, y, z in points] + [f"f {a} {b} {c}" for a, b, c in cells]
+    return "\n".join(lines) + "\n"
+
+
+@slow
+@pytest.mark.parametrize("date", [None, 0.0], ids=["now", "1970"])
+def test_a_changed_mesh_file_reruns_what_follows(tmp_path: Path, date: float | None) -> None:
+    """Also when the new file is older than the results, as after unpacking an archive."""
+    first, second = (Sandbox.make(tmp_path / name) for name in ("first", "second"))
+    for sandbox, height in ((first, 0.0), (second, 0.1)):
+        scene = sandbox.path("config/scenes/spring_oop.yaml")
+        text = re.sub("mesh: .*", f"mesh: {{kind: file, path: {MESH}}}", scene.read_text())
+        scene.write_text(text)
+        sandbox.path("meshes").mkdir()
+        sandbox.path(MESH).write_text(sheet(height))
+        sandbox.finish(TABLE)
+    flat = first.results()
+    first.path(MESH).write_text(sheet(0.1))
+    if date is not None:
+        os.utime(first.path(MESH), (date, date))
+    first.finish(TABLE)
+    assert first.results() == second.results() != flat
