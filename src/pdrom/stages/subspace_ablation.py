@@ -12,9 +12,9 @@ from pdrom.stages.hyper import Motion, training_positions
 from pdrom.stages.scenes import RUNS, scene_of
 from pdrom.store import write_table
 from pdrom.subspace.columns import Columns
+from pdrom.subspace.interpolated import Training, interpolate
 from pdrom.subspace.model import SubspaceModel, make_columns
 from pdrom.subspace.specs import InterpolationSpec
-from pdrom.subspace.training import Training, interpolate
 from pdrom.subspace_ablation import AblationSpec
 from pdrom.tables.columns import COLUMNS
 from pdrom.tables.sensitivity import floor_of

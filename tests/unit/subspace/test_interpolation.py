@@ -9,12 +9,12 @@ from pdrom.fom.run import trajectory
 from pdrom.store import open_hdf5, write_hdf5
 from pdrom.subspace.block_deim import block_deim, train_basis
 from pdrom.subspace.hrpd import hrpd, sampled_space
+from pdrom.subspace.interpolated import Training, interpolate
 from pdrom.subspace.interpolation import InterpolatedLocalStep, Interpolation
 from pdrom.subspace.local_step import SubspaceLocalStep
 from pdrom.subspace.model import SubspaceModel, make_columns
 from pdrom.subspace.space import coordinates
 from pdrom.subspace.specs import HrpdSpec, InterpolationSpec
-from pdrom.subspace.training import Training, interpolate
 
 EVERYTHING = {"modes": 10_000, "oversampling": 100}
 GAPPY = InterpolationSpec(modes=8, states="visited", oversampling=3, margin=0.1)
