@@ -207,11 +207,11 @@ METRICS: dict[str, Callable[[Tables, dict], pd.Series]] = {
 METRIC_TABLES = {
     "local_share": "local_share",
     "rerun_error": "reduced_reruns",
-    "error_growth": "reduced_reruns",
+    "error_trend": "reduced_reruns",
     "singular_value_decay": "singular_values",
     "reconstruction_error": "reconstruction_error",
     "elements_per_entry": "reconstruction_error",
-    "local_time_ratio": "reduced_reruns",
+    "local_time_ratio": "breakeven",
     "position_basis_ratio": "reduced_reruns",
 }
 

@@ -20,9 +20,9 @@ from pdrom.scene import Scene
 from pdrom.snapshots import row_masses
 from pdrom.subspace.columns import Columns
 from pdrom.subspace.hrpd import hrpd, sampled_space
+from pdrom.subspace.interpolated import Training as States
+from pdrom.subspace.interpolated import interpolate
 from pdrom.subspace.interpolation import Interpolation
-from pdrom.subspace.interpolation_training import Training as States
-from pdrom.subspace.interpolation_training import interpolate
 from pdrom.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
 from pdrom.subspace.space import coordinates
 from pdrom.subspace.specs import HrpdSpec, InterpolationSpec

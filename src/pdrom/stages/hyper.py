@@ -17,8 +17,8 @@ from pdrom.stages.scenes import RUNS, scene_of
 from pdrom.store import open_hdf5, write_hdf5, write_table
 from pdrom.subspace.columns import Columns
 from pdrom.subspace.hrpd import hrpd, sampled_space
+from pdrom.subspace.interpolated import Training, interpolate
 from pdrom.subspace.interpolation import Interpolation
-from pdrom.subspace.interpolation_training import Training, interpolate
 from pdrom.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
 from pdrom.subspace.rerun import rerun_model
 from pdrom.subspace.specs import HrpdSpec, InterpolationSpec

@@ -12,7 +12,7 @@ from pdrom.stages.hyper import Motion, training_positions
 from pdrom.stages.scenes import RUNS, scene_of
 from pdrom.store import write_table
 from pdrom.subspace.columns import Columns
-from pdrom.subspace.interpolation_training import Training, interpolate
+from pdrom.subspace.interpolated import Training, interpolate
 from pdrom.subspace.model import SubspaceModel, make_columns
 from pdrom.subspace.specs import InterpolationSpec
 from pdrom.subspace_ablation import AblationSpec

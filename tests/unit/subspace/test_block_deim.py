@@ -11,7 +11,7 @@ from pdrom.errors import SamplingError, SnapshotError
 from pdrom.fom.run import trajectory
 from pdrom.snapshots import training_frames
 from pdrom.subspace.block_deim import block_deim, train_basis
-from pdrom.subspace.interpolation_training import Training, interpolate
+from pdrom.subspace.interpolated import Training, interpolate
 from pdrom.subspace.model import SubspaceModel, make_columns
 from pdrom.subspace.space import coordinates
 from pdrom.subspace.specs import InterpolationSpec

@@ -9,8 +9,8 @@ from pdrom.fom.run import trajectory
 from pdrom.store import open_hdf5, write_hdf5
 from pdrom.subspace.block_deim import block_deim, train_basis
 from pdrom.subspace.hrpd import hrpd, sampled_space
+from pdrom.subspace.interpolated import Training, interpolate
 from pdrom.subspace.interpolation import InterpolatedLocalStep, Interpolation
-from pdrom.subspace.interpolation_training import Training, interpolate
 from pdrom.subspace.local_step import SubspaceLocalStep
 from pdrom.subspace.model import SubspaceModel, make_columns
 from pdrom.subspace.space import coordinates

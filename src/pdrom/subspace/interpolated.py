@@ -4,13 +4,14 @@ import numpy as np
 
 from pdrom.constraints.base import ConstraintGroup
 from pdrom.errors import SceneError
+from pdrom.fom.stepper import Stepper
 from pdrom.scene import Scene
 from pdrom.snapshots import training_frames
 from pdrom.subspace.block_deim import States, TrainedBasis, block_deim, train_basis
 from pdrom.subspace.columns import Columns
 from pdrom.subspace.interpolation import Interpolation
-from pdrom.subspace.model import SubspaceModel
-from pdrom.subspace.space import coordinates
+from pdrom.subspace.local_step import SubspaceLocalStep
+from pdrom.subspace.space import ReducedSpace, coordinates, reduced_state
 from pdrom.subspace.specs import InterpolationSpec
 
 
@@ -63,7 +64,8 @@ class Training:
     def _visited(self) -> States:
         """Last local iterates of a run with full projections, in as many (even) frames."""
         wanted = set(training_frames(self._scene.config.frames, len(self._training)).tolist())
-        loop, state = SubspaceModel("pod", self._columns).loop(self._scene)
+        loop = _full_projections(self._scene, self._columns)
+        state = reduced_state(self._scene, self._columns)
         b, visited, last = self._columns.B, [], []
         for frame in range(self._scene.config.frames):
             start = state.positions
@@ -77,3 +79,11 @@ class Training:
                 "subspace is not finite: no states to train on"
             )
         return visited
+
+
+def _full_projections(scene: Scene, columns: Columns) -> Stepper:
+    """Step loop in the subspace with the projections of all elements."""
+    steps = [SubspaceLocalStep(group, columns) for group in scene.groups]
+    space = ReducedSpace(scene, columns, sum(step.matrix for step in steps))
+    config = scene.config
+    return Stepper(space, config.time_step, config.iterations, steps, track_objective=False)
