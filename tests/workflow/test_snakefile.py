@@ -178,7 +178,7 @@ FAULTS = {
     ),
     "unknown scene": (
         "config/default.yaml", "  - cloth_all\n", "  - cloth_some\n",
-        ("scenes", "'cloth_some'", "allowed: bar_release"),
+        ("scenes", "'cloth_some'", "allowed: ", "bar_release"),
     ),
     "unknown method": (
         "config/default.yaml", "methods: [pod,", "methods: [pood,",
