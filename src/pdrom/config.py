@@ -64,10 +64,12 @@ class IterationSweep(_Model):
     """Full-order runs with K in ``counts``, against one whose every frame is converged.
 
     A frame is converged when one more iteration moves no vertex by more than ``tolerance`` times
-    the extent; ``limit`` bounds the evaluations it may take.
+    the extent; ``limit`` bounds the evaluations it may take. Every K runs with Anderson
+    acceleration over ``anderson_window`` iterates, too (0: no such runs).
     """
 
     counts: tuple[Annotated[int, Field(ge=1, le=10_000)], ...] = (1, 2, 5, 10, 20, 40)
+    anderson_window: Annotated[int, Field(ge=0, le=50)] = 5
     tolerance: Annotated[float, Field(gt=0.0, lt=1.0)] = 1e-8
     limit: Annotated[int, Field(ge=2)] = 4000
 

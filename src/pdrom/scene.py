@@ -67,7 +67,7 @@ class SceneConfig(_Model):
     iterations: Annotated[int, Field(ge=1, le=10_000)] = 10
     anderson_window: Annotated[int, Field(ge=0, le=50)] = 0
     frames: Annotated[int, Field(ge=1, le=1_000_000)]
-    vertex_mass: Annotated[float, Field(ge=1e-12, le=1e12)] = 10.0
+    vertex_mass: Annotated[float, Field(ge=1e-150, le=1e150)] = 10.0
     effects: tuple[SerializeAsAny[EffectConfig], ...]
     reduce: dict[str, ReductionPlan] = Field(default_factory=dict)
     held_out: HeldOut = HeldOut()

@@ -93,7 +93,9 @@ def test_the_sweep_approaches_the_limit(tmp_path):
     with write_hdf5(fom) as file:
         file["positions"] = np.stack(positions)
     write_floor(floor, [1e-9] * 9 + [1.0] * 3)
-    settings = {"counts": [1, 3, 20, 60], "tolerance": 1e-10, "limit": 2000}
+    settings = {
+        "counts": [1, 3, 20, 60], "anderson_window": 4, "tolerance": 1e-10, "limit": 2000,
+    }  # fmt: skip
     horizon = {"perturbation": 1e-10, "threshold": 1e-3}
     config = scene.config.model_dump(mode="json")
 
@@ -102,7 +104,11 @@ def test_the_sweep_approaches_the_limit(tmp_path):
         sweep_iterations(*arguments, str(tmp_path / "out.csv"))
         return read_table(tmp_path / "out.csv", COLUMNS)
 
-    table = swept()
+    everything = swept()
+    fast = everything[everything.window == 4].set_index("iterations").error_converged
+    assert fast.index.tolist() == [3, 10, 20, 60]
+    table = everything[everything.window != 4]
+    assert (fast[[10, 20]] < 0.5 * table.set_index("iterations").error_converged[[10, 20]]).all()
     counts = table.iterations.dropna().tolist()
     assert counts == [1, 3, 10, 20, 60]
     assert (table.frames == 9).all()

@@ -19,6 +19,7 @@ rule timing:
         methods=PLAN.method_specs(),
         ranks=list(PLAN.settings.ranks),
         counts=list(PLAN.settings.iterations.counts),
+        window=PLAN.settings.iterations.anderson_window,
         protocol=PLAN.settings.timing.model_dump(),
         solver=PLAN.settings.solver,
         threads=PLAN.settings.threads,

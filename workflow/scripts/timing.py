@@ -7,6 +7,7 @@ with job_log(snakemake.log[0]):
         snakemake.params.methods,
         snakemake.params.ranks,
         snakemake.params.counts,
+        snakemake.params.window,
         snakemake.params.protocol,
         snakemake.params.solver,
         snakemake.params.threads,

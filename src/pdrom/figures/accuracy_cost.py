@@ -12,7 +12,7 @@ from pdrom.figures.multiples import clipped, label_outer, log_axis, small_multip
 from pdrom.figures.sources import Sources
 from pdrom.figures.spec import FigureSpec
 from pdrom.store import read_table
-from pdrom.tables.accuracy_cost import FEWER, FOM
+from pdrom.tables.accuracy_cost import ANDERSON, FEWER, FOM
 
 COLUMNS = [
     "scene", "method", "position_basis", "iterations", "relative_error_within_horizon",
@@ -46,7 +46,9 @@ def draw(sources: Sources, spec: FigureSpec) -> Figure:
     blind = {
         scene: fom[scene, k] for scene, k in full_order.iterations.items() if (scene, k) in fom
     }
-    table = table[(table[ERROR] > 0.0) & (table[TIME] > 0.0) & ~own & (table.method != FOM)]
+    table = table[
+        (table[ERROR] > 0.0) & (table[TIME] > 0.0) & ~own & ~table.method.isin([FOM, ANDERSON])
+    ]
     table["method"] = [model_name(row) for row in table.itertuples()]
     if spec.methods:
         table = table[table.method.isin([*spec.methods, FEWER])]

@@ -6,9 +6,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pdrom.fom.anderson import Anderson
 from pdrom.fom.converged import ConvergedStepper
 from pdrom.fom.sensitivity import horizon
 from pdrom.fom.stepper import Stepper
+from pdrom.fom.system import GlobalSystem
 from pdrom.metrics import trajectory_error
 from pdrom.rom.rerun import displacement_norms
 from pdrom.scene import Scene
@@ -18,7 +20,9 @@ from pdrom.tables.sensitivity import floor_of, sensitivity
 
 log = logging.getLogger(__name__)
 
-COLUMNS = ["scene", "iterations", "frames", "error_converged", "error_scene", "residual"]
+COLUMNS = [
+    "scene", "iterations", "window", "frames", "error_converged", "error_scene", "residual",
+]  # fmt: skip
 
 
 def sweep_iterations(
@@ -33,14 +37,15 @@ def sweep_iterations(
 ) -> None:
     """Run a scene with every K of ``settings`` up to its horizon, and once to convergence.
 
-    Each row has the error of a K against the converged run and against the scene's own K; the
-    last row is the converged run itself (``iterations`` empty) with its largest residual: the
-    change by one more iteration, relative to the extent. If a frame stays above the tolerance
-    there is no converged reference, and the errors against it are empty.
+    Each K runs plainly (``window`` 0) and with Anderson acceleration. Each row has the error of a
+    K against the converged run and against the scene's own run; the last row is the converged run
+    itself (``iterations`` empty) with its largest residual: the change by one more iteration,
+    relative to the extent. If a frame stays above the tolerance there is no converged reference,
+    and the errors against it are empty.
 
     Parameters
     ----------
-    settings : counts, tolerance, limit (see `pdrom.config.IterationSweep`)
+    settings : counts, anderson_window, tolerance, limit (see `pdrom.config.IterationSweep`)
     floor : perturbation and threshold that define the horizon
     """
     scene = scene_of(config, mesh)
@@ -56,19 +61,31 @@ def sweep_iterations(
         log.warning("%s: no convergence in %d evaluations", name, settings["limit"])
     log.info("%s: %.0f evaluations a frame", name, np.mean(best.evaluations))
     rows = []
-    for count in sorted({*settings["counts"], scene.config.iterations}):
+    counts = sorted({*settings["counts"], scene.config.iterations})
+    for count, window in accelerated(counts, settings["anderson_window"]):
         run = own
-        if count != scene.config.iterations:
-            space = scene.space(system)
-            loop = Stepper(space, scene.config.time_step, count, scene.groups, False)
-            run = _run(loop, scene, frames)
+        if (count, window) != (scene.config.iterations, scene.config.anderson_window):
+            run = _run(stepper_of(scene, system, count, window), scene, frames)
         converged = _error(run, limit) if best.converged else None
-        rows.append((name, count, frames, converged, _error(run, own), None))
+        rows.append((name, count, window, frames, converged, _error(run, own), None))
     residual = max(best.changes) / scene.mesh.extent
     converged = 0.0 if best.converged else None
-    rows.append((name, None, frames, converged, _error(limit, own), residual))
-    table = pd.DataFrame(rows, columns=COLUMNS).astype({"iterations": "Int64"})
+    rows.append((name, None, None, frames, converged, _error(limit, own), residual))
+    table = pd.DataFrame(rows, columns=COLUMNS).astype({"iterations": "Int64", "window": "Int64"})
     write_table(table, output)
+
+
+def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
+    """(K, window) of all runs: plain ones, then accelerated ones where K lets two iterates mix."""
+    plain = [(count, 0) for count in counts]
+    return plain + [(count, window) for count in counts if window and count > 2]
+
+
+def stepper_of(scene: Scene, system: GlobalSystem, iterations: int, window: int) -> Stepper:
+    """Step loop of the full-order model with its own number of iterations and acceleration."""
+    acceleration = Anderson(window) if window else None
+    space = scene.space(system)
+    return Stepper(space, scene.config.time_step, iterations, scene.groups, False, acceleration)
 
 
 def _run(loop: Stepper, scene: Scene, frames: int) -> np.ndarray:

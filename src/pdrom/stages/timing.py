@@ -15,7 +15,7 @@ from pdrom.basis import load_basis
 from pdrom.constraints.base import ConstraintGroup
 from pdrom.constraints.implementations import IMPLEMENTATIONS
 from pdrom.effect_costs import effect_costs, left_out
-from pdrom.fom.stepper import LocalStep, Stepper
+from pdrom.fom.stepper import LocalStep
 from pdrom.fom.system import GlobalSystem
 from pdrom.method import MethodSpec
 from pdrom.rom.local_step import ReducedLocalStep
@@ -23,9 +23,11 @@ from pdrom.rom.ranks import resolve_ranks
 from pdrom.rom.rerun import replace_group
 from pdrom.sampling.load import load_reduction
 from pdrom.scene import Scene
+from pdrom.stages.iterations import accelerated, stepper_of
 from pdrom.stages.scenes import scene_of
 from pdrom.store import open_hdf5, write_table
 from pdrom.subspace.load import load_models
+from pdrom.tables.accuracy_cost import ANDERSON, FOM
 from pdrom.timing import LiftTimed, Measurement, Variant, measure, measure_calls
 
 log = logging.getLogger(__name__)
@@ -49,6 +51,7 @@ def time_scene(
     methods: dict[str, dict[str, Any]],
     ranks: list[int | str],
     counts: list[int],
+    window: int,
     protocol: dict[str, Any],
     solver: str,
     threads: int,
@@ -60,6 +63,7 @@ def time_scene(
     Parameters
     ----------
     counts : numbers of iterations K of the full-order run that are timed beside the scene's own
+    window : of the Anderson acceleration that each K is timed with, too
     protocol : settings of `pdrom.config.Timing`
     inputs : mesh, fom (full-order run), and lists of bases, samplings, hyper
     outputs : frames, breakeven, effects, left_out
@@ -69,7 +73,9 @@ def time_scene(
     warmup, repeats = protocol["warmup"], protocol["repeats"]
     frames = min(protocol["frames"], bound.config.frames)
     make = partial(_variant, bound, system, frames)
-    variants = _full_order(bound, make, protocol) + _other_counts(bound, system, frames, counts)
+    variants = _full_order(bound, make, protocol) + _other_counts(
+        bound, system, frames, counts, window
+    )
     alone: dict[tuple[Any, ...], LocalStep] = {}
     for path in inputs["samplings"]:
         group, method = Path(path).parent.name, Path(path).stem
@@ -150,17 +156,17 @@ def _full_order(scene: Scene, make: Make, protocol: dict[str, Any]) -> list[Vari
 
 
 def _other_counts(
-    scene: Scene, system: GlobalSystem, frames: int, counts: list[int]
+    scene: Scene, system: GlobalSystem, frames: int, counts: list[int], window: int
 ) -> list[Variant]:
-    """The compiled full-order run with other numbers of iterations, method "fom"."""
+    """The compiled full-order run with other numbers of iterations, plain and accelerated."""
     variants = []
-    for count in counts:
-        if count == scene.config.iterations:
-            continue
-        space = scene.space(system)
-        loop = Stepper(space, scene.config.time_step, count, scene.groups, track_objective=False)
-        labels = {"method": "fom", "iterations": count, "implementation": "compiled"}
-        variants.append(Variant(labels, loop, scene.initial_state(), frames))
+    own = (scene.config.iterations, scene.config.anderson_window)
+    for count, size in accelerated(sorted({*counts, scene.config.iterations}), window):
+        if (count, size) != own:
+            loop = stepper_of(scene, system, count, size)
+            method = ANDERSON if size else FOM
+            labels = {"method": method, "iterations": count, "implementation": "compiled"}
+            variants.append(Variant(labels, loop, scene.initial_state(), frames))
     return variants
 
 

@@ -5,12 +5,13 @@ Errors have one of two references, and only rows with the same one may be compar
 =================  ==================================================================
 method             error against
 =================  ==================================================================
-fom                the full-order run whose frames are converged (K -> infinity)
+fom, fom-anderson  the full-order run whose frames are converged (K -> infinity)
 every other        the scene's own full-order run, which has finitely many iterations
 =================  ==================================================================
 
 Among the others, ``full`` without a position subspace is that own run (error zero by definition),
 and ``fewer-iterations`` is the full-order run stopped earlier: what a reduction has to beat.
+``fom-anderson`` are full-order runs with accelerated iterations.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -21,7 +22,7 @@ import pandas as pd
 from pdrom.store import read_table
 from pdrom.tables.columns import conform
 
-FOM, FEWER = "fom", "fewer-iterations"
+FOM, ANDERSON, FEWER = "fom", "fom-anderson", "fewer-iterations"
 CONVERGED, OWN = "converged", "own iterations"
 
 
@@ -63,13 +64,16 @@ def accuracy_cost(
 
 def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     """Full-order runs of every K against the converged one, and those stopped early."""
-    full = times[times.method.isna() | (times.method == FOM)]
-    cost = full[["scene", "iterations", "ms_per_frame"]].astype({"iterations": "Int64"})
+    full = times[times.method.isna() | times.method.isin([FOM, ANDERSON])]
+    cost = full[["scene", "method", "iterations", "ms_per_frame"]]
+    cost = cost.astype({"iterations": "Int64"}).fillna({"method": FOM})
     errors = errors.dropna(subset=["iterations"]).astype({"iterations": "Int64"})
-    errors = errors.merge(cost, on=["scene", "iterations"])
-    own = cost[full.method.isna()].set_index("scene").iterations
-    early = errors[(errors.iterations < errors.scene.map(own)).astype(bool)]
-    parts = [(FOM, errors, "error_converged"), (FEWER, early, "error_scene")]
+    errors["method"] = (errors.window > 0).map({True: ANDERSON, False: FOM})
+    errors = errors.merge(cost, on=["scene", "method", "iterations"])
+    own = full[full.method.isna()].set_index("scene").iterations
+    early = (errors.iterations < errors.scene.map(own)) & (errors.method == FOM)
+    parts = [(errors.method, errors, "error_converged")]
+    parts.append((FEWER, errors[early.astype(bool)], "error_scene"))
     named = [
         rows.assign(method=method, relative_error_within_horizon=rows[column])
         for method, rows, column in parts
@@ -80,7 +84,7 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
 
 def reference_of(points: pd.DataFrame) -> pd.Series:
     """What the error of each row of the table is taken against: `CONVERGED` or `OWN`."""
-    return (points.method == FOM).map({True: CONVERGED, False: OWN})
+    return points.method.isin([FOM, ANDERSON]).map({True: CONVERGED, False: OWN})
 
 
 def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:

@@ -214,6 +214,11 @@ def _write_tables(sources, scenes, methods, rng) -> None:
         costs += [
             (scene, "fom", "full", np.nan, np.nan, k, 1.0 / k**2, time, True) for scene in scenes
         ]
+        costs += [
+            (scene, "fom-anderson", "full", np.nan, np.nan, k, 1.0 / k**3, 1.1 * time, True)
+            for scene in scenes
+            if k > 2
+        ]
         if k < 10:
             early = ("fewer-iterations", "full", np.nan, np.nan, k, 0.5 / k, time, k == 2)
             costs += [(scene, *early) for scene in scenes]

@@ -37,7 +37,7 @@ def test_a_regular_system_is_solved(rng):
     assert (matrix @ y)[free] == pytest.approx(rhs[free])
 
 
-@pytest.mark.parametrize("mass", [1e-12, 1e-6, 1.0, 1e12])
+@pytest.mark.parametrize("mass", [1e-100, 1e-6, 1.0, 1e100])
 def test_coordinates_do_not_depend_on_the_unit_of_mass(mass, rng):
     """With held vertices, whose columns are not mass-orthonormal; the rest shape is met exactly."""
     scene = make_scene(
