@@ -118,7 +118,8 @@ def _draw_scene(
 
 def _label_iterations(ax: Axes, time: float, error: float, iterations: float) -> None:
     ax.annotate(
-        f"K={iterations:.0f}", (time, error), (2.5, 2.5), textcoords="offset points", fontsize=6.5,
+        f"{iterations:.0f}", (time, error), (0.0, 5.5), textcoords="offset points", fontsize=6.5,
+        ha="center",
     )  # fmt: skip
 
 
@@ -161,7 +162,7 @@ def _legend(figure: Figure, sources: Sources, styles: dict[str, tuple[str, str]]
         for method, (colour, marker) in styles.items()
     ]  # fmt: skip
     ring = {"marker": "o", "markersize": 7, "markerfacecolor": "none"}
-    handles.append(Line2D([], [], label="fewer iterations", markersize=4.5, **_FEWER))
+    handles.append(Line2D([], [], label="fewer iterations (number K)", markersize=4.5, **_FEWER))
     handles.append(Line2D([], [], color="#333333", label="best trade-offs", **ring))
     handles.append(Line2D([], [], color=style.GREY, linewidth=1.2, label="full order: time"))
     handles.append(Line2D([], [], label="full order: its own error", **_BLIND))

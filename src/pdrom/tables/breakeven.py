@@ -14,7 +14,8 @@ CURVE = ["scene", "group", "method", "vertices", "threads"]
 def breakeven(paths: Iterable[str]) -> pd.DataFrame:
     """One row per size; ``breakeven_r`` belongs to a whole curve (scene, group, method).
 
-    It is empty where the reduction still pays at the largest size, the numerical rank.
+    It is empty where the reduction still pays at the largest size, the numerical rank, and the
+    smallest size tried where it never pays.
     """
     parts = [part for part in map(read_table, paths) if len(part)]
     table = pd.concat(parts, ignore_index=True)
