@@ -98,9 +98,7 @@ def test_a_job_that_is_killed_in_any_rule(
     (output,) = sandbox.folder.glob(RULES[rule])
     target = str(output.relative_to(sandbox.folder))
     output.unlink()
-    status, said = sandbox.run(
-        *targets, fault=f"kill:/\\.{re.escape(output.stem)}\\.[0-9a-f]{{12}}"
-    )
+    status, said = sandbox.run(target, fault=f"kill:/\\.{re.escape(output.stem)}\\.[0-9a-f]{{12}}")
     assert status != 0
     assert f"job {rule} ended without a word" in last_lines(said)
     sandbox.finish(target)
