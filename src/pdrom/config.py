@@ -204,6 +204,28 @@ class Online(_Model):
     tolerances: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (1e-2,)
 
 
+class Offline(_Model):
+    """Sizes of the offline algorithms that are timed beside pyMOR's, on random matrices.
+
+    POD of ``rows`` x ``snapshots``, interpolation with ``r`` modes of it, non-negative least
+    squares with ``elements`` columns and ``equations`` rows to ``tolerance``.
+    """
+
+    rows: Annotated[int, Field(ge=10, le=10_000_000)] = 100_000
+    snapshots: Annotated[int, Field(ge=2, le=5000)] = 200
+    r: Annotated[int, Field(ge=1, le=5000)] = 200
+    elements: Annotated[int, Field(ge=10, le=10_000_000)] = 100_000
+    equations: Annotated[int, Field(ge=2, le=20_000)] = 1000
+    tolerance: Annotated[float, Field(gt=0.0, lt=1.0)] = 1e-3
+    seed: Seed = 0
+
+    @model_validator(mode="after")
+    def _modes_exist(self) -> Self:
+        if self.r > min(self.snapshots, self.rows):
+            raise ValueError(f"r = {self.r}: at most snapshots = {self.snapshots} and rows")
+        return self
+
+
 class StudySettings(_Model):
     """Content of config/default.yaml, possibly overridden by --configfile."""
 
@@ -223,6 +245,7 @@ class StudySettings(_Model):
     budgets: tuple[Annotated[float, Field(gt=0.0)], ...] = (0.1, 1.0, 10.0)
     subspace: Subspace = Subspace()
     scaling: Scaling = Scaling()
+    offline: Offline = Offline()
     stability: Stability = Stability()
     guard: Guard = Guard()
     hard_cases: HardCases = HardCases()

@@ -48,6 +48,7 @@ TABLES = (
     "gain_prediction",
     "online",
     "subspace_ablation",
+    "offline_cost",
     "claims",
 )
 

@@ -51,6 +51,21 @@ rule scaling:
         "../scripts/scaling.py"
 
 
+rule offline:
+    output:
+        report("results/tables/offline_cost.csv", category="Tables"),
+    log:
+        "results/logs/tables/offline_cost.log",
+    threads: workflow.cores or 1
+    params:
+        settings=PLAN.settings.offline.model_dump(mode="json"),
+        code=PLAN.code("pdrom.stages.offline"),
+    message:
+        "Cost of the offline algorithms (alone on the machine)"
+    script:
+        "../scripts/offline.py"
+
+
 rule machine:
     output:
         "results/machine.json",

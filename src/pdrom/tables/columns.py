@@ -89,6 +89,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "finite", "max_extent", "relative_error_within_horizon", "relative_error_full_projections",
         "heldout_error_within_horizon", "heldout_error_full_projections",
     ),
+    "offline_cost": ("task", "implementation", "rows", "columns", "seconds", "difference"),
     "claims": (
         "claim", "source", "paper", "measured", "verdict", "why", "figure_or_table",
     ),
@@ -118,6 +119,7 @@ TIMING_COLUMNS: dict[str, tuple[str, ...]] = {
     "effects_cost": ("ms_per_frame", "share"),
     "effects_left_out": ("ms_per_frame", "saved_ms", "own_ms"),
     "online": ("ms_per_frame", "ms_per_iteration", "fom_ms_per_frame", "speedup"),
+    "offline_cost": ("seconds",),
     "claims": ("measured", "verdict", "why"),
 }  # fmt: skip
 
