@@ -4,6 +4,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
 
 from pdrom.figures import style
 from pdrom.figures.multiples import clipped, label_outer, log_axis, small_multiples
@@ -14,7 +15,7 @@ from pdrom.tables.accuracy_cost import ANDERSON, FOM
 
 ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
 COLUMNS = ["scene", "method", "iterations", ERROR, TIME]
-LOW, HIGH = 1e-8, 1e1
+LOW, HIGH = 1e-5, 1e1
 RUNS = {
     FOM: ("plain iterations", style.BLACK, "o"),
     ANDERSON: ("with Anderson acceleration", style.VERMILLION, "s"),
@@ -40,6 +41,7 @@ def draw(sources: Sources, spec: FigureSpec) -> Figure:
     for ax, scene in zip(axes, scenes, strict=True):
         log_axis(ax, LOW, HIGH)
         ax.set_xscale("log")
+        ax.xaxis.set_minor_formatter(NullFormatter())
         for method in RUNS:
             rows = table[(table.scene == scene) & (table.method == method)]
             _draw_run(ax, rows.sort_values("iterations"), method)

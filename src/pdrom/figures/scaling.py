@@ -26,6 +26,7 @@ OFFLINE = {
 }
 NAMES = {"fom": "full order", "ecsw": "POD subspace, ecsw"}
 COLOURS = {"fom": style.BLACK, "ecsw": "#1B6E6E"}
+BESIDE = {"fom": 6, "ecsw": 5}  # where the exponent stands, points above the end of the line
 MARKERS = {"fom": "o", "ecsw": ">"}
 
 
@@ -76,7 +77,7 @@ def _draw_times(ax: Axes, rows: pd.DataFrame, fits: pd.DataFrame) -> None:
             end = part.iloc[-1]
             ax.annotate(
                 rf"$N^{{{fits[own].exponent.iloc[0]:.2f}}}$",
-                (end.vertices, end.ms_per_iteration), xytext=(-2, 5),
+                (end.vertices, end.ms_per_iteration), xytext=(-3, BESIDE.get(str(method), -11)),
                 textcoords="offset points", ha="right", color=colour, fontsize=7.5,
             )  # fmt: skip
 

@@ -95,10 +95,12 @@ def _subspace_strips(table: pd.DataFrame, sources: Sources, spec: FigureSpec) ->
     for basis, method in dict.fromkeys(zip(part.position_basis, part.method, strict=True)):
         own = part[(part.position_basis == basis) & (part.method == method)]
         sizes = sorted(own.k.dropna().unique())
-        sampled = "all projections" if method == "full" else method
-        blocks.append(Block(f"{basis} subspace\n{sampled}", [str(int(k)) for k in sizes]))
+        sampled = "all" if method == "full" else method
+        blocks.append(Block(f"{basis}\n{sampled}", [str(int(k)) for k in sizes]))
         lookups.append([_by_experiment(own[own.k == k]) for k in sizes])
-    return _wrapped(rows, blocks, lookups, "number of position modes k")
+    return _wrapped(
+        rows, blocks, lookups, "number of modes k of the position subspace (all: all projections)"
+    )
 
 
 def _wrapped(rows: dict, blocks: list[Block], lookups: list, xlabel: str) -> list[_Strip]:

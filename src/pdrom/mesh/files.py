@@ -4,7 +4,6 @@ import io
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
-import meshio
 import numpy as np
 
 from pdrom.errors import MeshError
@@ -24,6 +23,9 @@ def read_mesh_file(path: Path) -> Mesh:
     MeshError
         The file is missing or unreadable, holds other cells, or mixes triangles and tetrahedra.
     """
+    # a fifth of a second that only scenes with a mesh file pay
+    import meshio
+
     if not path.is_file():
         raise MeshError(f"{path}: no such mesh file")
     if path.stat().st_size > MAX_BYTES:
