@@ -87,6 +87,7 @@ class Plan:
         folder = self.root / "config"
         load_claims(folder / "claims.yaml")
         load_expectations(folder / "hard_cases.yaml")
+        self.hard_cases()
         self._check_scenes(folder)
         self._check_figures(folder)
         self.scaling_spec()

@@ -29,15 +29,15 @@ METHODS: dict[str, tuple[str, str]] = {
     "block-qdeim": (GREEN, "X"),
     "gappy": ("#7A5C00", "<"),
     "bounded": ("#1F9E89", "*"),
-    "fewer-iterations": (BLACK, "x"),
+    "fewer-iterations": ("#4D4D4D", "x"),
     "pod subspace": ("#5E3C99", "p"),
-    "pod subspace, ecsw-3e-02": ("#00A19A", "8"),
+    "pod subspace, ecsw-3e-02": ("#00A19A", "."),
     "pod subspace, ecsw-1e-02": ("#1B6E6E", ">"),
     "pod subspace, ecsw-1e-03": ("#3F6B00", "d"),
     "skinning subspace": ("#8B1A4A", "h"),
     "pod subspace, block-deim": ("#4FA3C7", "H"),
     "pod subspace, gappy": ("#C08A00", "8"),
-    "pod subspace, hrpd": ("#B05CC6", "*"),
+    "pod subspace, hrpd": ("#B05CC6", "|"),
     "skinning subspace, hrpd": ("#D98BA6", "+"),
 }
 _RESERVE = (("#5A5A5A", "1"), ("#9A6A00", "2"), ("#6B3F00", "3"), ("#2B2B80", "4"))

@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 
 from conftest import ROOT, make_scene
+from pdrom.config import Subspace
 from pdrom.method import load_methods
 from pdrom.stages.fom import run_fom
 from pdrom.stages.guard import try_guard
@@ -43,7 +44,7 @@ def study(tmp_path_factory) -> dict:
     make_mesh(scene["mesh"], ROOT, mesh)
     for run in ("train", "heldout"):
         runs[run] = str(folder / f"{run}.h5")
-        run_fom(scene, mesh, run, "cholespy", runs[run])
+        run_fom(scene, mesh, run, "cholespy", 1, runs[run])
     snapshots = str(folder / "snapshots.h5")
     collect_snapshots(scene, "strain", mesh, runs["train"], runs["heldout"], snapshots)
     bases, samplings = [], []
@@ -59,7 +60,7 @@ def study(tmp_path_factory) -> dict:
                samplings[-1], errors)  # fmt: skip
     hyper = str(folder / "models.h5")
     tables = {run: str(folder / f"models_{run}.csv") for run in runs}
-    settings = {"bases": ["pod"], "sizes": [2, 4], "tolerances": [1e-2]}
+    settings = Subspace(bases=("pod",), sizes=(2, 4), tolerances=(1e-2,)).model_dump(mode="json")
     run_hyper(scene, settings, 100.0, mesh, runs, hyper, tables)
     return {"scene": scene, "mesh": mesh, "fom": runs["train"], "bases": bases,
             "samplings": samplings, "hyper": hyper, "folder": folder, "tables": tables}  # fmt: skip
