@@ -179,7 +179,7 @@ def test_a_failed_set_up_is_made_anew(folder: Folder) -> None:
     folder.path.joinpath("pip-fails").unlink()
     status, errors = folder.run()
     assert status == 0, errors
-    assert folder.calls == ["snakemake --cores all --rerun-incomplete"]
+    assert folder.calls == ["snakemake --cores all --scheduler greedy --rerun-incomplete"]
 
 
 def test_the_environment_is_made_once_for_each_lock_file(folder: Folder) -> None:
@@ -197,9 +197,9 @@ def test_arguments_are_handed_on(folder: Folder) -> None:
     folder.run("-j2")
     folder.run("test", "-q", "tests/unit")
     assert folder.calls == [
-        "snakemake --cores all --rerun-incomplete -n results/figures/a b.pdf",
-        "snakemake --rerun-incomplete --cores 1",
-        "snakemake --rerun-incomplete -j2",
+        "snakemake --cores all --scheduler greedy --rerun-incomplete -n results/figures/a b.pdf",
+        "snakemake --scheduler greedy --rerun-incomplete --cores 1",
+        "snakemake --scheduler greedy --rerun-incomplete -j2",
         "python -m pytest -q tests/unit",
     ]
 

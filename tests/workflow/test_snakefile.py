@@ -165,7 +165,7 @@ FAULTS = {
         (SCENE, "reduce.strain", "allowed: spring"),
     ),
     "no basis vector": (
-        "config/default.yaml", "ranks: [6, 10, 20, full]", "ranks: [0, 10, 20, full]",
+        "config/default.yaml", "ranks: [6, 10, 20, 50, full]", "ranks: [0, 10, 20, 50, full]",
         ("config/default.yaml", "ranks.0", "= 0", "greater than or equal to 1"),
     ),
     "negative weight": (
