@@ -80,7 +80,6 @@ RULES = {
     "fom": RUN,
     "snapshots": SNAPSHOTS,
     "pod": BASIS,
-    "sampling": f"{SAMPLING}.csv",
     "reruns": "results/reruns/spring_oop/spring/block-deim_heldout.csv",
     "reduced_reruns_table": "results/tables/reduced_reruns.csv",
     "figure_singular_values": "results/figures/singular_values.png",
@@ -110,7 +109,7 @@ def test_a_job_that_is_killed_in_any_rule(
 def test_a_run_that_is_killed_with_all_its_jobs(undisturbed: Sandbox, tmp_path: Path) -> None:
     """Half-written files and the locks of both programs are left, and nobody unlocks by hand."""
     sandbox = Sandbox.make(tmp_path / "run")
-    for folder in ("fom", "snapshots", "pod", "sampling"):
+    for folder in ("fom", "snapshots", "pod", "reruns"):
         process = sandbox.start(TABLE)
         wait_for(lambda folder=folder: _written(sandbox, folder), process)
         kill_all(process)
