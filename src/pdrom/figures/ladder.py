@@ -14,7 +14,6 @@ from pdrom.store import read_table
 
 COLUMNS = ["scene", "direction", "rung", "gain", "relative_error_within_horizon"]
 ERRORS, GAINS = (1e-4, 1e2), (1.0, 1e5)  # limits; what lies outside is drawn on the rim
-MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 
 @style.styled
@@ -63,7 +62,7 @@ def _draw_quantity(
         values = [rows.get(rung, np.nan) for rung in rungs]
         values = clipped(np.nan_to_num(np.array(values, float), nan=np.inf), *limits)
         heights = np.arange(len(rungs)) + 0.09 * (i - 0.5 * (len(scenes) - 1))
-        colour, marker = style.CYCLE[i % len(style.CYCLE)], MARKERS[i % len(MARKERS)]
+        colour, marker = style.scene_style(i)
         ax.plot(values, heights, linestyle="none", color=colour, marker=marker, markersize=3.2)
         signs = table[(table.scene == scene) & (table.direction == "signs")][column]
         if len(signs):
@@ -76,12 +75,6 @@ def _draw_quantity(
 
 
 def _legend(figure: Figure, scenes: list[str]) -> None:
-    handles = [
-        Line2D(
-            [], [], linestyle="none", marker=MARKERS[i % len(MARKERS)],
-            color=style.CYCLE[i % len(style.CYCLE)], label=style.words(scene),
-        )
-        for i, scene in enumerate(scenes)
-    ]  # fmt: skip
+    handles = style.scene_handles(scenes)
     handles.append(Line2D([], [], color=style.GREY, label="spread over sign choices"))
     figure.legend(handles=handles, loc="outside lower center", ncols=4)

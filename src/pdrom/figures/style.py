@@ -9,6 +9,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 WIDTH = 7.0  # inches, text width of the paper
 
@@ -52,6 +53,7 @@ GROUPS: dict[str, tuple[str, str]] = {
 AXES = {"x": VERMILLION, "y": GREEN, "z": BLUE}
 SPLITS = {"train": "-", "test": "--", "heldout": ":"}
 SPLIT_NAMES = {"train": "train", "test": "test", "heldout": "held-out run"}
+SCENE_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
 
 RC: dict[str, Any] = {
@@ -111,6 +113,20 @@ def method_styles(names: Iterable[str]) -> dict[str, tuple[str, str]]:
     others = sorted(set(names) - set(METHODS))
     spare = {name: _RESERVE[i % len(_RESERVE)] for i, name in enumerate(others)}
     return {name: METHODS.get(name) or spare[name] for name in names}
+
+
+def scene_style(index: int) -> tuple[str, str]:
+    """(colour, marker) of the ``index``-th scene of a figure that tells scenes apart."""
+    return CYCLE[index % len(CYCLE)], SCENE_MARKERS[index % len(SCENE_MARKERS)]
+
+
+def scene_handles(scenes: Iterable[str]) -> list[Line2D]:
+    """Legend entries of scenes in the styles of `scene_style`."""
+    styles = [(scene, *scene_style(i)) for i, scene in enumerate(scenes)]
+    return [
+        Line2D([], [], linestyle="none", marker=marker, color=colour, label=words(scene))
+        for scene, colour, marker in styles
+    ]
 
 
 def group_colour(group: str) -> str:

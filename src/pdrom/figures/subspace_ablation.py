@@ -16,7 +16,6 @@ COLUMNS = [
     "scene", "k", "r", "variant", "gain", "relative_error_within_horizon",
     "relative_error_full_projections",
 ]  # fmt: skip
-MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 RATIOS = (0.5, 300.0)  # of errors; outside, and where a run blew up, points lie on the rim
 GAINS = (1.0, 40.0)
 
@@ -74,7 +73,7 @@ def _draw_points(
         refused = rows.gain.isna().to_numpy()
         values = np.nan_to_num(rows.value.to_numpy(float), nan=np.inf)
         values = clipped(values, *limits)
-        colour, marker = style.CYCLE[i % len(style.CYCLE)], MARKERS[i % len(MARKERS)]
+        colour, marker = style.scene_style(i)
         for chosen, shape in ((~refused, marker), (refused, "x")):
             ax.plot(
                 values[chosen], heights[chosen], linestyle="none", color=colour, marker=shape,
@@ -86,13 +85,7 @@ def _draw_points(
 
 
 def _legend(figure: Figure, scenes: list[str]) -> None:
-    handles = [
-        Line2D(
-            [], [], linestyle="none", marker=MARKERS[i % len(MARKERS)],
-            color=style.CYCLE[i % len(style.CYCLE)], label=style.words(scene),
-        )
-        for i, scene in enumerate(scenes)
-    ]  # fmt: skip
+    handles = style.scene_handles(scenes)
     handles.append(
         Line2D([], [], linestyle="none", marker="x", color=style.GREY, label="refused (not run)")
     )

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from meshless import assert_reads_nothing_of_the_mesh
 from test_subspace_run import GRAVITY, PINS, SCENES, SPRING, run_model, whole_space
 
 from conftest import make_scene, random_rotation
@@ -164,23 +165,7 @@ def test_a_step_reads_nothing_of_the_mesh(name, method):
     columns = make_columns(scene, reference[1:], "pod", 3)
     found = interpolations_of(scene, columns, reference[1:], method)
     loop, start = SubspaceModel("pod", columns, found).loop(scene)
-
-    def run() -> np.ndarray:
-        state, states = start, []
-        for frame in range(scene.config.frames):
-            state, _ = loop.step(state, frame)
-            states.append(state.positions)
-        return np.stack(states)
-
-    before = run()
-    assert np.isfinite(before).all()
-    for array in (columns.B, scene.mesh.points, scene.masses):
-        array.setflags(write=True)
-        array[...] = np.nan
-    for group in scene.groups:
-        group.S.data[...] = np.nan
-        group.weights[...] = np.nan
-    np.testing.assert_array_equal(run(), before)
+    assert_reads_nothing_of_the_mesh(scene, columns, loop, start)
 
 
 def test_arrays_of_a_step_have_the_size_of_the_sample():
