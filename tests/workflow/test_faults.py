@@ -110,8 +110,7 @@ def test_a_run_that_is_killed_with_all_its_jobs(undisturbed: Sandbox, tmp_path: 
     """Half-written files and the locks of both programs are left, and nobody unlocks by hand."""
     sandbox = Sandbox.make(tmp_path / "run")
     for folder in ("fom", "snapshots", "pod", "reruns"):
-        process = sandbox.start(TABLE)
-        wait_for(lambda folder=folder: _written(sandbox, folder), process)
+        process = _caught_writing(sandbox, folder)
         kill_all(process)
         assert sandbox.path(".cache/running").is_dir()
     sandbox.finish(TABLE)
@@ -119,17 +118,18 @@ def test_a_run_that_is_killed_with_all_its_jobs(undisturbed: Sandbox, tmp_path: 
     assert no_leftovers(sandbox)
 
 
-def _written(sandbox: Sandbox, folder: str) -> bool:
-    """Whether a job of a rule has begun a file."""
-    return any(sandbox.path("results").glob(f"{folder}/**/.*"))
+def _caught_writing(sandbox: Sandbox, folder: str) -> subprocess.Popen[str]:
+    """A run one of whose jobs is at a file of ``folder``, kept there for seconds by a slow disk."""
+    process = sandbox.start(TABLE, fault=f"slow:/results/{folder}/")
+    wait_for(lambda: any(sandbox.path("results").glob(f"{folder}/**/.*")), process)
+    return process
 
 
 @slow
 def test_jobs_that_survive_their_run_do_no_harm(undisturbed: Sandbox, tmp_path: Path) -> None:
     """``kill -9`` of the main process alone: its jobs go on beside those of the next run."""
     sandbox = Sandbox.make(tmp_path / "run")
-    process = sandbox.start(TABLE)
-    wait_for(lambda: _written(sandbox, "fom"), process)
+    process = _caught_writing(sandbox, "fom")
     process.kill()
     process.wait()
     sandbox.finish(TABLE)
@@ -140,8 +140,7 @@ def test_jobs_that_survive_their_run_do_no_harm(undisturbed: Sandbox, tmp_path: 
 @slow
 def test_an_interrupted_run_goes_on(undisturbed: Sandbox, tmp_path: Path) -> None:
     sandbox = Sandbox.make(tmp_path / "run")
-    process = sandbox.start(TABLE)
-    wait_for(lambda: _written(sandbox, "fom"), process)
+    process = _caught_writing(sandbox, "fom")
     os.killpg(process.pid, signal.SIGINT)
     process.communicate(timeout=60)
     assert process.returncode != 0
@@ -153,8 +152,7 @@ def test_an_interrupted_run_goes_on(undisturbed: Sandbox, tmp_path: Path) -> Non
 @slow
 def test_the_second_run_at_once_says_so_and_ends(undisturbed: Sandbox, tmp_path: Path) -> None:
     sandbox = Sandbox.make(tmp_path / "run")
-    first = sandbox.start(TABLE)
-    wait_for(lambda: _written(sandbox, "fom"), first)
+    first = _caught_writing(sandbox, "fom")
     status, output = sandbox.run(TABLE)
     assert status != 0
     assert output.splitlines() == [

@@ -2,13 +2,14 @@
 
 Python imports this module at its start. ``PDROM_FAULT`` is ``kind:pattern``: when a result whose
 temporary file matches the pattern is complete but has not got its name yet, the process is killed
-("kill") or told that the disk is full ("full").
+("kill"), told that the disk is full ("full") or kept waiting by a slow disk ("slow").
 """
 
 import errno
 import os
 import re
 import signal
+import time
 
 _kind, _, _pattern = os.environ.get("PDROM_FAULT", "").partition(":")
 _fsync = os.fsync
@@ -19,7 +20,9 @@ def _faulty_fsync(descriptor):
     if re.search(_pattern, os.readlink(f"/proc/self/fd/{number}")):
         if _kind == "kill":
             os.kill(os.getpid(), signal.SIGKILL)
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        if _kind == "full":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        time.sleep(3)
     _fsync(descriptor)
 
 
