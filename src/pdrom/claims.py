@@ -14,7 +14,7 @@ import pandas as pd
 from pydantic import Field, FiniteFloat, model_validator
 
 from pdrom.errors import ConfigurationError, choices
-from pdrom.tables.columns import COLUMNS
+from pdrom.tables.columns import BREAKEVEN_CURVE, COLUMNS
 from pdrom.yamlfile import ConfigModel, read_yaml, validate
 
 HOLDS, FAILS, UNDECIDED = "holds", "does not hold", "cannot be decided"
@@ -173,11 +173,11 @@ def _elements_per_entry(tables: Tables, where: dict) -> pd.Series:
 def _local_ratio(tables: Tables, where: dict) -> pd.Series:
     """Time of the reduced local step over that of the full compiled one, at the largest size.
 
-    One value per scene, group and method: whether the dense solve costs more from some size on
-    shows at the largest size that the basis has.
+    One value per scene, group, method, mesh and number of threads: whether the dense solve costs
+    more from some size on shows at the largest size that the basis has.
     """
     rows = _filter(tables["breakeven"], where).dropna(subset=["ratio"]).sort_values("r")
-    largest = rows.groupby(["scene", "group", "method"], sort=False).tail(1)
+    largest = rows.groupby(BREAKEVEN_CURVE, sort=False).tail(1)
     return largest.sort_index().ratio
 
 

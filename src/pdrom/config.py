@@ -113,6 +113,18 @@ class Subspace(_Model):
     interpolations: dict[str, InterpolationSpec] = Field(default_factory=dict)
 
 
+class SizedBreakEven(_Model):
+    """Reduced local steps timed alone on every mesh size: methods, sizes r, short repeats.
+
+    Bases come from the first ``training_frames`` frames.
+    """
+
+    methods: tuple[str, ...] = ("deim-joint", "block-deim")
+    sizes: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = (5, 10, 20, 40, 80, 120)
+    training_frames: Annotated[int, Field(ge=3, le=1000)] = 120
+    repeats: Annotated[int, Field(ge=1)] = 20
+
+
 class Scaling(_Model):
     """Cost against mesh size: factors on the vertices along a side for each scene.
 
@@ -130,7 +142,8 @@ class Scaling(_Model):
     training_frames: Annotated[int, Field(ge=3, le=1000)] = 16
     frames: Annotated[int, Field(ge=1)] = 3
     warmup: Annotated[int, Field(ge=0)] = 1
-    repeats: Annotated[int, Field(ge=1)] = 5
+    repeats: Annotated[int, Field(ge=1)] = 9
+    breakeven: SizedBreakEven = SizedBreakEven()
 
 
 class Stability(_Model):

@@ -8,6 +8,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from threadpoolctl import threadpool_limits
+
 from pdrom.errors import PdromError
 
 _JOB = re.compile(r"^Error in rule (?P<rule>\w+):(?P<body>(?:\n .*)*)", re.MULTILINE)
@@ -26,7 +28,10 @@ class _LogFile(logging.FileHandler):
 
 @contextmanager
 def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
-    """Send the package's log to ``path`` while a job runs.
+    """Send the package's log to ``path`` while a job runs, and keep libraries to one thread.
+
+    Snakemake gives the libraries of a job as many threads as the job claims, and one that measures
+    claims all cores to be alone. More threads would also change the order of sums.
 
     A `PdromError` (a user's mistake) ends the job with one line on stderr; any other exception
     keeps its traceback in the log and one line on stderr that says where to look.
@@ -42,7 +47,8 @@ def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
     logger.addHandler(handler)
     logger.setLevel(level)
     try:
-        yield logger
+        with threadpool_limits(limits=1):
+            yield logger
     except PdromError as error:
         logger.error("%s", error)
         sys.exit(f"pdrom: {error}")

@@ -90,7 +90,7 @@ class Plan:
         self.hard_cases()
         self._check_scenes(folder)
         self._check_figures(folder)
-        self.scaling_spec()
+        self.scaling_specs()
 
     def _check_scenes(self, folder: Path) -> None:
         settings = self.settings
@@ -300,22 +300,32 @@ class Plan:
 
     # Scaling --------------------------------------------------------------------------------
 
-    def scaling_files(self) -> list[str]:
-        """Parts of the table scaling, of the scenes that are in this configuration."""
+    def scaling_files(self, stage: str = "scaling") -> list[str]:
+        """Parts of the table scaling (or breakeven), of the scenes in this configuration."""
         return [
-            f"{RESULTS}/scaling/{scene}/x{factor:g}.csv"
+            f"{RESULTS}/{stage}/{scene}/x{factor:g}.csv"
             for scene, factors in self.settings.scaling.scenes.items()
             if scene in self.study.scenes
             for factor in factors
         ]
 
-    def scaling_spec(self) -> dict[str, Any]:
-        """Plain specification of the method that is timed on growing meshes."""
-        path, name = self.root / "config" / "methods.yaml", self.settings.scaling.method
-        methods = load_methods(path)
-        if name not in methods:
-            raise ConfigurationError(f"scaling.method = '{name}': unknown{choices(name, methods)}")
-        return methods[name].model_dump(mode="json")
+    def breakeven_files(self) -> list[str]:
+        """Parts of the table breakeven: of each scene as it is, and of it on other meshes."""
+        own = self.per_scene("breakeven", ".csv")
+        return own + [path for path in self.scaling_files("breakeven") if Path(path).stem != "x1"]
+
+    def scaling_specs(self) -> dict[str, Any]:
+        """Plain specifications of the methods that are timed on growing meshes."""
+        settings, methods = self.settings.scaling, load_methods(self.root / "config/methods.yaml")
+        wanted = {
+            "scaling.method": (settings.method,),
+            "scaling.breakeven.methods": settings.breakeven.methods,
+        }
+        for key, names in wanted.items():
+            for name in set(names) - set(methods):
+                raise ConfigurationError(f"{key} = '{name}': unknown{choices(name, methods)}")
+        names = dict.fromkeys(name for group in wanted.values() for name in group)
+        return {name: methods[name].model_dump(mode="json") for name in names}
 
     def scaling_settings(self) -> dict[str, Any]:
         """Plain settings of a mesh size; which sizes there are is no parameter of one."""

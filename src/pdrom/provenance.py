@@ -10,6 +10,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from threadpoolctl import threadpool_info
+
 from pdrom import __version__
 
 LIBRARIES = ("numpy", "scipy", "numba", "cholespy", "h5py", "pandas", "matplotlib", "snakemake")
@@ -54,7 +56,7 @@ def machine() -> dict[str, Any]:
         "python": platform.python_version(),
         "pdrom": __version__,
         "commit": _commit(),
-        "threads": os.environ.get("OMP_NUM_THREADS", "not pinned"),
+        "threads": max((pool["num_threads"] for pool in threadpool_info()), default=1),
         "libraries": library_versions(),
     }
 

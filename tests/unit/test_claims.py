@@ -53,6 +53,8 @@ def tables() -> dict[str, pd.DataFrame]:
                 "scene": ["a", "a", "b"],
                 "group": "spring",
                 "method": "deim",
+                "factor": 1.0,
+                "threads": 1,
                 "r": [6, 20, 6],
                 "ratio": [0.5, 1.5, 0.25],
             }

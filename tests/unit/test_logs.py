@@ -4,6 +4,8 @@ import io
 import logging
 
 import pytest
+import scipy.linalg  # noqa: F401  -- loads libraries that have threads
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from pdrom.errors import MeshError
 from pdrom.logs import end_with_failures, job_log
@@ -26,6 +28,19 @@ def test_messages_of_the_package_are_in_the_log(path):
     assert "INFO" in text
     assert text.rstrip().endswith("pdrom.mesh: made 3")
     assert len(text.splitlines()) == 1
+
+
+def test_libraries_have_one_thread_in_a_job(path):
+    """Snakemake sets as many as the job claims, and timing jobs claim every core."""
+
+    def threads() -> set[int]:
+        return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+    with threadpool_limits(limits=2):
+        assert threads() == {2}
+        with job_log(str(path)):
+            assert threads() == {1}
+        assert threads() == {2}
 
 
 def test_a_new_job_starts_a_new_log(path):

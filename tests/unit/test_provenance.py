@@ -6,6 +6,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+from threadpoolctl import threadpool_limits
 
 from pdrom import __version__, provenance
 
@@ -45,15 +46,14 @@ def test_versions_are_those_installed_and_absent_ones_are_said(monkeypatch):
         provenance.library_versions.cache_clear()
 
 
-def test_machine_names_threads_and_cores(monkeypatch):
-    monkeypatch.setenv("OMP_NUM_THREADS", "3")
-    machine = provenance.machine()
-    assert machine["threads"] == "3"
+def test_machine_names_threads_and_cores():
+    for threads in (2, 1):
+        with threadpool_limits(limits=threads):
+            machine = provenance.machine()
+        assert machine["threads"] == threads
     assert machine["cores"] >= 1
     assert machine["cpu"]
     assert machine["libraries"]["numpy"] == version("numpy")
-    monkeypatch.delenv("OMP_NUM_THREADS")
-    assert provenance.machine()["threads"] == "not pinned"
 
 
 @pytest.mark.parametrize(

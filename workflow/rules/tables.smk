@@ -196,7 +196,7 @@ rule scaling_fit_table:
 
 rule breakeven_table:
     input:
-        parts=PLAN.per_scene("breakeven", ".csv"),
+        parts=PLAN.breakeven_files(),
     output:
         report("results/tables/breakeven.csv", category="Tables"),
     log:

@@ -32,14 +32,14 @@ rule timing:
 
 rule scaling:
     output:
-        "results/scaling/{scene}/x{factor}.csv",
+        iterations="results/scaling/{scene}/x{factor}.csv",
+        breakeven="results/breakeven/{scene}/x{factor}.csv",
     log:
         "results/logs/scaling/{scene}_x{factor}.log",
     threads: workflow.cores or 1
     params:
         scene=lambda w: PLAN.scene_config(w.scene),
-        method=PLAN.settings.scaling.method,
-        spec=PLAN.scaling_spec(),
+        methods=PLAN.scaling_specs(),
         settings=PLAN.scaling_settings(),
         solver=PLAN.settings.solver,
         root=str(PLAN.root),

@@ -5,10 +5,9 @@ with job_log(snakemake.log[0]):
     scale_scene(
         snakemake.params.scene,
         snakemake.params.factor,
-        snakemake.params.method,
-        snakemake.params.spec,
+        snakemake.params.methods,
         snakemake.params.settings,
         snakemake.params.solver,
         snakemake.params.root,
-        snakemake.output[0],
+        {k: snakemake.output[k] for k in ("iterations", "breakeven")},
     )

@@ -164,7 +164,7 @@ class VertexBending(ConstraintGroup):
         effect: Literal["bending"] = "bending"
 
     rows_per_element = 1
-    split_from = 8192
+    split_from = 4096
     frame_lagged = True
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:

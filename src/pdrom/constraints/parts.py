@@ -6,10 +6,10 @@ threads: one thread does the parts one after the other.
 """
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache
 
 import numpy as np
+
+from pdrom.constraints.second_thread import both
 
 # (first, last, part, rhs) -> energy of the units first .. last - 1, S^T W p added to rhs
 Kernel = Callable[[int, int, int, np.ndarray], float]
@@ -52,16 +52,6 @@ class Parts:
             other[rows] = 0.0
             return kernel(self._middle, self._units, 1, other)
 
-        if threads == 1:
-            energy = kernel(0, self._middle, 0, rhs) + second()
-        else:
-            waiting = _helper().submit(second)
-            energy = kernel(0, self._middle, 0, rhs) + waiting.result()
+        energies = both(lambda: kernel(0, self._middle, 0, rhs), second, threads)
         rhs[rows] += other[rows]
-        return energy
-
-
-@cache
-def _helper() -> ThreadPoolExecutor:
-    """The second thread, started when it is first needed."""
-    return ThreadPoolExecutor(1, thread_name_prefix="local step")
+        return sum(energies)

@@ -111,7 +111,7 @@ class EdgeSpring(SimplexGroup):
 
     rows_per_element = 1
     per_element = ("rest",)
-    split_from = 16384
+    split_from = 8192
     project_kernel = staticmethod(_project)
     accumulate_kernel = staticmethod(_accumulate)
 

@@ -128,7 +128,7 @@ class TetrahedronGroup(SimplexGroup):
 
     rows_per_element = 3
     work_size = FOUND + 1
-    split_from = 2048
+    split_from = 1024
     project_kernel = staticmethod(_project)
     accumulate_kernel = staticmethod(_accumulate)
     minimum: float

@@ -174,7 +174,7 @@ class TriangleStrain(SimplexGroup):
         effect: Literal["strain"] = "strain"
 
     rows_per_element = 2
-    split_from = 8192
+    split_from = 4096
     project_kernel = staticmethod(_project)
     accumulate_kernel = staticmethod(_accumulate)
 

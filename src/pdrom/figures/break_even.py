@@ -11,7 +11,7 @@ from pdrom.figures.sources import Sources
 from pdrom.figures.spec import FigureSpec
 from pdrom.store import read_table
 
-COLUMNS = ["scene", "group", "method", "r", "ratio", "breakeven_r"]
+COLUMNS = ["scene", "group", "method", "factor", "threads", "r", "ratio"]
 
 
 @style.styled
@@ -27,7 +27,7 @@ def draw(sources: Sources, spec: FigureSpec) -> Figure:
     pairs = sources.holdings.experiments(spec.scenes, spec.groups)
     table = table[[pair in pairs for pair in zip(table.scene, table.group, strict=True)]]
     methods = sources.holdings.methods(spec.methods)
-    table = table[table.method.isin(methods)]
+    table = table[table.method.isin(methods) & (table.factor == 1.0) & (table.threads == 1)]
     if table.empty:
         return style.no_data("no reduced local step was timed")
     groups = [g for g in style.GROUPS if (table.group == g).any()]

@@ -37,6 +37,7 @@ FIGURES = Registry(
         "stability_sweep": f"{_PACKAGE}.stability_sweep:draw",
         "budget": f"{_PACKAGE}.budget:draw",
         "break_even": f"{_PACKAGE}.break_even:draw",
+        "break_even_sizes": f"{_PACKAGE}.break_even_sizes:draw",
         "effects_cost": f"{_PACKAGE}.effects_cost:draw",
     },
 )
@@ -72,6 +73,7 @@ READS: dict[str, tuple[str, ...]] = {
     "stability_sweep": ("table:stability",),
     "budget": ("table:budget",),
     "break_even": ("table:breakeven",),
+    "break_even_sizes": ("table:breakeven",),
     "effects_cost": ("table:effects_cost", "table:effects_left_out"),
 }
 # Figures of the first experiment and the first method that a configuration holds.

@@ -12,7 +12,7 @@ from pdrom.figures.spec import FigureSpec
 from pdrom.store import read_table
 
 COLUMNS = [
-    "scene", "method", "vertices", "ms_per_iteration", "local_ms", "global_ms",
+    "scene", "method", "threads", "vertices", "ms_per_iteration", "local_ms", "global_ms",
     "factorisation_ms", "memory_mb",
 ]  # fmt: skip
 PHASES = {
@@ -24,10 +24,12 @@ OFFLINE = {
     "factorisation_ms": ("factorisation (ms)", style.VERMILLION, "s"),
     "memory_mb": ("memory for it (MB)", style.PURPLE, "^"),
 }
-NAMES = {"fom": "full order", "ecsw": "POD subspace, ecsw"}
-COLOURS = {"fom": style.BLACK, "ecsw": "#1B6E6E"}
-BESIDE = {"fom": 6, "ecsw": 5}  # where the exponent stands, points above the end of the line
-MARKERS = {"fom": "o", "ecsw": ">"}
+TWO = "two threads"  # a method of its own here: the full-order run with two threads
+NAMES = {"fom": "full order", TWO: "full order, two threads", "ecsw": "POD subspace, ecsw"}
+COLOURS = {"fom": style.BLACK, TWO: "#8C8C8C", "ecsw": "#1B6E6E"}
+# where the exponent stands, points above the end of the line
+BESIDE = {"fom": 6, "ecsw": 5}
+MARKERS = {"fom": "o", TWO: "s", "ecsw": ">"}
 
 
 @style.styled
@@ -39,8 +41,8 @@ def draw(sources: Sources, spec: FigureSpec) -> Figure:
     StorageError
         A table is missing or lacks a column.
     """
-    table = read_table(sources.table("scaling"), COLUMNS)
-    fits = read_table(sources.table("scaling_fit"))
+    table = _two_threads_apart(read_table(sources.table("scaling"), COLUMNS))
+    fits = _two_threads_apart(read_table(sources.table("scaling_fit")))
     asked = spec.scenes or tuple(dict.fromkeys(table.scene))
     scenes = [scene for scene in asked if (table.scene == scene).any()]
     if not scenes:
@@ -61,6 +63,10 @@ def draw(sources: Sources, spec: FigureSpec) -> Figure:
     return figure
 
 
+def _two_threads_apart(table: pd.DataFrame) -> pd.DataFrame:
+    return table.assign(method=table.method.mask(table.threads == 2, TWO))
+
+
 def _draw_times(ax: Axes, rows: pd.DataFrame, fits: pd.DataFrame) -> None:
     ax.set_xscale("log")
     ax.set_yscale("log")
@@ -68,12 +74,14 @@ def _draw_times(ax: Axes, rows: pd.DataFrame, fits: pd.DataFrame) -> None:
     for method, part in rows.groupby("method", sort=False):
         colour, marker = _style(str(method))
         for quantity, (_, line) in PHASES.items():
+            if (method, quantity) == (TWO, "global_ms"):
+                continue  # the solves have one thread
             ax.plot(
                 part.vertices, part[quantity], line, color=colour,
                 marker=marker if line == "-" else None, linewidth=1.3 if line == "-" else 0.9,
             )  # fmt: skip
         own = (fits.method == method) & (fits.quantity == "ms_per_iteration")
-        if own.any():
+        if own.any() and method != TWO:
             end = part.iloc[-1]
             ax.annotate(
                 rf"$N^{{{fits[own].exponent.iloc[0]:.2f}}}$",

@@ -3,7 +3,10 @@
 import numpy as np
 
 from pdrom.constraints.base import ConstraintGroup
+from pdrom.constraints.second_thread import both
 from pdrom.sampling.reduction import Reduction
+
+SPLIT_FROM = 1 << 17  # entries of a lift (N, r) from which its rows are in two parts
 
 
 class ReducedLocalStep:
@@ -11,7 +14,7 @@ class ReducedLocalStep:
 
     Precomputed: the offset S^T W mean (N, 3), the lift S^T W V for each coefficient block, and the
     solution operators. Online: the projections of the sampled elements, a small dense product for
-    c, and the dense lift.
+    c, and the dense lift, shared by the group's threads.
     """
 
     def __init__(self, group: ConstraintGroup, reduction: Reduction) -> None:
@@ -23,6 +26,7 @@ class ReducedLocalStep:
         lift = group.S.T.multiply(group.row_weights[None, :]).tocsr()
         self._offset = lift @ mean
         self._limited = reduction.limited
+        self._parts = _parts(len(self._offset), reduction.r)
         place = _local_positions(reduction)
         self._blocks = []
         for block in reduction.blocks:
@@ -57,12 +61,28 @@ class ReducedLocalStep:
 
     def lift(self, coefficients: list[np.ndarray], rhs: np.ndarray) -> None:
         """Add S^T W (mean + V c) to ``rhs`` (N, 3)."""
-        rhs += self._offset
-        for (axis, *_, lifted), c in zip(self._blocks, coefficients, strict=True):
-            if axis is None:
-                rhs += (lifted @ c).reshape(rhs.shape)
-            else:
-                rhs[:, axis] += lifted @ c
+
+        def add(rows: slice) -> float:
+            own = rhs[rows]
+            own += self._offset[rows]
+            for (axis, *_, lifted), c in zip(self._blocks, coefficients, strict=True):
+                if axis is None:
+                    own += (lifted[3 * rows.start : 3 * rows.stop] @ c).reshape(own.shape)
+                else:
+                    own[:, axis] += lifted[rows] @ c
+            return 0.0
+
+        first, *others = self._parts
+        if others:
+            both(lambda: add(first), lambda: add(others[0]), self._group.threads)
+        else:
+            add(first)
+
+
+def _parts(vertices: int, r: int) -> list[slice]:
+    """One or two ranges of vertices, whatever the number of threads, which thus changes no bits."""
+    middle = vertices // 2 if vertices * r >= SPLIT_FROM else vertices
+    return [slice(0, middle), slice(middle, vertices)][: 1 + (middle < vertices)]
 
 
 def _local_positions(reduction: Reduction):

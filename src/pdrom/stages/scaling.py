@@ -13,9 +13,10 @@ import numpy as np
 import pandas as pd
 import psutil
 
-from pdrom.basis import compute_basis
+from pdrom.basis import Basis, compute_basis
 from pdrom.fom.stepper import LocalStep
 from pdrom.fom.system import GlobalSystem
+from pdrom.local_costs import local_costs
 from pdrom.method import MethodSpec
 from pdrom.rom.local_step import ReducedLocalStep
 from pdrom.rom.rerun import replace_group
@@ -24,38 +25,51 @@ from pdrom.scene import Scene, SceneConfig
 from pdrom.snapshots import row_masses
 from pdrom.store import write_table
 from pdrom.subspace.model import SubspaceModel, make_columns, sample_elements
-from pdrom.tables.columns import COLUMNS
+from pdrom.tables.accuracy_cost import FOM
 from pdrom.timing import Measurement, Variant, measure
 
 log = logging.getLogger(__name__)
 
+ITERATIONS = [
+    "scene", "method", "threads", "vertices", "elements", "r", "k", "elements_sampled",
+    "factorisation_ms", "memory_mb", "ms_per_iteration", "local_ms", "global_ms", "local_share",
+]  # fmt: skip
+STATES = 4  # states of the training run at which local steps are timed alone
+
 
 @dataclass(frozen=True)
 class Training:
-    """Positions (n, N, 3) m after the training frames, and projections (n, e p, 3) within them."""
+    """Positions (n, N, 3) m after the training frames, and projections (n, e p, 3) within them.
+
+    ``roundoff`` (n,) is that of the projections.
+    """
 
     positions: np.ndarray
     projections: np.ndarray
-    roundoff: float
+    roundoff: np.ndarray
+
+    def first(self, frames: int) -> "Training":
+        """The same of the first frames only."""
+        return Training(self.positions[:frames], self.projections[:frames], self.roundoff[:frames])
 
 
 def scale_scene(
     scene: dict[str, Any],
     factor: float,
-    method: str,
-    spec: dict[str, Any],
+    methods: dict[str, dict[str, Any]],
     settings: dict[str, Any],
     solver: str,
     root: str,
-    output: str,
+    outputs: dict[str, str],
 ) -> None:
-    """Measure a scene on one mesh size and write its part of the table scaling.
+    """Measure a scene on one mesh size and write its parts of the tables scaling and breakeven.
 
     Parameters
     ----------
     factor : on the vertices along each side of the mesh
-    method, spec : reduction of the local step that is timed beside the full-order run
-    settings : frames of training and of timing, warm-up and repeats, r, k, tolerance
+    methods : specifications of the reductions of the local step that ``settings`` name
+    settings : of `pdrom.config.Scaling`, without the scenes
+    outputs : iterations, breakeven
     """
     config = SceneConfig.model_validate(scene)
     # libraries and kernels are loaded before anything is measured
@@ -65,16 +79,27 @@ def scale_scene(
     idle = _memory()
     system, seconds = _factorised(bound, solver)
     measured = {"factorisation_ms": 1e3 * seconds, "memory_mb": _memory() - idle}
-    training = _train(bound, system, settings["training_frames"])
-    variants = {"fom": (_variant(bound, system, bound.groups, settings), measured)}
-    variants[method] = _reduced(bound, system, training, MethodSpec.model_validate(spec), settings)
-    variants["ecsw"] = _hyper(bound, training, settings)
-    results = measure([v for v, _ in variants.values()], settings["warmup"], settings["repeats"])
-    rows = [
-        {"scene": config.name, "method": name, **labels, **_times(bound, result)}
-        for (name, (_, labels)), result in zip(variants.items(), results, strict=True)
+    alone = settings["breakeven"]
+    training = _train(bound, system, max(settings["training_frames"], alone["training_frames"]))
+    first = training.first(settings["training_frames"])
+    specs = {name: MethodSpec.model_validate(spec) for name, spec in methods.items()}
+    method = settings["method"]
+    basis = _basis(bound, first, specs[method])
+    two = Scene.build(config, bound.mesh, threads=2)
+    variants = [
+        _full_order(bound, system, settings, measured),
+        _full_order(two, system, settings, {"threads": 2}),
+        _reduced(bound, system, basis, specs[method], settings),
+        _hyper(bound, first, settings),
     ]
-    write_table(pd.DataFrame(rows, columns=list(COLUMNS["scaling"])), output)
+    results = measure(variants, settings["warmup"], settings["repeats"])
+    rows = [{"scene": config.name, "threads": 1, **m.labels, **_times(bound, m)} for m in results]
+    table = pd.DataFrame(rows, columns=ITERATIONS)
+    write_table(table, outputs["iterations"])
+    steps = _steps_alone(bound, training.first(alone["training_frames"]), specs, alone)
+    states = training.positions[:: len(training.positions) // STATES][:STATES]
+    times = local_costs(bound, steps, states, settings["warmup"], alone["repeats"])
+    write_table(times.assign(factor=factor), outputs["breakeven"])
     log.info("%s: %d vertices done", config.name, bound.mesh.vertices)
 
 
@@ -101,45 +126,71 @@ def _train(scene: Scene, system: GlobalSystem, frames: int) -> Training:
     for frame in range(frames):
         state, _ = loop.step(state, frame, watch)
         positions.append(state.positions)
-    return Training(np.stack(positions), np.stack(projections), float(np.linalg.norm(roundoff)))
+    return Training(np.stack(positions), np.stack(projections), np.array(roundoff))
+
+
+def _basis(scene: Scene, training: Training, spec: MethodSpec) -> Basis:
+    group = scene.groups[0]
+    mass, rows = row_masses(group, scene.masses), group.rows_per_element
+    roundoff = float(np.linalg.norm(training.roundoff))
+    return compute_basis(training.projections, mass, roundoff, rows, spec)
+
+
+def _reduction(basis: Basis, spec: MethodSpec, size: int) -> Reduction:
+    return Reduction(basis, select(basis, spec, size), spec, size)
+
+
+def _steps_alone(
+    scene: Scene, training: Training, specs: dict[str, MethodSpec], settings: dict[str, Any]
+) -> dict[tuple[str, str, int], ReducedLocalStep]:
+    """Local steps of the first group by group, method and size, as far as the rank allows."""
+    group, steps = scene.groups[0], {}
+    for name in settings["methods"]:
+        basis = _basis(scene, training, specs[name])
+        for size in sorted({min(r, basis.rank) for r in settings["sizes"]}):
+            reduction = _reduction(basis, specs[name], size)
+            steps[group.name, name, size] = ReducedLocalStep(group, reduction)
+    return steps
+
+
+def _full_order(
+    scene: Scene, system: GlobalSystem, settings: dict[str, Any], labels: dict[str, Any]
+) -> Variant:
+    return _variant(scene, system, scene.groups, settings, {"method": FOM, **labels})
 
 
 def _reduced(
-    scene: Scene,
-    system: GlobalSystem,
-    training: Training,
-    spec: MethodSpec,
-    settings: dict[str, Any],
-) -> tuple[Variant, dict[str, Any]]:
-    group = scene.groups[0]
-    mass, rows = row_masses(group, scene.masses), group.rows_per_element
-    basis = compute_basis(training.projections, mass, training.roundoff, rows, spec)
-    size = min(settings["r"], basis.rank)
-    reduction = Reduction(basis, select(basis, spec, size), spec, size)
+    scene: Scene, system: GlobalSystem, basis: Basis, spec: MethodSpec, settings: dict[str, Any]
+) -> Variant:
+    group, method = scene.groups[0], settings["method"]
+    reduction = _reduction(basis, spec, min(settings["r"], basis.rank))
     steps = replace_group(scene, group.name, ReducedLocalStep(group, reduction))
-    labels = {"r": size, "elements_sampled": len(reduction.elements)}
-    return _variant(scene, system, steps, settings), labels
+    labels = {"r": reduction.r, "elements_sampled": len(reduction.elements)}
+    return _variant(scene, system, steps, settings, {"method": method, **labels})
 
 
-def _hyper(
-    scene: Scene, training: Training, settings: dict[str, Any]
-) -> tuple[Variant, dict[str, Any]]:
+def _hyper(scene: Scene, training: Training, settings: dict[str, Any]) -> Variant:
     columns = make_columns(scene, training.positions, "pod", settings["k"])
     frames = np.arange(len(training.positions))
     (samples,) = sample_elements(scene, columns, frames, [settings["tolerance"]])
     model = SubspaceModel("pod", columns, samples)
     labels = {
+        "method": "ecsw",
         "k": columns.modes,
         "elements_sampled": sum(len(chosen.elements) for chosen in samples.values()),
     }
-    return Variant({}, *model.loop(scene), settings["frames"]), labels
+    return Variant(labels, *model.loop(scene), settings["frames"])
 
 
 def _variant(
-    scene: Scene, system: GlobalSystem, steps: list[LocalStep], settings: dict[str, Any]
+    scene: Scene,
+    system: GlobalSystem,
+    steps: list[LocalStep],
+    settings: dict[str, Any],
+    labels: dict[str, Any],
 ) -> Variant:
     loop = scene.stepper(system, steps, track_objective=False)
-    return Variant({}, loop, scene.initial_state(), settings["frames"])
+    return Variant(labels, loop, scene.initial_state(), settings["frames"])
 
 
 def _times(scene: Scene, measured: Measurement) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from pdrom.constraints.implementations import IMPLEMENTATIONS
 from pdrom.effect_costs import effect_costs, left_out
 from pdrom.fom.stepper import LocalStep
 from pdrom.fom.system import GlobalSystem
+from pdrom.local_costs import local_costs
 from pdrom.method import MethodSpec
 from pdrom.rom.local_step import ReducedLocalStep
 from pdrom.rom.ranks import resolve_ranks
@@ -28,7 +29,7 @@ from pdrom.stages.scenes import scene_of
 from pdrom.store import open_hdf5, write_table
 from pdrom.subspace.load import load_models
 from pdrom.tables.accuracy_cost import ANDERSON, FOM
-from pdrom.timing import LiftTimed, Measurement, Variant, measure, measure_calls
+from pdrom.timing import LiftTimed, Measurement, Variant, measure
 
 log = logging.getLogger(__name__)
 
@@ -39,11 +40,7 @@ COLUMNS = [
     "implementation", "ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms",
     "global_ms", "spread_ms", "repeats",
 ]  # fmt: skip
-BREAKEVEN = [
-    "scene", "group", "method", "vertices", "elements", "threads", "r", "local_ms", "full_ms",
-]  # fmt: skip
 STATES = 5  # states of the full-order run at which local steps are timed alone
-THREADS = 1  # kernels and libraries run on one
 
 
 def time_scene(
@@ -76,7 +73,7 @@ def time_scene(
     variants = _full_order(bound, make, protocol) + _other_counts(
         bound, system, frames, counts, window
     )
-    alone: dict[tuple[Any, ...], LocalStep] = {}
+    alone: dict[tuple[str, str, int], ReducedLocalStep] = {}
     for path in inputs["samplings"]:
         group, method = Path(path).parent.name, Path(path).stem
         source = _Source(bound.group(group), method, methods[method], inputs["bases"], path)
@@ -98,7 +95,8 @@ def time_scene(
     write_table(pd.DataFrame([_row(bound, m) for m in results], columns=COLUMNS), outputs["frames"])
     log.info("%s: %d reduced local steps alone", name, len(alone))
     states = _states(inputs["fom"])
-    write_table(_break_even(bound, alone, states, protocol), outputs["breakeven"])
+    times = local_costs(bound, alone, states, warmup, protocol["breakeven_repeats"])
+    write_table(times.assign(factor=1.0), outputs["breakeven"])
     log.info("%s: effects", name)
     costs = effect_costs(bound, system, frames, warmup, repeats)
     write_table(costs, outputs["effects"])
@@ -175,38 +173,6 @@ def _states(fom: str) -> np.ndarray:
     with open_hdf5(fom) as file:
         positions = file["positions"]
         return np.stack([positions[i * (len(positions) - 1) // STATES] for i in range(STATES)])
-
-
-def _break_even(
-    scene: Scene,
-    alone: dict[tuple[Any, ...], LocalStep],
-    states: np.ndarray,
-    protocol: dict[str, Any],
-) -> pd.DataFrame:
-    """Time of one local step, reduced and full, mean over some states, interleaved."""
-    rhs = np.zeros_like(states[0])
-
-    def call(step: LocalStep) -> Callable[[], None]:
-        step.begin_frame(states[0])
-
-        def all_states() -> None:
-            for y in states:
-                step.accumulate(y, rhs)
-
-        return all_states
-
-    groups = {group: scene.group(group) for group, _, _ in alone}
-    calls = {key: call(step) for key, step in (groups | alone).items()}
-    with np.errstate(over="ignore", invalid="ignore"):
-        times = measure_calls(calls, protocol["warmup"], protocol["breakeven_repeats"])
-    rows = [
-        (
-            scene.config.name, group, method, scene.mesh.vertices, groups[group].elements, THREADS,
-            r, times[group, method, r] / len(states), times[group] / len(states),
-        )
-        for group, method, r in alone
-    ]  # fmt: skip
-    return pd.DataFrame(rows, columns=BREAKEVEN)
 
 
 def _row(scene: Scene, measurement: Measurement) -> dict[str, Any]:

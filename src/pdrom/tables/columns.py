@@ -36,11 +36,11 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "error_test", "error_heldout", "finite", "blowup_frame", "relative_error_within_horizon",
     ),
     "scaling": (
-        "scene", "method", "vertices", "elements", "r", "k", "elements_sampled",
+        "scene", "method", "threads", "vertices", "elements", "r", "k", "elements_sampled",
         "factorisation_ms", "memory_mb", "ms_per_iteration", "local_ms", "global_ms",
-        "local_share",
+        "local_share", "speedup", "local_speedup",
     ),
-    "scaling_fit": ("scene", "method", "quantity", "exponent", "points"),
+    "scaling_fit": ("scene", "method", "threads", "quantity", "exponent", "points"),
     "stability": (
         "scene", "method", "r", "h", "stiffness_ratio", "finite", "blowup_frame", "max_extent",
         "energy_ratio", "gain", "group", "position_basis", "k", "experiment", "relative_error",
@@ -64,8 +64,8 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "relative_error_within_horizon", "ms_per_frame",
     ),
     "breakeven": (
-        "scene", "group", "method", "vertices", "elements", "threads", "r", "local_ms", "full_ms",
-        "ratio", "breakeven_r",
+        "scene", "group", "method", "factor", "vertices", "elements", "threads", "r", "local_ms",
+        "full_ms", "ratio", "breakeven_r",
     ),
     "effects_cost": ("scene", "effect", "elements", "ms_per_frame", "share"),
     "effects_left_out": (
@@ -95,6 +95,9 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 
+# What the sizes r of one line of the table breakeven have in common.
+BREAKEVEN_CURVE = ["scene", "group", "method", "factor", "threads"]
+
 # The only columns that may differ between two runs on one machine.
 TIMING_COLUMNS: dict[str, tuple[str, ...]] = {
     "reduced_reruns": ("ms_per_frame", "local_ms", "global_ms", "speedup"),
@@ -102,7 +105,7 @@ TIMING_COLUMNS: dict[str, tuple[str, ...]] = {
     "local_share": ("local_ms", "assembly_ms", "global_ms", "local_share"),
     "scaling": (
         "factorisation_ms", "memory_mb", "ms_per_iteration", "local_ms", "global_ms",
-        "local_share",
+        "local_share", "speedup", "local_speedup",
     ),
     "scaling_fit": ("exponent",),
     "guard": ("ms_per_frame", "relative_cost"),

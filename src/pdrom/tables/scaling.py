@@ -6,19 +6,31 @@ import numpy as np
 import pandas as pd
 
 from pdrom.store import read_table
+from pdrom.tables.accuracy_cost import FOM
 from pdrom.tables.columns import COLUMNS, conform
 
 QUANTITIES = ("ms_per_iteration", "local_ms", "global_ms", "factorisation_ms", "memory_mb")
 
 
 def scaling(paths: Iterable[str]) -> pd.DataFrame:
-    """All scenes, one row per mesh size and method (``fom``, a reduced local step, ``ecsw``)."""
-    parts = [read_table(path) for path in paths]
+    """All scenes, one row per mesh size and method (``fom``, a reduced local step, ``ecsw``).
+
+    The speed-ups, of an iteration and of its local step, are over the full-order run on one thread.
+    """
+    parts = [_with_speedups(read_table(path)) for path in paths]
     if not parts:
         return pd.DataFrame(columns=list(COLUMNS["scaling"]))
     table = pd.concat(parts, ignore_index=True)
     counts = dict.fromkeys(("r", "k", "elements_sampled"), "Int64")
     return conform(table.astype(counts), "scaling")
+
+
+def _with_speedups(part: pd.DataFrame) -> pd.DataFrame:
+    (own,) = part[(part.method == FOM) & (part.threads == 1)].itertuples()
+    return part.assign(
+        speedup=own.ms_per_iteration / part.ms_per_iteration,
+        local_speedup=own.local_ms / part.local_ms,
+    )
 
 
 def scaling_fit(table: pd.DataFrame) -> pd.DataFrame:
@@ -27,12 +39,12 @@ def scaling_fit(table: pd.DataFrame) -> pd.DataFrame:
     A quantity with fewer than two sizes has no row.
     """
     rows = []
-    for (scene, method), part in table.groupby(["scene", "method"], sort=False):
+    for labels, part in table.groupby(["scene", "method", "threads"], sort=False):
         for quantity in QUANTITIES:
             points = part[["vertices", quantity]].dropna()
             points = points[points[quantity] > 0.0].astype(float)
             if points.vertices.nunique() < 2:
                 continue
             exponent, _ = np.polyfit(np.log(points.vertices), np.log(points[quantity]), 1)
-            rows.append([scene, method, quantity, exponent, len(points)])
+            rows.append([*labels, quantity, exponent, len(points)])
     return pd.DataFrame(rows, columns=list(COLUMNS["scaling_fit"]))

@@ -237,9 +237,11 @@ def _write_tables(sources, scenes, methods, rng) -> None:
         )
     ]
     ratios = [
-        (scene, group, method, r, 0.05 * r, 20)
+        (scene, group, method, factor, 400 * factor**2, threads, r, *_ratio(method, r, threads))
         for scene, group in pairs
         for method in methods
+        for factor in (1, 2, 5)
+        for threads in (1, 2)
         for r in (6, 14, 40)
     ]
     shares = [
@@ -313,7 +315,7 @@ def _write_tables(sources, scenes, methods, rng) -> None:
         " stiffness_ratio",
         "budget": "scene budget_ms reference method position_basis k r iterations"
         " relative_error_within_horizon",
-        "breakeven": "scene group method r ratio breakeven_r",
+        "breakeven": "scene group method factor vertices threads r ratio breakeven_r",
         "effects_cost": "scene effect ms_per_frame share",
         "effects_left_out": "scene left_out groups ms_per_frame own_ms",
         "reduced_reruns": "scene group method r position_basis max_extent blowup_frame"
@@ -332,16 +334,27 @@ def _write_tables(sources, scenes, methods, rng) -> None:
     _write_scaling(sources, scenes)
 
 
+def _ratio(method, r, threads):
+    """Ratio and break-even size: block-deim pays always, qdeim never, the others up to 20."""
+    if method == "block-deim":
+        return 0.01 * r, np.nan
+    return (0.2 * r, 6) if method == "qdeim" else (0.05 * r * threads, 20 // threads)
+
+
 def _write_scaling(sources, scenes) -> None:
-    header = "scene method vertices ms_per_iteration local_ms global_ms factorisation_ms memory_mb"
+    header = (
+        "scene method threads vertices ms_per_iteration local_ms global_ms factorisation_ms"
+        " memory_mb"
+    )
     rows = [
-        (scene, method, n, n * cost, 0.6 * n * cost, 0.4 * n * cost, *extra)
+        (scene, method, threads, n, n * cost, 0.6 * n * cost, 0.4 * n * cost, *extra)
         for scene in scenes
         for n in (400, 1600, 10000)
-        for method, cost, extra in (
-            ("fom", 1e-4, (0.01 * n, 0.001 * n)),
-            ("block-deim", 5e-5, (np.nan, np.nan)),
-            ("ecsw", 1e-2 / n, (np.nan, np.nan)),
+        for method, threads, cost, extra in (
+            ("fom", 1, 1e-4, (0.01 * n, 0.001 * n)),
+            ("fom", 2, 7e-5, (np.nan, np.nan)),
+            ("block-deim", 1, 5e-5, (np.nan, np.nan)),
+            ("ecsw", 1, 1e-2 / n, (np.nan, np.nan)),
         )
     ]
     table = pd.DataFrame(rows, columns=header.split())

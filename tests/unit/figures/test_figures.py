@@ -267,6 +267,18 @@ def test_break_even_has_a_panel_per_group(study):
     }  # fmt: skip
 
 
+def test_break_even_over_mesh_sizes(study):
+    figure = draw(study, "break_even_sizes", methods=("deim-joint", "block-deim", "qdeim"))
+    assert [ax.get_title() for ax in figure.axes] == ["strain oop", "bar release"]
+    lines = [line for line in figure.axes[0].get_lines() if line.get_marker() == "None"]
+    drawn = {(*line.get_ydata(), line.get_linestyle()) for line in lines}
+    sizes = ((20, "-"), (10, "--"), (40, "-"), (40, "--"), (6, "-"), (6, "--"))
+    assert drawn == {(size, size, size, style) for size, style in sizes}
+    points = [line for line in figure.axes[0].get_lines() if line.get_marker() != "None"]
+    marks = {line.get_ydata()[0]: line.get_marker() for line in points}
+    assert (marks[40], marks[6]) == ("^", "v")
+
+
 def test_a_scene_without_effects_ends_at_the_tick(study):
     figure = draw(study, "effects_cost", scenes=("strain_oop", "cloth_all"))
     shares, without = figure.axes

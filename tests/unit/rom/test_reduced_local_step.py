@@ -119,6 +119,19 @@ def test_evaluates_sampled_elements_only(spec):
         np.testing.assert_array_equal(added(step), rhs)
 
 
+def test_two_threads_share_the_lift_with_the_bits_of_one(spec, monkeypatch):
+    _, reduction = reduction_of(spec)
+    group = InventedGroup(np.random.default_rng(7).standard_normal((ROWS, 3)))
+    whole = added(ReducedLocalStep(group, reduction))
+    monkeypatch.setattr("pdrom.rom.local_step.SPLIT_FROM", 1)
+    step = ReducedLocalStep(group, reduction)
+    shared = []
+    for group.threads in (1, 2):
+        shared.append(added(step))
+    np.testing.assert_array_equal(*shared)
+    np.testing.assert_allclose(shared[0], whole, atol=1e-13 * np.abs(whole).max())
+
+
 def test_adds_to_what_is_there_and_knows_no_energy(spec):
     _, reduction = reduction_of(spec)
     step = ReducedLocalStep(InventedGroup(np.ones((ROWS, 3))), reduction)

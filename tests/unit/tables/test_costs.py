@@ -70,8 +70,8 @@ def curve(folder, scene: str, offset: float, slope: float, full: float, sizes, s
         frac=1.0, random_state=shuffle
     )
     table = table.assign(
-        scene=scene, group="spring", method="block-deim", vertices=9, elements=20, threads=1,
-        full_ms=full,
+        scene=scene, group="spring", method="block-deim", factor=1.0, vertices=9, elements=20,
+        threads=1, full_ms=full,
     )  # fmt: skip
     write_table(table, folder / f"{scene}.csv")
     return str(folder / f"{scene}.csv")

@@ -7,15 +7,17 @@ import pytest
 from conftest import ROOT
 from pdrom.config import Scaling, Study
 from pdrom.stages.scaling import scale_scene
-from pdrom.tables.columns import COLUMNS
+from pdrom.tables.breakeven import breakeven
+from pdrom.tables.columns import BREAKEVEN_CURVE, COLUMNS
 from pdrom.tables.scaling import QUANTITIES, scaling, scaling_fit
 
 SPEC = {"title": "block DEIM", "centring": "affine", "rows": "element"}
+JOINT = {"title": "joint DEIM", "centring": "affine", "rows": "joint"}
 
 
 def power_laws(exponents, sizes=(100, 1000, 10000)):
     columns = {q: 2.5 * np.power(sizes, e) for q, e in zip(QUANTITIES, exponents, strict=True)}
-    return pd.DataFrame({"scene": "a", "method": "fom", "vertices": sizes, **columns})
+    return pd.DataFrame({"scene": "a", "method": "fom", "threads": 1, "vertices": sizes, **columns})
 
 
 def test_exponents_of_exact_power_laws():
@@ -43,22 +45,45 @@ def test_no_scene_gives_empty_tables():
 @pytest.mark.parametrize("name", ["strain_oop", "bar_release"])
 def test_every_size_is_measured(tmp_path, name):
     study = Study.load({"scenes": [name], "methods": ["pod"]}, ROOT)
-    settings = Scaling(r=4, k=5, training_frames=8, frames=1, repeats=2).model_dump()
-    paths = []
+    alone = {"sizes": [2, 3, 1000], "training_frames": 9, "repeats": 2}
+    settings = Scaling(r=4, k=5, training_frames=8, frames=1, repeats=2, breakeven=alone)
+    outputs = {}
     for factor in (0.3, 0.5):
-        paths.append(str(tmp_path / f"x{factor}.csv"))
+        outputs[factor] = {k: str(tmp_path / f"{k}{factor}") for k in ("iterations", "breakeven")}
         scale_scene(
-            study.scenes[name].model_dump(mode="json"), factor, "block-deim", SPEC, settings,
-            "cholespy", str(ROOT), paths[-1],
+            study.scenes[name].model_dump(mode="json"), factor,
+            {"block-deim": SPEC, "deim-joint": JOINT}, settings.model_dump(), "cholespy",
+            str(ROOT), outputs[factor],
         )  # fmt: skip
-    table = scaling(paths)
+    sizes = [study.scenes[name].mesh.coarsened(f).build(ROOT).vertices for f in outputs]
+    _check_iterations(scaling(files["iterations"] for files in outputs.values()), sizes)
+    _check_alone(breakeven(files["breakeven"] for files in outputs.values()), sizes)
+
+
+def _check_iterations(table: pd.DataFrame, sizes: list[int]) -> None:
     assert tuple(table.columns) == COLUMNS["scaling"]
-    assert table.method.tolist() == 2 * ["fom", "block-deim", "ecsw"]
-    sizes = [study.scenes[name].mesh.coarsened(f).build(ROOT).vertices for f in (0.3, 0.5)]
-    assert table.vertices.tolist() == [n for n in sizes for _ in range(3)]
+    assert table.method.tolist() == 2 * ["fom", "fom", "block-deim", "ecsw"]
+    assert table.threads.tolist() == 2 * [1, 2, 1, 1]
+    assert table.vertices.tolist() == [n for n in sizes for _ in range(4)]
     assert (table.ms_per_iteration >= table.local_ms + table.global_ms).all()
     assert table.local_share.between(0.0, 1.0).all()
     fom, reduced = table[table.method == "fom"], table[table.method != "fom"]
-    assert (fom.factorisation_ms > 0.0).all()
+    assert (fom[fom.threads == 1].factorisation_ms > 0.0).all()
+    assert (fom[fom.threads == 1].speedup == 1.0).all()
+    own = fom[fom.threads == 1].set_index("vertices").local_ms
+    np.testing.assert_allclose(table.local_speedup * table.local_ms, table.vertices.map(own))
     assert fom.elements_sampled.isna().all()
     assert (reduced.elements_sampled <= reduced.elements).all()
+
+
+def _check_alone(table: pd.DataFrame, sizes: list[int]) -> None:
+    assert tuple(table.columns) == COLUMNS["breakeven"]
+    assert (table.local_ms > 0.0).all()
+    assert (table.full_ms > 0.0).all()
+    curves = table.groupby(BREAKEVEN_CURVE)
+    assert len(curves) == 2 * 2 * 2
+    assert [g.vertices.iloc[0] for _, g in curves if g.threads.iloc[0] == 1] == 2 * sizes
+    for _, curve in curves:
+        # the largest size is the numerical rank, not what was asked for
+        assert curve.r.tolist()[:2] == [2, 3]
+        assert 3 < curve.r.iloc[-1] < 1000
