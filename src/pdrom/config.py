@@ -120,8 +120,8 @@ class SizedBreakEven(_Model):
     """
 
     methods: tuple[str, ...] = ("deim-joint", "block-deim")
-    sizes: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = (5, 10, 20, 40, 80, 120)
-    training_frames: Annotated[int, Field(ge=3, le=1000)] = 120
+    sizes: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = (5, 10, 20, 40, 80)
+    training_frames: Annotated[int, Field(ge=3, le=1000)] = 84
     repeats: Annotated[int, Field(ge=1)] = 20
 
 

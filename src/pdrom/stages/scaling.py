@@ -20,7 +20,7 @@ from pdrom.local_costs import local_costs
 from pdrom.method import MethodSpec
 from pdrom.rom.local_step import ReducedLocalStep
 from pdrom.rom.rerun import replace_group
-from pdrom.sampling import Reduction, select
+from pdrom.sampling import Reduction, select, select_path
 from pdrom.scene import Scene, SceneConfig
 from pdrom.snapshots import row_masses
 from pdrom.store import write_table
@@ -136,19 +136,16 @@ def _basis(scene: Scene, training: Training, spec: MethodSpec) -> Basis:
     return compute_basis(training.projections, mass, roundoff, rows, spec)
 
 
-def _reduction(basis: Basis, spec: MethodSpec, size: int) -> Reduction:
-    return Reduction(basis, select(basis, spec, size), spec, size)
-
-
 def _steps_alone(
     scene: Scene, training: Training, specs: dict[str, MethodSpec], settings: dict[str, Any]
 ) -> dict[tuple[str, str, int], ReducedLocalStep]:
     """Local steps of the first group by group, method and size, as far as the rank allows."""
     group, steps = scene.groups[0], {}
     for name in settings["methods"]:
-        basis = _basis(scene, training, specs[name])
-        for size in sorted({min(r, basis.rank) for r in settings["sizes"]}):
-            reduction = _reduction(basis, specs[name], size)
+        spec, basis = specs[name], _basis(scene, training, specs[name])
+        sizes = sorted({min(r, basis.rank) for r in settings["sizes"]})
+        for size, sampling in select_path(basis, spec, sizes).items():
+            reduction = Reduction(basis, sampling, spec, size)
             steps[group.name, name, size] = ReducedLocalStep(group, reduction)
     return steps
 
@@ -163,7 +160,8 @@ def _reduced(
     scene: Scene, system: GlobalSystem, basis: Basis, spec: MethodSpec, settings: dict[str, Any]
 ) -> Variant:
     group, method = scene.groups[0], settings["method"]
-    reduction = _reduction(basis, spec, min(settings["r"], basis.rank))
+    size = min(settings["r"], basis.rank)
+    reduction = Reduction(basis, select(basis, spec, size), spec, size)
     steps = replace_group(scene, group.name, ReducedLocalStep(group, reduction))
     labels = {"r": reduction.r, "elements_sampled": len(reduction.elements)}
     return _variant(scene, system, steps, settings, {"method": method, **labels})
