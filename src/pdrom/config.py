@@ -140,7 +140,7 @@ class Scaling(_Model):
     k: Annotated[int, Field(ge=1, le=1000)] = 20
     tolerance: Annotated[float, Field(gt=0.0, lt=1.0)] = 1e-2
     training_frames: Annotated[int, Field(ge=3, le=1000)] = 16
-    frames: Annotated[int, Field(ge=1)] = 3
+    frames: Annotated[int, Field(ge=1)] = 10
     warmup: Annotated[int, Field(ge=0)] = 1
     repeats: Annotated[int, Field(ge=1)] = 9
     breakeven: SizedBreakEven = SizedBreakEven()

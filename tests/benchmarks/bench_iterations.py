@@ -1,22 +1,52 @@
-"""One frame (K = 10 local/global iterations) of the full-order model, a scene a family."""
+"""One frame (K = 10 local/global iterations) of the full-order model, a scene a family.
+
+Plain with one thread and with two, and with Anderson acceleration.
+"""
 
 import numpy as np
 import pytest
 from families import FAMILIES
 
-from pdrom.fom.stepper import State
+from pdrom.fom.anderson import Anderson
+from pdrom.fom.stepper import State, Stepper
+from pdrom.scene import Scene
+
+WINDOW = 5
 
 
+def plain(scene: Scene) -> Stepper:
+    """One thread."""
+    return scene.stepper(track_objective=False)
+
+
+def two_threads(scene: Scene) -> Stepper:
+    """The local step of large groups is shared."""
+    for group in scene.groups:
+        group.threads = 2
+    return scene.stepper(track_objective=False)
+
+
+def accelerated(scene: Scene) -> Stepper:
+    """The last iterates are combined."""
+    space, config = scene.space(scene.system), scene.config
+    acceleration = Anderson(WINDOW)
+    return Stepper(space, config.time_step, config.iterations, scene.groups, False, acceleration)
+
+
+LOOPS = {"plain": plain, "two threads": two_threads, "accelerated": accelerated}
+
+
+@pytest.mark.parametrize("kind", LOOPS)
 @pytest.mark.parametrize("family", FAMILIES)
-def bench_frame(benchmark, family):
+def bench_frame(benchmark, family, kind):
     """Frame 0 from rest, factorised beforehand."""
     scene = FAMILIES[family]()
-    loop, start = scene.stepper(track_objective=False), scene.initial_state()
+    loop, start = LOOPS[kind](scene), scene.initial_state()
 
     def frame() -> State:
         return loop.step(start, 0)[0]
 
-    benchmark.group = "frame"
+    benchmark.group = f"frame {family}"
     state = benchmark(frame)
     benchmark.extra_info["ms_per_iteration"] = round(
         1e3 * benchmark.stats.stats.min / scene.config.iterations, 4

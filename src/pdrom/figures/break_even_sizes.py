@@ -4,6 +4,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
 
 from pdrom.figures import style
 from pdrom.figures.multiples import label_outer, small_multiples
@@ -37,7 +38,14 @@ def draw(sources: Sources, spec: FigureSpec) -> Figure:
     for ax, scene in zip(axes, scenes, strict=True):
         _draw_scene(ax, points[points.scene == scene], styles)
         ax.set_title(style.words(scene))
+        ax.set_xlim(0.8 * points.vertices.min(), 1.25 * points.vertices.max())
+    axes[0].set_ylim(bottom=0.0)
     label_outer(axes, spec.columns, "vertices", "break-even size r")
+    _legend(figure, sources, styles)
+    return figure
+
+
+def _legend(figure: Figure, sources: Sources, styles: dict[str, tuple[str, str]]) -> None:
     handles = [
         Line2D([], [], color=colour, marker=marker, label=sources.holdings.title(name))
         for name, (colour, marker) in styles.items()
@@ -50,7 +58,6 @@ def draw(sources: Sources, spec: FigureSpec) -> Figure:
         look = {"marker": marker, "markerfacecolor": "white", "linestyle": "none"}
         handles.append(Line2D([], [], color=style.BLACK, label=label, **look))
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
-    return figure
 
 
 def _sizes(table: pd.DataFrame) -> pd.DataFrame:
@@ -70,7 +77,7 @@ def _sizes(table: pd.DataFrame) -> pd.DataFrame:
 
 def _draw_scene(ax: Axes, points: pd.DataFrame, styles: dict[str, tuple[str, str]]) -> None:
     ax.set_xscale("log")
-    ax.set_yscale("log")
+    ax.xaxis.set_minor_formatter(NullFormatter())
     style.grid(ax)
     # methods of the own mesh alone have no line to draw
     counts = points.groupby("method").factor.transform("nunique")

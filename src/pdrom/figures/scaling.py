@@ -27,7 +27,7 @@ OFFLINE = {
 TWO = "two threads"  # a method of its own here: the full-order run with two threads
 NAMES = {"fom": "full order", TWO: "full order, two threads", "ecsw": "POD subspace, ecsw"}
 COLOURS = {"fom": style.BLACK, TWO: "#8C8C8C", "ecsw": "#1B6E6E"}
-# where the exponent stands, points above the end of the line
+# whose exponent is printed, and how many points above the end of the line
 BESIDE = {"fom": 6, "ecsw": 5}
 MARKERS = {"fom": "o", TWO: "s", "ecsw": ">"}
 
@@ -81,11 +81,11 @@ def _draw_times(ax: Axes, rows: pd.DataFrame, fits: pd.DataFrame) -> None:
                 marker=marker if line == "-" else None, linewidth=1.3 if line == "-" else 0.9,
             )  # fmt: skip
         own = (fits.method == method) & (fits.quantity == "ms_per_iteration")
-        if own.any() and method != TWO:
+        if own.any() and method in BESIDE:
             end = part.iloc[-1]
             ax.annotate(
                 rf"$N^{{{fits[own].exponent.iloc[0]:.2f}}}$",
-                (end.vertices, end.ms_per_iteration), xytext=(-3, BESIDE.get(str(method), -11)),
+                (end.vertices, end.ms_per_iteration), xytext=(-3, BESIDE[str(method)]),
                 textcoords="offset points", ha="right", color=colour, fontsize=7.5,
             )  # fmt: skip
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numba import njit
 from scipy import sparse
 
 from pdrom.constraints.base import ConstraintGroup
@@ -44,10 +45,23 @@ class Elimination:
         if self._coupling is None:
             self._solver.solve(rhs, y)
             return
-        np.take(rhs, self.free, axis=0, out=self._rhs, mode="clip")
-        self._rhs -= self._load
+        _take_less(rhs, self.free, self._load, self._rhs)
         self._solver.solve(self._rhs, self._solution)
-        y[self.free] = self._solution
+        _put(self._solution, self.free, y)
+
+
+@njit(cache=True)
+def _take_less(values, rows, less, out):
+    for i in range(len(rows)):
+        for axis in range(3):
+            out[i, axis] = values[rows[i], axis] - less[i, axis]
+
+
+@njit(cache=True)
+def _put(values, rows, out):
+    for i in range(len(rows)):
+        for axis in range(3):
+            out[rows[i], axis] = values[i, axis]
 
 
 def require_accurate(matrix, solve: Callable[[np.ndarray, np.ndarray], None]) -> None:
