@@ -73,7 +73,7 @@ class _SecondThread:
                 own = first()
             finally:
                 # the caller's arrays may go away once this returns
-                while not _changed(self._done, self._count - 1, YIELD, 0):
+                while not _reaches(self._done, self._count, YIELD, 0):
                     time.sleep(0)
                 other, self._work, self._result = self._result, None, 0.0
         if isinstance(other, BaseException):
@@ -83,8 +83,8 @@ class _SecondThread:
     def _run(self) -> None:
         count = 0
         while True:
-            self._await(count)
             count += 1
+            self._await(count)
             try:
                 self._result = self._work()
             except BaseException as error:  # raised in the thread that asked
@@ -92,7 +92,7 @@ class _SecondThread:
             _write(self._done, count)
 
     def _await(self, count: int) -> None:
-        """Return when there is work after number ``count``.
+        """Return when there is work number ``count``.
 
         Awake, it goes on looking for as long as the caller takes to leave the interpreter: a thread
         that asks for the interpreter's lock while another has it is put to sleep.
@@ -100,10 +100,10 @@ class _SecondThread:
         The flag is set before the last look, and the caller reads it after giving work, so that
         one of the two sees the other.
         """
-        if _changed(self._given, count, TURNS, SETTLE):
+        if _reaches(self._given, count, TURNS, SETTLE):
             return
         self._asleep = True
-        while not _changed(self._given, count, 1, 0):
+        while not _reaches(self._given, count, 1, 0):
             self._wake.wait()
             self._wake.clear()
         self._asleep = False
@@ -133,13 +133,13 @@ def _store(_context, _address, _value):
 
 
 @njit(nogil=True, cache=True)
-def _changed(address, value, turns, more):
-    """Whether the number at ``address`` is another than ``value`` within so many looks.
+def _reaches(address, value, turns, more):
+    """Whether the number at ``address`` is at least ``value`` within so many looks.
 
     It looks as often as ``more`` says after that.
     """
     looks = 0
-    while looks < turns and _load(address) == value:
+    while looks < turns and _load(address) < value:
         looks += 1
     for _ in range(more):
         _load(address)
