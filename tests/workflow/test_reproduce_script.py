@@ -15,6 +15,7 @@ import pytest
 SCRIPT = Path(__file__).resolve().parents[2] / "reproduce"
 TOOLS = ["cat", "chmod", "cksum", "cp", "dirname", "find", "grep", "mkdir", "ps", "rm", "sed", "sh"]
 TOOLS += ["sleep", "tail", "touch", "tr"]
+OPTIONS = "--scheduler greedy --max-jobs-per-timespan 1000/20s --rerun-incomplete"
 LOCK_FILE = f"nowhere==1.0 --hash=sha256:{64 * '0'}\n"
 
 # Stands for a Python of a given version that makes environments out of itself.
@@ -179,7 +180,7 @@ def test_a_failed_set_up_is_made_anew(folder: Folder) -> None:
     folder.path.joinpath("pip-fails").unlink()
     status, errors = folder.run()
     assert status == 0, errors
-    assert folder.calls == ["snakemake --cores all --scheduler greedy --rerun-incomplete"]
+    assert folder.calls == [f"snakemake --cores all {OPTIONS}"]
 
 
 def test_the_environment_is_made_once_for_each_lock_file(folder: Folder) -> None:
@@ -197,9 +198,9 @@ def test_arguments_are_handed_on(folder: Folder) -> None:
     folder.run("-j2")
     folder.run("test", "-q", "tests/unit")
     assert folder.calls == [
-        "snakemake --cores all --scheduler greedy --rerun-incomplete -n results/figures/a b.pdf",
-        "snakemake --scheduler greedy --rerun-incomplete --cores 1",
-        "snakemake --scheduler greedy --rerun-incomplete -j2",
+        f"snakemake --cores all {OPTIONS} -n results/figures/a b.pdf",
+        f"snakemake {OPTIONS} --cores 1",
+        f"snakemake {OPTIONS} -j2",
         "python -m pytest -q tests/unit",
     ]
 
