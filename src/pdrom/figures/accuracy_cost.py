@@ -146,7 +146,7 @@ def _label_rate(ax: Axes, x: float, height: float, text: str) -> None:
 
 def _label_times(ax: Axes, decades: float) -> None:
     """Plain numbers on the logarithmic axis, as many as there is room for."""
-    steps = [(0.4, (1, 1.5, 2, 3, 5, 7)), (0.7, (1, 2, 3, 5)), (1.3, (1, 2, 5)), (9, (1,))]
+    steps = [(0.4, (1, 1.5, 2, 3, 5, 7)), (0.7, (1, 2, 3, 5)), (1.3, (1, 2, 5)), (2.0, (1, 3))]
     subs = next((s for limit, s in steps if decades < limit), (1,))
     ax.xaxis.set_major_locator(LogLocator(subs=subs))
     ax.xaxis.set_minor_locator(NullLocator())
