@@ -1,5 +1,5 @@
 # Entry point of `snakemake` and of `./reproduce`: the workflow with the manuscript as its target.
-from pdrom.configfiles import check_or_exit
+from pdrom.pipeline.configfiles import check_or_exit
 
 check_or_exit("config/default.yaml", *workflow.overwrite_configfiles)
 

@@ -1,19 +1,18 @@
 """Shared builders of small scenes."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import settings
 
-from pdrom.scene import Scene, SceneConfig
+from pdrom.model.scene import Scene, SceneConfig
+from places import ROOT
 
 # The same examples in every run: a failure can be repeated, and no run depends on the clock.
 settings.register_profile("pdrom", derandomize=True, deadline=None)
 settings.load_profile("pdrom")
 
-ROOT = Path(__file__).resolve().parents[1]
 
 GROUPS = {
     "bending": {"kind": "cloth", "rows": 7, "columns": 6, "wave": 0.1},

@@ -8,12 +8,12 @@ from typing import Any
 
 import yaml
 
-from pdrom.config import Study
-from pdrom.configfiles import check_files
-from pdrom.plan import Plan
-from pdrom.yamlfile import read_yaml
+from pdrom.core.yamlfile import read_yaml
+from pdrom.pipeline.configfiles import check_files
+from pdrom.pipeline.plan import Plan
+from pdrom.pipeline.study import Study
+from places import CONFIG
 
-CONFIG = Path(__file__).resolve().parents[2] / "config"
 STUDY = "config/default.yaml"
 SCENE = "config/scenes/small.yaml"
 MESH = "meshes/square.obj"

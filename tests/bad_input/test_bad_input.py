@@ -7,7 +7,7 @@ import pytest
 
 from bad_input.cases import CASES, Case
 from bad_input.project import MESH, SCENE, Replace, load_project, make_project
-from pdrom.errors import PdromError
+from pdrom.core.errors import PdromError
 
 
 def test_the_unbroken_project_is_accepted(tmp_path: Path) -> None:

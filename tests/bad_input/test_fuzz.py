@@ -28,7 +28,7 @@ from bad_input.project import (
     make_project,
     small_study,
 )
-from pdrom.errors import PdromError
+from pdrom.core.errors import PdromError
 
 EXAMPLES = int(os.environ.get("PDROM_FUZZ_EXAMPLES", "25"))
 SPARE_BYTES = 2_000_000_000

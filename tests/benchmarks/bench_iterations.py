@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from families import FAMILIES
 
-from pdrom.fom.anderson import Anderson
-from pdrom.fom.stepper import State, Stepper
-from pdrom.scene import Scene
+from pdrom.model.dynamics.acceleration import Anderson
+from pdrom.model.dynamics.stepper import State, Stepper
+from pdrom.model.scene import Scene
 
 WINDOW = 5
 

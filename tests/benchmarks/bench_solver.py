@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from families import FAMILIES
 
-from pdrom.fom.solvers import SOLVERS
-from pdrom.scene import Scene
+from pdrom.model.dynamics.solvers import SOLVERS
+from pdrom.model.scene import Scene
 
 LARGE = [name for name in FAMILIES if "100x100" in name or "80x10x10" in name]
 

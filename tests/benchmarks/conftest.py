@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from pdrom.provenance import machine
+from pdrom.core.provenance import machine
 
 
 def pytest_benchmark_update_json(

@@ -1,12 +1,9 @@
 """Scenes of the benchmarks: one a family and size, deformed as in the middle of a run."""
 
-from pathlib import Path
-
 import numpy as np
 
-from pdrom.scene import Scene, SceneConfig
-
-ROOT = Path(__file__).resolve().parents[2]
+from pdrom.model.scene import Scene, SceneConfig
+from places import ROOT
 
 WEIGHTS = {
     "bending": 1e-2,

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from conftest import make_scene, random_rotation
-from pdrom.fom.run import simulate, trajectory
-from pdrom.fom.stepper import State
+from pdrom.model.dynamics.stepper import State
+from pdrom.model.runs.full_order import simulate, trajectory
 
 GRAVITY = {"effect": "gravity"}
 

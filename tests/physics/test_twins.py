@@ -3,9 +3,9 @@
 import pytest
 
 from conftest import ROOT
-from pdrom.config import load_bound_scene
-from pdrom.fom.run import trajectory
-from pdrom.fom.sensitivity import perturbation_field, relative_difference
+from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs.sensitivity import perturbation_field, relative_difference
+from pdrom.pipeline.study import load_bound_scene
 
 WELL_POSED = sorted(
     path.stem

@@ -7,7 +7,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+from places import ROOT
+
 PARTS = ("Snakefile", "config", "paper/main.tex", "paper/references.bib", "src", "workflow")
 
 

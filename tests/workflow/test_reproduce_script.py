@@ -12,7 +12,9 @@ from pathlib import Path
 
 import pytest
 
-SCRIPT = Path(__file__).resolve().parents[2] / "reproduce"
+from places import ROOT
+
+SCRIPT = ROOT / "reproduce"
 TOOLS = ["cat", "chmod", "cksum", "cp", "dirname", "find", "grep", "mkdir", "ps", "rm", "sed", "sh"]
 TOOLS += ["sleep", "tail", "touch", "tr"]
 OPTIONS = "--scheduler greedy --max-jobs-per-timespan 1000/20s --rerun-incomplete"

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from checkout import Checkout, copy_repository
 
-from pdrom.plan import TABLES
+from pdrom.pipeline.plan import TABLES
 
 MICRO = {
     "scenes": ["spring_oop", "strain_oop", "bar_release"],
@@ -96,14 +96,16 @@ def test_another_number_of_cores_reruns_nothing(finished: Checkout) -> None:
 
 
 def test_comments_and_docstrings_rerun_nothing(finished: Checkout) -> None:
-    spring = "src/pdrom/constraints/spring.py"
+    spring = "src/pdrom/model/constraints/spring.py"
     finished.edit(spring, '"""Edge springs:', '"""Springs along edges:')
     finished.edit(spring, "    # scaled: ", "    # divided: ")
     assert finished.planned(*MICRO_ARGUMENTS) == set()
 
 
 def test_a_kernel_reruns_the_scenes_that_use_it_and_what_follows(finished: Checkout) -> None:
-    finished.edit("src/pdrom/constraints/spring.py", "choose(scale == 0.0", "choose(scale <= 0.0")
+    finished.edit(
+        "src/pdrom/model/constraints/spring.py", "choose(scale == 0.0", "choose(scale <= 0.0"
+    )
     planned = finished.planned(*MICRO_ARGUMENTS)
     per_scene = {p for p in planned if _stage(p) not in ("tables", "figures", "paper")}
     assert {p.split("/")[2].removesuffix(".csv") for p in per_scene} == {"spring_oop"}

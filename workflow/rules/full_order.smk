@@ -10,7 +10,7 @@ rule mesh:
         config=lambda w: PLAN.mesh_config(w.mesh),
         root=lambda w: str(PLAN.root),
         content=lambda w: PLAN.digest(*PLAN.mesh_file(w.mesh)),
-        code=PLAN.code("pdrom.stages.mesh"),
+        code=PLAN.code("pdrom.experiments.mesh"),
     message:
         "Mesh {wildcards.mesh}"
     script:
@@ -28,7 +28,7 @@ rule fom:
     params:
         scene=lambda w: PLAN.scene_config(w.scene),
         solver=PLAN.settings.solver,
-        code=lambda w: PLAN.scene_code("pdrom.stages.fom", w.scene),
+        code=lambda w: PLAN.scene_code("pdrom.experiments.fom", w.scene),
     message:
         "Full-order run of {wildcards.scene} ({wildcards.run})"
     script:
@@ -47,7 +47,7 @@ rule sensitivity:
         perturbations=list(PLAN.settings.sensitivity.perturbations),
         reference=PLAN.settings.sensitivity.reference,
         seeds=list(PLAN.settings.sensitivity.seeds),
-        code=lambda w: PLAN.scene_code("pdrom.stages.sensitivity", w.scene),
+        code=lambda w: PLAN.scene_code("pdrom.experiments.sensitivity", w.scene),
     message:
         "Perturbed full-order runs of {wildcards.scene}"
     script:
@@ -71,7 +71,7 @@ rule iterations:
             "threshold": PLAN.settings.sensitivity.threshold,
         },
         solver=PLAN.settings.solver,
-        code=lambda w: PLAN.scene_code("pdrom.stages.iterations", w.scene),
+        code=lambda w: PLAN.scene_code("pdrom.experiments.iterations", w.scene),
     message:
         "Accuracy of {wildcards.scene} against the number of iterations"
     script:
@@ -89,7 +89,7 @@ rule snapshots:
         "results/logs/snapshots/{scene}_{group}.log",
     params:
         scene=lambda w: PLAN.scene_config(w.scene),
-        code=lambda w: PLAN.scene_code("pdrom.stages.snapshots", w.scene),
+        code=lambda w: PLAN.scene_code("pdrom.experiments.snapshots", w.scene),
     message:
         "Snapshots of {wildcards.group} in {wildcards.scene}"
     script:

@@ -1,4 +1,4 @@
-# Every reduction at the edge of what may happen (src/pdrom/hardcases), and the accuracy of the kernels
+# Every reduction at the edge of what may happen (src/pdrom/experiments/hard_cases), and the accuracy of the kernels
 rule hard_cases:
     input:
         expectations="config/hard_cases.yaml",

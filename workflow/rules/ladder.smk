@@ -17,7 +17,7 @@ rule ladder:
             "threshold": PLAN.settings.sensitivity.threshold,
         },
         blowup_extent=PLAN.settings.blowup_extent,
-        code=lambda w: PLAN.scene_code("pdrom.stages.ladder", w.scene),
+        code=lambda w: PLAN.scene_code("pdrom.experiments.ladder", w.scene),
     message:
         "Ladder of {wildcards.group} in {wildcards.scene}"
     script:

@@ -12,7 +12,7 @@ rule paper_inputs:
     params:
         facts=PLAN.facts(),
         content=PLAN.digest("paper/main.tex", "paper/references.bib"),
-        code=PLAN.code("pdrom.stages.paper"),
+        code=PLAN.code("pdrom.report.paper.build"),
     message:
         "Numbers, tables and references of the manuscript"
     script:
@@ -30,7 +30,7 @@ rule paper:
         "results/logs/paper/main.log",
     params:
         content=PLAN.digest("paper/main.tex"),
-        code=PLAN.code("pdrom.stages.paper"),
+        code=PLAN.code("pdrom.report.paper.build"),
     message:
         "Manuscript paper/main.pdf"
     script:

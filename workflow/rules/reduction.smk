@@ -8,7 +8,7 @@ rule pod:
         "results/logs/pod/{scene}_{group}_{basis}.log",
     params:
         spec=lambda w: PLAN.basis_spec(w.basis),
-        code=PLAN.code("pdrom.stages.pod"),
+        code=PLAN.code("pdrom.experiments.pod"),
     message:
         "POD of {wildcards.group} in {wildcards.scene} ({wildcards.basis})"
     script:
@@ -40,7 +40,7 @@ rule reruns:
         blowup_extent=PLAN.settings.blowup_extent,
         guard=PLAN.guard_settings(),
         solver=PLAN.settings.solver,
-        code=lambda w: PLAN.scene_code("pdrom.stages.reduction", w.scene),
+        code=lambda w: PLAN.scene_code("pdrom.experiments.reduction", w.scene),
     message:
         "Sampling and reruns of {wildcards.scene}, {wildcards.group} by {wildcards.method}"
     script:
@@ -62,7 +62,7 @@ rule hyper:
         scene=lambda w: PLAN.scene_config(w.scene),
         settings=PLAN.subspace_settings(),
         blowup_extent=PLAN.settings.blowup_extent,
-        code=lambda w: PLAN.scene_code("pdrom.stages.hyper", w.scene),
+        code=lambda w: PLAN.scene_code("pdrom.experiments.hyper", w.scene),
     message:
         "Position subspaces of {wildcards.scene}, with full and with sampled projections"
     script:

@@ -15,7 +15,7 @@ rule stability:
         settings=PLAN.stability_settings(),
         blowup_extent=PLAN.settings.blowup_extent,
         solver=PLAN.settings.solver,
-        code=lambda w: PLAN.scene_code("pdrom.stages.stability", w.scene),
+        code=lambda w: PLAN.scene_code("pdrom.experiments.stability", w.scene),
     message:
         "Time step and stiffness of {wildcards.scene}"
     script:

@@ -17,7 +17,7 @@ rule subspace_ablation:
             "threshold": PLAN.settings.sensitivity.threshold,
         },
         blowup_extent=PLAN.settings.blowup_extent,
-        code=lambda w: PLAN.scene_code("pdrom.stages.subspace_ablation", w.scene),
+        code=lambda w: PLAN.scene_code("pdrom.experiments.subspace_ablation", w.scene),
     message:
         "Variants of block DEIM in a position subspace of {wildcards.scene}"
     script:

@@ -275,7 +275,7 @@ rule claims_table:
         "results/logs/tables/claims.log",
     params:
         content=PLAN.digest("config/claims.yaml"),
-        code=PLAN.code("pdrom.stages.claims"),
+        code=PLAN.code("pdrom.report.decide"),
     message:
         "Verdicts on the claims of the paper"
     script:

@@ -23,7 +23,7 @@ rule timing:
         protocol=PLAN.settings.timing.model_dump(),
         solver=PLAN.settings.solver,
         threads=PLAN.settings.threads,
-        code=lambda w: PLAN.scene_code("pdrom.stages.timing", w.scene),
+        code=lambda w: PLAN.scene_code("pdrom.experiments.timing", w.scene),
     message:
         "Timings of {wildcards.scene} (alone on the machine)"
     script:
@@ -44,7 +44,7 @@ rule scaling:
         solver=PLAN.settings.solver,
         root=str(PLAN.root),
         factor=lambda w: float(w.factor),
-        code=lambda w: PLAN.scene_code("pdrom.stages.scaling", w.scene),
+        code=lambda w: PLAN.scene_code("pdrom.experiments.scaling", w.scene),
     message:
         "Cost of {wildcards.scene} on a mesh with {wildcards.factor} times the vertices along a side (alone)"
     script:
@@ -59,7 +59,7 @@ rule offline:
     threads: workflow.cores or 1
     params:
         settings=PLAN.settings.offline.model_dump(mode="json"),
-        code=PLAN.code("pdrom.stages.offline"),
+        code=PLAN.code("pdrom.experiments.offline"),
     message:
         "Cost of the offline algorithms (alone on the machine)"
     script:
@@ -72,7 +72,7 @@ rule machine:
     log:
         "results/logs/machine.log",
     params:
-        code=PLAN.code("pdrom.provenance"),
+        code=PLAN.code("pdrom.core.provenance"),
     message:
         "Record of the machine and the library versions"
     script:

@@ -1,8 +1,8 @@
 from pathlib import Path
 
-from pdrom.figures.sources import PUBLISHED
-from pdrom.logs import job_log
-from pdrom.stages.figures import draw
+from pdrom.core.logs import job_log
+from pdrom.report.drawing import draw
+from pdrom.report.figures.sources import PUBLISHED
 
 with job_log(snakemake.log[0]):
     draw(

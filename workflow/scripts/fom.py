@@ -1,5 +1,5 @@
-from pdrom.logs import job_log
-from pdrom.stages.fom import run_fom
+from pdrom.core.logs import job_log
+from pdrom.experiments.fom import run_fom
 
 with job_log(snakemake.log[0]):
     run_fom(

@@ -1,5 +1,5 @@
-from pdrom.logs import job_log
-from pdrom.stages.guard import try_guard
+from pdrom.core.logs import job_log
+from pdrom.experiments.guard import try_guard
 
 with job_log(snakemake.log[0]):
     try_guard(

@@ -1,5 +1,5 @@
-from pdrom.logs import job_log
-from pdrom.stages.hard_cases import run_hard_cases
+from pdrom.core.logs import job_log
+from pdrom.experiments.hard_cases.experiment import run_hard_cases
 
 with job_log(snakemake.log[0]):
     run_hard_cases(

@@ -1,5 +1,5 @@
-from pdrom.logs import job_log
-from pdrom.stages.hyper import run_hyper
+from pdrom.core.logs import job_log
+from pdrom.experiments.hyper import run_hyper
 
 with job_log(snakemake.log[0]):
     run_hyper(

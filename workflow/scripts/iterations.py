@@ -1,5 +1,5 @@
-from pdrom.logs import job_log
-from pdrom.stages.iterations import sweep_iterations
+from pdrom.core.logs import job_log
+from pdrom.experiments.iterations import sweep_iterations
 
 with job_log(snakemake.log[0]):
     sweep_iterations(

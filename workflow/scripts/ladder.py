@@ -1,5 +1,5 @@
-from pdrom.logs import job_log
-from pdrom.stages.ladder import climb
+from pdrom.core.logs import job_log
+from pdrom.experiments.ladder import climb
 
 with job_log(snakemake.log[0]):
     climb(

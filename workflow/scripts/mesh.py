@@ -1,7 +1,7 @@
 from pathlib import Path
 
-from pdrom.logs import job_log
-from pdrom.stages.mesh import make_mesh
+from pdrom.core.logs import job_log
+from pdrom.experiments.mesh import make_mesh
 
 with job_log(snakemake.log[0]):
     make_mesh(snakemake.params.config, Path(snakemake.params.root), snakemake.output[0])

@@ -1,5 +1,5 @@
-from pdrom.logs import job_log
-from pdrom.stages.online import run_online
+from pdrom.core.logs import job_log
+from pdrom.experiments.online import run_online
 
 with job_log(snakemake.log[0]):
     run_online(

@@ -1,7 +1,7 @@
 from pathlib import Path
 
-from pdrom.logs import job_log
-from pdrom.stages.paper import build
+from pdrom.core.logs import job_log
+from pdrom.report.paper.build import build
 
 with job_log(snakemake.log[0]):
     build(

@@ -1,5 +1,5 @@
-from pdrom.logs import job_log
-from pdrom.stages.reduction import reduce_group
+from pdrom.core.logs import job_log
+from pdrom.experiments.reduction import reduce_group
 
 with job_log(snakemake.log[0]):
     labels = {key: snakemake.wildcards[key] for key in ("scene", "group", "method")}

@@ -1,5 +1,5 @@
-from pdrom.logs import job_log
-from pdrom.stages.scaling import scale_scene
+from pdrom.core.logs import job_log
+from pdrom.experiments.scaling import scale_scene
 
 with job_log(snakemake.log[0]):
     scale_scene(

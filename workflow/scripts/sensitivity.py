@@ -1,5 +1,5 @@
-from pdrom.logs import job_log
-from pdrom.stages.sensitivity import measure_sensitivity
+from pdrom.core.logs import job_log
+from pdrom.experiments.sensitivity import measure_sensitivity
 
 with job_log(snakemake.log[0]):
     measure_sensitivity(

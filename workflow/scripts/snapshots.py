@@ -1,5 +1,5 @@
-from pdrom.logs import job_log
-from pdrom.stages.snapshots import collect_snapshots
+from pdrom.core.logs import job_log
+from pdrom.experiments.snapshots import collect_snapshots
 
 with job_log(snakemake.log[0]):
     collect_snapshots(

@@ -1,5 +1,5 @@
-from pdrom.logs import job_log
-from pdrom.stages.stability import sweep
+from pdrom.core.logs import job_log
+from pdrom.experiments.stability import sweep
 
 with job_log(snakemake.log[0]):
     sweep(

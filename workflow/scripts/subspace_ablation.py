@@ -1,5 +1,5 @@
-from pdrom.logs import job_log
-from pdrom.stages.subspace_ablation import ablate
+from pdrom.core.logs import job_log
+from pdrom.experiments.subspace_ablation import ablate
 
 with job_log(snakemake.log[0]):
     ablate(

@@ -1,5 +1,5 @@
-from pdrom.logs import job_log
-from pdrom.stages.timing import time_scene
+from pdrom.core.logs import job_log
+from pdrom.experiments.timing import time_scene
 
 with job_log(snakemake.log[0]):
     time_scene(

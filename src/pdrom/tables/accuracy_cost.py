@@ -19,7 +19,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from pdrom.store import read_table
+from pdrom.core.store import read_table
 from pdrom.tables.columns import conform
 
 FOM, ANDERSON, FEWER = "fom", "fom-anderson", "fewer-iterations"

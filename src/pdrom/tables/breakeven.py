@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 import pandas as pd
 
-from pdrom.rom.break_even import break_even
-from pdrom.store import read_table
+from pdrom.core.store import read_table
+from pdrom.reduction.local.break_even import break_even
 from pdrom.tables.columns import BREAKEVEN_CURVE, conform
 
 

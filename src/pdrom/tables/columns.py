@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from pdrom.errors import StorageError
+from pdrom.core.errors import StorageError
 
 COLUMNS: dict[str, tuple[str, ...]] = {
     "singular_values": (

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import pandas as pd
 
-from pdrom.store import read_table
+from pdrom.core.store import read_table
 from pdrom.tables.columns import COLUMNS, conform
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from pdrom.fom.sensitivity import HELDOUT
-from pdrom.metrics import trajectory_error
-from pdrom.store import open_hdf5, read_table
+from pdrom.core.metrics import trajectory_error
+from pdrom.core.store import open_hdf5, read_table
+from pdrom.model.runs.sensitivity import HELDOUT
 from pdrom.tables.columns import conform
 from pdrom.tables.sensitivity import floor_of, horizons
 

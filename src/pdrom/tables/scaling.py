@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from pdrom.store import read_table
+from pdrom.core.store import read_table
 from pdrom.tables.accuracy_cost import FOM
 from pdrom.tables.columns import COLUMNS, conform
 

@@ -5,8 +5,8 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from pdrom.fom.sensitivity import horizon
-from pdrom.store import read_table
+from pdrom.core.store import read_table
+from pdrom.model.runs.sensitivity import horizon
 from pdrom.tables.columns import conform
 
 

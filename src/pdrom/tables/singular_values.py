@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from pdrom.basis import load_basis
+from pdrom.reduction.basis import load_basis
 from pdrom.tables.columns import conform
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from pdrom.store import open_hdf5, read_table
+from pdrom.core.store import open_hdf5, read_table
 from pdrom.tables.columns import conform
 
 OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
@@ -37,7 +37,7 @@ def stability(
     full_order, reruns, hyper, sweeps : files ``fom/{scene}/train.h5``, ``reruns/{scene}/{group}/
         {method}.csv``, ``hyper/{scene}/models.csv`` and ``stability/{scene}.csv``
     time_steps : scene -> h in seconds
-    wrong, left : see `pdrom.config.Stability`
+    wrong, left : see `pdrom.pipeline.study.Stability`
     """
     runs = pd.concat(
         [_full_order_rows(full_order), _rerun_rows(reruns, hyper, reduced_reruns)],

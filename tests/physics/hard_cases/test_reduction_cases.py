@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from hard_cases import EXPECTED, METHODS, parameters, training
-from pdrom.hardcases.catalogue import reducible_cases
-from pdrom.hardcases.expectations import FAILURES, surprise
-from pdrom.hardcases.outcomes import row
-from pdrom.hardcases.reductions import names, reduced_run
+from pdrom.experiments.hard_cases.catalogue import reducible_cases
+from pdrom.experiments.hard_cases.expectations import FAILURES, surprise
+from pdrom.experiments.hard_cases.outcomes import row
+from pdrom.experiments.hard_cases.reductions import names, reduced_run
 
 CASES = [*reducible_cases(), *reducible_cases(slow=True)]
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pdrom.store import write_table
+from pdrom.core.store import write_table
 from pdrom.tables.breakeven import breakeven
 from pdrom.tables.budget import budget
 from pdrom.tables.columns import COLUMNS

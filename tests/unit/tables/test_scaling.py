@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 from conftest import ROOT
-from pdrom.config import Scaling, Study
-from pdrom.stages.scaling import scale_scene
+from pdrom.experiments.scaling import scale_scene
+from pdrom.pipeline.study import Scaling, Study
 from pdrom.tables.breakeven import breakeven
 from pdrom.tables.columns import BREAKEVEN_CURVE, COLUMNS
 from pdrom.tables.scaling import QUANTITIES, scaling, scaling_fit

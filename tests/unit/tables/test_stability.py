@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pdrom.store import write_hdf5, write_table
+from pdrom.core.store import write_hdf5, write_table
 from pdrom.tables.columns import COLUMNS
 from pdrom.tables.stability import OUTCOMES, outcomes, stability
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pdrom.basis import Basis, save_basis
-from pdrom.errors import StorageError
-from pdrom.store import write_hdf5, write_table
+from pdrom.core.errors import StorageError
+from pdrom.core.store import write_hdf5, write_table
+from pdrom.reduction.basis import Basis, save_basis
 from pdrom.tables import COLUMNS, TIMING_COLUMNS
 from pdrom.tables.accuracy_cost import accuracy_cost, pareto, reference_of
 from pdrom.tables.columns import conform
@@ -156,7 +156,7 @@ def test_horizons_of_every_scene(tmp_path):
 
 def test_floor_survives_a_file(tmp_path):
     """Labels stay text when the table is read back."""
-    from pdrom.store import read_table
+    from pdrom.core.store import read_table
 
     table = sensitivity(sensitivity_files(tmp_path))
     write_table(table, tmp_path / "sensitivity.csv")

@@ -1,6 +1,0 @@
-"""Bases of projection snapshots: weighting, centring, POD, numerical rank."""
-
-from pdrom.basis.compute import compute_basis
-from pdrom.basis.types import Basis, load_basis, save_basis
-
-__all__ = ["Basis", "compute_basis", "load_basis", "save_basis"]

@@ -1,1 +1,0 @@
-"""Constraint groups of projective dynamics, one a module (see `pdrom.effects`)."""

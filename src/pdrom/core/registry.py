@@ -1,0 +1,44 @@
+"""Names that are loaded on demand.
+
+A registry maps a name of the configuration to ``"package.module:attribute"``. Nothing is imported
+before it is asked for: what a scene does not list is not even loaded.
+"""
+
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from typing import Any
+
+from pdrom.core.errors import ConfigurationError, choices
+
+
+class Registry(Mapping[str, str]):
+    """Read-only map from a name to the place of its implementation."""
+
+    def __init__(self, kind: str, entries: Mapping[str, str]) -> None:
+        self.kind = kind
+        self._entries = dict(entries)
+
+    def __getitem__(self, name: str) -> str:
+        try:
+            return self._entries[name]
+        except KeyError:
+            allowed = choices(name, sorted(self._entries))
+            raise ConfigurationError(f"unknown {self.kind} '{name}'{allowed}") from None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._entries
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def module(self, name: str) -> str:
+        """Module that implements ``name``; ConfigurationError for an unknown name."""
+        return self[name].partition(":")[0]
+
+    def load(self, name: str) -> Any:
+        """Import the module of ``name`` and return the attribute that the entry names."""
+        module, _, attribute = self[name].partition(":")
+        return getattr(import_module(module), attribute)

@@ -1,0 +1,153 @@
+"""Reading YAML and checking it against a typed model, with messages a user can act on."""
+
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_args
+
+import yaml
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
+
+from pdrom.core.errors import ConfigurationError, choices
+
+MAX_BYTES = 1_000_000
+M = TypeVar("M", bound=BaseModel)
+
+# Numbers of the physics stay where sums and squares of them neither overflow nor lose every digit.
+Length = Annotated[float, Field(ge=-1e6, le=1e6)]
+PositiveLength = Annotated[float, Field(ge=1e-6, le=1e6)]
+
+
+class ConfigModel(BaseModel):
+    """Base of typed configuration: unknown keys are refused, instances are frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_truth_value_for_a_number(cls, data: Any) -> Any:
+        """YAML reads yes, on and true as a truth value, which would count as the number 1."""
+        for key, value in data.items() if isinstance(data, dict) else ():
+            field = cls.model_fields.get(key)
+            entries = value if isinstance(value, (list, tuple)) else [value]
+            truth = any(isinstance(entry, bool) for entry in entries)
+            if truth and field is not None and field.annotation is not bool:
+                raise ValueError(f"{key} = {shown(value, 60)}: a truth value (yes, on, true ...)")
+        return data
+
+
+class _PlainLoader(yaml.SafeLoader):
+    """Safe loader (no tag runs code) that refuses a key given twice, and aliases.
+
+    A few nested aliases stand for billions of entries.
+    """
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        if self.check_event(yaml.events.AliasEvent):
+            event = self.peek_event()
+            raise yaml.composer.ComposerError(
+                None, None, f"alias '*{event.anchor}' is not allowed", event.start_mark
+            )
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if isinstance(key, (dict, list, set)):
+                raise yaml.constructor.ConstructorError(None, None, "a key must be a plain value")
+            if key in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"key '{key}' is given twice", key_node.start_mark
+                )
+            seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+def read_yaml(path: Path) -> Any:
+    """Content of a YAML file; ConfigurationError if it is missing or not plain YAML."""
+    if not path.is_file():
+        raise ConfigurationError(f"{path}: no such configuration file")
+    if path.stat().st_size > MAX_BYTES:
+        raise ConfigurationError(f"{path}: larger than {MAX_BYTES} bytes")
+    try:
+        # a byte order mark, as some editors write it, is no part of the text
+        return yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_PlainLoader)
+    except (yaml.YAMLError, ValueError, TypeError, RecursionError) as error:
+        # ValueError: no UTF-8, or a date that is none; TypeError: a key that cannot be one
+        message = " ".join(str(error).replace('in "<unicode string>", ', "in ").split())
+        raise ConfigurationError(f"{path}: not valid YAML: {message}") from error
+    except OSError as error:
+        raise ConfigurationError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+def validate(model: type[M], data: Any, source: str) -> M:
+    """``data`` as an instance of ``model``; ConfigurationError naming file, key and value."""
+    if not isinstance(data, dict):
+        found = "nothing" if data is None else shown(data, 60)
+        raise ConfigurationError(f"{source}: a mapping of keys is required, found {found}")
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise ConfigurationError(f"{source}: {describe(error, model)}") from error
+
+
+def describe(error: ValidationError, model: type[BaseModel]) -> str:
+    """The first fault of a validation as ``key = value: what is allowed``."""
+    # a misspelt key is also a missing one: the first says more
+    faults = sorted(error.errors(), key=lambda fault: fault["type"] == "missing")
+    fault = faults[0]
+    location = fault["loc"]
+    names = [str(part) for part in location if part != "constrained-int"]
+    key = " ".join(".".join(names).split()) or model.__name__
+    message = fault["msg"].removeprefix("Value error, ")
+    # a tuple of Python is a list of YAML
+    message = message.replace("valid tuple", "valid list").replace("Tuple should", "List should")
+    if fault["type"] == "extra_forbidden":
+        owner = _model_at(model, location[:-1])
+        return f"unknown key '{key}'{choices(location[-1], keys_of(owner)) if owner else ''}"
+    if fault["type"] == "invalid_key":
+        return f"{key}: the key is not a text"
+    if fault["type"] == "missing":
+        return f"key '{key}' is missing"
+    if fault["type"] == "union_tag_not_found":
+        return f"{key}: key {fault['ctx']['discriminator']} is missing"
+    if fault["type"] == "value_error" and isinstance(fault["input"], (dict, list, BaseModel)):
+        # the message names what is wrong inside the whole value
+        return f"{key}: {message}" if location and not message.startswith(key) else message
+    return f"{key} = {shown(fault['input'], 80)}: {message}"
+
+
+def shown(value: Any, width: int) -> str:
+    """``value`` as it stands in a message, on one line and cut to ``width``."""
+    try:
+        return f"{value!r:.{width}}"
+    except ValueError:  # Python writes no integer of more than 4300 digits
+        return f"a {type(value).__name__} of {value.bit_length()} bits"
+
+
+def keys_of(model: type[BaseModel]) -> list[str]:
+    """Names of the keys that ``model`` accepts."""
+    return [field.alias or name for name, field in model.model_fields.items()]
+
+
+def _model_at(model: type[BaseModel], location: tuple[int | str, ...]) -> type[BaseModel] | None:
+    """Model found by following ``location`` from ``model``; None where it is not one model."""
+    current: type[BaseModel] | None = model
+    for part in location:
+        if isinstance(part, int) or current is None:
+            continue
+        field = current.model_fields.get(part)
+        current = _inner_model(field.annotation) if field else current
+    return current
+
+
+def _inner_model(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    models = [m for a in get_args(annotation) if (m := _inner_model(a)) is not None]
+    return models[0] if len(models) == 1 else None

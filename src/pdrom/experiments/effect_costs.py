@@ -1,0 +1,151 @@
+"""What each effect of a scene costs in a frame, and what a scene without it saves.
+
+Effects are timed by stand-ins around them, so that a normal run holds no timer at all.
+"""
+
+from collections.abc import Callable, Sequence
+from itertools import combinations
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pdrom.experiments.measurement import Measurement, Variant, measure, median_frames
+from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.dynamics.space import VertexSpace
+from pdrom.model.dynamics.stepper import Stepper
+from pdrom.model.dynamics.system import GlobalSystem
+from pdrom.model.effects.base import Boundary, Contact, Effect, Force
+from pdrom.model.scene import Scene
+
+GLOBAL, REST = "global solve", "rest of the frame"
+COSTS = ["scene", "effect", "elements", "ms_per_frame", "share"]
+LEFT_OUT = ["scene", "left_out", "groups", "elements", "ms_per_frame", "saved_ms", "own_ms"]
+
+# Questions that the step loop asks an effect of each role.
+_QUESTIONS: dict[type[Effect], tuple[str, ...]] = {
+    ConstraintGroup: ("begin_frame", "accumulate"),
+    Force: ("acceleration",),
+    Boundary: ("active", "held", "targets"),
+    Contact: ("correct",),
+}
+
+
+class Timed:
+    """Stands for an effect and adds up the time of the questions that the step loop asks it."""
+
+    def __init__(self, effect: Effect, questions: Sequence[str]) -> None:
+        self.name = effect.name
+        self.seconds = 0.0
+        for question in questions:
+            setattr(self, question, self._timed(getattr(effect, question)))
+
+    def _timed(self, ask: Callable[..., Any]) -> Callable[..., Any]:
+        def answer(*arguments: Any) -> Any:
+            before = perf_counter()
+            result = ask(*arguments)
+            self.seconds += perf_counter() - before
+            return result
+
+        return answer
+
+
+def effect_costs(
+    scene: Scene, system: GlobalSystem, frames: int, warmup: int, repeats: int
+) -> pd.DataFrame:
+    """Table of `COSTS` of the full-order run: effects, the global solve, and the rest.
+
+    An effect that a scene lists several times has one row. Elements are those of a group, the
+    vertices that a hold may ever hold, else all vertices. The shares add up to one.
+    """
+    roles = (scene.groups, scene.forces, scene.boundaries, scene.contacts)
+    kinds = zip(roles, _QUESTIONS.values(), strict=True)
+    timed = [[Timed(effect, asked) for effect in effects] for effects, asked in kinds]
+    groups, *others = timed
+    space = VertexSpace(system, *others)
+    config = scene.config
+    loop = Stepper(space, config.time_step, config.iterations, groups, track_objective=False)
+    stands = [stand for role in timed for stand in role]
+    names = list(dict.fromkeys(stand.name for stand in stands))
+    samples = [_profile(loop, scene, frames, stands, names) for _ in range(warmup + repeats)]
+    total, *parts = median_frames(np.array(samples[warmup:]))
+    elements = [*(_elements(scene, name) for name in names), *(2 * [scene.mesh.vertices])]
+    rows = zip([*names, GLOBAL, REST], elements, parts, strict=True)
+    return pd.DataFrame([(config.name, *row, row[-1] / total) for row in rows], columns=COSTS)
+
+
+def _profile(
+    loop: Stepper, scene: Scene, frames: int, stands: list[Timed], names: list[str]
+) -> list[list[float]]:
+    """Milliseconds of each frame: total, each effect, global solve, rest."""
+    state, rows = scene.initial_state(), []
+    for frame in range(frames):
+        for stand in stands:
+            stand.seconds = 0.0
+        state, report = loop.step(state, frame)
+        own = [sum(stand.seconds for stand in stands if stand.name == name) for name in names]
+        total, solve = float(report.seconds.sum()), float(report.seconds[2])
+        rows.append([1e3 * part for part in (total, *own, solve, total - sum(own) - solve)])
+    return rows
+
+
+def _elements(scene: Scene, name: str) -> int:
+    """Elements of the effects called ``name``."""
+    for group in scene.groups:
+        if group.name == name:
+            return group.elements
+    held = [b.vertices for b in scene.boundaries if b.name == name]
+    return len(np.unique(np.concatenate(held))) if held else scene.mesh.vertices
+
+
+def left_out_sets(scene: Scene) -> list[tuple[str, ...]]:
+    """What is left out in turn: nothing, every effect alone, all groups but one.
+
+    Empty for a scene with a single group: without it there is nothing to project.
+    """
+    groups = scene.config.groups
+    if len(groups) < 2:
+        return []
+    single = [(name,) for name in dict.fromkeys(e.effect for e in scene.config.effects)]
+    several = combinations(groups, len(groups) - 1) if len(groups) > 2 else ()
+    return [(), *single, *several]
+
+
+def left_out(
+    scene: Scene, costs: pd.DataFrame, frames: int, warmup: int, repeats: int, solver: str
+) -> pd.DataFrame:
+    """Table of `LEFT_OUT`: time of the scene without some of its effects, built without them.
+
+    ``saved_ms`` is the time of the whole scene minus that of the row, ``own_ms`` what the effects
+    cost inside the whole scene (``costs``, see `effect_costs`).
+    """
+    sets = left_out_sets(scene)
+    variants = [_without(scene, names, frames, solver) for names in sets]
+    if not variants:
+        return pd.DataFrame(columns=LEFT_OUT)
+    results = measure(variants, warmup, repeats)
+    whole, own = results[0].frame, costs.set_index("effect")
+    rows = [_saving(r, names, whole, own) for r, names in zip(results, sets, strict=True)]
+    return pd.DataFrame([(scene.config.name, *row) for row in rows], columns=LEFT_OUT)
+
+
+def _without(scene: Scene, names: tuple[str, ...], frames: int, solver: str) -> Variant:
+    kept = tuple(e for e in scene.config.effects if e.effect not in names)
+    part = Scene.build(scene.config.model_copy(update={"effects": kept}), scene.mesh)
+    loop = part.stepper(part.system_with(solver), track_objective=False)
+    return Variant({"groups": len(part.groups)}, loop, part.initial_state(), frames)
+
+
+def _saving(
+    result: Measurement, names: tuple[str, ...], whole: float, own: pd.DataFrame
+) -> tuple[object, ...]:
+    chosen = own.loc[list(names)]
+    return (
+        " + ".join(names) or "nothing",
+        result.labels["groups"],
+        int(chosen.elements.sum()),
+        result.frame,
+        whole - result.frame,
+        float(chosen.ms_per_frame.sum()),
+    )

@@ -1,0 +1,149 @@
+"""Relative errors of the compiled projections against high precision, by class of matrix."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from mpmath import mp
+
+from pdrom.experiments.hard_cases.case import build
+from pdrom.experiments.hard_cases.matrices import CLASSES, VECTORS, MatrixClass
+from pdrom.experiments.hard_cases.reference import clamped, digits_for, exact, half_sphere, spring
+from pdrom.experiments.hard_cases.shapes import one_tetrahedron, one_triangle, sheet
+from pdrom.model.constraints.base import ConstraintGroup
+
+SEED = 11
+CLAMPED = {
+    "strain": one_triangle,
+    "tetrahedron_strain": one_tetrahedron,
+    "deformation_gradient": one_tetrahedron,
+}
+
+
+def unit_group(effect: str) -> ConstraintGroup:
+    """Group of one element whose rest edges are the unit vectors, so that S q holds q itself."""
+    mesh = one_triangle() if effect == "spring" else CLAMPED[effect]()
+    return build(mesh, {"effect": effect, "weight": 1.0}, frames=1).groups[0]
+
+
+def projected(group: ConstraintGroup, d: np.ndarray) -> np.ndarray:
+    """Compiled projection of S q = ``d`` (rows, 3) by a group of `unit_group`."""
+    y = np.zeros((group.S.shape[1], 3))
+    y[1 : 1 + len(d)] = d
+    return group.project_elements(y, np.array([0]))
+
+
+def clamped_error(group: ConstraintGroup, d: np.ndarray, unique: bool) -> tuple[float, float]:
+    """Relative error of p(d) and the condition number of the projection at d.
+
+    Where p is not unique any nearest point is right: the error is that of the distance |d - p|, or
+    of the singular values of p, whichever is larger, and the condition number is 1.
+    """
+    low, high = _range(group)
+    found = projected(group, d)
+    if not np.isfinite(found).all():
+        return np.inf, 1.0
+    with mp.workdps(digits_for(d)):
+        p, condition = clamped(d, low, high)
+        if unique:
+            return float(mp.norm(exact(found) - p) / mp.norm(p)), float(condition)
+        size = max(mp.norm(exact(d)), mp.norm(p))
+        distance, best = mp.norm(exact(d) - exact(found)), mp.norm(exact(d) - p)
+        outside = _outside(found, low, high)
+        return max(float(abs(distance - best) / size), outside), 1.0
+
+
+def _range(group: ConstraintGroup) -> tuple[float, float]:
+    if group.name == "deformation_gradient":
+        return 1.0, 1.0
+    return group.config.minimum, group.config.maximum
+
+
+def _outside(p: np.ndarray, low: float, high: float) -> float:
+    """How far singular values of p lie outside [low, high]; a wrong orientation counts fully."""
+    sigma = np.linalg.svd(p, compute_uv=False)
+    if len(p) == 3 and np.linalg.det(p) < 0.0:
+        return 1.0
+    return float(np.max(np.maximum(low - sigma, sigma - high), initial=0.0))
+
+
+def spring_error(group: ConstraintGroup, d: np.ndarray) -> tuple[float, float]:
+    """Relative error of the projected edge d (1, 3); the condition number is 1."""
+    with mp.workdps(digits_for(d, group.rest[0])):
+        p = spring(d, group.rest[0])
+        return float(mp.norm(exact(projected(group, d)) - p) / mp.norm(p)), 1.0
+
+
+def _bending_states() -> dict[str, Any]:
+    """States of a curved sheet, by class."""
+    return {
+        "random": lambda x, rng: rng.standard_normal(x.shape),
+        "nearly at rest (1e-6)": lambda x, rng: x + 1e-6 * rng.standard_normal(x.shape),
+        "mirrored": lambda x, rng: x * [1.0, -1.0, 1.0] + 1e-3 * rng.standard_normal(x.shape),
+        "nearly flat (1e-6)": lambda x, rng: x * [1.0, 1e-6, 1.0],
+        "far away (1e6)": lambda x, rng: x + 1e6,
+        "huge (1e150)": lambda x, rng: 1e150 * rng.standard_normal(x.shape),
+        "tiny (1e-150)": lambda x, rng: 1e-150 * rng.standard_normal(x.shape),
+    }
+
+
+def bending_errors(cases: int) -> Iterator[tuple[str, float, float]]:
+    """(class, relative error, condition number) of projected curvature vectors."""
+    scene = build(sheet(wave=0.1), {"effect": "bending", "weight": 1.0}, frames=1)
+    group, points = scene.groups[0], scene.mesh.points
+    for name, state in _bending_states().items():
+        rng = np.random.default_rng(SEED)
+        y = state(points, rng)
+        # the normals are data of the frame, not of the projection: taken from the rest shape
+        group.begin_frame(points)
+        for element in rng.permutation(group.elements)[:cases]:
+            row = group.S[[element]].toarray()[0]
+            used = np.flatnonzero(row)
+            found = group.project_elements(y, np.array([element]))
+            pole = group.side[element] * group.normals[element]
+            with mp.workdps(digits_for(row[used], y[used])):
+                p, condition = half_sphere(row[used], y[used], group.magnitude[element], pole)
+                yield name, float(mp.norm(exact(found) - p) / mp.norm(p)), float(condition)
+
+
+def _samples(kind: MatrixClass, rows: int, cases: int) -> Iterator[np.ndarray]:
+    rng = np.random.default_rng(SEED)
+    for _ in range(cases):
+        yield kind.make(rng, rows)
+
+
+def _errors(cases: int) -> Iterator[tuple[str, str, float, float]]:
+    """(group, class, relative error, condition number) of every case."""
+    group = unit_group("spring")
+    for kind in VECTORS:
+        for d in _samples(kind, 1, cases):
+            yield "spring", kind.name, *spring_error(group, d)
+    for name, error, condition in bending_errors(cases):
+        yield "bending", name, error, condition
+    for effect in CLAMPED:
+        group = unit_group(effect)
+        for kind in CLASSES:
+            if group.rows_per_element in kind.rows:
+                for d in _samples(kind, group.rows_per_element, cases):
+                    yield effect, kind.name, *clamped_error(group, d, kind.unique)
+
+
+def kernel_accuracy(cases: int) -> list[dict[str, Any]]:
+    """Rows of the table kernel_accuracy, at most ``cases`` matrices a class.
+
+    worst_over_condition is the worst error over max(1, condition number): a backward stable kernel
+    keeps it at a few units of round-off, whatever the matrix.
+    """
+    rows: dict[tuple[str, str], dict[str, Any]] = {}
+    for group, name, error, condition in _errors(cases):
+        row = rows.setdefault(
+            (group, name),
+            {"group": group, "matrix_class": name, "cases": 0, "condition": 1.0,
+             "worst_relative_error": 0.0, "worst_over_condition": 0.0},
+        )  # fmt: skip
+        row["cases"] += 1
+        row["condition"] = max(row["condition"], condition)
+        row["worst_relative_error"] = max(row["worst_relative_error"], error)
+        scaled = error / max(1.0, condition)
+        row["worst_over_condition"] = max(row["worst_over_condition"], scaled)
+    return list(rows.values())

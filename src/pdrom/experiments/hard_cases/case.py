@@ -1,0 +1,60 @@
+"""What a hard case is."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdrom.core.yamlfile import validate
+from pdrom.model.dynamics.stepper import State
+from pdrom.model.mesh.types import Mesh
+from pdrom.model.scene import Scene, SceneConfig
+
+
+def at_rest(scene: Scene) -> State:
+    """The state that the scene itself starts from."""
+    return scene.initial_state()
+
+
+@dataclass(frozen=True)
+class HardCase:
+    """A scene that is hard for a named reason, and what must hold in it.
+
+    scene : builds the scene; a case that must be refused raises here
+    why : what makes it hard
+    holds : names of the checks that its full-order run must pass (module `checks` beside)
+    start : the state before the first frame
+    bound : largest extent that is no blow-up, over that of start, rest and handles
+    slow : left to the slow tests
+    """
+
+    name: str
+    scene: Callable[[], Scene]
+    why: str
+    holds: tuple[str, ...]
+    start: Callable[[Scene], State] = at_rest
+    bound: float = 2.0
+    slow: bool = False
+
+
+def build(
+    mesh: Mesh, *effects: dict, frames: int = 30, masses: np.ndarray | None = None, **settings
+) -> Scene:
+    """Scene of ``effects`` on ``mesh``; ``masses`` (N,) kg in place of equal ones."""
+    config = validate(
+        SceneConfig,
+        {
+            "name": "hard_case",
+            "title": "hard case",
+            "mesh": {"kind": "file", "path": "generated"},
+            "frames": frames,
+            "effects": list(effects),
+            **settings,
+        },
+        "hard case",
+    )
+    scene = Scene.build(config, mesh)
+    if masses is None:
+        return scene
+    fields = {name: getattr(scene, name) for name in Scene.__dataclass_fields__}
+    return Scene(**{**fields, "masses": masses})

@@ -1,0 +1,46 @@
+"""Rule hard_cases: every reduction in the hard cases, and the accuracy of the kernels."""
+
+import logging
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from pdrom.core.store import write_table
+from pdrom.experiments.hard_cases.accuracy import kernel_accuracy
+from pdrom.experiments.hard_cases.catalogue import CASES
+from pdrom.experiments.hard_cases.expectations import load_expectations, surprise
+from pdrom.experiments.hard_cases.outcomes import rows
+from pdrom.reduction.method import MethodSpec
+from pdrom.tables.columns import conform
+from pdrom.tables.hard_cases import hard_cases
+
+log = logging.getLogger(__name__)
+
+
+def run_hard_cases(
+    methods: dict[str, dict[str, Any]],
+    cases: list[str],
+    matrices: int,
+    expectations: str,
+    cases_output: str,
+    kernels_output: str,
+) -> None:
+    """Write the tables hard_cases and kernel_accuracy.
+
+    Parameters
+    ----------
+    matrices : per class, for the accuracy of the kernels
+    """
+    specs = {name: MethodSpec.model_validate(spec) for name, spec in methods.items()}
+    expected = load_expectations(Path(expectations))
+    found = []
+    for name in cases:
+        for row in rows(CASES[name], specs, expected):
+            found.append(row)
+            contradiction = surprise(row["outcome"], name, expected.get(row["method"]))
+            if contradiction:
+                log.warning("%s, %s: %s", name, row["method"], contradiction)
+        log.info("%s: done", name)
+    write_table(hard_cases(found), cases_output)
+    write_table(conform(pd.DataFrame(kernel_accuracy(matrices)), "kernel_accuracy"), kernels_output)

@@ -1,0 +1,80 @@
+"""How a reduction fares in a hard case."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from pdrom.core.errors import PdromError
+from pdrom.experiments.hard_cases.case import HardCase
+from pdrom.experiments.hard_cases.checks import momentum, reach
+from pdrom.experiments.hard_cases.expectations import FAILURES, HOLDS, NOTHING, Expectation
+from pdrom.experiments.hard_cases.reductions import ReducedRun, Training, names, reduced_run
+from pdrom.reduction.method import MethodSpec
+
+# An extent beyond these multiples of the full-order run's scale.
+BLOWUP, DISTORTED = 100.0, 3.0
+
+
+def scale_of(training: Training) -> float:
+    """Largest extent of the full-order run, of rest, start and held vertices, m."""
+    return max(training.run.extent, reach(training.scene, training.run))
+
+
+def outcome_of(case: HardCase, training: Training, reduced: ReducedRun) -> str:
+    """One of `HOLDS`, `NOTHING`, `FAILURES`: the first that applies."""
+    run = reduced.run
+    if run is None:
+        return NOTHING
+    if reduced.gain == np.inf:
+        return "singular"
+    if run.blowup_frame is not None:
+        return "blow-up"
+    if run.extent > DISTORTED * scale_of(training):
+        return "distorted"
+    # in a subspace the local step is a descent step again; an interpolation promises nothing
+    if reduced.k is not None and run.excess.max() > 0.0:
+        return "objective rises"
+    # S^T W p sums to zero whatever p is
+    if "momentum" in case.holds and momentum(case, training.scene, run):
+        return "momentum changes"
+    return HOLDS
+
+
+def rows(
+    case: HardCase, methods: Mapping[str, MethodSpec], expected: Mapping[str, Expectation]
+) -> Iterator[dict[str, Any]]:
+    """Rows of the table hard_cases: every reduction in ``case``."""
+    training = Training(case)
+    for name in names(methods):
+        yield {"case": case.name, "method": name, **row(training, name, methods, expected)}
+
+
+def row(
+    training: Training,
+    name: str,
+    methods: Mapping[str, MethodSpec],
+    expected: Mapping[str, Expectation],
+) -> dict[str, Any]:
+    """One reduction: sizes, what the run did, its outcome and, if it failed, why."""
+    entry = expected.get(name)
+    extent = scale_of(training)
+    try:
+        reduced = reduced_run(training, name, methods, BLOWUP * extent)
+    except PdromError as error:
+        return {"frames": 0, "finite": False, "outcome": "refused", "why": str(error)}
+    outcome = outcome_of(training.case, training, reduced)
+    sizes = {"k": reduced.k, "r": reduced.r, "gain": reduced.gain}
+    if reduced.run is None:
+        return {**sizes, "frames": 0, "outcome": outcome, "why": "projections are round-off"}
+    run = reduced.run
+    return {
+        **sizes,
+        "frames": len(run.rise),
+        "finite": run.blowup_frame is None,
+        "blowup_frame": run.blowup_frame,
+        "max_extent": run.extent / extent,
+        "objective_rise": float(run.rise.max(initial=0.0)),
+        "outcome": outcome,
+        "why": entry.why if entry and outcome in FAILURES else "",
+    }

@@ -1,0 +1,18 @@
+"""Full-order runs of hard cases."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pdrom.experiments.hard_cases.case import HardCase
+from pdrom.experiments.hard_cases.record import Record, record
+from pdrom.experiments.hard_cases.roundoff import Roundoff
+from pdrom.model.scene import Scene
+
+
+def full_order(
+    case: HardCase, scene: Scene, observe: Callable[[int, np.ndarray], None] | None = None
+) -> Record:
+    """Run ``scene``, made by ``case``, from its start; ``observe`` sees every last iterate."""
+    loop = scene.stepper()
+    return record(scene, loop, case.start(scene), Roundoff(scene, loop), observe=observe)

@@ -1,0 +1,63 @@
+"""Time of local steps alone: reduced ones beside the full one of their group (claim C9)."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pandas as pd
+
+from pdrom.experiments.measurement import measure_calls
+from pdrom.model.dynamics.stepper import LocalStep
+from pdrom.model.scene import Scene
+from pdrom.reduction.local.local_step import ReducedLocalStep
+
+COLUMNS = [
+    "scene", "group", "method", "vertices", "elements", "threads", "r", "local_ms", "full_ms",
+]  # fmt: skip
+THREADS = (1, 2)
+
+
+def local_costs(
+    scene: Scene,
+    reduced: Mapping[tuple[str, str, int], ReducedLocalStep],
+    states: np.ndarray,
+    warmup: int,
+    repeats: int,
+) -> pd.DataFrame:
+    """Milliseconds of one local step, mean over some states, with one thread and with two.
+
+    The steps of a number of threads are interleaved; a second thread that waits for work would
+    disturb those that have one.
+
+    Parameters
+    ----------
+    reduced : local steps by group, method and r, bound to the groups of ``scene``
+    states : (n, N, 3) positions in m; frame-lagged data are those of the first
+    """
+    groups = {name: scene.group(name) for name, _, _ in reduced}
+    steps: dict[object, LocalStep] = {**groups, **reduced}
+    calls = {key: _all_states(step, states) for key, step in steps.items()}
+    before = {name: group.threads for name, group in groups.items()}
+    rows = []
+    for threads in THREADS:
+        for group in groups.values():
+            group.threads = threads
+        with np.errstate(over="ignore", invalid="ignore"):
+            times = measure_calls(calls, warmup, repeats)
+        for name, method, r in reduced:
+            labels = (name, method, scene.mesh.vertices, groups[name].elements, threads, r)
+            both = (times[name, method, r] / len(states), times[name] / len(states))
+            rows.append((scene.config.name, *labels, *both))
+    for name, group in groups.items():
+        group.threads = before[name]
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _all_states(step: LocalStep, states: np.ndarray) -> Callable[[], None]:
+    rhs = np.zeros_like(states[0])
+    step.begin_frame(states[0])
+
+    def call() -> None:
+        for y in states:
+            step.accumulate(y, rhs)
+
+    return call

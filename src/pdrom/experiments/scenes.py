@@ -1,0 +1,16 @@
+"""What several stages need: the scene of a run, bound to its mesh file."""
+
+from typing import Any
+
+from pdrom.model.mesh.types import load_mesh
+from pdrom.model.scene import Scene, SceneConfig
+
+RUNS = ("train", "heldout")
+
+
+def scene_of(config: dict[str, Any], mesh_path: str, run: str = "train", threads: int = 1) -> Scene:
+    """Scene of ``run`` ("train" or "heldout") from its plain configuration and mesh file."""
+    scene = SceneConfig.model_validate(config)
+    if run == "heldout":
+        scene = scene.held_out_variant()
+    return Scene.build(scene, load_mesh(mesh_path), threads)

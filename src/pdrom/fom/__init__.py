@@ -1,1 +1,0 @@
-"""The full-order model: global system, step loop, run."""

@@ -1,5 +1,0 @@
-"""Meshes: generators, files, checks, vertex selections."""
-
-from pdrom.mesh.types import Mesh, load_mesh, save_mesh
-
-__all__ = ["Mesh", "load_mesh", "save_mesh"]

@@ -1,0 +1,1 @@
+"""The full-order model: meshes, effects, constraint groups and the step loop."""

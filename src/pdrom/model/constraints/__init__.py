@@ -1,0 +1,1 @@
+"""Constraint groups of projective dynamics, one a module (see `pdrom.model.effects`)."""

@@ -1,0 +1,153 @@
+"""The constraint group: operator S, weights W and projection p.
+
+Energy of a group (Bouaziz et al. 2014, eq. 4): W(q) = 1/2 sum_e w_e || S_e q - p_e(q) ||_F^2.
+"""
+
+from abc import abstractmethod
+from copy import copy
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+from scipy import sparse
+
+from pdrom.core.errors import SceneError
+from pdrom.model.effects.base import Effect, EffectConfig
+from pdrom.model.mesh.types import Mesh
+
+Weight = Annotated[float, Field(gt=0.0, le=1e16, allow_inf_nan=False)]
+
+
+class GroupConfig(EffectConfig):
+    """``weight`` w of the group; the element weights are w times the rest measure where stated."""
+
+    weight: Weight
+
+
+class ConstraintGroup(Effect):
+    """A set of equal constraints, evaluated in batches.
+
+    Attributes
+    ----------
+    name : name of the group in configuration and tables
+    elements : number e of elements
+    rows_per_element : rows p of each element's operator
+    S : (e p, N) CSR, the unweighted differential operator
+    weights : (e,) element weights, rest measure included
+    """
+
+    rows_per_element: int
+    split_from: int
+    """Elements from which the group has two parts (`pdrom.model.constraints.parts`)."""
+    S: sparse.csr_array
+    weights: np.ndarray
+    threads: int = 1
+    """Threads of `accumulate`, 1 or 2; the result is the same bit for bit."""
+    gradient_kernel: Any = None
+    """Compiled projection from S q (module `gradient_kernel` beside), if there is one."""
+    frame_lagged: bool = False
+    """Whether ``begin_frame`` freezes anything."""
+
+    @property
+    def elements(self) -> int:
+        """Number e of elements."""
+        return len(self.weights)
+
+    @property
+    def row_weights(self) -> np.ndarray:
+        """Diagonal of W, (e p,)."""
+        return np.repeat(self.weights, self.rows_per_element)
+
+    def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
+        """Freeze what depends on the frame's first positions q (N, 3); most groups have nothing."""
+
+    def kernel_parameters(self) -> np.ndarray:
+        """Numbers that ``gradient_kernel`` needs beside S q, in the order that it expects.
+
+        Frame-lagged ones are those of the last ``begin_frame``.
+        """
+        raise NotImplementedError(f"{self.name} has no gradient kernel")
+
+    def project(self, y: np.ndarray) -> np.ndarray:
+        """Projections p(y) of all elements, (e p, 3)."""
+        return self.project_elements(y, np.arange(self.elements))
+
+    @abstractmethod
+    def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:
+        """Projections of some elements, (len(elements) p, 3), in the order given."""
+
+    @abstractmethod
+    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
+        """Add S^T W p(y) to ``rhs`` (N, 3) in place and return the energy W(y)."""
+
+    @abstractmethod
+    def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
+        """NumPy reference of the projection: S_e q -> p_e, both (len(elements), p, 3)."""
+
+    @abstractmethod
+    def restricted(
+        self, elements: np.ndarray, factors: np.ndarray
+    ) -> tuple["ConstraintGroup", np.ndarray]:
+        """The group of some elements only, on the vertices they need.
+
+        Parameters
+        ----------
+        elements : (m,) element indices
+        factors : (m,) what each element weight is multiplied by
+
+        Returns
+        -------
+        group, vertices
+            A group whose positions are those of ``vertices`` (n,), in this order.
+        """
+
+    def system_matrix(self) -> sparse.csr_array:
+        """S^T W S, (N, N) CSR."""
+        return (self.S.T @ self.S.multiply(self.row_weights[:, None])).tocsr()
+
+    def roundoff(self, q: np.ndarray) -> float:
+        """Size of the round-off in S q: eps times the norm of the terms that cancel, |S| |q|."""
+        return float(np.finfo(float).eps * np.linalg.norm(abs(self.S) @ np.abs(q)))
+
+
+class StencilGroup(ConstraintGroup):
+    """A group whose elements all have the same number m of vertices.
+
+    Attributes
+    ----------
+    stencil : (e, m) int32 vertex indices
+    operator : (e, p, m) dense element operators: S_e q = operator[e] @ q[stencil[e]]
+    """
+
+    stencil: np.ndarray
+    operator: np.ndarray
+    per_element: tuple[str, ...] = ()
+    """Names of further arrays with one entry per element."""
+
+    def restricted(
+        self, elements: np.ndarray, factors: np.ndarray
+    ) -> tuple["ConstraintGroup", np.ndarray]:
+        vertices, local = np.unique(self.stencil[elements], return_inverse=True)
+        part = copy(self)
+        part.stencil = local.reshape(len(elements), self.stencil.shape[1]).astype(np.int32)
+        part.weights = self.weights[elements] * factors
+        for name in ("operator", *self.per_element):
+            setattr(part, name, np.ascontiguousarray(getattr(self, name)[elements]))
+        part._assemble(len(vertices))
+        return part, vertices
+
+    def _assemble(self, vertices: int) -> None:
+        e, p, m = self.operator.shape
+        rows = np.repeat(np.arange(e * p), m)
+        columns = np.repeat(self.stencil[:, None, :], p, axis=1).ravel()
+        self.S = sparse.csr_array((self.operator.ravel(), (rows, columns)), shape=(e * p, vertices))
+
+
+def require_cells(mesh: Mesh, kind: str, effect: str) -> np.ndarray:
+    """The mesh's cells of ``kind``; SceneError if the mesh has none."""
+    cells = getattr(mesh, kind)
+    if kind == "triangles" and len(mesh.tetrahedra):
+        raise SceneError(f"effect '{effect}' needs a surface mesh, this mesh is a volume")
+    if len(cells) == 0:
+        raise SceneError(f"effect '{effect}' needs {kind}, this mesh has none")
+    return np.ascontiguousarray(cells, dtype=np.int32)

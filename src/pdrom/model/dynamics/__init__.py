@@ -1,0 +1,1 @@
+"""The step loop of projective dynamics and its global system."""

@@ -1,0 +1,91 @@
+"""The coordinates that the step loop works in: vertex positions, or those of a subspace."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from pdrom.model.dynamics.system import GlobalSystem
+from pdrom.model.effects.base import Boundary, Contact, Force
+
+
+class Solve(Protocol):
+    """A factored system with the fixed coordinates eliminated."""
+
+    def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
+        """Overwrite the free coordinates of ``y`` by the solution for ``rhs``."""
+
+
+class Space(ABC):
+    """What the step loop asks of its coordinates. Arrays are (n, 3) with n coordinates."""
+
+    @abstractmethod
+    def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+        """Acceleration of the frame by all forces, broadcastable to (n, 3), m/s^2."""
+
+    @abstractmethod
+    def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates held in ``frame``, ascending (m,), and their values (m, 3)."""
+
+    @abstractmethod
+    def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
+        """The factored system without the ``fixed`` coordinates, which take their ``targets``."""
+
+    @abstractmethod
+    def inertia(self, s: np.ndarray) -> np.ndarray:
+        """(M / h^2) s."""
+
+    @abstractmethod
+    def inertia_energy(self, difference: np.ndarray) -> float:
+        """1/(2 h^2) |M^1/2 difference|^2 in joule."""
+
+    @abstractmethod
+    def correct(self, y: np.ndarray) -> None:
+        """Contacts at the end of a frame, in place."""
+
+
+class VertexSpace(Space):
+    """All vertex positions. Roles that a scene does not fill are empty and cost nothing."""
+
+    def __init__(
+        self,
+        system: GlobalSystem,
+        forces: Sequence[Force] = (),
+        boundaries: Sequence[Boundary] = (),
+        contacts: Sequence[Contact] = (),
+    ) -> None:
+        self.system = system
+        self._inertia = system.inertia[:, None]
+        self._forces, self._boundaries, self._contacts = forces, boundaries, contacts
+
+    def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+        total = np.zeros(3)
+        for force in self._forces:
+            total = total + force.acceleration(positions, velocities)
+        return total
+
+    def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        active = [b for b in self._boundaries if b.active(frame)]
+        if not active:
+            return np.empty(0, dtype=np.int64), np.empty((0, 3))
+        held = [b.held(frame) for b in active]
+        targets = [b.targets(frame, positions[v]) for b, v in zip(active, held, strict=True)]
+        vertices, first = np.unique(np.concatenate(held), return_index=True)
+        return vertices, np.concatenate(targets)[first]
+
+    def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
+        elimination = self.system.eliminate(fixed)
+        elimination.set_targets(targets)
+        return elimination
+
+    def inertia(self, s: np.ndarray) -> np.ndarray:
+        return self._inertia * s
+
+    def inertia_energy(self, difference: np.ndarray) -> float:
+        squares = np.einsum("ij,ij->i", difference, difference)
+        return 0.5 * float(self.system.inertia @ squares)
+
+    def correct(self, y: np.ndarray) -> None:
+        for contact in self._contacts:
+            contact.correct(y)

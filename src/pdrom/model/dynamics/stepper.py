@@ -1,0 +1,152 @@
+"""The step loop of projective dynamics, shared by the full-order model and every reduced run.
+
+One frame (Bouaziz et al. 2014, alg. 1): y <- s = q + h v + h^2 a, then K times a local step
+p_j = p_j(y) and a global step (M/h^2 + sum S^T W S) y = (M/h^2) s + sum S^T W p; finally
+v = (y - q) / h and q = y. What replaces the projections of a group is a `LocalStep`.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Protocol
+
+import numpy as np
+
+from pdrom.model.dynamics.acceleration import Anderson
+from pdrom.model.dynamics.space import Solve, Space
+
+PHASES = ("inertia", "local", "global", "finish")
+
+
+class LocalStep(Protocol):
+    """Contribution of one group to the right-hand side. A constraint group is one itself.
+
+    With a position subspace y and rhs are coordinates (k, 3) in place of vertex positions (N, 3).
+    """
+
+    name: str
+
+    def begin_frame(self, q: np.ndarray) -> None:
+        """Called once a frame with its first positions (N, 3)."""
+
+    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
+        """Add S^T W p(y) to ``rhs`` (N, 3); return the energy W(y), nan where it is not known."""
+
+
+@dataclass(frozen=True)
+class State:
+    """Positions (N, 3) m and velocities (N, 3) m/s; in a subspace their coordinates (k, 3)."""
+
+    positions: np.ndarray
+    velocities: np.ndarray
+
+
+@dataclass(frozen=True)
+class FrameReport:
+    """What a frame did.
+
+    objective : (K,) value of 1/(2 h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) at the K local iterates
+        (at a refused one the value of the last accepted), nan where a local step does not know its
+        energy; empty if it was not tracked
+    seconds : (4,) time of each of `PHASES`
+    """
+
+    objective: np.ndarray
+    seconds: np.ndarray
+
+
+class Stepper:
+    """Advances a state frame by frame in the coordinates of a `Space`."""
+
+    def __init__(
+        self,
+        space: Space,
+        time_step: float,
+        iterations: int,
+        local_steps: Sequence[LocalStep],
+        track_objective: bool = True,
+        acceleration: Anderson | None = None,
+    ) -> None:
+        self.space = space
+        self.time_step = time_step
+        self.iterations = iterations
+        self.local_steps = list(local_steps)
+        self._acceleration = acceleration
+        self._track = track_objective
+
+    def step(
+        self,
+        state: State,
+        frame: int,
+        on_last_iterate: Callable[[np.ndarray], None] | None = None,
+    ) -> tuple[State, FrameReport]:
+        """Do one frame (0-based ``frame``); ``on_last_iterate`` sees the last local iterate y."""
+        seconds = np.zeros(len(PHASES))
+        started = perf_counter()
+        s, elimination, base = self._begin(state, frame)
+        seconds[0] = perf_counter() - started
+        y, objective = self._iterate(s, base, elimination, seconds, on_last_iterate)
+        before = perf_counter()
+        after = self._finish(state, y)
+        seconds[3] = perf_counter() - before
+        return after, FrameReport(objective, seconds)
+
+    def _begin(self, state: State, frame: int) -> tuple[np.ndarray, Solve, np.ndarray]:
+        """Inertial prediction s with held coordinates at their targets, the system, (M/h^2) s."""
+        space, h = self.space, self.time_step
+        s = state.positions + h * state.velocities
+        s += h**2 * space.acceleration(state.positions, state.velocities)
+        fixed, targets = space.fixed(frame, state.positions)
+        s[fixed] = targets
+        elimination = space.eliminate(fixed, targets)
+        base = space.inertia(s)
+        for local in self.local_steps:
+            local.begin_frame(state.positions)
+        return s, elimination, base
+
+    def _iterate(
+        self,
+        s: np.ndarray,
+        base: np.ndarray,
+        elimination: Solve,
+        seconds: np.ndarray,
+        on_last_iterate: Callable[[np.ndarray], None] | None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """All iterations of a frame, started at s: the last y and the objective at the iterates.
+
+        Their times are added to ``seconds``.
+        """
+        space, acceleration = self.space, self._acceleration
+        y, rhs = s.copy(), np.empty_like(s)
+        if acceleration is not None:
+            acceleration.begin_frame(y)
+        objective = np.full(self.iterations if self._track else 0, np.nan)
+        for k in range(self.iterations):
+            if on_last_iterate is not None and k == self.iterations - 1:
+                on_last_iterate(y)
+            before = perf_counter()
+            np.copyto(rhs, base)
+            energy = 0.0
+            for local in self.local_steps:
+                energy += local.accumulate(y, rhs)
+            between = perf_counter()
+            seconds[1] += between - before
+            if self._track and energy == energy:
+                objective[k] = energy + space.inertia_energy(y - s)
+            before = perf_counter()
+            if acceleration is None:
+                elimination.solve(rhs, y)
+            elif acceleration.refuse(y, energy + space.inertia_energy(y - s)):
+                objective[k : k + 1] = objective[k - 1 : k]
+            else:
+                elimination.solve(rhs, y)
+                # the last image stays as it is: its objective is known not to rise
+                if k < self.iterations - 1:
+                    acceleration.combine(y)
+            seconds[2] += perf_counter() - before
+        return y, objective
+
+    def _finish(self, state: State, y: np.ndarray) -> State:
+        """State after the frame: contacts, then the velocities."""
+        self.space.correct(y)
+        return State(y, (y - state.positions) / self.time_step)

@@ -1,0 +1,22 @@
+"""Effects of a scene, loaded by name and only when a scene lists them."""
+
+from pdrom.core.registry import Registry
+
+EFFECTS = Registry(
+    "effect",
+    {
+        "gravity": "pdrom.model.effects.gravity:Gravity",
+        "damping": "pdrom.model.effects.damping:Damping",
+        "floor": "pdrom.model.effects.floor:Floor",
+        "kick": "pdrom.model.effects.kick:Kick",
+        "pins": "pdrom.model.effects.hold:Pins",
+        "translate": "pdrom.model.effects.hold:Translate",
+        "rotate": "pdrom.model.effects.hold:Rotate",
+        "poke": "pdrom.model.effects.poke:Poke",
+        "bending": "pdrom.model.constraints.bending:VertexBending",
+        "spring": "pdrom.model.constraints.spring:EdgeSpring",
+        "strain": "pdrom.model.constraints.triangle_strain:TriangleStrain",
+        "tetrahedron_strain": "pdrom.model.constraints.tetrahedron_strain:TetrahedronStrain",
+        "deformation_gradient": "pdrom.model.constraints.deformation_gradient:DeformationGradient",
+    },
+)

@@ -1,0 +1,136 @@
+"""What an effect is.
+
+A scene is a mesh and a list of effects. Each effect is one class with one typed configuration,
+registered under the name that the configuration uses. It plays exactly one role, and the step loop
+asks each role only for the effects that the scene lists:
+
+=============  ===================================================  =========================
+role           question of the step loop                            examples
+=============  ===================================================  =========================
+`Start`        initial velocity                                     kick
+`Force`        acceleration of the frame                            gravity
+`Boundary`     which vertices are held, and where                   pins, translate, poke
+`Contact`      correction of the end-of-frame positions             floor
+constraint     local projection and its operator                    spring, strain (in
+group                                                               `pdrom.model.constraints`)
+=============  ===================================================  =========================
+"""
+
+from abc import ABC, abstractmethod
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import Field
+
+from pdrom.core.yamlfile import ConfigModel, Length
+from pdrom.model.mesh.types import Mesh
+
+
+class ScaledWithFrames:
+    """Marks a configuration field that counts frames and follows a change of the frame count."""
+
+
+FrameNumber = Annotated[int, Field(ge=0, le=1_000_000), ScaledWithFrames()]
+Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
+Vector = tuple[Length, Length, Length]
+Selection = str | tuple[int, ...]
+
+
+class EffectConfig(ConfigModel):
+    """Base of an effect's configuration: unknown keys are refused, instances are frozen."""
+
+    effect: str
+
+    def with_frames_scaled(self, factor: float) -> Self:
+        """Same effect with every frame number multiplied by ``factor`` (a duration stays >= 1)."""
+        changes: dict[str, Any] = {}
+        for name, field in type(self).model_fields.items():
+            value = getattr(self, name)
+            if value and any(isinstance(m, ScaledWithFrames) for m in _metadata(field)):
+                changes[name] = max(1, round(value * factor))
+        return self.model_copy(update=changes)
+
+    def check_step(self, time_step: float) -> None:
+        """Raise ValueError if the effect is unstable with this time step (s)."""
+
+    def reversed(self) -> Self:
+        """The motion in the opposite direction; an effect that does not move stays as it is."""
+        return self
+
+
+def _metadata(field: Any) -> list[Any]:
+    """Markers of a field, also those inside ``FrameNumber | None``."""
+    nested = [m for a in getattr(field.annotation, "__args__", ()) for m in _arguments(a)]
+    return [*field.metadata, *nested]
+
+
+def _arguments(annotation: Any) -> tuple[Any, ...]:
+    return getattr(annotation, "__metadata__", ())
+
+
+class Effect(ABC):
+    """An effect bound to a mesh. ``Config`` is the typed configuration of the class."""
+
+    Config: type[EffectConfig]
+
+    def __init__(self, config: EffectConfig, mesh: Mesh, masses: np.ndarray) -> None:
+        self.config: Any = config
+        self.name: str = config.effect
+
+
+class Start(Effect):
+    """Sets the state before the first frame."""
+
+    @abstractmethod
+    def velocity(self) -> np.ndarray:
+        """Initial velocity to add, (N, 3) m/s."""
+
+
+class Force(Effect):
+    """Accelerates the vertices."""
+
+    @abstractmethod
+    def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+        """Acceleration of the frame, (3,) or (N, 3) m/s^2."""
+
+    def potential(self, positions: np.ndarray, masses: np.ndarray) -> float:
+        """Potential energy in joule up to a constant; a force that has none (damping) adds none."""
+        return 0.0
+
+
+class Boundary(Effect):
+    """Prescribes positions. Held vertices are eliminated from the system, not penalised."""
+
+    vertices: np.ndarray
+    """All vertices that the effect may ever hold, ascending (n,) int64."""
+
+    moves: bool
+    """Whether the targets move while held."""
+
+    @abstractmethod
+    def active(self, frame: int) -> bool:
+        """Whether anything is held in ``frame`` (0-based: the step from state f to f + 1)."""
+
+    @abstractmethod
+    def held(self, frame: int) -> np.ndarray:
+        """Vertices that are held in an active ``frame``, (n,) int64."""
+
+    @abstractmethod
+    def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
+        """Positions (n, 3) m of the held vertices at the end of ``frame``.
+
+        ``current`` (n, 3) are their positions at its beginning; the effect remembers where they
+        were when it took hold of them.
+        """
+
+    @abstractmethod
+    def units(self) -> list[np.ndarray]:
+        """Sets of vertices that are always held together."""
+
+
+class Contact(Effect):
+    """Corrects positions at the end of a frame."""
+
+    @abstractmethod
+    def correct(self, positions: np.ndarray) -> None:
+        """Change positions (N, 3) m in place."""

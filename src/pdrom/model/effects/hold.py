@@ -1,0 +1,132 @@
+"""Vertices that are held for a range of frames: still, or moved by a handle."""
+
+from abc import abstractmethod
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from pdrom.model.effects.base import Boundary, EffectConfig, FrameNumber, Selection, Vector
+from pdrom.model.mesh.select import select_vertices
+from pdrom.model.mesh.types import Mesh
+
+
+class HoldConfig(EffectConfig):
+    """Frames ``start`` <= f < ``until`` (None: to the end) and the vertices that are held."""
+
+    select: Selection
+    start: FrameNumber = 0
+    until: FrameNumber | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.until is not None and self.until <= self.start:
+            raise ValueError(f"until = {self.until} must be greater than start = {self.start}")
+        return self
+
+
+class Hold(Boundary):
+    """Base of pins and handles: remembers the positions at which it took hold."""
+
+    def __init__(self, config: HoldConfig, mesh: Mesh, masses: np.ndarray) -> None:
+        super().__init__(config, mesh, masses)
+        self.vertices = select_vertices(mesh, config.select)
+        self._anchor: np.ndarray | None = None
+
+    def active(self, frame: int) -> bool:
+        until = self.config.until
+        return self.config.start <= frame and (until is None or frame < until)
+
+    def held(self, frame: int) -> np.ndarray:
+        return self.vertices
+
+    def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
+        if self._anchor is None or frame == self.config.start:
+            self._anchor = current.copy()
+        return self._moved(self._anchor, frame)
+
+    def units(self) -> list[np.ndarray]:
+        return [self.vertices]
+
+    @abstractmethod
+    def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
+        """Positions (n, 3) at the end of ``frame`` of vertices that were taken at ``anchor``."""
+
+
+class Pins(Hold):
+    """Vertices held where they were when the pin took hold."""
+
+    class Config(HoldConfig):
+        """See `HoldConfig`."""
+
+        effect: Literal["pins"] = "pins"
+
+    moves = False
+
+    def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
+        return anchor
+
+
+class HandleConfig(HoldConfig):
+    """A motion that takes ``over`` frames from ``start`` on and then holds."""
+
+    over: Annotated[FrameNumber, Field(ge=1)]
+
+    def progress(self, frame: int) -> float:
+        """Fraction of the motion done at the end of ``frame``, in [0, 1]."""
+        return min(1.0, (frame + 1 - self.start) / self.over)
+
+
+class Translate(Hold):
+    """Vertices moved at constant speed by an offset."""
+
+    class Config(HandleConfig):
+        """``offset`` in metres."""
+
+        effect: Literal["translate"] = "translate"
+        offset: Vector
+
+        def reversed(self) -> Self:
+            return self.model_copy(update={"offset": tuple(-x for x in self.offset)})
+
+    moves = True
+
+    def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
+        return anchor + self.config.progress(frame) * np.array(self.config.offset)
+
+
+AXES = {"x": 0, "y": 1, "z": 2}
+
+
+class Rotate(Hold):
+    """Vertices turned at constant angular speed about an axis through the rest shape's centre."""
+
+    class Config(HandleConfig):
+        """``degrees`` counted right-handed about ``axis``."""
+
+        effect: Literal["rotate"] = "rotate"
+        axis: Literal["x", "y", "z"]
+        degrees: Annotated[float, Field(ge=-1e6, le=1e6)]
+
+        def reversed(self) -> Self:
+            return self.model_copy(update={"degrees": -self.degrees})
+
+    moves = True
+
+    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
+        super().__init__(config, mesh, masses)
+        self._centre = 0.5 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))
+
+    def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
+        angle = np.radians(self.config.degrees) * self.config.progress(frame)
+        axis = AXES[self.config.axis]
+        first, second = (axis + 1) % 3, (axis + 2) % 3
+        arm = anchor - self._centre
+        turned = anchor.copy()
+        turned[:, first] = (
+            self._centre[first] + np.cos(angle) * arm[:, first] - np.sin(angle) * arm[:, second]
+        )
+        turned[:, second] = (
+            self._centre[second] + np.sin(angle) * arm[:, first] + np.cos(angle) * arm[:, second]
+        )
+        return turned

@@ -1,0 +1,39 @@
+"""A smooth random initial velocity, for held-out trajectories."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from pdrom.model.effects.base import EffectConfig, Seed, Start
+from pdrom.model.mesh.types import Mesh
+
+
+class Kick(Start):
+    """Random combination of the fields 1, x, y, z, xy, yz, zx (scaled coordinates), seeded.
+
+    Low-degree polynomials excite what a slow motion of the whole body does and leave the
+    element-scale noise out.
+    """
+
+    class Config(EffectConfig):
+        """``speed`` is the largest vertex speed in m/s; only ``axes`` get a velocity."""
+
+        effect: Literal["kick"] = "kick"
+        speed: Annotated[float, Field(gt=0.0, le=1e3, allow_inf_nan=False)]
+        seed: Seed
+        axes: Annotated[tuple[Literal["x", "y", "z"], ...], Field(min_length=1)] = ("x", "y", "z")
+
+    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
+        super().__init__(config, mesh, masses)
+        self._points = mesh.points
+        self._extent = mesh.extent
+
+    def velocity(self) -> np.ndarray:
+        x, y, z = ((self._points - self._points.mean(axis=0)) / (0.5 * self._extent)).T
+        fields = np.stack([np.ones_like(x), x, y, z, x * y, y * z, z * x], axis=1)
+        generator = np.random.default_rng(self.config.seed)
+        coefficients = generator.standard_normal((fields.shape[1], 3))
+        coefficients[:, ["xyz"[a] not in self.config.axes for a in range(3)]] = 0.0
+        velocity = fields @ coefficients
+        return velocity * (self.config.speed / np.linalg.norm(velocity, axis=1).max())

@@ -1,0 +1,76 @@
+"""One vertex after the other is pushed back and forth."""
+
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field
+
+from pdrom.core.errors import SceneError
+from pdrom.core.yamlfile import Length
+from pdrom.model.effects.base import Boundary, EffectConfig, FrameNumber, Selection
+from pdrom.model.effects.hold import AXES
+from pdrom.model.mesh.select import farthest_points, select_vertices
+from pdrom.model.mesh.types import Mesh
+
+# displacement over amplitude at equally spaced times: 0 -> -z -> +z -> -z -> 0
+KNOTS = (0.0, -1.0, 1.0, -1.0, 0.0)
+
+
+class Poke(Boundary):
+    """Moves a vertex 0 -> -z -> +z -> -z -> 0, lets go, and goes on to the next.
+
+    The vertices follow farthest-point sampling from the centre, without those of ``avoid``. The
+    paper gives no speeds: amplitude, frames and order are this study's choice.
+    """
+
+    class Config(EffectConfig):
+        """``amplitude`` in metres along ``axis``; ``over`` frames of motion, ``rest`` between."""
+
+        effect: Literal["poke"] = "poke"
+        amplitude: Length = 0.2
+        axis: Literal["x", "y", "z"] = "z"
+        over: Annotated[FrameNumber, Field(ge=1)] = 20
+        rest: FrameNumber = 10
+        count: Annotated[int, Field(ge=1, le=1000)] = 8
+        avoid: tuple[Selection, ...] = ()
+
+        def reversed(self) -> Self:
+            return self.model_copy(update={"amplitude": -self.amplitude})
+
+    moves = True
+
+    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
+        super().__init__(config, mesh, masses)
+        avoided = [select_vertices(mesh, selection) for selection in config.avoid]
+        free = np.setdiff1d(np.arange(mesh.vertices), np.concatenate([[], *avoided]).astype(int))
+        if len(free) < config.count:
+            raise SceneError(
+                f"poke: count = {config.count}, but only {len(free)} vertices are free"
+            )
+        self._order = farthest_points(mesh.points, free, config.count)
+        self.vertices = np.sort(self._order)
+        self._anchor: np.ndarray | None = None
+        self._turn = -1
+
+    def active(self, frame: int) -> bool:
+        turn, phase = divmod(frame, self.config.over + self.config.rest)
+        return turn < self.config.count and phase < self.config.over
+
+    def held(self, frame: int) -> np.ndarray:
+        turn = frame // (self.config.over + self.config.rest)
+        return self._order[turn : turn + 1]
+
+    def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
+        turn, phase = divmod(frame, self.config.over + self.config.rest)
+        if turn != self._turn or phase == 0:
+            self._turn, self._anchor = turn, current.copy()
+        progress = (phase + 1) / self.config.over
+        target = self._anchor.copy()
+        times = np.linspace(0.0, 1.0, len(KNOTS))
+        target[:, AXES[self.config.axis]] += self.config.amplitude * np.interp(
+            progress, times, KNOTS
+        )
+        return target
+
+    def units(self) -> list[np.ndarray]:
+        return [np.array([vertex]) for vertex in self._order]

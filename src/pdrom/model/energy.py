@@ -1,0 +1,91 @@
+"""Total energy of a run, from its stored positions, and how it compares with the full order."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdrom.model.scene import Scene
+
+# The potential of the groups is evaluated at every so many frames, and at the last one.
+STRIDE = 4
+
+
+def energies(scene: Scene, positions: np.ndarray) -> np.ndarray:
+    """Kinetic energy, potential of all groups and of all forces in joule, at sampled frames (n,).
+
+    Parameters
+    ----------
+    positions : (F + 1, N, 3) m of a run of ``scene``, the initial ones first. Velocities are those
+        of the step loop, (q_f - q_{f-1}) / h; the initial state brings its own.
+
+    Every `STRIDE`-th frame, the first and the last are taken: a fraction 1 / (STRIDE K) of the
+    local steps of the run. The projections are the full ones, whatever the run was made with. The
+    potential of the forces has an arbitrary zero, so that only differences mean anything.
+    """
+    frames = sorted({*range(0, len(positions), STRIDE), len(positions) - 1})
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.array([_energy(scene, positions, frame) for frame in frames])
+
+
+@dataclass(frozen=True)
+class EnergyScale:
+    """What the energy of reduced runs is compared with.
+
+    The potential of the forces is counted from the least one that the full-order run reaches, so
+    that its total energy is never negative.
+
+    zero : that least potential, J
+    peak : largest total energy of the full-order run, J, counted from there
+    """
+
+    scene: Scene
+    zero: float
+    peak: float
+
+    @classmethod
+    def of(cls, scene: Scene, reference: np.ndarray) -> "EnergyScale":
+        """Scale of a full-order run with positions (F + 1, N, 3)."""
+        zero = min(_force_potential(scene, q) for q in reference)
+        return cls(scene, zero, float(energies(scene, reference).max()) - zero)
+
+    def ratio(self, positions: np.ndarray) -> float | None:
+        """Largest total energy of a run (F' + 1, N, 3) over that of the full-order run.
+
+        One for the full-order run itself. Above one, the run has gained energy that neither the
+        initial state nor the handles brought into the full-order run. inf if the energy overflows;
+        None if the full-order run has no energy above round-off to compare with.
+        """
+        if not self.peak > _roundoff(self.scene):
+            return None
+        own = float(energies(self.scene, positions).max()) - self.zero
+        return own / self.peak if np.isfinite(own) else float("inf")
+
+
+def _energy(scene: Scene, positions: np.ndarray, frame: int) -> float:
+    q = positions[frame]
+    if frame == 0:
+        v = scene.initial_state().velocities
+    else:
+        v = (q - positions[frame - 1]) / scene.config.time_step
+    kinetic = 0.5 * float(scene.masses @ np.einsum("ij,ij->i", v, v))
+    return kinetic + _group_potential(scene, q) + _force_potential(scene, q)
+
+
+def _group_potential(scene: Scene, q: np.ndarray) -> float:
+    """Sum of W_j(q); frame-lagged data are taken at q itself."""
+    unused = np.zeros_like(q)
+    total = 0.0
+    for group in scene.groups:
+        group.begin_frame(q)
+        total += group.accumulate(q, unused)
+    return total
+
+
+def _roundoff(scene: Scene) -> float:
+    """Energy of the rounding errors in S q of the rest shape, J."""
+    rest = scene.mesh.points
+    return sum(0.5 * float(g.weights.max()) * g.roundoff(rest) ** 2 for g in scene.groups)
+
+
+def _force_potential(scene: Scene, q: np.ndarray) -> float:
+    return sum(force.potential(q, scene.masses) for force in scene.forces)

@@ -1,0 +1,145 @@
+"""Typed configuration of a mesh: a generator with its parameters, or a file."""
+
+import hashlib
+import json
+import re
+from math import prod
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from pdrom.core.errors import MeshError
+from pdrom.core.yamlfile import ConfigModel, Length, PositiveLength
+from pdrom.model.mesh.checks import check_mesh
+from pdrom.model.mesh.files import read_mesh_file
+from pdrom.model.mesh.generators import bar, cloth
+from pdrom.model.mesh.types import Mesh
+
+Count = Annotated[int, Field(ge=2, le=2000)]
+# A cloth of this size needs about 1 GB while its operators are built.
+MAX_VERTICES = 1_000_000
+
+
+def _check_size(**counts: int) -> None:
+    total = prod(counts.values())
+    if total > MAX_VERTICES:
+        product = " x ".join(f"{name} = {count}" for name, count in counts.items())
+        raise ValueError(f"{product} are {total} vertices, allowed: at most {MAX_VERTICES}")
+
+
+class _Model(ConfigModel):
+    """Base of the kinds of meshes."""
+
+    @property
+    def identifier(self) -> str:
+        """File name of the mesh: readable, and different for different parameters."""
+        canonical = json.dumps(self.model_dump(mode="json"), sort_keys=True)
+        return f"{self.label}_{hashlib.sha256(canonical.encode()).hexdigest()[:8]}"
+
+
+class ClothMesh(_Model):
+    """Sheet of the generator `pdrom.model.mesh.generators.cloth`; lengths in metres."""
+
+    kind: Literal["cloth"]
+    rows: Count = 20
+    columns: Count = 20
+    plane: Literal["xy", "xz"] = "xy"
+    extent: PositiveLength = 1.0
+    lift: Length = 2.0
+    wave: Length = 0.0
+
+    @model_validator(mode="after")
+    def _not_too_large(self) -> Self:
+        _check_size(rows=self.rows, columns=self.columns)
+        return self
+
+    def coarsened(self, factor: float) -> Self:
+        """Same sheet with ``factor`` times the vertices along each side, at least 4."""
+        sizes = {name: max(4, round(getattr(self, name) * factor)) for name in ("rows", "columns")}
+        return self.model_copy(update=sizes)
+
+    def build(self, root: Path) -> Mesh:
+        """Generate the mesh."""
+        return cloth(self.rows, self.columns, self.plane, self.extent, self.lift, self.wave)
+
+    @property
+    def label(self) -> str:
+        """Readable part of the mesh's file name."""
+        return f"cloth_{self.rows}x{self.columns}_{self.plane}"
+
+
+class BarMesh(_Model):
+    """Bar of the generator `pdrom.model.mesh.generators.bar`; lengths in metres."""
+
+    kind: Literal["bar"]
+    nx: Count = 40
+    ny: Count = 5
+    nz: Count = 5
+    extent: PositiveLength = 1.0
+    lift: Length = 2.0
+
+    @model_validator(mode="after")
+    def _not_too_large(self) -> Self:
+        _check_size(nx=self.nx, ny=self.ny, nz=self.nz)
+        return self
+
+    def coarsened(self, factor: float) -> Self:
+        """Same bar with ``factor`` times the vertices along each side, at least 3."""
+        sizes = {name: max(3, round(getattr(self, name) * factor)) for name in ("nx", "ny", "nz")}
+        return self.model_copy(update=sizes)
+
+    def build(self, root: Path) -> Mesh:
+        """Generate the mesh."""
+        return bar(self.nx, self.ny, self.nz, self.extent, self.lift)
+
+    @property
+    def label(self) -> str:
+        """Readable part of the mesh's file name."""
+        return f"bar_{self.nx}x{self.ny}x{self.nz}"
+
+
+class MeshFile(_Model):
+    """A mesh file below the project's folder, in any format of meshio."""
+
+    kind: Literal["file"]
+    path: str
+    scale: Annotated[float, Field(ge=1e-9, le=1e9)] = 1.0
+
+    @field_validator("path")
+    @classmethod
+    def _inside(cls, value: str) -> str:
+        if Path(value).is_absolute() or ".." in Path(value).parts:
+            raise ValueError("a path below the project's folder is required, without '..'")
+        if not value.strip() or not value.isprintable():
+            raise ValueError("a path of printable characters is required")
+        return value
+
+    def coarsened(self, factor: float) -> Self:
+        """A mesh file has one resolution."""
+        return self
+
+    def build(self, root: Path) -> Mesh:
+        """Read the mesh."""
+        mesh = read_mesh_file(self.file(root))
+        scaled = Mesh(mesh.points * self.scale, mesh.triangles, mesh.tetrahedra)
+        return check_mesh(scaled, self.path)
+
+    def file(self, root: Path) -> Path:
+        """The mesh file; MeshError if a link leads out of the project's folder."""
+        path = root / self.path
+        try:
+            inside = path.resolve().is_relative_to(root.resolve())
+        except (OSError, RuntimeError) as error:  # a circle of links
+            raise MeshError(f"mesh.path = '{self.path}': leads nowhere") from error
+        if not inside:
+            raise MeshError(f"mesh.path = '{self.path}': a link that leads out of the project")
+        return path
+
+    @property
+    def label(self) -> str:
+        """Readable part of the mesh's file name."""
+        return re.sub(r"[^A-Za-z0-9_-]", "_", Path(self.path).stem)[:40]
+
+
+MeshConfig = Annotated[ClothMesh | BarMesh | MeshFile, Field(discriminator="kind")]

@@ -1,0 +1,101 @@
+"""Cloth and bar of the study (EXPERIMENTS: 20 x 20 sheet, 40 x 5 x 5 bar), at any resolution."""
+
+from typing import Literal
+
+import numpy as np
+
+from pdrom.model.mesh.types import Mesh
+
+Plane = Literal["xy", "xz"]
+
+
+def cloth(
+    rows: int,
+    columns: int,
+    plane: Plane = "xy",
+    extent: float = 1.0,
+    lift: float = 2.0,
+    wave: float = 0.0,
+) -> Mesh:
+    """Rectangular sheet of ``rows`` x ``columns`` vertices with square cells, two triangles a cell.
+
+    Vertex (i, j) has index ``i * columns + j``. Each cell is split into [ll, ur, ul] and
+    [ll, lr, ur] with ul = ll + 1, lr = ll + columns, ur = lr + 1. The sheet is centred, its longer
+    side measures ``extent`` metres, and it is lifted by ``lift`` metres along y.
+
+    Parameters
+    ----------
+    plane : "xy" (upright) or "xz" (horizontal).
+    wave : amplitude in metres of the curved rest shape ``wave * sin(6 u) cos(5 v)`` out of the
+        plane, with u and v the sheet's coordinates over its extent.
+    """
+    spacing = extent / (max(rows, columns) - 1)
+    u = (np.arange(rows) - 0.5 * (rows - 1)) * spacing
+    v = (np.arange(columns) - 0.5 * (columns - 1)) * spacing
+    grid_u, grid_v = (a.ravel() for a in np.meshgrid(u, v, indexing="ij"))
+    if wave:
+        height = wave * np.sin(6.0 * grid_u / extent) * np.cos(5.0 * grid_v / extent)
+    else:
+        height = np.zeros_like(grid_u)
+    order = (grid_u, grid_v, height) if plane == "xy" else (grid_u, height, grid_v)
+    points = np.column_stack(order)
+    points[:, 1] += lift
+    return Mesh(points, _cloth_triangles(rows, columns))
+
+
+def _cloth_triangles(rows: int, columns: int) -> np.ndarray:
+    i, j = (a.ravel() for a in np.meshgrid(range(rows - 1), range(columns - 1), indexing="ij"))
+    ll = i * columns + j
+    ul, lr, ur = ll + 1, ll + columns, ll + columns + 1
+    pairs = np.stack([np.stack([ll, ur, ul], 1), np.stack([ll, lr, ur], 1)], axis=1)
+    return pairs.reshape(-1, 3).astype(np.int32)
+
+
+def bar(nx: int, ny: int, nz: int, extent: float = 1.0, lift: float = 2.0) -> Mesh:
+    """Bar of nx x ny x nz vertices with cubic cells, five tetrahedra a cell, alternating parity.
+
+    Vertex (i, j, k) has index ``(i * ny + j) * nz + k``. Neighbouring cells mirror each other so
+    that their face diagonals meet. Centred, longest side ``extent`` metres, lifted along y.
+    """
+    counts = np.array([nx, ny, nz])
+    spacing = extent / (counts.max() - 1)
+    axes = [(np.arange(n) - 0.5 * (n - 1)) * spacing for n in counts]
+    points = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")], axis=1)
+    points[:, 1] += lift
+    tetrahedra = orient(points, _bar_tetrahedra(nx, ny, nz))
+    return Mesh(points, boundary(tetrahedra), tetrahedra)
+
+
+# Corners of a cell are numbered by the bits of (di, dj, dk); the inner tetrahedron comes first.
+_EVEN = ((0, 3, 5, 6), (1, 0, 3, 5), (2, 0, 6, 3), (4, 0, 5, 6), (7, 3, 6, 5))
+_ODD = ((1, 2, 4, 7), (0, 1, 2, 4), (3, 1, 7, 2), (5, 1, 4, 7), (6, 2, 7, 4))
+
+
+def _bar_tetrahedra(nx: int, ny: int, nz: int) -> np.ndarray:
+    cells = np.stack(
+        [a.ravel() for a in np.meshgrid(*(range(n - 1) for n in (nx, ny, nz)), indexing="ij")], 1
+    )
+    shifts = np.array([[b >> 2 & 1, b >> 1 & 1, b & 1] for b in range(8)])
+    corners = cells[:, None, :] + shifts
+    index = (corners[..., 0] * ny + corners[..., 1]) * nz + corners[..., 2]
+    odd = cells.sum(axis=1) % 2 == 1
+    pattern = np.where(odd[:, None, None], np.array(_ODD), np.array(_EVEN))
+    return np.take_along_axis(index[:, None, :].repeat(5, axis=1), pattern, axis=2).reshape(-1, 4)
+
+
+def orient(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
+    """The tetrahedra (E, 4) int32, two corners swapped where the signed volume is negative."""
+    a, b, c, d = (points[tetrahedra[:, i]] for i in range(4))
+    negative = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0.0
+    oriented = tetrahedra.astype(np.int32)
+    oriented[negative, 2], oriented[negative, 3] = tetrahedra[negative, 3], tetrahedra[negative, 2]
+    return oriented
+
+
+def boundary(tetrahedra: np.ndarray) -> np.ndarray:
+    """Faces (T, 3) int32 that belong to one tetrahedron only, oriented outwards."""
+    faces = tetrahedra[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
+    _, first, count = np.unique(
+        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    return faces[np.sort(first[count == 1])].astype(np.int32)

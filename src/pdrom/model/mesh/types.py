@@ -1,0 +1,54 @@
+"""The mesh that every later stage works on."""
+
+import os
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pdrom.core.store import open_hdf5, write_hdf5
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A triangle or tetrahedron mesh at rest.
+
+    points : (N, 3) float64, metres
+    triangles : (T, 3) int32; of a volume mesh its boundary, oriented outwards
+    tetrahedra : (E, 4) int32; empty for a surface
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+    tetrahedra: np.ndarray = field(default_factory=lambda: np.empty((0, 4), dtype=np.int32))
+
+    @property
+    def vertices(self) -> int:
+        """Number N of vertices."""
+        return len(self.points)
+
+    @property
+    def extent(self) -> float:
+        """Longest side of the bounding box at rest, metres."""
+        return float(np.ptp(self.points, axis=0).max())
+
+    def edges(self) -> np.ndarray:
+        """Unique edges (n, 2) int32 with a < b, in lexicographic order."""
+        cells = self.tetrahedra if len(self.tetrahedra) else self.triangles
+        corners = cells.shape[1]
+        pairs = [cells[:, [i, j]] for i in range(corners) for j in range(i + 1, corners)]
+        return np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0).astype(np.int32)
+
+
+def save_mesh(mesh: Mesh, path: str | os.PathLike[str], attributes: dict | None = None) -> None:
+    """Write a mesh to HDF5 (datasets points, triangles, tetrahedra)."""
+    with write_hdf5(path) as file:
+        for name in ("points", "triangles", "tetrahedra"):
+            file[name] = getattr(mesh, name)
+        file["points"].attrs["unit"] = "m"
+        file.attrs.update(attributes or {})
+
+
+def load_mesh(path: str | os.PathLike[str]) -> Mesh:
+    """Read a mesh written by `save_mesh`; StorageError if the file is damaged."""
+    with open_hdf5(path) as file:
+        return Mesh(*(file[name][...] for name in ("points", "triangles", "tetrahedra")))

@@ -1,0 +1,117 @@
+"""A full-order run, streamed to HDF5 frame by frame."""
+
+import logging
+import os
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import h5py
+import numpy as np
+
+from pdrom.core.store import write_hdf5
+from pdrom.model.dynamics.stepper import PHASES, FrameReport, State
+from pdrom.model.scene import Scene
+
+log = logging.getLogger(__name__)
+
+
+def simulate(
+    scene: Scene, perturbation: np.ndarray | None = None, **stepper: Any
+) -> Iterator[tuple[State, FrameReport]]:
+    """States and reports of all frames of a scene, one after the other."""
+    loop = scene.stepper(**stepper)
+    state = scene.initial_state(perturbation)
+    for frame in range(scene.config.frames):
+        state, report = loop.step(state, frame)
+        yield state, report
+
+
+def trajectory(scene: Scene, perturbation: np.ndarray | None = None, **stepper: Any) -> np.ndarray:
+    """Positions (F + 1, N, 3) of a run, the initial ones first."""
+    positions = [scene.initial_state(perturbation).positions]
+    positions += [state.positions for state, _ in simulate(scene, perturbation, **stepper)]
+    return np.stack(positions)
+
+
+def run(
+    scene: Scene,
+    path: str | os.PathLike[str],
+    snapshot_frames: Mapping[str, np.ndarray],
+    attributes: Mapping[str, Any],
+    solver: str = "cholespy",
+) -> None:
+    """Run a scene and write positions, velocities, objective, timings and the asked snapshots.
+
+    Parameters
+    ----------
+    snapshot_frames : group -> frames (ascending) whose last local iterate is stored; a group that
+        is not listed stores nothing.
+    """
+    frames = scene.config.frames
+    system = scene.system_with(solver)
+    loop = scene.stepper(system)
+    state = scene.initial_state()
+    with write_hdf5(path) as file:
+        file.attrs.update(attributes)
+        series = _create_series(file, scene)
+        recorder = _SnapshotRecorder(file, scene, snapshot_frames)
+        series["positions"][0], series["velocities"][0] = state.positions, state.velocities
+        for frame in range(frames):
+            watch = recorder.observer(frame)
+            state, report = loop.step(state, frame, watch)
+            series["positions"][frame + 1] = state.positions
+            series["velocities"][frame + 1] = state.velocities
+            series["objective"][frame] = report.objective
+            series["timings"][frame] = 1e3 * report.seconds
+            if (frame + 1) % max(1, frames // 10) == 0:
+                log.info("%s: frame %d of %d", scene.config.name, frame + 1, frames)
+        file.attrs["factorisations"] = system.factorisations
+
+
+def _create_series(file: h5py.File, scene: Scene) -> dict[str, h5py.Dataset]:
+    frames, n = scene.config.frames, scene.mesh.vertices
+    shapes = {
+        "positions": ((frames + 1, n, 3), "m"),
+        "velocities": ((frames + 1, n, 3), "m/s"),
+        "objective": ((frames, scene.config.iterations), "J"),
+        "timings": ((frames, len(PHASES)), "ms"),
+    }
+    series = {}
+    for name, (shape, unit) in shapes.items():
+        series[name] = file.create_dataset(name, shape, dtype="f8")
+        series[name].attrs["unit"] = unit
+    series["timings"].attrs["phases"] = PHASES
+    return series
+
+
+class _SnapshotRecorder:
+    """Stores p of the asked groups and frames; a frame without snapshots costs nothing."""
+
+    def __init__(
+        self, file: h5py.File, scene: Scene, snapshot_frames: Mapping[str, np.ndarray]
+    ) -> None:
+        self._targets = []
+        for name, frames in snapshot_frames.items():
+            group = scene.group(name)
+            store = file.create_group(f"snapshots/{name}")
+            store["frames"] = np.asarray(frames, dtype=np.int64)
+            shape = (len(frames), group.elements * group.rows_per_element, 3)
+            data = store.create_dataset("p", shape, dtype="f8")
+            roundoff = store.create_dataset("roundoff", (len(frames),), dtype="f8")
+            store.attrs["elements"] = group.elements
+            store.attrs["rows_per_element"] = group.rows_per_element
+            position = {int(frame): i for i, frame in enumerate(frames)}
+            self._targets.append((group, position, data, roundoff))
+
+    def observer(self, frame: int):
+        """Function of the last local iterate, or None if this frame stores nothing."""
+        wanted = [t for t in self._targets if frame in t[1]]
+        if not wanted:
+            return None
+
+        def record(y: np.ndarray) -> None:
+            for group, position, data, roundoff in wanted:
+                data[position[frame]] = group.project(y)
+                roundoff[position[frame]] = group.roundoff(y)
+
+        return record

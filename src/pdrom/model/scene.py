@@ -1,0 +1,272 @@
+"""A scene: a mesh and a list of effects, typed, checked, and bound to the step loop."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import (
+    Field,
+    SerializeAsAny,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+
+from pdrom.core.errors import ConfigurationError, SceneError
+from pdrom.core.yamlfile import ConfigModel, describe, shown
+from pdrom.model.constraints.base import ConstraintGroup, GroupConfig
+from pdrom.model.dynamics.acceleration import Anderson
+from pdrom.model.dynamics.space import VertexSpace
+from pdrom.model.dynamics.stepper import LocalStep, State, Stepper
+from pdrom.model.dynamics.system import DEFAULT_SOLVER, GlobalSystem
+from pdrom.model.effects import EFFECTS
+from pdrom.model.effects.base import Boundary, Contact, Effect, EffectConfig, Force, Seed, Start
+from pdrom.model.mesh.checks import check_mesh
+from pdrom.model.mesh.config import MeshConfig
+from pdrom.model.mesh.types import Mesh
+
+SCENE_NAME = r"^[a-z][a-z0-9_]{0,63}$"
+# Positions and velocities of a longer run fill disk and memory: 1600 vertices for 100,000 frames.
+MAX_VERTEX_FRAMES = 160_000_000
+
+
+class _Model(ConfigModel):
+    """Base of the sections of a scene."""
+
+
+class HeldOut(_Model):
+    """How the held-out trajectory differs from the training one.
+
+    ``frames_factor`` stretches every handle and schedule in time (another speed), ``reverse`` turns
+    the handles' direction round, ``kick`` adds an initial velocity (m/s, seeded).
+    """
+
+    frames_factor: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.25
+    reverse: bool = False
+    kick: Annotated[float, Field(ge=0.0, le=1e3)] = 0.0
+    kick_axes: Annotated[tuple[Literal["x", "y", "z"], ...], Field(min_length=1)] = ("x", "y", "z")
+    seed: Seed = 1
+
+
+class ReductionPlan(_Model):
+    """Experiments on one group: how many training snapshots its basis gets."""
+
+    train: Annotated[int, Field(ge=2, le=100_000)]
+
+
+class SceneConfig(_Model):
+    """Configuration of a scene (config/scenes/*.yaml). Units: seconds, metres, kilograms."""
+
+    name: Annotated[str, Field(pattern=SCENE_NAME)]
+    title: str
+    mesh: MeshConfig
+    time_step: Annotated[float, Field(ge=1e-9, le=10.0)] = 0.016
+    iterations: Annotated[int, Field(ge=1, le=10_000)] = 10
+    anderson_window: Annotated[int, Field(ge=0, le=50)] = 0
+    frames: Annotated[int, Field(ge=1, le=1_000_000)]
+    vertex_mass: Annotated[float, Field(ge=1e-150, le=1e150)] = 10.0
+    effects: tuple[SerializeAsAny[EffectConfig], ...]
+    reduce: dict[str, ReductionPlan] = Field(default_factory=dict)
+    held_out: HeldOut = HeldOut()
+
+    @field_validator("effects", mode="before")
+    @classmethod
+    def _typed_effects(cls, value: Any) -> tuple[EffectConfig, ...]:
+        if not isinstance(value, (list, tuple)):
+            raise ValueError("a list of effects is required")
+        return tuple(_effect_config(entry, index) for index, entry in enumerate(value))
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        groups = self.groups
+        if not groups:
+            raise ValueError("effects list no constraint group: there is nothing to project")
+        if len(set(groups)) < len(groups):
+            raise ValueError(f"effects list a constraint group twice: {', '.join(groups)}")
+        for effect in self.effects:
+            effect.check_step(self.time_step)
+        for group, plan in self.reduce.items():
+            if group not in groups:
+                raise ValueError(f"reduce.{group}: not in effects (allowed: {', '.join(groups)})")
+            even = (self.frames + 1) // 2
+            if plan.train > even:
+                raise ValueError(
+                    f"reduce.{group}.train = {plan.train}: only {even} even frames in {self.frames}"
+                )
+        return self
+
+    @property
+    def groups(self) -> list[str]:
+        """Names of the constraint groups, in the order of the effects."""
+        return [e.effect for e in self.effects if isinstance(e, GroupConfig)]
+
+    @property
+    def modules(self) -> list[str]:
+        """Modules that implement the listed effects (for the code fingerprint)."""
+        return sorted({EFFECTS.module(e.effect) for e in self.effects})
+
+    def coarsened(self, resolution: float, frames: float) -> Self:
+        """The scene on a coarser mesh and with fewer frames; schedules shrink alike."""
+        count = max(4, round(self.frames * frames))
+        even = (count + 1) // 2
+        plans = {
+            group: ReductionPlan(train=max(2, min(round(plan.train * frames), even)))
+            for group, plan in self.reduce.items()
+        }
+        return self.model_copy(
+            update={
+                "mesh": self.mesh.coarsened(resolution),
+                "frames": count,
+                "effects": tuple(e.with_frames_scaled(frames) for e in self.effects),
+                "reduce": plans,
+            }
+        )
+
+    def held_out_variant(self) -> Self:
+        """The scene of the held-out trajectory (see `HeldOut`)."""
+        plan = self.held_out
+        effects = [e.with_frames_scaled(plan.frames_factor) for e in self.effects]
+        if plan.reverse:
+            effects = [e.reversed() for e in effects]
+        if plan.kick:
+            kick = {"effect": "kick", "speed": plan.kick, "seed": plan.seed}
+            effects.append(_effect_config({**kick, "axes": plan.kick_axes}, len(effects)))
+        return self.model_copy(update={"effects": tuple(effects)})
+
+
+def _effect_config(entry: Any, index: int) -> EffectConfig:
+    """Typed configuration of one entry of ``effects``."""
+    if isinstance(entry, EffectConfig):
+        return entry
+    if not isinstance(entry, dict) or not isinstance(entry.get("effect"), str):
+        raise ValueError(f"effects[{index}] = {shown(entry, 60)}: a mapping with a key 'effect'")
+    try:
+        model = EFFECTS.load(entry["effect"]).Config
+    except ConfigurationError as error:
+        raise ValueError(f"effects[{index}]: {error}") from error
+    try:
+        return model.model_validate(entry)
+    except ValidationError as error:
+        fault = describe(error, model)
+        raise ValueError(f"effects[{index}] ({entry['effect']}): {fault}") from error
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A scene bound to its mesh: every listed effect built, sorted by role."""
+
+    config: SceneConfig
+    mesh: Mesh
+    masses: np.ndarray
+    groups: list[ConstraintGroup]
+    forces: list[Force]
+    boundaries: list[Boundary]
+    contacts: list[Contact]
+    starts: list[Start]
+
+    @classmethod
+    def build(cls, config: SceneConfig, mesh: Mesh, threads: int = 1) -> "Scene":
+        """Bind ``config`` to ``mesh``; ``threads`` (1 or 2) share the local step of large groups.
+
+        Raises
+        ------
+        MeshError, SceneError
+            Faulty mesh, an empty selection, or effects that hold a vertex in different places.
+        """
+        check_mesh(mesh, config.name)
+        _check_size(config, mesh)
+        masses = np.full(mesh.vertices, config.vertex_mass)
+        effects = [_bind(entry, config.name, mesh, masses) for entry in config.effects]
+        roles = (ConstraintGroup, Force, Boundary, Contact, Start)
+        by_role = [[e for e in effects if isinstance(e, role)] for role in roles]
+        scene = cls(config, mesh, masses, *by_role)
+        _check_holds(scene.boundaries, config)
+        for group in scene.groups:
+            group.threads = threads
+        return scene
+
+    def group(self, name: str) -> ConstraintGroup:
+        """The constraint group called ``name``; SceneError if the scene does not list it."""
+        for group in self.groups:
+            if group.name == name:
+                return group
+        raise SceneError(f"{self.config.name}: no group '{name}' ({', '.join(self.config.groups)})")
+
+    @cached_property
+    def system(self) -> GlobalSystem:
+        """Global system with the default solver, built once."""
+        return self.system_with(DEFAULT_SOLVER)
+
+    def system_with(self, solver: str) -> GlobalSystem:
+        """Global system solved by the registered ``solver``."""
+        return GlobalSystem(self.masses, self.config.time_step, self.groups, solver)
+
+    def initial_state(self, perturbation: np.ndarray | None = None) -> State:
+        """State before the first frame; ``perturbation`` (N, 3) m is added to the positions."""
+        positions = self.mesh.points.copy()
+        if perturbation is not None:
+            positions += perturbation
+        velocities = np.zeros_like(positions)
+        for start in self.starts:
+            velocities += start.velocity()
+        return State(positions, velocities)
+
+    def stepper(
+        self,
+        system: GlobalSystem | None = None,
+        local_steps: Sequence[LocalStep] | None = None,
+        track_objective: bool = True,
+    ) -> Stepper:
+        """Step loop of the scene; ``local_steps`` replaces the full projections of all groups."""
+        return Stepper(
+            self.space(system or self.system),
+            self.config.time_step,
+            self.config.iterations,
+            self.groups if local_steps is None else local_steps,
+            track_objective,
+            self.acceleration(),
+        )
+
+    def acceleration(self) -> Anderson | None:
+        """Acceleration of the iterations, None if the scene asks for none."""
+        window = self.config.anderson_window
+        return Anderson(window) if window else None
+
+    def space(self, system: GlobalSystem) -> VertexSpace:
+        """Vertex positions as the coordinates of the step loop."""
+        return VertexSpace(system, self.forces, self.boundaries, self.contacts)
+
+
+def _bind(config: EffectConfig, scene: str, mesh: Mesh, masses: np.ndarray) -> Effect:
+    try:
+        return EFFECTS.load(config.effect)(config, mesh, masses)
+    except SceneError as error:
+        raise SceneError(f"scene '{scene}', effect '{config.effect}': {error}") from error
+
+
+def _check_size(config: SceneConfig, mesh: Mesh) -> None:
+    """A run that cannot be stored is refused before anything is allocated."""
+    if config.frames * mesh.vertices > MAX_VERTEX_FRAMES:
+        raise SceneError(
+            f"scene '{config.name}': frames = {config.frames} on {mesh.vertices} vertices: allowed "
+            f"are at most {MAX_VERTEX_FRAMES // mesh.vertices} frames"
+        )
+
+
+def _check_holds(boundaries: list[Boundary], config: SceneConfig) -> None:
+    """A vertex may be held twice only if nothing that holds it moves."""
+    for first, second in combinations(boundaries, 2):
+        if not (first.moves or second.moves):
+            continue
+        shared = np.intersect1d(first.vertices, second.vertices)
+        if len(shared) == 0:
+            continue
+        for frame in range(config.frames):
+            if first.active(frame) and second.active(frame):
+                raise SceneError(
+                    f"scene '{config.name}': vertex {shared[0]} is held by '{first.name}' and by "
+                    f"'{second.name}' in frame {frame}"
+                )

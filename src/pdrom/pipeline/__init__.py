@@ -1,0 +1,1 @@
+"""What a configuration holds, where results lie, and what has to run."""

@@ -1,0 +1,52 @@
+"""The configuration files that Snakemake merges, checked before it reads them.
+
+Snakemake would take the last of two equal keys without a word, run code that a file asks for
+(``__use_yte__``), and show a traceback for a file that is no text.
+"""
+
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from pdrom.core.errors import ConfigurationError
+from pdrom.core.yamlfile import read_yaml, shown
+
+OPTIONS = ("--configfile", "--configfiles")
+TEMPLATE_KEY = "__use_yte__"
+
+
+def check_files(paths: Iterable[str | Path]) -> None:
+    """Read every file; ConfigurationError for one that is no plain mapping of keys."""
+    for path in map(Path, paths):
+        content = read_yaml(path)
+        if not isinstance(content, dict):
+            found = "nothing" if content is None else shown(content, 60)
+            raise ConfigurationError(f"{path}: a mapping of keys is required, found {found}")
+        if TEMPLATE_KEY in content:
+            raise ConfigurationError(f"{path}: {TEMPLATE_KEY}: templates are not allowed")
+
+
+def check_or_exit(*paths: str | Path) -> None:
+    """`check_files`; a fault ends the process with one line."""
+    try:
+        check_files(paths)
+    except ConfigurationError as error:
+        sys.exit(f"pdrom: {error}")
+
+
+def named_files(arguments: Sequence[str]) -> list[str]:
+    """Files that Snakemake's options name among ``arguments``."""
+    files: list[str] = []
+    inside = False
+    for argument in arguments:
+        option, equals, value = argument.partition("=")
+        if argument.startswith("-"):
+            inside = option in OPTIONS and not equals
+            files += [value] if option in OPTIONS and equals else []
+        elif inside:
+            files.append(argument)
+    return files
+
+
+if __name__ == "__main__":
+    check_or_exit(*named_files(sys.argv[1:]))

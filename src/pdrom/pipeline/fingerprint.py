@@ -1,0 +1,123 @@
+"""Fingerprints of code: what a workflow step runs, comments and docstrings left aside.
+
+Snakemake notices a change of a rule's parameters but not of a module that its script imports. A
+rule therefore carries the fingerprint of the modules it uses as a parameter.
+"""
+
+import ast
+import hashlib
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from pdrom.core.errors import ConfigurationError
+
+PACKAGE = "pdrom"
+
+
+def fingerprint(*modules: str) -> str:
+    """SHA-256 over the named modules and everything of the package that they import.
+
+    Imports are found statically, inside functions too. Names that a registry loads on demand are
+    not followed: the caller lists the modules that it will ask for.
+
+    Raises
+    ------
+    ConfigurationError
+        If a module does not exist.
+    """
+    reached = sorted(_closure(modules))
+    digest = hashlib.sha256()
+    for name in reached:
+        digest.update(f"{name} {_digest(_source(name))}\n".encode())
+    return digest.hexdigest()
+
+
+def closure(*modules: str) -> list[str]:
+    """Names of the modules that `fingerprint` covers, sorted."""
+    return sorted(_closure(modules))
+
+
+def _closure(modules: tuple[str, ...]) -> set[str]:
+    reached: set[str] = set()
+    waiting = list(modules)
+    while waiting:
+        name = waiting.pop()
+        if name in reached:
+            continue
+        reached.add(name)
+        waiting += _imports(_source(name), name)
+    return reached
+
+
+@cache
+def _source(module: str) -> Path:
+    """File of a module of the package."""
+    path = _locate(module)
+    if path is None:
+        raise ConfigurationError(f"fingerprint: no module '{module}' in the package")
+    return path
+
+
+@cache
+def _locate(module: str) -> Path | None:
+    root = Path(find_spec(PACKAGE).origin).parent
+    parts = module.split(".")
+    if parts[0] != PACKAGE:
+        return None
+    base = root.joinpath(*parts[1:])
+    for candidate in (base / "__init__.py", base.with_suffix(".py")):
+        if candidate.is_file():
+            return candidate
+    return None
+
+
+@cache
+def _imports(path: Path, module: str) -> tuple[str, ...]:
+    """Modules of the package that a file imports, with the packages above them."""
+    found: set[str] = set()
+    for node in ast.walk(_tree(path)):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            found.add(node.module)
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    parents = {parent for name in found for parent in _packages_above(name)}
+    known = {name for name in found | parents if _locate(name) is not None}
+    # the package's own __init__ holds the version only
+    return tuple(sorted(known - {PACKAGE, module}))
+
+
+def _packages_above(name: str) -> list[str]:
+    parts = name.split(".")
+    return [".".join(parts[:i]) for i in range(1, len(parts))]
+
+
+@cache
+def _tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
+def _digest(path: Path) -> str:
+    """Hash of a file's syntax tree without docstrings; layout and comments do not count."""
+    return digest_of_source(path.read_text(encoding="utf-8"))
+
+
+def digest_of_source(source: str) -> str:
+    """Hash of source text without comments, layout and docstrings."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            # a string that stands alone does nothing: docstrings, also those of attributes
+            node.body = [s for s in body if not _is_string(s)] or [ast.Pass()]
+    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
+
+
+def _is_string(statement: ast.stmt) -> bool:
+    return (
+        isinstance(statement, ast.Expr)
+        and isinstance(statement.value, ast.Constant)
+        and isinstance(statement.value.value, str)
+    )

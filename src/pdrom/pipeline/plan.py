@@ -1,0 +1,486 @@
+"""The plan that the workflow rules ask: file names, parameters and code fingerprints."""
+
+import os
+import sys
+from collections.abc import Sequence
+from functools import cached_property
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from pdrom.core.errors import ConfigurationError, PdromError, choices
+from pdrom.experiments.hard_cases.catalogue import reducible_cases
+from pdrom.experiments.hard_cases.expectations import load_expectations
+from pdrom.experiments.ladder_spec import LadderSpec, load_ladder
+from pdrom.experiments.subspace_ablation_spec import AblationSpec, load_ablation
+from pdrom.model.effects import EFFECTS
+from pdrom.model.mesh.config import MeshFile
+from pdrom.pipeline.fingerprint import fingerprint
+from pdrom.pipeline.study import Study, StudySettings, require_scenes
+from pdrom.reduction.method import MethodSpec, load_methods
+from pdrom.report.claims import load_claims
+from pdrom.report.figures import FIGURES, FigureSpec, Holdings, figure_inputs, load_figures
+from pdrom.report.figures.sources import PUBLISHED
+from pdrom.report.paper.textables import TEX_TABLES
+
+RESULTS = "results"
+REFERENCE_BASIS = "none-none-vectorised"
+TABLES = (
+    "singular_values",
+    "reconstruction_error",
+    "reduced_reruns",
+    "heldout_reruns",
+    "accuracy_cost",
+    "local_share",
+    "sensitivity",
+    "ladder",
+    "scaling",
+    "scaling_fit",
+    "stability",
+    "guard",
+    "hard_cases",
+    "kernel_accuracy",
+    "budget",
+    "breakeven",
+    "effects_cost",
+    "effects_left_out",
+    "targets",
+    "gain_prediction",
+    "online",
+    "subspace_ablation",
+    "offline_cost",
+    "claims",
+)
+
+
+def load_plan(config: dict[str, Any], root: Path, files: Sequence[str | Path] = ()) -> "Plan":
+    """Plan of a configuration; a faulty one ends the process with one line, before any job.
+
+    Parameters
+    ----------
+    files : where the configuration came from, for the messages
+    """
+    names = [os.path.relpath(path, root) for path in files] or ["config/default.yaml"]
+    source = f"configuration ({', '.join(sorted(set(names)))})"
+    try:
+        plan = Plan(Study.load(config, root, source))
+        plan.check()
+        return plan
+    except PdromError as error:
+        sys.exit(f"pdrom: {error}")
+
+
+class Plan:
+    """Everything that depends on the configuration and is needed to write the rules."""
+
+    def __init__(self, study: Study) -> None:
+        self.study = study
+        self.root = study.root
+
+    @property
+    def settings(self) -> StudySettings:
+        """Checked settings of the study."""
+        return self.study.settings
+
+    def check(self) -> None:
+        """Read every file of the configuration, so that a fault shows early."""
+        folder = self.root / "config"
+        load_claims(folder / "claims.yaml")
+        load_expectations(folder / "hard_cases.yaml")
+        self.hard_cases()
+        self._check_scenes(folder)
+        self._check_figures(folder)
+        self.scaling_specs()
+
+    def _check_scenes(self, folder: Path) -> None:
+        settings = self.settings
+        named = {
+            f"{folder / 'ladder.yaml'}: scenes": self.ladder.scenes,
+            f"{folder / 'subspace_ablation.yaml'}: scenes": self.ablation.scenes,
+            "subspace.scenes": settings.subspace.scenes,
+            "scaling.scenes": tuple(settings.scaling.scenes),
+            "stability.scenes": settings.stability.scenes,
+            "guard.cases": tuple(case.scene for case in settings.guard.cases),
+        }
+        for place, scenes in named.items():
+            require_scenes(self.root, scenes, place)
+
+    def _check_figures(self, folder: Path) -> None:
+        known = {"methods": load_methods(folder / "methods.yaml"), "groups": EFFECTS}
+        for figure, spec in self.figure_specs.items():
+            for key, names in known.items():
+                for name in getattr(spec, key):
+                    if name not in names:
+                        place = f"{folder / 'figures.yaml'}: {figure}.{key} = '{name}'"
+                        raise ConfigurationError(f"{place}: unknown{choices(name, names)}")
+
+    # Parameters -----------------------------------------------------------------------------
+
+    def scene_config(self, scene: str) -> dict[str, Any]:
+        """Plain configuration of a scene; a change of it reruns the scene's jobs."""
+        return self._scene_configs[scene]
+
+    @cached_property
+    def _scene_configs(self) -> dict[str, dict[str, Any]]:
+        return {name: s.model_dump(mode="json") for name, s in self.study.scenes.items()}
+
+    def mesh_config(self, mesh: str) -> dict[str, Any]:
+        """Plain configuration of a mesh."""
+        return self.study.meshes[mesh].model_dump(mode="json")
+
+    def mesh_file(self, mesh: str) -> list[str]:
+        """The file that a mesh is read from, an empty list for one that is generated."""
+        config = self.study.meshes[mesh]
+        return [config.path] if isinstance(config, MeshFile) else []
+
+    def digest(self, *paths: str) -> str:
+        """Checksum of files that people edit.
+
+        Snakemake compares times of files, which a copy, an archive or a wrong clock may set back;
+        as a parameter of a rule, the content itself decides.
+        """
+        files = [self.root / path for path in paths]
+        content = b"".join(sha256(f.read_bytes()).digest() for f in files if f.is_file())
+        return sha256(content).hexdigest()[:16]
+
+    def method_spec(self, method: str) -> dict[str, Any]:
+        """Plain specification of a method."""
+        return self._method(method).model_dump(mode="json")
+
+    def method_specs(self) -> dict[str, dict[str, Any]]:
+        """Plain specifications of all methods of the study."""
+        return {name: self.method_spec(name) for name in self.study.methods}
+
+    def basis_spec(self, basis: str) -> dict[str, Any]:
+        """Plain specification of the first method that uses ``basis``."""
+        names = [m for m, spec in self.study.methods.items() if spec.basis_id == basis]
+        return {k: self.method_spec(names[0])[k] for k in ("weighting", "centring", "layout")}
+
+    def subspace_settings(self) -> dict[str, Any]:
+        """Plain settings of the position subspaces; which scenes have them is no parameter."""
+        return self.settings.subspace.model_dump(mode="json", exclude={"scenes"})
+
+    def _method(self, method: str) -> MethodSpec:
+        return self.study.methods[method]
+
+    # Files ----------------------------------------------------------------------------------
+
+    def mesh_path(self, scene: str) -> str:
+        """Mesh file of a scene."""
+        return f"{RESULTS}/meshes/{self.study.mesh_of(scene)}.h5"
+
+    def basis_path(self, scene: str, group: str, method: str) -> str:
+        """Basis file that a method needs."""
+        return f"{RESULTS}/pod/{scene}/{group}/{self._method(method).basis_id}.h5"
+
+    def bases_of(self, scene: str) -> list[str]:
+        """All basis files of a scene."""
+        groups = self.study.scenes[scene].reduce
+        paths = [self.basis_path(scene, g, m) for g in groups for m in self.study.methods]
+        return sorted(set(paths))
+
+    def reference_bases(self) -> list[str]:
+        """One basis file per experiment, for its singular values: uncentred if there."""
+        paths = []
+        for scene, group in self.study.experiments:
+            ids = [spec.basis_id for spec in self.study.methods.values()]
+            chosen = sorted(ids, key=lambda i: (i != REFERENCE_BASIS, ids.index(i)))[0]
+            paths.append(f"{RESULTS}/pod/{scene}/{group}/{chosen}.h5")
+        return paths
+
+    def samplings_of(self, scene: str) -> list[str]:
+        """All sampling files of a scene."""
+        return self._per_method("sampling", ".h5", scene)
+
+    def per_experiment(self, stage: str, tail: str) -> list[str]:
+        """Files of a stage over all scenes, groups and methods, in configuration order."""
+        return [p for scene in self.study.scenes for p in self._per_method(stage, tail, scene)]
+
+    def per_scene(self, stage: str, tail: str) -> list[str]:
+        """Files of a stage over all scenes; ``tail`` follows the scene's name."""
+        return [f"{RESULTS}/{stage}/{scene}{tail}" for scene in self.study.scenes]
+
+    def hyper(self, tail: str) -> list[str]:
+        """Files of the position subspaces over the scenes that have them."""
+        scenes = [s for s in self.study.scenes if s in self.settings.subspace.scenes]
+        return [f"{RESULTS}/hyper/{scene}/{tail}" for scene in scenes]
+
+    def hyper_of(self, scene: str) -> list[str]:
+        """The models of one scene, an empty list if it has none."""
+        path = f"{RESULTS}/hyper/{scene}/models.h5"
+        return [path] if path in self.hyper("models.h5") else []
+
+    def _per_method(self, stage: str, tail: str, scene: str) -> list[str]:
+        return [
+            f"{RESULTS}/{stage}/{scene}/{group}/{method}{tail}"
+            for group in self.study.scenes[scene].reduce
+            for method in self.study.methods
+        ]
+
+    @property
+    def tables(self) -> list[str]:
+        """All tables."""
+        return [f"{RESULTS}/tables/{name}.csv" for name in TABLES]
+
+    # Stability and guard --------------------------------------------------------------------
+
+    @property
+    def sweeps(self) -> list[str]:
+        """Files of the short runs over time step and stiffness."""
+        scenes = [s for s in self.study.scenes if s in self.settings.stability.scenes]
+        return [f"{RESULTS}/stability/{scene}.csv" for scene in scenes]
+
+    def stability_settings(self) -> dict[str, Any]:
+        """Plain settings of the short runs; which scenes have them is no parameter."""
+        settings = self.settings.stability
+        ranks = [r for r in settings.ranks if r in self.settings.ranks]
+        other = {"scenes", "wrong", "left"}
+        return {**settings.model_dump(mode="json", exclude=other), "ranks": ranks}
+
+    def time_steps(self) -> dict[str, float]:
+        """Time step of every scene in seconds."""
+        return {name: scene.time_step for name, scene in self.study.scenes.items()}
+
+    def guard_settings(self) -> dict[str, Any]:
+        """Plain settings of the guard of the reruns."""
+        return self.settings.guard.watching.model_dump(mode="json")
+
+    @cached_property
+    def _guard_cases(self) -> list[tuple[str, str, str, int | str]]:
+        """(scene, group, method, r) of the guard's cases that this configuration holds."""
+        held = [c for c in self.settings.guard.cases if c.scene in self.study.scenes]
+        held = [c for c in held if c.method in self.study.methods and c.r in self.settings.ranks]
+        return [
+            (c.scene, group, c.method, c.r)
+            for c in held
+            for group in self.study.scenes[c.scene].reduce
+        ]
+
+    def guard_cases(self) -> list[dict[str, Any]]:
+        """Plain cases of the guard."""
+        return [
+            {"scene": self.scene_config(scene), "group": group, "name": method, "r": r,
+             "method": self.method_spec(method)}
+            for scene, group, method, r in self._guard_cases
+        ]  # fmt: skip
+
+    def guard_files(self, kind: str) -> list[str]:
+        """Mesh, fom, basis or sampling file of each case, in order."""
+        places = {
+            "mesh": lambda scene, group, method: self.mesh_path(scene),
+            "fom": lambda scene, group, method: f"{RESULTS}/fom/{scene}/train.h5",
+            "basis": self.basis_path,
+            "sampling": lambda scene, group, method: (
+                f"{RESULTS}/sampling/{scene}/{group}/{method}.h5"
+            ),
+        }
+        return [places[kind](*case[:3]) for case in self._guard_cases]
+
+    def guard_code(self) -> str:
+        """Fingerprint of the guard's stage with the effects of its scenes."""
+        scenes = dict.fromkeys(case[0] for case in self._guard_cases)
+        modules = [m for scene in scenes for m in self.study.scenes[scene].modules]
+        return fingerprint("pdrom.experiments.guard", *modules)
+
+    # Ladder ---------------------------------------------------------------------------------
+
+    @cached_property
+    def ladder(self) -> LadderSpec:
+        """Ladder of config/ladder.yaml."""
+        return load_ladder(self.root / "config" / "ladder.yaml")
+
+    def ladder_rungs(self) -> dict[str, Any]:
+        """Plain ladder; which scenes climb it is no parameter of one climb."""
+        return {**self.ladder.model_dump(mode="json"), "scenes": []}
+
+    def ladder_files(self) -> list[str]:
+        """Files of the scenes that climb the ladder and are in this configuration."""
+        pairs = [(s, g) for s, g in self.study.experiments if s in self.ladder.scenes]
+        return [f"{RESULTS}/ladder/{scene}/{group}.csv" for scene, group in pairs]
+
+    # Scaling --------------------------------------------------------------------------------
+
+    def scaling_files(self, stage: str = "scaling") -> list[str]:
+        """Parts of the table scaling (or breakeven), of the scenes in this configuration."""
+        return [
+            f"{RESULTS}/{stage}/{scene}/x{factor:g}.csv"
+            for scene, factors in self.settings.scaling.scenes.items()
+            if scene in self.study.scenes
+            for factor in factors
+        ]
+
+    def breakeven_files(self) -> list[str]:
+        """Parts of the table breakeven: of each scene as it is, and of it on other meshes."""
+        own = self.per_scene("breakeven", ".csv")
+        return own + [path for path in self.scaling_files("breakeven") if Path(path).stem != "x1"]
+
+    def scaling_specs(self) -> dict[str, Any]:
+        """Plain specifications of the methods that are timed on growing meshes."""
+        settings, methods = self.settings.scaling, load_methods(self.root / "config/methods.yaml")
+        wanted = {
+            "scaling.method": (settings.method,),
+            "scaling.breakeven.methods": settings.breakeven.methods,
+        }
+        for key, names in wanted.items():
+            for name in set(names) - set(methods):
+                raise ConfigurationError(f"{key} = '{name}': unknown{choices(name, methods)}")
+        names = dict.fromkeys(name for group in wanted.values() for name in group)
+        return {name: methods[name].model_dump(mode="json") for name in names}
+
+    def scaling_settings(self) -> dict[str, Any]:
+        """Plain settings of a mesh size; which sizes there are is no parameter of one."""
+        return self.settings.scaling.model_dump(mode="json", exclude={"scenes"})
+
+    # Hard cases -----------------------------------------------------------------------------
+
+    def hard_cases(self) -> dict[str, Any]:
+        """Parameters of the hard cases: every method of config/methods.yaml runs in them."""
+        settings, known = self.settings.hard_cases, reducible_cases()
+        for name in settings.cases:
+            if name not in known:
+                raise ConfigurationError(
+                    f"hard_cases.cases: unknown case '{name}' (allowed: {', '.join(known)})"
+                )
+        methods = load_methods(self.root / "config" / "methods.yaml")
+        return {
+            "methods": {name: spec.model_dump(mode="json") for name, spec in methods.items()},
+            "cases": list(settings.cases or known),
+            "matrices": settings.matrices,
+        }
+
+    def hard_cases_code(self) -> str:
+        """Fingerprint of the hard cases, which use every effect there is."""
+        return fingerprint("pdrom.experiments.hard_cases.experiment", *map(EFFECTS.module, EFFECTS))
+
+    # Large scenes ---------------------------------------------------------------------------
+
+    def online_scene(self, scene: str) -> dict[str, Any]:
+        """Plain configuration of a large scene."""
+        return self.study.online[scene].model_dump(mode="json")
+
+    def online_settings(self) -> dict[str, Any]:
+        """Plain settings of the large scenes; which there are is no parameter of one."""
+        return self.settings.online.model_dump(mode="json", exclude={"scenes"})
+
+    def online_files(self) -> list[str]:
+        """Files of the large scenes of this configuration."""
+        return [f"{RESULTS}/online/{scene}.csv" for scene in self.study.online]
+
+    def online_code(self, scene: str) -> str:
+        """Fingerprint of the stage together with the effects that a large scene lists."""
+        return fingerprint("pdrom.experiments.online", *self.study.online[scene].modules)
+
+    # Ablation in position subspaces ---------------------------------------------------------
+
+    @cached_property
+    def ablation(self) -> AblationSpec:
+        """Ablation of config/subspace_ablation.yaml."""
+        return load_ablation(self.root / "config" / "subspace_ablation.yaml")
+
+    def ablation_settings(self) -> dict[str, Any]:
+        """Plain ablation; which scenes it runs on is no parameter of one run."""
+        return {**self.ablation.model_dump(mode="json", exclude_unset=True), "scenes": []}
+
+    def ablation_files(self) -> list[str]:
+        """Files of the scenes of the ablation that this configuration holds."""
+        scenes = [s for s in self.study.scenes if s in self.ablation.scenes]
+        return [f"{RESULTS}/subspace_ablation/{scene}.csv" for scene in scenes]
+
+    # Figures --------------------------------------------------------------------------------
+
+    @cached_property
+    def figure_specs(self) -> dict[str, FigureSpec]:
+        """Figures of config/figures.yaml, with the floor's settings of this study."""
+        floor = self.settings.sensitivity
+        update = {"perturbation": floor.reference, "threshold": floor.threshold}
+        figures = load_figures(self.root / "config" / "figures.yaml")
+        return {name: spec.model_copy(update=update) for name, spec in figures.items()}
+
+    @cached_property
+    def _holdings(self) -> Holdings:
+        return Holdings.of_study(self.study)
+
+    @property
+    def figures(self) -> list[str]:
+        """PDF of every figure."""
+        return [f"{RESULTS}/figures/{name}.pdf" for name in self.figure_specs]
+
+    def figure_spec(self, figure: str) -> dict[str, Any]:
+        """Plain specification of a figure."""
+        return self.figure_specs[figure].model_dump(mode="json")
+
+    def figure_label(self, figure: str) -> str:
+        """Number in the paper and name, for the report."""
+        number = self.figure_specs[figure].number
+        return f"{number} {figure}" if number else figure
+
+    def figure_holdings(self, figure: str) -> dict[str, Any]:
+        """What this configuration holds, as plain data."""
+        return self._holdings.model_dump(mode="json")
+
+    def figure_inputs(self, figure: str) -> list[str]:
+        """Files that a figure reads."""
+        spec = self.figure_specs[figure]
+        published = sorted(map(str, PUBLISHED.glob("*.csv"))) if spec.published else []
+        return published + figure_inputs(figure, spec, self._holdings, RESULTS)
+
+    def figure_code(self, figure: str) -> str:
+        """Fingerprint of the code that draws a figure."""
+        return fingerprint("pdrom.report.drawing", FIGURES.module(figure))
+
+    # Manuscript -----------------------------------------------------------------------------
+
+    @property
+    def paper_inputs(self) -> list[str]:
+        """Generated files that main.tex reads."""
+        return ["macros.tex", "main.bbl", *(f"{name}.tex" for name in TEX_TABLES)]
+
+    def facts(self) -> dict[str, list[dict[str, Any]]]:
+        """Facts of the configuration that the manuscript states, as tables."""
+        settings = self.settings
+        study = {
+            "scenes": len(self.study.scenes),
+            "experiments": len(self.study.experiments),
+            "threshold": settings.sensitivity.threshold,
+            "perturbation": settings.sensitivity.reference,
+            "seeds": len(settings.sensitivity.seeds),
+            "repeats": settings.timing.repeats,
+            "timed_frames": settings.timing.frames,
+            "blowup_extent": settings.blowup_extent,
+            "ranks": ", ".join(str(r) for r in settings.ranks),
+            "wrong": settings.stability.wrong,
+            "left": settings.stability.left,
+            "guard_action": settings.guard.action,
+            "guard_margin": settings.guard.margin,
+            "guard_extent": settings.guard.extent,
+            "guard_rise": settings.guard.rise,
+            "tolerance": settings.iterations.tolerance,
+        }
+        methods = [{"method": m, **self.method_spec(m)} for m in self.study.methods]
+        scenes = [self._scene_facts(name) for name in self.study.scenes]
+        return {"study": [study], "methods": methods, "scenes": scenes}
+
+    def _scene_facts(self, name: str) -> dict[str, Any]:
+        config = self.study.scenes[name]
+        scene = self.study.bound[name]
+        weights = {e.effect: e.weight for e in config.effects if e.effect in config.groups}
+        return {
+            "scene": name,
+            "groups": ", ".join(f"{g} ({weights[g]:g})" for g in config.groups),
+            "vertices": scene.mesh.vertices,
+            "elements": sum(group.elements for group in scene.groups),
+            "frames": config.frames,
+            "iterations": config.iterations,
+            "time_step": config.time_step,
+            "vertex_mass": config.vertex_mass,
+        }
+
+    # Code -----------------------------------------------------------------------------------
+
+    def code(self, *modules: str) -> str:
+        """Fingerprint of the code that a stage runs; a change of it reruns the stage."""
+        return fingerprint(*modules)
+
+    def scene_code(self, stage: str, scene: str) -> str:
+        """Fingerprint of a stage together with the effects that a scene lists."""
+        return fingerprint(stage, *self.study.scenes[scene].modules)

@@ -1,0 +1,1 @@
+"""Model order reduction: snapshots, bases, samplings and reduced runs."""

@@ -1,0 +1,140 @@
+"""A reduction method is a combination of ingredients; the presets are named combinations."""
+
+import re
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from pdrom.core.errors import ConfigurationError
+from pdrom.core.yamlfile import ConfigModel, read_yaml, shown, validate
+
+METHOD_NAME = "[a-z0-9][a-z0-9-]{0,63}"
+Weighting = Literal["none", "mass"]
+Centring = Literal["none", "affine", "mean-in-modes"]
+Layout = Literal["vectorised", "per-axis"]
+Rows = Literal["all", "scalar", "joint", "element"]
+Selection = Literal["greedy", "pivoted-qr", "s-opt"]
+Solve = Literal["square", "qr", "tikhonov"]
+Bounds = Literal["none", "training"]
+
+
+class BasisSpec(ConfigModel):
+    """How a basis is made from snapshots.
+
+    weighting : "mass" makes the modes orthonormal in the lumped-mass inner product of the rows
+    centring : "affine" subtracts the mean and adds it back online; "mean-in-modes" is the way of
+        the published code (first snapshot subtracted, modes rescaled, it is added to every mode,
+        re-orthogonalised per axis)
+    layout : "vectorised" has one column per snapshot with coefficients shared by x, y, z;
+        "per-axis" has one basis for each axis
+    """
+
+    weighting: Weighting = "none"
+    centring: Centring = "none"
+    layout: Layout = "vectorised"
+
+    @property
+    def basis_id(self) -> str:
+        """Name of the basis file."""
+        return f"{self.weighting}-{self.centring}-{self.layout}"
+
+
+class MethodSpec(BasisSpec):
+    """A reduction of one group's projections.
+
+    rows : "all" is the orthogonal projection, "scalar" samples single entries (classical DEIM),
+        "joint" one row for x, y and z with separate coefficients (the paper's variant), "element"
+        all 3p entries of an element
+    selection : "greedy" residual (DEIM), "pivoted-qr" (Q-DEIM) or "s-opt" (S-OPT)
+    solve : of the sampled equations: "square", least squares by "qr", or normal equations with
+        Tikhonov term ("tikhonov", the published code)
+    oversampling : samples per mode; further ones by S-OPT after selection "s-opt", otherwise by
+        GappyPOD+E
+    gain_bound : samples are added (GappyPOD+E) until the gain is at most this, so that the error of
+        a projection is at most this multiple of the best approximation's; None: no bound
+    bounds : "training" keeps the coefficients in the range of the training snapshots
+    margin : by how much of its width that range is extended at both ends
+    coefficients : "shared" by the axes or "per-axis"; None takes what the rows and the basis imply
+    repeat_rows : whether the greedy may pick a row again (the published code does not exclude it)
+    title : what the method is called in figures and tables
+    """
+
+    title: str
+    rows: Rows
+    selection: Selection = "greedy"
+    solve: Solve = "qr"
+    repeat_rows: bool = False
+    oversampling: Annotated[int, Field(ge=1, le=100)] = 1
+    gain_bound: Annotated[float, Field(gt=1.0, le=1e6)] | None = None
+    bounds: Bounds = "none"
+    margin: Annotated[float, Field(ge=0.0, le=10.0)] = 0.1
+    coefficients: Literal["shared", "per-axis"] | None = None
+    tikhonov: Annotated[float, Field(gt=0.0, le=1.0)] = 1e-8
+
+    @model_validator(mode="after")
+    def _combination_exists(self) -> Self:
+        if self.rows == "joint" and self.selection != "greedy":
+            raise ValueError(f"rows = 'joint' with selection = '{self.selection}': only 'greedy'")
+        if self.rows == "element" and self.solve == "square":
+            raise ValueError("rows = 'element' with solve = 'square': allowed are qr, tikhonov")
+        if self.oversampling > 1 and not self.may_oversample:
+            raise ValueError(
+                f"oversampling = {self.oversampling} with rows = '{self.rows}', solve = "
+                f"'{self.solve}': only rows = 'scalar' or 'element' with solve = 'qr', 'tikhonov'"
+            )
+        if self.gain_bound is not None and (not self.may_oversample or self.per_axis):
+            raise ValueError(
+                f"gain_bound = {self.gain_bound} with rows = '{self.rows}', solve = "
+                f"'{self.solve}': only rows = 'scalar' or 'element' with solve = 'qr', "
+                "'tikhonov' and coefficients that the axes share"
+            )
+        if self.bounds != "none" and self.per_axis:
+            raise ValueError(
+                f"bounds = '{self.bounds}' with coefficients per axis: only with shared ones"
+            )
+        if self.separate_axes and self.coefficients == "shared":
+            raise ValueError(
+                f"coefficients = 'shared' with {self.layout}, {self.centring}: only 'per-axis'"
+            )
+        if self.per_axis and self.rows == "scalar":
+            raise ValueError(
+                f"rows = 'scalar' with {self.layout}, {self.centring}: separate coefficients per "
+                "axis need rows = 'all', 'joint' or 'element'"
+            )
+        if self.repeat_rows and self.solve == "square":
+            raise ValueError("repeat_rows with solve = 'square': a repeated row is singular")
+        return self
+
+    @property
+    def may_oversample(self) -> bool:
+        """Whether there can be more samples than modes."""
+        return self.rows in ("scalar", "element") and self.solve != "square"
+
+    @property
+    def per_axis(self) -> bool:
+        """Whether each axis has coefficients of its own."""
+        if self.coefficients is not None:
+            return self.coefficients == "per-axis"
+        return self.rows == "joint" or self.separate_axes
+
+    @property
+    def separate_axes(self) -> bool:
+        """Whether the basis itself is orthonormal axis by axis, not as a whole."""
+        return self.layout == "per-axis" or self.centring == "mean-in-modes"
+
+
+def load_methods(path: Path) -> dict[str, MethodSpec]:
+    """Methods of config/methods.yaml by name; ConfigurationError for any fault."""
+    content = read_yaml(path)
+    if not isinstance(content, dict) or not content:
+        raise ConfigurationError(f"{path}: a mapping of method names is required")
+    for name in content:
+        if not isinstance(name, str) or not re.fullmatch(METHOD_NAME, name):
+            raise ConfigurationError(
+                f"{path}: method {shown(name, 60)}: allowed are small letters, digits and hyphens"
+            )
+    return {
+        str(name): validate(MethodSpec, spec, f"{path}: method '{name}'")
+        for name, spec in content.items()
+    }

@@ -1,0 +1,157 @@
+"""GappyPOD+E: more samples than modes, each where it raises sigma_min most.
+
+B. Peherstorfer, Z. Drmac, S. Gugercin, Stability of discrete empirical interpolation and gappy
+proper orthogonal decomposition with randomized and deterministic sampling points, SIAM J. Sci.
+Comput. 42 (2020), section 4. Points are generalised to blocks of rows (the elements), and how many
+there are may follow from a bound on the gain instead of being given.
+"""
+
+import numpy as np
+from scipy import linalg
+
+from pdrom.core.errors import SamplingError
+
+
+def oversample(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np.ndarray:
+    """``elements`` followed by others, ``count`` in all (or as many as there are).
+
+    Parameters
+    ----------
+    v : (size e, r) basis, ``size`` consecutive rows for each of the e elements
+    elements : where to start, distinct; usually one for each mode
+
+    Raises
+    ------
+    SamplingError
+        An element is repeated or out of range.
+    """
+    growing = _Growing(v, size, elements)
+    while growing.count < min(count, growing.total):
+        growing.add()
+    return growing.chosen
+
+
+def bound_gain(v: np.ndarray, size: int, elements: np.ndarray, bound: float) -> np.ndarray:
+    """``elements`` followed by others until || (P^T V)^+ ||_2 <= ``bound``.
+
+    It ends with all elements if even they do not meet the bound, which for orthonormal columns and
+    a bound of at least 1 cannot happen: their gain is 1. Parameters and errors as `oversample`.
+    """
+    growing = _Growing(v, size, elements)
+    while growing.count < growing.total and growing.gain > bound:
+        growing.add()
+    return growing.chosen
+
+
+class _Growing:
+    """Sampled elements and the Gram matrix G = (P^T V)^T P^T V of their rows."""
+
+    def __init__(self, v: np.ndarray, size: int, elements: np.ndarray) -> None:
+        self._rows = np.ascontiguousarray(v)
+        self._blocks = self._rows.reshape(-1, size, v.shape[1])
+        self._picked = [int(e) for e in elements]
+        self._check()
+        rows = self._blocks[self._picked].reshape(-1, v.shape[1])
+        self._gram = rows.T @ rows
+        self._decompose()
+
+    def _check(self) -> None:
+        if len(set(self._picked)) < len(self._picked):
+            raise SamplingError(f"{self.count} elements to start with, some of them repeated")
+        if self._picked and not 0 <= min(self._picked) <= max(self._picked) < self.total:
+            raise SamplingError(
+                f"elements {min(self._picked)} to {max(self._picked)} to start with: allowed are "
+                f"0 to {self.total - 1}"
+            )
+
+    @property
+    def total(self) -> int:
+        """Number of elements e."""
+        return len(self._blocks)
+
+    @property
+    def count(self) -> int:
+        """Number of sampled elements."""
+        return len(self._picked)
+
+    @property
+    def chosen(self) -> np.ndarray:
+        """Sampled elements in order of selection."""
+        return np.array(self._picked, dtype=np.int64)
+
+    @property
+    def gain(self) -> float:
+        """1 / sigma_min; inf where the smallest eigenvalue of G is round-off."""
+        roundoff = len(self._gram) * np.finfo(float).eps * np.trace(self._gram)
+        return 1.0 / np.sqrt(self._smallest) if self._smallest > roundoff else np.inf
+
+    def add(self) -> None:
+        """Sample the element with the largest bound on the growth of the smallest eigenvalue."""
+        new = self._strongest()
+        self._picked.append(new)
+        self._gram += self._blocks[new].T @ self._blocks[new]
+        self._decompose()
+
+    def _decompose(self) -> None:
+        """Smallest eigenvalue of G, its eigenvector, and the gap to the next (inf if r = 1)."""
+        last = min(1, len(self._gram) - 1)
+        values, vectors = linalg.eigh(
+            self._gram, subset_by_index=(0, last), check_finite=False, driver="evr"
+        )
+        self._smallest, self._weakest = float(values[0]), vectors[:, 0]
+        self._gap = max(float(values[1] - values[0]), 0.0) if last else np.inf
+
+    def _strongest(self) -> int:
+        """Element that is not sampled yet with the largest `eigenvalue_growth`.
+
+        The growth is at most |B u|^2: candidates are those where this is larger than the bound of
+        the element with the largest |B u|^2, which wins ties: if the smallest eigenvalue is double,
+        all bounds are zero.
+        """
+        products = (self._rows @ self._weakest).reshape(self.total, -1)
+        strength = np.einsum("es,es->e", products, products)
+        strength[self._picked] = -1.0
+        first = int(np.argmax(strength))
+        bound = self._growth(np.array([first]), products)[0]
+        if bound == 0.0:
+            return first
+        others = np.flatnonzero(strength > bound)
+        growth = self._growth(others, products)
+        return int(others[np.argmax(growth)]) if growth.max(initial=0.0) > bound else first
+
+    def _growth(self, elements: np.ndarray, products: np.ndarray) -> np.ndarray:
+        return eigenvalue_growth(self._blocks[elements], products[elements], self._gap)
+
+
+def eigenvalue_growth(blocks: np.ndarray, products: np.ndarray, gap: float) -> np.ndarray:
+    """Lower bounds on how much B^T B raises the smallest eigenvalue of a symmetric matrix, (m,).
+
+    For u the eigenvector of the smallest eigenvalue, g the gap to the next one and b = B u,
+
+        t = (g + n - sqrt((g + n)^2 - 4 g |b|^2)) / 2,    n = |B^T b|^2 / |b|^2.
+
+    For a single row n = |B|^2: the bound of Ipsen and Nadler (2009) in the paper's equation (4.3).
+    For blocks: with all other eigenvalues lowered to the second smallest, the growth is the root of
+    t = sum_i beta_i^2 f(mu_i), f(mu) = (g - t) / (g - t + mu), where mu_i are the eigenvalues of
+    C C^T, C the part of B orthogonal to u, and beta_i the components of b in its eigenvectors. f is
+    convex, so that by Jensen's inequality the mean of mu, |C^T b|^2 / |b|^2 = n - |b|^2, gives a
+    lower bound. An infinite gap gives |b|^2.
+
+    Parameters
+    ----------
+    blocks : (m, s, r) the B of m candidates
+    products : (m, s) their b
+    gap : g >= 0
+    """
+    squared = np.einsum("es,es->e", products, products)
+    if np.isinf(gap):
+        return squared
+    pulled = (products[:, None, :] @ blocks)[:, 0]
+    mean = np.einsum("ek,ek->e", pulled, pulled)
+    mean = np.divide(mean, squared, out=np.zeros_like(mean), where=squared > 0.0)
+    total = gap + mean
+    root = np.sqrt(np.maximum(total**2 - 4.0 * gap * squared, 0.0))
+    # the smaller root without cancellation
+    denominator = total + root
+    growth = np.zeros_like(squared)
+    return np.divide(2.0 * gap * squared, denominator, out=growth, where=denominator > 0.0)

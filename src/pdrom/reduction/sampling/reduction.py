@@ -1,0 +1,141 @@
+"""A reduced projection: p(q) is replaced by mean + V c, with c from sampled entries of p."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pdrom.reduction.basis.types import Basis
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.sampling.solve import norm_and_condition, solution_operator
+from pdrom.reduction.sampling.types import Sampling
+
+
+@dataclass(frozen=True)
+class Block:
+    """One set of coefficients: shared by all axes (``axis`` None), or of a single axis.
+
+    entries : sampled entries of the vectorised projection that determine the coefficients
+    matrix : (m, r) the basis at these entries
+    operator : (r, m) from sampled values to coefficients
+    """
+
+    axis: int | None
+    entries: np.ndarray
+    matrix: np.ndarray
+    operator: np.ndarray
+
+    @property
+    def output(self) -> slice:
+        """Entries of the vectorised projection that the block reconstructs."""
+        return slice(None) if self.axis is None else slice(self.axis, None, 3)
+
+
+class Reduction:
+    """An interpolation (or projection) operator of a method at basis size r.
+
+    An axis in which the training data are round-off carries nothing: its coefficients are zero and
+    it does not count for the gain. That is kinder to methods with separate systems per axis than
+    their text, which would divide noise by noise. An axis that does carry something but whose
+    system is singular is a failure of the method: gain inf, reconstruction nan.
+    """
+
+    def __init__(self, basis: Basis, sampling: Sampling, spec: MethodSpec, r: int) -> None:
+        self.basis, self.sampling, self.spec, self.r = basis, sampling, spec, r
+        self.v = basis.truncated(r)
+        axes = [int(a) for a in np.flatnonzero(basis.active_axes)] if spec.per_axis else [None]
+        self.blocks = [self._block(axis) for axis in axes]
+        self._limits = _limits(basis, spec, r)
+
+    @property
+    def elements(self) -> np.ndarray:
+        """Elements to evaluate, in the order that `coefficients` expects."""
+        return self.sampling.elements
+
+    def limited(self, coefficients: np.ndarray) -> np.ndarray:
+        """Coefficients (..., r) in the range of the training snapshots, if the method asks for it.
+
+        Each one is clipped: for orthonormal modes the nearest admissible point to V c. It brings c
+        nearer to every admissible c*, so that it cannot hurt where the true ones are in range;
+        where a run rightly leaves the range, it does.
+        Bounded least squares would fit the samples better, but needs an iteration per evaluation.
+        """
+        if self._limits is None:
+            return coefficients
+        return np.clip(coefficients, *self._limits)
+
+    def _block(self, axis: int | None) -> Block:
+        if self.spec.rows == "all":
+            entries = np.arange(len(self.v))[slice(None) if axis is None else slice(axis, None, 3)]
+            matrix = self.v[entries]
+            return Block(axis, entries, matrix, _orthogonal_operator(matrix))
+        entries = _entries_of(self.sampling.entries, self.spec.rows, axis)
+        matrix = self.v[entries]
+        operator = solution_operator(matrix, self.spec.solve, self.spec.tikhonov)
+        return Block(axis, entries, matrix, operator)
+
+    @cached_property
+    def _norms(self) -> tuple[float, float]:
+        if self.spec.rows == "all":
+            return 1.0, 1.0
+        pairs = [norm_and_condition(b.matrix, b.operator) for b in self.blocks]
+        return max(g for g, _ in pairs), max(c for _, c in pairs)
+
+    @property
+    def gain(self) -> float:
+        """|| (P^T V)^+ ||_2, the largest over the coefficient blocks; inf if one is singular.
+
+        For orthonormal V: || p - p^ || <= gain || (I - V V^T)(p - mean) || (Chaturantabut and
+        Sorensen 2010, lemma 3.2). It holds for separate axes too, where the parts V_a of V have
+        norm at most 1, but not for the Tikhonov solve, which is no projection: its gain is the
+        norm of its operator. With mass weighting V is orthonormal in the mass inner product and
+        the factor of the error in that norm is || (P^T V)^+ P^T M^(-1/2) ||_2 instead; the gain
+        stays the amplification of sampled values, as for the other methods.
+        """
+        return self._norms[0]
+
+    @property
+    def condition(self) -> float:
+        """Condition number of P^T V, the largest over the coefficient blocks."""
+        return self._norms[1]
+
+    @property
+    def rows_sampled(self) -> int:
+        """Number of distinct operator rows with a sampled entry."""
+        return len(np.unique(self.sampling.entries // 3))
+
+    def reconstruct(self, snapshots: np.ndarray) -> np.ndarray:
+        """Reduced version of full projections (n, e p, 3), same shape; nan if it does not exist."""
+        matrix = snapshots.reshape(len(snapshots), -1)
+        result = np.tile(self.basis.mean, (len(matrix), 1))
+        for block in self.blocks:
+            sampled = matrix[:, block.entries] - self.basis.mean[block.entries]
+            coefficients = self.limited(sampled @ block.operator.T)
+            result[:, block.output] += coefficients @ self.v[block.output].T
+        return result.reshape(snapshots.shape)
+
+
+def _limits(basis: Basis, spec: MethodSpec, r: int) -> np.ndarray | None:
+    """Smallest and largest admissible coefficients (2, r); None if they are free."""
+    if spec.bounds == "none":
+        return None
+    lower, upper = basis.trained[0, :, :r]
+    extra = spec.margin * (upper - lower)
+    return np.stack([lower - extra, upper + extra])
+
+
+def _entries_of(entries: np.ndarray, rows: str, axis: int | None) -> np.ndarray:
+    """Entries that determine the coefficients of ``axis`` (None: of all axes)."""
+    if rows == "joint":
+        # one index stands for the whole row
+        axes = np.arange(3) if axis is None else np.array([axis])
+        return (3 * (entries // 3)[:, None] + axes).ravel()
+    return entries if axis is None else entries[entries % 3 == axis]
+
+
+def _orthogonal_operator(matrix: np.ndarray) -> np.ndarray:
+    """Pseudo-inverse of a full-rank matrix (n, r): V^T for orthonormal columns."""
+    gram = matrix.T @ matrix
+    if np.allclose(gram, np.eye(len(gram)), rtol=0.0, atol=1e-12):
+        return matrix.T
+    return np.linalg.pinv(matrix)

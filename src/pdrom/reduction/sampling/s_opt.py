@@ -1,0 +1,187 @@
+"""S-OPT: samples that maximise the S-measure of the sampled basis, one after the other.
+
+J. T. Lauzon, S. W. Cheung, Y. Shin, Y. Choi, D. M. Copeland, K. Huynh, S-OPT: A points selection
+algorithm for hyper-reduction in reduced order models, SIAM J. Sci. Comput. 46 (2024), after Shin
+and Xiu (2016). Points are generalised to blocks of rows (the elements).
+"""
+
+import numpy as np
+from scipy import linalg
+
+from pdrom.core.errors import SamplingError
+
+_EPS = np.finfo(float).eps
+
+
+def s_measure(a: np.ndarray) -> float:
+    """S(A) = (sqrt(det A^T A) / prod_j |A_j|)^(1/r) of A (m, r), columns A_j; in [0, 1].
+
+    1 if and only if the columns are orthogonal, 0 if they depend on each other.
+    """
+    norms = np.linalg.norm(a, axis=0)
+    if a.shape[0] < a.shape[1] or not norms.all():
+        return 0.0
+    logarithm = np.linalg.slogdet((a / norms).T @ (a / norms))[1]
+    return float(min(np.exp(0.5 * logarithm / a.shape[1]), 1.0))
+
+
+def s_opt(v: np.ndarray, size: int, count: int | None = None) -> np.ndarray:
+    """Greedy maximisation of the S-measure: ``count`` elements (default r, at most e), int64.
+
+    Step k <= r maximises S of the first k modes at k elements, every further step that of all r;
+    the first r elements are nested in r. The first step, where S is 1 for every element, takes the
+    largest norm of the first mode, as classical DEIM does.
+
+    Parameters
+    ----------
+    v : (size e, r) basis, ``size`` consecutive rows for each of the e elements; size 1 is the
+        method of the paper
+
+    Raises
+    ------
+    SamplingError
+        A mode depends on the earlier ones at whatever elements could be taken.
+    """
+    path = s_opt_path(v, size)
+    return extend(v, size, path, v.shape[1] if count is None else count)
+
+
+def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
+    """One element a mode (all e if e < r), nested in r; parameters and errors as `s_opt`."""
+    state = _Sampled(v, size)
+    for mode in range(min(v.shape[1], state.total)):
+        state.add(state.best_with(mode), mode)
+    return state.chosen
+
+
+def extend(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np.ndarray:
+    """``elements`` followed by those that raise the S-measure of all modes, ``count`` in all.
+
+    Ends with all e elements if there are fewer. Raises SamplingError if the modes depend on each
+    other at the elements to start with.
+    """
+    count = min(count, len(v) // size)
+    if count <= len(elements):
+        return np.asarray(elements, dtype=np.int64)
+    state = _Sampled(v, size, elements)
+    while len(state.chosen) < count:
+        state.add(state.best())
+    return state.chosen
+
+
+class _Sampled:
+    """Sampled elements with what the S-measure of one more needs.
+
+    With G the Gram matrix of the sampled rows and B (s, k) the rows of a candidate,
+    det(G + B^T B) = det G det(I + M), M = B G^-1 B^T. Taking an element D updates all M at once
+    (Woodbury): M <- M - X (I + D G^-1 D^T)^-1 X^T, X = B G^-1 D^T. A mode d that is added to the
+    columns multiplies the determinant by the squared norm of its least-squares residual, with a
+    candidate q + z^T (I + M)^-1 z: q from the rows that are sampled already, z the candidate's part
+    of the residual; afterwards M <- M + z z^T / q. One step costs O(s e (s + k)) instead of a
+    determinant for each element.
+    """
+
+    def __init__(self, v: np.ndarray, size: int, elements: np.ndarray | None = None) -> None:
+        # the measure does not depend on the lengths of the columns, round-off does
+        norms = np.linalg.norm(v, axis=0)
+        if not norms.all():
+            raise SamplingError(f"S-OPT: mode {int(np.argmin(norms)) + 1} is zero")
+        self._blocks = (v / norms).reshape(-1, size, v.shape[1])
+        self.total = len(self._blocks)
+        self._squares = np.einsum("esk,esk->ek", self._blocks, self._blocks)
+        self._picked = [] if elements is None else [int(e) for e in elements]
+        self._products = np.zeros((self.total, size, size))
+        self._modes = 0
+        if self._picked:
+            self._modes = v.shape[1]
+            self._products = self._from_scratch()
+
+    @property
+    def chosen(self) -> np.ndarray:
+        """Sampled elements in order of selection."""
+        return np.array(self._picked, dtype=np.int64)
+
+    def best(self) -> int:
+        """Element with the largest S-measure of the modes that are in."""
+        norms = np.log(self._column_norms(self._modes)).sum(axis=1)
+        return self._argmax(self._log_determinants() - norms)
+
+    def best_with(self, mode: int) -> int:
+        """The same when ``mode`` joins the columns."""
+        if not self._picked:
+            return int(np.argmax(self._squares[:, mode]))
+        z, q = self._residual(mode)
+        solved = np.linalg.solve(self._shifted(), z[:, :, None])[:, :, 0]
+        residual = q + np.maximum(np.einsum("es,es->e", z, solved), 0.0)
+        possible = residual > 0.0
+        measure = np.full(self.total, -np.inf)
+        measure[possible] = np.log(residual[possible])
+        norms = np.log(self._column_norms(mode + 1)[possible]).sum(axis=1)
+        measure[possible] += self._log_determinants()[possible] - norms
+        return self._argmax(measure)
+
+    def add(self, element: int, mode: int | None = None) -> None:
+        """Sample ``element`` and, if given, let ``mode`` join the columns."""
+        inverse, columns = self._inverse(), self._blocks[:, :, : self._modes]
+        rows = columns[element]
+        small = np.eye(len(rows)) + rows @ inverse @ rows.T
+        cross = columns @ (inverse @ rows.T)
+        self._products -= cross @ np.linalg.solve(small, cross.transpose(0, 2, 1))
+        self._picked.append(element)
+        if mode is not None:
+            z, q = self._residual(mode)
+            if q <= _EPS**2:
+                raise SamplingError(
+                    f"S-OPT: mode {mode + 1} depends on the modes before it at all elements"
+                )
+            self._products += z[:, :, None] * z[:, None, :] / q
+            self._modes = mode + 1
+
+    def _residual(self, mode: int) -> tuple[np.ndarray, float]:
+        """Residual (e, s) of a mode fitted at the sampled rows, and its squared norm there."""
+        known, new = self._blocks[:, :, : self._modes], self._blocks[:, :, mode]
+        fit = np.linalg.lstsq(self._sampled_rows(), new[self._picked].ravel(), rcond=None)[0]
+        z = new - known @ fit
+        return z, float(np.sum(z[self._picked] ** 2))
+
+    def _sampled_rows(self) -> np.ndarray:
+        """(s m, k) sampled rows of the modes that are in."""
+        rows = self._blocks[self._picked, :, : self._modes]
+        return rows.reshape(rows.shape[0] * rows.shape[1], self._modes)
+
+    def _inverse(self) -> np.ndarray:
+        """G^-1 (k, k) of the sampled rows."""
+        rows = self._sampled_rows()
+        factor = linalg.qr(rows, mode="r", check_finite=False)[0][: self._modes]
+        diagonal = np.abs(np.diag(factor))
+        if len(rows) < self._modes or diagonal.min(initial=1.0) <= _EPS * diagonal.max(initial=0.0):
+            raise SamplingError(
+                f"S-OPT: the first {self._modes} modes depend on each other at the "
+                f"{len(self._picked)} sampled elements"
+            )
+        half = linalg.solve_triangular(factor, np.eye(self._modes), check_finite=False)
+        return half @ half.T
+
+    def _from_scratch(self) -> np.ndarray:
+        """All M (e, s, s)."""
+        columns = self._blocks[:, :, : self._modes]
+        return columns @ self._inverse() @ columns.transpose(0, 2, 1)
+
+    def _shifted(self) -> np.ndarray:
+        """All I + M."""
+        return self._products + np.eye(self._products.shape[1])
+
+    def _log_determinants(self) -> np.ndarray:
+        """log det(I + M) of all elements; at least 0, below which only round-off leads."""
+        return np.maximum(np.linalg.slogdet(self._shifted())[1], 0.0)
+
+    def _column_norms(self, modes: int) -> np.ndarray:
+        """Squared norms (e, modes) of the sampled columns with each element added."""
+        return self._squares[self._picked, :modes].sum(axis=0) + self._squares[:, :modes]
+
+    def _argmax(self, measure: np.ndarray) -> int:
+        """First element with the largest measure among those that are not sampled."""
+        measure[self._picked] = -np.inf
+        if np.isneginf(measure).all():
+            raise SamplingError("S-OPT: no element makes the sampled modes independent")
+        return int(np.argmax(measure))

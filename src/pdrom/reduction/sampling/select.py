@@ -1,0 +1,91 @@
+"""From a method's specification to its sampling."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pdrom.reduction.basis.types import Basis
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.sampling.block import block_elements
+from pdrom.reduction.sampling.block_qdeim import block_qdeim_elements
+from pdrom.reduction.sampling.deim import deim_entries
+from pdrom.reduction.sampling.gappy_pod_e import bound_gain, oversample
+from pdrom.reduction.sampling.joint import joint_rows
+from pdrom.reduction.sampling.qdeim import qdeim_entries
+from pdrom.reduction.sampling.s_opt import extend as extend_s_opt
+from pdrom.reduction.sampling.s_opt import s_opt_path
+from pdrom.reduction.sampling.types import Sampling
+
+
+def select(basis: Basis, spec: MethodSpec, r: int) -> Sampling:
+    """Sampling of ``spec`` for the first r modes of ``basis``."""
+    return select_path(basis, spec, [r])[r]
+
+
+def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[int, Sampling]:
+    """Samplings for several r; greedy selections are nested and made once for the largest.
+
+    Raises
+    ------
+    RankError
+        If an r is below 1 or exceeds the numerical rank of the basis.
+    """
+    if not ranks:
+        return {}
+    basis.truncated(min(ranks))
+    v = basis.truncated(max(ranks))
+    if spec.rows == "all":
+        everything = Sampling.of_elements(
+            np.arange(basis.elements), basis.rows_per_element, basis.elements
+        )
+        return dict.fromkeys(ranks, everything)
+    if spec.rows == "joint":
+        path = 3 * joint_rows(v, basis.active_axes, spec.repeat_rows)
+        return {r: _of_entries(path[:r], basis, spec) for r in ranks}
+    if spec.rows == "element":
+        counts = (basis.rows_per_element, basis.elements)
+        chosen = _sampled_blocks(v, 3 * basis.rows_per_element, spec, ranks)
+        return {r: Sampling.of_elements(elements, *counts) for r, elements in chosen.items()}
+    chosen = _sampled_blocks(v, 1, spec, ranks)
+    return {r: _of_entries(entries, basis, spec) for r, entries in chosen.items()}
+
+
+def _sampled_blocks(
+    v: np.ndarray, size: int, spec: MethodSpec, ranks: Sequence[int]
+) -> dict[int, np.ndarray]:
+    """Blocks of ``size`` rows (elements, or entries for size 1) for every r: one a mode, then more.
+
+    Blocks beyond the modes are not nested in r: they depend on where the first r modes are weak.
+    """
+    chosen = {}
+    for r, start in _one_a_mode(v, size, spec, ranks).items():
+        add = extend_s_opt if spec.selection == "s-opt" else oversample
+        if spec.oversampling > 1:
+            start = add(v[:, :r], size, start, spec.oversampling * r)
+        if spec.gain_bound is not None:
+            start = bound_gain(v[:, :r], size, start, spec.gain_bound)
+        chosen[r] = start
+    return chosen
+
+
+def _one_a_mode(
+    v: np.ndarray, size: int, spec: MethodSpec, ranks: Sequence[int]
+) -> dict[int, np.ndarray]:
+    """As many blocks as modes (or as there are), by the method's selection."""
+    if spec.selection == "pivoted-qr":
+        return {r: _pivots(v[:, :r], size) for r in ranks}
+    if spec.selection == "s-opt":
+        path = s_opt_path(v, size)
+    else:
+        path = deim_entries(v) if size == 1 else block_elements(v, size)
+    return {r: path[:r] for r in ranks}
+
+
+def _pivots(v: np.ndarray, size: int) -> np.ndarray:
+    return qdeim_entries(v) if size == 1 else block_qdeim_elements(v, size)
+
+
+def _of_entries(entries: np.ndarray, basis: Basis, spec: MethodSpec) -> Sampling:
+    return Sampling.of_entries(
+        entries, basis.rows_per_element, basis.elements, repeats=spec.repeat_rows
+    )

@@ -1,0 +1,133 @@
+"""Snapshots of projections: which frames train, which test, and the matrices of a group."""
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdrom.core.errors import SnapshotError
+from pdrom.core.store import open_hdf5, require_finite, write_hdf5
+from pdrom.model.constraints.base import ConstraintGroup
+
+SPLITS = ("train", "test", "heldout")
+
+
+def training_frames(frames: int, count: int) -> np.ndarray:
+    """``count`` even frames, spread evenly over the run (n,) int64."""
+    even = np.arange(0, frames, 2)
+    return even[np.round(np.linspace(0, len(even) - 1, count)).astype(np.int64)]
+
+
+def test_frames(frames: int) -> np.ndarray:
+    """The odd frames (n,) int64."""
+    return np.arange(1, frames, 2)
+
+
+def stored_frames(frames: int, count: int) -> np.ndarray:
+    """Frames of the training run whose snapshots are needed, ascending."""
+    return np.sort(np.concatenate([training_frames(frames, count), test_frames(frames)]))
+
+
+def row_masses(group: ConstraintGroup, masses: np.ndarray) -> np.ndarray:
+    """Lumped mass of each operator row (e p,) kg.
+
+    Every vertex hands its mass out in equal parts to the elements that touch it, so that the masses
+    of the elements sum to those of the touched vertices; each row of an element carries it.
+    """
+    touches = (group.S != 0).astype(np.float64)
+    rows = group.rows_per_element
+    element = touches[::rows]
+    for row in range(1, rows):
+        element = element + touches[row::rows]
+    element = (element != 0).astype(np.float64)
+    valence = np.asarray(element.sum(axis=0)).ravel()
+    share = np.divide(masses, valence, out=np.zeros_like(masses), where=valence > 0)
+    return np.repeat(element @ share, rows)
+
+
+@dataclass(frozen=True)
+class SnapshotSet:
+    """Snapshots (n, e p, 3) of one group, and the size of their round-off.
+
+    ``roundoff`` is the Frobenius norm of the rounding errors of the train matrix: a singular value
+    below it is noise.
+    """
+
+    train: np.ndarray
+    test: np.ndarray
+    heldout: np.ndarray
+    frames: dict[str, np.ndarray]
+    row_mass: np.ndarray
+    elements: int
+    rows_per_element: int
+    roundoff: float
+
+
+def collect(
+    training_run: str | os.PathLike[str],
+    heldout_run: str | os.PathLike[str],
+    group: ConstraintGroup,
+    masses: np.ndarray,
+    train: np.ndarray,
+) -> SnapshotSet:
+    """Read the snapshots of ``group`` from two runs and split them.
+
+    Raises
+    ------
+    SnapshotError
+        A split is empty, lacks a training frame, or holds NaN or Inf.
+    """
+    p, frames, roundoff = _read(training_run, group.name)
+    held, held_frames, _ = _read(heldout_run, group.name)
+    is_train = np.isin(frames, train)
+    odd = frames % 2 == 1
+    if not odd.any() or not len(train) or np.count_nonzero(is_train) < len(train):
+        raise SnapshotError(
+            f"{training_run}: snapshots of '{group.name}': stored are {len(frames)} frames, "
+            f"{np.count_nonzero(is_train)} of {len(train)} train frames and {odd.sum()} test frames"
+        )
+    return SnapshotSet(
+        train=p[is_train],
+        test=p[odd],
+        heldout=held,
+        frames={"train": frames[is_train], "test": frames[odd], "heldout": held_frames},
+        row_mass=row_masses(group, masses),
+        elements=group.elements,
+        rows_per_element=group.rows_per_element,
+        roundoff=float(np.linalg.norm(roundoff[is_train])),
+    )
+
+
+def _read(path: str | os.PathLike[str], group: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    with open_hdf5(path) as file:
+        store = file[f"snapshots/{group}"]
+        p, frames, roundoff = (store[name][...] for name in ("p", "frames", "roundoff"))
+    if len(p) == 0:
+        raise SnapshotError(f"{path}: group '{group}' has no snapshots")
+    return require_finite(f"{path}: snapshots of '{group}'", p, SnapshotError), frames, roundoff
+
+
+def save_snapshots(snapshots: SnapshotSet, path: str | os.PathLike[str], attributes: dict) -> None:
+    """Write a snapshot set (datasets train, test, heldout, <split>_frames, row_mass)."""
+    with write_hdf5(path) as file:
+        file.attrs.update(attributes)
+        for split in SPLITS:
+            file[split] = getattr(snapshots, split)
+            file[f"{split}_frames"] = snapshots.frames[split]
+        file["row_mass"] = snapshots.row_mass
+        file["row_mass"].attrs["unit"] = "kg"
+        for name in ("elements", "rows_per_element", "roundoff"):
+            file.attrs[name] = getattr(snapshots, name)
+
+
+def load_snapshots(path: str | os.PathLike[str]) -> SnapshotSet:
+    """Read what `save_snapshots` wrote; StorageError if the file is damaged."""
+    with open_hdf5(path) as file:
+        return SnapshotSet(
+            **{split: file[split][...] for split in SPLITS},
+            frames={split: file[f"{split}_frames"][...] for split in SPLITS},
+            row_mass=file["row_mass"][...],
+            elements=int(file.attrs["elements"]),
+            rows_per_element=int(file.attrs["rows_per_element"]),
+            roundoff=float(file.attrs["roundoff"]),
+        )

@@ -1,0 +1,126 @@
+"""Columns of a position subspace q = B z, coefficients shared by x, y and z.
+
+The free vertices get k modes and, always, the affine columns 1, x, y, z of the rest shape: the rest
+shape and every rigid motion are in the space. Vertices that a boundary ever holds get columns of
+their own (affine, and what their released motion needs), atom by atom. While an atom is held its
+coordinates are fixed, so that pins and handles are met exactly (affine lift); when it is released
+they are unknowns like the others. The space never changes during a run.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from pdrom.reduction.basis.pod import fix_signs, pod
+
+# Columns that add less than this (relative) to the span are dropped.
+DEPENDENT = 1e-9
+
+# Motion below this fraction of the positions is round-off.
+ROUNDOFF = 100.0 * np.finfo(float).eps
+
+
+@dataclass(frozen=True)
+class Columns:
+    """A position subspace.
+
+    B : (N, K) columns; the free ones are mass-orthonormal
+    free : indices of the columns of the free vertices
+    atoms : vertex sets that are held together, and ...
+    atom_columns : ... the columns that each of them has
+    modes : number k of modes beside the affine columns
+    """
+
+    B: np.ndarray
+    free: np.ndarray
+    atoms: list[np.ndarray]
+    atom_columns: list[np.ndarray]
+    modes: int
+
+
+def affine_columns(points: np.ndarray) -> np.ndarray:
+    """1, x, y, z of the rest shape, (N, 4)."""
+    return np.column_stack([np.ones(len(points)), points])
+
+
+def displacement_modes(
+    trajectory: np.ndarray, points: np.ndarray, masses: np.ndarray, k: int
+) -> np.ndarray:
+    """First k POD modes (N, k) of displacements, mass-weighted, without their affine part.
+
+    Each axis of each frame of ``trajectory`` (n, N, 3) is one snapshot, so that x, y and z share
+    the modes (Monem et al. 2023). Fewer are returned where the data hold fewer.
+    """
+    displacements = (trajectory - points).transpose(1, 0, 2).reshape(len(points), -1)
+    weight = np.sqrt(masses)[:, None]
+    affine = orthonormal(weight * affine_columns(points))
+    rest = weight * displacements
+    rest = rest - affine @ (affine.T @ rest)
+    modes, sigma = pod(rest)
+    # a motion that is affine altogether leaves nothing but round-off
+    noise = ROUNDOFF * float(np.linalg.norm(weight[:, :, None] * trajectory.transpose(1, 0, 2)))
+    useful = int(np.count_nonzero(sigma > max(DEPENDENT * sigma[0], noise)))
+    return modes[:, : min(k, useful)] / weight
+
+
+def build_columns(
+    modes: np.ndarray,
+    points: np.ndarray,
+    masses: np.ndarray,
+    atoms: Sequence[np.ndarray],
+    trajectory: np.ndarray,
+    tolerance: float = 1e-3,
+) -> Columns:
+    """Space of ``modes`` (N, k) on the free vertices and of the atoms' own columns.
+
+    An atom gets its affine columns and, where its vertices move otherwise in ``trajectory``
+    (n, N, 3), POD modes of that motion down to ``tolerance`` of it.
+    """
+    n = len(points)
+    held = np.zeros(n, dtype=bool)
+    for atom in atoms:
+        held[atom] = True
+    free_vertices = np.flatnonzero(~held)
+    weight = np.sqrt(masses[free_vertices])[:, None]
+    raw = np.hstack([affine_columns(points), modes])[free_vertices]
+    blocks = [(free_vertices, orthonormal(weight * raw) / weight)]
+    blocks += [(a, _atom_columns(a, points, trajectory, modes.shape[1], tolerance)) for a in atoms]
+    total = sum(block.shape[1] for _, block in blocks)
+    b = np.zeros((n, total))
+    ranges, start = [], 0
+    for vertices, block in blocks:
+        stop = start + block.shape[1]
+        b[vertices, start:stop] = block
+        ranges.append(np.arange(start, stop))
+        start = stop
+    return Columns(b, ranges[0], list(atoms), ranges[1:], modes.shape[1])
+
+
+def _atom_columns(
+    atom: np.ndarray, points: np.ndarray, trajectory: np.ndarray, most: int, tolerance: float
+) -> np.ndarray:
+    affine = orthonormal(affine_columns(points[atom]))
+    motion = (trajectory[:, atom] - points[atom]).transpose(1, 0, 2).reshape(len(atom), -1)
+    rest = motion - affine @ (affine.T @ motion)
+    modes, sigma = pod(rest)
+    scale = max(float(np.linalg.norm(motion)), np.finfo(float).eps * np.linalg.norm(points[atom]))
+    count = min(int(np.count_nonzero(sigma > tolerance * scale)), most, len(atom) - affine.shape[1])
+    return np.hstack([affine, modes[:, :count]])
+
+
+def orthonormal(columns: np.ndarray) -> np.ndarray:
+    """Orthonormal columns with the span of ``columns``, dependent ones left out, in order."""
+    kept: list[np.ndarray] = []
+    for column in columns.T:
+        norm = np.linalg.norm(column)
+        rest = column.copy()
+        for _ in range(2):  # twice is enough (Kahan and Parlett)
+            for other in kept:
+                rest -= other * (other @ rest)
+        if norm > 0.0 and np.linalg.norm(rest) > DEPENDENT * norm:
+            kept.append(rest / np.linalg.norm(rest))
+    if not kept:
+        return np.empty((len(columns), 0))
+    return fix_signs(linalg.qr(np.stack(kept, axis=1), mode="economic")[0])

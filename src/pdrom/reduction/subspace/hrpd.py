@@ -1,0 +1,119 @@
+"""Hyper-reduced projective dynamics: sampled constraints with interpolation.
+
+Brandt, Eisemann and Hildebrandt (2018, sect. 5): the projections of a group are confined to a
+smooth, low-dimensional space and fitted, in the weighted least-squares sense, to the projections of
+sampled constraints. The space needs no training: its functions are skinning weights on the
+elements times the rest vectors S q_rest, so that every field of linear maps that varies slowly over
+the mesh is in it. The source adds the weights themselves as further columns (the translations of a
+skinning space); they are left out, since S annihilates translations and their value depends on the
+arbitrary frame of each element.
+"""
+
+import numpy as np
+from scipy import linalg, sparse
+
+from pdrom.core.errors import SamplingError
+from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.mesh.select import farthest_points
+from pdrom.reduction.basis.pod import pod
+from pdrom.reduction.sampling.solve import norm_and_condition, solution_operator
+from pdrom.reduction.subspace.columns import DEPENDENT, Columns, orthonormal
+from pdrom.reduction.subspace.interpolation import Interpolation, element_rows, reduced_strain
+from pdrom.reduction.subspace.skinning import skinning_weights
+from pdrom.reduction.subspace.specs import HrpdSpec
+
+# Condition number of the sampled equations from which on their solution is noise.
+SINGULAR = 1e8
+
+
+def hrpd(group: ConstraintGroup, columns: Columns, sampled: "SampledSpace | None") -> Interpolation:
+    """Interpolation of the projections from a sampled space, for the subspace ``columns``."""
+    strain, stiffness = reduced_strain(group, columns)
+    if sampled is None:
+        return Interpolation.of_constant(stiffness, np.zeros((len(stiffness), 3)))
+    modes = strain.T @ (group.row_weights[:, None] * sampled.V)
+    offset = np.zeros((len(stiffness), 3))
+    return Interpolation(sampled.elements, sampled.operator, modes, offset, stiffness, sampled.gain)
+
+
+class SampledSpace:
+    """A space of projections and the operator that fits it to sampled elements.
+
+    V : (e p, d), orthonormal in the inner product of the weights W; shared by x, y and z
+    elements : (m,) sampled elements, ascending
+    operator : (d, m p), weighted least squares
+    gain : || (P^T W^(1/2) V)^+ ||_2
+    """
+
+    def __init__(self, group: ConstraintGroup, V: np.ndarray, elements: np.ndarray) -> None:
+        rows = element_rows(elements, group.rows_per_element)
+        root = np.sqrt(group.row_weights[rows])
+        weighted = root[:, None] * V[rows]
+        operator = solution_operator(weighted, "qr", 0.0)
+        self.gain, condition = norm_and_condition(weighted, operator)
+        if condition > SINGULAR:
+            raise SamplingError(
+                f"hrpd: group '{group.name}': {len(elements)} samples do not determine a space of "
+                f"dimension {V.shape[1]}; allowed are more samples or a smaller dimension"
+            )
+        self.V, self.elements, self.operator = V, elements, operator * root
+
+
+def sampled_space(
+    group: ConstraintGroup, points: np.ndarray, spec: HrpdSpec
+) -> SampledSpace | None:
+    """Space and samples of ``spec``; None where the rest vectors, and so all columns, are noise.
+
+    Raises
+    ------
+    SamplingError
+        The sampled elements do not determine the space.
+    """
+    rest = group.S @ points
+    if np.linalg.norm(rest) <= group.roundoff(points):
+        return None
+    centres = element_centres(group, points)
+    count = min(spec.samples, group.elements)
+    elements = np.sort(farthest_points(centres, np.arange(group.elements), count))
+    V = projection_space(rest, centres, group.row_weights, spec.dimension)
+    return SampledSpace(group, V, elements)
+
+
+def projection_space(
+    rest: np.ndarray, centres: np.ndarray, weights: np.ndarray, dimension: int
+) -> np.ndarray:
+    """W-orthonormal columns (e p, d) of the span of skinning weights times rest vectors.
+
+    The rest vectors themselves come first (one linear map for the whole mesh: the rest shape and
+    its rotations are exact), then the directions with the largest singular values.
+
+    Parameters
+    ----------
+    rest : (e p, 3) rest vectors S q_rest
+    centres : (e, 3)
+    weights : (e p,) diagonal of W
+    """
+    root = np.sqrt(weights)[:, None]
+    active = rest[:, np.linalg.norm(rest, axis=0) > DEPENDENT * np.linalg.norm(rest)]
+    fixed = orthonormal(root * active)
+    wanted = max(dimension - fixed.shape[1], 0)
+    handles = max(2, -(-dimension // fixed.shape[1]))
+    while True:
+        handles = min(handles, len(centres))
+        blend = np.repeat(skinning_weights(centres, handles), len(rest) // len(centres), axis=0)
+        raw = root * (blend[:, :, None] * active[:, None, :]).reshape(len(rest), -1)
+        modes, sigma = pod(raw - fixed @ (fixed.T @ raw))
+        useful = int(np.count_nonzero(sigma > DEPENDENT * linalg.norm(raw, 2)))
+        if useful >= wanted or handles == len(centres):
+            return np.hstack([fixed, modes[:, : min(wanted, useful)]])[:, :dimension] / root
+        handles += 1
+
+
+def element_centres(group: ConstraintGroup, points: np.ndarray) -> np.ndarray:
+    """Mean position (e, 3) of the vertices that each element touches."""
+    touched = sparse.csr_array((group.S != 0).astype(np.float64))
+    by_element = sum(
+        touched[row :: group.rows_per_element] for row in range(group.rows_per_element)
+    )
+    by_element = (by_element != 0).astype(np.float64)
+    return (by_element @ points) / np.asarray(by_element.sum(axis=1)).reshape(-1, 1)

@@ -1,0 +1,94 @@
+"""A hyper-reduced model of a scene: columns, sampled elements of every group, and its step loop."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pdrom.model.dynamics.stepper import State, Stepper
+from pdrom.model.scene import Scene
+from pdrom.reduction.subspace.atoms import atoms
+from pdrom.reduction.subspace.columns import Columns, build_columns, displacement_modes
+from pdrom.reduction.subspace.ecsw import ecsw_elements
+from pdrom.reduction.subspace.fused import FusedStepper
+from pdrom.reduction.subspace.interpolation import InterpolatedLocalStep, Interpolation
+from pdrom.reduction.subspace.local_step import SubspaceLocalStep
+from pdrom.reduction.subspace.skinning import skinning_modes
+from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
+from pdrom.reduction.subspace.training import training_run
+
+# Training frames that the element sampling looks at, at most.
+FRAMES = 70
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Sampled elements (m,) and their factors (m,); all elements with factor one if empty."""
+
+    elements: np.ndarray | None = None
+    factors: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class SubspaceModel:
+    """Position basis ("pod" or "skinning"), its columns, and what is sampled of each group."""
+
+    position_basis: str
+    columns: Columns
+    samples: dict[str, Samples | Interpolation] = field(default_factory=dict)
+
+    def loop(self, scene: Scene) -> tuple[Stepper, State]:
+        """Step loop in the coordinates of the subspace, and the initial state."""
+        steps = []
+        for group in scene.groups:
+            chosen = self.samples.get(group.name, Samples())
+            if isinstance(chosen, Interpolation):
+                steps.append(InterpolatedLocalStep(group, self.columns, chosen))
+                continue
+            steps.append(SubspaceLocalStep(group, self.columns, chosen.elements, chosen.factors))
+        space = ReducedSpace(scene, self.columns, sum(step.matrix for step in steps))
+        config = scene.config
+        loop = FusedStepper(space, config.time_step, config.iterations, steps, scene.acceleration())
+        return loop, reduced_state(scene, self.columns)
+
+    def positions(self, z: np.ndarray) -> np.ndarray:
+        """Vertex positions (N, 3) m of coordinates (K, 3)."""
+        return self.columns.B @ z
+
+
+def make_columns(scene: Scene, training: np.ndarray, kind: str, k: int) -> Columns:
+    """Columns of a position subspace of ``kind`` with k modes (fewer if there are fewer).
+
+    Parameters
+    ----------
+    training : (n, N, 3) positions of the training frames
+    """
+    points, masses = scene.mesh.points, scene.masses
+    if kind == "pod":
+        modes = displacement_modes(training, points, masses, k)
+    else:
+        modes = skinning_modes(points, masses, k)
+    return build_columns(modes, points, masses, atoms(scene.boundaries, len(points)), training)
+
+
+def sample_elements(
+    scene: Scene,
+    columns: Columns,
+    frames: np.ndarray,
+    tolerances: Sequence[float],
+    start: State | None = None,
+) -> list[dict[str, Samples]]:
+    """Energy-conserving samples of every group for each tolerance.
+
+    They are trained on iterates of the subspace with all projections, in some of the training
+    ``frames`` of a run that begins at ``start`` (coordinates) or where the scene does.
+    """
+    chosen = frames[np.unique(np.linspace(0, len(frames) - 1, FRAMES).round().astype(int))]
+    training = training_run(scene, columns, chosen, start)
+    found = {
+        group.name: ecsw_elements(group, columns, training, tolerances) for group in scene.groups
+    }
+    return [
+        {name: Samples(*solutions[i]) for name, solutions in found.items()}
+        for i in range(len(tolerances))
+    ]

@@ -1,0 +1,203 @@
+"""The step loop in the coordinates of a position subspace, q = B z.
+
+Everything that has the length of the mesh is used here once, before the run. During a run the
+arrays have the length of the subspace, of the held vertices, or (for a scene with a floor) of its
+probe vertices.
+"""
+
+import numpy as np
+from scipy import linalg
+
+from pdrom.core.errors import SceneError, SolverError
+from pdrom.model.dynamics.space import Solve, Space
+from pdrom.model.dynamics.stepper import State
+from pdrom.model.dynamics.system import require_accurate
+from pdrom.model.effects.base import Boundary, Contact
+from pdrom.model.scene import Scene
+from pdrom.reduction.subspace.columns import Columns
+
+# Vertices that are asked whether the floor was reached, at most.
+PROBES = 200
+
+
+class DenseElimination:
+    """Reduced system with fixed coordinates eliminated; the inverse is small and explicit."""
+
+    def __init__(self, matrix: np.ndarray, fixed: np.ndarray) -> None:
+        self.free = np.setdiff1d(np.arange(len(matrix)), fixed)
+        block = matrix[np.ix_(self.free, self.free)]
+        try:
+            factor = linalg.cho_factor(block)
+        except linalg.LinAlgError as error:
+            raise SolverError(f"reduced system of size {len(self.free)}: {error}") from error
+        self._inverse = np.ascontiguousarray(linalg.cho_solve(factor, np.eye(len(self.free))))
+        require_accurate(block, lambda rhs, out: np.matmul(self._inverse, rhs, out=out))
+        self._coupling = np.ascontiguousarray(matrix[np.ix_(self.free, fixed)])
+        self.fixed, self.targets = fixed, np.zeros((len(fixed), 3))
+        self._load = np.zeros((len(self.free), 3))
+
+    def set_targets(self, targets: np.ndarray) -> None:
+        """Values (m, 3) of the fixed coordinates."""
+        self.targets = targets
+        self._load = self._coupling @ targets
+
+    def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
+        """Overwrite the free coordinates of ``y``."""
+        y[self.free] = self.solved(rhs)
+
+    def solved(self, rhs: np.ndarray) -> np.ndarray:
+        """Free coordinates that belong to ``rhs`` (K, 3)."""
+        return self._inverse @ (rhs[self.free] - self._load)
+
+    def lift(self, rows: np.ndarray) -> np.ndarray:
+        """What a unit force on each of ``rows`` (m, K) adds to the free coordinates, (m, K')."""
+        return rows[:, self.free] @ self._inverse
+
+
+class ReducedSpace(Space):
+    """Coordinates z (K, 3) of q = B z.
+
+    Parameters
+    ----------
+    matrix : (K, K) stiffness B^T (sum of the groups' S^T W S) B, possibly with sampled weights
+
+    Attributes
+    ----------
+    matrix : (K, K) system matrix A: inertia and stiffness
+    """
+
+    def __init__(self, scene: Scene, columns: Columns, matrix: np.ndarray) -> None:
+        h = scene.config.time_step
+        self.columns = columns
+        mass = columns.B.T @ (scene.masses[:, None] * columns.B)
+        self.matrix = mass / h**2 + matrix
+        self._inertia = mass / h**2
+        self._forces = [_reduce_force(f, columns, mass, scene) for f in scene.forces]
+        self._boundaries = [_ReducedBoundary(b, columns) for b in scene.boundaries]
+        self._contacts = [_ReducedContact(c, columns, scene) for c in scene.contacts]
+        self._cache: dict[bytes, DenseElimination] = {}
+
+    def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+        total = np.zeros_like(positions)
+        for constant, rate in self._forces:
+            total += constant
+            total += rate * velocities
+        return total
+
+    def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        active = [b for b in self._boundaries if b.boundary.active(frame)]
+        if not active:
+            return np.empty(0, dtype=np.int64), np.empty((0, 3))
+        parts = [b.targets(frame, positions) for b in active]
+        indices, first = np.unique(np.concatenate([i for i, _ in parts]), return_index=True)
+        return indices, np.concatenate([t for _, t in parts])[first]
+
+    def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
+        key = fixed.tobytes()
+        if key not in self._cache:
+            self._cache[key] = DenseElimination(self.matrix, fixed)
+        elimination = self._cache[key]
+        elimination.set_targets(targets)
+        return elimination
+
+    def inertia(self, s: np.ndarray) -> np.ndarray:
+        return self._inertia @ s
+
+    def inertia_energy(self, difference: np.ndarray) -> float:
+        return 0.5 * float(np.sum(difference * (self._inertia @ difference)))
+
+    def correct(self, y: np.ndarray) -> None:
+        for contact in self._contacts:
+            contact.correct(y)
+
+
+def coordinates(columns: Columns, masses: np.ndarray, field: np.ndarray) -> np.ndarray:
+    """Mass-orthogonal projection of a field (N, 3) on the subspace, (K, 3)."""
+    return _mass_solve(columns, masses, columns.B.T @ (masses[:, None] * field))
+
+
+def _mass_solve(columns: Columns, masses: np.ndarray, rhs: np.ndarray) -> np.ndarray:
+    """(B^T M B)^-1 ``rhs``.
+
+    Equilibrated: columns of held vertices are not mass-orthonormal, so that masses far from 1 kg
+    would make the matrix ill-conditioned by their scale alone.
+    """
+    mass = columns.B.T @ (masses[:, None] * columns.B)
+    scale = 1.0 / np.sqrt(np.diag(mass))[:, None]
+    return scale * linalg.solve(scale * mass * scale.T, scale * rhs, assume_a="pos")
+
+
+def reduced_state(scene: Scene, columns: Columns) -> State:
+    """Initial state of the scene in coordinates; the rest shape is in the space exactly."""
+    state = scene.initial_state()
+    return State(
+        coordinates(columns, scene.masses, state.positions),
+        coordinates(columns, scene.masses, state.velocities),
+    )
+
+
+def _reduce_force(force, columns: Columns, mass: np.ndarray, scene: Scene):
+    """A force as (constant coordinates (K, 3), rate): a = constant + rate v.
+
+    The forces of this project are affine in the velocity with one rate for all vertices; another
+    one is refused, not approximated.
+    """
+    shape = scene.mesh.points.shape
+    rng = np.random.default_rng(0)
+    q, v = rng.standard_normal(shape), rng.standard_normal(shape)
+    constant = np.broadcast_to(force.acceleration(scene.mesh.points, np.zeros(shape)), shape)
+    rate = float(np.sum((force.acceleration(q, v) - constant) * v) / np.sum(v * v))
+    if not np.allclose(force.acceleration(q, v), constant + rate * v, rtol=1e-12, atol=1e-12):
+        raise SceneError(f"effect '{force.name}' is not affine in the velocity: not reducible")
+    return coordinates(columns, scene.masses, constant), rate
+
+
+class _ReducedBoundary:
+    """A boundary whose vertices are met exactly by the coordinates of their atoms."""
+
+    def __init__(self, boundary: Boundary, columns: Columns) -> None:
+        self.boundary = boundary
+        self._parts: dict[bytes, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+        self._columns = columns
+
+    def targets(self, frame: int, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        vertices = self.boundary.held(frame)
+        key = vertices.tobytes()
+        if key not in self._parts:
+            self._parts[key] = self._prepare(vertices)
+        indices, rows, inverse = self._parts[key]
+        return indices, inverse @ self.boundary.targets(frame, rows @ z[indices])
+
+    def _prepare(self, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        held = set(vertices.tolist())
+        touched = [
+            c
+            for atom, c in zip(self._columns.atoms, self._columns.atom_columns, strict=True)
+            if int(atom[0]) in held
+        ]
+        indices = np.sort(np.concatenate(touched))
+        rows = self._columns.B[np.ix_(vertices, indices)]
+        return indices, rows, np.linalg.pinv(rows)
+
+
+class _ReducedContact:
+    """A contact, looked for at probe vertices and, where one is hit, resolved at all vertices."""
+
+    def __init__(self, contact: Contact, columns: Columns, scene: Scene) -> None:
+        self._contact = contact
+        n = scene.mesh.vertices
+        probes = np.unique(np.linspace(0, n - 1, min(PROBES, n)).round().astype(np.int64))
+        self._probes = np.ascontiguousarray(columns.B[probes])
+        self._columns = columns
+        weighted = columns.B * scene.masses[:, None]
+        self._project = _mass_solve(columns, scene.masses, weighted.T)
+
+    def correct(self, y: np.ndarray) -> None:
+        probed = self._probes @ y
+        corrected = probed.copy()
+        self._contact.correct(corrected)
+        if np.array_equal(probed, corrected):
+            return
+        full = self._columns.B @ y
+        self._contact.correct(full)
+        y[...] = self._project @ full

@@ -1,0 +1,136 @@
+"""Where the elements of a constraint group lie on the mesh, to colour them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import Colormap, Normalize
+
+from pdrom.core.errors import StorageError
+from pdrom.model.constraints.bending import interior_vertices
+from pdrom.model.mesh.types import Mesh
+from pdrom.report.figures.camera import Camera
+from pdrom.report.figures.mesh_render import Surface, draw_lines, draw_surface
+
+KINDS = {
+    "bending": "vertex",
+    "spring": "edge",
+    "strain": "triangle",
+    "deformation_gradient": "tetrahedron",
+    "tetrahedron_strain": "tetrahedron",
+}
+UNITS = {"bending": "1/m", "spring": "m"}  # of a projection; strains have no unit
+NEUTRAL = "#E4E1DA"
+
+
+@dataclass(frozen=True)
+class ElementMap:
+    """Elements of one group on one mesh.
+
+    kind : vertex, edge, triangle or tetrahedron
+    cells : (e, m) vertex indices of each element
+    """
+
+    kind: str
+    cells: np.ndarray
+    mesh: Mesh
+
+    @property
+    def surface(self) -> Surface:
+        """Surface of the mesh, ready to be drawn."""
+        return Surface(self.mesh.triangles, open=len(self.mesh.tetrahedra) == 0)
+
+    def centres(self, points: np.ndarray) -> np.ndarray:
+        """Centre of each element (e, 3), m."""
+        return points[self.cells].mean(axis=1)
+
+    def face_values(self, values: np.ndarray) -> np.ndarray:
+        """Values (e,) of the elements carried to the surface triangles (T,).
+
+        A triangle takes its own value, that of the tetrahedron behind it, or the mean of its
+        vertices that carry one; NaN where there is none. Edges have no face values.
+        """
+        triangles = self.mesh.triangles
+        if self.kind == "triangle":
+            return values
+        if self.kind == "tetrahedron":
+            return values[_tetrahedron_behind(self.mesh)]
+        field = np.full(self.mesh.vertices, np.nan)
+        field[self.cells[:, 0]] = values
+        corners = field[triangles]
+        known = np.isfinite(corners)
+        total = np.where(known, corners, 0.0).sum(axis=1)
+        count = known.sum(axis=1)
+        return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
+
+    def draw(
+        self,
+        ax: Axes,
+        points: np.ndarray,
+        values: np.ndarray,
+        camera: Camera,
+        cmap: Colormap,
+        norm: Normalize,
+    ) -> None:
+        """Draw the mesh at ``points`` (N, 3) m with ``values`` (e,) of its elements as colour."""
+        if self.kind == "edge" and self.surface.open:
+            draw_surface(ax, points, self.surface, camera, "#FFFFFF", wire=0.0, contrast=0.15)
+            draw_lines(ax, points[self.cells], camera, cmap(norm(values)))
+            return
+        if self.kind == "edge":
+            values, faces = _edges_to_vertices(self, values), True
+        else:
+            faces = False
+        carried = self.face_values(values) if not faces else values[self.mesh.triangles].mean(1)
+        rgb = cmap(norm(np.nan_to_num(carried)))[:, :3]
+        rgb[~np.isfinite(carried)] = (0.92, 0.91, 0.89)
+        draw_surface(ax, points, self.surface, camera, rgb, wire=0.12, contrast=0.35)
+
+
+def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMap:
+    """Elements of ``group`` on ``mesh``, in the order of the group's rows.
+
+    Raises
+    ------
+    StorageError
+        The group is not known to lie on vertices, edges, triangles or tetrahedra, or ``source``
+        holds another number of elements than the mesh.
+    """
+    kind = KINDS.get(group)
+    if kind is None:
+        raise StorageError(f"{source}: group '{group}' cannot be drawn (allowed: {list(KINDS)})")
+    cells = {
+        "vertex": lambda: interior_vertices(mesh.triangles, mesh.vertices)[:, None],
+        "edge": mesh.edges,
+        "triangle": lambda: mesh.triangles,
+        "tetrahedron": lambda: mesh.tetrahedra,
+    }[kind]()
+    if len(cells) != elements:
+        raise StorageError(f"{source}: {elements} elements of '{group}', the mesh has {len(cells)}")
+    return ElementMap(kind, cells, mesh)
+
+
+def magnitude(vector: np.ndarray, rows_per_element: int) -> np.ndarray:
+    """Norm of each element's 3 p entries of a vectorised quantity (3 e p,), (e,)."""
+    return np.linalg.norm(vector.reshape(-1, 3 * rows_per_element), axis=1)
+
+
+def _tetrahedron_behind(mesh: Mesh) -> np.ndarray:
+    """Tetrahedron (T,) that each boundary triangle belongs to."""
+    corners = mesh.tetrahedra[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3)
+    keys = _face_keys(corners, mesh.vertices)
+    order = np.argsort(keys, kind="stable")
+    position = np.searchsorted(keys[order], _face_keys(mesh.triangles, mesh.vertices))
+    return order[position] // 4
+
+
+def _face_keys(faces: np.ndarray, vertices: int) -> np.ndarray:
+    a, b, c = np.sort(faces.astype(np.int64), axis=1).T
+    return (a * vertices + b) * vertices + c
+
+
+def _edges_to_vertices(elements: ElementMap, values: np.ndarray) -> np.ndarray:
+    """Mean value of the edges at each vertex (N,)."""
+    n = elements.mesh.vertices
+    total = np.bincount(elements.cells.ravel(), np.repeat(values, 2), minlength=n)
+    return total / np.maximum(np.bincount(elements.cells.ravel(), minlength=n), 1)

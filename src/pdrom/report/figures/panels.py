@@ -1,0 +1,160 @@
+"""Panels with a run in them: the mesh at one instant, or why there is none."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
+
+from pdrom.model.mesh.types import Mesh
+from pdrom.report.figures.camera import Camera, Window, bounds, window_of
+from pdrom.report.figures.mesh_render import (
+    Colour,
+    Surface,
+    draw_floor,
+    draw_outline,
+    draw_surface,
+    outline_edges,
+    set_window,
+)
+from pdrom.report.figures.style import FAILED
+
+SAME_SCALE = 1.25  # a run that needs more than this multiple of the window is drawn smaller
+SLACK = 1.05  # a picture this much smaller than its neighbours is not pointed out
+SHORTEST, TALLEST = 0.35, 1.5  # allowed heights of a panel over its width
+
+
+@dataclass(frozen=True)
+class RunPanel:
+    """One run at one instant.
+
+    positions : (N, 3) m, finite; None if there is nothing to draw
+    failure : what went wrong, drawn in red; None for a run that lived
+    remark : one line below the picture
+    reference : whether this is the run that others are compared with
+    flat : (N, 2) m, the positions in the picture plane (see `seen_by`)
+    """
+
+    title: str
+    colour: Colour
+    positions: np.ndarray | None
+    failure: str | None = None
+    remark: str | None = None
+    reference: bool = False
+    flat: np.ndarray | None = None
+
+    def seen_by(self, camera: Camera) -> "RunPanel":
+        """The panel with its positions in the picture plane of ``camera``."""
+        flat = None if self.positions is None else camera.project(self.positions)
+        return replace(self, flat=flat)
+
+    def zoomed(self, window: Window) -> Window:
+        """``window``, or one of the same shape that holds both it and the run."""
+        if self.flat is None or window.contains(self.flat).all():
+            return window
+        corners = [(window.left, window.bottom), (window.right, window.top)]
+        both = bounds(np.concatenate([self.flat, corners]), 0.03)
+        factor = max(both.width / window.width, both.height / window.height)
+        return both.resized(factor * window.width, factor * window.height)
+
+    def scale(self, window: Window) -> float:
+        """How many times smaller than in ``window`` the run is drawn, at least 1."""
+        return self.zoomed(window).width / window.width
+
+
+def mesh_surface(mesh: Mesh) -> Surface:
+    """Surface of a mesh; that of a volume is closed."""
+    return Surface(mesh.triangles, open=len(mesh.tetrahedra) == 0)
+
+
+def shared_window(
+    camera: Camera, reference: np.ndarray, panels: list[RunPanel], margin: float = 0.1
+) -> Window:
+    """Window of the reference positions (N, 3), widened for runs of about the same size."""
+    base = window_of(camera, [reference], margin)
+    size = SAME_SCALE * max(base.width, base.height)
+    clouds = [reference]
+    for panel in panels:
+        if panel.positions is None or panel.failure:
+            continue
+        own = window_of(camera, [reference, panel.positions], margin)
+        if max(own.width, own.height) <= size:
+            clouds.append(panel.positions)
+    return fit_aspect(window_of(camera, clouds, margin))
+
+
+def fit_aspect(window: Window) -> Window:
+    """The window made taller or wider until its shape is allowed for a panel."""
+    height = np.clip(window.height, SHORTEST * window.width, None)
+    width = max(window.width, height / TALLEST)
+    return window.resized(width, height)
+
+
+def draw_run(
+    ax: Axes,
+    mesh: Mesh,
+    panel: RunPanel,
+    camera: Camera,
+    window: Window,
+    ghost: np.ndarray | None = None,
+) -> None:
+    """Draw a run in ``window``; one that left it is drawn smaller and says so.
+
+    Parameters
+    ----------
+    ghost : (N, 3) m, positions whose outline is drawn for comparison
+    """
+    ax.set_title(panel.title, pad=3)
+    if panel.failure:
+        _mark_failure(ax)
+    if panel.positions is None:
+        set_window(ax, window)
+        _centre_note(ax, panel)
+        return
+    shown, zoom = panel.zoomed(window), panel.scale(window)
+    surface = mesh_surface(mesh)
+    if not panel.failure:
+        draw_floor(ax, panel.positions, surface, camera, shown)
+    if ghost is not None:
+        draw_outline(ax, ghost, outline_edges(mesh.points, mesh.triangles), camera)
+    draw_surface(ax, panel.positions, surface, camera, panel.colour)
+    set_window(ax, shown)
+    lines = [text for text in (panel.failure, panel.remark) if text]
+    if zoom > SLACK:
+        lines.append(f"scale 1 : {_scale(zoom)}")
+        _frame(ax)
+    if lines:
+        colour = FAILED if panel.failure or zoom > SLACK else "#555555"
+        ax.set_xlabel("\n".join(lines), color=colour, fontsize=7.5, labelpad=2)
+
+
+def _scale(factor: float) -> str:
+    return f"{factor:.1f}" if factor < 10.0 else f"{factor:.0f}"
+
+
+def _mark_failure(ax: Axes) -> None:
+    ax.add_patch(
+        Rectangle(
+            (0, 0), 1, 1, transform=ax.transAxes, facecolor="#FBEDEB", edgecolor="#EBB9B4",
+            hatch="////", linewidth=0.0, zorder=-5, clip_on=False,
+        )
+    )  # fmt: skip
+
+
+def _frame(ax: Axes) -> None:
+    """Thin red frame: this picture has another scale than its neighbours."""
+    style = {"facecolor": "none", "edgecolor": FAILED, "linewidth": 0.6, "clip_on": False}
+    ax.add_patch(Rectangle((0, 0), 1, 1, transform=ax.transAxes, zorder=8, **style))
+
+
+def _centre_note(ax: Axes, panel: RunPanel) -> None:
+    centre_note(ax, panel.failure or panel.remark or "", FAILED if panel.failure else "#666666")
+
+
+def centre_note(ax: Axes, text: str, colour: str = "#666666") -> None:
+    """Boxed text in the middle of a panel."""
+    box = {"boxstyle": "round,pad=0.4", "facecolor": "white", "edgecolor": colour, "lw": 0.6}
+    ax.text(
+        0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center",
+        color=colour, fontsize=7.5, bbox=box,
+    )  # fmt: skip

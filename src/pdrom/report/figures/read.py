@@ -1,0 +1,158 @@
+"""Reading what figures draw from the results."""
+
+import os
+from dataclasses import dataclass
+
+import h5py
+import numpy as np
+
+from pdrom.core.errors import StorageError
+from pdrom.core.store import open_hdf5
+
+Path = str | os.PathLike[str]
+
+
+def frame_numbers(fractions: tuple[float, ...], frames: int) -> list[int]:
+    """Entries of ``positions`` (0 .. frames) at fractions of a run, without repetition."""
+    return list(dict.fromkeys(round(fraction * frames) for fraction in fractions))
+
+
+def positions_at(path: Path, fractions: tuple[float, ...]) -> tuple[list[int], np.ndarray]:
+    """Frame numbers and positions (n, N, 3) m of a run at fractions of it.
+
+    Raises
+    ------
+    StorageError
+        The file is missing or holds positions that are not finite.
+    """
+    with open_hdf5(path) as file:
+        data = file["positions"]
+        frames = frame_numbers(fractions, len(data) - 1)
+        chosen = np.stack([data[frame] for frame in frames])
+    if not np.isfinite(chosen).all():
+        raise StorageError(f"{path}: positions of a full-order run are not finite")
+    return frames, chosen
+
+
+@dataclass(frozen=True)
+class RerunInfo:
+    """One basis size of a file of reduced runs.
+
+    marked : the size exceeds the numerical rank, nothing ran
+    blowup_frame : frame at which the run blew up, -1 if it did not
+    entries : stored positions, the initial ones included
+    """
+
+    label: str
+    r: int
+    full: bool
+    marked: bool
+    blowup_frame: int
+    max_extent: float
+    entries: int
+
+    @property
+    def title(self) -> str:
+        """The size in words."""
+        return f"r = {self.r} (full rank)" if self.full else f"r = {self.r}"
+
+
+def rerun_infos(path: Path) -> list[RerunInfo]:
+    """Basis sizes in a file of reduced runs, ascending."""
+    with open_hdf5(path) as file:
+        infos = [_info(label, file[label]) for label in file if _is_size(label)]
+    return sorted(infos, key=lambda info: (info.r, info.full))
+
+
+def _is_size(label: str) -> bool:
+    return label.startswith("r") and label[1:].isdigit()
+
+
+def _info(label: str, group: h5py.Group) -> RerunInfo:
+    attrs = group.attrs
+    marked = bool(attrs["marked"])
+    return RerunInfo(
+        label=label,
+        r=int(attrs["r"]),
+        full=bool(attrs.get("full", False)),
+        marked=marked,
+        blowup_frame=-1 if marked else int(attrs["blowup_frame"]),
+        max_extent=0.0 if marked else float(attrs["max_extent"]),
+        entries=len(group["positions"]) if "positions" in group else 0,
+    )
+
+
+def rerun_errors(path: Path, info: RerunInfo) -> np.ndarray:
+    """Relative error of every frame that ran (F',)."""
+    with open_hdf5(path) as file:
+        return file[info.label]["error"][...]
+
+
+def choose_ranks(infos: list[RerunInfo], asked: tuple[int | str, ...]) -> list[RerunInfo]:
+    """Runs of the asked sizes, in this order, without repetition; all if none of them exists."""
+    chosen: dict[str, RerunInfo] = {}
+    for rank in asked:
+        for info in infos:
+            if info.full if rank == "full" else info.r == rank:
+                chosen.setdefault(info.label, info)
+    return list(chosen.values()) or infos
+
+
+def rerun_positions(path: Path, info: RerunInfo, frame: int) -> tuple[int, np.ndarray] | None:
+    """Last finite positions (N, 3) m up to entry ``frame``, and their entry; None without any.
+
+    A run that blew up holds fewer entries than the full-order run.
+    """
+    with open_hdf5(path) as file:
+        data = file[info.label]["positions"] if info.entries else ()
+        for entry in range(min(frame, len(data) - 1), -1, -1):
+            positions = np.asarray(data[entry], dtype=float)
+            if np.isfinite(positions).all():
+                return entry, positions
+    return None
+
+
+@dataclass(frozen=True)
+class BasisView:
+    """Modes V (3 e p, rank) of a group and their singular values."""
+
+    V: np.ndarray
+    singular_values: np.ndarray
+    rank: int
+    rows_per_element: int
+
+    @property
+    def elements(self) -> int:
+        """Number e of elements."""
+        return len(self.V) // (3 * self.rows_per_element)
+
+
+def read_basis(path: Path) -> BasisView:
+    """Basis of a group; StorageError if the file is damaged."""
+    with open_hdf5(path) as file:
+        return BasisView(
+            V=file["V"][...],
+            singular_values=file["singular_values"][...],
+            rank=int(file.attrs["rank"]),
+            rows_per_element=int(file.attrs["rows_per_element"]),
+        )
+
+
+@dataclass(frozen=True)
+class SamplingView:
+    """Entries and elements that a method selected for one basis size r."""
+
+    r: int
+    entries: np.ndarray
+    elements: np.ndarray
+
+
+def read_samplings(path: Path) -> list[SamplingView]:
+    """Selections of all basis sizes, ascending in r."""
+    with open_hdf5(path) as file:
+        views = [
+            SamplingView(int(label[1:]), group["entries"][...], group["elements"][...])
+            for label, group in file.items()
+            if _is_size(label)
+        ]
+    return sorted(views, key=lambda view: view.r)

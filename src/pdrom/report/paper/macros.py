@@ -1,0 +1,125 @@
+r"""Numbers of the manuscript.
+
+The source names a number by where it stands in a table::
+
+    \val{reduced_reruns|scene=bar_release|method=block-deim|r=20|relative_error_within_horizon}
+
+(table, any number of column=value filters, the column; optionally ``max``, ``min``, ``median`` or
+``count`` of the rows that match). The keys are found in the source, resolved here, and written as
+one TeX macro each. No number is typed, and none is generated that the text does not use.
+"""
+
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pdrom.core.errors import PaperError
+
+_KEY = re.compile(r"\\val\{([^{}]*)\}")
+MISSING = "n/a"
+AGGREGATES: dict[str, Callable[[pd.Series], Any]] = {
+    "max": lambda column: column.max(),
+    "min": lambda column: column.min(),
+    "median": lambda column: column.median(),
+    "count": lambda column: len(column),
+}
+
+
+def keys_of(source: str) -> list[str]:
+    """Keys that a TeX source uses, in order of first use."""
+    return list(dict.fromkeys(_KEY.findall(source)))
+
+
+def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:
+    r"""TeX definitions for every \val key of ``source``.
+
+    Raises
+    ------
+    PaperError
+        An unknown table or column, or a key that matches several rows without an aggregate.
+    """
+    lines = [
+        "% generated from results/tables",
+        r"\makeatletter",
+        r"\newcommand{\val}[1]{\@ifundefined{val@#1}{\errmessage{no value for #1}}"
+        r"{\csname val@#1\endcsname}}",
+    ]
+    for key in keys_of(source):
+        lines.append(rf"\expandafter\def\csname val@{key}\endcsname{{{resolve(key, tables)}}}")
+    lines.append(r"\makeatother")
+    return "\n".join(lines) + "\n"
+
+
+def resolve(key: str, tables: Mapping[str, pd.DataFrame]) -> str:
+    """TeX text of one key; `MISSING` where this configuration has no such number."""
+    name, *parts = key.split("|")
+    if name not in tables:
+        raise PaperError(f"\\val{{{key}}}: no table '{name}' (allowed: {', '.join(tables)})")
+    aggregate = AGGREGATES[parts.pop()] if parts and parts[-1] in AGGREGATES else None
+    if not parts or "=" in parts[-1]:
+        raise PaperError(f"\\val{{{key}}}: names no column of table '{name}'")
+    *filters, column = parts
+    rows = tables[name]
+    for entry in filters:
+        field, _, value = entry.partition("=")
+        _require(field, rows, key)
+        matches = rows[field].map(lambda cell, value=value: _same(cell, value))
+        rows = rows[matches.astype(bool)]
+    _require(column, rows, key)
+    cells = rows[column].dropna()
+    if aggregate is not None:
+        return format_number(aggregate(cells)) if len(cells) else MISSING
+    if len(rows) > 1:
+        raise PaperError(f"\\val{{{key}}}: matches {len(rows)} rows of table '{name}'")
+    return format_number(cells.iloc[0]) if len(cells) else MISSING
+
+
+def _require(field: str, rows: pd.DataFrame, key: str) -> None:
+    if field not in rows.columns:
+        raise PaperError(
+            f"\\val{{{key}}}: no column '{field}' (allowed: {', '.join(rows.columns)})"
+        )
+
+
+def _same(cell: Any, value: str) -> bool:
+    if isinstance(cell, str):
+        return cell == value
+    try:
+        return float(cell) == float(value)
+    except (TypeError, ValueError):
+        return str(cell) == value
+
+
+def format_number(value: Any) -> str:
+    """A cell as TeX: text escaped, integers plain, other numbers with two significant digits."""
+    if isinstance(value, str):
+        return escape(value)
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "no"
+    number = float(value)
+    if number != number:
+        return MISSING
+    if number in (float("inf"), float("-inf")):
+        return r"\ensuremath{\infty}" if number > 0.0 else r"\ensuremath{-\infty}"
+    if number == int(number) and abs(number) < 1e6:
+        return str(int(number))
+    mantissa, exponent = f"{number:.1e}".split("e")
+    power = int(exponent)
+    if -3 < power < 4:
+        digits = max(0, 1 - power)
+        return f"{number:.{digits}f}"
+    return rf"\ensuremath{{{mantissa}\cdot 10^{{{power}}}}}"
+
+
+_SPECIAL = {
+    "\\": r"\textbackslash{}", "_": r"\_", "%": r"\%", "&": r"\&", "#": r"\#", "$": r"\$",
+    "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
+}  # fmt: skip
+
+
+def escape(text: str) -> str:
+    """Plain text for TeX."""
+    return "".join(_SPECIAL.get(character, character) for character in text)

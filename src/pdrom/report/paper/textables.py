@@ -1,0 +1,270 @@
+"""Tables of the manuscript as TeX, generated from the tables of the study."""
+
+from collections.abc import Mapping, Sequence
+
+import pandas as pd
+
+from pdrom.experiments.hard_cases.catalogue import CASES
+from pdrom.experiments.hard_cases.expectations import FAILURES
+from pdrom.report.paper.macros import escape, format_number
+
+Tables = Mapping[str, pd.DataFrame]
+_VERDICT_COLOUR = {"holds": "okgreen", "does not hold": "okred"}
+
+
+def tabular(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
+    """A tabular with a ruled head; cells are TeX already."""
+    lines = [rf"\begin{{tabular}}{{{columns}}}", r"\hline", " & ".join(header) + r" \\", r"\hline"]
+    lines += [" & ".join(row) + r" \\" for row in rows]
+    return "\n".join([*lines, r"\hline", r"\end{tabular}"]) + "\n"
+
+
+def longtable(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
+    """A table that may break across pages."""
+    head = " & ".join(header) + r" \\"
+    lines = [rf"\begin{{longtable}}{{{columns}}}", r"\hline", head, r"\hline", r"\endhead"]
+    lines += [" & ".join(row) + r" \\" for row in rows]
+    return "\n".join([*lines, r"\hline", r"\end{longtable}"]) + "\n"
+
+
+def name(text: str) -> str:
+    """A scene, group or method name, in typewriter."""
+    return rf"\texttt{{{escape(text)}}}"
+
+
+def claims(tables: Tables) -> str:
+    """Verdict on each claim, with what was measured."""
+    rows = []
+    for row in tables["claims"].itertuples():
+        colour = _VERDICT_COLOUR.get(row.verdict, "okgrey")
+        verdict = rf"\textcolor{{{colour}}}{{{escape(row.verdict)}}}"
+        measured = escape(str(row.measured)).replace("; ", r"; \newline ")
+        rows.append([row.claim, escape(row.paper), measured, verdict, name(row.figure_or_table)])
+    header = ["claim", "the paper says", "measured", "verdict", "shown in"]
+    left = r">{\raggedright\arraybackslash}"
+    return longtable(header, rows, rf"l{left}p{{3.6cm}}{left}p{{3cm}}{left}p{{2.4cm}}l")
+
+
+def scenes(tables: Tables) -> str:
+    """Scenes with their groups, sizes and horizons."""
+    horizon = tables["reduced_reruns"].groupby("scene").horizon_frame.first()
+    rows = []
+    for row in tables["scenes"].itertuples():
+        end = int(horizon[row.scene]) if row.scene in horizon else None
+        shown = "run" if end == row.frames else str(end)
+        groups = escape(row.groups)
+        rows.append(
+            [name(row.scene), groups, str(row.vertices), str(row.elements), str(row.frames), shown]
+        )
+    header = ["scene", "groups (weight)", "vertices", "elements", "frames", "horizon"]
+    return longtable(header, rows, r"l>{\raggedright\arraybackslash}p{5.2cm}rrrr")
+
+
+def methods(tables: Tables) -> str:
+    """Ingredients of each method."""
+    rows = [
+        [
+            name(row.method),
+            escape(row.title),
+            row.centring,
+            row.rows,
+            row.selection if row.rows != "all" else "--",
+            _samples(row),
+            row.solve,
+        ]
+        for row in tables["methods"].itertuples()
+    ]
+    header = ["method", "title", "centring", "rows", "selection", "samples", "solve"]
+    return tabular(header, rows, "lllllll")
+
+
+def _samples(row) -> str:
+    """How many samples a method takes."""
+    if row.rows == "all":
+        return "--"
+    least = "one a mode" if row.oversampling == 1 else f"{row.oversampling} a mode"
+    return least if pd.isna(row.gain_bound) else rf"$\gamma \le {row.gain_bound:g}$"
+
+
+def ranks(tables: Tables) -> str:
+    """Numerical rank and decay of each group's snapshots."""
+    rows = []
+    for (scene, group), part in tables["singular_values"].groupby(["scene", "group"], sort=False):
+        real = part[part.above_roundoff]
+        decay = [_relative(real, component) for component in (6, 10, 20)]
+        rows.append([name(scene), escape(group.replace("_", " ")), str(len(real)), *decay])
+    header = ["scene", "group", "rank", r"$\sigma_6/\sigma_1$", r"$\sigma_{10}/\sigma_1$",
+              r"$\sigma_{20}/\sigma_1$"]  # fmt: skip
+    return longtable(header, rows, "llrrrr")
+
+
+def _relative(rows: pd.DataFrame, component: int) -> str:
+    cell = rows[rows.component == component].relative
+    return format_number(cell.iloc[0]) if len(cell) else "--"
+
+
+def reruns(tables: Tables) -> str:
+    """Error within the horizon of every method at r = 20 and at full rank."""
+    table = tables["reduced_reruns"]
+    table = table[table.position_basis == "full"]
+    order = list(tables["methods"].method)
+    rows = []
+    for (scene, group), part in table.groupby(["scene", "group"], sort=False):
+        if not (part.frames > 0).any() and not part.blowup_frame.notna().any():
+            continue
+        cells = [_rerun_cell(part[part.method == method]) for method in order]
+        rows.append([name(scene), escape(group.replace("_", " ")), *cells])
+    header = ["scene", "group", *(escape(m) for m in order)]
+    return tabular(header, rows, "ll" + "r" * len(order))
+
+
+def _rerun_cell(part: pd.DataFrame) -> str:
+    """Error at the largest size that the numerical rank allows."""
+    ran = part[(part.frames > 0) | part.blowup_frame.notna()].sort_values("r")
+    if ran.empty:
+        return "--"
+    last = ran.iloc[-1]
+    if pd.isna(last.relative_error_within_horizon) and pd.isna(last.blowup_frame):
+        return "stopped"
+    if pd.isna(last.relative_error_within_horizon):
+        return rf"\textcolor{{okred}}{{blow-up, {int(last.blowup_frame)}}}"
+    return format_number(last.relative_error_within_horizon)
+
+
+def local_share(tables: Tables) -> str:
+    """Share of the local step in a frame, by implementation."""
+    table = tables["local_share"]
+    rows = []
+    for scene, part in table.groupby("scene", sort=False):
+        by = part.set_index("implementation")
+        cells = []
+        for kind in ("interpreted", "numpy", "compiled"):
+            row = by.loc[kind]
+            total = row.local_ms + row.assembly_ms + row.global_ms
+            cells += [format_number(total), format_number(row.local_share)]
+        rows.append([name(scene), *cells])
+    header = ["scene", "interp.\\ ms", "share", "NumPy ms", "share", "compiled ms", "share"]
+    return longtable(header, rows, "lrrrrrr")
+
+
+_OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up")
+
+
+def stability(tables: Tables) -> str:
+    """How many runs of each method ended how: the study's reruns, then those at other settings."""
+    table = tables["stability"]
+    table = table[(table.outcome != "not run") & ~_full_order(table)]
+    rows = []
+    for (basis, method), part in table.groupby(["position_basis", "method"], sort=False):
+        reruns, sweep = (part[part.experiment == kind] for kind in ("rerun", "sweep"))
+        row = [name(method) if basis == "full" else name(f"{method}, {basis} subspace")]
+        row += [str((reruns.outcome == outcome).sum()) for outcome in _OUTCOMES]
+        row += [format_number(value) for value in (reruns.energy_ratio.median(),
+                                                   reruns.energy_ratio.max())]  # fmt: skip
+        row += [f"{(sweep.outcome == 'accurate').sum()} of {len(sweep)}"]
+        rows.append([*row, format_number(sweep.energy_ratio.max())])
+    header = ["method", *_OUTCOMES, "energy (median)", "(max)", "$h$, stiffness: accurate",
+              "energy (max)"]  # fmt: skip
+    narrow = r">{\raggedleft\arraybackslash}p{1.25cm}"
+    return tabular(header, rows, "l" + narrow * 8)
+
+
+def _full_order(table: pd.DataFrame) -> pd.Series:
+    return (table.method == "full") & (table.position_basis == "full")
+
+
+def guard(tables: Tables) -> str:
+    """What watching costs and what falling back buys."""
+    rows = []
+    for row in tables["guard"].itertuples():
+        full = row.method == "full"
+        action = "full order" if full else row.action
+        method = "" if full else name(f"{row.method}, r = {int(row.r)}")
+        share = "--" if pd.isna(row.fallback_share) else format_number(row.fallback_share)
+        first = "--" if pd.isna(row.guard_frame) else f"{int(row.guard_frame)}, {row.guard_reason}"
+        error = "blow-up" if pd.isna(row.relative_error) else format_number(row.relative_error)
+        cells = [error, format_number(row.energy_ratio), first, share]
+        rows.append([name(row.scene), method, action, *cells, format_number(row.ms_per_frame)])
+    header = ["scene", "method", "guard", "error", "energy", "first frame, reason", "fallen back",
+              "ms per frame"]  # fmt: skip
+    return tabular(header, rows, "lllrrlrr")
+
+
+def hard_cases(tables: Tables) -> str:
+    """Hard cases in which some reduction fails: what makes them hard, and how each one fails."""
+    table = tables["hard_cases"]
+    failed = table[table.outcome.isin(FAILURES)]
+    reductions = list(dict.fromkeys(failed.method))
+    rows = []
+    for case, part in failed.groupby("case", sort=False):
+        by = {row.method: row for row in part.itertuples()}
+        cells = [_failure(by[m]) if m in by else "--" for m in reductions]
+        rows.append([name(case), escape(CASES[case].why), *cells])
+    header = ["case", "why it is hard", *map(name, reductions)]
+    left = r">{\raggedright\arraybackslash}"
+    return longtable(header, rows, rf"l{left}p{{5.2cm}}" + f"{left}p{{2.6cm}}" * len(reductions))
+
+
+def _failure(row) -> str:
+    """How a reduction failed, with what tells it apart from others."""
+    if row.outcome == "singular":
+        return "singular"
+    if row.outcome == "blow-up":
+        text = f"blow-up, {int(row.blowup_frame)}"
+    elif row.outcome == "distorted":
+        text = rf"{format_number(row.max_extent)}\,$\times$ the extent"
+    else:
+        text = escape(row.outcome)
+    return text if pd.isna(row.gain) else rf"{text}; gain {format_number(row.gain)}"
+
+
+def hard_reductions(tables: Tables) -> str:
+    """Every reduction over the hard cases: how many it passes, how it fails, and why."""
+    rows = []
+    for method, part in tables["hard_cases"].groupby("method", sort=False):
+        count = part.outcome.value_counts()
+        failed = part[part.outcome.isin(FAILURES)]
+        why = failed.why.dropna()
+        cells = [count.get(o, 0) for o in ("holds", "nothing to reduce", "singular", "blow-up")]
+        other = len(part) - sum(cells)
+        shown = escape(why.iloc[0]) if len(why) else "--"
+        rows.append([name(method), *(str(c) for c in (*cells, other)), shown])
+    header = ["reduction", "holds", "nothing", "singular", "blow-up", "distorted", "why it fails"]
+    left = r">{\raggedright\arraybackslash}"
+    return tabular(header, rows, rf"lrrrrr{left}p{{6cm}}")
+
+
+def kernel_accuracy(tables: Tables) -> str:
+    """Worst error of each group's projections over its condition number, by class of matrix."""
+    table = tables["kernel_accuracy"]
+    rows = []
+    for group, part in table.groupby("group", sort=False):
+        worst = part.loc[part.worst_over_condition.idxmax()]
+        far = part.loc[part.worst_relative_error.idxmax()]
+        rows.append(
+            [
+                escape(group.replace("_", " ")), str(len(part)), str(int(part.cases.sum())),
+                format_number(worst.worst_over_condition), escape(worst.matrix_class),
+                format_number(far.worst_relative_error), escape(far.matrix_class),
+                format_number(far.condition),
+            ]
+        )  # fmt: skip
+    header = [
+        "group", "classes", "cases", "error/cond.", "in class", "error", "in class", "cond.",
+    ]  # fmt: skip
+    return tabular(header, rows, "lrrrlrlr")
+
+
+TEX_TABLES = {
+    "tab_claims": claims,
+    "tab_scenes": scenes,
+    "tab_methods": methods,
+    "tab_ranks": ranks,
+    "tab_reruns": reruns,
+    "tab_local_share": local_share,
+    "tab_stability": stability,
+    "tab_guard": guard,
+    "tab_hard_cases": hard_cases,
+    "tab_hard_reductions": hard_reductions,
+    "tab_kernel_accuracy": kernel_accuracy,
+}

@@ -1,1 +1,0 @@
-"""One module per workflow rule: paths and plain parameters in, files out."""

@@ -1,0 +1,131 @@
+"""What a job leaves in its log, and what the user sees when it fails."""
+
+import io
+import logging
+
+import pytest
+import scipy.linalg  # noqa: F401  -- loads libraries that have threads
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from pdrom.core.errors import MeshError
+from pdrom.core.logs import end_with_failures, job_log
+
+LOGGER = logging.getLogger("pdrom")
+
+
+@pytest.fixture
+def path(tmp_path):
+    """A log in a folder that does not exist yet."""
+    return tmp_path / "logs" / "rule" / "job.log"
+
+
+def test_messages_of_the_package_are_in_the_log(path):
+    with job_log(str(path)):
+        logging.getLogger("pdrom.model.mesh").info("made %d", 3)
+        logging.getLogger("pdrom.model.mesh").debug("hidden")
+        logging.getLogger("other").error("elsewhere")
+    text = path.read_text()
+    assert "INFO" in text
+    assert text.rstrip().endswith("pdrom.model.mesh: made 3")
+    assert len(text.splitlines()) == 1
+
+
+def test_libraries_have_one_thread_in_a_job(path):
+    """Snakemake sets as many as the job claims, and timing jobs claim every core."""
+
+    def threads() -> set[int]:
+        return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+    with threadpool_limits(limits=2):
+        assert threads() == {2}
+        with job_log(str(path)):
+            assert threads() == {1}
+        assert threads() == {2}
+
+
+def test_a_new_job_starts_a_new_log(path):
+    for message in ("first", "second"):
+        with job_log(str(path)) as logger:
+            logger.info(message)
+    assert "second" in path.read_text()
+    assert "first" not in path.read_text()
+
+
+def test_a_mistake_of_the_user_is_one_line_without_traceback(path):
+    with pytest.raises(SystemExit) as caught, job_log(str(path)):
+        raise MeshError("a.obj: vertex 3 is nan")
+    assert caught.value.code == "pdrom: a.obj: vertex 3 is nan"
+    assert "ERROR   pdrom: a.obj: vertex 3 is nan" in path.read_text()
+    assert "Traceback" not in path.read_text()
+
+
+def test_any_other_failure_keeps_its_traceback_in_the_log(path):
+    with pytest.raises(SystemExit) as caught, job_log(str(path)):
+        raise ZeroDivisionError("by zero")
+    assert caught.value.code == f"pdrom: ZeroDivisionError: by zero (traceback in {path})"
+    assert "Traceback" in path.read_text()
+    assert "test_logs.py" in path.read_text()
+
+
+@pytest.mark.parametrize("failure", [None, MeshError("x"), ValueError("x"), KeyboardInterrupt()])
+def test_logger_is_as_before_whatever_happened(path, failure):
+    before = (list(LOGGER.handlers), LOGGER.level)
+    try:
+        with job_log(str(path)):
+            assert len(LOGGER.handlers) == len(before[0]) + 1
+            if failure is not None:
+                raise failure
+    except (SystemExit, KeyboardInterrupt):
+        assert failure is not None
+    assert (list(LOGGER.handlers), LOGGER.level) == before
+
+
+SNAKEMAKE = """\
+[Sat Nov 21 08:13:06 2026]
+Error in rule pod:
+    message: None
+    jobid: 6
+    output: results/pod/a.h5, results/pod/a.csv
+    log: {log} (check log file(s) for error details)
+[Sat Nov 21 08:13:07 2026]
+Error in rule fom:
+    jobid: 7
+    output: results/fom/b.h5
+    log: results/logs/none.log (check log file(s) for error details)
+Shutting down, this might take some time.
+"""
+
+
+def test_the_last_lines_say_what_failed(path, tmp_path):
+    """A job with an error in its log, and one that was killed."""
+    with pytest.raises(SystemExit), job_log(str(path)):
+        raise MeshError("a.obj: vertex 3 is nan")
+    workflow = tmp_path / "snakemake.log"
+    workflow.write_text(SNAKEMAKE.format(log=path))
+    with pytest.raises(SystemExit) as caught:
+        end_with_failures([str(workflow), str(tmp_path / "missing")])
+    assert caught.value.code.splitlines() == [
+        "pdrom: job pod failed: a.obj: vertex 3 is nan",
+        "pdrom: job fom ended without a word while making results/fom/b.h5: killed? out of memory?",
+        "pdrom: what is finished is kept; the same command goes on from there",
+    ]
+
+
+def test_a_log_that_cannot_be_written_is_named(tmp_path):
+    (tmp_path / "logs").write_text("a file in place of the folder")
+    with pytest.raises(SystemExit) as caught, job_log(str(tmp_path / "logs" / "job.log")):
+        pass
+    assert "job.log: cannot be written (" in caught.value.code
+
+
+def test_a_full_disk_prints_no_traceback_for_each_message(path, capfd, monkeypatch):
+    """The log is cut short; what the job itself cannot write is another matter."""
+    with (
+        job_log(str(path)) as logger,
+        open("/dev/full", "wb", buffering=0) as full,
+        monkeypatch.context() as patch,
+    ):
+        stream = io.TextIOWrapper(full, write_through=True)
+        patch.setattr(logger.handlers[-1], "stream", stream)
+        logger.info("a message")
+    assert capfd.readouterr().err == ""

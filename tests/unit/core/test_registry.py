@@ -1,0 +1,63 @@
+"""Names that are loaded on demand."""
+
+import json
+import subprocess
+import sys
+from importlib.util import find_spec
+
+import pytest
+
+from pdrom.core.errors import ConfigurationError
+from pdrom.core.registry import Registry
+from pdrom.model.dynamics.solvers import SOLVERS
+from pdrom.model.effects import EFFECTS
+from pdrom.report.figures import FIGURES
+
+REGISTRY = Registry("thing", {"loads": "json:loads", "absent": "no.such.module:x"})
+
+
+def test_is_a_read_only_mapping():
+    assert list(REGISTRY) == ["loads", "absent"]
+    assert len(REGISTRY) == 2
+    assert "loads" in REGISTRY
+    assert "other" not in REGISTRY
+    assert REGISTRY["loads"] == "json:loads"
+    assert REGISTRY.module("loads") == "json"
+    with pytest.raises(TypeError):
+        REGISTRY["new"] = "json:dumps"
+
+
+def test_later_changes_of_the_entries_have_no_say():
+    entries = {"a": "json:loads"}
+    registry = Registry("thing", entries)
+    entries["b"] = "json:dumps"
+    assert list(registry) == ["a"]
+
+
+def test_loads_the_attribute():
+    assert REGISTRY.load("loads") is json.loads
+
+
+@pytest.mark.parametrize("ask", [REGISTRY.load, REGISTRY.module, REGISTRY.__getitem__])
+def test_unknown_names_list_what_is_allowed(ask):
+    with pytest.raises(
+        ConfigurationError, match=r"unknown thing 'other' \(allowed: absent, loads\)"
+    ):
+        ask("other")
+
+
+def test_nothing_is_imported_before_it_is_asked_for():
+    code = (
+        "import sys; from pdrom.core.registry import Registry;"
+        "r = Registry('thing', {'a': 'wave:open'}); r['a']; r.module('a'); 'a' in r;"
+        "before = 'wave' in sys.modules; r.load('a'); print(before, 'wave' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "True"]
+
+
+@pytest.mark.parametrize("registry", [EFFECTS, SOLVERS, FIGURES], ids=lambda r: r.kind)
+def test_every_entry_of_the_package_exists(registry):
+    for name in registry:
+        assert find_spec(registry.module(name)) is not None
+        assert callable(registry.load(name))

@@ -1,0 +1,131 @@
+"""YAML: plain, without repeated keys, and faults that name file, key and value."""
+
+from typing import Literal
+
+import pytest
+from pydantic import BaseModel, ConfigDict, Field
+
+from pdrom.core.errors import ConfigurationError
+from pdrom.core.yamlfile import MAX_BYTES, keys_of, read_yaml, validate
+
+
+class Inner(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    size: int = Field(ge=1)
+    kind: Literal["a", "b"] = "a"
+
+
+class Outer(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    name: str
+    inner: Inner
+    optional: Inner | None = None
+    many: dict[str, Inner] = Field(default_factory=dict)
+    row: tuple[Inner, ...] = ()
+    other: str = Field(default="x", alias="another")
+
+
+GOOD = {"name": "n", "inner": {"size": 1}}
+
+
+def written(tmp_path, content: str | bytes):
+    path = tmp_path / "file.yaml"
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
+def test_reads_plain_yaml(tmp_path):
+    path = written(tmp_path, "a: 1\nb: [1.5, x, null]\nc: {d: true}\n")
+    assert read_yaml(path) == {"a": 1, "b": [1.5, "x", None], "c": {"d": True}}
+
+
+def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
+    assert read_yaml(written(tmp_path, b"\xef\xbb\xbfa: 1\n")) == {"a": 1}
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("a: &x [1]\nb: *x\n", r"alias '\*x' is not allowed"),
+        ("a: 1\nb: 2\na: 3\n", "key 'a' is given twice"),
+        ("x: {a: 1, a: 1}\n", "key 'a' is given twice"),
+        ("- {b: {a: 1, a: 1}}\n", "key 'a' is given twice"),
+        ("[1, 2]: 3\n", "not valid YAML"),
+        ("? {a: 1}\n: 2\n", "not valid YAML"),
+        ("a: [1\n", "not valid YAML"),
+        ("a: 1\n\tb: 2\n", "not valid YAML"),
+        (b"a: \xff\xfe\n", "not valid YAML"),
+        ("[" * 3000, "not valid YAML"),
+        ("#" * (MAX_BYTES + 1), "larger than"),
+    ],
+)
+def test_faulty_files_are_named_in_one_line(tmp_path, content, message):
+    with pytest.raises(ConfigurationError, match=rf"file\.yaml: .*{message}") as caught:
+        read_yaml(written(tmp_path, content))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "tag",
+    [
+        "!!python/object/apply:pathlib.Path.touch",
+        "!!python/object/new:pathlib.Path",
+        "!!python/name:os.system",
+        "!!python/tuple",
+    ],
+)
+def test_tags_that_run_code_are_refused(tmp_path, tag):
+    with pytest.raises(ConfigurationError, match="could not determine a constructor"):
+        read_yaml(written(tmp_path, f"a: {tag} ['{tmp_path / 'made'}']\n"))
+    assert not (tmp_path / "made").exists()
+
+
+def test_missing_file_is_named(tmp_path):
+    with pytest.raises(ConfigurationError, match=r"gone\.yaml: no such configuration file"):
+        read_yaml(tmp_path / "gone.yaml")
+
+
+def test_valid_data_become_the_model():
+    result = validate(Outer, {**GOOD, "many": {"k": {"size": 2, "kind": "b"}}}, "source")
+    assert result.many["k"] == Inner(size=2, kind="b")
+
+
+INNER = r"\(allowed: size, kind\)"
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        ({**GOOD, "nam": 1}, r"unknown key 'nam' \(allowed: name, inner, .*another\)"),
+        ({**GOOD, "inner": {"size": 1, "sise": 2}}, rf"unknown key 'inner\.sise' {INNER}"),
+        ({**GOOD, "optional": {"size": 1, "x": 2}}, rf"unknown key 'optional\.x' {INNER}"),
+        ({**GOOD, "many": {"k": {"size": 1, "x": 2}}}, rf"unknown key 'many\.k\.x' {INNER}"),
+        ({**GOOD, "row": [{"size": 1, "x": 2}]}, rf"unknown key 'row\.0\.x' {INNER}"),
+        ({"name": "n"}, "key 'inner' is missing"),
+        ({**GOOD, "inner": {}}, r"key 'inner\.size' is missing"),
+        ({**GOOD, "inner": {"size": 0}}, r"inner\.size = 0: .*greater than or equal to 1"),
+        ({**GOOD, "inner": {"size": 1, "kind": "c"}}, r"inner\.kind = 'c': .*'a' or 'b'"),
+        ({**GOOD, "name": 3}, "name = 3: .*valid string"),
+    ],
+)
+def test_faults_name_source_key_and_what_is_allowed(data, message):
+    with pytest.raises(ConfigurationError, match=f"^source: {message}"):
+        validate(Outer, data, "source")
+
+
+@pytest.mark.parametrize("data", [None, [], "text", 3])
+def test_what_is_no_mapping_is_shown(data):
+    with pytest.raises(ConfigurationError, match="source: a mapping of keys is required"):
+        validate(Outer, data, "source")
+
+
+def test_long_values_are_cut():
+    with pytest.raises(ConfigurationError) as caught:
+        validate(Outer, {**GOOD, "inner": "x" * 5000}, "source")
+    assert len(str(caught.value)) < 300
+
+
+def test_keys_use_their_alias():
+    assert keys_of(Outer) == ["name", "inner", "optional", "many", "row", "another"]

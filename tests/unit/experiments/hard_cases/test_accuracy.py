@@ -1,0 +1,118 @@
+"""Compiled projections against mpmath on hard matrices."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from mpmath import mp
+
+from pdrom.experiments.hard_cases.accuracy import (
+    CLAMPED,
+    bending_errors,
+    clamped_error,
+    kernel_accuracy,
+    projected,
+    spring_error,
+    unit_group,
+)
+from pdrom.experiments.hard_cases.matrices import CLASSES, VECTORS, rotation
+from pdrom.experiments.hard_cases.reference import clamped, digits_for, half_sphere, spring
+from strategies import hard_matrices
+
+EPS = np.finfo(float).eps
+# A backward stable projection is wrong by a few round-offs times the condition number.
+STABLE = 20.0 * EPS
+
+GROUPS = {name: unit_group(name) for name in (*CLAMPED, "spring")}
+
+
+@pytest.mark.parametrize("kind", CLASSES, ids=lambda k: k.name)
+@pytest.mark.parametrize("effect", CLAMPED)
+def test_clamped_projections_are_backward_stable(effect, kind):
+    group = GROUPS[effect]
+    rng = np.random.default_rng(5)
+    for _ in range(10):
+        d = kind.make(rng, group.rows_per_element)
+        error, condition = clamped_error(group, d, kind.unique)
+        assert error <= STABLE * max(1.0, condition)
+
+
+@settings(max_examples=50, deadline=None)
+@given(drawn=hard_matrices(rows=3))
+@pytest.mark.parametrize("effect", ["tetrahedron_strain", "deformation_gradient"])
+def test_any_matrix_of_a_tetrahedron(effect, drawn):
+    kind, d = drawn
+    error, condition = clamped_error(GROUPS[effect], d, kind.unique)
+    assert error <= STABLE * max(1.0, condition)
+
+
+@settings(max_examples=50, deadline=None)
+@given(drawn=hard_matrices(rows=2))
+def test_any_matrix_of_a_triangle(drawn):
+    kind, d = drawn
+    error, condition = clamped_error(GROUPS["strain"], d, kind.unique)
+    assert error <= STABLE * max(1.0, condition)
+
+
+@pytest.mark.parametrize("kind", VECTORS, ids=lambda k: k.name)
+def test_springs(kind):
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        error, _ = spring_error(GROUPS["spring"], kind.make(rng, 1))
+        assert error <= STABLE
+
+
+def test_bending():
+    for name, error, condition in bending_errors(16):
+        assert error <= STABLE * max(1.0, condition), name
+
+
+@pytest.mark.parametrize("effect", CLAMPED)
+def test_the_unit_element_sees_the_matrix_itself(effect, rng):
+    group = GROUPS[effect]
+    d = rng.standard_normal((group.rows_per_element, 3))
+    y = np.zeros((group.S.shape[1], 3))
+    y[1:] = d
+    assert np.array_equal(group.S @ y, d)
+    inside = rotation(rng)[: len(d)]
+    assert projected(group, inside) == pytest.approx(inside, abs=1e-15)
+
+
+def test_reference_of_known_matrices():
+    """Diagonal matrices and a mirrored one have projections that can be written down."""
+    with mp.workdps(60):
+        p, condition = clamped(np.diag([3.0, 0.5, -0.25]), 0.75, 1.5)
+        assert float(condition) == 12.0
+        assert np.array(p.tolist(), dtype=float) == pytest.approx(np.diag([1.5, 0.75, 0.75]))
+        _, condition = clamped(np.diag([1.0, 1.0, -1.0]), 1.0, 1.0)
+        assert condition == mp.inf
+    d = np.array([[0.0, 2.0, 0.0], [0.0, 0.0, 1e-300]])
+    with mp.workdps(digits_for(d)):
+        p, _ = clamped(d, 0.75, 1.5)
+        expected = np.array([[0.0, 1.5, 0.0], [0.0, 0.0, 0.75]])
+        assert np.array(p.tolist(), dtype=float) == pytest.approx(expected)
+
+
+def test_reference_of_known_vectors():
+    with mp.workdps(60):
+        p = spring(np.array([[0.0, 3e-300, 4e-300]]), np.array([0.0, 0.0, 10.0]))
+        assert np.array(p.tolist(), dtype=float) == pytest.approx(np.array([[0.0, 6.0, 8.0]]))
+        pole = np.array([0.0, 0.0, 1.0])
+        p, _ = half_sphere(np.array([1.0]), np.array([[3.0, 4.0, 12.0]]), 13.0, pole)
+        assert np.array(p.tolist(), dtype=float) == pytest.approx(np.array([[3.0, 4.0, 12.0]]))
+        p, condition = half_sphere(np.array([1.0]), np.array([[3.0, 4.0, -12.0]]), 5.0, pole)
+        assert np.array(p.tolist(), dtype=float) == pytest.approx(np.array([[3.0, 4.0, 0.0]]))
+        assert float(condition) == pytest.approx(13.0 / 5.0)
+
+
+def test_digits_follow_the_range_of_the_entries():
+    assert digits_for(np.ones(3)) == digits_for(np.zeros(3)) == 50
+    assert digits_for(np.array([1.0, 1e-300])) == 650
+
+
+def test_the_table_has_every_group_and_class():
+    rows = kernel_accuracy(1)
+    assert {r["group"] for r in rows} == {*CLAMPED, "spring", "bending"}
+    named = {r["matrix_class"] for r in rows if r["group"] == "tetrahedron_strain"}
+    assert named == {k.name for k in CLASSES}
+    assert all(r["cases"] == 1 for r in rows)
+    assert all(r["worst_over_condition"] <= r["worst_relative_error"] for r in rows)

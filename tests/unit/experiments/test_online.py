@@ -1,0 +1,79 @@
+"""Rule online: the rows of one scene."""
+
+import numpy as np
+import pytest
+
+from conftest import make_scene
+from pdrom.core.errors import ConfigurationError
+from pdrom.core.store import read_table
+from pdrom.core.yamlfile import validate
+from pdrom.experiments.online import relative_error, run_online
+from pdrom.model.runs.full_order import trajectory
+from pdrom.pipeline.study import Online
+from pdrom.reduction.subspace.model import SubspaceModel, make_columns
+from pdrom.tables.columns import COLUMNS
+from pdrom.tables.online import online
+
+EFFECTS = (
+    {"effect": "spring", "weight": 1e5},
+    {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]},
+    {"effect": "pins", "select": "top"},
+)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    scene = make_scene(*EFFECTS, mesh={"kind": "cloth", "rows": 8, "columns": 7}, frames=10)
+    config = scene.config.model_dump(mode="json") | {
+        "reduce": {"spring": {"train": 5}}, "held_out": {"kick": 0.5},
+    }  # fmt: skip
+    path = tmp_path_factory.mktemp("online") / "scene.csv"
+    settings = {"bases": ["pod", "skinning"], "sizes": [3], "tolerances": [0.3, 1e-2]}
+    run_online(config, settings, {"frames": 3, "warmup": 1, "repeats": 2}, ".", str(path))
+    return scene, path
+
+
+def test_rows_of_a_scene(written):
+    scene, path = written
+    table = read_table(path)
+    assert tuple(table.columns) == COLUMNS["online"]
+    assert table.position_basis.tolist() == ["pod", "pod", "skinning", "skinning"]
+    assert table.tau.tolist() == [0.3, 1e-2] * 2
+    assert (table.vertices == 56).all()
+    assert (table.elements == scene.groups[0].elements).all()
+    assert (table.elements_sampled > 0).all()
+    assert (table.elements_sampled <= table.elements).all()
+    for column in ("relative_error_train", "relative_error_heldout"):
+        assert table[column].between(1e-6, 1.0).all()
+    # the held-out motion starts with a kick that the training has not seen
+    assert (table.relative_error_heldout > table.relative_error_train).any()
+    np.testing.assert_allclose(table.speedup, table.fom_ms_per_frame / table.ms_per_frame)
+    np.testing.assert_allclose(table.ms_per_iteration, table.ms_per_frame / 10)
+    assert table.fom_ms_per_frame.nunique() == 1
+
+
+def test_table_is_the_rows_of_all_scenes(written):
+    _, path = written
+    assert len(online([path, path])) == 8
+    empty = online([])
+    assert tuple(empty.columns) == COLUMNS["online"]
+    assert len(empty) == 0
+
+
+def test_error_is_that_of_the_trajectories(written):
+    scene, _ = written
+    reference = trajectory(scene)
+    model = SubspaceModel("pod", make_columns(scene, reference[1:], "pod", 3))
+    loop, state = model.loop(scene)
+    run = [reference[0]]
+    for frame in range(scene.config.frames):
+        state, _ = loop.step(state, frame)
+        run.append(model.positions(state.positions))
+    moved = np.linalg.norm(reference - reference[0])
+    expected = np.linalg.norm(np.stack(run) - reference) / moved
+    assert relative_error(scene, model, reference) == pytest.approx(expected, rel=1e-9)
+
+
+def test_faulty_settings_are_refused():
+    with pytest.raises(ConfigurationError, match="tolerances"):
+        validate(Online, {"tolerances": [2.0]}, "here")

@@ -1,0 +1,145 @@
+"""The ablation in position subspaces: its configuration, and its stage on a small scene."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from conftest import make_scene
+from pdrom.core.errors import ConfigurationError
+from pdrom.core.store import read_table, write_hdf5, write_table
+from pdrom.experiments.subspace_ablation import ablate
+from pdrom.experiments.subspace_ablation_spec import AblationSpec, load_ablation
+from pdrom.model.mesh.types import save_mesh
+from pdrom.model.runs.full_order import trajectory
+from pdrom.model.scene import Scene
+from pdrom.reduction.subspace.specs import InterpolationSpec
+from pdrom.tables import COLUMNS
+from pdrom.tables.subspace_ablation import subspace_ablation
+from places import ROOT
+
+HORIZON = 30
+
+
+def test_the_projects_ablation_changes_one_thing_at_a_time_first():
+    """Up to the first combination a variant differs from the plain method in a single setting."""
+    spec = load_ablation(ROOT / "config" / "subspace_ablation.yaml")
+    first, *others = spec.variants.items()
+    assert first[1] == InterpolationSpec()
+    for name, variant in others:
+        assert len(variant.model_fields_set) == 1 + name.count("+"), name
+    assert len(spec.cases()) == len(spec.modes) * len(spec.variants)
+    assert {case.modes for _, case in spec.cases()} == set(spec.modes)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("variants: {a: {modes: 5}}", "variants.a.modes: given by 'modes'"),
+        ("variants: {a: {states: guessed}}", "states"),
+        ("variants: {}", "variants"),
+        ("variants: {a: {}}\nranks: [3]", "ranks"),
+    ],
+)
+def test_faults_of_the_file_are_named(tmp_path, text, message):
+    path = tmp_path / "ablation.yaml"
+    path.write_text(f"scenes: []\nsizes: [4]\nmodes: [6]\n{text}\n")
+    with pytest.raises(ConfigurationError, match=message) as caught:
+        load_ablation(path)
+    assert str(path) in str(caught.value)
+
+
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory) -> pd.DataFrame:
+    """Rows of the stage for a hanging sheet whose training motion has a horizon."""
+    folder = tmp_path_factory.mktemp("ablation")
+    scene = make_scene(
+        {"effect": "strain", "weight": 1e6},
+        {"effect": "gravity"},
+        {"effect": "pins", "select": "left"},
+        mesh={"kind": "cloth", "rows": 9, "columns": 8, "plane": "xz"},
+        frames=60,
+        reduce={"strain": {"train": 30}},
+        held_out={"kick": 0.5, "kick_axes": ["y"], "seed": 3},
+    )
+    mesh = folder / "mesh.h5"
+    save_mesh(scene.mesh, mesh)
+    motions = {"train": scene, "heldout": Scene.build(scene.config.held_out_variant(), scene.mesh)}
+    runs = {}
+    for motion, bound in motions.items():
+        runs[motion] = str(folder / f"{motion}.h5")
+        with write_hdf5(runs[motion]) as file:
+            file["positions"] = trajectory(bound)
+    floor = [
+        ("test", label, seed, frame, 1.0 if label == "1e-10" and frame >= HORIZON else 1e-9)
+        for label in ("1e-10", "heldout")
+        for seed in (1, 2)
+        for frame in range(60)
+    ]
+    columns = ["scene", "perturbation", "seed", "frame", "relative_difference"]
+    write_table(pd.DataFrame(floor, columns=columns), folder / "sensitivity.csv")
+    spec = AblationSpec(
+        scenes=(),
+        sizes=(8,),
+        modes=(15,),
+        variants={
+            "plain": InterpolationSpec(),
+            "refused": InterpolationSpec(refuse_above=1.01),
+            "residual": InterpolationSpec(interpolates="residual"),
+            "mended": InterpolationSpec(states="visited", oversampling=3),
+        },
+    )
+    ablate(
+        scene.config.model_dump(mode="json"),
+        spec.model_dump(mode="json", exclude_unset=True),
+        {"perturbation": 1e-10, "threshold": 1e-3},
+        5.0,
+        str(mesh),
+        runs,
+        str(folder / "sensitivity.csv"),
+        str(folder / "rows.csv"),
+    )
+    return read_table(folder / "rows.csv").set_index("variant", drop=False)
+
+
+def test_every_variant_is_a_row_beside_the_full_projections(rows):
+    assert set(rows.columns) == set(COLUMNS["subspace_ablation"])
+    assert rows.variant.tolist() == ["plain", "refused", "residual", "mended"]
+    for column in ("relative_error_full_projections", "heldout_error_full_projections"):
+        assert rows[column].nunique() == 1
+        assert 0.0 < rows[column].iloc[0] < 0.1
+    assert (rows.r == 15).all()
+    assert rows.elements_sampled.dropna().astype(int).tolist() == [15, 15, 45]
+    assert rows.gain["mended"] < rows.gain["plain"]
+
+
+def test_a_refused_basis_has_not_run(rows):
+    empty = ["elements_sampled", "gain", "finite", "max_extent", "relative_error_within_horizon"]
+    assert rows.loc["refused", empty].isna().all()
+
+
+def test_the_mended_method_is_as_good_as_the_full_projections(rows):
+    mended = rows.loc["mended"]
+    assert mended.finite
+    limit = 1.5 * mended.relative_error_full_projections
+    assert mended.relative_error_within_horizon < limit
+    assert mended.heldout_error_within_horizon < 2.0 * mended.heldout_error_full_projections
+    assert rows.relative_error_within_horizon["plain"] > limit
+
+
+def test_a_run_that_leaves_the_scene_before_the_horizon_has_no_error(rows):
+    residual = rows.loc["residual"]
+    assert residual.max_extent > 5.0
+    assert not residual.finite
+    # it left after the horizon of the training motion; the held-out one is judged to its end
+    assert residual.relative_error_within_horizon > 0.5
+    assert np.isnan(residual.heldout_error_within_horizon)
+
+
+def test_table_joins_the_scenes(tmp_path, rows):
+    for scene in ("a", "b"):
+        write_table(rows.assign(scene=scene), tmp_path / f"{scene}.csv")
+    table = subspace_ablation([str(tmp_path / "a.csv"), str(tmp_path / "b.csv")])
+    assert table.scene.tolist() == ["a"] * 4 + ["b"] * 4
+    assert tuple(table.columns) == COLUMNS["subspace_ablation"]
+    assert tuple(subspace_ablation([]).columns) == COLUMNS["subspace_ablation"]
+    assert np.isnan(table.gain[1])

@@ -1,0 +1,220 @@
+"""Every kind of degenerate element: the compiled projections against LAPACK's singular values.
+
+Elements with the unit simplex as rest shape have S q = F^T exactly, so that F itself is chosen.
+"""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from conftest import random_rotation
+from pdrom.model.constraints.bending import VertexBending
+from pdrom.model.constraints.deformation_gradient import DeformationGradient
+from pdrom.model.constraints.lanes import LANES
+from pdrom.model.constraints.spring import EdgeSpring
+from pdrom.model.constraints.tetrahedron_strain import TetrahedronStrain
+from pdrom.model.constraints.triangle_strain import TriangleStrain
+from pdrom.model.mesh.generators import cloth
+from pdrom.model.mesh.types import Mesh
+
+
+def simplices(rows: int, count: int) -> Mesh:
+    """``count`` separate unit simplices with ``rows`` + 1 vertices."""
+    corners = np.eye(4, 3, k=-1)[: rows + 1]
+    cells = np.arange(count * (rows + 1), dtype=np.int32).reshape(count, rows + 1)
+    points = np.tile(corners, (count, 1))
+    if rows == 3:
+        return Mesh(points, np.empty((0, 3), dtype=np.int32), cells)
+    return Mesh(points, cells)
+
+
+def bound(kind: type, rows: int, count: int, **settings: float):
+    """A group of ``count`` unit simplices."""
+    mesh = simplices(rows, count)
+    return kind(kind.Config(weight=1.0, **settings), mesh, np.ones(mesh.vertices))
+
+
+def positions(f: np.ndarray) -> np.ndarray:
+    """Positions of unit simplices whose F^T are ``f`` (e, rows, 3)."""
+    return np.concatenate([np.zeros((len(f), 1, 3)), f], axis=1).reshape(-1, 3)
+
+
+def projected(group, f: np.ndarray) -> np.ndarray:
+    """Projections (e, rows, 3) of the group's elements at F^T = f."""
+    return group.project(positions(f)).reshape(f.shape)
+
+
+KINDS = {
+    "rotation": (DeformationGradient, 3, {}),
+    "narrow": (TetrahedronStrain, 3, {"minimum": 0.99, "maximum": 1.01}),
+    "wide": (TetrahedronStrain, 3, {"minimum": 0.1, "maximum": 10.0}),
+    "triangle": (TriangleStrain, 2, {"minimum": 0.99, "maximum": 1.01}),
+    "wide triangle": (TriangleStrain, 2, {"minimum": 0.1, "maximum": 10.0}),
+}
+
+# zero, round-off, tiny, small, repeated, in range, and any size
+SINGULAR_VALUES = st.one_of(
+    st.sampled_from([0.0, 1e-300, 1e-17, 1e-16, 1e-12, 1e-8, 1e-5, 0.1, 0.99, 1.0, 1.01, 2.0]),
+    st.floats(0.0, 5.0),
+    st.floats(-1e-7, 1e-7).map(lambda x: 1.0 + x),
+)
+
+
+@st.composite
+def matrices(draw, rows: int) -> np.ndarray:
+    """F^T of one element from its singular values, maybe mirrored, at any scale."""
+    sigma = np.array([draw(SINGULAR_VALUES) for _ in range(rows)])
+    if draw(st.booleans()):
+        sigma[-1] = -sigma[-1]
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    left, right = random_rotation(rng)[:rows], random_rotation(rng)[:rows, :rows]
+    turn = draw(st.sampled_from(["random", "none", "by pi", "diagonal"]))
+    if turn == "none":
+        left, right = np.eye(rows, 3), np.eye(rows)
+    elif turn == "by pi":
+        left, right = np.diag([-1.0, -1.0, 1.0])[:rows], np.eye(rows)
+    elif turn == "diagonal":
+        left, right = random_rotation(rng)[:rows], np.eye(rows)
+    scale = 10.0 ** draw(st.one_of(st.just(0.0), st.floats(-150.0, 150.0)))
+    return scale * (right.T @ (sigma[:, None] * left))
+
+
+def gap(f: np.ndarray) -> float:
+    """How far F is from matrices without a unique projection, relative to its norm."""
+    sigma = np.linalg.svd(f, compute_uv=False)
+    if sigma[0] == 0.0:
+        return 0.0
+    smallest = sigma[-1]
+    if len(f) == 3 and np.linalg.det(f / sigma[0]) < 0.0:
+        smallest = -smallest
+    # two columns in space may turn about each other only where the smaller one vanishes
+    return (sigma[-2] + smallest if len(f) == 3 else sigma[-1]) / sigma[0]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@given(data=st.data())
+def test_the_projection_is_the_nearest_member(kind, data):
+    """In the manifold, as near as LAPACK's; equal to it to 1e-10 where it is unique."""
+    group_type, rows, settings = KINDS[kind]
+    f = data.draw(matrices(rows))[None]
+    group = bound(group_type, rows, 1, **settings)
+    p, reference = projected(group, f), group.reference_project(f, np.arange(1))
+    low, high = settings.get("minimum", 1.0), settings.get("maximum", 1.0)
+    sigma = np.linalg.svd(p[0], compute_uv=False)
+    assert low * (1 - 1e-13) <= sigma[-1] <= sigma[0] <= high * (1 + 1e-13)
+    if rows == 3:
+        assert np.linalg.det(p[0]) > 0.0
+    norm = np.linalg.norm(f) + np.linalg.norm(reference)
+    nearest = np.linalg.norm(f - reference)
+    assert np.linalg.norm(f - p) <= nearest + 1e-13 * norm
+    separation = gap(f[0])
+    if separation > 1e-4:
+        assert np.abs(p - reference).max() <= 1e-10 * np.abs(reference).max()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_named_degenerate_elements(kind, rng):
+    """Points, lines, flat, mirrored and repeated ones; F of known projection where it is unique."""
+    group_type, rows, settings = KINDS[kind]
+    turn = random_rotation(rng)
+    half_turn = np.diag([1.0, -1.0, -1.0])
+    eye = np.eye(3)
+    members = [eye, turn, half_turn, half_turn @ turn]
+    others = [0.0 * eye, np.diag([1.0, 0.0, 0.0]), -eye, -turn, np.full((3, 3), 1.0)]
+    f = np.stack(members + others)[:, :rows]
+    group = bound(group_type, rows, len(f), **settings)
+    p = projected(group, f)
+    assert np.abs(p[:4] - f[:4]).max() < 1e-14
+    assert np.isfinite(p).all()
+    assert np.array_equal(p, projected(group, f))
+    reference = group.reference_project(f, np.arange(len(f)))
+    distance, nearest = (np.linalg.norm(f - q, axis=(1, 2)) for q in (p, reference))
+    assert distance == pytest.approx(nearest, rel=1e-12, abs=1e-14)
+
+
+@pytest.mark.parametrize("exponent", range(0, -15, -2))
+@pytest.mark.parametrize("kind", KINDS)
+def test_small_singular_values_keep_their_direction(kind, exponent, rng):
+    """Columns at right angles of any length: F^T F would lose the short one."""
+    group_type, rows, settings = KINDS[kind]
+    sigma = np.array([1.3, 0.7, 10.0**exponent] if rows == 3 else [1.3, 10.0**exponent])
+    directions = np.stack([random_rotation(rng)[:rows] for _ in range(50)])
+    low, high = settings.get("minimum", 1.0), settings.get("maximum", 1.0)
+    expected = np.clip(sigma, low, high)[:, None] * directions
+    p = projected(bound(group_type, rows, 50, **settings), sigma[:, None] * directions)
+    assert np.abs(p - expected).max() < 1e-13 * high
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_not_finite_stays_so_and_harms_no_other(kind, bad, rng):
+    group_type, rows, settings = KINDS[kind]
+    f = rng.standard_normal((3 * LANES, rows, 3))
+    group = bound(group_type, rows, len(f), **settings)
+    clean = projected(group, f)
+    f[LANES + 1, 0, 1] = bad
+    p = projected(group, f)
+    others = np.arange(len(f)) != LANES + 1
+    assert np.isnan(p[LANES + 1]).any()
+    assert np.array_equal(p[others], clean[others])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_element_has_the_same_bits_in_any_company(kind, rng):
+    """Neighbours in a block take part in the same loops, but change nothing."""
+    group_type, rows, settings = KINDS[kind]
+    f = np.eye(3)[:rows] + rng.standard_normal((2 * LANES + 3, rows, 3)) * 10.0 ** rng.uniform(
+        -9, 1, (2 * LANES + 3, 1, 1)
+    )
+    together = projected(bound(group_type, rows, len(f), **settings), f)
+    alone = bound(group_type, rows, 1, **settings)
+    for i in range(len(f)):
+        assert np.array_equal(projected(alone, f[i : i + 1])[0], together[i])
+
+
+@given(
+    direction=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda d: max(map(abs, d)) > 0.1),
+    exponent=st.floats(-150.0, 150.0),
+)
+def test_springs_of_any_length(direction, exponent):
+    group = _one_spring()
+    d = 10.0**exponent * np.array(direction)
+    p = group.project(np.stack([np.zeros(3), d, np.zeros(3)]))[0]
+    reference = group.reference_project(d[None, None], np.arange(1))[0, 0]
+    assert np.abs(p - reference).max() <= 1e-12 * np.abs(reference).max()
+
+
+def _one_spring() -> EdgeSpring:
+    mesh = Mesh(
+        np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 4.0], [1.0, 0.0, 0.0]]), np.array([[0, 1, 2]])
+    )
+    return EdgeSpring(EdgeSpring.Config(weight=1.0), mesh, np.ones(3))
+
+
+def test_a_spring_without_length_takes_its_rest_edge():
+    group = _one_spring()
+    p = group.project(np.ones((3, 3)))
+    assert np.array_equal(p, group.rest)
+    tiny = np.array([[0.0, 0.0, 0.0], [5e-324, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    assert group.project(tiny)[0] == pytest.approx([5.0, 0.0, 0.0], rel=1e-12)
+
+
+@given(exponent=st.floats(-150.0, 150.0), seed=st.integers(0, 2**32 - 1))
+def test_bending_at_any_scale(exponent, seed):
+    """The half sphere is scale-free: p keeps the rest magnitude, and the reference is met."""
+    rng = np.random.default_rng(seed)
+    y = 10.0**exponent * rng.standard_normal((42, 3))
+    _CURVED.begin_frame(y)
+    d = (_CURVED.S @ y)[:, None, :]
+    p, reference = _CURVED.project(y), _CURVED.reference_project(d, np.arange(_CURVED.elements))
+    assert np.linalg.norm(_CURVED.normals, axis=1) == pytest.approx(1.0, rel=1e-12)
+    assert np.abs(p - reference[:, 0]).max() <= 1e-10 * np.abs(reference).max()
+
+
+def _curved() -> VertexBending:
+    mesh = cloth(7, 6, wave=0.1)
+    return VertexBending(VertexBending.Config(weight=1.0), mesh, np.ones(mesh.vertices))
+
+
+_CURVED = _curved()

@@ -1,0 +1,105 @@
+"""Anderson acceleration; reference: its equivalence with GMRES on affine maps (Walker, Ni 2011)."""
+
+import numpy as np
+import pytest
+
+from conftest import GROUPS, make_scene
+from pdrom.model.dynamics.acceleration import Anderson
+from pdrom.model.runs.full_order import simulate, trajectory
+
+PINNED = {"effect": "pins", "select": "left"}
+
+
+def affine_map(rng, n=12, distinct=4):
+    """(A, b) of y -> A y + b with a symmetric contraction that has few distinct eigenvalues."""
+    q, _ = np.linalg.qr(rng.standard_normal((n, n)))
+    values = np.resize(np.linspace(0.3, 0.95, distinct), n)
+    return q * values @ q.T, rng.standard_normal((n, 3))
+
+
+def iterate(matrix, shift, window, iterations):
+    acceleration, y = Anderson(window), np.zeros_like(shift)
+    acceleration.begin_frame(y)
+    for _ in range(iterations):
+        assert not acceleration.refuse(y, float("nan"))
+        y = matrix @ y + shift
+        acceleration.combine(y)
+    return y
+
+
+def test_affine_map_ends_after_as_many_steps_as_it_has_eigenvalues(rng):
+    matrix, shift = affine_map(rng)
+    # one coordinate of each of the three right-hand sides: 4 eigenvalues times 3 independent parts
+    shift[:, 1:] = shift[:, :1]
+    exact = np.linalg.solve(np.eye(12) - matrix, shift)
+    error = np.linalg.norm(iterate(matrix, shift, 8, 6) - exact)
+    plain = np.linalg.norm(iterate(matrix, shift, 1, 6) - exact)
+    assert error < 1e-7 * np.linalg.norm(exact)
+    assert plain > 1e-4 * np.linalg.norm(exact)
+
+
+def test_residual_is_that_of_gmres(rng):
+    """With an unlimited window step m + 1 is the image of the m-th iterate of GMRES (here by dense
+    least squares over the Krylov space)."""
+    matrix, shift = affine_map(rng, distinct=12)
+    shift[:, 1:] = shift[:, :1]
+    steps, operator = 5, np.eye(12) - matrix
+    powers = [np.linalg.matrix_power(operator, i) @ shift[:, 0] for i in range(steps)]
+    krylov, _ = np.linalg.qr(np.stack(powers, axis=1))
+    found = krylov @ np.linalg.lstsq(operator @ krylov, shift[:, 0], rcond=None)[0]
+    y = iterate(matrix, shift, 20, steps + 1)
+    assert np.allclose(y[:, 0], matrix @ found + shift[:, 0], atol=1e-7 * np.abs(y).max())
+
+
+@pytest.mark.parametrize("group", sorted(GROUPS))
+@pytest.mark.parametrize("window", [1, 3, 6])
+def test_same_fixed_point_and_monotone_objective(group, window):
+    effects = ({"effect": group, "weight": 1e4}, {"effect": "gravity"})
+    plain = make_scene(*effects, mesh=GROUPS[group], frames=3, iterations=2000)
+    fast = make_scene(
+        *effects, mesh=GROUPS[group], frames=3, iterations=300, anderson_window=window
+    )
+    assert np.abs(trajectory(fast) - trajectory(plain)).max() < 1e-7
+    for _, report in simulate(fast):
+        rises = np.diff(report.objective) / np.maximum(np.abs(report.objective[:-1]), 1e-12)
+        assert rises.max() < 1e-9
+
+
+@pytest.mark.parametrize("group", ["spring", "strain", "deformation_gradient"])
+def test_ten_accelerated_iterations_beat_ten_plain_ones(group):
+    effects = ({"effect": group, "weight": 1e5}, {"effect": "gravity"}, PINNED)
+    runs = {
+        (k, w): trajectory(
+            make_scene(*effects, mesh=GROUPS[group], frames=8, iterations=k, anderson_window=w)
+        )[-1]
+        for k, w in ((10, 0), (10, 5), (1500, 0))
+    }
+    plain, fast = (np.linalg.norm(runs[10, w] - runs[1500, 0]) for w in (0, 5))
+    assert fast < 0.5 * plain
+
+
+def test_a_risen_objective_brings_back_the_plain_image():
+    acceleration, y = Anderson(3), np.ones((2, 3))
+    acceleration.begin_frame(y)
+    for objective in (2.0, 1.0):
+        assert not acceleration.refuse(y, objective)
+        y = 0.5 * y
+        plain = y.copy()
+        acceleration.combine(y)
+    y += 5.0
+    assert acceleration.refuse(y, 3.0)
+    assert np.array_equal(y, plain)
+    assert acceleration.refused == 1
+
+
+def test_window_zero_is_the_plain_iteration(group_scene):
+    assert group_scene.acceleration() is None
+
+
+def test_pinned_vertices_stay_exactly_in_place():
+    scene = make_scene(
+        {"effect": "spring", "weight": 1e5}, {"effect": "gravity"}, PINNED,
+        frames=5, anderson_window=4,
+    )  # fmt: skip
+    held = scene.boundaries[0].vertices
+    assert np.array_equal(trajectory(scene)[-1][held], scene.mesh.points[held])

@@ -1,0 +1,125 @@
+"""Backends of the global step against dense elimination."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import sparse
+
+from conftest import make_scene
+from pdrom.core.errors import ConfigurationError, SolverError
+from pdrom.model.dynamics.solvers import SOLVERS
+from pdrom.model.dynamics.system import GlobalSystem
+
+NAMES = sorted(SOLVERS)
+
+
+def spd(n: int, seed: int) -> sparse.csr_array:
+    """Random sparse symmetric positive definite matrix."""
+    rng = np.random.default_rng(seed)
+    root = sparse.random_array((n, n), density=min(1.0, 4.0 / n), rng=rng, format="csr")
+    return sparse.csr_array(root @ root.T + sparse.eye_array(n))
+
+
+@pytest.mark.parametrize("name", NAMES)
+@settings(max_examples=25, deadline=None)
+@given(n=st.integers(1, 60), seed=st.integers(0, 2**31))
+def test_solves_like_the_dense_matrix(name, n, seed):
+    matrix = spd(n, seed)
+    rhs = np.random.default_rng(seed + 1).standard_normal((n, 3))
+    before, out = rhs.copy(), np.full((n, 3), np.nan)
+    SOLVERS.load(name)(matrix).solve(rhs, out)
+    expected = np.linalg.solve(matrix.toarray(), rhs)
+    assert np.abs(out - expected).max() <= 1e-10 * max(1.0, np.abs(expected).max())
+    np.testing.assert_array_equal(rhs, before)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_one_factorisation_serves_many_solves_and_ignores_later_changes(name, rng):
+    matrix = spd(30, 3)
+    solver = SOLVERS.load(name)(matrix)
+    dense = matrix.toarray()
+    matrix.data[:] = np.nan
+    for _ in range(3):
+        rhs, out = rng.standard_normal((30, 3)), np.empty((30, 3))
+        solver.solve(rhs, out)
+        np.testing.assert_allclose(dense @ out, rhs, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_singular_matrix_has_one_error(name):
+    matrix = sparse.csr_array(np.diag([1.0, 0.0, 2.0]))
+    with pytest.raises(SolverError, match="size 3"):
+        SOLVERS.load(name)(matrix)
+
+
+SCENE = make_scene({"effect": "spring", "weight": 1e4}, {"effect": "strain", "weight": 1e5})
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("fixed", [[], [0], [0, 3, 17], list(range(29)), list(range(30))])
+def test_elimination_is_the_dense_block_solve(name, fixed, rng):
+    system = SCENE.system_with(name)
+    fixed = np.array(fixed, dtype=np.int64)
+    n = SCENE.mesh.vertices
+    assert n == 30
+    targets, rhs = rng.standard_normal((len(fixed), 3)), rng.standard_normal((n, 3))
+    y = np.full((n, 3), np.nan)
+    y[fixed] = targets
+    elimination = system.eliminate(fixed)
+    elimination.set_targets(targets)
+    elimination.solve(rhs, y)
+    free = np.setdiff1d(np.arange(n), fixed)
+    dense = system.matrix.toarray()
+    expected = np.linalg.solve(
+        dense[np.ix_(free, free)], rhs[free] - dense[np.ix_(free, fixed)] @ targets
+    )
+    np.testing.assert_array_equal(y[fixed], targets)
+    np.testing.assert_allclose(y[free], expected, rtol=1e-9, atol=1e-9)
+
+
+def test_factored_once_per_set(monkeypatch):
+    system = SCENE.system_with("splu")
+    one = system.eliminate(np.array([1, 2]))
+    assert system.eliminate(np.array([1, 2], dtype=np.int32)) is one
+    assert system.eliminate(np.array([1, 3])) is not one
+    assert system.factorisations == 2
+
+
+def test_system_is_symmetric_positive_definite():
+    dense = SCENE.system_with("splu").matrix.toarray()
+    np.testing.assert_allclose(dense, dense.T, rtol=1e-14, atol=1e-9)
+    smallest = np.linalg.eigvalsh(dense)[0]
+    # rigid translations are free of strain: what remains is the inertia
+    assert smallest == pytest.approx(10.0 / 0.016**2, rel=1e-8)
+
+
+def test_numbers_that_are_none_are_refused():
+    masses = SCENE.masses.copy()
+    masses[4] = np.inf
+    with pytest.raises(SolverError, match="global system"):
+        GlobalSystem(masses, 0.016, SCENE.groups)
+
+
+def test_unknown_solver_lists_the_known_ones():
+    with pytest.raises(ConfigurationError, match=r"cholespy, splu"):
+        SCENE.system_with("lu").eliminate(np.array([0]))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_masses_that_round_off_swallows_are_refused(name):
+    """A free body: nothing but inertia holds a translation, and inertia is lost in the matrix."""
+    scene = make_scene({"effect": "spring", "weight": 1e6}, vertex_mass=1e-12)
+    with pytest.raises(SolverError, match=r"beside the weights|not positive definite"):
+        scene.system_with(name).eliminate(np.empty(0, dtype=np.int64))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_masses_that_round_off_swallows_do_no_harm_to_a_held_body(name):
+    scene = make_scene({"effect": "spring", "weight": 1e6}, vertex_mass=1e-12)
+    elimination = scene.system_with(name).eliminate(np.arange(5))
+    elimination.set_targets(scene.mesh.points[:5])
+    y = scene.mesh.points.copy()
+    rhs = scene.groups[0].S.T @ (scene.groups[0].row_weights[:, None] * scene.groups[0].rest)
+    elimination.solve(rhs, y)
+    assert y == pytest.approx(scene.mesh.points, abs=1e-9)

@@ -1,0 +1,330 @@
+"""Bases of snapshots: every ingredient, and hard input."""
+
+import dataclasses
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import linalg
+
+from pdrom.core.errors import RankError, SnapshotError, StorageError
+from pdrom.reduction.basis import Basis, compute_basis, load_basis, save_basis
+from pdrom.reduction.method import BasisSpec
+
+WEIGHTINGS, LAYOUTS = ("none", "mass"), ("vectorised", "per-axis")
+CENTRINGS = ("none", "affine", "mean-in-modes")
+SPECS = [
+    BasisSpec(weighting=w, centring=c, layout=layout)
+    for w, c, layout in itertools.product(WEIGHTINGS, CENTRINGS, LAYOUTS)
+]
+SEEDS = st.integers(0, 2**32 - 1)
+ROWS = 12
+
+
+def basis_of(
+    p: np.ndarray, spec: BasisSpec, roundoff: float = 0.0, mass: np.ndarray | None = None, **kw
+) -> Basis:
+    """Basis of snapshots with three rows an element; unit masses unless given."""
+    mass = np.ones(p.shape[1]) if mass is None else mass
+    return compute_basis(p, mass, roundoff, 3, spec, **kw)
+
+
+def snapshots(seed: int, n: int = 7) -> tuple[np.ndarray, np.ndarray]:
+    """Random snapshots (n, 12, 3) about a common mean, and row masses (12,)."""
+    rng = np.random.default_rng(seed)
+    return rng.standard_normal((n, ROWS, 3)) + 3.0, rng.uniform(0.1, 10.0, ROWS)
+
+
+@pytest.fixture(params=SPECS, ids=lambda s: s.basis_id)
+def spec(request: pytest.FixtureRequest) -> BasisSpec:
+    """Every combination of ingredients."""
+    return request.param
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=SEEDS)
+@pytest.mark.parametrize("any_spec", SPECS, ids=lambda s: s.basis_id)
+def test_modes_are_orthonormal_in_their_inner_product(any_spec, seed):
+    p, mass = snapshots(seed)
+    kept = p.copy(), mass.copy()
+    basis = basis_of(p, any_spec, mass=mass)
+    np.testing.assert_array_equal(p, kept[0])
+    np.testing.assert_array_equal(mass, kept[1])
+    weight = mass if any_spec.weighting == "mass" else np.ones(ROWS)
+    by_axis = basis.V.reshape(ROWS, 3, -1)
+    grams = [by_axis[:, a].T @ (weight[:, None] * by_axis[:, a]) for a in range(3)]
+    if basis.separate_axes:
+        for gram in grams:
+            assert np.abs(gram - np.eye(basis.rank)).max() < 1e-12
+    else:
+        assert np.abs(sum(grams) - np.eye(basis.rank)).max() < 1e-12
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=SEEDS)
+@pytest.mark.parametrize(
+    "any_spec", [s for s in SPECS if s.centring != "mean-in-modes"], ids=lambda s: s.basis_id
+)
+def test_training_snapshots_lie_in_the_affine_space(any_spec, seed):
+    p, mass = snapshots(seed)
+    basis = basis_of(p, any_spec, mass=mass)
+    columns = p.reshape(len(p), -1).T - basis.mean[:, None]
+    outside = columns - basis.V @ np.linalg.lstsq(basis.V, columns, rcond=None)[0]
+    if basis.separate_axes:
+        for a in range(3):
+            v = basis.V[a::3]
+            outside[a::3] = columns[a::3] - v @ np.linalg.lstsq(v, columns[a::3], rcond=None)[0]
+    assert np.abs(outside).max() < 1e-10
+
+
+def test_same_input_same_bytes(spec):
+    p, mass = snapshots(3)
+    first, second = basis_of(p, spec, mass=mass), basis_of(p.copy(), spec, mass=mass.copy())
+    for field in dataclasses.fields(Basis):
+        assert np.array_equal(getattr(first, field.name), getattr(second, field.name))
+
+
+def test_order_of_snapshots_does_not_matter():
+    p, _ = snapshots(5)
+    for centring in ("none", "affine"):
+        one = basis_of(p, BasisSpec(centring=centring))
+        two = basis_of(p[::-1], BasisSpec(centring=centring))
+        np.testing.assert_allclose(one.V, two.V, atol=1e-12)
+
+
+def test_singular_values_are_those_of_the_weighted_centred_matrix():
+    p, mass = snapshots(11)
+    basis = basis_of(p, BasisSpec(weighting="mass", centring="affine"), mass=mass)
+    centred = (p - p.mean(axis=0)) * np.sqrt(mass)[:, None]
+    reference = np.linalg.svd(centred.reshape(len(p), -1).T, compute_uv=False)
+    np.testing.assert_allclose(basis.singular_values, reference, atol=1e-13 * reference[0])
+    assert basis.rank == len(p) - 1
+
+
+def test_per_axis_layout_is_three_separate_pods():
+    p, _ = snapshots(13)
+    basis = basis_of(p, BasisSpec(layout="per-axis"))
+    squares = np.zeros(len(p))
+    for a in range(3):
+        u, sigma, _ = np.linalg.svd(p[:, :, a].T, full_matrices=False)
+        ours = basis.V.reshape(ROWS, 3, -1)[:, a]
+        np.testing.assert_allclose(np.abs(u.T @ ours), np.eye(len(p)), atol=1e-10)
+        squares += sigma**2
+    np.testing.assert_allclose(basis.singular_values, np.sqrt(squares), rtol=1e-12)
+
+
+def test_first_mode_of_known_snapshots():
+    """Rows of one direction d with amplitudes t: V = d / |d|, sigma_1 = |d| |t|."""
+    d = np.arange(1.0, 3 * ROWS + 1).reshape(ROWS, 3)
+    t = np.array([1.0, -2.0, 2.0])
+    basis = basis_of(t[:, None, None] * d, BasisSpec())
+    assert basis.rank == 1
+    np.testing.assert_allclose(basis.V[:, 0], d.ravel() / np.linalg.norm(d), rtol=1e-13)
+    assert basis.singular_values[0] == pytest.approx(np.linalg.norm(d) * 3.0, rel=1e-13)
+
+
+# The published code's modes -----------------------------------------------------------------
+
+
+def published_modes(p: np.ndarray, signs: np.ndarray) -> np.ndarray:
+    """The recipe written out with a dense SVD: divide by the deviation, POD, multiply, add, QR."""
+    matrix = p.reshape(len(p), -1).T
+    first = matrix[:, 0]
+    deviation = np.std(matrix - first[:, None])
+    u, sigma, _ = np.linalg.svd((matrix - first[:, None]) / deviation, full_matrices=False)
+    rank = int((sigma > 1e-10 * sigma[0]).sum())
+    u = u[:, :rank] * np.sign(u[np.abs(u[:, :rank]).argmax(axis=0), range(rank)]) * signs[:rank]
+    modes = u * deviation + first[:, None]
+    for a in range(3):
+        modes[a::3] = linalg.qr(modes[a::3], mode="economic")[0]
+    return modes
+
+
+def test_mean_in_modes_follows_the_recipe():
+    p, _ = snapshots(17)
+    basis = basis_of(p, BasisSpec(centring="mean-in-modes"))
+    wanted = published_modes(p, np.ones(len(p)))
+    assert basis.V.shape == wanted.shape
+    assert not basis.mean.any()
+    for a in range(3):
+        np.testing.assert_allclose(
+            np.abs(basis.V[a::3].T @ wanted[a::3]), np.eye(basis.rank), atol=1e-10
+        )
+
+
+def test_mean_in_modes_spans_another_space_with_other_signs():
+    p, _ = snapshots(19)
+    spec = BasisSpec(centring="mean-in-modes")
+    fixed = basis_of(p, spec)
+    seeds = range(6)
+    flipped = [basis_of(p, spec, signs=np.random.default_rng(s)) for s in seeds]
+    angles = [linalg.subspace_angles(fixed.V[::3], b.V[::3])[0] for b in flipped]
+    assert max(angles) > 1e-2
+    again = basis_of(p, spec, signs=np.random.default_rng(0))
+    np.testing.assert_array_equal(again.V, flipped[0].V)
+
+
+@pytest.mark.parametrize("centring", ["none", "affine"])
+def test_signs_have_no_say_elsewhere(centring):
+    p, _ = snapshots(19)
+    spec = BasisSpec(centring=centring)
+    flipped = basis_of(p, spec, signs=np.random.default_rng(1))
+    np.testing.assert_array_equal(basis_of(p, spec).V, flipped.V)
+
+
+def test_mean_in_modes_has_no_more_modes_than_rows(rng):
+    p = rng.standard_normal((30, 6, 3))
+    assert basis_of(p, BasisSpec()).rank == 18
+    assert basis_of(p, BasisSpec(centring="mean-in-modes")).rank == 6
+
+
+# Hard input ---------------------------------------------------------------------------------
+
+
+def test_zero_snapshots_have_no_basis(spec):
+    basis = basis_of(np.zeros((5, ROWS, 3)), spec)
+    assert basis.rank == 0
+    assert basis.V.shape == (3 * ROWS, 0)
+    assert basis.active_axes == (False, False, False)
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=SEEDS, n=st.integers(2, 40), exponent=st.integers(-8, 8))
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("weighting", WEIGHTINGS)
+def test_constant_snapshots_have_no_basis_but_a_mean(weighting, layout, seed, n, exponent):
+    """What a computed mean leaves is round-off, for every number of snapshots and every scale."""
+    one, mass = snapshots(seed, 1)
+    p = np.repeat(one, n, axis=0) * 10.0**exponent
+    for centring in ("affine", "mean-in-modes"):
+        spec = BasisSpec(weighting=weighting, centring=centring, layout=layout)
+        assert basis_of(p, spec, mass=mass).rank == 0
+    basis = basis_of(p, BasisSpec(centring="affine"))
+    np.testing.assert_allclose(basis.mean, p[0].ravel(), rtol=1e-13)
+
+
+def test_round_off_has_no_basis(spec, rng):
+    """Data of size 1e-14 are a full-rank matrix; only their round-off tells that they are noise."""
+    p = 1e-14 * rng.standard_normal((7, ROWS, 3))
+    assert basis_of(p, spec, roundoff=1e-12).rank == 0
+
+
+def test_small_data_above_round_off_keep_their_rank(rng):
+    p = 1e-14 * rng.standard_normal((7, ROWS, 3))
+    assert basis_of(p, BasisSpec(), roundoff=1e-20).rank == 7
+
+
+@pytest.mark.parametrize("centring", ["none", "affine"])
+def test_repeated_snapshots_add_no_rank(centring):
+    p, _ = snapshots(23, 5)
+    spec = BasisSpec(centring=centring)
+    assert basis_of(np.concatenate([p, p, p]), spec).rank == basis_of(p, spec).rank
+
+
+def test_a_flat_axis_gets_no_modes_and_is_flagged(spec, rng):
+    p = rng.standard_normal((7, ROWS, 3))
+    p[:, :, 2] = 1e-17 * rng.standard_normal((7, ROWS))
+    basis = basis_of(p, spec, roundoff=1e-14)
+    assert basis.active_axes == (True, True, False)
+    if basis.separate_axes:
+        assert not basis.V[2::3].any()
+    assert np.abs(basis.V[2::3]).max() < 1e-14
+
+
+def test_an_axis_that_stays_where_it_is_needs_no_modes_with_a_mean(rng):
+    p = rng.standard_normal((7, ROWS, 3))
+    p[:, :, 2] = rng.standard_normal(ROWS)
+    assert basis_of(p, BasisSpec(centring="affine")).active_axes == (True, True, False)
+    assert basis_of(p, BasisSpec(centring="none")).active_axes == (True, True, True)
+    assert basis_of(p, BasisSpec(centring="mean-in-modes")).active_axes == (True, True, True)
+
+
+def test_per_axis_rank_is_the_largest_and_poorer_axes_are_padded(rng):
+    p = rng.standard_normal((7, ROWS, 3))
+    p[:, :, 2] = rng.standard_normal((7, 2)) @ rng.standard_normal((2, ROWS))
+    basis = basis_of(p, BasisSpec(layout="per-axis"))
+    assert basis.rank == 7
+    assert basis.V[2::3, :2].any(axis=0).all()
+    assert not basis.V[2::3, 2:].any()
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_numbers_that_are_none_are_named(spec, bad):
+    p, _ = snapshots(29)
+    p[2, 3, 1] = bad
+    with pytest.raises(SnapshotError, match=r"entry \(2, 3, 1\) is -?(nan|inf)"):
+        basis_of(p, spec)
+
+
+@pytest.mark.parametrize("shape", [(1, 12, 3), (5, 12), (5, 12, 2), (5, 0, 3), (5, 11, 3)])
+def test_wrong_shapes_are_named(shape):
+    with pytest.raises(SnapshotError, match="required"):
+        compute_basis(np.ones(shape), np.ones(shape[1]), 0.0, 3, BasisSpec())
+
+
+@pytest.mark.parametrize("mass", [0.0, -1.0, np.nan])
+def test_rows_without_mass_are_named(mass):
+    p, masses = snapshots(31)
+    masses[4] = mass
+    with pytest.raises(SnapshotError, match="row_mass"):
+        basis_of(p, BasisSpec(weighting="mass"), mass=masses)
+    basis_of(p, BasisSpec(), mass=masses)
+
+
+def test_wrong_number_of_masses_is_named():
+    with pytest.raises(SnapshotError, match=r"\(11,\), required: \(12,\)"):
+        basis_of(snapshots(31)[0], BasisSpec(), mass=np.ones(11))
+
+
+# Type and file ------------------------------------------------------------------------------
+
+
+def test_truncation_names_the_rank():
+    basis = basis_of(snapshots(37)[0], BasisSpec())
+    np.testing.assert_array_equal(basis.truncated(3), basis.V[:, :3])
+    for r in (0, -1, 8):
+        with pytest.raises(RankError, match=rf"r = {r}, .* rank 7 .* allowed are 1 to 7"):
+            basis.truncated(r)
+
+
+def test_file_round_trip(spec, tmp_path):
+    path = tmp_path / "scene" / "group" / f"{spec.basis_id}.h5"
+    basis = basis_of(snapshots(41)[0], spec)
+    save_basis(basis, path, {"unit": "m"})
+    loaded = load_basis(path)
+    for field in dataclasses.fields(Basis):
+        if field.name != "origin":
+            assert np.array_equal(getattr(basis, field.name), getattr(loaded, field.name))
+    with pytest.raises(RankError, match=rf"scene/group/{spec.basis_id}\.h5: r = 99"):
+        loaded.truncated(99)
+
+
+def test_empty_basis_survives_a_file(tmp_path):
+    save_basis(basis_of(np.zeros((4, ROWS, 3)), BasisSpec()), tmp_path / "b.h5", {})
+    assert load_basis(tmp_path / "b.h5").V.shape == (3 * ROWS, 0)
+
+
+def test_damaged_file_is_named(tmp_path):
+    path = tmp_path / "b.h5"
+    save_basis(basis_of(snapshots(43)[0], BasisSpec()), path, {})
+    path.write_bytes(path.read_bytes()[:-500])
+    with pytest.raises(StorageError, match=r"b\.h5"):
+        load_basis(path)
+
+
+def test_the_trained_range_holds_every_snapshot_and_is_reached(spec):
+    """The least box around the coefficients that reconstruct the snapshots (full rank)."""
+    p, mass = snapshots(47)
+    basis = basis_of(p, spec, mass=mass)
+    parts = [slice(a, None, 3) for a in range(3)] if basis.separate_axes else [slice(None)]
+    assert basis.trained.shape == (len(parts), 2, basis.rank)
+    offsets = p.reshape(len(p), -1) - basis.mean
+    weights = np.sqrt(np.repeat(mass, 3)) if spec.weighting == "mass" else np.ones(3 * ROWS)
+    for part, (low, high) in zip(parts, basis.trained, strict=True):
+        # an independent way: weighted least squares, unique because the modes are independent
+        scaled = weights[part, None] * basis.V[part]
+        c = linalg.lstsq(scaled, (weights * offsets)[:, part].T)[0]
+        np.testing.assert_allclose(low, c.min(axis=1), atol=1e-10)
+        np.testing.assert_allclose(high, c.max(axis=1), atol=1e-10)

@@ -1,0 +1,94 @@
+"""POD against a dense SVD and pyMOR; its orthonormality, accuracy and sign convention."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pymor.algorithms.pod import pod as pymor_pod
+from pymor.vectorarrays.numpy import NumpyVectorSpace
+
+from pdrom.reduction.basis.pod import fix_signs, pod
+
+SHAPES = st.tuples(st.integers(1, 60), st.integers(1, 12), st.integers(0, 2**32 - 1))
+
+
+def matrix_of(shape: tuple[int, int, int]) -> np.ndarray:
+    """Random matrix (n, m) with columns of very different size."""
+    n, m, seed = shape
+    rng = np.random.default_rng(seed)
+    return rng.standard_normal((n, m)) * 10.0 ** rng.uniform(-6, 6, m)
+
+
+@settings(deadline=None)
+@given(SHAPES)
+def test_modes_are_orthonormal_and_input_is_kept(shape):
+    matrix = matrix_of(shape)
+    before = matrix.copy()
+    u, sigma = pod(matrix)
+    np.testing.assert_array_equal(matrix, before)
+    assert u.shape == (matrix.shape[0], min(matrix.shape))
+    assert np.abs(u.T @ u - np.eye(u.shape[1])).max() < 1e-13
+    assert (np.diff(sigma) <= 0.0).all()
+
+
+@settings(deadline=None)
+@given(SHAPES)
+def test_singular_values_are_those_of_a_dense_svd(shape):
+    matrix = matrix_of(shape)
+    reference = np.linalg.svd(matrix, compute_uv=False)
+    np.testing.assert_allclose(pod(matrix)[1], reference, rtol=0.0, atol=1e-14 * reference[0])
+
+
+@settings(deadline=None)
+@given(SHAPES)
+def test_all_modes_reproduce_the_matrix(shape):
+    matrix = matrix_of(shape)
+    u, _ = pod(matrix)
+    assert np.abs(u @ (u.T @ matrix) - matrix).max() <= 1e-13 * np.abs(matrix).max()
+
+
+def test_small_singular_values_survive_where_the_gram_matrix_loses_them(rng):
+    """sigma_8 = 1e-13 sigma_1: below sqrt(eps), so that A^T A cannot hold it."""
+    q = np.linalg.qr(rng.standard_normal((500, 8)))[0]
+    w = np.linalg.qr(rng.standard_normal((8, 8)))[0]
+    wanted = np.logspace(0, -13, 8)
+    matrix = q * wanted @ w.T
+    np.testing.assert_allclose(pod(matrix)[1], wanted, rtol=1e-2)
+    gram = np.sqrt(np.abs(np.linalg.eigvalsh(matrix.T @ matrix)))
+    assert gram.min() > 10 * wanted[-1] or gram.min() < wanted[-1] / 10
+
+
+def test_agrees_with_pymor(rng):
+    matrix = rng.standard_normal((200, 12)) * np.logspace(0, -3, 12)
+    array = NumpyVectorSpace(200).from_numpy(matrix)
+    assert len(array) == 12
+    modes, sigma = pymor_pod(array, method="qr_svd", rtol=0.0)
+    u, ours = pod(matrix)
+    np.testing.assert_allclose(ours, sigma, rtol=1e-11)
+    np.testing.assert_allclose(u, fix_signs(modes.to_numpy()), atol=1e-9)
+
+
+@settings(deadline=None)
+@given(SHAPES)
+def test_entry_of_largest_magnitude_is_positive(shape):
+    u = pod(matrix_of(shape))[0]
+    largest = np.abs(u).max(axis=0)
+    assert (u.max(axis=0) >= largest * (1.0 - 1e-6)).all()
+
+
+def test_first_of_tied_entries_decides_the_sign():
+    u = np.array([[-0.5, 0.5], [0.5 * (1.0 + 1e-12), -0.5 * (1.0 + 1e-12)]])
+    np.testing.assert_array_equal(fix_signs(u), u * [-1.0, 1.0])
+
+
+@settings(deadline=None)
+@given(SHAPES, st.integers(0, 2**32 - 1))
+def test_signs_do_not_depend_on_those_of_the_input(shape, seed):
+    matrix = matrix_of(shape)
+    flips = np.random.default_rng(seed).choice([-1.0, 1.0], matrix.shape[1])
+    np.testing.assert_array_equal(fix_signs(matrix), fix_signs(matrix * flips))
+
+
+@pytest.mark.parametrize("shape", [(7, 0), (0, 0)])
+def test_no_column_has_no_sign(shape):
+    assert fix_signs(np.empty(shape)).shape == shape

@@ -1,0 +1,184 @@
+"""The reduced local step against the dense formula, on an invented group and on the real ones."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from pdrom.reduction.basis import Basis, compute_basis
+from pdrom.reduction.local.local_step import ReducedLocalStep
+from pdrom.reduction.method import MethodSpec, load_methods
+from pdrom.reduction.sampling import Reduction, select
+from places import CONFIG
+
+PRESETS = load_methods(CONFIG / "methods.yaml")
+N, ELEMENTS, P, R = 9, 12, 2, 4
+ROWS = ELEMENTS * P
+
+
+class InventedGroup:
+    """A group whose projections are given per call of `next`, and that records what is asked."""
+
+    name = "invented"
+    elements = ELEMENTS
+
+    def __init__(self, projections: np.ndarray) -> None:
+        rng = np.random.default_rng(8)
+        self.S = sparse.random_array((ROWS, N), density=0.3, rng=rng, format="csr")
+        self.row_weights = np.repeat(rng.uniform(1.0, 9.0, ELEMENTS), P)
+        self.projections = projections
+        self.asked: list[np.ndarray] = []
+        self.frames: list[np.ndarray | None] = []
+
+    def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
+        self.frames.append(elements)
+
+    def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:
+        self.asked.append(elements)
+        return self.projections.reshape(ELEMENTS, P, 3)[elements].reshape(-1, 3)
+
+    def full(self, p: np.ndarray) -> np.ndarray:
+        """S^T W p (N, 3)."""
+        return self.S.T @ (self.row_weights[:, None] * p)
+
+
+def reduction_of(spec: MethodSpec, seed: int = 1) -> tuple[np.ndarray, Reduction]:
+    """Snapshots (7, rows, 3) and the reduction of size R made from them."""
+    rng = np.random.default_rng(seed)
+    p = rng.standard_normal((7, ROWS, 3)) + 1.0
+    basis = compute_basis(p, rng.uniform(0.5, 2.0, ROWS), 0.0, P, spec)
+    return p, Reduction(basis, select(basis, spec, R), spec, R)
+
+
+def added(step: ReducedLocalStep) -> np.ndarray:
+    """What a step adds to the right-hand side."""
+    rhs = np.zeros((N, 3))
+    step.accumulate(np.zeros((N, 3)), rhs)
+    return rhs
+
+
+VARIANTS = {
+    **PRESETS,
+    "mass": MethodSpec(title="t", weighting="mass", centring="affine", rows="element"),
+    "mass-joint": MethodSpec(title="t", weighting="mass", rows="joint"),
+    "per-axis": MethodSpec(title="t", layout="per-axis", centring="affine", rows="joint"),
+    "per-axis-all": MethodSpec(title="t", layout="per-axis", rows="all"),
+    "published-all": MethodSpec(title="t", centring="mean-in-modes", rows="all"),
+}
+
+
+@pytest.fixture(params=sorted(VARIANTS))
+def spec(request: pytest.FixtureRequest) -> MethodSpec:
+    """The presets and further combinations."""
+    return VARIANTS[request.param]
+
+
+def test_adds_the_lifted_reconstruction(spec):
+    """S^T W of `Reduction.reconstruct`, for projections that are not in the space."""
+    _, reduction = reduction_of(spec)
+    other = np.random.default_rng(5).standard_normal((3, ROWS, 3))
+    group = InventedGroup(other[0])
+    step = ReducedLocalStep(group, reduction)
+    for projections, wanted in zip(other, reduction.reconstruct(other), strict=True):
+        group.projections = projections
+        scale = np.abs(group.full(wanted)).max()
+        np.testing.assert_allclose(added(step), group.full(wanted), atol=1e-11 * scale)
+
+
+@pytest.mark.parametrize("preset", [name for name in PRESETS if name != "published"])
+def test_projection_in_the_space_gives_the_full_right_hand_side(preset):
+    _, reduction = reduction_of(PRESETS[preset])
+    c = np.random.default_rng(6).standard_normal(R)
+    inside = (reduction.basis.mean + reduction.v @ c).reshape(ROWS, 3)
+    group = InventedGroup(inside)
+    scale = np.abs(group.full(inside)).max() * reduction.gain
+    np.testing.assert_allclose(
+        added(ReducedLocalStep(group, reduction)), group.full(inside), atol=1e-12 * scale
+    )
+
+
+def test_evaluates_sampled_elements_only(spec):
+    _, reduction = reduction_of(spec)
+    group = InventedGroup(np.ones((ROWS, 3)))
+    step = ReducedLocalStep(group, reduction)
+    step.begin_frame(np.zeros((N, 3)))
+    rhs = added(step)
+    assert len(group.asked) == len(group.frames) == 1
+    np.testing.assert_array_equal(group.asked[0], reduction.elements)
+    if spec.rows == "all" or spec.oversampling * R >= ELEMENTS:
+        assert group.frames == [None]
+        assert len(group.asked[0]) == ELEMENTS
+    else:
+        np.testing.assert_array_equal(group.frames[0], reduction.elements)
+        assert len(group.asked[0]) <= R
+        # what the other elements hold has no influence
+        hidden = np.ones((ELEMENTS, P, 3))
+        hidden[np.setdiff1d(np.arange(ELEMENTS), reduction.elements)] = np.nan
+        group.projections = hidden.reshape(ROWS, 3)
+        np.testing.assert_array_equal(added(step), rhs)
+
+
+def test_two_threads_share_the_lift_with_the_bits_of_one(spec, monkeypatch):
+    _, reduction = reduction_of(spec)
+    group = InventedGroup(np.random.default_rng(7).standard_normal((ROWS, 3)))
+    whole = added(ReducedLocalStep(group, reduction))
+    monkeypatch.setattr("pdrom.reduction.local.local_step.SPLIT_FROM", 1)
+    step = ReducedLocalStep(group, reduction)
+    shared = []
+    for group.threads in (1, 2):
+        shared.append(added(step))
+    np.testing.assert_array_equal(*shared)
+    np.testing.assert_allclose(shared[0], whole, atol=1e-13 * np.abs(whole).max())
+
+
+def test_adds_to_what_is_there_and_knows_no_energy(spec):
+    _, reduction = reduction_of(spec)
+    step = ReducedLocalStep(InventedGroup(np.ones((ROWS, 3))), reduction)
+    rhs = np.full((N, 3), 7.0)
+    assert np.isnan(step.accumulate(np.zeros((N, 3)), rhs))
+    np.testing.assert_allclose(rhs - 7.0, added(step), atol=1e-12 * np.abs(rhs).max())
+    assert step.name == "invented"
+
+
+def test_failed_method_spoils_its_axis_and_raises_nothing():
+    """An infinite gain reaches the run as nan, which ends it as a blow-up in its first frame."""
+    spec = PRESETS["deim-joint"]
+    p, reduction = reduction_of(spec)
+    basis = reduction.basis
+    v = basis.V.copy()
+    v[2::3] = 0.0
+    flat = Basis(**{**vars(basis), "V": v})
+    step = ReducedLocalStep(InventedGroup(p[0]), Reduction(flat, select(flat, spec, R), spec, R))
+    rhs = added(step)
+    assert np.isnan(rhs[:, 2]).all()
+    assert np.isfinite(rhs[:, :2]).all()
+
+
+@pytest.mark.parametrize("preset", [name for name in PRESETS if name != "published"])
+def test_real_groups_reproduce_their_full_local_step(group_scene, preset):
+    """Snapshots of random positions; at one of them all modes give the group's own S^T W p."""
+    group, spec = group_scene.groups[0], PRESETS[preset]
+    rng = np.random.default_rng(4)
+    rest = group_scene.mesh.points
+    positions = [rest + 0.05 * rng.standard_normal(rest.shape) for _ in range(5)]
+    group.begin_frame(rest)
+    p = np.stack([group.project(q) for q in positions])
+    basis = compute_basis(p, np.ones(p.shape[1]), 0.0, group.rows_per_element, spec)
+    reduction = Reduction(basis, select(basis, spec, basis.rank), spec, basis.rank)
+    step = ReducedLocalStep(group, reduction)
+    for q in positions:
+        full, reduced = np.zeros_like(q), np.zeros_like(q)
+        group.begin_frame(rest)
+        group.accumulate(q, full)
+        step.begin_frame(rest)
+        step.accumulate(q, reduced)
+        tolerance = 1e-11 * reduction.gain * np.abs(full).max()
+        np.testing.assert_allclose(reduced, full, atol=tolerance)
+
+
+def test_variants_cover_shared_and_separate_coefficients():
+    shared = {name: reduction_of(s)[1].blocks[0].axis is None for name, s in VARIANTS.items()}
+    assert set(shared.values()) == {True, False}
+    for (one, s), (two, t) in itertools.combinations(VARIANTS.items(), 2):
+        assert s != t, (one, two)

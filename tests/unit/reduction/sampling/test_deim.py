@@ -1,0 +1,127 @@
+"""DEIM against pyMOR and the definition; Q-DEIM against its defining factorisation."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from pymor.algorithms.ei import deim as pymor_deim
+from pymor.vectorarrays.numpy import NumpyVectorSpace
+from scipy import linalg
+
+from pdrom.reduction.sampling.deim import deim_entries
+from pdrom.reduction.sampling.qdeim import qdeim_entries
+
+SIZES = st.tuples(st.integers(1, 60), st.integers(1, 15), st.integers(0, 2**32 - 1))
+
+
+def orthonormal(size: tuple[int, int, int]) -> np.ndarray:
+    """Random orthonormal columns (n, r), r <= n."""
+    n, r, seed = size
+    rng = np.random.default_rng(seed)
+    return np.linalg.qr(rng.standard_normal((n, min(n, r))))[0]
+
+
+def decaying(n: int = 400, m: int = 40) -> np.ndarray:
+    """POD modes of 1 / sqrt((x - a)^2 + 0.01) (after Chaturantabut and Sorensen 2010, sec. 4)."""
+    x, a = np.linspace(0, 1, n)[:, None], np.linspace(0, 1, m)
+    return np.linalg.svd(1.0 / np.sqrt((x - a) ** 2 + 0.01), full_matrices=False)[0][:, :20]
+
+
+def pymor_entries(v: np.ndarray) -> np.ndarray:
+    """Entries of pyMOR's DEIM on a given basis."""
+    return pymor_deim(NumpyVectorSpace(len(v)).from_numpy(v.copy()), pod=False)[0]
+
+
+@settings(deadline=None)
+@given(SIZES)
+def test_picks_the_entries_of_pymor(size):
+    v = orthonormal(size)
+    np.testing.assert_array_equal(deim_entries(v), pymor_entries(v))
+
+
+def test_picks_the_entries_of_pymor_for_a_decaying_basis():
+    v = decaying()
+    np.testing.assert_array_equal(deim_entries(v), pymor_entries(v))
+
+
+@settings(deadline=None)
+@given(SIZES)
+def test_selection_is_nested_distinct_and_keeps_its_input(size):
+    v = orthonormal(size)
+    before = v.copy()
+    entries = deim_entries(v)
+    np.testing.assert_array_equal(v, before)
+    assert len(set(entries.tolist())) == v.shape[1]
+    for r in range(1, v.shape[1]):
+        np.testing.assert_array_equal(deim_entries(v[:, :r]), entries[:r])
+
+
+@settings(deadline=None)
+@given(SIZES)
+def test_system_is_regular_and_follows_the_growth_bound(size):
+    """|| (P^T V)^-1 || <= (1 + sqrt(2 n))^(r-1) / || v_1 ||_inf (lemma 3.2)."""
+    v = orthonormal(size)
+    n, r = v.shape
+    gain = np.linalg.norm(np.linalg.inv(v[deim_entries(v)]), 2)
+    assert gain <= (1.0 + np.sqrt(2.0 * n)) ** (r - 1) / np.abs(v[:, 0]).max() * (1.0 + 1e-10)
+
+
+@settings(deadline=None)
+@given(SIZES, st.integers(0, 2**32 - 1))
+def test_permuted_rows_are_picked_in_the_same_order(size, seed):
+    v = orthonormal(size)
+    order = np.random.default_rng(seed).permutation(len(v))
+    np.testing.assert_array_equal(order[deim_entries(v[order])], deim_entries(v))
+
+
+@settings(deadline=None)
+@given(SIZES, st.integers(0, 2**32 - 1))
+def test_signs_of_the_modes_do_not_matter(size, seed):
+    v = orthonormal(size)
+    flipped = v * np.random.default_rng(seed).choice([-1.0, 1.0], v.shape[1])
+    np.testing.assert_array_equal(deim_entries(flipped), deim_entries(v))
+
+
+def test_known_selection():
+    """v_1 peaks at entry 2; the residual of v_2 = (3, 0, 4, 0) / 5 is +-(3, -2, 0, -2) / 5."""
+    v = np.array([[0.0, 1.0, 2.0, 1.0], [3.0, 0.0, 4.0, 0.0]]).T
+    np.testing.assert_array_equal(deim_entries(v), [2, 0])
+    np.testing.assert_array_equal(deim_entries(np.eye(4)[:, [3, 1]]), [3, 1])
+
+
+@settings(deadline=None)
+@given(SIZES)
+def test_qdeim_takes_the_pivots_of_a_permuted_triangular_factorisation(size):
+    """The pivots are distinct and give V^T P = Q R with |R_kk| >= the norm of what is left."""
+    v = orthonormal(size)
+    r = v.shape[1]
+    entries = qdeim_entries(v)
+    assert len(set(entries.tolist())) == r
+    q, factor = linalg.qr(v[entries].T)
+    rest = q.T @ v.T
+    for k in range(r):
+        left = np.linalg.norm(rest[k:], axis=0).max()
+        assert abs(factor[k, k]) == pytest.approx(left, rel=1e-8)
+
+
+@settings(deadline=None)
+@given(SIZES)
+def test_qdeim_does_not_depend_on_the_basis_of_the_space(size):
+    """Drmac and Gugercin 2016: V Q with orthogonal Q gives the same norms, hence the same pivots.
+
+    A square V is left out: its rows all have norm 1, and round-off would decide among them.
+    """
+    v = orthonormal(size)
+    assume(v.shape[0] > v.shape[1])
+    q = np.linalg.qr(np.random.default_rng(size[2] + 1).standard_normal((v.shape[1],) * 2))[0]
+    np.testing.assert_array_equal(qdeim_entries(v @ q), qdeim_entries(v))
+
+
+def test_qdeim_gain_is_below_that_of_the_greedy_on_average():
+    gains = []
+    for seed in range(30):
+        v = orthonormal((200, 20, seed))
+        picks = deim_entries(v), qdeim_entries(v)
+        gains.append([np.linalg.norm(np.linalg.inv(v[entries]), 2) for entries in picks])
+    greedy, pivoted = np.mean(gains, axis=0)
+    assert pivoted < greedy

@@ -1,0 +1,182 @@
+"""GappyPOD+E against its published loop, dense eigenvalues and the best subset."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pdrom.core.errors import SamplingError
+from pdrom.reduction.sampling.block import block_elements
+from pdrom.reduction.sampling.gappy_pod_e import bound_gain, eigenvalue_growth, oversample
+from pdrom.reduction.sampling.qdeim import qdeim_entries
+
+SIZES = st.tuples(
+    st.integers(3, 25), st.sampled_from([1, 3, 6]), st.integers(1, 9), st.integers(0, 2**32 - 1)
+).filter(lambda s: s[2] <= s[0])
+
+
+def modes(size: tuple[int, int, int, int]) -> np.ndarray:
+    """Random orthonormal modes (rows * elements, r), some elements far larger than others."""
+    elements, rows, r, seed = size
+    rng = np.random.default_rng(seed)
+    scale = np.repeat(10.0 ** rng.uniform(-2, 1, elements), rows)
+    return np.linalg.qr(rng.standard_normal((elements * rows, r)) * scale[:, None])[0]
+
+
+def gain(v: np.ndarray, size: int, elements) -> float:
+    """1 / sigma_min of the sampled rows, from a dense SVD."""
+    rows = v.reshape(-1, size, v.shape[1])[np.asarray(elements)].reshape(-1, v.shape[1])
+    smallest = np.linalg.svd(rows, compute_uv=False)[-1] if len(rows) >= v.shape[1] else 0.0
+    return 1.0 / smallest if smallest > 1e-14 else np.inf
+
+
+def published_loop(u: np.ndarray, count: int) -> list[int]:
+    """The loop of Peherstorfer, Drmac and Gugercin 2020 (algorithm 1), written out with SVDs."""
+    picked = qdeim_entries(u).tolist()
+    while len(picked) < count:
+        _, s, w = np.linalg.svd(u[picked], full_matrices=False)
+        gap = s[-2] ** 2 - s[-1] ** 2
+        rotated = w @ u.T
+        length = gap + np.sum(rotated**2, axis=0)
+        bound = length - np.sqrt(length**2 - 4.0 * gap * rotated[-1] ** 2)
+        picked.append(next(int(i) for i in np.argsort(-bound) if i not in picked))
+    return picked
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_single_rows_follow_the_published_loop(seed):
+    v = modes((40, 1, 6, seed))
+    assert oversample(v, 1, qdeim_entries(v), 25).tolist() == published_loop(v, 25)
+
+
+@settings(deadline=None)
+@given(SIZES)
+def test_growth_is_a_lower_bound_and_exact_for_one_mode(size):
+    """Against dense eigenvalues of G + B^T B; at most |B u|^2, which r = 1 attains."""
+    v = modes(size)
+    blocks = v.reshape(size[0], size[1], -1)
+    rows = blocks[: max(1, size[0] // 2)].reshape(-1, v.shape[1])
+    gram = rows.T @ rows
+    values, vectors = np.linalg.eigh(gram)
+    products = blocks @ vectors[:, 0]
+    gap = values[1] - values[0] if len(values) > 1 else np.inf
+    bound = eigenvalue_growth(blocks, products, gap)
+    true = np.array([np.linalg.eigvalsh(gram + b.T @ b)[0] for b in blocks]) - values[0]
+    assert (bound >= 0.0).all()
+    assert (bound <= true + 1e-12).all()
+    assert (true <= np.sum(products**2, axis=1) + 1e-12).all()
+    if v.shape[1] == 1:
+        np.testing.assert_allclose(bound, true, atol=1e-12)
+
+
+def test_growth_is_sharper_than_with_the_norm_of_the_block(rng):
+    """Blocks as single rows of their Frobenius norm are the looser bound (and still one)."""
+    blocks = rng.standard_normal((50, 6, 8))
+    products = blocks[:, :, 0]
+    sharp = eigenvalue_growth(blocks, products, 0.7)
+    squared, length = np.sum(products**2, axis=1), np.sum(blocks**2, axis=(1, 2))
+    total = 0.7 + length
+    loose = 0.5 * (total - np.sqrt(total**2 - 4 * 0.7 * squared))
+    assert (sharp >= loose - 1e-14).all()
+    assert np.median(sharp / loose) > 1.5
+
+
+@settings(deadline=None)
+@given(SIZES)
+def test_each_element_has_the_largest_bound_and_none_raises_the_gain(size):
+    v = modes(size)
+    before = v.copy()
+    start = block_elements(v, size[1])
+    path = oversample(v, size[1], start, size[0])
+    np.testing.assert_array_equal(v, before)
+    assert path[: len(start)].tolist() == start.tolist()
+    assert sorted(path.tolist()) == list(range(size[0]))
+    gains = [gain(v, size[1], path[:k]) for k in range(len(start), len(path) + 1)]
+    assert all(b <= a * (1.0 + 1e-9) for a, b in itertools.pairwise(gains))
+    blocks = v.reshape(size[0], size[1], -1)
+    for k in range(len(start), len(path)):
+        rows = blocks[path[:k]].reshape(-1, v.shape[1])
+        values, vectors = np.linalg.eigh(rows.T @ rows)
+        gap = values[1] - values[0] if len(values) > 1 else np.inf
+        bound = eigenvalue_growth(blocks, blocks @ vectors[:, 0], gap)
+        bound[path[:k]] = 0.0
+        assert bound[path[k]] >= bound.max() * (1.0 - 1e-6) - 1e-12
+
+
+@settings(deadline=None)
+@given(SIZES, st.floats(1.01, 50.0))
+def test_bounded_gain_is_met_with_no_element_too_many(size, bound):
+    """Orthonormal modes have gain 1 at all elements, so that every bound can be met."""
+    v = modes(size)
+    start = block_elements(v, size[1])
+    chosen = bound_gain(v, size[1], start, bound)
+    assert gain(v, size[1], chosen) <= bound * (1.0 + 1e-9)
+    if len(chosen) > len(start):
+        assert gain(v, size[1], chosen[:-1]) > bound * (1.0 - 1e-9)
+    path = oversample(v, size[1], start, len(chosen))
+    np.testing.assert_array_equal(chosen, path)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_one_more_element_is_nearly_the_best_one(seed):
+    """All choices of two further elements of twelve: the greedy pair is never far off."""
+    v = modes((12, 3, 4, seed))
+    start = block_elements(v, 3)
+    others = np.setdiff1d(np.arange(12), start)
+    best = min(gain(v, 3, [*start, *pair]) for pair in itertools.combinations(others, 2))
+    assert best <= gain(v, 3, oversample(v, 3, start, 6)) * (1 + 1e-12) <= 1.35 * best * (1 + 1e-12)
+
+
+def test_bounded_gain_is_near_the_smallest_set_that_meets_it():
+    """Brute force over all sets that contain the start, smallest first."""
+    for seed in range(6):
+        v = modes((11, 3, 3, seed))
+        start = block_elements(v, 3)
+        others = np.setdiff1d(np.arange(11), start)
+        chosen = bound_gain(v, 3, start, 1.3)
+        fewest = next(
+            k
+            for k in range(len(others) + 1)
+            if any(gain(v, 3, [*start, *s]) <= 1.3 for s in itertools.combinations(others, k))
+        )
+        assert fewest <= len(chosen) - len(start) <= fewest + 1
+
+
+def test_an_even_share_of_the_elements_is_the_least_that_a_bound_needs(rng):
+    """trace(G) = r m / e for modes of equal size everywhere: gain >= sqrt(e / m)."""
+    hadamard = np.array([[1.0]])
+    for _ in range(6):
+        hadamard = np.kron(hadamard, [[1.0, 1.0], [1.0, -1.0]])
+    v = hadamard[:, rng.permutation(64)[:5]] / 8.0
+    for bound in (2.0, 3.0):
+        chosen = bound_gain(v, 1, block_elements(v, 1), bound)
+        assert len(chosen) >= 64 / bound**2
+
+
+def test_modes_that_depend_on_each_other_end_with_all_elements(rng):
+    v = rng.standard_normal((30, 4))
+    v[:, 3] = v[:, 0]
+    chosen = bound_gain(v, 3, block_elements(v[:, :3], 3), 2.0)
+    assert sorted(chosen.tolist()) == list(range(10))
+
+
+def test_zero_and_repeated_rows_are_no_obstacle(rng):
+    """Elements of zeros are taken last; of equal elements the first comes first."""
+    v = np.zeros((36, 3))
+    v[:18] = np.linalg.qr(rng.standard_normal((18, 3)))[0]
+    v[18:24] = v[:6]
+    path = oversample(v, 6, np.array([1]), 6)
+    assert np.isfinite(v[path]).all()
+    assert set(path[-2:].tolist()) == {4, 5}
+    assert path.tolist().index(0) < path.tolist().index(3)
+
+
+@pytest.mark.parametrize(
+    ("start", "named"), [([1, 1], "repeated"), ([0, 10], "0 to 9"), ([-1], "0 to 9")]
+)
+def test_faulty_starts_are_named(start, named, rng):
+    v = np.linalg.qr(rng.standard_normal((30, 3)))[0]
+    with pytest.raises(SamplingError, match=named):
+        oversample(v, 3, np.array(start), 5)

@@ -1,0 +1,147 @@
+"""Every method of the study on snapshots that hold little, nothing, or widely different sizes."""
+
+import numpy as np
+import pytest
+
+from conftest import ROOT
+from pdrom.core.errors import RankError, SnapshotError
+from pdrom.reduction.basis import compute_basis
+from pdrom.reduction.method import load_methods
+from pdrom.reduction.sampling import Reduction, select
+
+METHODS = load_methods(ROOT / "config" / "methods.yaml")
+FRAMES, ELEMENTS, ROWS = 9, 14, 2
+EPS = np.finfo(float).eps
+
+
+def low_rank(rng: np.random.Generator, rank: int) -> np.ndarray:
+    """Snapshots (9, 28, 3) of rank ``rank`` with sizes of order one."""
+    modes = rng.standard_normal((rank, ELEMENTS * ROWS * 3))
+    return (rng.standard_normal((FRAMES, rank)) @ modes).reshape(FRAMES, -1, 3)
+
+
+def flat(p: np.ndarray) -> np.ndarray:
+    p = p.copy()
+    p[:, :, 2] = 0.0
+    return p
+
+
+def twins(p: np.ndarray) -> np.ndarray:
+    """The second element is the first again."""
+    p = p.copy()
+    p[:, ROWS : 2 * ROWS] = p[:, :ROWS]
+    return p
+
+
+def ill_scaled(p: np.ndarray) -> np.ndarray:
+    """Half of the elements are twelve decades larger."""
+    p = p.copy()
+    p[:, : ROWS * ELEMENTS // 2] *= 1e12
+    return p
+
+
+# name -> snapshots and the largest rank that they hold (an affine mean takes one of it at most)
+SNAPSHOTS = {
+    "zero": (lambda rng: np.zeros((FRAMES, ELEMENTS * ROWS, 3)), 0),
+    "constant": (lambda rng: np.repeat(low_rank(rng, 4)[:1], FRAMES, axis=0), 1),
+    "repeated": (lambda rng: low_rank(rng, 5)[[0, 1] * 4 + [0]], 2),
+    "rank one": (lambda rng: low_rank(rng, 1), 1),
+    "rank three": (lambda rng: low_rank(rng, 3), 3),
+    "full": (lambda rng: low_rank(rng, FRAMES), FRAMES),
+    "tiny": (lambda rng: 1e-14 * low_rank(rng, 3), 3),
+    "denormal": (lambda rng: 1e-310 * low_rank(rng, 3), FRAMES),
+    "huge": (lambda rng: 1e140 * low_rank(rng, 3), 3),
+    "flat axis": (lambda rng: flat(low_rank(rng, 3)), 3),
+    "twin elements": (lambda rng: twins(low_rank(rng, 3)), 3),
+    "ill-scaled": (lambda rng: ill_scaled(low_rank(rng, 3)), 3),
+    "one sign": (lambda rng: 1.0 + 1e-9 * low_rank(rng, 2), 3),
+}
+
+
+def basis_of(p: np.ndarray, method: str, roundoff: float | None = None):
+    """Basis with the round-off of numbers as they are stored, unless more is given."""
+    roundoff = EPS * float(np.linalg.norm(p)) if roundoff is None else roundoff
+    return compute_basis(p, np.ones(p.shape[1]), roundoff, ROWS, METHODS[method])
+
+
+@pytest.fixture(params=SNAPSHOTS)
+def hard(request, rng):
+    """Snapshots and their rank."""
+    make, rank = SNAPSHOTS[request.param]
+    return make(rng), rank
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_basis_vector_is_noise(hard, method):
+    """The numerical rank never exceeds the rank of the data, and V has no further columns."""
+    p, rank = hard
+    basis = basis_of(p, method)
+    assert basis.rank <= rank
+    assert basis.V.shape[1] == basis.rank
+    assert np.isfinite(basis.V).all()
+    assert np.isfinite(basis.mean).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_size_reports_its_gain(hard, method):
+    """Up to the rank a gain is reported; where it is finite, so is the reconstruction."""
+    p, _ = hard
+    basis = basis_of(p, method)
+    for r in range(1, basis.rank + 1):
+        reduction = Reduction(basis, select(basis, METHODS[method], r), METHODS[method], r)
+        # single axes of bases that are orthonormal as a whole may hold less than one
+        assert not np.isnan(reduction.gain)
+        assert reduction.gain > 0.0
+        if np.isfinite(reduction.gain):
+            assert np.isfinite(reduction.reconstruct(p)).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_beyond_the_rank_is_a_named_error(hard, method):
+    p, _ = hard
+    basis = basis_of(p, method)
+    for r in (0, basis.rank + 1, 10**6):
+        with pytest.raises(RankError, match=f"r = {r}, .* numerical rank {basis.rank}"):
+            select(basis, METHODS[method], r)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_data_below_their_round_off_have_no_basis(hard, method):
+    p, _ = hard
+    assert basis_of(p, method, roundoff=2.0 * np.linalg.norm(p) + 1e-300).rank == 0
+
+
+@pytest.mark.parametrize("method", ["pod", "deim", "qdeim", "block-deim", "block-qdeim", "gappy"])
+@pytest.mark.parametrize(
+    "name", ["repeated", "rank one", "rank three", "full", "tiny", "huge", "twin elements"]
+)
+def test_full_rank_reproduces_the_data(name, method, rng):
+    p = SNAPSHOTS[name][0](rng)
+    basis = basis_of(p, method)
+    spec = METHODS[method]
+    reduction = Reduction(basis, select(basis, spec, basis.rank), spec, basis.rank)
+    error = np.linalg.norm(reduction.reconstruct(p) - p) / np.linalg.norm(p)
+    assert error <= 100.0 * EPS * reduction.gain
+
+
+@pytest.mark.parametrize("method", ["block-deim", "block-qdeim"])
+def test_a_twin_element_is_not_taken_for_a_second_mode(method, rng):
+    """Two identical elements carry one piece of information: both would leave a mode open."""
+    p = np.zeros((FRAMES, ELEMENTS * ROWS, 3))
+    first, second = rng.standard_normal((2, FRAMES))
+    p[:, : 2 * ROWS] = first[:, None, None]
+    p[:, 6 * ROWS : 7 * ROWS] = 0.1 * second[:, None, None]
+    basis = basis_of(p, method)
+    assert basis.rank == 2
+    chosen = select(basis, METHODS[method], 2)
+    assert 6 in chosen.elements
+    assert Reduction(basis, chosen, METHODS[method], 2).gain < 10.0
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("method", METHODS)
+def test_numbers_that_are_none_are_named(method, bad, rng):
+    p = low_rank(rng, 3)
+    p[4, 7, 1] = bad
+    with pytest.raises(SnapshotError, match=r"entry \(4, 7, 1\) is"):
+        basis_of(p, method)

@@ -1,0 +1,241 @@
+"""Position subspaces: atoms, columns, modes."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from conftest import make_scene, random_rotation
+from pdrom.model.runs.full_order import trajectory
+from pdrom.reduction.subspace.atoms import atoms
+from pdrom.reduction.subspace.columns import (
+    affine_columns,
+    build_columns,
+    displacement_modes,
+    orthonormal,
+)
+from pdrom.reduction.subspace.model import make_columns
+from pdrom.reduction.subspace.skinning import skinning_modes, skinning_weights
+from pdrom.reduction.subspace.space import coordinates
+
+
+class Units:
+    """A boundary of which only the units are asked."""
+
+    def __init__(self, *units) -> None:
+        self._units = [np.array(sorted(unit)) for unit in units]
+
+    def units(self):
+        return self._units
+
+
+SETS = st.lists(
+    st.lists(st.sets(st.integers(0, 19), min_size=1, max_size=8), min_size=1, max_size=3),
+    max_size=4,
+)
+
+
+@given(SETS)
+def test_atoms_partition_what_is_held(boundaries):
+    found = atoms([Units(*units) for units in boundaries], 20)
+    units = [unit for boundary in boundaries for unit in boundary]
+    members = np.concatenate(found) if found else np.array([], dtype=int)
+    assert len(members) == len(set(members.tolist()))
+    assert set(members.tolist()) == set().union(*units)
+    for atom in found:
+        # a unit holds all of an atom or nothing of it
+        assert all(set(atom.tolist()) <= unit or not set(atom.tolist()) & unit for unit in units)
+    for one in found:
+        for other in found:
+            # and no two atoms could be one
+            together = [(int(one[0]) in unit) == (int(other[0]) in unit) for unit in units]
+            assert one is other or not all(together)
+
+
+def test_atoms_of_overlapping_pins_by_hand():
+    found = atoms([Units({0, 1, 2, 3}), Units({2, 3, 4}), Units({9}, {8})], 10)
+    assert [a.tolist() for a in found] == [[0, 1], [2, 3], [4], [8], [9]]
+    assert atoms([], 10) == []
+
+
+@settings(max_examples=40, deadline=None)
+@given(n=st.integers(1, 12), m=st.integers(1, 12), rank=st.integers(0, 12), seed=st.integers(0, 99))
+def test_orthonormal_keeps_the_span(n, m, rank, seed):
+    rng = np.random.default_rng(seed)
+    rank = min(rank, n, m)
+    columns = rng.standard_normal((n, rank)) @ rng.standard_normal((rank, m))
+    q = orthonormal(columns)
+    assert q.shape == (n, rank)
+    np.testing.assert_allclose(q.T @ q, np.eye(rank), atol=1e-12)
+    np.testing.assert_allclose(q @ (q.T @ columns), columns, atol=1e-7 * (1 + abs(columns).max()))
+
+
+def test_orthonormal_leaves_out_dependent_and_zero_columns():
+    e = np.eye(4)
+    columns = np.column_stack([np.zeros(4), e[0], 3 * e[0], e[1], e[0] - e[1], e[2]])
+    np.testing.assert_allclose(orthonormal(columns), e[:, :3], atol=1e-15)
+
+
+HELD = (
+    {"effect": "pins", "select": "top"},
+    {"effect": "translate", "select": "bottom", "offset": [0.0, -0.2, 0.1], "over": 5, "until": 8},
+)
+SPRING = {"effect": "spring", "weight": 1e5}
+GRAVITY = {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]}
+
+
+@pytest.fixture(scope="module")
+def moved():
+    """Scene with vertices of different mass, a pin and a handle, and its trajectory."""
+    scene = make_scene(SPRING, GRAVITY, *HELD, frames=12)
+    scene.masses[:] = np.random.default_rng(0).uniform(5.0, 20.0, scene.mesh.vertices)
+    return scene, trajectory(scene)
+
+
+@pytest.fixture(params=[("pod", 3), ("pod", 8), ("skinning", 3), ("skinning", 10)], ids=str)
+def space(request, moved):
+    """Scene, trajectory and columns of each kind."""
+    scene, run = moved
+    return scene, run, make_columns(scene, run[1:], *request.param), request.param
+
+
+def test_free_block_is_mass_orthonormal(space):
+    scene, _, columns, (_, k) = space
+    block = columns.B[:, columns.free]
+    np.testing.assert_allclose(
+        block.T @ (scene.masses[:, None] * block), np.eye(block.shape[1]), atol=1e-10
+    )
+    assert columns.modes == k
+    # the affine columns of a flat sheet are three
+    assert len(columns.free) == k + 3
+
+
+def test_columns_of_atoms_live_on_their_atoms_only(space):
+    scene, _, columns, _ = space
+    held = np.concatenate(columns.atoms)
+    assert (columns.B[np.ix_(held, columns.free)] == 0.0).all()
+    for atom, own in zip(columns.atoms, columns.atom_columns, strict=True):
+        others = np.setdiff1d(np.arange(scene.mesh.vertices), atom)
+        assert (columns.B[np.ix_(others, own)] == 0.0).all()
+        block = columns.B[np.ix_(atom, own)]
+        np.testing.assert_allclose(block.T @ block, np.eye(len(own)), atol=1e-12)
+    every = np.concatenate([columns.free, *columns.atom_columns])
+    np.testing.assert_array_equal(np.sort(every), np.arange(columns.B.shape[1]))
+    assert np.linalg.matrix_rank(columns.B) == columns.B.shape[1]
+
+
+def test_rest_shape_and_affine_motions_are_in_the_space(space, rng):
+    scene, _, columns, _ = space
+    points = scene.mesh.points
+    fields = [
+        points,
+        points @ random_rotation(rng).T + rng.standard_normal(3),
+        points @ rng.standard_normal((3, 3)),
+    ]
+    for field in fields:
+        z = coordinates(columns, scene.masses, field)
+        np.testing.assert_allclose(columns.B @ z, field, atol=1e-11)
+
+
+def test_coordinates_are_the_best_in_the_mass_norm(space, rng):
+    scene, _, columns, _ = space
+    field = rng.standard_normal(scene.mesh.points.shape)
+    left = field - columns.B @ coordinates(columns, scene.masses, field)
+    np.testing.assert_allclose(columns.B.T @ (scene.masses[:, None] * left), 0.0, atol=1e-11)
+    z = rng.standard_normal((columns.B.shape[1], 3))
+    np.testing.assert_allclose(
+        coordinates(columns, scene.masses, columns.B @ z), z, rtol=1e-9, atol=1e-9
+    )
+
+
+def test_displacement_modes_are_the_mass_weighted_pod(moved):
+    """Against a dense SVD of the snapshots that have lost their affine part."""
+    scene, run = moved
+    points, masses = scene.mesh.points, scene.masses
+    modes = displacement_modes(run[1:], points, masses, 5)
+    root = np.sqrt(masses)[:, None]
+    snapshots = np.hstack([root * (q - points) for q in run[1:]])
+    affine = np.linalg.qr(root * affine_columns(points)[:, :3])[0]
+    u = np.linalg.svd(snapshots - affine @ (affine.T @ snapshots))[0][:, :5]
+    mine = root * modes
+    np.testing.assert_allclose(mine.T @ mine, np.eye(5), atol=1e-10)
+    np.testing.assert_allclose(mine @ mine.T, u @ u.T, atol=1e-7)
+    np.testing.assert_allclose(
+        affine_columns(points).T @ (masses[:, None] * modes), 0.0, atol=1e-10
+    )
+
+
+def test_there_are_no_more_modes_than_the_data_hold(moved):
+    scene, _ = moved
+    points = scene.mesh.points
+    bump = np.zeros_like(points)
+    bump[7, 2] = 1.0
+    few = displacement_modes(np.stack([points + bump, points + 3 * bump]), points, scene.masses, 9)
+    assert few.shape[1] == 1
+    rigid = np.stack([points + 1.0, 2.0 * points])
+    assert displacement_modes(rigid, points, scene.masses, 9).shape[1] == 0
+
+
+def test_more_modes_have_a_smaller_error(moved):
+    scene, run = moved
+    errors = []
+    for k in (1, 3, 6, 12):
+        columns = make_columns(scene, run[1:], "pod", k)
+        z = coordinates(columns, scene.masses, run[-1])
+        errors.append(np.linalg.norm(columns.B @ z - run[-1]))
+    assert errors == sorted(errors, reverse=True)
+    assert errors[-1] < 0.05 * errors[0]
+
+
+def test_atoms_get_modes_for_what_they_do_when_released(moved):
+    """The bottom row is let go in frame 8 and bends: its motion is in its columns."""
+    scene, run = moved
+    columns = make_columns(scene, run[1:], "pod", 8)
+    straight = build_columns(
+        displacement_modes(run[1:], scene.mesh.points, scene.masses, 8),
+        scene.mesh.points, scene.masses, columns.atoms, run[1:8],
+    )  # fmt: skip
+    for atom, own, few in zip(
+        columns.atoms, columns.atom_columns, straight.atom_columns, strict=True
+    ):
+        block = columns.B[np.ix_(atom, own)]
+        motion = run[-1][atom]
+        left = motion - block @ (block.T @ motion)
+        assert np.linalg.norm(left) < 2e-3 * np.linalg.norm(run[-1] - run[0])
+        assert len(few) == 2
+    assert max(len(own) for own in columns.atom_columns) > 2
+
+
+@pytest.mark.parametrize("handles", [1, 2, 5, 12, 30])
+def test_skinning_weights_are_a_partition_of_unity(handles):
+    points = make_scene(SPRING).mesh.points
+    weights = skinning_weights(points, handles)
+    assert weights.shape == (30, handles)
+    assert (weights >= 0.0).all()
+    assert (weights <= 1.0).all()
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0, rtol=1e-13)
+    assert (weights.max(axis=0) > 0.0).all()
+    assert np.linalg.matrix_rank(weights) == handles
+
+
+def test_skinning_weights_do_not_depend_on_place_and_size(rng):
+    points = rng.standard_normal((40, 3))
+    np.testing.assert_allclose(
+        skinning_weights(7.0 * points + 3.0, 5), skinning_weights(points, 5), atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("k", [1, 4, 9, 20])
+def test_skinning_modes_are_mass_orthonormal_without_affine_part(moved, k):
+    scene, _ = moved
+    points, masses = scene.mesh.points, scene.masses
+    modes = skinning_modes(points, masses, k)
+    np.testing.assert_allclose(modes.T @ (masses[:, None] * modes), np.eye(k), atol=1e-9)
+    np.testing.assert_allclose(affine_columns(points).T @ (masses[:, None] * modes), 0.0, atol=1e-8)
+
+
+def test_skinning_ends_at_the_size_of_the_mesh(moved):
+    scene, _ = moved
+    modes = skinning_modes(scene.mesh.points, scene.masses, 500)
+    # everything but the three affine columns of a flat sheet
+    assert modes.shape[1] == scene.mesh.vertices - 3

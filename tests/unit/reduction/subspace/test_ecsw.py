@@ -1,0 +1,207 @@
+"""Energy-conserving sampling and weighting: few elements that stand for all, and stability."""
+
+from copy import copy
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from conftest import GROUPS, make_scene
+from pdrom.model.dynamics.stepper import State, Stepper
+from pdrom.model.runs.full_order import trajectory
+from pdrom.reduction.subspace import ecsw
+from pdrom.reduction.subspace.columns import build_columns
+from pdrom.reduction.subspace.ecsw import ecsw_elements, training_equations
+from pdrom.reduction.subspace.local_step import SubspaceLocalStep
+from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
+from pdrom.reduction.subspace.space import ReducedSpace, coordinates
+from pdrom.reduction.subspace.training import TrainingFrame, training_run
+
+SCENES = {
+    name: make_scene({"effect": name, "weight": 1e4}, {"effect": "gravity"}, mesh=GROUPS[name])
+    for name in GROUPS
+}
+
+
+def random_columns(scene, rng, k=5):
+    modes = rng.standard_normal((scene.mesh.vertices, k))
+    none = np.stack([scene.mesh.points] * 2)
+    return build_columns(modes, scene.mesh.points, scene.masses, [], none)
+
+
+@pytest.mark.parametrize("name", SCENES)
+@settings(max_examples=12, deadline=None)
+@given(seed=st.integers(0, 2**31), spread=st.floats(-2, 1.5))
+def test_objective_never_rises_whatever_the_factors(name, seed, spread):
+    """Random elements, random non-negative factors, random states."""
+    scene, rng = SCENES[name], np.random.default_rng(seed)
+    columns = random_columns(scene, rng)
+    group = scene.groups[0]
+    elements = np.sort(rng.permutation(group.elements)[: rng.integers(1, group.elements)])
+    factors = 10.0 ** rng.uniform(-3, 3, len(elements))
+    factors[rng.random(len(elements)) < 0.2] = 0.0
+    factors[0] = 1.0
+    step = SubspaceLocalStep(group, columns, elements, factors)
+    loop = Stepper(ReducedSpace(scene, columns, step.matrix), 0.016, 20, [step])
+    shape = scene.mesh.points.shape
+    q = scene.mesh.points + 10.0**spread * rng.standard_normal(shape)
+    state = State(
+        coordinates(columns, scene.masses, q),
+        coordinates(columns, scene.masses, rng.standard_normal(shape)),
+    )
+    for frame in range(2):
+        state, report = loop.step(state, frame)
+        assert np.isfinite(state.positions).all()
+        assert (np.diff(report.objective) <= 1e-11 * report.objective[0]).all()
+
+
+@pytest.fixture(scope="module")
+def pulled():
+    """Scene of springs and strain under a handle, its run, and a snapshot basis."""
+    scene = make_scene(
+        {"effect": "spring", "weight": 1e4},
+        {"effect": "strain", "weight": 1e5},
+        {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]},
+        {"effect": "pins", "select": "top"},
+        mesh={"kind": "cloth", "rows": 10, "columns": 9},
+        frames=12,
+    )
+    run = trajectory(scene)
+    return scene, run, make_columns(scene, run[1:], "pod", 4)
+
+
+def everything(group) -> np.ndarray:
+    return np.arange(group.elements)
+
+
+def test_sampled_equations_meet_the_tolerance(pulled):
+    scene, _, columns = pulled
+    training = training_run(scene, columns, np.arange(0, 12, 3))
+    for group in scene.groups:
+        rows, total = training_equations(group, columns, training, everything(group))
+        np.testing.assert_allclose(rows.sum(axis=1), total, atol=1e-9)
+        counts = []
+        tolerances = [0.3, 1e-2, 1e-3]
+        for tolerance, (elements, factors) in zip(
+            tolerances, ecsw_elements(group, columns, training, tolerances), strict=True
+        ):
+            assert (factors > 0.0).all()
+            assert len(np.unique(elements)) == len(elements) < group.elements
+            left = rows[:, elements] @ factors - total
+            assert np.linalg.norm(left) <= tolerance * np.linalg.norm(total) * (1 + 1e-9)
+            counts.append(len(elements))
+        assert counts == sorted(counts)
+
+
+def test_a_part_of_a_large_group_stands_for_all(pulled, monkeypatch):
+    scene, _, columns = pulled
+    group = scene.groups[1]
+    training = training_run(scene, columns, [2, 8])
+    rows, total = training_equations(group, columns, training, everything(group))
+    monkeypatch.setattr(ecsw, "CANDIDATES", group.elements // 2)
+    elements, factors = ecsw_elements(group, columns, training, [3e-2])[0]
+    left = rows[:, elements] @ factors - total
+    assert np.linalg.norm(left) <= 3e-2 * np.linalg.norm(total)
+
+
+def test_factors_of_one_repeat_the_iterations(pulled):
+    """What is trained on is an identity: all equations hold for the iterates of the run."""
+    scene, _, columns = pulled
+    steps = [SubspaceLocalStep(group, columns) for group in scene.groups]
+    space = ReducedSpace(scene, columns, sum(step.matrix for step in steps))
+    inertia = space.matrix - sum(step.matrix for step in steps)
+    frame = training_run(scene, columns, [5])[0]
+    fixed = np.concatenate(columns.atom_columns)
+    free = np.setdiff1d(np.arange(len(inertia)), fixed)
+    sums = []
+    for before, after in frame.pairs:
+        total = np.zeros_like(after)
+        for group in scene.groups:
+            d = group.S @ (columns.B @ after) - group.project(columns.B @ before)
+            total += columns.B.T @ (group.S.T @ (group.row_weights[:, None] * d))
+        # (M/h^2)(s - z') is the sum of all elements; s is that of the frame
+        sums.append((total + inertia @ after)[free])
+    for other in sums[1:]:
+        np.testing.assert_allclose(other, sums[0], rtol=1e-9, atol=1e-7 * abs(sums[0]).max())
+    energy = frame.measure[:, free]
+    np.testing.assert_allclose(
+        energy.T @ energy, np.linalg.inv(space.matrix[np.ix_(free, free)]), rtol=1e-8, atol=1e-16
+    )
+    assert not frame.measure[:, fixed].any()
+
+
+def test_a_finer_tolerance_gives_a_better_run(pulled):
+    scene, run, columns = pulled
+    motion = np.linalg.norm(run - run[0])
+
+    def error(samples) -> float:
+        model = SubspaceModel("pod", columns, samples)
+        loop, state = model.loop(scene)
+        off = 0.0
+        for frame in range(scene.config.frames):
+            state, _ = loop.step(state, frame)
+            off += np.linalg.norm(model.positions(state.positions) - run[frame + 1]) ** 2
+        return np.sqrt(off) / motion
+
+    full = error({})
+    fine, coarse = map(error, sample_elements(scene, columns, np.arange(12), [1e-3, 0.5]))
+    assert full < 0.05
+    assert abs(fine - full) < 0.05
+    assert coarse > fine
+
+
+def test_training_equations_are_those_of_the_elements(rng):
+    """Element by element from the definition; hashing adds each equation to one row, signed."""
+    scene = SCENES["strain"]
+    group, columns = copy(scene.groups[0]), random_columns(scene, rng, 3)
+    group.weights = group.weights * rng.uniform(0.2, 5.0, group.elements)
+    p, k = group.rows_per_element, columns.B.shape[1]
+    before, after = pair = rng.standard_normal((2, k, 3))
+    # the constant column has no strain, hence one equation an axis less
+    measure = rng.standard_normal((k - 1, k))
+    count = 3 * (k - 1)
+    projected, dense = group.project(columns.B @ before), group.S.toarray()
+    expected = np.zeros((count, group.elements))
+    for e in range(group.elements):
+        own = slice(p * e, p * (e + 1))
+        left = group.weights[e] * measure @ columns.B.T @ dense[own].T
+        difference = dense[own] @ columns.B @ after - projected[own]
+        expected[:, e] = (left @ difference).ravel()
+    expected /= np.linalg.norm(expected.sum(axis=1))
+    frame = TrainingFrame(before, pair[None], measure)
+    rows, total = training_equations(group, columns, [frame], np.arange(group.elements))
+    assert rows.shape == (count + 1, group.elements)
+    np.testing.assert_allclose(rows.sum(axis=1), total, atol=1e-12)
+    np.testing.assert_allclose(rows[-1], group.weights / group.weights.sum(), rtol=1e-14)
+    assert np.linalg.matrix_rank(expected) == count < group.elements
+    hashing = rows[:-1] @ np.linalg.pinv(expected)
+    np.testing.assert_allclose(np.sort(abs(hashing), axis=0)[-1], 1.0, atol=1e-8)
+    np.testing.assert_allclose(np.sort(abs(hashing), axis=0)[:-1], 0.0, atol=1e-8)
+    assert {-1.0, 1.0} <= set(hashing.round().ravel().tolist())
+    some = np.array([3, 0])
+    np.testing.assert_array_equal(
+        training_equations(group, columns, [frame], some)[0], rows[:, some]
+    )
+
+
+def test_a_group_at_rest_keeps_its_stiffness(pulled):
+    """No force at all in the training states, and still elements and weight."""
+    scene, _, columns = pulled
+    rest = coordinates(columns, scene.masses, scene.mesh.points)
+    measure = np.eye(len(rest))
+    still = TrainingFrame(rest, np.stack([[rest, rest]]), measure)
+    for group in scene.groups:
+        elements, factors = ecsw_elements(group, columns, [still], [1e-2])[0]
+        assert len(elements) > 0
+        kept = factors @ group.weights[elements] / group.weights.sum()
+        assert kept == pytest.approx(1.0, abs=0.2)
+
+
+def test_the_choice_is_repeatable(pulled):
+    scene, _, columns = pulled
+    training = training_run(scene, columns, [1, 2, 3])
+    one, two = (ecsw_elements(scene.groups[0], columns, training, [1e-2])[0] for _ in range(2))
+    np.testing.assert_array_equal(one[0], two[0])
+    np.testing.assert_array_equal(one[1], two[1])
+    assert len(ecsw_elements(scene.groups[0], columns, training, [0.0], most=5)[0][0]) == 5

@@ -1,0 +1,300 @@
+"""Runs in a position subspace: exact where nothing is lost, and independent of the mesh."""
+
+import numpy as np
+import pytest
+from meshless import assert_reads_nothing_of_the_mesh
+
+from conftest import GROUPS, make_scene
+from pdrom.core.errors import SceneError
+from pdrom.core.store import write_hdf5
+from pdrom.model.dynamics.stepper import Stepper
+from pdrom.model.runs.full_order import trajectory
+from pdrom.reduction.subspace.atoms import atoms
+from pdrom.reduction.subspace.columns import build_columns
+from pdrom.reduction.subspace.fused import FusedStepper
+from pdrom.reduction.subspace.load import load_models
+from pdrom.reduction.subspace.local_step import SubspaceLocalStep
+from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
+from pdrom.reduction.subspace.space import ReducedSpace, coordinates
+
+SPRING = {"effect": "spring", "weight": 1e5}
+STRAIN = {"effect": "strain", "weight": 1e5}
+GRAVITY = {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]}
+PINS = {"effect": "pins", "select": "top"}
+HANDLES = (
+    PINS,
+    {"effect": "rotate", "select": "bottom", "axis": "y", "degrees": 30.0, "over": 6},
+)
+BAR = GROUPS["tetrahedron_strain"]
+
+SCENES = {
+    "free": make_scene(SPRING, STRAIN, GRAVITY, frames=6),
+    "pins": make_scene(SPRING, GRAVITY, PINS, frames=6),
+    "handles": make_scene(SPRING, STRAIN, GRAVITY, *HANDLES, frames=8),
+    "damped": make_scene(SPRING, GRAVITY, {"effect": "damping", "rate": 2.0}, PINS, frames=6),
+    "bending": make_scene(
+        {"effect": "bending", "weight": 10.0}, GRAVITY, PINS, mesh=GROUPS["bending"], frames=6
+    ),
+    "bar": make_scene(
+        {"effect": "tetrahedron_strain", "weight": 1e6}, GRAVITY,
+        {"effect": "pins", "select": "left"}, mesh=BAR, frames=6,
+    ),
+    "poke": make_scene(
+        SPRING, {"effect": "poke", "over": 4, "rest": 2, "count": 2, "avoid": ["top"]}, PINS,
+        frames=12,
+    ),
+    "floor": make_scene(
+        SPRING, {"effect": "gravity", "acceleration": [0.0, -300.0, 0.0]}, {"effect": "floor"},
+        frames=12,
+    ),
+}  # fmt: skip
+
+
+def run_model(scene, model) -> np.ndarray:
+    """Positions (F + 1, N, 3) of a run."""
+    loop, state = model.loop(scene)
+    run = [model.positions(state.positions)]
+    for frame in range(scene.config.frames):
+        state, _ = loop.step(state, frame)
+        run.append(model.positions(state.positions))
+    return np.stack(run)
+
+
+def whole_space(scene):
+    """Columns that span all motions of all vertices."""
+    n = scene.mesh.vertices
+    found = atoms(scene.boundaries, n)
+    anything = np.random.default_rng(0).standard_normal((n, n, 3))
+    columns = build_columns(np.eye(n), scene.mesh.points, scene.masses, found, anything)
+    assert columns.B.shape == (n, n)
+    return columns
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_whole_space_repeats_the_full_order_run(name):
+    scene = SCENES[name]
+    reference = trajectory(scene)
+    motion = np.linalg.norm(reference[-1] - reference[0])
+    result = run_model(scene, SubspaceModel("pod", whole_space(scene)))
+    assert np.linalg.norm(result[-1] - reference[-1]) < 1e-8 * motion
+    np.testing.assert_allclose(result, reference, atol=1e-7)
+
+
+@pytest.mark.parametrize("kind", ["pod", "skinning"])
+@pytest.mark.parametrize("name", ["pins", "handles", "poke", "bar"])
+def test_pins_and_handles_are_met_exactly(name, kind):
+    scene = SCENES[name]
+    reference = trajectory(scene)
+    model = SubspaceModel(kind, make_columns(scene, reference[1:], kind, 3))
+    result = run_model(scene, model)
+    checked = 0
+    for boundary in scene.boundaries:
+        took_hold, last = 0, None
+        for frame in range(scene.config.frames):
+            if not boundary.active(frame):
+                continue
+            held = boundary.held(frame)
+            if not np.array_equal(held, last):
+                # a poked vertex starts from wherever this run has brought it
+                took_hold, last = frame, held
+            moved, wanted = (r[frame + 1, held] - r[took_hold, held] for r in (result, reference))
+            np.testing.assert_allclose(moved, wanted, atol=1e-12)
+            checked += 1
+    assert checked >= scene.config.frames
+
+
+def test_snapshot_basis_error_falls_with_its_size():
+    scene = SCENES["handles"]
+    reference = trajectory(scene)
+    errors = []
+    for k in (1, 4, 12):
+        model = SubspaceModel("pod", make_columns(scene, reference[1:], "pod", k))
+        errors.append(np.linalg.norm(run_model(scene, model) - reference))
+    assert errors[2] < 0.5 * errors[1] < 0.5 * errors[0]
+
+
+def test_released_pins_move_again():
+    scene = make_scene(
+        SPRING, GRAVITY, PINS, {"effect": "pins", "select": "bottom", "until": 3}, frames=8
+    )
+    reference = trajectory(scene)
+    bottom = scene.boundaries[1].vertices
+    result = run_model(scene, SubspaceModel("pod", make_columns(scene, reference[1:], "pod", 10)))
+    np.testing.assert_allclose(result[3, bottom], reference[0, bottom], atol=1e-12)
+    assert np.linalg.norm(result[-1, bottom] - reference[0, bottom]) > 1e-2
+    error = np.linalg.norm(result[-1] - reference[-1])
+    assert error < 0.05 * np.linalg.norm(reference[-1] - reference[0])
+
+
+def test_restricted_group_is_the_full_group_on_its_elements(group_scene, rng):
+    """Projections, energy and right-hand side, also from frozen data of a frame."""
+    group = group_scene.groups[0]
+    elements = np.sort(rng.permutation(group.elements)[: group.elements // 3])
+    factors = rng.uniform(0.5, 4.0, len(elements))
+    part, vertices = group.restricted(elements, factors)
+    points = group_scene.mesh.points
+    q = points + 0.05 * rng.standard_normal(points.shape)
+    y = points + 0.05 * rng.standard_normal(points.shape)
+    group.begin_frame(q)
+    part.begin_frame(q[vertices])
+    p = group.project_elements(y, elements)
+    np.testing.assert_allclose(part.project(y[vertices]), p, rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(part.weights, group.weights[elements] * factors)
+    rows = np.repeat(elements, group.rows_per_element) * group.rows_per_element
+    rows += np.tile(np.arange(group.rows_per_element), len(elements))
+    s = group.S.toarray()[rows]
+    np.testing.assert_array_equal(part.S.toarray(), s[:, vertices])
+    outside = np.setdiff1d(np.arange(len(points)), vertices)
+    assert not s[:, outside].any()
+    rhs = np.zeros((len(vertices), 3))
+    energy = part.accumulate(y[vertices], rhs)
+    weighted = part.row_weights[:, None] * p
+    np.testing.assert_allclose(rhs, s[:, vertices].T @ weighted, rtol=1e-9, atol=1e-9)
+    expected = 0.5 * float(part.row_weights @ ((s @ y - p) ** 2).sum(axis=1))
+    assert energy == pytest.approx(expected, rel=1e-9)
+
+
+def test_restriction_leaves_the_group_alone(group_scene, rng):
+    group, points = group_scene.groups[0], group_scene.mesh.points
+    y = points + 0.05 * rng.standard_normal(points.shape)
+    group.begin_frame(points)
+    before, weights = group.project(y), group.weights.copy()
+    part, vertices = group.restricted(np.array([1, 0]), np.array([2.0, 3.0]))
+    part.begin_frame(10.0 * y[vertices][:, ::-1])
+    part.accumulate(y[vertices], np.zeros((len(vertices), 3)))
+    np.testing.assert_array_equal(group.project(y), before)
+    np.testing.assert_array_equal(group.weights, weights)
+
+
+def test_step_of_all_elements_is_the_projected_full_step(group_scene, rng):
+    scene, group = group_scene, group_scene.groups[0]
+    columns = whole_space(scene)
+    step = SubspaceLocalStep(group, columns)
+    q = scene.mesh.points + 0.05 * rng.standard_normal(scene.mesh.points.shape)
+    z = coordinates(columns, scene.masses, q)
+    group.begin_frame(q)
+    step.begin_frame(z)
+    full, reduced = np.zeros_like(q), np.ones_like(z)
+    energy = group.accumulate(q, full)
+    assert step.accumulate(z, reduced) == pytest.approx(energy, rel=1e-9)
+    np.testing.assert_allclose(reduced, 1.0 + columns.B.T @ full, rtol=1e-7, atol=1e-4)
+    dense = columns.B.T @ (group.system_matrix() @ columns.B)
+    np.testing.assert_allclose(step.matrix, dense, atol=1e-10 * np.abs(dense).max())
+
+
+@pytest.mark.parametrize("name", ["handles", "bending", "bar", "poke", "damped"])
+def test_a_step_reads_nothing_of_the_mesh(name):
+    """With everything of the length of the mesh overwritten after the first run, the second,
+    which needs no preparation any more, is the same."""
+    scene = make_scene(
+        *[e.model_dump() for e in SCENES[name].config.effects],
+        mesh=SCENES[name].config.mesh.model_dump(),
+        frames=SCENES[name].config.frames,
+    )
+    reference = trajectory(scene)
+    columns = make_columns(scene, reference[1:], "pod", 3)
+    few = {
+        g.name: Samples(np.arange(0, g.elements, 5), np.full(len(range(0, g.elements, 5)), 5.0))
+        for g in scene.groups
+    }
+    loop, start = SubspaceModel("pod", columns, few).loop(scene)
+    assert_reads_nothing_of_the_mesh(scene, columns, loop, start)
+
+
+def test_arrays_of_a_step_have_the_size_of_the_sample():
+    """The same sampled elements on meshes of two sizes: nothing grows with the mesh.
+
+    Elements are stored in whole blocks, which are smaller than the meshes.
+    """
+    sizes = []
+    for rows in (32, 64):
+        scene = make_scene(SPRING, PINS, mesh={"kind": "cloth", "rows": rows, "columns": 8})
+        run = trajectory(scene)
+        columns = make_columns(scene, run[1:], "skinning", 4)
+        step = SubspaceLocalStep(scene.groups[0], columns, np.array([3, 11]), np.ones(2))
+        held = [v for v in vars(step).values() if isinstance(v, np.ndarray)]
+        held += [v for v in vars(step.group).values() if isinstance(v, np.ndarray)]
+        sizes.append((step.group.S.shape, sorted(a.shape for a in held)))
+        assert len(held) >= 4
+        assert max(a.size for a in held) < scene.mesh.vertices
+    assert sizes[0] == sizes[1]
+
+
+@pytest.mark.parametrize("name", ["free", "handles", "poke", "damped", "bending", "bar"])
+def test_fused_iterations_are_the_plain_ones(name):
+    """The compiled loop against the step loop with projections and solve one after the other."""
+    scene = SCENES[name]
+    reference = trajectory(scene)
+    columns = make_columns(scene, reference[1:], "pod", 4)
+    few = {
+        g.name: Samples(np.arange(0, g.elements, 3), np.full(len(range(0, g.elements, 3)), 3.0))
+        for g in scene.groups
+    }
+    loop, state = SubspaceModel("pod", columns, few).loop(scene)
+    assert isinstance(loop, FusedStepper)
+    plain = Stepper(loop.space, loop.time_step, loop.iterations, loop.local_steps)
+    other = state
+    for frame in range(scene.config.frames):
+        state, report = loop.step(state, frame)
+        other, _ = plain.step(other, frame)
+        assert len(report.objective) == 0
+        np.testing.assert_allclose(state.positions, other.positions, rtol=1e-8, atol=1e-8)
+    moved = other.positions - loop_start(scene, columns)
+    assert np.linalg.norm(moved) > 1e-3
+
+
+def loop_start(scene, columns) -> np.ndarray:
+    return coordinates(columns, scene.masses, scene.mesh.points)
+
+
+def test_a_group_without_a_gradient_kernel_iterates_plainly():
+    scene = SCENES["pins"]
+    columns = make_columns(scene, trajectory(scene)[1:], "pod", 4)
+    step = SubspaceLocalStep(scene.groups[0], columns)
+    model = SubspaceModel("pod", columns)
+    loop, state = model.loop(scene)
+    plain = FusedStepper(loop.space, 0.016, 10, [Plain(step)])
+    np.testing.assert_allclose(
+        loop.step(state, 0)[0].positions, plain.step(state, 0)[0].positions, rtol=1e-10, atol=1e-10
+    )
+
+
+class Plain:
+    """A local step of another kind."""
+
+    def __init__(self, step) -> None:
+        self.name, self.begin_frame, self.accumulate = (
+            step.name, step.begin_frame, step.accumulate,
+        )  # fmt: skip
+
+
+def test_forces_that_cannot_be_reduced_are_refused():
+    scene = make_scene(SPRING, GRAVITY)
+    force = scene.forces[0]
+    force.acceleration = lambda positions, velocities: velocities**2
+    columns = make_columns(scene, np.stack([scene.mesh.points] * 2), "skinning", 2)
+    with pytest.raises(SceneError, match="'gravity' is not affine in the velocity"):
+        ReducedSpace(scene, columns, np.eye(columns.B.shape[1]))
+
+
+def test_models_survive_a_file(tmp_path):
+    """The layout of rule hyper."""
+    from pdrom.experiments.hyper import _store_columns, _store_model
+
+    scene = SCENES["handles"]
+    reference = trajectory(scene)
+    columns = make_columns(scene, reference[1:], "pod", 4)
+    samples = sample_elements(scene, columns, np.arange(8), [1e-2])[0]
+    with write_hdf5(tmp_path / "models.h5") as file:
+        _store_columns(file.create_group("columns/pod_k004"), columns)
+        for method, chosen in (("full", {}), ("ecsw", samples)):
+            labels = {"method": method, "position_basis": "pod", "k": 4, "base": "pod_k004"}
+            _store_model(file.create_group(f"models/pod_k004_{method}"), labels, chosen)
+    loaded = load_models(tmp_path / "models.h5")
+    assert [labels for labels, _ in loaded] == [
+        {"method": method, "position_basis": "pod", "k": 4} for method in ("full", "ecsw")
+    ]
+    for (_, model), chosen in zip(loaded, ({}, samples), strict=True):
+        np.testing.assert_array_equal(
+            run_model(scene, model), run_model(scene, SubspaceModel("pod", columns, chosen))
+        )

@@ -1,0 +1,96 @@
+"""Specifications of methods: presets, combinations that exist, faults that are named."""
+
+import pytest
+from pydantic import ValidationError
+
+from pdrom.core.errors import ConfigurationError
+from pdrom.reduction.method import MethodSpec, load_methods
+from places import CONFIG
+
+PATH = CONFIG / "methods.yaml"
+
+
+def test_presets_are_the_methods_of_the_literature():
+    """The ingredients of EXPERIMENTS table 3, method by method."""
+    chosen = {
+        name: (m.weighting, m.centring, m.layout, m.rows, m.selection, m.solve, m.repeat_rows)
+        for name, m in load_methods(PATH).items()
+        if m.rows != "all"
+    }
+    affine = ("none", "affine", "vectorised")
+    assert chosen == {
+        "deim": (*affine, "scalar", "greedy", "square", False),
+        "qdeim": (*affine, "scalar", "pivoted-qr", "square", False),
+        "deim-joint": ("none", "none", "vectorised", "joint", "greedy", "square", False),
+        "published": (
+            "none", "mean-in-modes", "vectorised", "joint", "greedy", "tikhonov", True,
+        ),
+        "block-deim": (*affine, "element", "greedy", "qr", False),
+        "block-qdeim": (*affine, "element", "pivoted-qr", "qr", False),
+        "gappy": (*affine, "element", "greedy", "qr", False),
+        "bounded": (*affine, "element", "greedy", "qr", False),
+        "bounded-range": (*affine, "element", "greedy", "qr", False),
+        "s-opt": (*affine, "scalar", "s-opt", "square", False),
+        "block-s-opt": (*affine, "element", "s-opt", "qr", False),
+    }  # fmt: skip
+    assert load_methods(PATH)["pod"].rows == "all"
+    assert load_methods(PATH)["published"].tikhonov == 1e-8
+
+
+def test_methods_with_the_same_basis_share_its_name():
+    methods = load_methods(PATH)
+    assert methods["deim"].basis_id == methods["block-deim"].basis_id == "none-affine-vectorised"
+    assert methods["published"].basis_id == "none-mean-in-modes-vectorised"
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        {"rows": "joint", "selection": "pivoted-qr"},
+        {"rows": "element", "solve": "square"},
+        {"rows": "scalar", "layout": "per-axis"},
+        {"rows": "element", "centring": "mean-in-modes", "coefficients": "shared"},
+        {"rows": "scalar", "coefficients": "per-axis"},
+        {"rows": "joint", "selection": "s-opt"},
+        {"rows": "scalar", "solve": "square", "oversampling": 2},
+        {"rows": "scalar", "solve": "square", "gain_bound": 2.0},
+        {"rows": "all", "gain_bound": 2.0},
+        {"rows": "joint", "gain_bound": 2.0},
+        {"rows": "element", "coefficients": "per-axis", "gain_bound": 2.0},
+        {"rows": "element", "gain_bound": 1.0},
+        {"rows": "element", "coefficients": "per-axis", "bounds": "training"},
+        {"rows": "element", "bounds": "training", "margin": -0.1},
+        {"rows": "joint", "solve": "square", "repeat_rows": True},
+        {"rows": "vertices"},
+        {"rows": "all", "oversampling": 3},
+        {"rows": "all", "tikhonov": 0.0},
+        {},
+    ],
+)
+def test_combinations_that_do_not_exist_are_refused(fault):
+    with pytest.raises(ValidationError):
+        MethodSpec(title="t", **fault)
+
+
+def test_a_method_cannot_be_changed():
+    method = MethodSpec(title="t", rows="all")
+    with pytest.raises(ValidationError, match="frozen"):
+        method.rows = "joint"
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("deim: {title: a, rows: vertices}", "deim.*rows"),
+        ("deim: {title: a, rows: all, extra: 1}", "deim.*extra"),
+        ("deim: {rows: all}", "deim.*title"),
+        ("[deim]", "mapping"),
+        ("", "mapping"),
+        ("deim: {title: a, rows: joint, selection: pivoted-qr}", "deim.*only 'greedy'"),
+    ],
+)
+def test_faults_name_file_method_and_key(tmp_path, text, named):
+    path = tmp_path / "methods.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=rf"methods\.yaml.*{named}"):
+        load_methods(path)

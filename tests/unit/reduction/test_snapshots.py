@@ -1,0 +1,168 @@
+"""Which frames train and which test, row masses, and the files of snapshots."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from conftest import make_scene
+from pdrom.core.errors import SnapshotError, StorageError
+from pdrom.core.store import open_hdf5, write_hdf5
+from pdrom.model.runs.full_order import run
+from pdrom.reduction import snapshots
+from pdrom.reduction.snapshots import (
+    collect,
+    load_snapshots,
+    row_masses,
+    save_snapshots,
+    stored_frames,
+    training_frames,
+)
+
+FRAMES = st.integers(4, 500)
+
+
+@settings(deadline=None)
+@given(frames=FRAMES, data=st.data())
+def test_training_and_test_frames_are_disjoint_and_spread(frames, data):
+    count = data.draw(st.integers(2, (frames + 1) // 2))
+    train, test = training_frames(frames, count), snapshots.test_frames(frames)
+    assert len(train) == len(np.unique(train)) == count
+    assert not np.intersect1d(train, test).size
+    assert train[0] == 0
+    assert train[-1] == 2 * ((frames - 1) // 2)
+    assert set(train % 2) == {0}
+    np.testing.assert_array_equal(test, [f for f in range(frames) if f % 2])
+    gaps = np.diff(train)
+    assert gaps.max() - gaps.min() <= 2
+    stored = stored_frames(frames, count)
+    np.testing.assert_array_equal(stored, sorted({*train.tolist(), *test.tolist()}))
+
+
+def test_known_frames():
+    assert training_frames(9, 3).tolist() == [0, 4, 8]
+    assert training_frames(10, 5).tolist() == [0, 2, 4, 6, 8]
+    assert stored_frames(5, 2).tolist() == [0, 1, 3, 4]
+
+
+def test_row_masses_hand_out_all_mass(group_scene, rng):
+    group = group_scene.groups[0]
+    masses = rng.uniform(0.5, 2.0, group_scene.mesh.vertices)
+    rows = row_masses(group, masses).reshape(group.elements, group.rows_per_element)
+    assert (rows == rows[:, :1]).all()
+    touched = np.asarray(abs(group.S).sum(axis=0)).ravel() > 0
+    assert rows[:, 0].sum() == pytest.approx(masses[touched].sum(), rel=1e-12)
+    assert (rows > 0.0).all()
+
+
+def test_row_mass_of_springs_by_hand():
+    """A vertex of valence v gives a v-th of its mass to each of its edges."""
+    scene = make_scene(
+        {"effect": "spring", "weight": 1.0}, mesh={"kind": "cloth", "rows": 3, "columns": 3}
+    )
+    group = scene.groups[0]
+    ends = abs(group.S.toarray()) > 0
+    valence = ends.sum(axis=0)
+    masses = np.arange(1.0, 10.0)
+    expected = [sum(masses[v] / valence[v] for v in np.flatnonzero(row)) for row in ends]
+    assert row_masses(group, masses) == pytest.approx(expected, rel=1e-13)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Scene with a training and a held-out run of 12 frames."""
+    folder = tmp_path_factory.mktemp("runs")
+    effects = [{"effect": "gravity"}, {"effect": "pins", "select": "top"}]
+    scene = make_scene(*effects, {"effect": "spring", "weight": 1e4}, frames=12)
+    run(scene, folder / "train.h5", {"spring": stored_frames(12, 3)}, {})
+    run(scene, folder / "held.h5", {"spring": np.array([1, 6])}, {})
+    return scene, folder
+
+
+def test_splits_hold_their_frames(runs):
+    scene, folder = runs
+    group = scene.groups[0]
+    train = training_frames(12, 3)
+    got = collect(folder / "train.h5", folder / "held.h5", group, scene.masses, train)
+    np.testing.assert_array_equal(got.frames["train"], train)
+    np.testing.assert_array_equal(got.frames["test"], snapshots.test_frames(12))
+    np.testing.assert_array_equal(got.frames["heldout"], [1, 6])
+    with open_hdf5(folder / "train.h5") as file:
+        store = file["snapshots/spring"]
+        frames, p, roundoff = (store[name][...] for name in ("frames", "p", "roundoff"))
+    for split in ("train", "test"):
+        at = np.searchsorted(frames, got.frames[split])
+        np.testing.assert_array_equal(getattr(got, split), p[at])
+    at = np.searchsorted(frames, train)
+    assert got.roundoff == pytest.approx(np.sqrt((roundoff[at] ** 2).sum()))
+    assert got.train.shape == (3, group.elements, 3)
+    assert (got.elements, got.rows_per_element) == (group.elements, 1)
+
+
+def test_round_off_of_a_projection_is_small_but_not_zero(runs):
+    scene, folder = runs
+    got = collect(
+        folder / "train.h5", folder / "held.h5", scene.groups[0], scene.masses, np.array([0])
+    )
+    assert 0.0 < got.roundoff < 1e-13 * np.linalg.norm(scene.mesh.points) * 100
+
+
+def test_file_round_trip(runs, tmp_path):
+    scene, folder = runs
+    group, train = scene.groups[0], training_frames(12, 3)
+    got = collect(folder / "train.h5", folder / "held.h5", group, scene.masses, train)
+    save_snapshots(got, tmp_path / "s.h5", {"scene": "test"})
+    back = load_snapshots(tmp_path / "s.h5")
+    for name, value in vars(got).items():
+        if name == "frames":
+            assert value.keys() == back.frames.keys()
+            for split in value:
+                np.testing.assert_array_equal(value[split], back.frames[split])
+        else:
+            np.testing.assert_array_equal(value, getattr(back, name))
+    with open_hdf5(tmp_path / "s.h5") as file:
+        assert file.attrs["scene"] == "test"
+        assert file["row_mass"].attrs["unit"] == "kg"
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda p: np.where(np.arange(p.size).reshape(p.shape) == 4, np.nan, p), "is nan, finite"),
+        (lambda p: np.full_like(p, np.inf), "is inf, finite"),
+        (lambda p: p[:0], "has no snapshots"),
+    ],
+)
+@pytest.mark.parametrize("which", ["train", "held"])
+def test_faulty_snapshots_name_file_and_group(runs, tmp_path, spoil, message, which):
+    scene, folder = runs
+    paths = {name: folder / f"{name}.h5" for name in ("train", "held")}
+    with open_hdf5(paths[which]) as file:
+        store = {name: file[f"snapshots/spring/{name}"][...] for name in ("p", "frames")}
+        roundoff = file["snapshots/spring/roundoff"][...]
+    paths[which] = tmp_path / "spoilt.h5"
+    p = spoil(store["p"])
+    with write_hdf5(paths[which]) as file:
+        file["snapshots/spring/p"] = p
+        file["snapshots/spring/frames"] = store["frames"][: len(p)]
+        file["snapshots/spring/roundoff"] = roundoff[: len(p)]
+    with pytest.raises(SnapshotError, match=rf"spoilt\.h5: .*'spring'.*{message}"):
+        collect(paths["train"], paths["held"], scene.groups[0], scene.masses, np.array([0]))
+
+
+def test_missing_group_is_named(runs, tmp_path):
+    scene, folder = runs
+    with write_hdf5(tmp_path / "empty.h5") as file:
+        file.attrs["x"] = 1
+    with pytest.raises(StorageError, match=r"empty\.h5"):
+        collect(
+            tmp_path / "empty.h5", folder / "held.h5", scene.groups[0], scene.masses, np.array([0])
+        )
+
+
+@pytest.mark.parametrize("train", [np.array([], dtype=int), np.array([0, 2])])
+def test_training_frames_that_were_not_stored_are_an_error(runs, train):
+    """The docstring promises a SnapshotError for an empty split."""
+    scene, folder = runs
+    with pytest.raises(SnapshotError, match=r"train\.h5: snapshots of 'spring'.* train frames"):
+        collect(folder / "train.h5", folder / "held.h5", scene.groups[0], scene.masses, train)

@@ -1,0 +1,393 @@
+"""Results of invented studies in the documented formats: bent sheets, a bar, random bases."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+
+from pdrom.core.store import write_table
+from pdrom.model.constraints.bending import interior_vertices
+from pdrom.model.mesh.generators import bar, cloth
+from pdrom.model.mesh.types import Mesh, save_mesh
+from pdrom.reduction.sampling.block import block_elements
+from pdrom.reduction.sampling.deim import deim_entries
+from pdrom.report.figures import FIGURES, FigureSpec, Holdings, Sources, load_figures
+from pdrom.report.figures.sources import MethodHolding, SceneHolding
+from pdrom.tables.scaling import scaling_fit
+from places import ROOT
+
+FRAMES = 20
+ROWS = {"bending": 1, "spring": 1, "strain": 2, "deformation_gradient": 3, "tetrahedron_strain": 3}
+METHOD_ROWS = {"pod": "all", "deim": "scalar", "qdeim": "scalar", "deim-joint": "joint",
+               "published": "joint", "block-deim": "element"}  # fmt: skip
+SCENES = {
+    "cloth_all": ("bending", "spring", "strain"),
+    "bend_fall": ("bending",),
+    "bend_curved": ("bending",),
+    "spring_stretch": ("spring",),
+    "spring_twist": ("spring",),
+    "spring_twist_twin": ("spring",),
+    "strain_twist": ("strain",),
+    "strain_oop": ("strain",),
+    "bar_release": ("deformation_gradient",),
+    "bar_twist": ("tetrahedron_strain",),
+}
+FLAT = ("bend_fall",)  # scenes whose projections are round-off
+BLOWN_UP = ("spring_twist", "deim-joint", 10)  # scene, method, r of a run that fails
+BLOWUP_FRAME = 4
+TABLES = (
+    "reconstruction_error", "singular_values", "local_share", "sensitivity", "accuracy_cost",
+    "ladder", "scaling", "scaling_fit", "stability", "budget", "breakeven", "effects_cost",
+    "effects_left_out", "reduced_reruns", "gain_prediction",
+    "subspace_ablation",
+)  # fmt: skip
+
+
+@dataclass
+class Study:
+    """An invented study on disk."""
+
+    root: Path
+    sources: Sources
+    specs: dict[str, FigureSpec]
+
+
+def mesh_of(scene: str) -> Mesh:
+    """Small mesh of a scene."""
+    if scene.startswith("bar"):
+        return bar(7, 3, 3)
+    return cloth(7, 6, wave=0.1 if scene == "bend_curved" else 0.0)
+
+
+def element_count(mesh: Mesh, group: str) -> int:
+    """Elements of a group on a mesh."""
+    counts = {
+        "bending": lambda: len(interior_vertices(mesh.triangles, mesh.vertices)),
+        "spring": lambda: len(mesh.edges()),
+        "strain": lambda: len(mesh.triangles),
+    }
+    return counts.get(group, lambda: len(mesh.tetrahedra))()
+
+
+def make_results(root: Path, scenes: dict[str, tuple[str, ...]], methods: list[str]) -> Holdings:
+    """Write the results of ``scenes`` and ``methods`` below ``root``."""
+    rng = np.random.default_rng(7)
+    holdings = Holdings(
+        scenes={
+            name: SceneHolding(mesh="bar" if name.startswith("bar") else name, groups=groups)
+            for name, groups in scenes.items()
+        },
+        reductions={
+            name: MethodHolding(title=name, basis="none-none-vectorised", rows=METHOD_ROWS[name])
+            for name in methods
+        },
+    )
+    sources = Sources(root, holdings)
+    for scene, groups in scenes.items():
+        mesh = mesh_of(scene)
+        save_mesh(mesh, sources.mesh(scene))
+        positions = _trajectory(mesh)
+        with _new(sources.run(scene)) as file:
+            file["positions"] = positions
+        for group in groups:
+            rank = 0 if scene in FLAT else 14
+            count = element_count(mesh, group)
+            basis = _write_basis(sources, scene, group, count, rank, methods[0], rng)
+            for method in methods:
+                _write_sampling(sources.sampling(scene, group, method), basis, group, method)
+                _write_reruns(sources, scene, group, method, positions, rank, rng)
+    _write_tables(sources, scenes, methods, rng)
+    return holdings
+
+
+def _new(path: Path) -> h5py.File:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return h5py.File(path, "w")
+
+
+def _trajectory(mesh: Mesh) -> np.ndarray:
+    """The mesh bends more and more and sinks to the floor."""
+    t = np.linspace(0.0, 1.0, FRAMES + 1)[:, None]
+    q = np.repeat(mesh.points[None], FRAMES + 1, axis=0)
+    q[:, :, 2] += 0.4 * t * np.sin(4.0 * mesh.points[:, 0])
+    q[:, :, 1] -= 1.5 * t**2
+    return q
+
+
+def _write_basis(sources, scene, group, count, rank, method, rng) -> np.ndarray:
+    rows = ROWS[group]
+    V = np.linalg.qr(rng.standard_normal((3 * rows * count, 14)))[0][:, :rank]
+    with _new(sources.basis(scene, group, method)) as file:
+        file["V"], file["mean"] = V, np.zeros(len(V))
+        file["singular_values"] = 0.5 ** np.arange(14)
+        file.attrs.update(rank=rank, roundoff=1e-12, rows_per_element=rows)
+    with _new(sources.snapshots(scene, group)) as file:
+        for split in ("train", "test", "heldout"):
+            file[split] = rng.standard_normal((10, rows * count, 3))
+            file[f"{split}_frames"] = np.arange(0, FRAMES, 2) + (split != "train")
+        file["row_mass"] = np.ones(rows * count)
+        file.attrs.update(rows_per_element=rows, elements=count, roundoff=1e-12)
+    return V
+
+
+def _write_sampling(path: Path, V: np.ndarray, group: str, method: str) -> None:
+    size = 3 * ROWS[group]
+    with _new(path) as file:
+        for r in range(1, V.shape[1] + 1):
+            if METHOD_ROWS[method] == "scalar":
+                entries = deim_entries(V[:, :r])
+            elif METHOD_ROWS[method] == "joint":
+                entries = 3 * np.arange(r)
+            else:
+                elements = block_elements(V[:, :r], size)
+                entries = (size * elements[:, None] + np.arange(size)).ravel()
+            store = file.create_group(f"r{r:04d}")
+            store["entries"] = entries
+            store["elements"] = np.unique(entries // size)
+
+
+def _write_reruns(sources, scene, group, method, positions, rank, rng) -> None:
+    with _new(sources.rerun(scene, group, method)) as file:
+        file["displacement"] = np.ones(FRAMES)
+        for r in (6, 10, 14, 20):
+            store = file.create_group(f"r{r:04d}")
+            store.attrs.update(r=r, full=r == rank, marked=r > rank)
+            if r > rank:
+                continue
+            failed = (scene, method, r) == BLOWN_UP
+            last = BLOWUP_FRAME if failed else FRAMES
+            moved = positions[: last + 1] + 0.02 / r * rng.standard_normal(positions[0].shape)
+            if failed:
+                moved[-1] = np.nan
+            store["positions"] = moved.astype(np.float32)
+            store["error"] = np.geomspace(1e-4, 1e-1, last) / r
+            store["extent"] = np.ones(last)
+            blowup = BLOWUP_FRAME if failed else -1
+            store.attrs.update(finite=not failed, blowup_frame=blowup, max_extent=1.1)
+
+
+def _outcome(scene: str, method: str, r: int) -> tuple[float, float, float]:
+    """Frame of a blow-up, error of the run, error within the horizon."""
+    if (scene, method) == BLOWN_UP[:2]:
+        return BLOWUP_FRAME, np.nan, np.nan
+    error = 1e-3 if method == "pod" else 1e-2 * r
+    return np.nan, error, error
+
+
+def _write_tables(sources, scenes, methods, rng) -> None:
+    pairs = [(scene, group) for scene, groups in scenes.items() for group in groups]
+    values, errors = [], []
+    for scene, group in pairs:
+        flat = scene in FLAT
+        for k in range(1, 15):
+            relative = 0.05 ** (k - 1)
+            values.append((scene, group, k, 3 * relative, relative, not flat and relative > 1e-13))
+        for method in methods:
+            for r in (1, 2, 4, 8, 14):
+                for split in ("train", "test", "heldout"):
+                    error = np.nan if flat else 1e5 / 10.0**r
+                    gain = 1.0 if method == "pod" else 3.0 * r
+                    errors.append((scene, group, method, r, split, error, gain, r))
+    times = [
+        (scene, implementation, 42, local, 0.1, 1.0, local / (local + 1.1))
+        for scene in scenes
+        for implementation, local in (("compiled", 0.6), ("numpy", 4.0), ("interpreted", 90.0))
+    ]
+    floors = [
+        (scene, label, frame, 10.0 ** (-9 + (0.5 * frame if "spring" in scene else 0.05)))
+        for scene in scenes
+        for label in ("1e-10", "1e-08", "solver")
+        for frame in range(FRAMES)
+    ]
+    costs = [
+        (scene, method, "full", np.nan, r, 10, 1.0 / r, 0.2 * r, r == 14)
+        for scene in scenes
+        for method in methods
+        for r in (6, 14)
+    ]
+    costs += [(scene, "full", "full", np.nan, np.nan, 10, 0.0, 4.0, True) for scene in scenes]
+    for k, time in ((2, 1.0), (5, 2.0), (10, 4.0), (40, 16.0)):
+        costs += [
+            (scene, "fom", "full", np.nan, np.nan, k, 1.0 / k**2, time, True) for scene in scenes
+        ]
+        costs += [
+            (scene, "fom-anderson", "full", np.nan, np.nan, k, 1.0 / k**3, 1.1 * time, True)
+            for scene in scenes
+            if k > 2
+        ]
+        if k < 10:
+            early = ("fewer-iterations", "full", np.nan, np.nan, k, 0.5 / k, time, k == 2)
+            costs += [(scene, *early) for scene in scenes]
+    bought = [
+        (scene, limit, reference, *best)
+        for scene in scenes
+        for limit, reference, best in (
+            (0.1, "own iterations", (None, None, np.nan, np.nan, np.nan, np.nan)),
+            (0.1, "converged", (None, None, np.nan, np.nan, np.nan, np.nan)),
+            (1.0, "own iterations", (methods[0], "full", np.nan, 14, 10, 0.02)),
+            (1.0, "converged", ("fom", "full", np.nan, np.nan, 2, 0.25)),
+            (3.0, "own iterations", ("ecsw-1e-02", "pod", 8, 33, 10, 1e-9)),
+            (3.0, "converged", ("fom", "full", np.nan, np.nan, 5, 0.04)),
+            (10.0, "own iterations", ("full", "full", np.nan, np.nan, 10, 0.0)),
+            (10.0, "converged", ("fom", "full", np.nan, np.nan, 10, 0.01)),
+        )
+    ]
+    ratios = [
+        (scene, group, method, factor, 400 * factor**2, threads, r, *_ratio(method, r, threads))
+        for scene, group in pairs
+        for method in methods
+        for factor in (1, 2, 5)
+        for threads in (1, 2)
+        for r in (6, 14, 40)
+    ]
+    shares = [
+        (scene, effect, time, time / 4.0)
+        for scene, groups in scenes.items()
+        for effect, time in (
+            *((group, 2.0 / len(groups)) for group in groups), ("gravity", 0.5), ("pins", 0.5),
+            ("global solve", 0.7), ("rest of the frame", 0.3),
+        )
+    ]  # fmt: skip
+    removed = [
+        (scene, name, number, time, 4.0 - time)
+        for scene, groups in scenes.items()
+        if len(groups) > 1
+        for name, number, time in (("nothing", 3, 4.0), ("gravity", 3, 3.5), ("a + b", 1, 2.0))
+    ]
+    rungs = [("up", "published code"), ("up", "+ affine"), ("down", "- QR"), ("signs", "signs 1")]
+    ladder = [
+        (scene, direction, rung, 10.0**i if i < 2 else np.inf, 0.1 * i if i else np.nan)
+        for scene in scenes
+        for i, (direction, rung) in enumerate(rungs)
+    ]
+    outcome = {6: "wrong", 14: "accurate", 20: "not run"}
+    runs = [
+        (scene, group, method, "full", np.nan, r, "rerun", outcome[r], np.nan, 0.016, 1.0)
+        for scene, group in pairs
+        for method in methods
+        for r in outcome
+        if scene not in FLAT
+    ]
+    runs += [
+        (scene, "all", "full", "pod", 10, 99, "rerun", "left the scene", np.nan, 0.016, 1.0)
+        for scene in scenes
+    ]
+    failed = {0.016: "accurate", 0.2: "blow-up"}
+    runs += [
+        (scene, group, method, "full", np.nan, 6, "sweep", failed[h],
+         np.nan if h < 0.1 else BLOWUP_FRAME, h, ratio)
+        for scene, group in pairs
+        for method in methods
+        for h, ratio in ((0.016, 1.0), (0.2, 1.0), (0.016, 100.0))
+    ]  # fmt: skip
+    reruns = [
+        (scene, group, method, r, "full", 1.0, *_outcome(scene, method, r))
+        for scene, group in pairs
+        if scene not in FLAT
+        for method in methods
+        for r in (8, 14)
+    ]
+    predictions = [
+        ("gain", "10", "100", 40, 0.25, np.nan),
+        ("gain", "10000", "inf", 2, 1.0, np.nan),
+        ("gain", "all", "all", 42, 0.3, 30.0),
+    ]
+    variants = [("plain", 9.0, 0.5), ("refused", None, None), ("both + more", 2.0, None)]
+    ablation = [
+        (scene, "pod", 20, r, variant, gain, error, 0.01)
+        for scene in scenes
+        for r in (20, 50)
+        for variant, gain, error in variants
+    ]
+    columns = {
+        "singular_values": "scene group component singular_value relative above_roundoff",
+        "reconstruction_error": "scene group method r split relative_error gain elements_sampled",
+        "local_share": "scene implementation vertices local_ms assembly_ms global_ms local_share",
+        "sensitivity": "scene perturbation frame relative_difference",
+        "accuracy_cost": "scene method position_basis k r iterations relative_error_within_horizon"
+        " ms_per_frame pareto",
+        "ladder": "scene direction rung gain relative_error_within_horizon",
+        "stability": "scene group method position_basis k r experiment outcome blowup_frame h"
+        " stiffness_ratio",
+        "budget": "scene budget_ms reference method position_basis k r iterations"
+        " relative_error_within_horizon",
+        "breakeven": "scene group method factor vertices threads r ratio breakeven_r",
+        "effects_cost": "scene effect ms_per_frame share",
+        "effects_left_out": "scene left_out groups ms_per_frame own_ms",
+        "reduced_reruns": "scene group method r position_basis max_extent blowup_frame"
+        " relative_error relative_error_within_horizon",
+        "gain_prediction": "predictor lower upper runs failed_share threshold",
+        "subspace_ablation": "scene position_basis k r variant gain relative_error_within_horizon"
+        " relative_error_full_projections",
+    }
+    made = (
+        values, errors, times, floors, costs, ladder, runs, bought, ratios, shares, removed, reruns,
+        predictions, ablation,
+    )  # fmt: skip
+    rows = dict(zip(columns, made, strict=True))
+    for name, header in columns.items():
+        write_table(pd.DataFrame(rows[name], columns=header.split()), sources.table(name))
+    _write_scaling(sources, scenes)
+
+
+def _ratio(method, r, threads):
+    """Ratio and break-even size: block-deim pays always, qdeim never, the others up to 20."""
+    if method == "block-deim":
+        return 0.01 * r, np.nan
+    return (0.2 * r, 6) if method == "qdeim" else (0.05 * r * threads, 20 // threads)
+
+
+def _write_scaling(sources, scenes) -> None:
+    header = (
+        "scene method threads vertices ms_per_iteration local_ms global_ms factorisation_ms"
+        " memory_mb"
+    )
+    rows = [
+        (scene, method, threads, n, n * cost, 0.6 * n * cost, 0.4 * n * cost, *extra)
+        for scene in scenes
+        for n in (400, 1600, 10000)
+        for method, threads, cost, extra in (
+            ("fom", 1, 1e-4, (0.01 * n, 0.001 * n)),
+            ("fom", 2, 7e-5, (np.nan, np.nan)),
+            ("block-deim", 1, 5e-5, (np.nan, np.nan)),
+            ("ecsw", 1, 1e-2 / n, (np.nan, np.nan)),
+        )
+    ]
+    table = pd.DataFrame(rows, columns=header.split())
+    write_table(table, sources.table("scaling"))
+    write_table(scaling_fit(table), sources.table("scaling_fit"))
+
+
+@pytest.fixture(scope="session")
+def specs() -> dict[str, FigureSpec]:
+    """The figures of the project."""
+    return load_figures(ROOT / "config" / "figures.yaml")
+
+
+@pytest.fixture(scope="session")
+def study(tmp_path_factory, specs) -> Study:
+    """An invented study with all methods."""
+    root = tmp_path_factory.mktemp("results")
+    holdings = make_results(root, SCENES, list(METHOD_ROWS))
+    return Study(root, Sources(root, holdings), specs)
+
+
+@pytest.fixture
+def small_study(tmp_path, specs) -> Callable[..., Study]:
+    """Maker of a study with other scenes and methods."""
+
+    def make(scenes: dict[str, tuple[str, ...]], methods: list[str]) -> Study:
+        holdings = make_results(tmp_path, scenes, methods)
+        return Study(tmp_path, Sources(tmp_path, holdings), specs)
+
+    return make
+
+
+@pytest.fixture(params=list(FIGURES))
+def figure_name(request) -> str:
+    """Every figure in turn."""
+    return request.param

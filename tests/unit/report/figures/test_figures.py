@@ -1,0 +1,290 @@
+"""Every figure draws from invented results; what it says about failures and missing data."""
+
+import os
+import shutil
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import h5py
+import pytest
+from matplotlib.figure import Figure
+
+from pdrom.core.errors import StorageError
+from pdrom.model.mesh.generators import cloth
+from pdrom.model.mesh.types import save_mesh
+from pdrom.report.figures import FIGURES, Sources, figure_inputs
+from pdrom.report.figures.output import draw_figure, make_figure
+
+from .conftest import BLOWN_UP, BLOWUP_FRAME, ROOT, Study
+
+PICTURES = ("snapshots_and_modes", "deim_iterations", "cloth_all_grid", "bending_runs",
+            "spring_runs", "strain_runs", "bar_runs")  # fmt: skip
+
+
+def draw(study: Study, name: str, **changes: object) -> Figure:
+    return draw_figure(name, study.sources, study.specs[name].model_copy(update=changes))
+
+
+def texts(figure: Figure) -> list[str]:
+    """Every text of a figure."""
+    found = [t.get_text() for t in figure.findobj(lambda artist: hasattr(artist, "get_text"))]
+    return [text for text in found if text]
+
+
+def test_draws_without_warnings_and_writes_both_files(study, figure_name, tmp_path):
+    pdf, png = tmp_path / "a.pdf", tmp_path / "a.png"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        make_figure(figure_name, study.sources, study.specs[figure_name], pdf, png)
+    assert pdf.read_bytes().startswith(b"%PDF")
+    assert png.read_bytes().startswith(b"\x89PNG")
+    assert pdf.stat().st_size < 1_500_000
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.pdf", "a.png"]
+
+
+def test_holds_more_than_a_note(study, figure_name):
+    figure = draw(study, figure_name)
+    assert figure.axes
+    assert not any("no data" in text for text in texts(figure))
+
+
+def test_every_panel_holds_data(study, figure_name):
+    for ax in draw(study, figure_name).axes:
+        assert ax.has_data() or ax.texts or ax.images, ax.get_title()
+
+
+@pytest.mark.parametrize("name", sorted(set(FIGURES) - set(PICTURES)))
+def test_axes_are_labelled(study, name):
+    figure = draw(study, name)
+    labels = {ax.get_xlabel() for ax in figure.axes} | {ax.get_ylabel() for ax in figure.axes}
+    assert len(labels - {""}) >= (1 if name == "local_share" else 2)
+
+
+@pytest.mark.parametrize(("name", "unit"), [("local_share", "(%)"), ("accuracy_cost", "(ms)")])
+def test_units_stand_on_the_axes(study, name, unit):
+    assert all(unit in ax.get_xlabel() for ax in draw(study, name).axes if ax.get_xlabel())
+
+
+DRAW_ALL = """
+import sys
+from pathlib import Path
+from pdrom.report.figures import FIGURES, Holdings, Sources, load_figures
+from pdrom.report.figures.output import make_figure
+
+config, holdings, root, out = sys.argv[1:]
+sources = Sources(root, Holdings.model_validate_json(holdings))
+for name, spec in load_figures(config).items():
+    make_figure(name, sources, spec, Path(out, name + ".pdf"), Path(out, name + ".png"))
+"""
+
+
+def test_bytes_are_equal_in_another_process(study, tmp_path):
+    """Another hash seed and other settings of the user must not change a byte."""
+    environment = {
+        **os.environ,
+        "PYTHONHASHSEED": "99",
+        "PYTHONPATH": os.pathsep.join(sys.path),
+        "MATPLOTLIBRC": str(tmp_path / "matplotlibrc"),
+        "SOURCE_DATE_EPOCH": "86400",
+    }
+    (tmp_path / "matplotlibrc").write_text("font.size: 31\nsavefig.bbox: tight\nfigure.dpi: 50\n")
+    arguments = [study.sources.holdings.model_dump_json(), str(study.root), str(tmp_path)]
+    config = str(ROOT / "config" / "figures.yaml")
+    subprocess.run(
+        [sys.executable, "-c", DRAW_ALL, config, *arguments], check=True, env=environment
+    )
+    for name, spec in study.specs.items():
+        files = tmp_path / "own.pdf", tmp_path / "own.png"
+        make_figure(name, study.sources, spec, *files)
+        for file in files:
+            assert file.read_bytes() == (tmp_path / f"{name}{file.suffix}").read_bytes(), name
+
+
+def test_reads_only_what_it_declares(study, figure_name, tmp_path):
+    spec, holdings = study.specs[figure_name], study.sources.holdings
+    for path in map(Path, figure_inputs(figure_name, spec, holdings, str(study.root))):
+        target = tmp_path / path.relative_to(study.root)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, target)
+    assert draw_figure(figure_name, Sources(tmp_path, holdings), spec).axes
+
+
+def test_a_missing_file_is_named(study, figure_name, tmp_path):
+    spec, holdings = study.specs[figure_name], study.sources.holdings
+    with pytest.raises(StorageError, match=str(tmp_path)):
+        draw_figure(figure_name, Sources(tmp_path, holdings), spec)
+
+
+def test_a_failed_run_is_marked_and_never_drawn_with_nan(study):
+    scene, _, _ = BLOWN_UP
+    figure = draw(study, "spring_runs", scenes=(scene,))
+    marked = [t for t in texts(figure) if f"blew up at frame {BLOWUP_FRAME}" in t]
+    assert len(marked) == 1
+    hatched = [p for ax in figure.axes for p in ax.patches if p.get_hatch()]
+    assert len(hatched) == 1
+    # the last stored state is not finite: the one before it is drawn
+    assert f"drawn: frame {BLOWUP_FRAME - 1}" in marked[0]
+
+
+def test_a_run_that_ended_early_lies_on_the_rim(study):
+    """Error against gain: as high as the axis goes, and counted among the runs."""
+    scene, method, _ = BLOWN_UP
+    figure = draw(study, "error_against_gain", scenes=(scene,), methods=(method,))
+    left, right = figure.axes
+    (dots,) = (
+        line for line in left.lines if len(line.get_xdata()) > 0 and line.get_marker() == "D"
+    )
+    assert (dots.get_ydata() == left.get_ylim()[1]).all()
+    assert dots.get_xdata().tolist() == [24.0, 42.0]
+    assert [bar.get_height() for bar in right.patches] == [25.0, 100.0]
+
+
+def test_a_failure_later_than_the_drawn_instant_is_no_failure(study):
+    figure = draw(study, "spring_runs", scenes=(BLOWN_UP[0],), frames=(0.1,))
+    assert not any("blew up" in text for text in texts(figure))
+
+
+def test_a_run_that_never_began_says_why(study):
+    assert any("round-off" in t for t in texts(draw(study, "bending_runs", scenes=("bend_fall",))))
+    figure = draw(study, "spring_runs", scenes=("spring_stretch",), ranks=(6, 20))
+    assert any("exceeds" in text for text in texts(figure))
+
+
+def test_a_run_out_of_view_is_drawn_to_a_stated_scale(small_study):
+    study = small_study({"spring_twist": ("spring",)}, ["deim-joint"])
+    with h5py.File(study.sources.rerun("spring_twist", "spring", "deim-joint"), "a") as file:
+        file["r0006/positions"][...] *= 8.0
+    figure = draw(study, "spring_runs", ranks=(6, 14))
+    assert sum("scale 1 :" in text for text in texts(figure)) == 1
+
+
+@pytest.mark.parametrize("rank", [6, 14, "full"])
+def test_asked_sizes_are_drawn_once(study, rank):
+    figure = draw(
+        study, "spring_runs", scenes=("spring_stretch",), methods=("deim",), ranks=(rank,)
+    )
+    assert len(figure.axes) == 2
+
+
+def test_missing_scenes_and_methods_leave_their_panels_out(small_study, figure_name):
+    study = small_study({"strain_oop": ("strain",)}, ["deim", "block-deim"])
+    figure = draw(study, figure_name)
+    for ax in figure.axes:
+        assert "spring" not in ax.get_title()
+    empty = {"cloth_all_grid", "bending_runs", "spring_runs", "strain_runs", "bar_runs",
+             "reconstruction_error", "deim_entries", "error_against_gain"}  # fmt: skip
+    noted = any("no data in this configuration" in text for text in texts(figure))
+    assert noted == (figure_name in empty)
+
+
+def test_experiments_of_round_off_only(small_study, figure_name):
+    study = small_study({"bend_fall": ("bending",)}, ["deim", "deim-joint", "block-deim"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert texts(draw(study, figure_name, scenes=("bend_fall",)))
+
+
+def test_singular_values_below_round_off_are_hollow(study):
+    figure = draw(study, "singular_values", scenes=("bend_fall", "spring_twist"))
+    flat, spring = figure.axes
+    for ax, hollow in ((flat, 14), (spring, 4)):
+        lines = [line for line in ax.lines if line.get_markerfacecolor() == "white"]
+        assert sum(len(line.get_xdata()) for line in lines) == hollow
+
+
+def test_errors_above_the_axis_are_marked_on_its_rim(study):
+    figure = draw(study, "reconstruction_error", scenes=("strain_twist",), methods=("deim",))
+    (ax,) = figure.axes
+    arrows = [line for line in ax.lines if line.get_marker() == 6]
+    assert [list(line.get_xdata()) for line in arrows] == [[1.0]]  # 1e5 / 10^r at r = 1
+    assert max(line.get_ydata().max() for line in ax.lines) <= ax.get_ylim()[1]
+
+
+def test_the_horizon_is_the_first_frame_above_the_threshold(study):
+    figure = draw(study, "sensitivity_floor", scenes=("spring_twist", "strain_oop"))
+    # 10^(-9 + f/2) exceeds 1e-3 first at f = 13
+    assert "spring twist: 13" in texts(figure)
+    assert "strain oop: beyond 20" in texts(figure)
+
+
+def test_published_values_are_drawn_where_they_are_given(study, tmp_path):
+    (tmp_path / "singular_values.csv").write_text(
+        "experiment,group,component,singular_value\nall_three,spring,1,5\nall_three,spring,2,1\n"
+    )
+    sources = Sources(study.root, study.sources.holdings, tmp_path)
+    figure = draw_figure("singular_values", sources, study.specs["singular_values"])
+    assert "published code's output" in texts(figure)
+    without = draw(study, "singular_values")
+    assert "published code's output" not in texts(without)
+
+
+def test_a_mesh_that_does_not_fit_is_refused(small_study):
+    study = small_study({"strain_oop": ("strain",)}, ["deim"])
+    save_mesh(cloth(4, 4), study.sources.mesh("strain_oop"))
+    with pytest.raises(StorageError, match="elements of 'strain'"):
+        draw(study, "deim_iterations")
+
+
+# Cost -------------------------------------------------------------------------------------------
+
+
+def test_points_with_another_reference_are_no_dots(study):
+    """Errors against the converged run are one line; no dot or ring lies at their times."""
+    figure = draw(study, "accuracy_cost", scenes=("strain_oop",))
+    (ax,) = figure.axes
+    lines = [line for line in ax.lines if line.get_linestyle() == "-."]
+    assert [line.get_ydata()[0] for line in lines] == [0.01]  # fom, K = 10
+    times = {float(x) for line in ax.lines if line.get_marker() == "o" for x in line.get_xdata()}
+    assert 16.0 not in times  # fom, K = 40
+    (fewer,) = [line for line in ax.lines if line.get_marker() == "x"]
+    assert list(fewer.get_xdata()) == [1.0, 2.0]
+
+
+def test_rates_out_of_reach_are_named(study):
+    figure = draw(study, "accuracy_cost", scenes=("strain_oop",))
+    assert "60, 30 fps \N{RIGHTWARDS ARROW}" in texts(figure)
+    (ax,) = figure.axes
+    assert ax.get_xlim()[1] < 1e3 / 60.0
+
+
+def test_a_budget_says_what_it_buys(study):
+    figure = draw(study, "budget", scenes=("strain_oop",))
+    found = texts(figure)
+    assert [ax.get_title() for ax in figure.axes] == [
+        "0.1 ms a frame", "1 ms a frame", "3 ms a frame", "10 ms a frame",
+    ]  # fmt: skip
+    assert found.count("nothing fits") == 1
+    assert found.count("full order fits") == 1
+    assert {"r=14", "k=8, 33 el.", "K=2", "K=5", "K=10"} <= set(found)
+
+
+def test_break_even_has_a_panel_per_group(study):
+    figure = draw(study, "break_even")
+    assert {ax.get_title() for ax in figure.axes} == {
+        "bending", "spring", "strain", "tetrahedron strain", "deformation gradient",
+    }  # fmt: skip
+
+
+def test_break_even_over_mesh_sizes(study):
+    figure = draw(study, "break_even_sizes", methods=("deim-joint", "block-deim", "qdeim"))
+    assert [ax.get_title() for ax in figure.axes] == ["strain oop", "bar release"]
+    lines = [line for line in figure.axes[0].get_lines() if line.get_marker() == "None"]
+    drawn = {(*line.get_ydata(), line.get_linestyle()) for line in lines}
+    sizes = ((20, "-"), (10, "--"), (40, "-"), (40, "--"), (6, "-"), (6, "--"))
+    assert drawn == {(size, size, size, style) for size, style in sizes}
+    points = [line for line in figure.axes[0].get_lines() if line.get_marker() != "None"]
+    marks = {line.get_ydata()[0]: line.get_marker() for line in points}
+    assert (marks[40], marks[6]) == ("^", "v")
+
+
+def test_a_scene_without_effects_ends_at_the_tick(study):
+    figure = draw(study, "effects_cost", scenes=("strain_oop", "cloth_all"))
+    shares, without = figure.axes
+    assert [t.get_text() for t in shares.get_yticklabels()] == ["strain oop", "cloth all"]
+    assert [t.get_text() for t in without.get_yticklabels()] == [
+        "whole", "without gravity", "without a + b",
+    ]  # fmt: skip
+    assert [bar.get_width() for bar in without.patches] == [4.0, 3.5, 2.0]
+    assert [line.get_xdata()[0] for line in without.lines] == [3.5, 2.0]

@@ -1,0 +1,129 @@
+"""The manuscript types no result: every number of its prose comes from a table."""
+
+import re
+
+import pytest
+from matplotlib.figure import Figure
+
+from conftest import ROOT
+from pdrom.core.yamlfile import read_yaml
+from pdrom.pipeline.plan import TABLES, Plan
+from pdrom.pipeline.study import Study
+from pdrom.report.paper.bibliography import bibliography, cited_keys
+from pdrom.report.paper.macros import keys_of
+from pdrom.report.paper.tex import build_pdf, packages_of
+from pdrom.tables.columns import COLUMNS
+
+SOURCE = (ROOT / "paper" / "main.tex").read_text(encoding="utf-8")
+
+# What may hold digits without stating a result: mathematics, keys, lengths, names of claims.
+_NOT_PROSE = [
+    r"(?<!\\)%.*",
+    r"\\begin\{(equation|align)\*?\}.*?\\end\{\1\*?\}",
+    r"\\(val|cite|label|ref|eqref|input|includegraphics|scene|method|figureof|fontsize)"
+    r"(\[[^\]]*\])?\{[^{}]*\}",
+    r"\\(setlength|vspace|hspace)\{[^{}]*\}(\{[^{}]*\})?",
+    r"\{fig:[a-z]+\}|\\begin\{[a-z]+\}(\[[^\]]*\])?(\{[^{}]*\})?",
+    r"\bC\d+(?=[:.\s])",
+]
+
+
+# Digits of a formula that are no quantity: indices and exponents, a factor of a symbol, a bound 0.
+_NOTATION = [r"[_^](\{[^{}]*\}|.)", r"\d+(?=[a-zA-Z])", r"\\(ge|le)\s*0(?![.\d])"]
+
+
+def notation_removed(formula: re.Match) -> str:
+    """An inline formula without its notation: what keeps a digit states a quantity."""
+    text = formula.group(0)
+    for pattern in _NOTATION:
+        text = re.sub(pattern, " ", text)
+    return text
+
+
+def prose(source: str) -> str:
+    """Body text without displayed mathematics, notation, keys, lengths and the names of claims."""
+    text = source.split(r"\begin{document}", 1)[1]
+    for pattern in _NOT_PROSE:
+        text = re.sub(pattern, " ", text, flags=re.S if "begin" in pattern else 0)
+    return re.sub(r"(?<!\\)\$.*?(?<!\\)\$", notation_removed, text, flags=re.S)
+
+
+def typed_numbers(source: str) -> list[str]:
+    """Numbers typed in the prose, with the words around them."""
+    return [m.group(0) for m in re.finditer(r".{0,30}\d[\d.,]*.{0,20}", prose(source))]
+
+
+def test_no_result_is_typed():
+    assert typed_numbers(SOURCE) == []
+
+
+@pytest.mark.parametrize(
+    "sentence",
+    [
+        "The error is 0.03.",
+        "It blew up at frame 12.",
+        "A speed-up of 50 times.",
+        r"5\,\% remain",
+        "The error is $0.03$.",
+        r"It stays below $10^{-3}$.",
+        r"$50\times$ faster",
+        r"an $e \le 0.2$",
+    ],
+)
+def test_a_typed_result_is_found(sentence):
+    changed = SOURCE.replace(r"\section{Limitations}", rf"\section{{Limitations}} {sentence}")
+    assert len(typed_numbers(changed)) == 1
+
+
+def test_only_packages_of_both_tex_systems():
+    allowed = {
+        "fontenc", "inputenc", "lmodern", "amsmath", "geometry", "graphicx", "xcolor", "array",
+        "longtable", "enumitem", "microtype", "hyperref", "tabularx", "rotating", "url",
+    }  # fmt: skip
+    assert set(packages_of(SOURCE)) <= allowed
+
+
+def test_every_key_names_a_column_of_a_table():
+    study = Study.load(read_yaml(ROOT / "config" / "default.yaml"), ROOT)
+    facts = Plan(study).facts()
+    columns = {name: set(COLUMNS[name]) for name in TABLES}
+    columns |= {name: set(rows[0]) for name, rows in facts.items()}
+    for key in keys_of(SOURCE):
+        table, *parts = key.split("|")
+        if table == "machine":
+            continue
+        fields = [part.partition("=")[0] for part in parts]
+        unknown = set(fields) - columns[table] - {"max", "min", "median", "count"}
+        assert not unknown, key
+
+
+def test_every_figure_of_the_study_is_shown():
+    shown = set(re.findall(r"\\figureof\{([a-z_]+)\}", SOURCE))
+    missing = set(read_yaml(ROOT / "config" / "figures.yaml")) - shown
+    assert missing <= {"reconstruction_error_sound"}
+
+
+def test_every_citation_has_an_entry():
+    text = bibliography(SOURCE, ROOT / "paper" / "references.bib")
+    assert text.count(r"\bibitem") == len(cited_keys(SOURCE)) > 10
+
+
+def test_the_same_inputs_give_the_same_bytes_in_every_folder(tmp_path):
+    """An included PDF brings the name of its file along unless the preamble suppresses it."""
+    settings = [line for line in SOURCE.splitlines() if line.startswith(r"\pdf")]
+    document = "\n".join(
+        [r"\documentclass{article}", r"\usepackage[T1]{fontenc}", r"\usepackage{lmodern}",
+         r"\usepackage{graphicx}", *settings, r"\begin{document}",
+         r"\includegraphics{picture.pdf}", r"\end{document}"]
+    )  # fmt: skip
+    made = []
+    for name in ("one", "another"):
+        folder = tmp_path / name / "paper"
+        folder.mkdir(parents=True)
+        figure = Figure()
+        figure.subplots().plot([0, 1])
+        figure.savefig(folder / "picture.pdf", metadata={"CreationDate": None})
+        (folder / "main.tex").write_text(document, encoding="utf-8")
+        build_pdf(folder / "main.tex", tmp_path / name / "main.pdf", [])
+        made.append((tmp_path / name / "main.pdf").read_bytes())
+    assert made[0] == made[1]

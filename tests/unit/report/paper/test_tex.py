@@ -1,0 +1,104 @@
+"""Building PDFs: whole, the same bytes everywhere, and faults in one line."""
+
+import shutil
+
+import pytest
+
+from pdrom.core.errors import PaperError
+from pdrom.report.paper.tex import build_pdf, packages_of
+
+DOCUMENT = r"""\documentclass{article}
+\usepackage[T1]{fontenc}
+\usepackage{lmodern}
+\pdftrailerid{}
+\begin{document}
+\section{One}\label{sec:one}
+Section \ref{sec:one} and \cite{key}. \input{part}
+\begin{thebibliography}{9}
+\bibitem{key} An entry.
+\end{thebibliography}
+\end{document}
+"""
+
+
+def project(folder, text=DOCUMENT):
+    """A source with a part in a folder of its own."""
+    (folder / "generated").mkdir(parents=True)
+    (folder / "generated" / "part.tex").write_text("Part.")
+    source = folder / "main.tex"
+    source.write_text(text)
+    return source
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """The same document built in two folders."""
+    outputs = []
+    for name in ("first", "a longer second"):
+        folder = tmp_path_factory.mktemp("tex") / name
+        source = project(folder)
+        output = folder / "out" / "main.pdf"
+        build_pdf(source, output, [folder / "generated"])
+        outputs.append(output)
+    return outputs
+
+
+def test_output_is_a_pdf_alone_in_its_folder(built):
+    for output in built:
+        assert output.read_bytes().startswith(b"%PDF-")
+        assert list(output.parent.iterdir()) == [output]
+        names = {path.name for path in output.parent.parent.iterdir()}
+        assert names == {"main.tex", "generated", "out"}
+
+
+def test_bytes_do_not_depend_on_the_folder(built):
+    assert built[0].read_bytes() == built[1].read_bytes()
+
+
+def test_other_text_gives_other_bytes(built, tmp_path):
+    source = project(tmp_path, DOCUMENT.replace("An entry", "Another entry"))
+    build_pdf(source, tmp_path / "main.pdf", [tmp_path / "generated"])
+    assert (tmp_path / "main.pdf").read_bytes() != built[0].read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("Section", r"\nosuchcommand Section", r"! Undefined control sequence.* l\.7"),
+        (r"\input{part}", r"\input{gone}", r"! LaTeX Error: File `gone.tex' not found"),
+        (r"\ref{sec:one}", r"\ref{sec:two}", r"undefined references: sec:two"),
+        (r"\cite{key}", r"\cite{other} \ref{a}", r"undefined references: a, other"),
+        (r"\documentclass{article}", r"\documentclass{article}\usepackage{no-such-package}",
+         r"no-such-package.sty' not found|needed packages"),
+        (r"\end{document}", "", r"main\.tex"),
+    ],
+)  # fmt: skip
+def test_faults_are_one_line_and_leave_the_old_pdf(tmp_path, old, new, message):
+    source = project(tmp_path, DOCUMENT.replace(old, new))
+    output = tmp_path / "main.pdf"
+    output.write_bytes(b"old")
+    with pytest.raises(PaperError, match=message) as caught:
+        build_pdf(source, output, [tmp_path / "generated"])
+    assert str(source) in str(caught.value)
+    assert output.read_bytes() == b"old"
+
+
+def test_the_shell_is_out_of_reach(tmp_path):
+    source = project(
+        tmp_path, DOCUMENT.replace("Section", rf"\immediate\write18{{touch {tmp_path}/made}}")
+    )
+    build_pdf(source, tmp_path / "main.pdf", [tmp_path / "generated"])
+    assert not (tmp_path / "made").exists()
+
+
+def test_without_any_tex_the_reason_is_given(tmp_path, monkeypatch):
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    monkeypatch.setattr("pdrom.report.paper.tex.find_spec", lambda name: None)
+    with pytest.raises(PaperError, match="no pdflatex with the needed packages on PATH"):
+        build_pdf(project(tmp_path), tmp_path / "main.pdf", [])
+
+
+def test_packages_of_a_source():
+    source = r"\usepackage{a} \usepackage[x=1,y]{b, c}" "\n" r"\usepackage{a}\RequirePackage{d}"
+    assert packages_of(source) == ["a", "b", "c"]
+    assert packages_of("") == []

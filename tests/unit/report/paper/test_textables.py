@@ -1,0 +1,248 @@
+"""TeX tables from the tables of the study, cell by cell."""
+
+import pandas as pd
+import pytest
+
+from pdrom.report.paper.textables import (
+    TEX_TABLES,
+    claims,
+    guard,
+    local_share,
+    longtable,
+    ranks,
+    reruns,
+    stability,
+    tabular,
+)
+from pdrom.report.paper.textables import scenes as scene_table
+
+COLUMNS = [
+    "scene", "group", "method", "position_basis", "r", "frames", "blowup_frame", "horizon_frame",
+    "relative_error_within_horizon",
+]  # fmt: skip
+TABLES = {
+    "methods": pd.DataFrame(
+        {
+            "method": ["pod", "deim_x"],
+            "title": ["A & B", "50 %"],
+            "centring": ["none", "affine"],
+            "rows": ["all", "scalar"],
+            "selection": ["greedy", "greedy"],
+            "solve": ["square", "qr"],
+            "oversampling": [1, 3],
+            "gain_bound": [None, None],
+        }
+    ),
+    "scenes": pd.DataFrame(
+        {
+            "scene": ["bar_a", "b"],
+            "groups": ["triangle_strain (1e+07)", "spring (1)"],
+            "vertices": [400, 9],
+            "elements": [722, 12],
+            "frames": [10, 20],
+        }
+    ),
+    "reduced_reruns": pd.DataFrame(
+        [
+            ("bar_a", "edge_spring", "pod", "full", 6, 10, None, 10, 0.5),
+            ("bar_a", "edge_spring", "pod", "full", 20, 10, None, 10, 0.25),
+            ("bar_a", "edge_spring", "pod", "full", 30, 0, None, 10, None),
+            ("bar_a", "edge_spring", "deim_x", "full", 6, 10, None, 10, 0.75),
+            ("bar_a", "edge_spring", "deim_x", "full", 20, 5, 4, 10, None),
+            ("b", "bending", "pod", "full", 6, 0, None, 7, None),
+            ("b", "all", "pod", "pod", 6, 10, None, 7, 0.125),
+        ],
+        columns=COLUMNS,
+    ),
+    "singular_values": pd.DataFrame(
+        {
+            "scene": "bar_a",
+            "group": "edge_spring",
+            "component": [1, 6, 10, 20],
+            "relative": [1.0, 0.5, 0.01, 1e-15],
+            "above_roundoff": [True, True, True, False],
+        }
+    ),
+    "stability": pd.DataFrame(
+        [
+            ("full", "full", "rerun", "accurate", 1.0),
+            ("pod", "full", "rerun", "accurate", 1.0),
+            ("pod", "full", "rerun", "blow-up", float("inf")),
+            ("pod", "full", "rerun", "not run", None),
+            ("pod", "full", "rerun", "wrong", 3.0),
+            ("pod", "full", "sweep", "wrong", 2.0),
+            ("ecsw", "pod", "rerun", "accurate", 0.5),
+        ],
+        columns=["method", "position_basis", "experiment", "outcome", "energy_ratio"],
+    ),
+    "guard": pd.DataFrame(
+        [
+            ("bar_a", "full", None, "none", 0.0, 1.0, None, None, None, 2.0),
+            ("bar_a", "deim_x", 20, "none", 0.5, 4.0, None, None, None, 1.0),
+            ("bar_a", "deim_x", 20, "fall-back", None, 1.0, 3, "extent", 0.25, 1.5),
+        ],
+        columns=[
+            "scene",
+            "method",
+            "r",
+            "action",
+            "relative_error",
+            "energy_ratio",
+            "guard_frame",
+            "guard_reason",
+            "fallback_share",
+            "ms_per_frame",
+        ],
+    ),
+    "local_share": pd.DataFrame(
+        {
+            "scene": "bar_a",
+            "implementation": ["compiled", "interpreted", "numpy"],
+            "local_ms": [1.0, 100.0, 10.0],
+            "assembly_ms": [0.0, 20.0, 2.0],
+            "global_ms": [1.0, 30.0, 4.0],
+            "local_share": [0.5, 0.8, 0.75],
+        }
+    ),
+    "claims": pd.DataFrame(
+        {
+            "claim": ["C1", "C2", "C3"],
+            "paper": ["70 % or more", "x", "y"],
+            "measured": ["0.1; 0.2", "no data", "3"],
+            "verdict": ["holds", "cannot be decided", "does not hold"],
+            "figure_or_table": ["local_share", "a", "b"],
+        }
+    ),
+    "hard_cases": pd.DataFrame(
+        [
+            ("torn", "pod", 1.0, None, 1.0, "holds", None),
+            ("torn", "deim_x", float("inf"), 0, 1.0, "singular", "a % reason"),
+            ("kicked", "pod", None, None, None, "nothing to reduce", None),
+            ("kicked", "deim_x", 25.0, 7, 300.0, "blow-up", "a % reason"),
+            ("folded", "deim_x", 25.0, None, 4.0, "distorted", "a % reason"),
+        ],
+        columns=["case", "method", "gain", "blowup_frame", "max_extent", "outcome", "why"],
+    ),
+    "kernel_accuracy": pd.DataFrame(
+        {
+            "group": ["spring", "strain", "strain"],
+            "matrix_class": ["random", "zero", "huge (1e150)"],
+            "cases": [4, 5, 6],
+            "condition": [1.0, 1.0, 1e6],
+            "worst_relative_error": [1e-16, 3e-16, 1e-12],
+            "worst_over_condition": [1e-16, 3e-16, 1e-18],
+        }
+    ),
+}
+
+
+def rows(text: str) -> list[str]:
+    """Rows of the body, the head left out."""
+    lines = [line for line in text.splitlines() if line.endswith(r" \\")]
+    return lines[1:]
+
+
+def test_rows_and_columns_of_a_table():
+    for make, name in ((tabular, "tabular"), (longtable, "longtable")):
+        text = make(["a", "b"], [["1", "2"], ["3", "4"]], "lr")
+        assert text.startswith(rf"\begin{{{name}}}{{lr}}")
+        assert text.endswith(rf"\end{{{name}}}" + "\n")
+        assert rows(text) == [r"1 & 2 \\", r"3 & 4 \\"]
+        assert r"a & b \\" in text
+
+
+@pytest.mark.parametrize("name", TEX_TABLES)
+def test_every_row_has_a_cell_for_every_column(name):
+    text = TEX_TABLES[name](TABLES)
+    head = next(line for line in text.splitlines() if line.endswith(r" \\"))
+    body = rows(text)
+    assert body
+    for row in body:
+        assert row.replace(r"\&", "").count("&") == head.count("&")
+        assert "nan" not in row
+    assert TEX_TABLES[name](TABLES) == text
+
+
+def test_reruns_show_the_largest_size_that_ran():
+    """Ranks beyond the data and subspaces are left out, a blow-up shows its frame."""
+    (row,) = rows(reruns(TABLES))
+    assert row == (r"\texttt{bar\_a} & edge spring & 0.25 & \textcolor{okred}{blow-up, 4} \\")
+
+
+@pytest.mark.parametrize(
+    ("changes", "samples"),
+    [
+        ({}, "3 a mode"),
+        ({"oversampling": 1}, "one a mode"),
+        ({"gain_bound": 2.5}, r"$\gamma \le 2.5$"),
+        ({"rows": "all"}, "--"),
+    ],
+)
+def test_methods_say_how_many_samples_they_take(changes, samples):
+    frame = TABLES["methods"][1:].assign(**changes)
+    (row,) = rows(TEX_TABLES["tab_methods"]({"methods": frame}))
+    assert row.split(" & ")[5] == samples
+
+
+def test_ranks_count_what_is_above_round_off():
+    (row,) = rows(ranks(TABLES))
+    assert row == r"\texttt{bar\_a} & edge spring & 3 & 0.50 & 0.010 & -- \\"
+
+
+def test_local_share_orders_the_implementations():
+    (row,) = rows(local_share(TABLES))
+    assert row == r"\texttt{bar\_a} & 150 & 0.80 & 16 & 0.75 & 2 & 0.50 \\"
+
+
+def test_horizon_of_a_calm_scene_is_its_run():
+    first, second = rows(scene_table(TABLES))
+    assert first.endswith(r"& 400 & 722 & 10 & run \\")
+    assert second.endswith(r"& 9 & 12 & 20 & 7 \\")
+    assert r"triangle\_strain (1e+07)" in first
+
+
+def test_hard_cases_show_failures_only():
+    torn, kicked, folded = rows(TEX_TABLES["tab_hard_cases"](TABLES))
+    assert r"\texttt{deim\_x}" in TEX_TABLES["tab_hard_cases"](TABLES)
+    assert "pod" not in TEX_TABLES["tab_hard_cases"](TABLES)
+    assert torn.endswith(r"and lets go & singular \\")
+    assert kicked.endswith(r"& blow-up, 7; gain 25 \\")
+    assert folded.endswith(r"& 4\,$\times$ the extent; gain 25 \\")
+
+
+def test_hard_reductions_count_outcomes():
+    pod, deim = rows(TEX_TABLES["tab_hard_reductions"](TABLES))
+    assert pod == r"\texttt{pod} & 1 & 1 & 0 & 0 & 0 & -- \\"
+    assert deim == r"\texttt{deim\_x} & 0 & 0 & 1 & 1 & 1 & a \% reason \\"
+
+
+def test_kernel_accuracy_names_the_worst_class():
+    spring, strain = rows(TEX_TABLES["tab_kernel_accuracy"](TABLES))
+    assert spring.startswith("spring & 1 & 4 & ")
+    assert strain.startswith("strain & 2 & 11 & ")
+    assert "& zero &" in strain
+    assert "& huge (1e150) &" in strain
+
+
+def test_verdicts_have_their_colour():
+    holds, open_, fails = rows(claims(TABLES))
+    assert r"\textcolor{okgreen}{holds}" in holds
+    assert r"\textcolor{okgrey}{cannot be decided}" in open_
+    assert r"\textcolor{okred}{does not hold}" in fails
+    assert r"70 \% or more" in holds
+    assert r"0.1; \newline 0.2" in holds
+
+
+def test_stability_counts_what_ran():
+    first, second = rows(stability(TABLES))
+    cells = [cell.strip() for cell in first.removesuffix(r"\\").split("&")]
+    assert cells[1:5] == ["1", "1", "0", "1"]
+    assert cells[5:] == ["3", r"\ensuremath{\infty}", "0 of 1", "2"]
+    assert second.startswith(r"\texttt{ecsw, pod subspace} & 1 & 0 & 0 & 0 & 0.50 & 0.50 & 0 of 0")
+
+
+def test_guard_shows_what_was_seen_and_repeated():
+    full, plain, fallen = rows(guard(TABLES))
+    assert full == r"\texttt{bar\_a} &  & full order & 0 & 1 & -- & -- & 2 \\"
+    assert plain.endswith(r"& none & 0.50 & 4 & -- & -- & 1 \\")
+    assert fallen.endswith(r"& fall-back & blow-up & 1 & 3, extent & 0.25 & 1.5 \\")
