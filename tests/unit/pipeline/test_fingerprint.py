@@ -82,7 +82,12 @@ def test_strings_that_are_used_count():
 
 def test_closure_follows_imports():
     found = closure("pdrom.model.dynamics.solvers")
-    assert found == ["pdrom.core.errors", "pdrom.model.dynamics.solvers", "pdrom.core.registry"]
+    assert found == [
+        "pdrom.core",
+        "pdrom.core.errors",
+        "pdrom.core.registry",
+        "pdrom.model.dynamics.solvers",
+    ]
     assert {"pdrom.core.store", "pdrom.model.constraints.base"} < set(
         closure("pdrom.model.dynamics.system")
     )
@@ -149,11 +154,11 @@ def prints(tmp_path_factory):
 
     return {
         "none": taken(),
-        "comment": edited("constraints/spring.py", "\n# a comment\n"),
-        "spring": edited("constraints/spring.py", "\nADDED = 1\n"),
-        "bending": edited("constraints/bending.py", "\nADDED = 1\n"),
-        "mesh": edited("mesh/generators.py", "\nADDED = 1\n"),
-        "store": edited("store.py", "\nADDED = 1\n"),
+        "comment": edited("model/constraints/spring.py", "\n# a comment\n"),
+        "spring": edited("model/constraints/spring.py", "\nADDED = 1\n"),
+        "bending": edited("model/constraints/bending.py", "\nADDED = 1\n"),
+        "mesh": edited("model/mesh/generators.py", "\nADDED = 1\n"),
+        "store": edited("core/store/tables.py", "\nADDED = 1\n"),
     }
 
 
