@@ -11,8 +11,6 @@ from typing import Any
 from pdrom.core.errors import ConfigurationError, PdromError, choices
 from pdrom.experiments.hard_cases.catalogue import reducible_cases
 from pdrom.experiments.hard_cases.expectations import load_expectations
-from pdrom.experiments.ladder_spec import LadderSpec, load_ladder
-from pdrom.experiments.subspace_ablation_spec import AblationSpec, load_ablation
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.config import MeshFile
 from pdrom.pipeline.fingerprint import fingerprint
@@ -95,8 +93,8 @@ class Plan:
     def _check_scenes(self, folder: Path) -> None:
         settings = self.settings
         named = {
-            f"{folder / 'ladder.yaml'}: scenes": self.ladder.scenes,
-            f"{folder / 'subspace_ablation.yaml'}: scenes": self.ablation.scenes,
+            f"{folder / 'ladder.yaml'}: scenes": self.study.ladder.scenes,
+            f"{folder / 'subspace_ablation.yaml'}: scenes": self.study.ablation.scenes,
             "subspace.scenes": settings.subspace.scenes,
             "scaling.scenes": tuple(settings.scaling.scenes),
             "stability.scenes": settings.stability.scenes,
@@ -284,18 +282,13 @@ class Plan:
 
     # Ladder ---------------------------------------------------------------------------------
 
-    @cached_property
-    def ladder(self) -> LadderSpec:
-        """Ladder of config/ladder.yaml."""
-        return load_ladder(self.root / "config" / "ladder.yaml")
-
     def ladder_rungs(self) -> dict[str, Any]:
         """Plain ladder; which scenes climb it is no parameter of one climb."""
-        return {**self.ladder.model_dump(mode="json"), "scenes": []}
+        return {**self.study.ladder.model_dump(mode="json"), "scenes": []}
 
     def ladder_files(self) -> list[str]:
         """Files of the scenes that climb the ladder and are in this configuration."""
-        pairs = [(s, g) for s, g in self.study.experiments if s in self.ladder.scenes]
+        pairs = [(s, g) for s, g in self.study.experiments if s in self.study.ladder.scenes]
         return [f"{RESULTS}/ladder/{scene}/{group}.csv" for scene, group in pairs]
 
     # Scaling --------------------------------------------------------------------------------
@@ -372,18 +365,13 @@ class Plan:
 
     # Ablation in position subspaces ---------------------------------------------------------
 
-    @cached_property
-    def ablation(self) -> AblationSpec:
-        """Ablation of config/subspace_ablation.yaml."""
-        return load_ablation(self.root / "config" / "subspace_ablation.yaml")
-
     def ablation_settings(self) -> dict[str, Any]:
         """Plain ablation; which scenes it runs on is no parameter of one run."""
-        return {**self.ablation.model_dump(mode="json", exclude_unset=True), "scenes": []}
+        return {**self.study.ablation.model_dump(mode="json", exclude_unset=True), "scenes": []}
 
     def ablation_files(self) -> list[str]:
         """Files of the scenes of the ablation that this configuration holds."""
-        scenes = [s for s in self.study.scenes if s in self.ablation.scenes]
+        scenes = [s for s in self.study.scenes if s in self.study.ablation.scenes]
         return [f"{RESULTS}/subspace_ablation/{scene}.csv" for scene in scenes]
 
     # Figures --------------------------------------------------------------------------------

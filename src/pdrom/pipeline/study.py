@@ -1,6 +1,7 @@
 """The study: which scenes, methods and settings one run of the pipeline covers."""
 
 from collections.abc import Iterable
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -8,6 +9,8 @@ from pydantic import Field, model_validator
 
 from pdrom.core.errors import ConfigurationError, PdromError, choices
 from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
+from pdrom.experiments.ladder_spec import LadderSpec, load_ladder
+from pdrom.experiments.subspace_ablation_spec import AblationSpec, load_ablation
 from pdrom.model.dynamics.solvers import SOLVERS
 from pdrom.model.effects.base import Seed
 from pdrom.model.scene import SCENE_NAME, Scene, SceneConfig
@@ -315,6 +318,16 @@ class Study:
         """
         settings = validate(StudySettings, config, source)
         return cls(settings, Path(root))
+
+    @cached_property
+    def ladder(self) -> LadderSpec:
+        """Ladder of config/ladder.yaml."""
+        return load_ladder(self.root / "config" / "ladder.yaml")
+
+    @cached_property
+    def ablation(self) -> AblationSpec:
+        """Ablation of config/subspace_ablation.yaml."""
+        return load_ablation(self.root / "config" / "subspace_ablation.yaml")
 
     @property
     def experiments(self) -> list[tuple[str, str]]:

@@ -67,7 +67,7 @@ def test_an_edit_of_an_inlined_function_reaches_every_kernel(tmp_path):
         tmp_path / "src" / "pdrom",
         ignore=shutil.ignore_patterns("__pycache__"),
     )
-    lanes = tmp_path / "src" / "pdrom" / "constraints" / "lanes.py"
+    lanes = tmp_path / "src" / "pdrom" / "model" / "constraints" / "lanes.py"
     before = _spring_in(tmp_path)
     text = lanes.read_text()
     scaled = "return (s * a[0], s * a[1], s * a[2])"

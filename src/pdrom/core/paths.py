@@ -1,0 +1,104 @@
+"""Where results lie: the one module that knows the layout below a results folder, both ways.
+
+A `Place` is a kind of file. It turns labels (scene, group, method ...) into a path, and a path back
+into labels. The results folder itself is chosen by the pipeline, one for each configuration.
+"""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from string import Formatter
+
+from pdrom.core.errors import StorageError
+
+RESULTS = "results"
+
+# What a label may be; the workflow restricts its wildcards to the same.
+LABELS = {
+    "mesh": r"[A-Za-z0-9_.-]+",
+    "scene": r"[a-z][a-z0-9_]*",
+    "run": r"train|heldout",
+    "group": r"[a-z_]+",
+    "basis": r"[a-z0-9-]+",
+    "method": r"[a-z0-9-]+",
+    "factor": r"[0-9.]+",
+    "name": r"[A-Za-z0-9_.]+",
+}
+
+
+@dataclass(frozen=True)
+class Place:
+    """A kind of file; ``pattern`` is relative to the results folder, with labels in braces."""
+
+    pattern: str
+
+    def at(self, results: str, **labels: str) -> str:
+        """Path of the file with these labels below the folder ``results``."""
+        return f"{results}/{self.pattern.format(**labels)}"
+
+    def rule(self, results: str) -> str:
+        """Path with its labels left in braces, as a rule of the workflow writes it."""
+        return f"{results}/{self.pattern}"
+
+    def file(self, path: str) -> "File":
+        """A path of this kind with its labels; StorageError if it is no such path."""
+        found = self._expression.search(path)
+        if found is None:
+            raise StorageError(f"{path}: no file of the kind '{self.pattern}'")
+        return File(path, found.groupdict())
+
+    def files(self, paths: Iterable[str]) -> "list[File]":
+        """`file` of each path, in order."""
+        return [self.file(path) for path in paths]
+
+    @cached_property
+    def _expression(self) -> re.Pattern[str]:
+        parts = []
+        for text, label, _, _ in Formatter().parse(self.pattern):
+            parts.append(re.escape(text))
+            if label is not None:
+                parts.append(f"(?P<{label}>{LABELS[label]})")
+        return re.compile(rf"(?:^|/){''.join(parts)}$")
+
+
+@dataclass(frozen=True)
+class File:
+    """A file and what its path says about it."""
+
+    path: str
+    labels: dict[str, str]
+
+    def __getitem__(self, label: str) -> str:
+        return self.labels[label]
+
+
+MESH = Place("meshes/{mesh}.h5")
+FULL_ORDER = Place("fom/{scene}/{run}.h5")
+SENSITIVITY = Place("sensitivity/{scene}.csv")
+ITERATIONS = Place("iterations/{scene}.csv")
+SNAPSHOTS = Place("snapshots/{scene}/{group}.h5")
+BASIS = Place("pod/{scene}/{group}/{basis}.h5")
+SAMPLING = Place("sampling/{scene}/{group}/{method}.h5")
+RECONSTRUCTION = Place("sampling/{scene}/{group}/{method}.csv")
+RERUNS = Place("reruns/{scene}/{group}/{method}.h5")
+RERUNS_TRAIN = Place("reruns/{scene}/{group}/{method}.csv")
+RERUNS_HELDOUT = Place("reruns/{scene}/{group}/{method}_heldout.csv")
+SUBSPACES = Place("hyper/{scene}/models.h5")
+SUBSPACES_TRAIN = Place("hyper/{scene}/models.csv")
+SUBSPACES_HELDOUT = Place("hyper/{scene}/models_heldout.csv")
+LADDER = Place("ladder/{scene}/{group}.csv")
+STABILITY = Place("stability/{scene}.csv")
+SUBSPACE_ABLATION = Place("subspace_ablation/{scene}.csv")
+TIMINGS = Place("timings/{scene}.csv")
+BREAK_EVEN = Place("breakeven/{scene}.csv")
+BREAK_EVEN_SIZED = Place("breakeven/{scene}/x{factor}.csv")
+EFFECTS = Place("effects/{scene}.csv")
+LEFT_OUT = Place("left_out/{scene}.csv")
+SCALING = Place("scaling/{scene}/x{factor}.csv")
+ONLINE = Place("online/{scene}.csv")
+MACHINE = Place("machine.json")
+TABLE = Place("tables/{name}.csv")
+FIGURE = Place("figures/{name}.pdf")
+FIGURE_PICTURE = Place("figures/{name}.png")
+PAPER_INPUT = Place("paper/{name}")

@@ -1,0 +1,39 @@
+"""What an artifact (a table, a figure) says that it reads; the pipeline finds it.
+
+A declaration holds no path: it names kinds of files, other tables and keys of the configuration.
+"""
+
+from dataclasses import dataclass
+
+from pdrom.core.paths import Place
+
+
+@dataclass(frozen=True)
+class Every:
+    """Every file of a kind that the configuration holds, handed over with its labels."""
+
+    place: Place
+
+
+@dataclass(frozen=True)
+class TableOf:
+    """A table of the study, by name."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A value of the configuration, by its key; dots lead into sections."""
+
+    key: str
+
+
+@dataclass(frozen=True)
+class PerScene:
+    """A value of every scene's configuration, as a mapping from the scene's name."""
+
+    key: str
+
+
+Read = Every | TableOf | Setting | PerScene

@@ -1,0 +1,113 @@
+"""Which files of each kind a configuration holds."""
+
+from collections.abc import Callable, Iterator
+
+from pdrom.core import paths
+from pdrom.core.paths import Place
+from pdrom.pipeline.study import Study
+
+Labels = dict[str, str]
+
+
+def labels_of(study: Study, place: Place) -> list[Labels]:
+    """Labels of every file of a kind, in the order of the configuration, without repetition."""
+    found = _HELD[place](study)
+    return list({tuple(labels.items()): labels for labels in found}.values())
+
+
+def paths_of(study: Study, place: Place, results: str) -> list[str]:
+    """Paths of every file of a kind below the folder ``results``."""
+    return [place.at(results, **labels) for labels in labels_of(study, place)]
+
+
+def _meshes(study: Study) -> Iterator[Labels]:
+    for mesh in study.meshes:
+        yield {"mesh": mesh}
+
+
+def _runs(study: Study) -> Iterator[Labels]:
+    for scene in study.scenes:
+        for run in ("train", "heldout"):
+            yield {"scene": scene, "run": run}
+
+
+def _scenes(study: Study) -> Iterator[Labels]:
+    for scene in study.scenes:
+        yield {"scene": scene}
+
+
+def _experiments(study: Study) -> Iterator[Labels]:
+    for scene, group in study.experiments:
+        yield {"scene": scene, "group": group}
+
+
+def _bases(study: Study) -> Iterator[Labels]:
+    for scene, group in study.experiments:
+        for method in study.methods.values():
+            yield {"scene": scene, "group": group, "basis": method.basis_id}
+
+
+def _methods(study: Study) -> Iterator[Labels]:
+    for scene, group in study.experiments:
+        for method in study.methods:
+            yield {"scene": scene, "group": group, "method": method}
+
+
+def _among(select: Callable[[Study], tuple[str, ...]]) -> Callable[[Study], Iterator[Labels]]:
+    """The scenes of a list of the configuration, as far as the study holds them."""
+
+    def held(study: Study) -> Iterator[Labels]:
+        listed = select(study)
+        for scene in study.scenes:
+            if scene in listed:
+                yield {"scene": scene}
+
+    return held
+
+
+def _ladders(study: Study) -> Iterator[Labels]:
+    for scene, group in study.experiments:
+        if scene in study.ladder.scenes:
+            yield {"scene": scene, "group": group}
+
+
+def _sizes(study: Study) -> Iterator[Labels]:
+    for scene, factors in study.settings.scaling.scenes.items():
+        if scene in study.scenes:
+            for factor in factors:
+                yield {"scene": scene, "factor": f"{factor:g}"}
+
+
+def _online(study: Study) -> Iterator[Labels]:
+    for scene in study.online:
+        yield {"scene": scene}
+
+
+_subspaces = _among(lambda study: study.settings.subspace.scenes)
+
+_HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
+    paths.MESH: _meshes,
+    paths.FULL_ORDER: _runs,
+    paths.SENSITIVITY: _scenes,
+    paths.ITERATIONS: _scenes,
+    paths.SNAPSHOTS: _experiments,
+    paths.BASIS: _bases,
+    paths.SAMPLING: _methods,
+    paths.RECONSTRUCTION: _methods,
+    paths.RERUNS: _methods,
+    paths.RERUNS_TRAIN: _methods,
+    paths.RERUNS_HELDOUT: _methods,
+    paths.SUBSPACES: _subspaces,
+    paths.SUBSPACES_TRAIN: _subspaces,
+    paths.SUBSPACES_HELDOUT: _subspaces,
+    paths.LADDER: _ladders,
+    paths.STABILITY: _among(lambda study: study.settings.stability.scenes),
+    paths.SUBSPACE_ABLATION: _among(lambda study: study.ablation.scenes),
+    paths.TIMINGS: _scenes,
+    paths.BREAK_EVEN: _scenes,
+    paths.BREAK_EVEN_SIZED: _sizes,
+    paths.EFFECTS: _scenes,
+    paths.LEFT_OUT: _scenes,
+    paths.SCALING: _sizes,
+    paths.ONLINE: _online,
+}
