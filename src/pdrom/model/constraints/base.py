@@ -151,3 +151,12 @@ def require_cells(mesh: Mesh, kind: str, effect: str) -> np.ndarray:
     if len(cells) == 0:
         raise SceneError(f"effect '{effect}' needs {kind}, this mesh has none")
     return np.ascontiguousarray(cells, dtype=np.int32)
+
+
+def directions(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors and lengths (..., 1) of the vectors (..., 3) of a; zero where one is zero."""
+    # scaled: neither overflow nor underflow of the squares
+    largest = np.abs(a).max(axis=-1, keepdims=True)
+    part = a / np.where(largest > 0.0, largest, 1.0)
+    length = np.linalg.norm(part, axis=-1, keepdims=True)
+    return part / np.where(length > 0.0, length, 1.0), largest * length

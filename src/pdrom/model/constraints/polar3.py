@@ -9,6 +9,7 @@ import numpy as np
 
 from pdrom.model.constraints.lanes import (
     LANES,
+    SMALLEST,
     choose,
     cross,
     dot,
@@ -21,7 +22,8 @@ from pdrom.model.constraints.lanes import (
 )
 
 STEPS = 16
-# det F relative to the cube of the mean singular value: below it the SVD takes over
+# det F relative to the cube of the root mean square of the singular values: below it the SVD
+# takes over
 WELL_CONDITIONED = 1e-2
 # square of a Newton step: quadratic convergence, a step of 1e-9 leaves an error of 1e-18
 LAST_STEP = 1e-18
@@ -41,11 +43,14 @@ def _start(f, at_f, p, at_p, state):
     for lane in range(LANES):
         f0, f1, f2 = load(f, at_f, lane), load(f, at_f + 3, lane), load(f, at_f + 6, lane)
         square = (dot(f0, f0) + dot(f1, f1) + dot(f2, f2)) / 3.0
-        mean = np.sqrt(square)
-        suited = dot(f0, cross(f1, f2)) > WELL_CONDITIONED * square * mean
-        save(p, at_p, lane, scaled(1.0 / mean, f0))
-        save(p, at_p + 3, lane, scaled(1.0 / mean, f1))
-        save(p, at_p + 6, lane, scaled(1.0 / mean, f2))
+        inverse = 1.0 / np.sqrt(square)
+        # scaled before the determinant, whose products would overflow; where the mean itself does,
+        # or vanishes, F is not suited
+        x0, x1, x2 = scaled(inverse, f0), scaled(inverse, f1), scaled(inverse, f2)
+        suited = square > SMALLEST and dot(x0, cross(x1, x2)) > WELL_CONDITIONED
+        save(p, at_p, lane, x0)
+        save(p, at_p + 3, lane, x1)
+        save(p, at_p + 6, lane, x2)
         state[lane] = _OPEN if suited else _UNSUITED
 
 

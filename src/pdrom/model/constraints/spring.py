@@ -4,7 +4,7 @@ from typing import Literal
 
 import numpy as np
 
-from pdrom.model.constraints.base import GroupConfig
+from pdrom.model.constraints.base import GroupConfig, directions
 from pdrom.model.constraints.gradient_kernel import carray, gradient_kernel
 from pdrom.model.constraints.lanes import (
     LANES,
@@ -135,7 +135,6 @@ class EdgeSpring(SimplexGroup):
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         rest = self.rest[elements, None, :]
-        length = np.linalg.norm(d, axis=2, keepdims=True)
+        direction, length = directions(d)
         rest_length = np.linalg.norm(rest, axis=2, keepdims=True)
-        safe = np.where(length > 0.0, length, 1.0)
-        return np.where(length > 0.0, d / safe * rest_length, rest)
+        return np.where(length > 0.0, direction * rest_length, rest)

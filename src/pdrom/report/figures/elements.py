@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, Normalize
 
 from pdrom.core.errors import StorageError
-from pdrom.model.constraints.bending import interior_vertices
+from pdrom.model.constraints.surface import interior_vertices
 from pdrom.model.mesh.types import Mesh
 from pdrom.report.figures.camera import Camera
 from pdrom.report.figures.mesh_render import Surface, draw_lines, draw_surface

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from pdrom.core.store import write_table
-from pdrom.model.constraints.bending import interior_vertices
+from pdrom.model.constraints.surface import interior_vertices
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh, save_mesh
 from pdrom.reduction.sampling.block import block_elements
