@@ -1,0 +1,87 @@
+"""Run a script in a fork of the server, or in a plain interpreter where no server answers.
+
+This file is run by its path, before any package is in reach, and for every job: it imports little.
+"""
+
+import os
+import signal
+import socket
+import sys
+from contextlib import suppress
+
+ADDRESS = "PDROM_JOB_SERVER"
+FORWARDED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def main() -> int:
+    """Exit code of the job; the process dies of the signal that the job died of."""
+    place = os.environ.get(ADDRESS)
+    script = len(sys.argv) == 2 and not sys.argv[1].startswith("-")
+    # a signal that comes before the job is known waits until it is
+    signal.pthread_sigmask(signal.SIG_BLOCK, FORWARDED)
+    connection = connect(place) if place and script else None
+    answer = ask(connection) if connection else b""
+    if not answer:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, FORWARDED)
+        os.execv(sys.executable, [sys.executable, *sys.argv[1:]])
+    job = int(answer)
+    for number in FORWARDED:
+        signal.signal(number, lambda received, frame: forward(job, received))
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, FORWARDED)
+    status = receive(connection)
+    if not status:
+        sys.stderr.write("pdrom: the process that jobs start from is gone\n")
+        return 1
+    code = os.waitstatus_to_exitcode(int(status))
+    if code < 0:
+        if -code in FORWARDED:
+            signal.signal(-code, signal.SIG_DFL)
+        os.kill(os.getpid(), -code)
+    return code
+
+
+def connect(place: str) -> socket.socket | None:
+    """Connection to the server; None where nobody listens."""
+    connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        connection.connect(place)
+    except OSError:
+        return None
+    return connection
+
+
+def ask(connection: socket.socket) -> bytes:
+    """Request a fork and return its process number; nothing if the server is gone."""
+    environment = [f"{key}={value}" for key, value in os.environ.items() if key != ADDRESS]
+    parts = [os.getcwd(), os.path.abspath(sys.argv[1]), *environment]
+    request = "\0".join(parts).encode("utf-8", "surrogateescape")
+    try:
+        socket.send_fds(connection, [b"%20d" % len(request)], [0, 1, 2])
+        connection.sendall(request)
+    except OSError:
+        return b""
+    return receive(connection)
+
+
+def receive(connection: socket.socket) -> bytes:
+    """One number of the server, a line of twenty characters; nothing if the server is gone."""
+    text = b""
+    while len(text) < 20:
+        try:
+            more = connection.recv(20 - len(text))
+        except OSError:
+            more = b""
+        if not more:
+            return b""
+        text += more
+    return text
+
+
+def forward(job: int, number: int) -> None:
+    """Hand a signal on to the job, which is in a session of its own."""
+    with suppress(ProcessLookupError):
+        os.killpg(job, number)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

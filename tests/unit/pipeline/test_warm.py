@@ -1,0 +1,129 @@
+"""Jobs that are forked from a server: they behave as scripts of a plain interpreter do."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pdrom.pipeline.warm import interpreter
+from pdrom.pipeline.warm.client import ADDRESS
+from pdrom.pipeline.warm.start import SUPPORTED
+
+pytestmark = pytest.mark.skipif(not SUPPORTED, reason="no safe forks on this platform")
+
+# A process that starts the server, runs the shell commands of its arguments, and says how they end.
+OWNER = """
+import subprocess, sys
+from pdrom.pipeline.warm import start_server, stop_server
+start_server(libraries=["fractions"])
+for command in sys.argv[1:]:
+    done = subprocess.run(command, shell=True)
+    print("ended", done.returncode, flush=True)
+stop_server()
+"""
+
+
+def run(*commands: str, **options) -> subprocess.CompletedProcess[str]:
+    """The owner with these commands, to its end."""
+    return subprocess.run(
+        [sys.executable, "-c", OWNER, *commands],
+        capture_output=True, text=True, check=True, **options,
+    )  # fmt: skip
+
+
+def script(folder: Path, text: str) -> str:
+    """Shell command that runs ``text`` as the workflow runs a script."""
+    path = folder / "a script é.py"
+    path.write_text(text, encoding="utf-8")
+    return f"{interpreter()} '{path}'"
+
+
+def test_a_job_has_the_surroundings_of_its_client(tmp_path):
+    code = """
+import os, sys
+print(os.getcwd(), os.environ["COLOUR"], sys.argv, sys.stdin.read().strip())
+print(__name__, "fractions" in sys.modules)
+print("a warning", file=sys.stderr)
+"""
+    command = script(tmp_path, code)
+    done = run(f"cd / && echo hello | COLOUR=blue {command}")
+    path = str(tmp_path / "a script é.py")
+    assert done.stdout.splitlines() == [f"/ blue {[path]} hello", "__main__ True", "ended 0"]
+    assert done.stderr == "a warning\n"
+
+
+def test_jobs_do_not_see_each_other(tmp_path):
+    code = "import fractions; print(getattr(fractions, 'mark', 0)); fractions.mark = 1"
+    command = script(tmp_path, code)
+    assert run(command, command).stdout.split("\n")[:4] == ["0", "ended 0", "0", "ended 0"]
+
+
+@pytest.mark.parametrize(
+    ("code", "ending", "message"),
+    [
+        ("import sys; sys.exit(3)", 3, ""),
+        ("import sys; sys.exit('pdrom: no')", 1, "pdrom: no\n"),
+        ("1 / 0", 1, "ZeroDivisionError: division by zero\n"),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", -9, ""),
+        ("import os; os._exit(7)", 7, ""),
+    ],
+)
+def test_the_client_ends_as_the_job_does(tmp_path, code, ending, message):
+    done = run(f"exec {script(tmp_path, code)}")
+    assert done.stdout == f"ended {ending}\n"
+    assert done.stderr.endswith(message)
+
+
+def test_a_signal_reaches_the_job(tmp_path):
+    """The client hands it on; the job says when it is ready for it."""
+    code = """
+import os, signal, sys
+signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(5))
+print("ready", os.getpid(), os.getppid(), flush=True)
+signal.pause()
+"""
+    command = f"exec {script(tmp_path, code)}"
+    owner = subprocess.Popen(
+        [sys.executable, "-c", OWNER, f"{command} & read line; kill -TERM $!; wait $!"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert owner.stdout.readline().startswith("ready")
+    out, _ = owner.communicate("go\n")
+    assert out == "ended 5\n"
+
+
+@pytest.mark.parametrize("victim", ["client", "owner"])
+def test_no_job_outlives_its_client_or_the_owner(tmp_path, victim):
+    """A pipe that the job holds closes when the job is gone, and only then."""
+    code = """
+import os, signal
+print(os.getpid(), flush=True)
+signal.pause()
+"""
+    told = "import os; os.execv('/bin/sh', ['sh', '-c', 'echo $$; exec ' + os.environ['JOB']])"
+    command = f'{sys.executable} -c "{told}"'
+    environment = {**os.environ, "JOB": script(tmp_path, code)}
+    owner = subprocess.Popen(
+        [sys.executable, "-c", OWNER, command], stdout=subprocess.PIPE, text=True, env=environment
+    )
+    client, _job = int(owner.stdout.readline()), int(owner.stdout.readline())
+    os.kill(client if victim == "client" else owner.pid, signal.SIGKILL)
+    rest = owner.stdout.read()
+    assert rest == ("ended -9\n" if victim == "client" else "")
+    owner.wait()
+
+
+def test_without_a_server_the_client_is_a_plain_interpreter(tmp_path):
+    command = script(tmp_path, "import sys; print('fractions' in sys.modules, sys.argv[1:])")
+    for environment in ({}, {ADDRESS: str(tmp_path / "nobody")}):
+        done = subprocess.run(
+            command, shell=True, capture_output=True, text=True, env={**os.environ, **environment}
+        )
+        assert done.stdout == "False []\n"
+    done = subprocess.run(
+        f"{interpreter()} -c 'print(1 + 1)'", shell=True, capture_output=True, text=True
+    )
+    assert done.stdout == "2\n"
