@@ -26,11 +26,15 @@ from pdrom.reduction.local.watched import WatchedLocalStep
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction
 from pdrom.reduction.sampling.load import load_reduction
-from pdrom.tables.columns import conform
 
 log = logging.getLogger(__name__)
 
 ACTIONS = ("none", "report", "fall-back")
+COLUMNS = [
+    "scene", "group", "method", "r", "action", "frames", "finite", "blowup_frame",
+    "relative_error", "energy_ratio", "guard_frame", "guard_reason", "guard_count",
+    "fallback_frames", "fallback_share", "ms_per_frame", "relative_cost",
+]  # fmt: skip
 Advance = Callable[[State, int], tuple[State, FrameReport]]
 
 
@@ -60,16 +64,9 @@ def try_guard(
             for i, row in enumerate(trial.rows())
         ]
         log.info("%s, %s", case["scene"]["name"], case["name"])
-    table = pd.DataFrame(rows, columns=_COLUMNS)
+    table = pd.DataFrame(rows, columns=COLUMNS)
     whole = ["r", "blowup_frame", "guard_frame", "guard_count", "fallback_frames"]
-    write_table(conform(table.astype(dict.fromkeys(whole, "Int64")), "guard"), output)
-
-
-_COLUMNS = [
-    "scene", "group", "method", "r", "action", "frames", "finite", "blowup_frame",
-    "relative_error", "energy_ratio", "guard_frame", "guard_reason", "guard_count",
-    "fallback_frames", "fallback_share", "ms_per_frame", "relative_cost",
-]  # fmt: skip
+    write_table(table.astype(dict.fromkeys(whole, "Int64")), output)
 
 
 class _Trial:

@@ -7,16 +7,15 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.metrics import trajectory_error
-from pdrom.core.store import open_hdf5, write_table
+from pdrom.core.store import open_hdf5, read_table, write_table
 from pdrom.experiments.scenes import scene_of
 from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.runs.converged import ConvergedStepper
-from pdrom.model.runs.sensitivity import horizon
+from pdrom.model.runs.horizon import floor_of, horizon
 from pdrom.model.scene import Scene
 from pdrom.reduction.local.rerun import displacement_norms
-from pdrom.tables.sensitivity import floor_of, sensitivity
 
 log = logging.getLogger(__name__)
 
@@ -51,7 +50,7 @@ def sweep_iterations(
     scene = scene_of(config, mesh)
     system = scene.system_with(solver)
     name = scene.config.name
-    spread = floor_of(sensitivity([sensitivity_table]), name, floor["perturbation"])
+    spread = floor_of(read_table(sensitivity_table), name, floor["perturbation"])
     frames = max(1, horizon(spread, floor["threshold"]))
     with open_hdf5(fom) as file:
         own = file["positions"][: frames + 1]

@@ -6,22 +6,24 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pdrom.core.metrics import relative_errors, trajectory_error
-from pdrom.core.store import open_hdf5, write_table
+from pdrom.core.metrics import relative_errors
+from pdrom.core.store import open_hdf5, read_table, write_table
 from pdrom.experiments.ladder_spec import LadderSpec
 from pdrom.experiments.scenes import scene_of
-from pdrom.model.runs.sensitivity import horizon
+from pdrom.model.runs.horizon import error_within, floor_of, horizon
 from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.local.local_step import ReducedLocalStep
 from pdrom.reduction.local.rerun import Rerun, displacement_norms, replace_group, rerun
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.snapshots import SPLITS, SnapshotSet, load_snapshots
-from pdrom.tables.columns import COLUMNS
-from pdrom.tables.sensitivity import floor_of
-from pdrom.tables.sensitivity import sensitivity as largest_over_seeds
 
 log = logging.getLogger(__name__)
+
+COLUMNS = [
+    "scene", "group", "direction", "rung", "r", "condition", "gain", "error_train", "error_test",
+    "error_heldout", "finite", "blowup_frame", "relative_error_within_horizon",
+]  # fmt: skip
 
 
 def climb(
@@ -45,7 +47,7 @@ def climb(
     bound, data = scene_of(scene, mesh), load_snapshots(snapshots)
     with open_hdf5(fom) as file:
         reference = file["positions"][...]
-    spread = floor_of(largest_over_seeds([sensitivity]), labels["scene"], floor["perturbation"])
+    spread = floor_of(read_table(sensitivity), labels["scene"], floor["perturbation"])
     end = horizon(spread, floor["threshold"])
     displacement = displacement_norms(reference)
     system = bound.system
@@ -62,7 +64,7 @@ def climb(
             row |= _run(outcome, displacement, end)
         rows.append(row)
         log.info("%s, %s", direction, row["rung"])
-    table = pd.DataFrame(rows, columns=COLUMNS["ladder"])
+    table = pd.DataFrame(rows, columns=COLUMNS)
     table["blowup_frame"] = table["blowup_frame"].astype("Int64")
     write_table(table, output)
 
@@ -90,10 +92,8 @@ def _measures(reduction: Reduction, data: SnapshotSet) -> dict[str, Any]:
 
 
 def _run(outcome: Rerun, displacement: np.ndarray, end: int) -> dict[str, Any]:
-    reached = outcome.frames >= end
-    error = trajectory_error(outcome.difference[:end], displacement[:end]) if reached else None
     return {
         "finite": outcome.blowup_frame is None,
         "blowup_frame": outcome.blowup_frame,
-        "relative_error_within_horizon": error,
+        "relative_error_within_horizon": error_within(outcome.difference, displacement, end),
     }

@@ -16,6 +16,7 @@ import psutil
 from pdrom.core.store import write_table
 from pdrom.experiments.local_costs import local_costs
 from pdrom.experiments.measurement import Measurement, Variant, measure
+from pdrom.experiments.names import FOM
 from pdrom.model.dynamics.stepper import LocalStep
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig
@@ -26,7 +27,6 @@ from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, select, select_path
 from pdrom.reduction.snapshots import row_masses
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
-from pdrom.tables.accuracy_cost import FOM
 
 log = logging.getLogger(__name__)
 

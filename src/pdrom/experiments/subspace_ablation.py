@@ -6,23 +6,24 @@ from typing import Any
 import pandas as pd
 
 from pdrom.core.errors import SamplingError
-from pdrom.core.metrics import trajectory_error
-from pdrom.core.store import write_table
+from pdrom.core.store import read_table, write_table
 from pdrom.experiments.hyper import Motion, training_positions
 from pdrom.experiments.scenes import RUNS, scene_of
 from pdrom.experiments.subspace_ablation_spec import AblationSpec
-from pdrom.model.runs.sensitivity import HELDOUT, horizon
+from pdrom.model.runs.horizon import HELDOUT, error_within, floor_of, horizon
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.interpolated import Training, interpolate
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns
 from pdrom.reduction.subspace.specs import InterpolationSpec
-from pdrom.tables.columns import COLUMNS
-from pdrom.tables.sensitivity import floor_of
-from pdrom.tables.sensitivity import sensitivity as largest_over_seeds
 
 log = logging.getLogger(__name__)
 
 POSITION_BASIS = "pod"
+COLUMNS = [
+    "scene", "group", "position_basis", "k", "r", "variant", "elements_sampled", "gain", "finite",
+    "max_extent", "relative_error_within_horizon", "relative_error_full_projections",
+    "heldout_error_within_horizon", "heldout_error_full_projections",
+]  # fmt: skip
 
 
 def ablate(
@@ -61,7 +62,7 @@ def ablate(
             row = row | {"r": settings.modes, "variant": variant}
             rows.append(row | study.outcome(columns, trained, settings))
             log.info("k = %d, r = %d, %s: %s", k, settings.modes, variant, rows[-1])
-    table = pd.DataFrame(rows, columns=COLUMNS["subspace_ablation"])
+    table = pd.DataFrame(rows, columns=COLUMNS)
     table["finite"] = table["finite"].astype("boolean")
     table["elements_sampled"] = table["elements_sampled"].astype("Int64")
     write_table(table, output)
@@ -81,7 +82,7 @@ class _Study:
     ) -> None:
         self._limit = blowup_extent
         self.motions = {m: Motion(scene_of(scene, mesh, m), runs[m]) for m in RUNS}
-        spread, name = largest_over_seeds([sensitivity]), scene["name"]
+        spread, name = read_table(sensitivity), scene["name"]
         labels = {"train": floor["perturbation"], "heldout": HELDOUT}
         self._ends = {
             motion: horizon(floor_of(spread, name, label), floor["threshold"])
@@ -121,6 +122,4 @@ class _Study:
         """A run and its error before the horizon; None if it did not get there."""
         case, end = self.motions[motion], self._ends[motion]
         run = case.run(model, self._limit)
-        if len(run["difference"]) < end:
-            return run, None
-        return run, trajectory_error(run["difference"][:end], case.displacement[:end])
+        return run, error_within(run["difference"], case.displacement, end)

@@ -16,6 +16,7 @@ from pdrom.experiments.effect_costs import effect_costs, left_out
 from pdrom.experiments.iterations import accelerated, stepper_of
 from pdrom.experiments.local_costs import local_costs
 from pdrom.experiments.measurement import LiftTimed, Measurement, Variant, measure
+from pdrom.experiments.names import ANDERSON, FOM
 from pdrom.experiments.scenes import scene_of
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.constraints.implementations import IMPLEMENTATIONS
@@ -29,7 +30,6 @@ from pdrom.reduction.local.rerun import replace_group
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling.load import load_reduction
 from pdrom.reduction.subspace.load import load_models
-from pdrom.tables.accuracy_cost import ANDERSON, FOM
 
 log = logging.getLogger(__name__)
 

@@ -20,9 +20,10 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.store import read_table
+from pdrom.experiments.names import ANDERSON, FOM
 from pdrom.tables.columns import conform
 
-FOM, ANDERSON, FEWER = "fom", "fom-anderson", "fewer-iterations"
+FEWER = "fewer-iterations"
 CONVERGED, OWN = "converged", "own iterations"
 
 

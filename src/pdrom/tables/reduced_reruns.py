@@ -6,11 +6,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from pdrom.core.metrics import trajectory_error
 from pdrom.core.store import open_hdf5, read_table
-from pdrom.model.runs.sensitivity import HELDOUT
+from pdrom.model.runs.horizon import HELDOUT, error_within, floor_of, horizons
 from pdrom.tables.columns import conform
-from pdrom.tables.sensitivity import floor_of, horizons
 
 KEYS = ["scene", "group", "method", "position_basis", "k", "r"]
 
@@ -103,9 +101,7 @@ def _subspace(path: str, ends: dict[str, int], motion: str) -> pd.DataFrame:
 
 def _error_within(run, displacement: np.ndarray, end: int) -> float | None:
     """Relative error over the frames before ``end``; None if the run did not get there."""
-    if "difference" not in run or len(run["difference"]) < end:
-        return None
-    return trajectory_error(run["difference"][:end], displacement[:end])
+    return error_within(run["difference"], displacement, end) if "difference" in run else None
 
 
 def _with_times(table: pd.DataFrame, paths: Iterable[str]) -> pd.DataFrame:

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.store import read_table
-from pdrom.tables.accuracy_cost import FOM
+from pdrom.experiments.names import FOM
 from pdrom.tables.columns import COLUMNS, conform
 
 QUANTITIES = ("ms_per_iteration", "local_ms", "global_ms", "factorisation_ms", "memory_mb")

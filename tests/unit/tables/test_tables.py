@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from pdrom.core.errors import StorageError
 from pdrom.core.store import write_hdf5, write_table
+from pdrom.model.runs.horizon import floor_of
 from pdrom.reduction.basis import Basis, save_basis
 from pdrom.tables import COLUMNS, TIMING_COLUMNS
 from pdrom.tables.accuracy_cost import accuracy_cost, pareto, reference_of
@@ -15,7 +16,7 @@ from pdrom.tables.columns import conform
 from pdrom.tables.local_share import local_share
 from pdrom.tables.reconstruction_error import reconstruction_error
 from pdrom.tables.reduced_reruns import heldout_reruns, reduced_reruns
-from pdrom.tables.sensitivity import floor_of, horizons, sensitivity
+from pdrom.tables.sensitivity import sensitivity
 from pdrom.tables.singular_values import singular_values
 
 TIMING = [
@@ -142,25 +143,6 @@ def test_floor_is_the_largest_over_the_seeds(tmp_path):
     assert tuple(table.columns) == COLUMNS["sensitivity"]
     assert floor_of(table, "a", 1e-10).tolist() == [0.0, 2e-9, 5e-3, 1.0]
     assert floor_of(table, "a", "heldout").tolist() == [1e-12, 1.0, 1.0, 1.0]
-    shuffled = table.sample(frac=1.0, random_state=3)
-    assert floor_of(shuffled, "a", 1e-10).tolist() == [0.0, 2e-9, 5e-3, 1.0]
-
-
-def test_horizons_of_every_scene(tmp_path):
-    table = sensitivity(sensitivity_files(tmp_path))
-    assert horizons(table, 1e-10, 1e-3) == {"a": 2, "b": 4}
-    assert horizons(table, 1e-10, 1e-2) == {"a": 3, "b": 4}
-    assert horizons(table, 1e-6, 1e-3)["a"] == 0
-    assert horizons(table, "heldout", 1e-3) == {"a": 1, "b": 4}
-
-
-def test_floor_survives_a_file(tmp_path):
-    """Labels stay text when the table is read back."""
-    from pdrom.core.store import read_table
-
-    table = sensitivity(sensitivity_files(tmp_path))
-    write_table(table, tmp_path / "sensitivity.csv")
-    assert horizons(read_table(tmp_path / "sensitivity.csv"), 1e-10, 1e-3) == {"a": 2, "b": 4}
 
 
 # Reruns -------------------------------------------------------------------------------------------

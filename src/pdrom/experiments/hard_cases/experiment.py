@@ -12,10 +12,13 @@ from pdrom.experiments.hard_cases.catalogue import CASES
 from pdrom.experiments.hard_cases.expectations import load_expectations, surprise
 from pdrom.experiments.hard_cases.outcomes import rows
 from pdrom.reduction.method import MethodSpec
-from pdrom.tables.columns import conform
-from pdrom.tables.hard_cases import hard_cases
 
 log = logging.getLogger(__name__)
+
+COLUMNS = [
+    "case", "method", "k", "r", "gain", "frames", "finite", "blowup_frame", "max_extent",
+    "objective_rise", "outcome", "why",
+]  # fmt: skip
 
 
 def run_hard_cases(
@@ -42,5 +45,6 @@ def run_hard_cases(
             if contradiction:
                 log.warning("%s, %s: %s", name, row["method"], contradiction)
         log.info("%s: done", name)
-    write_table(hard_cases(found), cases_output)
-    write_table(conform(pd.DataFrame(kernel_accuracy(matrices)), "kernel_accuracy"), kernels_output)
+    whole = dict.fromkeys(["k", "r", "frames", "blowup_frame"], "Int64")
+    write_table(pd.DataFrame(found, columns=COLUMNS).astype(whole), cases_output)
+    write_table(pd.DataFrame(kernel_accuracy(matrices)), kernels_output)

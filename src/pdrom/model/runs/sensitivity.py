@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs.horizon import HELDOUT
 from pdrom.model.scene import Scene
 
 COLUMNS = ["scene", "perturbation", "seed", "frame", "relative_difference"]
@@ -31,9 +32,6 @@ def perturbation_field(scene: Scene, size: float, seed: int) -> np.ndarray:
     """Random directions of length ``size`` times the extent, (N, 3) m."""
     field = np.random.default_rng(seed).standard_normal((scene.mesh.vertices, 3))
     return size * scene.mesh.extent * field / np.linalg.norm(field, axis=1, keepdims=True)
-
-
-HELDOUT = "heldout"
 
 
 def heldout_floor(heldout: Scene, size: float, seeds: tuple[int, ...]) -> pd.DataFrame:
@@ -60,12 +58,6 @@ def sensitivity(
     for label, variant in variants.items():
         parts.append(_rows(scene, label, 0, relative_difference(variant(scene), base)))
     return pd.concat(parts, ignore_index=True)
-
-
-def horizon(floor: np.ndarray, threshold: float) -> int:
-    """First frame at which the floor (F,) exceeds ``threshold``; F if it never does."""
-    above = np.flatnonzero(~(floor <= threshold))
-    return int(above[0]) if len(above) else len(floor)
 
 
 def _fresh(scene: Scene, **changes: object) -> Scene:

@@ -8,11 +8,12 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from pdrom.core.store import read_table
+from pdrom.experiments.names import ANDERSON, FOM
 from pdrom.report.figures import style
 from pdrom.report.figures.multiples import clipped, label_outer, log_axis, small_multiples
 from pdrom.report.figures.sources import Sources
 from pdrom.report.figures.spec import FigureSpec
-from pdrom.tables.accuracy_cost import ANDERSON, FEWER, FOM
+from pdrom.tables.accuracy_cost import FEWER
 
 COLUMNS = [
     "scene", "method", "position_basis", "iterations", "relative_error_within_horizon",

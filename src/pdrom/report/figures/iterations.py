@@ -7,11 +7,11 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
 from pdrom.core.store import read_table
+from pdrom.experiments.names import ANDERSON, FOM
 from pdrom.report.figures import style
 from pdrom.report.figures.multiples import clipped, label_outer, log_axis, small_multiples
 from pdrom.report.figures.sources import Sources
 from pdrom.report.figures.spec import FigureSpec
-from pdrom.tables.accuracy_cost import ANDERSON, FOM
 
 ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
 COLUMNS = ["scene", "method", "iterations", ERROR, TIME]

@@ -3,14 +3,14 @@
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from pdrom.model.runs.horizon import floor_of, horizon
 from pdrom.report.figures import style
-from pdrom.report.figures.floor import floor_of, horizon, read_sensitivity
+from pdrom.report.figures.floor import read_sensitivity
 from pdrom.report.figures.multiples import clipped, label_outer, log_axis, small_multiples
 from pdrom.report.figures.read import RerunInfo, choose_ranks, rerun_errors, rerun_infos
 from pdrom.report.figures.sources import Sources
@@ -55,13 +55,13 @@ def draw(sources: Sources, spec: FigureSpec) -> Figure:
     return figure
 
 
-def _draw_floor(ax: Axes, floor: pd.Series, threshold: float) -> None:
+def _draw_floor(ax: Axes, floor: np.ndarray, threshold: float) -> None:
     if len(floor) == 0:
         return
-    shown = clipped(floor.to_numpy(float), LOW, HIGH)
-    ax.fill_between(floor.index, LOW, shown, color=FLOOR, linewidth=0.0, zorder=0)
+    shown = clipped(floor, LOW, HIGH)
+    ax.fill_between(np.arange(len(floor)), LOW, shown, color=FLOOR, linewidth=0.0, zorder=0)
     end = horizon(floor, threshold)
-    if end is not None:
+    if end < len(floor):
         ax.axvline(end, color="#8A857A", linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
 
 

@@ -1,12 +1,13 @@
 """How far runs drift apart that start almost alike, and the horizon that follows."""
 
-import pandas as pd
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from pdrom.model.runs.horizon import floor_of, horizon
 from pdrom.report.figures import style
-from pdrom.report.figures.floor import floor_of, horizon, read_sensitivity
+from pdrom.report.figures.floor import read_sensitivity
 from pdrom.report.figures.multiples import clipped, label_outer, log_axis, small_multiples
 from pdrom.report.figures.sources import Sources
 from pdrom.report.figures.spec import FigureSpec
@@ -75,12 +76,12 @@ def _colours(scenes: list[str]) -> dict[str, str]:
     return {scene: colours[scene.removesuffix(TWIN)] for scene in scenes}
 
 
-def _draw_scene(ax: Axes, scene: str, floor: pd.Series, colour: str, threshold: float) -> None:
+def _draw_scene(ax: Axes, scene: str, floor: np.ndarray, colour: str, threshold: float) -> None:
     end = horizon(floor, threshold)
-    beyond = f"beyond {int(floor.index[-1]) + 1}"
-    label = f"{style.words(scene)}: {beyond if end is None else end}"
-    shown = clipped(floor.to_numpy(float), LOW, HIGH)
+    crossed = end < len(floor)
+    label = f"{style.words(scene)}: {end if crossed else f'beyond {end}'}"
+    shown = clipped(floor, LOW, HIGH)
     line = "--" if scene.endswith(TWIN) else "-"
-    ax.plot(floor.index, shown, color=colour, label=label, linestyle=line)
-    if end is not None:
+    ax.plot(np.arange(len(floor)), shown, color=colour, label=label, linestyle=line)
+    if crossed:
         ax.plot([end], [threshold], color=colour, marker="o", markersize=4.5, zorder=5)

@@ -2,44 +2,17 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from conftest import make_scene
 from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs.horizon import HELDOUT, horizon
 from pdrom.model.runs.sensitivity import (
     COLUMNS,
-    HELDOUT,
     heldout_floor,
-    horizon,
     perturbation_field,
     relative_difference,
     sensitivity,
 )
-
-
-@pytest.mark.parametrize(
-    ("floor", "expected"),
-    [
-        ([], 0),
-        ([0.0, 0.0], 2),
-        ([1e-3, 1e-3], 2),
-        ([0.0, 2e-3, 0.0, 5e-3], 1),
-        ([1.0], 0),
-        ([0.0, np.nan, 0.0], 1),
-        ([0.0, 0.0, np.inf], 2),
-    ],
-)
-def test_horizon_is_the_first_frame_above(floor, expected):
-    assert horizon(np.array(floor), 1e-3) == expected
-
-
-@given(st.lists(st.floats(0.0, 1.0), max_size=20), st.floats(1e-6, 0.5), st.floats(1.0, 3.0))
-def test_horizon_grows_with_the_threshold(floor, threshold, factor):
-    values = np.array(floor)
-    first = horizon(values, threshold)
-    assert (values[:first] <= threshold).all()
-    assert horizon(values, factor * threshold) >= first
 
 
 def test_relative_difference_by_hand():

@@ -3,7 +3,6 @@
 from itertools import combinations
 
 import numpy as np
-import pandas as pd
 import pytest
 from matplotlib.colors import Normalize, to_rgb
 from matplotlib.figure import Figure
@@ -14,7 +13,6 @@ from pdrom.reduction.sampling.deim import deim_entries
 from pdrom.report.figures import style
 from pdrom.report.figures.camera import Camera, Window, bounds, window_of
 from pdrom.report.figures.elements import element_map
-from pdrom.report.figures.floor import floor_of, horizon
 from pdrom.report.figures.mesh_render import (
     AMBIENT,
     RASTER_ABOVE,
@@ -245,15 +243,3 @@ def test_runs_are_read_only_where_finite(study):
 
 def test_instants_are_fractions_of_a_run():
     assert frame_numbers((0.0, 0.1, 0.11, 1.0), 20) == [0, 2, 20]
-
-
-def test_the_floor_is_the_largest_of_the_seeds():
-    table = pd.DataFrame(
-        [("a", "1e-10", 0, 1e-9), ("a", "1e-10", 1, 1e-2), ("a", "1e-10", 0, 1e-8),
-         ("a", "solver", 0, 5.0), ("a", "1e-08", 0, 7.0), ("b", "1e-10", 0, 9.0)],
-        columns=["scene", "perturbation", "frame", "relative_difference"],
-    )  # fmt: skip
-    floor = floor_of(table, "a", 1e-10)
-    assert list(floor) == [1e-8, 1e-2]
-    assert horizon(floor, 1e-3) == 1
-    assert horizon(floor, 1.0) is None
