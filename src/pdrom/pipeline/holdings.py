@@ -83,6 +83,11 @@ def _online(study: Study) -> Iterator[Labels]:
         yield {"scene": scene}
 
 
+def _one(study: Study) -> Iterator[Labels]:
+    """The only file of its kind, which no scene labels."""
+    yield {}
+
+
 _subspaces = _among(lambda study: study.settings.subspace.scenes)
 
 _HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
@@ -110,4 +115,8 @@ _HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.LEFT_OUT: _scenes,
     paths.SCALING: _sizes,
     paths.ONLINE: _online,
+    paths.HARD_CASES: _one,
+    paths.KERNEL_ACCURACY: _one,
+    paths.GUARD: _one,
+    paths.OFFLINE: _one,
 }
