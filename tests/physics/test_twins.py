@@ -5,7 +5,7 @@ import pytest
 from conftest import ROOT
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.runs.sensitivity import perturbation_field, relative_difference
-from pdrom.pipeline.study import load_bound_scene
+from pdrom.pipeline.scenes import load_bound_scene
 
 WELL_POSED = sorted(
     path.stem

@@ -35,25 +35,6 @@ rule fom:
         "../scripts/fom.py"
 
 
-rule sensitivity:
-    input:
-        mesh=lambda w: PLAN.mesh_path(w.scene),
-    output:
-        "results/sensitivity/{scene}.csv",
-    log:
-        "results/logs/sensitivity/{scene}.log",
-    params:
-        scene=lambda w: PLAN.scene_config(w.scene),
-        perturbations=list(PLAN.settings.sensitivity.perturbations),
-        reference=PLAN.settings.sensitivity.reference,
-        seeds=list(PLAN.settings.sensitivity.seeds),
-        code=lambda w: PLAN.scene_code("pdrom.experiments.sensitivity", w.scene),
-    message:
-        "Perturbed full-order runs of {wildcards.scene}"
-    script:
-        "../scripts/sensitivity.py"
-
-
 rule iterations:
     input:
         mesh=lambda w: PLAN.mesh_path(w.scene),

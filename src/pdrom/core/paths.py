@@ -41,6 +41,15 @@ class Place:
         """Path with its labels left in braces, as a rule of the workflow writes it."""
         return f"{results}/{self.pattern}"
 
+    def where(self, **labels: str) -> "Place":
+        """The same kind with some labels fixed."""
+        return Place(self.pattern.format_map(_Fixed(labels)))
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the labels of a path."""
+        return [label for _, label, _, _ in Formatter().parse(self.pattern) if label is not None]
+
     def file(self, path: str) -> "File":
         """A path of this kind with its labels; StorageError if it is no such path."""
         found = self._expression.search(path)
@@ -62,6 +71,13 @@ class Place:
         return re.compile(rf"(?:^|/){''.join(parts)}$")
 
 
+class _Fixed(dict[str, str]):
+    """Values of some labels; the others stay in braces."""
+
+    def __missing__(self, label: str) -> str:
+        return f"{{{label}}}"
+
+
 @dataclass(frozen=True)
 class File:
     """A file and what its path says about it."""
@@ -75,6 +91,8 @@ class File:
 
 MESH = Place("meshes/{mesh}.h5")
 FULL_ORDER = Place("fom/{scene}/{run}.h5")
+TRAIN = FULL_ORDER.where(run="train")
+HELDOUT = FULL_ORDER.where(run="heldout")
 SENSITIVITY = Place("sensitivity/{scene}.csv")
 ITERATIONS = Place("iterations/{scene}.csv")
 SNAPSHOTS = Place("snapshots/{scene}/{group}.h5")

@@ -36,4 +36,26 @@ class PerScene:
     key: str
 
 
+@dataclass(frozen=True)
+class EachOf:
+    """One file of a kind for each entry of a setting, in order; an entry knows its ``labels``."""
+
+    key: str
+    place: Place
+
+
+@dataclass(frozen=True)
+class ProjectFile:
+    """A file that people edit, by its path in the project."""
+
+    path: str
+
+
+@dataclass(frozen=True)
+class SourcesOf:
+    """Files that people edit and that a setting names by its property ``sources``."""
+
+    key: str
+
+
 Read = Every | TableOf | Setting | PerScene

@@ -8,9 +8,9 @@ from pdrom.model.scene import Scene, SceneConfig
 RUNS = ("train", "heldout")
 
 
-def scene_of(config: dict[str, Any], mesh_path: str, run: str = "train", threads: int = 1) -> Scene:
+def scene_of(config: Any, mesh_path: Any, run: str = "train", threads: int = 1) -> Scene:
     """Scene of ``run`` ("train" or "heldout") from its plain configuration and mesh file."""
     scene = SceneConfig.model_validate(config)
     if run == "heldout":
         scene = scene.held_out_variant()
-    return Scene.build(scene, load_mesh(mesh_path), threads)
+    return Scene.build(scene, load_mesh(getattr(mesh_path, "path", mesh_path)), threads)

@@ -4,7 +4,6 @@ import os
 import sys
 from collections.abc import Sequence
 from functools import cached_property
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,9 @@ from pdrom.experiments.hard_cases.expectations import load_expectations
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.config import MeshFile
 from pdrom.pipeline.fingerprint import fingerprint
-from pdrom.pipeline.study import Study, StudySettings, require_scenes
+from pdrom.pipeline.jobs import Jobs, digest
+from pdrom.pipeline.scenes import require_scenes
+from pdrom.pipeline.study import Study, StudySettings
 from pdrom.reduction.method import MethodSpec, load_methods
 from pdrom.report.claims import load_claims
 from pdrom.report.figures import FIGURES, FigureSpec, Holdings, figure_inputs, load_figures
@@ -71,9 +72,11 @@ def load_plan(config: dict[str, Any], root: Path, files: Sequence[str | Path] = 
 class Plan:
     """Everything that depends on the configuration and is needed to write the rules."""
 
-    def __init__(self, study: Study) -> None:
+    def __init__(self, study: Study, results: str = RESULTS) -> None:
         self.study = study
         self.root = study.root
+        self.results = results
+        self.jobs = Jobs(study, results)
 
     @property
     def settings(self) -> StudySettings:
@@ -132,14 +135,8 @@ class Plan:
         return [config.path] if isinstance(config, MeshFile) else []
 
     def digest(self, *paths: str) -> str:
-        """Checksum of files that people edit.
-
-        Snakemake compares times of files, which a copy, an archive or a wrong clock may set back;
-        as a parameter of a rule, the content itself decides.
-        """
-        files = [self.root / path for path in paths]
-        content = b"".join(sha256(f.read_bytes()).digest() for f in files if f.is_file())
-        return sha256(content).hexdigest()[:16]
+        """See `pdrom.pipeline.jobs.digest`."""
+        return digest(self.root, *paths)
 
     def method_spec(self, method: str) -> dict[str, Any]:
         """Plain specification of a method."""

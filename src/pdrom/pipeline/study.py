@@ -1,38 +1,39 @@
 """The study: which scenes, methods and settings one run of the pipeline covers."""
 
-from collections.abc import Iterable
+from copy import copy
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pdrom.core.errors import ConfigurationError, PdromError, choices
-from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
+from pdrom.core.errors import ConfigurationError, choices
+from pdrom.core.yamlfile import ConfigModel, validate
 from pdrom.experiments.ladder_spec import LadderSpec, load_ladder
+from pdrom.experiments.sensitivity import Sensitivity
 from pdrom.experiments.subspace_ablation_spec import AblationSpec, load_ablation
 from pdrom.model.dynamics.solvers import SOLVERS
 from pdrom.model.effects.base import Seed
+from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import SCENE_NAME, Scene, SceneConfig
+from pdrom.pipeline.scenes import (
+    Coarsen,
+    load_bound_scene,
+    load_scene,
+    read_scene,
+    scene_names,
+)
 from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.method import MethodSpec, load_methods
 from pdrom.reduction.subspace.specs import HrpdSpec, InterpolationSpec
 
 Rank = Annotated[int, Field(ge=1, le=100_000)] | Literal["full"]
-Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
 SceneName = Annotated[str, Field(pattern=SCENE_NAME)]
 Count = Annotated[int, Field(ge=1, le=100_000)]
 
 
 class _Model(ConfigModel):
     """Base of the sections of a study."""
-
-
-class Coarsen(_Model):
-    """Factors on mesh resolution (vertices along a side) and on every frame number."""
-
-    resolution: Fraction = 1.0
-    frames: Fraction = 1.0
 
 
 class Sweep(_Model):
@@ -46,21 +47,6 @@ class Sweep(_Model):
         dense = range(1, min(self.dense_to, largest) + 1)
         coarse = range(self.dense_to + self.step, largest + 1, self.step)
         return sorted({*dense, *coarse, largest} - {0})
-
-
-class Sensitivity(_Model):
-    """Perturbed full-order runs (EXPERIMENTS section 5); sizes relative to the extent."""
-
-    perturbations: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (1e-12, 1e-10, 1e-8)
-    reference: Annotated[float, Field(gt=0.0, lt=1.0)] = 1e-10
-    seeds: Annotated[tuple[Seed, ...], Field(min_length=1)] = (1, 2, 3)
-    threshold: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1e-3
-
-    @model_validator(mode="after")
-    def _reference_is_run(self) -> Self:
-        if self.reference not in self.perturbations:
-            raise ValueError(f"reference = {self.reference}: must be one of the perturbations")
-        return self
 
 
 class IterationSweep(_Model):
@@ -300,6 +286,7 @@ class Study:
         self.online: dict[str, SceneConfig] = {
             name: load_scene(root, name, settings.coarsen) for name in settings.online.scenes
         }
+        self._others: dict[str, SceneConfig] = {}
         self.methods: dict[str, MethodSpec] = _named_methods(root, settings.methods)
 
     @classmethod
@@ -329,6 +316,26 @@ class Study:
         """Ablation of config/subspace_ablation.yaml."""
         return load_ablation(self.root / "config" / "subspace_ablation.yaml")
 
+    def scene(self, name: str) -> SceneConfig:
+        """Configuration of a scene; of one outside the study, too, if it has a file.
+
+        Raises
+        ------
+        ConfigurationError
+            If there is no such scene, or it is faulty.
+        """
+        for held in (self.scenes, self.online, self._others):
+            if name in held:
+                return held[name]
+        self._others[name] = load_scene(self.root, name, self.settings.coarsen)
+        return self._others[name]
+
+    def only(self, scene: str) -> "Study":
+        """The same study of one scene, which need not be held."""
+        single = copy(self)
+        single.scenes = {scene: self.scene(scene)}
+        return single
+
     @property
     def experiments(self) -> list[tuple[str, str]]:
         """(scene, group) pairs whose group is reduced, in configuration order."""
@@ -336,48 +343,28 @@ class Study:
 
     def mesh_of(self, scene: str) -> str:
         """Identifier of a scene's mesh."""
-        return self.scenes[scene].mesh.identifier
+        return self.scene(scene).mesh.identifier
 
     @property
-    def meshes(self) -> dict[str, Any]:
+    def meshes(self) -> dict[str, MeshConfig]:
         """Mesh configurations by identifier."""
         return {scene.mesh.identifier: scene.mesh for scene in self.scenes.values()}
 
+    def mesh(self, identifier: str) -> MeshConfig:
+        """Configuration of a mesh; of one outside the study, too, if a scene has it.
 
-def load_scene(root: Path, name: str, coarsen: Coarsen | None = None) -> SceneConfig:
-    """Configuration of scene ``name``, see `load_bound_scene`."""
-    return load_bound_scene(root, name, coarsen).config
-
-
-def load_bound_scene(root: Path, name: str, coarsen: Coarsen | None = None) -> Scene:
-    """Scene ``name`` from config/scenes, coarsened, and built to find every fault early.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming the file and the fault; also for faults of the held-out variant.
-    """
-    path = root / "config" / "scenes" / f"{name}.yaml"
-    require_scenes(root, [name], "scenes")
-    scene = validate(SceneConfig, read_yaml(path), str(path))
-    if scene.name != name:
-        raise ConfigurationError(f"{path}: name = '{scene.name}', required: '{name}', as the file")
-    if coarsen is not None and coarsen != Coarsen():
-        scene = scene.coarsened(coarsen.resolution, coarsen.frames)
-    try:
-        mesh = scene.mesh.build(root)
-        Scene.build(scene.held_out_variant(), mesh)
-        return Scene.build(scene, mesh)
-    except PdromError as error:
-        raise ConfigurationError(f"{path}: {error}") from error
-
-
-def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
-    """ConfigurationError, which ``key`` opens, for a name without a file in config/scenes."""
-    known = sorted(path.stem for path in (root / "config" / "scenes").glob("*.yaml"))
-    for name in names:
-        if name not in known:
-            raise ConfigurationError(f"{key}: unknown scene '{name}'{choices(name, known)}")
+        Raises
+        ------
+        ConfigurationError
+            If no scene of config/scenes has it.
+        """
+        if identifier in self.meshes:
+            return self.meshes[identifier]
+        for name in scene_names(self.root):
+            mesh = read_scene(self.root, name, self.settings.coarsen).mesh
+            if mesh.identifier == identifier:
+                return mesh
+        raise ConfigurationError(f"no scene in config/scenes has the mesh '{identifier}'")
 
 
 def _named_methods(root: Path, names: tuple[str, ...]) -> dict[str, MethodSpec]:

@@ -12,7 +12,8 @@ from pdrom.core.errors import ConfigurationError, SceneError
 from pdrom.core.store import open_hdf5
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs.full_order import run, trajectory
-from pdrom.pipeline.study import Coarsen, Study, load_scene
+from pdrom.pipeline.scenes import Coarsen, load_scene
+from pdrom.pipeline.study import Study
 
 SPRING = {"effect": "spring", "weight": 1e5}
 

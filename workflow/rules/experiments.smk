@@ -1,0 +1,26 @@
+# One rule per experiment, named as it (src/pdrom/experiments): each module declares what it reads, writes and depends on
+for experiment in PLAN.jobs.experiments:
+
+    rule:
+        name:
+            experiment.name
+        input:
+            **PLAN.jobs.inputs(experiment),
+        output:
+            **{
+                name: (
+                    report(path, category="Tables")
+                    if name in PLAN.jobs.tables(experiment)
+                    else path
+                )
+                for name, path in PLAN.jobs.outputs(experiment).items()
+            },
+        log:
+            PLAN.jobs.log(experiment),
+        threads: PLAN.jobs.threads(experiment, workflow.cores or 1)
+        params:
+            **PLAN.jobs.params(experiment),
+        message:
+            PLAN.jobs.message(experiment)
+        script:
+            "../scripts/experiment.py"
