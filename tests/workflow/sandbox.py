@@ -40,25 +40,25 @@ class Sandbox:
     folder: Path
 
     @classmethod
-    def make(cls, folder: Path) -> "Sandbox":
+    def make(cls, folder: Path, python: Path = Path(sys.executable)) -> "Sandbox":
         """A sandbox in which nothing was run."""
         copy_repository(folder)
         shutil.copy2(ROOT / "reproduce", folder)
         shutil.copy2(ROOT / "requirements.lock", folder)
         (folder / MICRO_FILE).write_text(yaml.safe_dump(MICRO), encoding="utf-8")
-        return cls(folder)._with_environment()
+        return cls(folder)._with_environment(python)
 
     def copy(self, folder: Path) -> "Sandbox":
         """The same state, times of files included, in another folder."""
         shutil.copytree(self.folder, folder, symlinks=True)
         return Sandbox(folder)._with_environment()
 
-    def _with_environment(self) -> "Sandbox":
+    def _with_environment(self, python: Path = Path(sys.executable)) -> "Sandbox":
         programs = self.folder / ".venv" / "bin"
         programs.mkdir(parents=True, exist_ok=True)
         hooks = Path(__file__).parent / "hooks"
         for name, module in (("python", ""), ("snakemake", "-m snakemake")):
-            shim = SHIM.format(hooks=hooks, python=sys.executable, module=module)
+            shim = SHIM.format(hooks=hooks, python=python, module=module)
             (programs / name).write_text(shim, encoding="utf-8")
             (programs / name).chmod(0o755)
         lock = (self.folder / "requirements.lock").read_bytes()
@@ -93,6 +93,20 @@ class Sandbox:
         process = self.start(*targets, fault=fault, **options)
         output, _ = process.communicate(timeout=600)
         return process.returncode, output
+
+    def snakemake(self, *arguments: str) -> tuple[int, str]:
+        """The same by ``snakemake`` itself, without ``./reproduce``."""
+        done = subprocess.run(
+            [".venv/bin/snakemake", "--configfile", MICRO_FILE, "--cores", "2", *arguments],
+            cwd=self.folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=600,
+            check=False,
+        )
+        return done.returncode, done.stdout
 
     def finish(self, *targets: str) -> None:
         """A run that must succeed."""

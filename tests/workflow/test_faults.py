@@ -12,6 +12,7 @@ import resource
 import shutil
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -66,8 +67,8 @@ def test_a_killed_job_is_named_and_made_again(undisturbed: Sandbox, sandbox: San
     sandbox.path(TABLE).unlink()
     status, output = sandbox.run(TABLE, fault="kill:reconstruction_error")
     assert status != 0
-    assert "job reconstruction_error_table ended without a word" in last_lines(output)
-    assert f"making {TABLE}: killed?" in last_lines(output)
+    expected = f"job reconstruction_error_table failed while making {TABLE}: killed (SIGKILL)"
+    assert expected in last_lines(output)
     assert not sandbox.path(TABLE).exists()
     sandbox.finish(TABLE)
     assert sandbox.results() == undisturbed.results()
@@ -99,7 +100,7 @@ def test_a_job_that_is_killed_in_any_rule(
     output.unlink()
     status, said = sandbox.run(target, fault=f"kill:/\\.{re.escape(output.stem)}\\.[0-9a-f]{{12}}")
     assert status != 0
-    assert f"job {rule} ended without a word" in last_lines(said)
+    assert re.search(rf"job {rule} failed while making \S+: killed \(SIGKILL\)", last_lines(said))
     sandbox.finish(target)
     assert sandbox.results() == finished_study.results()
     assert no_leftovers(sandbox)
@@ -112,7 +113,7 @@ def test_a_run_that_is_killed_with_all_its_jobs(undisturbed: Sandbox, tmp_path: 
     for folder in ("fom", "snapshots", "pod", "reruns"):
         process = _caught_writing(sandbox, folder)
         kill_all(process)
-        assert sandbox.path(".cache/running").is_dir()
+        assert list(sandbox.path(".snakemake/locks").iterdir())
     sandbox.finish(TABLE)
     assert sandbox.results() == undisturbed.results()
     assert no_leftovers(sandbox)
@@ -142,8 +143,10 @@ def test_an_interrupted_run_goes_on(undisturbed: Sandbox, tmp_path: Path) -> Non
     sandbox = Sandbox.make(tmp_path / "run")
     process = _caught_writing(sandbox, "fom")
     os.killpg(process.pid, signal.SIGINT)
-    process.communicate(timeout=60)
-    assert process.returncode != 0
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert last_lines(said).startswith("pdrom: interrupted\n")
+    assert "Traceback" not in said
     assert no_leftovers(sandbox)
     sandbox.finish(TABLE)
     assert sandbox.results() == undisturbed.results()
@@ -151,16 +154,41 @@ def test_an_interrupted_run_goes_on(undisturbed: Sandbox, tmp_path: Path) -> Non
 
 @slow
 def test_the_second_run_at_once_says_so_and_ends(undisturbed: Sandbox, tmp_path: Path) -> None:
+    """Whether by ``./reproduce`` or by ``snakemake``; what only looks works meanwhile."""
     sandbox = Sandbox.make(tmp_path / "run")
     first = _caught_writing(sandbox, "fom")
-    status, output = sandbox.run(TABLE)
-    assert status != 0
-    assert output.splitlines() == [
-        f"reproduce: another ./reproduce (process {first.pid}) is at work in this folder"
-    ]
+    for second in (sandbox.run(TABLE), sandbox.snakemake(TABLE), sandbox.snakemake("--unlock")):
+        assert second[0] != 0
+        line = second[1].splitlines()[-1]
+        assert line.startswith(f"pdrom: another run (process {first.pid} on ")
+    status, output = sandbox.snakemake("-n", TABLE)
+    assert status == 0, output
     said, _ = first.communicate(timeout=300)
     assert first.returncode == 0, said
     assert sandbox.results() == undisturbed.results()
+
+
+@slow
+def test_snakemake_itself_heals_after_a_kill(undisturbed: Sandbox, tmp_path: Path) -> None:
+    sandbox = Sandbox.make(tmp_path / "run")
+    kill_all(_caught_writing(sandbox, "fom"))
+    assert list(sandbox.path(".snakemake/locks").iterdir())
+    status, output = sandbox.snakemake("--rerun-incomplete", TABLE)
+    assert status == 0, output
+    assert sandbox.results() == undisturbed.results()
+
+
+@slow
+def test_a_blank_and_a_letter_beyond_ascii_in_the_path(tmp_path: Path) -> None:
+    """The interpreter, too, lies in the folder, as it does in ``.venv``."""
+    folder = tmp_path / "Étude du projet"
+    sandbox = Sandbox.make(folder, python=folder / "environment" / "bin" / "python")
+    sandbox.path("environment").symlink_to(sys.prefix)
+    sandbox.finish(RUN)
+    sandbox.path(RUN).unlink()
+    status, output = sandbox.snakemake(RUN)
+    assert status == 0, output
+    assert sandbox.path(RUN).is_file()
 
 
 # Disks ----------------------------------------------------------------------------------------

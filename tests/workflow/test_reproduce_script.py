@@ -1,7 +1,8 @@
-"""The script ``reproduce``: clear failures, one run at a time, arguments handed on."""
+"""The script ``reproduce``: clear failures, one set-up at a time, arguments handed on."""
 
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -15,9 +16,10 @@ import pytest
 from places import ROOT
 
 SCRIPT = ROOT / "reproduce"
-TOOLS = ["cat", "chmod", "cksum", "cp", "dirname", "find", "grep", "mkdir", "ps", "rm", "sed", "sh"]
+TOOLS = ["cat", "chmod", "cksum", "cp", "dirname", "grep", "mkdir", "rm", "sed", "sh"]
 TOOLS += ["sleep", "tail", "touch", "tr"]
-OPTIONS = "--scheduler greedy --max-jobs-per-timespan 1000/20s --rerun-incomplete"
+PLATFORMS = "src/pdrom/pipeline/platforms.py"
+FRONT = "python -m pdrom.pipeline.front"
 LOCK_FILE = f"nowhere==1.0 --hash=sha256:{64 * '0'}\n"
 
 # Stands for a Python of a given version that makes environments out of itself.
@@ -26,20 +28,25 @@ case "$*" in
 *print*version_info*) echo {version} ;;
 *"sys.exit(sys.version_info"*) exit {too_old} ;;
 *"import venv"*) exit {no_venv} ;;
+*fcntl*) exec "{real}" "$@" ;;
+*platforms.py*)
+    [ ! -e unsupported ] || {{ echo "no wheel for it" >&2; exit 1; }}
+    cp "$2" "$3"
+    ;;
 *"-m venv"*)
     mkdir -p "$3/bin" "$3/packages"
     cp "$0" "$3/bin/python"
-    cp "$0.snakemake" "$3/bin/snakemake"
     ;;
-*"-m pip"*) [ ! -e pip-fails ] || {{ echo "ERROR: disk full"; exit 1; }} ;;
+*"-m pip"*)
+    for number in 1 2 3 4 5 6 7 8 9 10 11; do echo "Collecting package$number"; done
+    echo "Installing collected packages: all"
+    touch installing
+    while [ -e hold ]; do sleep 0.05; done
+    [ ! -e pip-fails ] || {{ cat pip-fails; exit 1; }}
+    ;;
 *sysconfig*) echo "$PWD/.venv/packages" ;;
 *) echo "python $*" >>calls ;;
 esac
-"""
-# Notes its arguments and stays until the file `hold` is gone.
-SNAKEMAKE = """#!/bin/sh
-echo "snakemake $*" >>calls
-while [ -e hold ]; do sleep 0.05; done
 """
 
 
@@ -54,18 +61,25 @@ class Folder:
         for tool in TOOLS:
             self.programs.joinpath(tool).symlink_to(shutil.which(tool))
         shutil.copy(SCRIPT, self.path)
+        platforms = self.path / PLATFORMS
+        platforms.parent.mkdir(parents=True)
+        shutil.copy(ROOT / PLATFORMS, platforms)
         self.path.joinpath("requirements.lock").write_text(LOCK_FILE, encoding="utf-8")
 
     def add_python(
         self, version: str = "3.12", too_old: bool = False, no_venv: bool = False
     ) -> None:
         """Put a stand-in for Python on the path."""
-        text = PYTHON.format(version=version, too_old=int(too_old), no_venv=int(no_venv))
-        for name, content in (("python3", text), ("python3.snakemake", SNAKEMAKE)):
-            self.programs.joinpath(name).write_text(content, encoding="utf-8")
-            self.programs.joinpath(name).chmod(0o755)
+        text = PYTHON.format(
+            version=version, too_old=int(too_old), no_venv=int(no_venv), real=sys.executable
+        )
+        program = self.programs / "python3"
+        program.write_text(text, encoding="utf-8")
+        program.chmod(0o755)
 
-    def start(self, *arguments: str, **environment: str) -> subprocess.Popen[str]:
+    def start(
+        self, *arguments: str, start_new_session: bool = False, **environment: str
+    ) -> subprocess.Popen[str]:
         """Start the script from another working directory."""
         return subprocess.Popen(
             [self.path / "reproduce", *arguments],
@@ -75,6 +89,7 @@ class Folder:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
+            start_new_session=start_new_session,
         )
 
     def run(self, *arguments: str, **environment: str) -> tuple[int, list[str]]:
@@ -98,17 +113,18 @@ def folder(tmp_path: Path) -> Folder:
 def test_no_python(folder: Folder) -> None:
     status, errors = folder.run()
     assert status != 0
-    assert errors == [
-        "reproduce: Python 3.11 or newer is needed, found none (set PYTHON to its path)"
-    ]
+    (line,) = errors
+    assert line.startswith("reproduce: Python 3.11, 3.12 or 3.13 is needed")
+    assert line.endswith("found none (set PYTHON to its path)")
 
 
-def test_old_python(folder: Folder) -> None:
-    folder.add_python(version="3.9", too_old=True)
+@pytest.mark.parametrize("version", ["3.9", "3.14"])
+def test_a_python_without_wheels(version: str, folder: Folder) -> None:
+    folder.add_python(version=version, too_old=True)
     status, errors = folder.run()
     assert status != 0
     (line,) = errors
-    assert "Python 3.11 or newer is needed, found only 3.9" in line
+    assert f"(some packages have no wheels for other ones), found only {version}" in line
 
 
 def test_python_without_venv(folder: Folder) -> None:
@@ -173,16 +189,16 @@ def test_no_network(folder: Folder) -> None:
 
 def test_a_failed_set_up_is_made_anew(folder: Folder) -> None:
     folder.add_python()
-    folder.path.joinpath("pip-fails").touch()
+    folder.path.joinpath("pip-fails").write_text("ERROR: no\n")
     status, errors = folder.run()
     assert status != 0
     assert errors[-1].startswith("reproduce: the packages cannot be installed")
-    assert errors[-1].endswith("ERROR: disk full")
+    assert errors[-1].endswith("ERROR: no")
     assert folder.calls == []
     folder.path.joinpath("pip-fails").unlink()
     status, errors = folder.run()
     assert status == 0, errors
-    assert folder.calls == [f"snakemake --cores all {OPTIONS}"]
+    assert folder.calls == [FRONT]
 
 
 def test_the_environment_is_made_once_for_each_lock_file(folder: Folder) -> None:
@@ -196,14 +212,10 @@ def test_the_environment_is_made_once_for_each_lock_file(folder: Folder) -> None
 def test_arguments_are_handed_on(folder: Folder) -> None:
     folder.add_python()
     folder.run("-n", "results/figures/a b.pdf")
-    folder.run("--cores", "1")
-    folder.run("-j2")
     folder.run("test", "-q", "tests/unit")
     assert folder.calls == [
-        f"snakemake --cores all {OPTIONS} -n results/figures/a b.pdf",
-        f"snakemake {OPTIONS} --cores 1",
-        f"snakemake {OPTIONS} -j2",
-        "python -m pytest -q tests/unit",
+        f"{FRONT} -n results/figures/a b.pdf",
+        f"{FRONT} test -q tests/unit",
     ]
 
 
@@ -211,45 +223,83 @@ def test_help_makes_nothing(folder: Folder) -> None:
     process = folder.start("--help")
     output, _ = process.communicate(timeout=60)
     assert process.returncode == 0
-    assert "./reproduce test" in output
+    for word in ("TARGETS", "--configfile", "-n", "--report", "test", "results/tables"):
+        assert word in output
+    assert "set -eu" not in output
     assert not (folder.path / ".venv").exists()
 
 
+def test_set_up_shows_that_it_is_alive(folder: Folder) -> None:
+    folder.add_python()
+    _, errors = folder.run()
+    assert errors[1:] == [
+        "reproduce: 10 of 1 packages",
+        "reproduce: unpacking 11 packages",
+    ]
+
+
+def test_a_platform_without_wheels_ends_before_anything_is_made(folder: Folder) -> None:
+    folder.add_python()
+    folder.path.joinpath("unsupported").touch()
+    status, errors = folder.run()
+    assert status != 0
+    assert errors[-1] == "no wheel for it"
+    assert not folder.path.joinpath("installing").exists()
+    assert not (folder.path / ".venv").exists()
+
+
+def test_a_full_disk_is_told_from_a_missing_network(folder: Folder) -> None:
+    folder.add_python()
+    said = "ERROR: Could not install: [Errno 28] No space left on device (timed out)\n"
+    folder.path.joinpath("pip-fails").write_text(said)
+    status, errors = folder.run()
+    assert status != 0
+    assert "no space left on the disk" in errors[-1]
+
+
 @pytest.fixture
-def held(folder: Folder) -> Iterator[tuple[Folder, subprocess.Popen[str]]]:
-    """A run that stays at work."""
+def installing(folder: Folder) -> Iterator[tuple[Folder, subprocess.Popen[str]]]:
+    """A set-up that stays at work."""
     folder.add_python()
     folder.path.joinpath("hold").touch()
-    process = folder.start()
-    limit = time.monotonic() + 30
-    while not folder.calls and time.monotonic() < limit:
+    process = folder.start(start_new_session=True)
+    limit = time.monotonic() + 60
+    while not folder.path.joinpath("installing").exists() and time.monotonic() < limit:
         time.sleep(0.02)
     yield folder, process
     folder.path.joinpath("hold").unlink(missing_ok=True)
-    process.communicate(timeout=30)
+    process.communicate(timeout=60)
 
 
-def test_the_second_of_two_runs_ends_at_once(held: tuple[Folder, subprocess.Popen[str]]) -> None:
-    folder, first = held
+def test_the_second_of_two_set_ups_ends_at_once(
+    installing: tuple[Folder, subprocess.Popen[str]],
+) -> None:
+    folder, first = installing
     status, errors = folder.run()
     assert status != 0
     assert errors == [
-        f"reproduce: another ./reproduce (process {first.pid}) is at work in this folder"
+        f"reproduce: another run (process {first.pid}, making .venv) is at work in this folder"
     ]
     folder.path.joinpath("hold").unlink()
-    first.communicate(timeout=30)
+    first.communicate(timeout=60)
     assert first.returncode == 0
     assert folder.run()[0] == 0
     assert len(folder.calls) == 2
 
 
-def test_a_killed_run_leaves_no_lock(held: tuple[Folder, subprocess.Popen[str]]) -> None:
-    folder, first = held
-    first.kill()
-    first.communicate(timeout=30)
+def test_a_killed_set_up_leaves_no_lock(installing: tuple[Folder, subprocess.Popen[str]]) -> None:
+    folder, first = installing
+    os.killpg(first.pid, signal.SIGKILL)
+    first.communicate(timeout=60)
     folder.path.joinpath("hold").unlink()
-    snakemake_lock = folder.path / ".snakemake" / "locks"
-    snakemake_lock.mkdir(parents=True)
-    status, errors = folder.run()
-    assert (status, errors) == (0, [])
-    assert not snakemake_lock.exists()
+    assert folder.run()[0] == 0
+    assert folder.calls == [FRONT]
+
+
+def test_an_interrupted_set_up_says_so(installing: tuple[Folder, subprocess.Popen[str]]) -> None:
+    folder, first = installing
+    os.killpg(first.pid, signal.SIGTERM)
+    _, errors = first.communicate(timeout=60)
+    assert first.returncode == 130
+    assert "reproduce: interrupted" in errors.splitlines()
+    assert folder.calls == []

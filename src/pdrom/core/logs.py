@@ -1,10 +1,10 @@
-"""One log per rule, and what the user sees when a job fails."""
+"""One log per job, and what the user sees when the job fails."""
 
+import errno
 import logging
-import re
 import sys
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -12,10 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from pdrom.core.errors import PdromError
 
-_JOB = re.compile(r"^Error in rule (?P<rule>\w+):(?P<body>(?:\n .*)*)", re.MULTILINE)
-_REFUSED = re.compile(r"^WorkflowError in rule (?P<rule>\w+) .*\n(?P<text>.*)", re.MULTILINE)
-_FIELD = re.compile(r"^ +(?P<key>log|output): (?P<path>[^\s,]+)", re.MULTILINE)
-_ERROR = re.compile(r"^[-0-9]+ [0-9:,]+ ERROR +pdrom: (?P<text>.*)$", re.MULTILINE)
+INTERRUPTED = 130  # exit status of a program that ends by Ctrl-C
 FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
 
 
@@ -34,7 +31,8 @@ def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
     claims all cores to be alone. More threads would also change the order of sums.
 
     A `PdromError` (a user's mistake) ends the job with one line on stderr; any other exception
-    keeps its traceback in the log and one line on stderr that says where to look.
+    keeps its traceback in the log and one line on stderr that says where to look. Lack of memory or
+    of space on the disk is said in words.
     """
     logger = logging.getLogger("pdrom")
     try:
@@ -52,8 +50,11 @@ def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
     except PdromError as error:
         logger.error("%s", error)
         sys.exit(f"pdrom: {error}")
+    except KeyboardInterrupt:
+        logger.error("interrupted")
+        sys.exit(INTERRUPTED)
     except Exception as error:
-        fault = f"{type(error).__name__}: {error}"
+        fault = _fault(error)
         logger.error("%s (traceback in %s)\n%s", fault, path, traceback.format_exc())
         sys.exit(f"pdrom: {fault} (traceback in {path})")
     finally:
@@ -63,32 +64,9 @@ def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
             handler.close()
 
 
-def end_with_failures(workflow_logs: Sequence[str]) -> None:
-    """End a failed run with what went wrong: the last lines that the user reads.
-
-    Snakemake prints its own account after a job's message. Every failed job is named once more with
-    the error in its log, and the process ends as a failure.
-
-    Parameters
-    ----------
-    workflow_logs : Snakemake's logs of the run
-    """
-    text = "\n".join(_content(path) for path in workflow_logs)
-    lines = [_failure(found["rule"], found["body"]) for found in _JOB.finditer(text)]
-    lines += [f"pdrom: job {found['rule']}: {found['text']}" for found in _REFUSED.finditer(text)]
-    advice = "pdrom: what is finished is kept; the same command goes on from there"
-    sys.exit("\n".join([*dict.fromkeys(lines), advice]))
-
-
-def _failure(rule: str, body: str) -> str:
-    fields = {found["key"]: found["path"] for found in _FIELD.finditer(body)}
-    errors = _ERROR.findall(_content(fields.get("log", "")))
-    if errors:
-        return f"pdrom: job {rule} failed: {errors[-1]}"
-    made = fields.get("output", "its result")
-    return f"pdrom: job {rule} ended without a word while making {made}: killed? out of memory?"
-
-
-def _content(path: str) -> str:
-    """Text of a log; nothing if it could not be written."""
-    return Path(path).read_text(encoding="utf-8", errors="replace") if Path(path).is_file() else ""
+def _fault(error: Exception) -> str:
+    if isinstance(error, MemoryError):
+        return f"out of memory ({error})" if str(error) else "out of memory"
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return f"no space left on the disk ({error})"
+    return f"{type(error).__name__}: {error}"

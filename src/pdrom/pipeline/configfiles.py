@@ -5,13 +5,12 @@ Snakemake would take the last of two equal keys without a word, run code that a 
 """
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import read_yaml, shown
 
-OPTIONS = ("--configfile", "--configfiles")
 TEMPLATE_KEY = "__use_yte__"
 
 
@@ -32,21 +31,3 @@ def check_or_exit(*paths: str | Path) -> None:
         check_files(paths)
     except ConfigurationError as error:
         sys.exit(f"pdrom: {error}")
-
-
-def named_files(arguments: Sequence[str]) -> list[str]:
-    """Files that Snakemake's options name among ``arguments``."""
-    files: list[str] = []
-    inside = False
-    for argument in arguments:
-        option, equals, value = argument.partition("=")
-        if argument.startswith("-"):
-            inside = option in OPTIONS and not equals
-            files += [value] if option in OPTIONS and equals else []
-        elif inside:
-            files.append(argument)
-    return files
-
-
-if __name__ == "__main__":
-    check_or_exit(*named_files(sys.argv[1:]))

@@ -14,7 +14,7 @@ STEP_NS = 10_000
 
 
 def settle_dates(folders: Iterable[str | Path]) -> int:
-    """Move files dated in the future to just before now, in their order; return how many.
+    """Move files dated in the future to just before now, in their order; say and return how many.
 
     The order is kept: what was newer than something else, and makes it run again, still is.
     """
@@ -25,10 +25,6 @@ def settle_dates(folders: Iterable[str | Path]) -> int:
     for path, date in future.items():
         settled = now - ranks[date] * STEP_NS
         os.utime(path, ns=(settled, settled))
+    if future:
+        sys.stderr.write(f"pdrom: {len(future)} files were dated in the future (clock set back?)\n")
     return len(future)
-
-
-if __name__ == "__main__":
-    count = settle_dates(sys.argv[1:])
-    if count:
-        sys.stderr.write(f"reproduce: {count} files were dated in the future (clock set back?)\n")

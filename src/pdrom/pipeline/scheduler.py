@@ -2,13 +2,19 @@
 
 import threading
 
+SCHEDULER = "snakemake.scheduling.job_scheduler"
+
 
 def cancel_timers() -> None:
-    """Cancel the timers that would make the scheduler choose jobs once more.
+    """Cancel the timers of Snakemake's rate limit, which would make it choose jobs once more.
 
-    It starts one of the rate limit's length after every choice, and the process would wait for the
-    last of them.
+    It starts one of the limit's length after every choice, and the process would wait for the last
+    of them. Timers of others go on.
     """
     for thread in threading.enumerate():
-        if isinstance(thread, threading.Timer):
+        if isinstance(thread, threading.Timer) and _module(thread) == SCHEDULER:
             thread.cancel()
+
+
+def _module(timer: threading.Timer) -> str:
+    return getattr(timer.function, "__module__", "")

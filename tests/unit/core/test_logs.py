@@ -1,5 +1,6 @@
 """What a job leaves in its log, and what the user sees when it fails."""
 
+import errno
 import io
 import logging
 
@@ -8,7 +9,7 @@ import scipy.linalg  # noqa: F401  -- loads libraries that have threads
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from pdrom.core.errors import MeshError
-from pdrom.core.logs import end_with_failures, job_log
+from pdrom.core.logs import INTERRUPTED, job_log
 
 LOGGER = logging.getLogger("pdrom")
 
@@ -80,35 +81,29 @@ def test_logger_is_as_before_whatever_happened(path, failure):
     assert (list(LOGGER.handlers), LOGGER.level) == before
 
 
-SNAKEMAKE = """\
-[Sat Nov 21 08:13:06 2026]
-Error in rule pod:
-    message: None
-    jobid: 6
-    output: results/pod/a.h5, results/pod/a.csv
-    log: {log} (check log file(s) for error details)
-[Sat Nov 21 08:13:07 2026]
-Error in rule fom:
-    jobid: 7
-    output: results/fom/b.h5
-    log: results/logs/none.log (check log file(s) for error details)
-Shutting down, this might take some time.
-"""
+@pytest.mark.parametrize(
+    ("failure", "said"),
+    [
+        (MemoryError("Unable to allocate 9 GiB"), "out of memory (Unable to allocate 9 GiB)"),
+        (MemoryError(), "out of memory"),
+        (OSError(errno.ENOSPC, "No space left on device", "a.h5"), "no space left on the disk ("),
+        (OSError(errno.EDQUOT, "Disk quota exceeded"), "no space left on the disk ("),
+        (OSError(errno.EIO, "Input/output error"), "OSError: [Errno 5] Input/output error"),
+    ],
+)
+def test_lack_of_memory_or_space_is_said_in_words(path, failure, said):
+    with pytest.raises(SystemExit) as caught, job_log(str(path)):
+        raise failure
+    assert caught.value.code.startswith(f"pdrom: {said}")
+    assert f"ERROR   pdrom: {said}" in path.read_text()
 
 
-def test_the_last_lines_say_what_failed(path, tmp_path):
-    """A job with an error in its log, and one that was killed."""
-    with pytest.raises(SystemExit), job_log(str(path)):
-        raise MeshError("a.obj: vertex 3 is nan")
-    workflow = tmp_path / "snakemake.log"
-    workflow.write_text(SNAKEMAKE.format(log=path))
-    with pytest.raises(SystemExit) as caught:
-        end_with_failures([str(workflow), str(tmp_path / "missing")])
-    assert caught.value.code.splitlines() == [
-        "pdrom: job pod failed: a.obj: vertex 3 is nan",
-        "pdrom: job fom ended without a word while making results/fom/b.h5: killed? out of memory?",
-        "pdrom: what is finished is kept; the same command goes on from there",
-    ]
+def test_an_interrupted_job_ends_without_a_traceback(path, capfd):
+    with pytest.raises(SystemExit) as caught, job_log(str(path)):
+        raise KeyboardInterrupt
+    assert caught.value.code == INTERRUPTED
+    assert path.read_text().endswith("ERROR   pdrom: interrupted\n")
+    assert capfd.readouterr().err == ""
 
 
 def test_a_log_that_cannot_be_written_is_named(tmp_path):

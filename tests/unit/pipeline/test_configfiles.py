@@ -1,25 +1,9 @@
-"""Which files the command line names, and what is refused of them."""
+"""What is refused of a configuration file."""
 
 import pytest
 
 from pdrom.core.errors import ConfigurationError
-from pdrom.pipeline.configfiles import check_files, named_files
-
-
-@pytest.mark.parametrize(
-    ("arguments", "files"),
-    [
-        ("-n", []),
-        ("--configfile a.yaml", ["a.yaml"]),
-        ("--configfile a.yaml b.yaml -n results/x", ["a.yaml", "b.yaml"]),
-        ("--configfiles a.yaml --cores 2", ["a.yaml"]),
-        ("--configfile=a.yaml results/x", ["a.yaml"]),
-        ("--config ranks=[3] --configfile a.yaml -- results/x", ["a.yaml"]),
-        ("--cores 2 results/x", []),
-    ],
-)
-def test_files_named_by_options(arguments, files):
-    assert named_files(arguments.split()) == files
+from pdrom.pipeline.configfiles import check_files
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,107 @@
+"""What a command line asks of Snakemake: configuration, targets, whether jobs will run."""
+
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pdrom.core.errors import ConfigurationError
+
+# Options with which Snakemake prints or draws something and runs no job.
+LOOKS_ONLY = (
+    "dryrun", "lint", "list_rules", "list_target_rules", "print_compilation", "containerize",
+    "dag", "rulegraph", "filegraph", "d3dag", "list_conda_envs", "list_changes",
+    "list_input_changes", "list_params_changes", "list_untracked", "summary", "detailed_summary",
+    "archive", "generate_unit_tests",
+)  # fmt: skip
+# Options whose own output is not to be replaced by one line a job.
+OWN_OUTPUT = ("logger", "quiet", "verbose", "printshellcmds", "debug_dag")
+YAML = (".yaml", ".yml", ".json")
+
+
+@dataclass(frozen=True)
+class CommandLine:
+    """Options of Snakemake that this project looks at.
+
+    configfiles : files of ``--configfile``, in order
+    settings : ``key=value`` pairs of ``--config``
+    targets : names of files and rules
+    report : file of ``--report``, None without one
+    looks_only : no job runs, nothing that a run makes is written
+    own_output, cores : what else decides about the options that `./reproduce` adds
+    """
+
+    arguments: tuple[str, ...]
+    configfiles: tuple[str, ...]
+    settings: tuple[str, ...]
+    targets: tuple[str, ...]
+    report: str | None
+    looks_only: bool
+    own_output: bool
+    cores: bool
+
+    @classmethod
+    def parse(cls, arguments: Sequence[str]) -> "CommandLine":
+        """By Snakemake's own parser, which ends the process for an option that it does not know.
+
+        Raises
+        ------
+        ConfigurationError
+            A target was taken for a value of ``--config`` or ``--configfile``.
+        """
+        # late: Snakemake's jobs import this module, too, and need no parser
+        from snakemake.cli import get_argument_parser
+
+        found = vars(get_argument_parser().parse_args(list(arguments)))
+        command = cls(
+            arguments=tuple(arguments),
+            configfiles=_texts(found["configfile"]),
+            settings=_texts(found["config"]),
+            targets=tuple(a for a in arguments if a in found["targets"]),
+            report=_report(found),
+            looks_only=any(found[name] for name in LOOKS_ONLY) or _reports(found),
+            own_output=any(found[name] is not None and found[name] for name in OWN_OUTPUT),
+            cores=found["cores"] is not None or found["jobs"] is not None,
+        )
+        command._check_values()
+        return command
+
+    @classmethod
+    def of_process(cls) -> "CommandLine":
+        """The command line of this process."""
+        return cls.parse(sys.argv[1:])
+
+    def _check_values(self) -> None:
+        swallowed = {
+            "--config": [s for s in self.settings if "=" not in s],
+            "--configfile": [f for f in self.configfiles[1:] if Path(f).suffix not in YAML],
+        }
+        for option, names in swallowed.items():
+            if names:
+                targets = [*names, *self.targets]
+                options = [a for a in self.arguments if a not in (*targets, "--")]
+                raise ConfigurationError(
+                    f"{option} takes every value that follows it, '{names[0]}' too; write two "
+                    f"hyphens before the targets: {shlex.join([*options, '--', *targets])}"
+                )
+
+    def with_targets(self, made: Mapping[str, Sequence[str]]) -> list[str]:
+        """The arguments with every target replaced by the files that are to be made for it."""
+        if not self.targets:
+            return list(self.arguments)
+        options = [a for a in self.arguments if a not in (*self.targets, "--")]
+        return [*options, "--", *dict.fromkeys(f for t in self.targets for f in made[t])]
+
+
+def _texts(values: Any) -> tuple[str, ...]:
+    return tuple(str(value) for value in values or ())
+
+
+def _reports(found: dict[str, Any]) -> bool:
+    return bool(found["report"] or found["reporter"]) and not found["report_after_run"]
+
+
+def _report(found: dict[str, Any]) -> str | None:
+    return str(found["report"]) if found["report"] and _reports(found) else None

@@ -1,0 +1,59 @@
+"""Environment variables of the jobs: none that the user has set may change a result."""
+
+import os
+import platform
+from collections.abc import Mapping
+from pathlib import Path
+
+# Settings of numerical libraries, of Python, Matplotlib and TeX.
+CLEARED = (
+    "OPENBLAS_", "GOTO_", "BLIS_", "MKL_", "VECLIB_", "OMP_", "GOMP_", "KMP_",
+    "NPY_", "NUMPY_", "SCIPY_", "NUMBA_", "NUMEXPR_", "PYTHON", "MPL", "MATPLOTLIB",
+    "TEX", "BIB", "BST",
+)  # fmt: skip
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+KEPT = ("NUMBA_CACHE_DIR", "MPLCONFIGDIR", "PYTHON", "PYTHONPATH", "PYTHONDONTWRITEBYTECODE")
+# Date in the manuscript and the figures, so that equal ones are equal bytes: 1 January 2026.
+DATE = "1767225600"
+
+
+def settled(environment: Mapping[str, str], kernels: str | None) -> dict[str, str]:
+    """An environment without inherited settings, and with those of this project.
+
+    Parameters
+    ----------
+    kernels : OpenBLAS's name of the kernels to use, None leaves the choice to it
+    """
+    kept = {
+        name: value
+        for name, value in environment.items()
+        if name in KEPT or not name.startswith(CLEARED)
+    }
+    fixed = {
+        **dict.fromkeys(THREADS, "1"),
+        "PYTHONHASHSEED": "0",
+        "MPLBACKEND": "Agg",
+        "LC_ALL": "C.UTF-8",
+        "SOURCE_DATE_EPOCH": DATE,
+        "FORCE_SOURCE_DATE": "1",
+    }
+    return {**kept, **fixed, **({"OPENBLAS_CORETYPE": kernels} if kernels else {})}
+
+
+def settle() -> None:
+    """Give this process, and so its jobs, the `settled` environment; before NumPy is loaded."""
+    environment = settled(os.environ, openblas_kernels())
+    for name in set(os.environ) - set(environment):
+        del os.environ[name]
+    os.environ.update(environment)
+
+
+def openblas_kernels(cpuinfo: Path = Path("/proc/cpuinfo")) -> str | None:
+    """Kernels that every processor with AVX2 has; None where there are none to agree on.
+
+    OpenBLAS chooses by processor, and its kernels sum in different orders.
+    """
+    if platform.machine() not in ("x86_64", "AMD64") or not cpuinfo.is_file():
+        return None
+    flags = cpuinfo.read_text(encoding="utf-8", errors="replace")
+    return "Haswell" if {"avx2", "fma"} <= set(flags.split()) else None

@@ -1,0 +1,144 @@
+"""What the user reads when a run fails: every failed job with its cause, in the last lines."""
+
+import logging
+import re
+import shutil
+import signal
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from snakemake_interface_logger_plugins.common import LogEvent
+
+from pdrom.core.logs import INTERRUPTED
+
+ADVICE = "pdrom: what is finished is kept; the same command goes on from there"
+
+_ERROR = re.compile(r"^[-0-9]+ [0-9:,]+ ERROR +pdrom: (?P<text>.*)$", re.MULTILINE)
+_IN_RULE = re.compile(r"^\w+ in rule (?P<rule>\w+)\b.*\n(?P<text>.*)", re.MULTILINE)
+_ENDING = re.compile(r"died with <Signals\.(?P<signal>\w+)|exit status (?P<status>\d+)")
+# How Snakemake's log says that the user or the system ended the run.
+_STOPS = {
+    "Terminating processes on user request": "interrupted",
+    "Will exit after finishing currently running jobs": "ended by SIGTERM",
+}
+_CAUSES = {
+    "SIGKILL": "killed (SIGKILL): out of memory?",
+    "SIGTERM": "ended by SIGTERM",
+    "SIGINT": "interrupted",
+    "SIGXFSZ": "its file became larger than the system allows (SIGXFSZ)",
+}
+_STATUSES = {126: "its interpreter cannot be executed", 127: "its interpreter was not found"}
+_FULL = ("No space left on device", "Errno 28")
+_FULL_DISK = 1 << 18  # bytes that are left when nothing more can be written
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A job that failed: its rule, its log, its first output, and what Snakemake says of it."""
+
+    rule: str
+    log: str
+    output: str
+    said: str
+
+    def line(self) -> str:
+        """Name of the job and cause."""
+        folder = next((p for p in Path(self.output).parents if p.is_dir()), Path())
+        errors = _ERROR.findall(_content(self.log))
+        # what did not even start has an older run's log
+        if errors and cause(self.said, folder) not in _STATUSES.values():
+            return f"pdrom: job {self.rule} failed: {errors[-1]}"
+        return (
+            f"pdrom: job {self.rule} failed while making {self.output}: {cause(self.said, folder)}"
+        )
+
+
+def cause(said: str, folder: Path) -> str:
+    """Why a job ended that wrote no error into its log.
+
+    Parameters
+    ----------
+    said : Snakemake's message, with the exit status or the signal
+    folder : where the job wrote
+    """
+    if any(words in said for words in _FULL) or shutil.disk_usage(folder).free < _FULL_DISK:
+        return "no space left on the disk"
+    if "MemoryError" in said:
+        return "out of memory"
+    found = _ENDING.search(said)
+    if found is None:
+        return "it ended without a word"
+    status = int(found["status"] or 0)
+    name = found["signal"] or (_signal(status - 128) if status > 128 else "")
+    if name:
+        return _CAUSES.get(name, f"crashed ({name})")
+    return _STATUSES.get(status, f"exit status {status}, without a word")
+
+
+def _signal(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return ""
+
+
+class Failures(logging.Handler):
+    """Listens to Snakemake's log for what fails."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.INFO)
+        self.jobs: list[Failure] = []
+        self.other: list[str] = []
+        self.stopped: str | None = None
+        # what was said last in each thread: the message of a job precedes the job's name
+        self._said: dict[int | None, str] = {}
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep what belongs to a failure."""
+        event = getattr(record, "event", None)
+        text = record.getMessage()
+        if event == LogEvent.JOB_ERROR:
+            said = self._said.pop(record.thread, "")
+            log, output = (_first(getattr(record, name, ())) for name in ("log", "output"))
+            self.jobs.append(Failure(record.rule_name, log, output or "its result", said))
+        elif event == LogEvent.ERROR:
+            found = _IN_RULE.search(text)
+            if found:
+                self.other.append(f"pdrom: job {found['rule']}: {found['text']}")
+            else:
+                self._said[record.thread] = text
+        elif event is None:
+            stops = [how for words, how in _STOPS.items() if words in text]
+            self.stopped = stops[0] if stops else self.stopped
+
+    def end(self) -> None:
+        """End a failed run: its last lines say what went wrong.
+
+        Snakemake prints its own account after a job's message. Every failed job is named once more
+        with the error in its log, and the process ends as a failure.
+        """
+        lines = [failure.line() for failure in self.jobs]
+        if self.stopped:
+            # jobs that ended with the run are no news
+            lines = [line for line in lines if not line.endswith(tuple(_CAUSES.values()))]
+            lines.append(f"pdrom: {self.stopped}")
+        sys.stderr.write("\n".join([*dict.fromkeys([*lines, *self.other]), ADVICE]) + "\n")
+        sys.exit(INTERRUPTED if self.stopped else 1)
+
+
+def listen() -> Failures:
+    """Failures of this process's run, from now on."""
+    failures = Failures()
+    logging.getLogger("snakemake.logging").addHandler(failures)
+    return failures
+
+
+def _first(names: Iterable[str]) -> str:
+    return next(iter(names), "")
+
+
+def _content(path: str) -> str:
+    """Text of a log; nothing if it could not be written."""
+    return Path(path).read_text(encoding="utf-8", errors="replace") if Path(path).is_file() else ""

@@ -1,0 +1,57 @@
+"""``./reproduce ARGS...``: Snakemake with this project's options, names and words.
+
+``python -m pdrom.pipeline.front`` does what the console command ``snakemake`` does, after the
+arguments were completed and the configuration files were checked. ``test`` as the first argument
+hands the others to pytest.
+"""
+
+import os
+import sys
+from collections.abc import Sequence
+
+from pdrom.core.errors import PdromError
+from pdrom.core.logs import INTERRUPTED
+from pdrom.pipeline.commandline import CommandLine
+from pdrom.pipeline.configfiles import check_files
+from pdrom.pipeline.environment import settle
+
+# The jobs are short: an integer program for each choice among them takes longer than it saves.
+# After every choice a timer of the rate limit's length causes another one; at the default length
+# they take a third of a core in the end.
+OPTIONS = ("--scheduler", "greedy", "--max-jobs-per-timespan", "1000/20s", "--rerun-incomplete")
+
+
+def completed(arguments: Sequence[str]) -> list[str]:
+    """Arguments for Snakemake.
+
+    Raises
+    ------
+    ConfigurationError
+        A configuration file is missing or no mapping; a target was taken for an option's value.
+    """
+    command = CommandLine.parse(arguments)
+    check_files(command.configfiles)
+    cores = () if command.cores else ("--cores", "all")
+    return [*cores, *OPTIONS, *arguments]
+
+
+def main() -> None:
+    """Run Snakemake or the tests; end the process with their status."""
+    settle()
+    if sys.argv[1:2] == ["test"]:
+        os.execv(sys.executable, [sys.executable, "-m", "pytest", *sys.argv[2:]])
+    from snakemake.cli import main as snakemake
+
+    try:
+        arguments = completed(sys.argv[1:])
+        sys.argv = ["snakemake", *arguments]
+        snakemake(arguments)
+    except PdromError as error:
+        sys.exit(f"pdrom: {error}")
+    except KeyboardInterrupt:
+        sys.stderr.write("pdrom: interrupted\n")
+        sys.exit(INTERRUPTED)
+
+
+if __name__ == "__main__":
+    main()

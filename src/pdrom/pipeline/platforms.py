@@ -1,0 +1,94 @@
+"""Which machines the locked packages have wheels for, known before anything is downloaded.
+
+``./reproduce`` runs this file by its path with the machine's own Python, before any package is
+there: only the standard library may be imported.
+"""
+
+import os
+import platform
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+OLDEST, NEWEST = (3, 11), (3, 13)
+# Packages without a wheel for Linux on ARM, where the project does without them.
+LEFT_OUT_ON_ARM = ("cholespy",)
+
+
+@dataclass(frozen=True)
+class Machine:
+    """What wheels are chosen by: ``libc`` is "glibc" or "" (musl, or no Linux)."""
+
+    system: str
+    processor: str
+    python: tuple[int, int]
+    libc: str
+
+    @classmethod
+    def here(cls) -> "Machine":
+        """This machine and this Python."""
+        libc = platform.libc_ver()[0] if platform.system() == "Linux" else ""
+        return cls(platform.system(), platform.machine(), sys.version_info[:2], libc)
+
+    def obstacle(self) -> str | None:
+        """Why the packages cannot be installed, with the remedy; None where they can."""
+        version = ".".join(map(str, self.python))
+        if not OLDEST <= self.python <= NEWEST:
+            package = "immutables has no wheel for it" if self.python > NEWEST else "it is too old"
+            return (
+                f"Python {version}: {package}; set PYTHON to one from {_text(OLDEST)} to "
+                f"{_text(NEWEST)}"
+            )
+        if self.system == "Darwin" and self.processor == "x86_64":
+            return (
+                "macOS on Intel: llvmlite has no wheel for it; use a Mac with Apple's processor or "
+                "Linux in a container or a virtual machine"
+            )
+        if self.system == "Linux" and self.libc != "glibc":
+            return (
+                "Linux without glibc: llvmlite has no wheel for it; use a distribution with glibc, "
+                "or a container of one (python:3.12-slim)"
+            )
+        known = {"Linux": ("x86_64", "aarch64"), "Darwin": ("arm64",)}
+        if self.processor not in known.get(self.system, ()):
+            return (
+                f"{self.system} on {self.processor}: there are wheels for Linux on x86_64 and "
+                "aarch64 and for macOS on arm64 only; use one of these"
+            )
+        return None
+
+    def left_out(self) -> tuple[str, ...]:
+        """Packages that the project does without on this machine."""
+        return LEFT_OUT_ON_ARM if (self.system, self.processor) == ("Linux", "aarch64") else ()
+
+
+def without(lock: str, packages: tuple[str, ...]) -> str:
+    """Text of a lock file without some packages; each entry is a line and its indented hashes."""
+    entries = re.split(r"^(?=[^\s#])", lock, flags=re.MULTILINE)
+    return "".join(entry for entry in entries if entry.partition("==")[0] not in packages)
+
+
+def main(lock: str, target: str) -> None:
+    """Write the packages that this machine gets from ``lock`` to ``target``, or say why not."""
+    machine = Machine.here()
+    obstacle = machine.obstacle()
+    if obstacle:
+        sys.exit(obstacle)
+    text = Path(lock).read_text(encoding="utf-8")
+    temporary = Path(f"{target}.{os.getpid()}")
+    temporary.write_text(without(text, machine.left_out()), encoding="utf-8")
+    temporary.replace(target)
+    if machine.left_out():
+        sys.stderr.write(
+            f"reproduce: {', '.join(machine.left_out())} has no wheel for this machine and is left "
+            "out; SciPy solves the global step instead\n"
+        )
+
+
+def _text(version: tuple[int, int]) -> str:
+    return ".".join(map(str, version))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

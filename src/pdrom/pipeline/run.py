@@ -1,0 +1,54 @@
+"""What every run does first and last, whether ``./reproduce`` or ``snakemake`` started it."""
+
+import sys
+
+from pdrom.core.errors import PdromError
+from pdrom.pipeline.commandline import CommandLine
+from pdrom.pipeline.dates import settle_dates
+from pdrom.pipeline.failures import Failures, listen
+from pdrom.pipeline.running import hold, remove_stale_locks
+from pdrom.pipeline.scheduler import cancel_timers
+from pdrom.pipeline.warm import start_server, stop_server
+
+# What Snakemake compares by date.
+DATED = ("results", "paper", "config", "workflow")
+
+
+class Run:
+    """The run of this process: it is alone in its folder, and says at its end what came of it."""
+
+    def __init__(self, command: CommandLine, failures: Failures) -> None:
+        self.command = command
+        self.failures = failures
+
+    @classmethod
+    def begin(cls) -> "Run":
+        """Be the only run in the working directory, or end the process with one line.
+
+        A command that only looks needs no lock, so that it works beside a run.
+        """
+        try:
+            command = CommandLine.of_process()
+            if command.looks_only:
+                remove_stale_locks()
+            else:
+                hold()
+                settle_dates(DATED)
+        except PdromError as error:
+            sys.exit(f"pdrom: {error}")
+        return cls(command, listen())
+
+    def start(self) -> None:
+        """Before the first job: the process that jobs are forked from."""
+        start_server()
+
+    def succeed(self) -> None:
+        """End a run whose jobs all succeeded."""
+        stop_server()
+        cancel_timers()
+
+    def fail(self) -> None:
+        """End a run that failed or was interrupted, as `Failures.end`."""
+        stop_server()
+        cancel_timers()
+        self.failures.end()

@@ -1,0 +1,57 @@
+"""Variables that change results are cleared, those of this project are set, the rest is left."""
+
+import pytest
+
+from pdrom.pipeline.environment import openblas_kernels, settled
+
+INHERITED = {
+    "OPENBLAS_CORETYPE": "Prescott",
+    "MKL_CBWR": "AVX2",
+    "NPY_DISABLE_CPU_FEATURES": "AVX2",
+    "NUMBA_DISABLE_JIT": "1",
+    "OMP_NUM_THREADS": "7",
+    "KMP_AFFINITY": "none",
+    "SOURCE_DATE_EPOCH": "1",
+    "PYTHONOPTIMIZE": "2",
+    "MATPLOTLIBRC": "/etc/rc",
+    "TEXINPUTS": "/etc/tex",
+    "LC_ALL": "tr_TR.UTF-8",
+    "PATH": "/bin",
+    "HOME": "/home/somebody",
+    "NUMBA_CACHE_DIR": "/cache",
+    "SLURM_JOB_ID": "3",
+}
+
+
+def test_nothing_inherited_changes_a_result():
+    names = ("PATH", "HOME", "NUMBA_CACHE_DIR", "SLURM_JOB_ID")
+    bare = {name: INHERITED[name] for name in names}
+    assert settled(INHERITED, "Haswell") == settled(bare, "Haswell")
+    assert settled(INHERITED, None) == settled(bare, None)
+    assert bare.items() <= settled(INHERITED, None).items()
+
+
+def test_threads_locale_and_kernels_are_fixed():
+    made = settled(INHERITED, "Haswell")
+    assert made["OMP_NUM_THREADS"] == made["OPENBLAS_NUM_THREADS"] == "1"
+    assert made["LC_ALL"] == "C.UTF-8"
+    assert made["OPENBLAS_CORETYPE"] == "Haswell"
+    assert "OPENBLAS_CORETYPE" not in settled(INHERITED, None)
+
+
+@pytest.mark.parametrize(
+    ("machine", "flags", "expected"),
+    [
+        ("x86_64", "fpu sse2 avx avx2 fma", "Haswell"),
+        ("x86_64", "fpu sse2 avx avx2 fma avx512f", "Haswell"),
+        ("x86_64", "fpu sse2 avx", None),
+        ("aarch64", "fp asimd", None),
+        ("x86_64", None, None),
+    ],
+)
+def test_kernels_that_many_processors_share(machine, flags, expected, tmp_path, monkeypatch):
+    monkeypatch.setattr("platform.machine", lambda: machine)
+    cpuinfo = tmp_path / "cpuinfo"
+    if flags is not None:
+        cpuinfo.write_text(f"processor : 0\nflags\t\t: {flags}\n")
+    assert openblas_kernels(cpuinfo) == expected

@@ -1,0 +1,103 @@
+"""The last lines of a failed run: every cause in words of its own."""
+
+import logging
+
+import pytest
+from snakemake_interface_logger_plugins.common import LogEvent
+
+from pdrom.core.logs import INTERRUPTED, job_log
+from pdrom.pipeline.failures import ADVICE, Failures, cause
+
+ENDED = "CalledProcessError in file x, line 3:\nCommand 'python x.py' "
+
+
+@pytest.fixture
+def snakemake():
+    """Stands for Snakemake's logger, with somebody who listens for failures."""
+    logger = logging.Logger("snakemake")
+    logger.failures = Failures()
+    logger.addHandler(logger.failures)
+    return logger
+
+
+def fail(logger, rule, log, said, output=("results/x.h5",)):
+    """A failed job as Snakemake logs it."""
+    logger.error(f"RuleException:\n{said}", extra={"event": LogEvent.ERROR})
+    extra = {"event": LogEvent.JOB_ERROR, "rule_name": rule, "log": [log], "output": list(output)}
+    logger.error("Error in rule", extra=extra)
+
+
+def end(logger, capsys):
+    """Exit status and last lines."""
+    with pytest.raises(SystemExit) as caught:
+        logger.failures.end()
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[-1] == ADVICE
+    return caught.value.code, lines[:-1]
+
+
+@pytest.mark.parametrize(
+    ("said", "expected"),
+    [
+        (ENDED + "died with <Signals.SIGKILL: 9>.", "killed (SIGKILL): out of memory?"),
+        (ENDED + "returned non-zero exit status 137.", "killed (SIGKILL): out of memory?"),
+        (ENDED + "returned non-zero exit status 130.", "interrupted"),
+        (ENDED + "returned non-zero exit status 143.", "ended by SIGTERM"),
+        (ENDED + "died with <Signals.SIGSEGV: 11>.", "crashed (SIGSEGV)"),
+        (ENDED + "returned non-zero exit status 139.", "crashed (SIGSEGV)"),
+        (ENDED + "returned non-zero exit status 127.", "its interpreter was not found"),
+        (ENDED + "returned non-zero exit status 126.", "its interpreter cannot be executed"),
+        (ENDED + "returned non-zero exit status 3.", "exit status 3, without a word"),
+        ("OSError: [Errno 28] No space left on device: 'x'", "no space left on the disk"),
+        ("MemoryError", "out of memory"),
+        ("", "it ended without a word"),
+    ],
+)
+def test_causes_are_told_apart(said, expected, tmp_path):
+    assert cause(said, tmp_path) == expected
+
+
+def test_every_failed_job_is_named_with_its_error(snakemake, tmp_path, capsys):
+    log = tmp_path / "job.log"
+    with pytest.raises(SystemExit), job_log(str(log)):
+        raise ValueError("vertex 3 is nan")
+    fail(snakemake, "pod", str(log), ENDED + "returned non-zero exit status 1.")
+    fail(snakemake, "fom", str(tmp_path / "none.log"), ENDED + "died with <Signals.SIGKILL: 9>.")
+    capsys.readouterr()
+    status, lines = end(snakemake, capsys)
+    assert status == 1
+    assert lines == [
+        f"pdrom: job pod failed: ValueError: vertex 3 is nan (traceback in {log})",
+        "pdrom: job fom failed while making results/x.h5: killed (SIGKILL): out of memory?",
+    ]
+
+
+def test_the_log_of_an_earlier_run_is_not_the_cause(snakemake, tmp_path, capsys):
+    """A job whose interpreter was not found did not open its log."""
+    log = tmp_path / "job.log"
+    with pytest.raises(SystemExit), job_log(str(log)):
+        raise ValueError("long ago")
+    fail(snakemake, "pod", str(log), ENDED + "returned non-zero exit status 127.")
+    _, lines = end(snakemake, capsys)
+    assert lines == [
+        "pdrom: job pod failed while making results/x.h5: its interpreter was not found"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("stop", "word"),
+    [
+        ("Terminating processes on user request, this might take some time.", "interrupted"),
+        ("Will exit after finishing currently running jobs (scheduler).", "ended by SIGTERM"),
+    ],
+)
+def test_an_interrupted_run_says_so_and_no_more(stop, word, snakemake, tmp_path, capsys):
+    snakemake.info(stop)
+    fail(snakemake, "pod", "none.log", ENDED + "returned non-zero exit status 130.")
+    assert end(snakemake, capsys) == (INTERRUPTED, [f"pdrom: {word}"])
+
+
+def test_faults_of_a_rule_itself(snakemake, capsys):
+    text = "WorkflowError in rule pod in file workflow/rules/x.smk, line 3:\nno such mesh"
+    snakemake.error(text, extra={"event": LogEvent.ERROR})
+    assert end(snakemake, capsys) == (1, ["pdrom: job pod: no such mesh"])
