@@ -120,38 +120,44 @@ class _Growing:
         return int(others[np.argmax(growth)]) if growth.max(initial=0.0) > bound else first
 
     def _growth(self, elements: np.ndarray, products: np.ndarray) -> np.ndarray:
-        return eigenvalue_growth(self._blocks[elements], products[elements], self._gap)
+        blocks, products = self._blocks[elements], products[elements]
+        return eigenvalue_growth(blocks, products, self._weakest, self._gap)
 
 
-def eigenvalue_growth(blocks: np.ndarray, products: np.ndarray, gap: float) -> np.ndarray:
+def eigenvalue_growth(
+    blocks: np.ndarray, products: np.ndarray, weakest: np.ndarray, gap: float
+) -> np.ndarray:
     """Lower bounds on how much B^T B raises the smallest eigenvalue of a symmetric matrix, (m,).
 
     For u the eigenvector of the smallest eigenvalue, g the gap to the next one and b = B u,
 
-        t = (g + n - sqrt((g + n)^2 - 4 g |b|^2)) / 2,    n = |B^T b|^2 / |b|^2.
+        t = 2 g |b|^2 / (g + n + sqrt((g - n)^2 + 4 g c)),   c = |C^T b|^2 / |b|^2,   n = |b|^2 + c,
+
+    with C = B - b u^T, the part of B orthogonal to u. It is the smaller root of
+    t^2 - (g + n) t + g |b|^2 without a difference that cancels: next to a double root (g = n,
+    c = 0) it has all its digits, where n = |B^T b|^2 / |b|^2 and the square root of
+    (g + n)^2 - 4 g |b|^2 keep half of them.
 
     For a single row n = |B|^2: the bound of Ipsen and Nadler (2009) in the paper's equation (4.3).
     For blocks: with all other eigenvalues lowered to the second smallest, the growth is the root of
     t = sum_i beta_i^2 f(mu_i), f(mu) = (g - t) / (g - t + mu), where mu_i are the eigenvalues of
-    C C^T, C the part of B orthogonal to u, and beta_i the components of b in its eigenvectors. f is
-    convex, so that by Jensen's inequality the mean of mu, |C^T b|^2 / |b|^2 = n - |b|^2, gives a
-    lower bound. An infinite gap gives |b|^2.
+    C C^T and beta_i the components of b in its eigenvectors. f is convex, so that by Jensen's
+    inequality the mean of mu, c, gives a lower bound. An infinite gap gives |b|^2.
 
     Parameters
     ----------
     blocks : (m, s, r) the B of m candidates
     products : (m, s) their b
+    weakest : (r,) the unit vector u
     gap : g >= 0
     """
     squared = np.einsum("es,es->e", products, products)
     if np.isinf(gap):
         return squared
-    pulled = (products[:, None, :] @ blocks)[:, 0]
-    mean = np.einsum("ek,ek->e", pulled, pulled)
-    mean = np.divide(mean, squared, out=np.zeros_like(mean), where=squared > 0.0)
-    total = gap + mean
-    root = np.sqrt(np.maximum(total**2 - 4.0 * gap * squared, 0.0))
-    # the smaller root without cancellation
-    denominator = total + root
+    pulled = (products[:, None, :] @ blocks)[:, 0] - squared[:, None] * weakest
+    beside = np.einsum("ek,ek->e", pulled, pulled)
+    beside = np.divide(beside, squared, out=np.zeros_like(beside), where=squared > 0.0)
+    mean = squared + beside
+    denominator = gap + mean + np.sqrt((gap - mean) ** 2 + 4.0 * gap * beside)
     growth = np.zeros_like(squared)
     return np.divide(2.0 * gap * squared, denominator, out=growth, where=denominator > 0.0)

@@ -10,7 +10,10 @@ from scipy import linalg
 
 from pdrom.core.errors import SamplingError
 
-_EPS = np.finfo(float).eps
+# Columns of length one depend on each other when what the others leave of one of them is below
+# this. Round-off leaves up to 1e-15 sqrt(r) of a column that is a copy; a column with less than
+# 1e-10 of its own at the samples would amplify their errors by 1e10 and is of no use either.
+DEPENDENT = 1e-12
 
 
 def s_measure(a: np.ndarray) -> float:
@@ -113,7 +116,7 @@ class _Sampled:
         z, q = self._residual(mode)
         solved = np.linalg.solve(self._shifted(), z[:, :, None])[:, :, 0]
         residual = q + np.maximum(np.einsum("es,es->e", z, solved), 0.0)
-        possible = residual > 0.0
+        possible = residual > DEPENDENT**2
         measure = np.full(self.total, -np.inf)
         measure[possible] = np.log(residual[possible])
         norms = np.log(self._column_norms(mode + 1)[possible]).sum(axis=1)
@@ -130,7 +133,7 @@ class _Sampled:
         self._picked.append(element)
         if mode is not None:
             z, q = self._residual(mode)
-            if q <= _EPS**2:
+            if q <= DEPENDENT**2:
                 raise SamplingError(
                     f"S-OPT: mode {mode + 1} depends on the modes before it at all elements"
                 )
@@ -154,7 +157,9 @@ class _Sampled:
         rows = self._sampled_rows()
         factor = linalg.qr(rows, mode="r", check_finite=False)[0][: self._modes]
         diagonal = np.abs(np.diag(factor))
-        if len(rows) < self._modes or diagonal.min(initial=1.0) <= _EPS * diagonal.max(initial=0.0):
+        if len(rows) < self._modes or diagonal.min(initial=1.0) <= DEPENDENT * diagonal.max(
+            initial=0.0
+        ):
             raise SamplingError(
                 f"S-OPT: the first {self._modes} modes depend on each other at the "
                 f"{len(self._picked)} sampled elements"

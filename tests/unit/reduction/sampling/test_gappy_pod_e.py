@@ -2,6 +2,7 @@
 
 import itertools
 
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -62,7 +63,7 @@ def test_growth_is_a_lower_bound_and_exact_for_one_mode(size):
     values, vectors = np.linalg.eigh(gram)
     products = blocks @ vectors[:, 0]
     gap = values[1] - values[0] if len(values) > 1 else np.inf
-    bound = eigenvalue_growth(blocks, products, gap)
+    bound = eigenvalue_growth(blocks, products, vectors[:, 0], gap)
     true = np.array([np.linalg.eigvalsh(gram + b.T @ b)[0] for b in blocks]) - values[0]
     assert (bound >= 0.0).all()
     assert (bound <= true + 1e-12).all()
@@ -71,11 +72,25 @@ def test_growth_is_a_lower_bound_and_exact_for_one_mode(size):
         np.testing.assert_allclose(bound, true, atol=1e-12)
 
 
+@pytest.mark.parametrize("offset", [0.0, *(10.0**k for k in range(-16, 0))])
+@pytest.mark.parametrize("side", [0.0, *(10.0**k for k in range(-20, -4, 3))])
+def test_growth_next_to_a_double_root_has_all_its_digits(offset, side):
+    """One row (b, sqrt(c)) and a gap near |b|^2: the exact root in 60 digits beside it."""
+    gap, b = 0.37, np.sqrt(0.37) * (1.0 + offset)
+    row = np.array([[[b, np.sqrt(side)]]])
+    with mpmath.workdps(60):
+        g, square, c = mpmath.mpf(gap), mpmath.mpf(b) ** 2, mpmath.mpf(row[0, 0, 1]) ** 2
+        total = g + square + c
+        root = (total - mpmath.sqrt(total**2 - 4 * g * square)) / 2
+        found = eigenvalue_growth(row, row @ np.eye(2)[0], np.eye(2)[0], gap)[0]
+        assert abs(found - root) <= 1e-14 * root
+
+
 def test_growth_is_sharper_than_with_the_norm_of_the_block(rng):
     """Blocks as single rows of their Frobenius norm are the looser bound (and still one)."""
     blocks = rng.standard_normal((50, 6, 8))
     products = blocks[:, :, 0]
-    sharp = eigenvalue_growth(blocks, products, 0.7)
+    sharp = eigenvalue_growth(blocks, products, np.eye(8)[0], 0.7)
     squared, length = np.sum(products**2, axis=1), np.sum(blocks**2, axis=(1, 2))
     total = 0.7 + length
     loose = 0.5 * (total - np.sqrt(total**2 - 4 * 0.7 * squared))
@@ -100,7 +115,7 @@ def test_each_element_has_the_largest_bound_and_none_raises_the_gain(size):
         rows = blocks[path[:k]].reshape(-1, v.shape[1])
         values, vectors = np.linalg.eigh(rows.T @ rows)
         gap = values[1] - values[0] if len(values) > 1 else np.inf
-        bound = eigenvalue_growth(blocks, blocks @ vectors[:, 0], gap)
+        bound = eigenvalue_growth(blocks, blocks @ vectors[:, 0], vectors[:, 0], gap)
         bound[path[:k]] = 0.0
         assert bound[path[k]] >= bound.max() * (1.0 - 1e-6) - 1e-12
 

@@ -134,6 +134,26 @@ def test_hard_bases_are_named(rng):
         extend(v, 3, np.array([0]), 6)
 
 
+@pytest.mark.parametrize("rows", [1, 3, 6])
+@settings(deadline=None, max_examples=40)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    r=st.integers(2, 9),
+    exponent=st.one_of(st.none(), st.floats(-18.0, -15.0), st.floats(-9.0, 0.0)),
+)
+def test_dependence_has_a_margin_on_both_sides(rows, seed, r, exponent):
+    """The last mode is a combination of the others up to 10^exponent."""
+    rng = np.random.default_rng(seed)
+    v = np.linalg.qr(rng.standard_normal((20 * rows, r)))[0]
+    beside = 0.0 if exponent is None else 10.0**exponent
+    v[:, -1] = v[:, :-1] @ rng.choice([-1.0, 0.5, 1.0], r - 1) + beside * v[:, -1]
+    if beside < 1e-12:
+        with pytest.raises(SamplingError, match=r"depend|independent"):
+            s_opt(v, rows)
+    else:
+        assert len(set(s_opt(v, rows, 12).tolist())) == 12
+
+
 def test_fewer_elements_than_modes_are_all_taken(rng):
     v = np.linalg.qr(rng.standard_normal((18, 5)))[0]
     assert sorted(s_opt(v, 6).tolist()) == [0, 1, 2]
