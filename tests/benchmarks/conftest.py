@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from pdrom.core.provenance import machine
+from pdrom.core.machine import machine
 
 
 def pytest_benchmark_update_json(
@@ -23,7 +23,7 @@ def _short(value: Any) -> Any:
 def pytest_benchmark_update_machine_info(config: Any, machine_info: dict[str, Any]) -> None:
     """Replace the record of the machine by the study's own."""
     machine_info.clear()
-    machine_info.update(machine())
+    machine_info.update(machine().model_dump(mode="json"))
 
 
 def pytest_benchmark_update_commit_info(config: Any, commit_info: dict[str, Any]) -> None:

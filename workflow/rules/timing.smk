@@ -72,7 +72,7 @@ rule machine:
     log:
         "results/logs/machine.log",
     params:
-        code=PLAN.code("pdrom.core.provenance"),
+        code=PLAN.code("pdrom.core.machine"),
     message:
         "Record of the machine and the library versions"
     script:

@@ -1,12 +1,10 @@
 """Attributes of result files: the same for equal runs, different for different settings."""
 
 import json
-import subprocess
 from importlib.metadata import version
 from pathlib import Path
 
 import pytest
-from threadpoolctl import threadpool_limits
 
 from pdrom import __version__
 from pdrom.core import provenance
@@ -45,28 +43,3 @@ def test_versions_are_those_installed_and_absent_ones_are_said(monkeypatch):
         }
     finally:
         provenance.library_versions.cache_clear()
-
-
-def test_machine_names_threads_and_cores():
-    for threads in (2, 1):
-        with threadpool_limits(limits=threads):
-            machine = provenance.machine()
-        assert machine["threads"] == threads
-    assert machine["cores"] >= 1
-    assert machine["cpu"]
-    assert machine["libraries"]["numpy"] == version("numpy")
-
-
-@pytest.mark.parametrize(
-    "failure",
-    [FileNotFoundError("git"), subprocess.TimeoutExpired("git", 10), None],
-    ids=["no git", "hanging", "no checkout"],
-)
-def test_commit_is_unknown_without_a_checkout(monkeypatch, failure):
-    def run(command, **settings):
-        if failure is not None:
-            raise failure
-        return subprocess.CompletedProcess(command, 128, stdout="", stderr="not a repository")
-
-    monkeypatch.setattr(provenance.subprocess, "run", run)
-    assert provenance.machine()["commit"] == "unknown"

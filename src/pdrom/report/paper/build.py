@@ -1,12 +1,15 @@
 """Rules of the manuscript: tables -> macros, TeX tables, bibliography -> PDF."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from pydantic import ValidationError
 
+from pdrom.core.errors import StorageError
+from pdrom.core.machine import Machine
 from pdrom.core.store import atomic_path, read_table
+from pdrom.core.yamlfile import describe
 from pdrom.report.paper.bibliography import bibliography
 from pdrom.report.paper.macros import macros
 from pdrom.report.paper.tex import build_pdf
@@ -30,15 +33,25 @@ def write_inputs(
     text = Path(source).read_text(encoding="utf-8")
     data = {Path(path).stem: read_table(path) for path in tables}
     data |= {name: pd.DataFrame(rows) for name, rows in facts.items()}
-    record = json.loads(Path(machine).read_text(encoding="utf-8"))
-    libraries = {f"version_{k}": v for k, v in record.pop("libraries").items()}
-    data["machine"] = pd.DataFrame([{**record, **libraries}])
+    data["machine"] = _machine_table(Path(machine))
     outputs = {"macros.tex": macros(text, data)}
     outputs |= {f"{name}.tex": make(data) for name, make in TEX_TABLES.items()}
     outputs["main.bbl"] = bibliography(text, Path(references))
     for name, content in outputs.items():
         with atomic_path(Path(folder) / name) as path:
             path.write_text(content, encoding="utf-8")
+
+
+def _machine_table(path: Path) -> pd.DataFrame:
+    """One row; versions of libraries as ``version_NAME``."""
+    try:
+        record = Machine.model_validate_json(path.read_text(encoding="utf-8"))
+    except ValidationError as error:
+        raise StorageError(f"{path}: {describe(error, Machine)}") from error
+    versions = {f"version_{name}": version for name, version in record.libraries.items()}
+    architectures = ", ".join(sorted({k.architecture for k in record.kernels if k.architecture}))
+    plain = record.model_dump(exclude={"libraries", "kernels"})
+    return pd.DataFrame([{**plain, **versions, "kernels": architectures}])
 
 
 def build(source: str, figures: str, inputs: str, output: str) -> None:

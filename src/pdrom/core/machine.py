@@ -1,0 +1,108 @@
+"""The machine that a study ran on: processor, kernels of the linear algebra, libraries, code."""
+
+import os
+import platform
+import subprocess
+from importlib import import_module
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict
+from threadpoolctl import threadpool_info
+
+from pdrom import __version__
+from pdrom.core.provenance import library_versions
+
+# what loads the linear algebra that the study uses: NumPy and SciPy bring a library each
+LINEAR_ALGEBRA = ("numpy.linalg", "scipy.linalg")
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Kernels(_Record):
+    """A library of linear algebra, or of threads, as it is loaded.
+
+    file : name of the shared library
+    kind : "blas" or "openmp"
+    architecture : processor that its kernels are written for; None where it does not say
+    """
+
+    file: str
+    kind: str
+    library: str
+    version: str | None
+    architecture: str | None
+    threads: int
+
+
+class Machine(_Record):
+    """The machine that timings and last digits belong to, and the code that ran on it.
+
+    threads : the most that one of the libraries would use
+    """
+
+    cpu: str
+    cores: int | None
+    system: str
+    python: str
+    pdrom: str
+    commit: str
+    threads: int
+    libraries: dict[str, str]
+    kernels: tuple[Kernels, ...]
+
+
+def machine() -> Machine:
+    """Record of this machine and this process."""
+    kernels = loaded_kernels()
+    return Machine(
+        cpu=_cpu_model(),
+        cores=os.cpu_count(),
+        system=f"{platform.system()} {platform.machine()}",
+        python=platform.python_version(),
+        pdrom=__version__,
+        commit=_commit(),
+        threads=max((each.threads for each in kernels), default=1),
+        libraries=library_versions(),
+        kernels=kernels,
+    )
+
+
+def loaded_kernels() -> tuple[Kernels, ...]:
+    """Libraries of linear algebra and of threads in this process, sorted by file."""
+    for module in LINEAR_ALGEBRA:
+        import_module(module)
+    found = [
+        Kernels(
+            file=Path(pool["filepath"]).name,
+            kind=pool["user_api"],
+            library=pool["internal_api"],
+            version=pool["version"],
+            architecture=pool.get("architecture"),
+            threads=pool["num_threads"],
+        )
+        for pool in threadpool_info()
+    ]
+    return tuple(sorted(found, key=lambda each: each.file))
+
+
+def _cpu_model() -> str:
+    info = Path("/proc/cpuinfo")
+    if info.is_file():
+        for line in info.read_text().splitlines():
+            if line.lower().startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or "unknown"
+
+
+def _commit() -> str:
+    """Commit of the checkout that the package lies in; "unknown" outside one."""
+    command = ["git", "rev-parse", "--short=12", "HEAD"]
+    try:
+        done = subprocess.run(
+            command, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=10
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return "unknown"
+    return done.stdout.strip() if done.returncode == 0 else "unknown"
