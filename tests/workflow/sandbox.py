@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -16,6 +17,7 @@ import pandas as pd
 import yaml
 from checkout import ROOT, copy_repository
 
+from pdrom.core.store import check_file
 from pdrom.tables.columns import TIMING_COLUMNS
 
 MICRO = {
@@ -118,11 +120,18 @@ class Sandbox:
         return self.folder / name
 
     def results(self) -> dict[str, str]:
-        """Digest of every result; what a clock measured is left out."""
-        files = [p for p in self.path("results").rglob("*") if p.is_file()]
+        """Digest of every result, all of them intact; what a clock measured is left out."""
+        files = [p for p in self.path("results").rglob("[!.]*") if p.is_file()]
         files += [p for p in [self.path("paper/main.pdf")] if p.is_file()]
+        sealed = [p for p in files if p.suffix != ".log"]
+        assert {check_file(p) for p in sealed} == {"intact"}
         names = {str(p.relative_to(self.folder)): p for p in files}
         return {name: _digest(path) for name, path in sorted(names.items()) if not _timed(path)}
+
+    def temporaries(self) -> list[Path]:
+        """Files of the results that have not got their names yet."""
+        files = [p for p in self.path("results").rglob(".*") if p.is_file()]
+        return [p for p in files if re.search(r"\.[0-9a-f]{12}(\.|$)", p.name)]
 
 
 def _timed(path: Path) -> bool:

@@ -20,6 +20,8 @@ from pathlib import Path
 import pytest
 from sandbox import Sandbox, kill_all, wait_for
 
+from pdrom.core.store import seal_path
+
 TABLE = "results/tables/reconstruction_error.csv"
 SNAPSHOTS = "results/snapshots/spring_oop/spring.h5"
 BASIS = "results/pod/spring_oop/spring/none-affine-vectorised.h5"
@@ -57,7 +59,7 @@ def last_lines(output: str, count: int = 2) -> str:
 
 def no_leftovers(sandbox: Sandbox) -> bool:
     """No temporary file stands among the results."""
-    return not list(sandbox.path("results").rglob(".*"))
+    return not sandbox.temporaries()
 
 
 # Killed jobs and runs -------------------------------------------------------------------------
@@ -122,7 +124,8 @@ def test_a_run_that_is_killed_with_all_its_jobs(undisturbed: Sandbox, tmp_path: 
 def _caught_writing(sandbox: Sandbox, folder: str) -> subprocess.Popen[str]:
     """A run one of whose jobs is at a file of ``folder``, kept there for seconds by a slow disk."""
     process = sandbox.start(TABLE, fault=f"slow:/results/{folder}/")
-    wait_for(lambda: any(sandbox.path("results").glob(f"{folder}/**/.*")), process)
+    place = sandbox.path("results") / folder
+    wait_for(lambda: any(place in p.parents for p in sandbox.temporaries()), process)
     return process
 
 
@@ -283,62 +286,124 @@ def test_a_file_in_place_of_the_results(tmp_path: Path) -> None:
 # Damaged files --------------------------------------------------------------------------------
 
 
-def flip_a_bit(path: Path, position: float = 0.6) -> None:
-    """Change one bit, keep the times: what a bad disk does."""
+def change(path: Path, changed: Callable[[bytes], bytes]) -> None:
+    """Change the bytes, keep the times: what a bad disk does."""
     before = path.stat()
-    content = bytearray(path.read_bytes())
-    content[int(position * len(content))] ^= 4
-    path.write_bytes(content)
+    path.write_bytes(changed(path.read_bytes()))
     os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
 
 
-def truncate(path: Path, kept: float = 0.6) -> None:
-    """Cut the end off, keep the times."""
-    before = path.stat()
-    os.truncate(path, int(kept * before.st_size))
-    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+def flip_a_bit(path: Path) -> None:
+    """Change one bit."""
+    change(path, lambda old: old[: len(old) // 2] + bytes([old[len(old) // 2] ^ 4])
+           + old[len(old) // 2 + 1 :])  # fmt: skip
 
 
-def damage_and_rerun(sandbox: Sandbox, damaged: str, missing: list[str], fault: str) -> None:
+def flip_bits_of_file_and_seal(path: Path) -> None:
+    """Change one bit of each."""
+    flip_a_bit(path)
+    flip_a_bit(seal_path(path))
+
+
+def truncate(path: Path) -> None:
+    """Cut the end off."""
+    change(path, lambda old: old[: len(old) * 6 // 10])
+
+
+def zero_last_sector(path: Path, size: int = 512) -> None:
+    """Overwrite the end with zeros."""
+    change(path, lambda old: old[:-size] + bytes(size))
+
+
+def zero_last_page(path: Path) -> None:
+    """Overwrite the end with zeros."""
+    zero_last_sector(path, 4096)
+
+
+def cut_at_a_line_end(path: Path) -> None:
+    """Lose the last row."""
+    change(path, lambda old: b"".join(old.splitlines(keepends=True)[:-1]))
+
+
+def lose_a_row(path: Path) -> None:
+    """Lose the second row."""
+    change(path, lambda old: b"".join(r for i, r in enumerate(old.splitlines(True)) if i != 2))
+
+
+def lose_the_seal(path: Path) -> None:
+    """As a copy of the file alone, or a job that was killed at the wrong moment."""
+    seal_path(path).unlink()
+
+
+def damage_and_rerun(
+    sandbox: Sandbox, damaged: str, missing: list[str], target: str = TABLE
+) -> None:
     """The run that reads the damaged file names it and sets it aside, the next one mends it."""
     for name in missing:
         sandbox.path(name).unlink()
-    status, output = sandbox.run(TABLE)
+    status, output = sandbox.run(target)
     assert status != 0
-    assert f"{damaged}: damaged, {fault}" in last_lines(output)
-    assert "set aside as" in last_lines(output)
-    aside = sandbox.path(f"{damaged}.damaged")
-    assert aside.is_file()
-    aside.unlink()
-    sandbox.finish(TABLE)
+    assert f"{damaged}: damaged, its c" in last_lines(output)
+    assert f"set aside as {Path(damaged).name}.damaged, the next run" in last_lines(output)
+    sandbox.path(f"{damaged}.damaged").unlink()
+    sandbox.finish(target)
 
 
-def test_a_changed_bit_in_the_snapshots(undisturbed: Sandbox, sandbox: Sandbox) -> None:
-    flip_a_bit(sandbox.path(SNAPSHOTS))
-    missing = [f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE]
-    damage_and_rerun(sandbox, SNAPSHOTS, missing, "its checksum does not match")
+# what lies between a damaged file and the table, or nothing would be read again
+BETWEEN = {
+    RUN: [SNAPSHOTS, BASIS, f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE],
+    SNAPSHOTS: [f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE],
+    BASIS: [f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE],
+    f"{SAMPLING}.csv": [TABLE],
+}
+
+
+def test_a_lost_row_of_a_table(undisturbed: Sandbox, sandbox: Sandbox) -> None:
+    name = f"{SAMPLING}.csv"
+    lose_a_row(sandbox.path(name))
+    damage_and_rerun(sandbox, name, BETWEEN[name])
     assert sandbox.results() == undisturbed.results()
 
 
 @slow
-@pytest.mark.parametrize("name", [RUN, BASIS])
-@pytest.mark.parametrize("damage", [flip_a_bit, truncate])
-def test_damaged_hdf5(
+@pytest.mark.parametrize(
+    ("name", "damage"),
+    [
+        (RUN, zero_last_sector),
+        (RUN, zero_last_page),
+        (SNAPSHOTS, flip_a_bit),
+        (BASIS, flip_bits_of_file_and_seal),
+        (BASIS, truncate),
+        (f"{SAMPLING}.csv", cut_at_a_line_end),
+        (f"{SAMPLING}.csv", flip_a_bit),
+        (f"{SAMPLING}.csv", lose_the_seal),
+    ],
+)
+def test_a_damaged_result(
     name: str, damage: Callable[[Path], None], undisturbed: Sandbox, sandbox: Sandbox
 ) -> None:
     damage(sandbox.path(name))
-    # what lies between the damaged file and the table, or nothing would be read again
-    between = [SNAPSHOTS, BASIS] if name == RUN else []
-    missing = [*between, f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE]
-    damage_and_rerun(sandbox, name, missing, "its ")
+    damage_and_rerun(sandbox, name, BETWEEN[name])
     assert sandbox.results() == undisturbed.results()
 
 
 @slow
-def test_a_truncated_table(undisturbed: Sandbox, sandbox: Sandbox) -> None:
-    truncate(sandbox.path(f"{SAMPLING}.csv"))
-    damage_and_rerun(sandbox, f"{SAMPLING}.csv", [TABLE], "its end is missing")
-    assert sandbox.results() == undisturbed.results()
+@pytest.mark.parametrize(
+    ("name", "missing"),
+    [
+        ("results/machine.json", "results/paper/main.bbl"),
+        ("results/tables/claims.csv", "results/paper/main.bbl"),
+        ("results/paper/macros.tex", "paper/main.pdf"),
+        ("results/figures/singular_values.pdf", "paper/main.pdf"),
+    ],
+)
+def test_what_the_manuscript_is_made_from(
+    name: str, missing: str, finished_study: Sandbox, tmp_path: Path
+) -> None:
+    sandbox = finished_study.copy(tmp_path / "run")
+    flip_a_bit(sandbox.path(name))
+    damage_and_rerun(sandbox, name, [missing], "paper/main.pdf")
+    assert sandbox.results() == finished_study.results()
 
 
 # Clocks and edited files ----------------------------------------------------------------------

@@ -1,6 +1,6 @@
 from pdrom.core.logs import job_log
 from pdrom.core.machine import machine
-from pdrom.core.store import atomic_path
+from pdrom.core.store import write_text
 
-with job_log(snakemake.log[0]), atomic_path(snakemake.output[0]) as path:
-    path.write_text(machine().model_dump_json(indent=2) + "\n", encoding="utf-8")
+with job_log(snakemake.log[0]):
+    write_text(machine().model_dump_json(indent=2) + "\n", snakemake.output[0])

@@ -1,6 +1,5 @@
-"""A file that takes its name only when it is complete."""
+"""A file that takes its name only when it is complete, with its seal beside it."""
 
-import errno
 import os
 import re
 import uuid
@@ -9,11 +8,13 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from pdrom.core.errors import StorageError
+from pdrom.core.store.oserrors import reason
+from pdrom.core.store.seal import SEAL_SUFFIX, seal_of, seal_path
 
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path beside ``path``; rename it on success, remove it on failure.
+    """Yield a temporary path beside ``path``; seal and rename it on success, else remove it.
 
     What a killed process left of the same target is removed first: one job at a time makes a file.
 
@@ -24,29 +25,51 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = Path(path)
     temporary = target.with_name(f".{target.stem}.{uuid.uuid4().hex[:12]}{target.suffix}")
+    seal = temporary.with_name(f"{temporary.name}{SEAL_SUFFIX}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         _remove_leftovers(target)
         yield temporary
-        with open(temporary, "rb") as handle:
-            os.fsync(handle.fileno())
-        os.replace(temporary, target)
+        seal.write_bytes(seal_of(temporary, target.name))
+        for written in (temporary, seal):
+            _bring_to_disk(written)
+        _rename(temporary, seal, target)
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
     finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
+        for left in (temporary, seal):
+            with suppress(OSError):
+                left.unlink(missing_ok=True)
 
 
 def _remove_leftovers(target: Path) -> None:
-    name = re.compile(rf"\.{re.escape(target.stem)}\.[0-9a-f]{{12}}{re.escape(target.suffix)}")
+    stem, suffix, seal = map(re.escape, (target.stem, target.suffix, SEAL_SUFFIX))
+    name = re.compile(rf"\.{stem}\.[0-9a-f]{{12}}{suffix}({seal})?")
     for path in target.parent.iterdir():
         if name.fullmatch(path.name):
             path.unlink(missing_ok=True)
 
 
-def reason(error: OSError) -> str:
-    """Words of the operating system; HDF5 hides the number in a long text."""
-    hidden = re.search(r"errno = (\d+)", str(error))
-    number = error.errno or (int(hidden[1]) if hidden else 0)
-    return os.strerror(number) if number in errno.errorcode else " ".join(str(error).split())[:200]
+def _bring_to_disk(path: Path) -> None:
+    with open(path, "rb") as handle:
+        os.fsync(handle.fileno())
+
+
+def _rename(temporary: Path, seal: Path, target: Path) -> None:
+    """Give both files their names, the seal first.
+
+    A process killed in between leaves no file, or an older one that its seal does not fit: both are
+    made anew. In the other order it would leave a good file without a seal. Where the second name
+    is refused, the older file keeps its own seal.
+    """
+    place = seal_path(target)
+    previous = place.read_bytes() if place.is_file() else None
+    os.replace(seal, place)
+    try:
+        os.replace(temporary, target)
+    except BaseException:
+        if previous is None:
+            place.unlink()
+        else:
+            place.write_bytes(previous)
+        raise

@@ -8,8 +8,9 @@ from pathlib import Path
 import pandas as pd
 
 from pdrom.core.errors import StorageError
-from pdrom.core.store.atomic import atomic_path, reason
-from pdrom.core.store.damage import damaged
+from pdrom.core.store.atomic import atomic_path
+from pdrom.core.store.oserrors import reason
+from pdrom.core.store.seal import require_intact
 
 FLOAT_FORMAT = "%.10g"
 
@@ -25,20 +26,22 @@ def read_table(
 ) -> pd.DataFrame:
     """Read a CSV table; StorageError if it is missing, damaged or lacks one of ``columns``.
 
-    ``result`` says that a run can make the table anew, so that a damaged one is set aside.
+    ``result`` says that a run wrote the table, with a seal; other tables have none.
     """
-    if not Path(path).is_file():
-        raise StorageError(f"{path}: no such file")
+    if result:
+        require_intact(path)
     try:
         content = Path(path).read_bytes()
         table = pd.read_csv(io.BytesIO(content))
+    except FileNotFoundError as error:
+        raise StorageError(f"{path}: no such file") from error
     except OSError as error:
         raise StorageError(f"{path}: cannot be read ({reason(error)})") from error
     except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
-        fault = f"not a readable table ({' '.join(str(error).split())})"
-        raise damaged(Path(path), fault, result) from error
-    if not content.endswith(b"\n") or b"\0" in content:
-        raise damaged(Path(path), "its end is missing or it is no text", result)
+        fault = " ".join(str(error).split())
+        raise StorageError(f"{path}: not a readable table ({fault})") from error
+    if not content.endswith(b"\n"):
+        raise StorageError(f"{path}: the end of its last line is missing")
     missing = [name for name in columns or () if name not in table.columns]
     if missing:
         raise StorageError(f"{path}: lacks the column(s) {', '.join(missing)}")

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from pdrom.core.errors import StorageError
 from pdrom.core.machine import Machine
-from pdrom.core.store import atomic_path, read_table
+from pdrom.core.store import read_table, read_text, require_intact, write_text
 from pdrom.core.yamlfile import describe
 from pdrom.report.paper.bibliography import bibliography
 from pdrom.report.paper.macros import macros
@@ -38,14 +38,13 @@ def write_inputs(
     outputs |= {f"{name}.tex": make(data) for name, make in TEX_TABLES.items()}
     outputs["main.bbl"] = bibliography(text, Path(references))
     for name, content in outputs.items():
-        with atomic_path(Path(folder) / name) as path:
-            path.write_text(content, encoding="utf-8")
+        write_text(content, Path(folder) / name)
 
 
 def _machine_table(path: Path) -> pd.DataFrame:
     """One row; versions of libraries as ``version_NAME``."""
     try:
-        record = Machine.model_validate_json(path.read_text(encoding="utf-8"))
+        record = Machine.model_validate_json(read_text(path))
     except ValidationError as error:
         raise StorageError(f"{path}: {describe(error, Machine)}") from error
     versions = {f"version_{name}": version for name, version in record.libraries.items()}
@@ -54,6 +53,9 @@ def _machine_table(path: Path) -> pd.DataFrame:
     return pd.DataFrame([{**plain, **versions, "kernels": architectures}])
 
 
-def build(source: str, figures: str, inputs: str, output: str) -> None:
-    """Build the PDF of the manuscript."""
-    build_pdf(Path(source), Path(output), [Path(figures), Path(inputs)])
+def build(source: str, figures: list[str], inputs: list[str], output: str) -> None:
+    """Build the PDF of the manuscript from its figures and what `write_inputs` wrote."""
+    results = [Path(path) for path in (*figures, *inputs)]
+    for path in results:
+        require_intact(path)
+    build_pdf(Path(source), Path(output), sorted({path.parent for path in results}))

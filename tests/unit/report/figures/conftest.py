@@ -4,12 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pandas as pd
 import pytest
 
-from pdrom.core.store import write_table
+from pdrom.core.store import write_hdf5, write_table
 from pdrom.model.constraints.surface import interior_vertices
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh, save_mesh
@@ -91,7 +90,7 @@ def make_results(root: Path, scenes: dict[str, tuple[str, ...]], methods: list[s
         mesh = mesh_of(scene)
         save_mesh(mesh, sources.mesh(scene))
         positions = _trajectory(mesh)
-        with _new(sources.run(scene)) as file:
+        with write_hdf5(sources.run(scene)) as file:
             file["positions"] = positions
         for group in groups:
             rank = 0 if scene in FLAT else 14
@@ -102,11 +101,6 @@ def make_results(root: Path, scenes: dict[str, tuple[str, ...]], methods: list[s
                 _write_reruns(sources, scene, group, method, positions, rank, rng)
     _write_tables(sources, scenes, methods, rng)
     return holdings
-
-
-def _new(path: Path) -> h5py.File:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return h5py.File(path, "w")
 
 
 def _trajectory(mesh: Mesh) -> np.ndarray:
@@ -121,11 +115,11 @@ def _trajectory(mesh: Mesh) -> np.ndarray:
 def _write_basis(sources, scene, group, count, rank, method, rng) -> np.ndarray:
     rows = ROWS[group]
     V = np.linalg.qr(rng.standard_normal((3 * rows * count, 14)))[0][:, :rank]
-    with _new(sources.basis(scene, group, method)) as file:
+    with write_hdf5(sources.basis(scene, group, method)) as file:
         file["V"], file["mean"] = V, np.zeros(len(V))
         file["singular_values"] = 0.5 ** np.arange(14)
         file.attrs.update(rank=rank, roundoff=1e-12, rows_per_element=rows)
-    with _new(sources.snapshots(scene, group)) as file:
+    with write_hdf5(sources.snapshots(scene, group)) as file:
         for split in ("train", "test", "heldout"):
             file[split] = rng.standard_normal((10, rows * count, 3))
             file[f"{split}_frames"] = np.arange(0, FRAMES, 2) + (split != "train")
@@ -136,7 +130,7 @@ def _write_basis(sources, scene, group, count, rank, method, rng) -> np.ndarray:
 
 def _write_sampling(path: Path, V: np.ndarray, group: str, method: str) -> None:
     size = 3 * ROWS[group]
-    with _new(path) as file:
+    with write_hdf5(path) as file:
         for r in range(1, V.shape[1] + 1):
             if METHOD_ROWS[method] == "scalar":
                 entries = deim_entries(V[:, :r])
@@ -151,7 +145,7 @@ def _write_sampling(path: Path, V: np.ndarray, group: str, method: str) -> None:
 
 
 def _write_reruns(sources, scene, group, method, positions, rank, rng) -> None:
-    with _new(sources.rerun(scene, group, method)) as file:
+    with write_hdf5(sources.rerun(scene, group, method)) as file:
         file["displacement"] = np.ones(FRAMES)
         for r in (6, 10, 14, 20):
             store = file.create_group(f"r{r:04d}")

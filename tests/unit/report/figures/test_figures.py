@@ -12,6 +12,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from pdrom.core.errors import StorageError
+from pdrom.core.store import atomic_path, seal_path
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import save_mesh
 from pdrom.report.figures import FIGURES, Sources, figure_inputs
@@ -41,7 +42,8 @@ def test_draws_without_warnings_and_writes_both_files(study, figure_name, tmp_pa
     assert pdf.read_bytes().startswith(b"%PDF")
     assert png.read_bytes().startswith(b"\x89PNG")
     assert pdf.stat().st_size < 1_500_000
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.pdf", "a.png"]
+    seals = [seal_path(pdf).name, seal_path(png).name]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [*seals, "a.pdf", "a.png"]
 
 
 def test_holds_more_than_a_note(study, figure_name):
@@ -105,9 +107,10 @@ def test_bytes_are_equal_in_another_process(study, tmp_path):
 def test_reads_only_what_it_declares(study, figure_name, tmp_path):
     spec, holdings = study.specs[figure_name], study.sources.holdings
     for path in map(Path, figure_inputs(figure_name, spec, holdings, str(study.root))):
-        target = tmp_path / path.relative_to(study.root)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(path, target)
+        target = tmp_path / path.relative_to(study.root).parent
+        target.mkdir(parents=True, exist_ok=True)
+        for file in (path, seal_path(path)):
+            shutil.copy(file, target)
     assert draw_figure(figure_name, Sources(tmp_path, holdings), spec).axes
 
 
@@ -154,8 +157,11 @@ def test_a_run_that_never_began_says_why(study):
 
 def test_a_run_out_of_view_is_drawn_to_a_stated_scale(small_study):
     study = small_study({"spring_twist": ("spring",)}, ["deim-joint"])
-    with h5py.File(study.sources.rerun("spring_twist", "spring", "deim-joint"), "a") as file:
-        file["r0006/positions"][...] *= 8.0
+    path = study.sources.rerun("spring_twist", "spring", "deim-joint")
+    with atomic_path(path) as copy:
+        shutil.copyfile(path, copy)
+        with h5py.File(copy, "a") as file:
+            file["r0006/positions"][...] *= 8.0
     figure = draw(study, "spring_runs", ranks=(6, 14))
     assert sum("scale 1 :" in text for text in texts(figure)) == 1
 

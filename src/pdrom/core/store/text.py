@@ -1,0 +1,19 @@
+"""Plain text: records, and what TeX reads."""
+
+import os
+from pathlib import Path
+
+from pdrom.core.store.atomic import atomic_path
+from pdrom.core.store.seal import require_intact
+
+
+def write_text(text: str, path: str | os.PathLike[str]) -> None:
+    """Write ``text`` as UTF-8."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def read_text(path: str | os.PathLike[str]) -> str:
+    """Read what `write_text` wrote; StorageError if it is missing or damaged."""
+    require_intact(path)
+    return Path(path).read_text(encoding="utf-8")

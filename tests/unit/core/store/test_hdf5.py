@@ -1,0 +1,112 @@
+"""HDF5: equal bytes for equal content, faults that are named."""
+
+import errno
+import os
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+
+from pdrom.core.errors import StorageError
+from pdrom.core.store import open_hdf5, seal_path, write_hdf5, write_text
+
+
+def test_failed_hdf5_leaves_the_old_file(tmp_path):
+    path = tmp_path / "result.h5"
+    with write_hdf5(path) as file:
+        file["x"] = np.arange(3)
+    before = path.read_bytes()
+    with pytest.raises(ZeroDivisionError), write_hdf5(path) as file:
+        file["x"] = np.arange(9)
+        raise ZeroDivisionError
+    assert path.read_bytes() == before
+    assert sorted(tmp_path.iterdir()) == sorted([path, seal_path(path)])
+
+
+def test_equal_content_equal_bytes(tmp_path):
+    for name in ("one.h5", "two.h5"):
+        with write_hdf5(tmp_path / name) as file:
+            file.attrs["title"] = "t"
+            file["b"] = np.linspace(0.0, 1.0, 50)
+            file["a/c"] = np.arange(4)
+    assert (tmp_path / "one.h5").read_bytes() == (tmp_path / "two.h5").read_bytes()
+
+
+def test_missing_pieces_are_named(tmp_path):
+    path = tmp_path / "few.h5"
+    with pytest.raises(StorageError, match=r"few\.h5: no such file"), open_hdf5(path):
+        pass
+    with write_hdf5(path) as file:
+        file["x"] = 1
+    with pytest.raises(StorageError, match=r"few\.h5.*'?y'?"), open_hdf5(path) as file:
+        file["y"][...]
+    with pytest.raises(StorageError, match=r"few\.h5.*unit"), open_hdf5(path) as file:
+        file.attrs["unit"]
+
+
+def test_reading_does_not_write(tmp_path):
+    path = tmp_path / "a.h5"
+    with write_hdf5(path) as file:
+        file["x"] = 1
+    with open_hdf5(path) as file:
+        assert isinstance(file, h5py.File)
+        assert file.mode == "r"
+
+
+def test_an_interruption_inside_hdf5_leaves_the_old_file(tmp_path):
+    path = tmp_path / "result.h5"
+    path.write_text("old")
+    with pytest.raises(KeyboardInterrupt), write_hdf5(path) as file:
+        file["x"] = np.arange(1000.0)
+        raise KeyboardInterrupt
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+LIMITED = """
+import resource, sys
+import numpy as np
+from pdrom.core.errors import StorageError
+from pdrom.core.store import write_hdf5
+resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+try:
+    with write_hdf5(sys.argv[1]) as file:
+        data = file.create_dataset("x", (100, 1000), dtype="f8")
+        for i in range(100):
+            data[i] = i
+except StorageError as error:
+    sys.exit(str(error))
+"""
+
+
+def test_no_space_in_the_middle_of_a_file(tmp_path):
+    """By a limit on the size of files, in a process of its own."""
+    path = tmp_path / "result.h5"
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, path], capture_output=True, text=True, check=False
+    )
+    assert done.stderr == f"{path}: cannot be written ({os.strerror(errno.EFBIG)})\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_is_not_hdf5_is_named(tmp_path):
+    write_text("no HDF5", tmp_path / "a.h5")
+    with pytest.raises(StorageError, match=r"a\.h5: cannot be read"), open_hdf5(tmp_path / "a.h5"):
+        pass
+    assert (tmp_path / "a.h5").exists()
+
+
+@pytest.mark.parametrize("damaged", [True, False])
+def test_an_error_while_reading_leads_to_another_check(tmp_path, damaged):
+    """What the disk lost after the first check is set aside; another error is not damage."""
+    path = tmp_path / "a.h5"
+    with write_hdf5(path) as file:
+        file["x"] = 1
+    message = "set aside" if damaged else os.strerror(errno.ENOLCK)
+    with pytest.raises(StorageError, match=message), open_hdf5(path):
+        if damaged:
+            os.truncate(path, 100)
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+    assert path.exists() != damaged

@@ -1,0 +1,207 @@
+"""Damage of any kind, in a result or in its seal, is noticed and leads to a new file."""
+
+import errno
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from pdrom.core.errors import StorageError
+from pdrom.core.store import (
+    check_file,
+    open_hdf5,
+    read_table,
+    read_text,
+    require_intact,
+    seal_path,
+    write_hdf5,
+    write_table,
+    write_text,
+)
+
+
+def write_one(path: Path) -> None:
+    """A small result of the kind that the name says."""
+    if path.suffix == ".h5":
+        with write_hdf5(path) as file:
+            file["x"] = np.linspace(0.0, 1.0, 64)
+            file["x"].attrs["unit"] = "m"
+            file["group/y"] = np.arange(30)
+    elif path.suffix == ".csv":
+        write_table(pd.DataFrame({"scene": ["a", "b", "c"], "error": [0.1, np.nan, 1e-300]}), path)
+    else:
+        write_text("\\newcommand{\\val}{1}\n" * 3, path)
+
+
+def read_one(path: Path) -> None:
+    """Read all of it as a job does."""
+    if path.suffix == ".h5":
+        with open_hdf5(path) as file:
+            file.visititems(lambda _, item: item[()] if isinstance(item, h5py.Dataset) else None)
+    elif path.suffix == ".csv":
+        read_table(path)
+    else:
+        read_text(path)
+
+
+@pytest.fixture(scope="module", params=["r.h5", "r.csv", "r.tex"])
+def result(request, tmp_path_factory) -> Path:
+    """A small result with its seal; what a test does to it is undone by `noticed`."""
+    path = tmp_path_factory.mktemp("result") / request.param
+    write_one(path)
+    assert check_file(path) == "intact"
+    return path
+
+
+def noticed(path: Path, content: bytes | None = None, seal: bytes | None = None) -> bool:
+    """Whether other bytes of the file, or of its seal, are found and the file is set aside.
+
+    Both are put back.
+    """
+    before = path.read_bytes(), seal_path(path).read_bytes()
+    path.write_bytes(before[0] if content is None else content)
+    seal_path(path).write_bytes(before[1] if seal is None else seal)
+    assert check_file(path) == "damaged"
+    aside = path.with_name(f"{path.name}.damaged")
+    with pytest.raises(StorageError, match=f"damaged, .* set aside as {aside.name}, the next run"):
+        read_one(path)
+    assert [p.name for p in path.parent.iterdir()] == [aside.name]
+    aside.unlink()
+    path.write_bytes(before[0])
+    seal_path(path).write_bytes(before[1])
+    return True
+
+
+def flipped(content: bytes, bit: int) -> bytes:
+    """``content`` with one bit changed."""
+    changed = bytearray(content)
+    changed[bit // 8] ^= 1 << bit % 8
+    return bytes(changed)
+
+
+@pytest.mark.parametrize("count", [1, 512, 4096])
+def test_a_zeroed_end_is_noticed(result, count):
+    content = result.read_bytes()
+    count = min(count, len(content))
+    kept = content[: len(content) - count]
+    ends = {kept + bytes([filler]) * count for filler in (0, 255)} - {content}
+    for changed in ends:  # the last byte of an HDF5 file may be a zero
+        assert noticed(result, changed)
+
+
+def test_every_cut_is_noticed(result):
+    content = result.read_bytes()
+    line_ends = [i + 1 for i, byte in enumerate(content) if byte == ord("\n")]
+    for kept in {*range(0, len(content), 512), *line_ends, len(content) - 1} - {len(content)}:
+        assert noticed(result, content[:kept])
+
+
+def test_every_lost_or_repeated_line_is_noticed(result):
+    lines = result.read_bytes().splitlines(keepends=True)
+    for i in range(len(lines)):
+        assert noticed(result, b"".join(lines[:i] + lines[i + 1 :]))
+        assert noticed(result, b"".join(lines[: i + 1] + lines[i:]))
+
+
+def test_appended_bytes_are_noticed(result):
+    for more in (b"\0", b"\n", b"a,b\n"):
+        assert noticed(result, result.read_bytes() + more)
+
+
+def test_a_changed_bit_in_every_byte_of_the_seal_is_noticed(result):
+    seal = seal_path(result).read_bytes()
+    for i in range(len(seal)):
+        assert noticed(result, seal=flipped(seal, 8 * i + i % 8))
+
+
+def test_every_cut_seal_is_noticed(result):
+    seal = seal_path(result).read_bytes()
+    for changed in (*(seal[:kept] for kept in range(len(seal))), seal + b"\n", seal.upper()):
+        assert noticed(result, seal=changed)
+
+
+@given(data=st.data())
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_changed_bit_in_the_file_and_one_in_the_seal_are_noticed(result, data):
+    content, seal = result.read_bytes(), seal_path(result).read_bytes()
+    bit = data.draw(st.integers(0, 8 * len(content) - 1))
+    other = data.draw(st.none() | st.integers(0, 8 * len(seal) - 1))
+    changed = seal if other is None else flipped(seal, other)
+    assert noticed(result, flipped(content, bit), changed)
+
+
+def test_a_result_without_its_seal_is_unsealed_and_set_aside(result, tmp_path):
+    copy = shutil.copy(result, tmp_path)
+    assert check_file(copy) == "unsealed"
+    with pytest.raises(StorageError, match=r"its checksum .* is missing .*set aside"):
+        read_one(Path(copy))
+    assert [p.name for p in tmp_path.iterdir()] == [f"{result.name}.damaged"]
+
+
+def test_a_folder_that_is_copied_or_renamed_stays_intact(result, tmp_path):
+    shutil.copytree(result.parent, tmp_path / "copy")
+    assert check_file(tmp_path / "copy" / result.name) == "intact"
+    read_one(tmp_path / "copy" / result.name)
+
+
+def test_the_seal_of_another_result_does_not_fit(result, tmp_path):
+    """Equal content under another name has another seal."""
+    shutil.copy(result, tmp_path / "other")
+    shutil.copy(seal_path(result), seal_path(tmp_path / "other"))
+    assert check_file(tmp_path / "other") == "damaged"
+
+
+def test_checking_changes_nothing(result):
+    before = {path: path.read_bytes() for path in result.parent.iterdir()}
+    result.write_bytes(b"damaged")
+    assert check_file(result) == "damaged"
+    assert result.read_bytes() == b"damaged"
+    result.write_bytes(before[result])
+    assert {path: path.read_bytes() for path in result.parent.iterdir()} == before
+
+
+def test_a_new_file_heals(result, tmp_path):
+    path = tmp_path / result.name
+    write_one(path)
+    path.write_bytes(b"")
+    with pytest.raises(StorageError, match="set aside"):
+        require_intact(path)
+    write_one(path)
+    read_one(path)
+    assert path.read_bytes() == result.read_bytes()
+
+
+def test_what_is_not_there_is_named(tmp_path):
+    for check in (check_file, require_intact):
+        with pytest.raises(StorageError, match=r"none\.csv: no such file"):
+            check(tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize(
+    ("number", "aside"), [(errno.EIO, True), (errno.EACCES, False), (errno.ENOMEM, False)]
+)
+def test_only_what_the_disk_lost_is_set_aside(tmp_path, monkeypatch, number, aside):
+    """A file that may not be read, or not now, is not damaged."""
+    path = tmp_path / "t.csv"
+    write_one(path)
+
+    def fail(*_):
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr("hashlib.file_digest", fail)
+    with pytest.raises(StorageError, match="set aside" if aside else os.strerror(number)):
+        read_table(path)
+    assert path.exists() != aside
+
+
+@pytest.mark.skipif(shutil.which("b2sum") is None, reason="b2sum is not installed")
+def test_the_seal_is_what_b2sum_checks(result):
+    command = ["b2sum", "--check", "--strict", seal_path(result).name]
+    assert subprocess.run(command, cwd=result.parent, check=False).returncode == 0
