@@ -109,7 +109,7 @@ class _Trial:
         )  # fmt: skip
         whole = outcome.blowup_frame is None
         displacement = displacement_norms(self.reference)
-        share = None if seen.fallback_frames is None else seen.fallback_frames / outcome.frames
+        share = seen.fallback_frames / outcome.frames if seen.watched else None
         return {
             "scene": self.scene.config.name,
             "group": self.group,

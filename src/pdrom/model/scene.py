@@ -180,9 +180,16 @@ class Scene:
         _check_size(config, mesh)
         masses = np.full(mesh.vertices, config.vertex_mass)
         effects = [_bind(entry, config.name, mesh, masses) for entry in config.effects]
-        roles = (ConstraintGroup, Force, Boundary, Contact, Start)
-        by_role = [[e for e in effects if isinstance(e, role)] for role in roles]
-        scene = cls(config, mesh, masses, *by_role)
+        scene = cls(
+            config,
+            mesh,
+            masses,
+            groups=[e for e in effects if isinstance(e, ConstraintGroup)],
+            forces=[e for e in effects if isinstance(e, Force)],
+            boundaries=[e for e in effects if isinstance(e, Boundary)],
+            contacts=[e for e in effects if isinstance(e, Contact)],
+            starts=[e for e in effects if isinstance(e, Start)],
+        )
         _check_holds(scene.boundaries, config)
         for group in scene.groups:
             group.threads = threads

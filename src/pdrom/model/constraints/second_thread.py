@@ -45,6 +45,11 @@ def _made_for(_process: int) -> "_SecondThread":
     return _SecondThread()
 
 
+def _nothing() -> float:
+    """No work."""
+    return 0.0
+
+
 class _SecondThread:
     """One daemon thread, one piece of work at a time."""
 
@@ -54,7 +59,7 @@ class _SecondThread:
         address = self._counters.ctypes.data
         self._given, self._done = address, address + _LINE * self._counters.itemsize
         self._count = 0
-        self._work: Work | None = None
+        self._work: Work = _nothing
         self._result: float | BaseException = 0.0
         self._asleep = False
         self._wake = threading.Event()
@@ -75,7 +80,7 @@ class _SecondThread:
                 # the caller's arrays may go away once this returns
                 while not _reaches(self._done, self._count, YIELD, 0):
                     time.sleep(0)
-                other, self._work, self._result = self._result, None, 0.0
+                other, self._work, self._result = self._result, _nothing, 0.0
         if isinstance(other, BaseException):
             raise other
         return own, other

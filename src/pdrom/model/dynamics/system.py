@@ -64,7 +64,7 @@ def _put(values, rows, out):
             out[rows[i], axis] = values[i, axis]
 
 
-def require_accurate(matrix, solve: Callable[[np.ndarray, np.ndarray], None]) -> None:
+def require_accurate(matrix, solve: Callable[[np.ndarray, np.ndarray], object]) -> None:
     """Raise SolverError if the factored ``matrix`` (n, n) does not return a known solution.
 
     The known solution is a translation: all springs and elements cancel in it and nothing but

@@ -62,7 +62,7 @@ class Poke(Boundary):
 
     def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
         turn, phase = divmod(frame, self.config.over + self.config.rest)
-        if turn != self._turn or phase == 0:
+        if self._anchor is None or turn != self._turn or phase == 0:
             self._turn, self._anchor = turn, current.copy()
         progress = (phase + 1) / self.config.over
         target = self._anchor.copy()

@@ -127,7 +127,12 @@ class ConvergedStepper(Stepper):
         """Whether every frame reached the tolerance."""
         return all(change <= self._tolerance for change in self.changes)
 
-    def step(self, state: State, frame: int, on_last_iterate=None) -> tuple[State, FrameReport]:
+    def step(
+        self,
+        state: State,
+        frame: int,
+        on_last_iterate: Callable[[np.ndarray], None] | None = None,
+    ) -> tuple[State, FrameReport]:
         """Do one frame; see `Stepper.step`. The report holds the objective at the end only."""
         s, elimination, base = self._begin(state, frame)
         rhs = np.empty_like(s)

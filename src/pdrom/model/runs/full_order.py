@@ -2,7 +2,7 @@
 
 import logging
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import h5py
@@ -103,7 +103,7 @@ class _SnapshotRecorder:
             position = {int(frame): i for i, frame in enumerate(frames)}
             self._targets.append((group, position, data, roundoff))
 
-    def observer(self, frame: int):
+    def observer(self, frame: int) -> Callable[[np.ndarray], None] | None:
         """Function of the last local iterate, or None if this frame stores nothing."""
         wanted = [t for t in self._targets if frame in t[1]]
         if not wanted:

@@ -21,7 +21,7 @@ def main() -> int:
     signal.pthread_sigmask(signal.SIG_BLOCK, FORWARDED)
     connection = connect(place) if place and script else None
     answer = ask(connection) if connection else b""
-    if not answer:
+    if connection is None or not answer:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, FORWARDED)
         os.execv(sys.executable, [sys.executable, *sys.argv[1:]])
     job = int(answer)

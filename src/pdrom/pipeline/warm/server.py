@@ -119,7 +119,9 @@ class Server:
         folder, script, *environment = parts
         os.chdir(folder)
         os.environ.clear()
-        os.environ.update(entry.split("=", 1) for entry in environment)
+        for entry in environment:
+            key, _, value = entry.partition("=")
+            os.environ[key] = value
         sys.argv = [script]
         sys.path[0] = os.path.dirname(script)
 

@@ -126,7 +126,7 @@ def _mean_error(matrix: np.ndarray, spec: BasisSpec) -> float:
     return 0.5 * np.finfo(float).eps * matrix.shape[1] * float(np.linalg.norm(matrix))
 
 
-def _active_axes(matrix: np.ndarray, roundoff: float) -> tuple[bool, bool, bool]:
+def _active_axes(matrix: np.ndarray, roundoff: float) -> tuple[bool, ...]:
     """Which axes hold more than round-off (of the data, or relative to the largest axis)."""
     norms = np.array([np.linalg.norm(matrix[axis::3]) for axis in range(3)])
     relative = max(matrix.shape) * np.finfo(float).eps * norms.max()
@@ -165,7 +165,7 @@ def _mean_in_modes(
     v: np.ndarray,
     centred: np.ndarray,
     first: np.ndarray,
-    active: tuple[bool, bool, bool],
+    active: tuple[bool, ...],
     signs: np.random.Generator | None,
 ) -> np.ndarray:
     """The published code's modes: rescaled, first snapshot added to each, QR axis by axis.

@@ -36,7 +36,7 @@ class Basis:
     roundoff: float
     rows_per_element: int
     separate_axes: bool
-    active_axes: tuple[bool, bool, bool]
+    active_axes: tuple[bool, ...]
     trained: np.ndarray
     origin: str = "basis"
 

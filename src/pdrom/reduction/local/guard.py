@@ -27,30 +27,32 @@ class GuardRecord:
     """What a guard saw in a run.
 
     frame, group, reason : of the first frame that left the trained range (None: no frame did)
-    count : frames that left it; None if nobody watched
-    fallback_frames : frames that were repeated with full projections; None if nobody watched
+    count : frames that left it
+    fallback_frames : frames that were repeated with full projections
     stopped : whether the run was ended by the guard
+    watched : whether anybody watched
     """
 
     frame: int | None = None
     group: str | None = None
     reason: str | None = None
-    count: int | None = 0
-    fallback_frames: int | None = 0
+    count: int = 0
+    fallback_frames: int = 0
     stopped: bool = False
+    watched: bool = True
 
     @classmethod
     def unwatched(cls) -> "GuardRecord":
         """Record of a run without a guard."""
-        return cls(count=None, fallback_frames=None)
+        return cls(watched=False)
 
     def columns(self) -> dict[str, object]:
-        """Cells of the tables."""
+        """Cells of the tables; counts are empty if nobody watched."""
         return {
             "guard_frame": self.frame,
             "guard_reason": self.reason,
-            "guard_count": self.count,
-            "fallback_frames": self.fallback_frames,
+            "guard_count": self.count if self.watched else None,
+            "fallback_frames": self.fallback_frames if self.watched else None,
         }
 
 

@@ -1,5 +1,7 @@
 """The reduced local step: S^T W p(y) is replaced by S^T W (mean + V c(y))."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from pdrom.model.constraints.base import ConstraintGroup
@@ -85,7 +87,7 @@ def _parts(vertices: int, r: int) -> list[slice]:
     return [slice(0, middle), slice(middle, vertices)][: 1 + (middle < vertices)]
 
 
-def _local_positions(reduction: Reduction):
+def _local_positions(reduction: Reduction) -> Callable[[np.ndarray], np.ndarray]:
     """Map from entries of the full vector to entries of the sampled elements' vector."""
     size = 3 * reduction.basis.rows_per_element
     order = np.argsort(reduction.elements, kind="stable")

@@ -3,7 +3,7 @@
 import numpy as np
 
 
-def joint_rows(v: np.ndarray, active: tuple[bool, bool, bool], repeat: bool) -> np.ndarray:
+def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndarray:
     """Row indices (r,) of the basis ``v`` (3 rows, r), nested in r.
 
     For mode k each axis a has its own system (P^T V_a) c_a = P^T v_{k,a}; the row with the largest

@@ -12,13 +12,15 @@ and no array that grows with the mesh.
 
 from collections.abc import Callable, Sequence
 from time import perf_counter
+from typing import TypeGuard
 
 import numpy as np
 from numba import njit
 
 from pdrom.model.constraints.gradient_kernel import call
 from pdrom.model.dynamics.acceleration import Anderson
-from pdrom.model.dynamics.stepper import Stepper
+from pdrom.model.dynamics.space import Solve
+from pdrom.model.dynamics.stepper import LocalStep, Stepper
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
 from pdrom.reduction.subspace.space import DenseElimination, ReducedSpace
 
@@ -36,23 +38,25 @@ class FusedStepper(Stepper):
         space: ReducedSpace,
         time_step: float,
         iterations: int,
-        local_steps: Sequence[SubspaceLocalStep],
+        local_steps: Sequence[LocalStep],
         acceleration: Anderson | None = None,
     ) -> None:
         super().__init__(space, time_step, iterations, local_steps, False, acceleration)
-        fused = acceleration is None and _fusible(local_steps)
-        self._sampled = _Sampled(local_steps) if fused else None
+        self._sampled = None
+        if acceleration is None and _fusible(local_steps):
+            self._sampled = _Sampled(local_steps)
         self._operators: dict[int, _Operators] = {}
 
     def _iterate(
         self,
         s: np.ndarray,
         base: np.ndarray,
-        elimination: DenseElimination,
+        elimination: Solve,
         seconds: np.ndarray,
         on_last_iterate: Callable[[np.ndarray], None] | None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        if self._sampled is None or on_last_iterate is not None:
+        watched = on_last_iterate is not None
+        if self._sampled is None or watched or not isinstance(elimination, DenseElimination):
             return super()._iterate(s, base, elimination, seconds, on_last_iterate)
         before = perf_counter()
         # eliminations live as long as their space
@@ -65,7 +69,7 @@ class FusedStepper(Stepper):
         return y, np.empty(0)
 
 
-def _fusible(steps: Sequence[SubspaceLocalStep]) -> bool:
+def _fusible(steps: Sequence[LocalStep]) -> TypeGuard[Sequence[SubspaceLocalStep]]:
     return all(
         isinstance(step, SubspaceLocalStep) and step.group.gradient_kernel is not None
         for step in steps

@@ -84,6 +84,6 @@ class Training:
 def _full_projections(scene: Scene, columns: Columns) -> Stepper:
     """Step loop in the subspace with the projections of all elements."""
     steps = [SubspaceLocalStep(group, columns) for group in scene.groups]
-    space = ReducedSpace(scene, columns, sum(step.matrix for step in steps))
+    space = ReducedSpace(scene, columns, [step.matrix for step in steps])
     config = scene.config
     return Stepper(space, config.time_step, config.iterations, steps, track_objective=False)

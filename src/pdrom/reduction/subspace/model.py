@@ -39,14 +39,14 @@ class SubspaceModel:
 
     def loop(self, scene: Scene) -> tuple[Stepper, State]:
         """Step loop in the coordinates of the subspace, and the initial state."""
-        steps = []
+        steps: list[SubspaceLocalStep | InterpolatedLocalStep] = []
         for group in scene.groups:
             chosen = self.samples.get(group.name, Samples())
             if isinstance(chosen, Interpolation):
                 steps.append(InterpolatedLocalStep(group, self.columns, chosen))
                 continue
             steps.append(SubspaceLocalStep(group, self.columns, chosen.elements, chosen.factors))
-        space = ReducedSpace(scene, self.columns, sum(step.matrix for step in steps))
+        space = ReducedSpace(scene, self.columns, [step.matrix for step in steps])
         config = scene.config
         loop = FusedStepper(space, config.time_step, config.iterations, steps, scene.acceleration())
         return loop, reduced_state(scene, self.columns)

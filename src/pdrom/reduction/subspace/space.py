@@ -5,6 +5,8 @@ arrays have the length of the subspace, of the held vertices, or (for a scene wi
 probe vertices.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy import linalg
 
@@ -59,18 +61,18 @@ class ReducedSpace(Space):
 
     Parameters
     ----------
-    matrix : (K, K) stiffness B^T (sum of the groups' S^T W S) B, possibly with sampled weights
+    matrices : (K, K) stiffness B^T S^T W S B of each group, possibly with sampled weights
 
     Attributes
     ----------
     matrix : (K, K) system matrix A: inertia and stiffness
     """
 
-    def __init__(self, scene: Scene, columns: Columns, matrix: np.ndarray) -> None:
+    def __init__(self, scene: Scene, columns: Columns, matrices: Sequence[np.ndarray]) -> None:
         h = scene.config.time_step
         self.columns = columns
         mass = columns.B.T @ (scene.masses[:, None] * columns.B)
-        self.matrix = mass / h**2 + matrix
+        self.matrix = mass / h**2 + sum(matrices, np.zeros_like(mass))
         self._inertia = mass / h**2
         self._forces = [_reduce_force(f, columns, mass, scene) for f in scene.forces]
         self._boundaries = [_ReducedBoundary(b, columns) for b in scene.boundaries]

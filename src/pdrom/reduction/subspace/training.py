@@ -46,19 +46,20 @@ def training_run(
     coordinates (K, 3), or where the scene does.
     """
     steps = [SubspaceLocalStep(group, columns) for group in scene.groups]
-    space = ReducedSpace(scene, columns, sum(step.matrix for step in steps))
+    space = ReducedSpace(scene, columns, [step.matrix for step in steps])
     watch = _Watch(steps[0])
     config = scene.config
     loop = Stepper(
         space, config.time_step, config.iterations, [watch, *steps[1:]], track_objective=False
     )
     measures = _Measures(space)
-    state, kept = start or reduced_state(scene, columns), []
+    state = start or reduced_state(scene, columns)
+    kept: list[TrainingFrame] = []
     wanted = {int(frame) for frame in frames}
     for frame in range(max(wanted) + 1):
         watch.iterates = [] if frame in wanted else None
         fixed = space.fixed(frame, state.positions)[0]
-        start = state.positions
+        first = state.positions
         state, _ = loop.step(state, frame)
         if frame in wanted:
             # a contact may have moved the end of the frame: then it is no iterate
@@ -66,7 +67,7 @@ def training_run(
             if len(iterates) == 1:
                 iterates = [*iterates, state.positions]
             pairs = np.stack([iterates[:-1], iterates[1:]], axis=1)
-            kept.append(TrainingFrame(start, pairs, measures.of(fixed)))
+            kept.append(TrainingFrame(first, pairs, measures.of(fixed)))
     return kept
 
 

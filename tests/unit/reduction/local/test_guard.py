@@ -87,6 +87,7 @@ def test_a_benign_run_at_full_rank_is_left_alone(case, action):
     assert seen == GuardRecord()
     plain, unseen = case.run(reduction, action="none")
     assert unseen == GuardRecord.unwatched()
+    assert unseen.columns()["guard_count"] is None
     np.testing.assert_array_equal(outcome.positions, plain.positions)
 
 

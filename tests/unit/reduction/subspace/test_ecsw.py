@@ -43,7 +43,7 @@ def test_objective_never_rises_whatever_the_factors(name, seed, spread):
     factors[rng.random(len(elements)) < 0.2] = 0.0
     factors[0] = 1.0
     step = SubspaceLocalStep(group, columns, elements, factors)
-    loop = Stepper(ReducedSpace(scene, columns, step.matrix), 0.016, 20, [step])
+    loop = Stepper(ReducedSpace(scene, columns, [step.matrix]), 0.016, 20, [step])
     shape = scene.mesh.points.shape
     q = scene.mesh.points + 10.0**spread * rng.standard_normal(shape)
     state = State(
@@ -109,7 +109,7 @@ def test_factors_of_one_repeat_the_iterations(pulled):
     """What is trained on is an identity: all equations hold for the iterates of the run."""
     scene, _, columns = pulled
     steps = [SubspaceLocalStep(group, columns) for group in scene.groups]
-    space = ReducedSpace(scene, columns, sum(step.matrix for step in steps))
+    space = ReducedSpace(scene, columns, [step.matrix for step in steps])
     inertia = space.matrix - sum(step.matrix for step in steps)
     frame = training_run(scene, columns, [5])[0]
     fixed = np.concatenate(columns.atom_columns)

@@ -274,7 +274,7 @@ def test_forces_that_cannot_be_reduced_are_refused():
     force.acceleration = lambda positions, velocities: velocities**2
     columns = make_columns(scene, np.stack([scene.mesh.points] * 2), "skinning", 2)
     with pytest.raises(SceneError, match="'gravity' is not affine in the velocity"):
-        ReducedSpace(scene, columns, np.eye(columns.B.shape[1]))
+        ReducedSpace(scene, columns, [np.eye(columns.B.shape[1])])
 
 
 def test_models_survive_a_file(tmp_path):
