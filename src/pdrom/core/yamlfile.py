@@ -18,8 +18,9 @@ MAX_BYTES = 1_000_000
 M = TypeVar("M", bound=BaseModel)
 
 # Numbers of the physics stay where sums and squares of them neither overflow nor lose every digit.
-Length = Annotated[float, Field(ge=-1e6, le=1e6)]
-PositiveLength = Annotated[float, Field(ge=1e-6, le=1e6)]
+MIN_LENGTH, MAX_LENGTH = 1e-6, 1e6
+Length = Annotated[float, Field(ge=-MAX_LENGTH, le=MAX_LENGTH)]
+PositiveLength = Annotated[float, Field(ge=MIN_LENGTH, le=MAX_LENGTH)]
 
 
 class ConfigModel(BaseModel):

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -16,6 +15,7 @@ from pydantic import (
 )
 
 from pdrom.core.errors import ConfigurationError, SceneError
+from pdrom.core.names import SceneName
 from pdrom.core.yamlfile import ConfigModel, describe, shown
 from pdrom.model.constraints.base import ConstraintGroup, GroupConfig
 from pdrom.model.dynamics.acceleration import Anderson
@@ -24,11 +24,11 @@ from pdrom.model.dynamics.stepper import LocalStep, State, Stepper
 from pdrom.model.dynamics.system import DEFAULT_SOLVER, GlobalSystem
 from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import Boundary, Contact, Effect, EffectConfig, Force, Seed, Start
+from pdrom.model.holding import check_holds, log_holds
 from pdrom.model.mesh.checks import check_mesh
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.mesh.types import Mesh
 
-SCENE_NAME = r"^[a-z][a-z0-9_]{0,63}$"
 # Positions and velocities of a longer run fill disk and memory: 1600 vertices for 100,000 frames.
 MAX_VERTEX_FRAMES = 160_000_000
 
@@ -60,7 +60,7 @@ class ReductionPlan(_Model):
 class SceneConfig(_Model):
     """Configuration of a scene (config/scenes/*.yaml). Units: seconds, metres, kilograms."""
 
-    name: Annotated[str, Field(pattern=SCENE_NAME)]
+    name: SceneName
     title: str
     mesh: MeshConfig
     time_step: Annotated[float, Field(ge=1e-9, le=10.0)] = 0.016
@@ -190,10 +190,14 @@ class Scene:
             contacts=[e for e in effects if isinstance(e, Contact)],
             starts=[e for e in effects if isinstance(e, Start)],
         )
-        _check_holds(scene.boundaries, config)
+        check_holds(scene.boundaries, config.name, config.frames)
         for group in scene.groups:
             group.threads = threads
         return scene
+
+    def log_holds(self) -> None:
+        """Log how many vertices each effect holds, see `pdrom.model.holding.log_holds`."""
+        log_holds(self.boundaries, self.config.name, self.mesh.vertices)
 
     def group(self, name: str) -> ConstraintGroup:
         """The constraint group called ``name``; SceneError if the scene does not list it."""
@@ -261,19 +265,3 @@ def _check_size(config: SceneConfig, mesh: Mesh) -> None:
             f"scene '{config.name}': frames = {config.frames} on {mesh.vertices} vertices: allowed "
             f"are at most {MAX_VERTEX_FRAMES // mesh.vertices} frames"
         )
-
-
-def _check_holds(boundaries: list[Boundary], config: SceneConfig) -> None:
-    """A vertex may be held twice only if nothing that holds it moves."""
-    for first, second in combinations(boundaries, 2):
-        if not (first.moves or second.moves):
-            continue
-        shared = np.intersect1d(first.vertices, second.vertices)
-        if len(shared) == 0:
-            continue
-        for frame in range(config.frames):
-            if first.active(frame) and second.active(frame):
-                raise SceneError(
-                    f"scene '{config.name}': vertex {shared[0]} is held by '{first.name}' and by "
-                    f"'{second.name}' in frame {frame}"
-                )

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from pdrom.core.errors import ConfigurationError, choices
+from pdrom.core.names import SceneName
 from pdrom.core.yamlfile import ConfigModel, validate
 from pdrom.experiments.ladder_spec import LadderSpec, load_ladder
 from pdrom.experiments.sensitivity import Sensitivity
@@ -15,7 +16,7 @@ from pdrom.experiments.subspace_ablation_spec import AblationSpec, load_ablation
 from pdrom.model.dynamics.solvers import SOLVERS
 from pdrom.model.effects.base import Seed
 from pdrom.model.mesh.config import MeshConfig
-from pdrom.model.scene import SCENE_NAME, Scene, SceneConfig
+from pdrom.model.scene import Scene, SceneConfig
 from pdrom.pipeline.scenes import (
     Coarsen,
     load_bound_scene,
@@ -28,7 +29,6 @@ from pdrom.reduction.method import MethodSpec, load_methods
 from pdrom.reduction.subspace.specs import HrpdSpec, InterpolationSpec
 
 Rank = Annotated[int, Field(ge=1, le=100_000)] | Literal["full"]
-SceneName = Annotated[str, Field(pattern=SCENE_NAME)]
 Count = Annotated[int, Field(ge=1, le=100_000)]
 
 

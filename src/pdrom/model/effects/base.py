@@ -104,6 +104,9 @@ class Boundary(Effect):
     vertices: np.ndarray
     """All vertices that the effect may ever hold, ascending (n,) int64."""
 
+    side: str | None = None
+    """Side of the rest shape that chose the vertices; None if they were listed or computed."""
+
     moves: bool
     """Whether the targets move while held."""
 

@@ -31,6 +31,7 @@ class Hold(Boundary):
     def __init__(self, config: HoldConfig, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
         self.vertices = select_vertices(mesh, config.select)
+        self.side = config.select if isinstance(config.select, str) else None
         self._anchor: np.ndarray | None = None
 
     def active(self, frame: int) -> bool:

@@ -4,6 +4,7 @@ import numpy as np
 
 from pdrom.core.errors import DegenerateElementError, MeshError
 from pdrom.core.store import require_finite
+from pdrom.core.yamlfile import MAX_LENGTH, MIN_LENGTH
 from pdrom.model.mesh.types import Mesh
 
 # An element is degenerate when its measure is below this fraction of its longest edge's power.
@@ -17,7 +18,8 @@ def check_mesh(mesh: Mesh, name: str) -> Mesh:
     ------
     MeshError
         No cells, indices out of range, NaN or Inf, unreferenced or repeated vertices, an element
-        that names a vertex twice.
+        that names a vertex twice or is given twice, an edge of more than two triangles or a face
+        of more than two tetrahedra.
     DegenerateElementError
         A triangle of zero area or a tetrahedron of zero volume at rest.
     """
@@ -27,6 +29,7 @@ def check_mesh(mesh: Mesh, name: str) -> Mesh:
         raise MeshError(f"{name}: no triangles and no tetrahedra")
     require_finite(f"{name}: points", mesh.points, MeshError)
     check_indices(cells, mesh.vertices, kind, name)
+    _check_neighbours(cells, kind, name)
     _check_vertices(mesh, cells, name)
     _check_measures(mesh, cells, kind, name)
     return mesh
@@ -46,6 +49,58 @@ def check_indices(cells: np.ndarray, vertices: int, kind: str, name: str) -> Non
         raise DegenerateElementError(
             f"{name}: {kind} {twice[0]} names a vertex twice: {cells[twice[0]].tolist()}"
         )
+
+
+def check_range(points: np.ndarray, scale: float, name: str) -> None:
+    """MeshError for a vertex or an extent that is out of range when multiplied by ``scale``.
+
+    Beyond the range squares of lengths overflow, or lose every digit.
+    """
+    limit = MAX_LENGTH / scale
+    outside = np.flatnonzero(~(np.abs(points) <= limit).all(axis=1))
+    if len(outside):
+        raise MeshError(
+            f"{name}: vertex {outside[0]} lies at {points[outside[0]].tolist()}, allowed are "
+            f"coordinates from {-limit:g} to {limit:g}"
+        )
+    extent = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
+    if extent < MIN_LENGTH / scale:
+        raise MeshError(
+            f"{name}: extent {extent:g}, allowed is at least {MIN_LENGTH / scale:g} (the longest "
+            "side of the bounding box)"
+        )
+
+
+def _check_neighbours(cells: np.ndarray, kind: str, name: str) -> None:
+    """No cell is given twice, and no edge of triangles or face of tetrahedra joins three."""
+    twice = _largest_group(np.sort(cells, axis=1))
+    if len(twice) > 1:
+        first, again = twice[:2]
+        raise MeshError(
+            f"{name}: {kind} {again} {cells[again].tolist()} repeats {kind} {first} "
+            f"{cells[first].tolist()}"
+        )
+    corners = cells.shape[1]
+    sides = [np.delete(cells, corner, axis=1) for corner in range(corners)]
+    sides = np.sort(np.concatenate(sides), axis=1)
+    shared = _largest_group(sides)
+    if len(shared) > 2:
+        side, owners = ("edge", "triangles") if corners == 3 else ("face", "tetrahedra")
+        raise MeshError(
+            f"{name}: {side} {sides[shared[0]].tolist()} belongs to {len(shared)} {owners}, "
+            "allowed: at most 2"
+        )
+
+
+def _largest_group(rows: np.ndarray) -> np.ndarray:
+    """Indices, ascending, of the row that occurs most often (the smallest one of them)."""
+    order = np.lexsort(rows.T[::-1])
+    ordered = rows[order]
+    new = (ordered[1:] != ordered[:-1]).any(axis=1)
+    starts = np.concatenate([[0], np.flatnonzero(new) + 1])
+    counts = np.diff(starts, append=len(rows))
+    largest = np.argmax(counts)
+    return order[starts[largest] :][: counts[largest]]
 
 
 def _check_vertices(mesh: Mesh, cells: np.ndarray, name: str) -> None:

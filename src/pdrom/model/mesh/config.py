@@ -11,14 +11,13 @@ from pydantic import Field, field_validator, model_validator
 
 from pdrom.core.errors import MeshError
 from pdrom.core.yamlfile import ConfigModel, Length, PositiveLength
-from pdrom.model.mesh.checks import check_mesh
+from pdrom.model.mesh.checks import check_mesh, check_range
 from pdrom.model.mesh.files import read_mesh_file
 from pdrom.model.mesh.generators import bar, cloth
+from pdrom.model.mesh.limits import MAX_VERTICES
 from pdrom.model.mesh.types import Mesh
 
 Count = Annotated[int, Field(ge=2, le=2000)]
-# A cloth of this size needs about 1 GB while its operators are built.
-MAX_VERTICES = 1_000_000
 
 
 def _check_size(**counts: int) -> None:
@@ -100,7 +99,7 @@ class BarMesh(_Model):
 
 
 class MeshFile(_Model):
-    """A mesh file below the project's folder, in any format of meshio."""
+    """A mesh file below the project's folder, of a format that keeps it in one file."""
 
     kind: Literal["file"]
     path: str
@@ -122,6 +121,7 @@ class MeshFile(_Model):
     def build(self, root: Path) -> Mesh:
         """Read the mesh."""
         mesh = read_mesh_file(self.file(root))
+        check_range(mesh.points, self.scale, self.path)
         scaled = Mesh(mesh.points * self.scale, mesh.triangles, mesh.tetrahedra)
         return check_mesh(scaled, self.path)
 

@@ -1,67 +1,129 @@
-"""Mesh files, read by meshio."""
+"""Mesh files, read by meshio in a process of its own with limits of time and memory."""
 
+import hashlib
 import io
-from contextlib import redirect_stderr, redirect_stdout
+import os
+import signal
+import subprocess
+import sys
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
 from pdrom.core.errors import MeshError
+from pdrom.model.mesh import reader
 from pdrom.model.mesh.checks import check_indices
 from pdrom.model.mesh.generators import boundary, orient
+from pdrom.model.mesh.limits import VARIABLE, MeshLimits, mesh_limits
 from pdrom.model.mesh.types import Mesh
 
-MAX_BYTES = 500_000_000
-ALLOWED_CELLS = ("triangle", "tetra")
+# Extension -> meshio's readers, tried in turn. Each opens the mesh file and no other: what a run
+# depends on is this one file, which is hashed and lies in the project. Not among them are formats
+# that keep data in further files (.xdmf, .pvd, .ele and .node, dolfin's .xml), include others
+# (.inp) or link to others (all that are HDF5 or netCDF inside: .med, .h5m, .hmf, .cgns, .e).
+FORMATS = {
+    ".avs": ("avsucd",),
+    ".bdf": ("nastran",),
+    ".dat": ("tecplot",),
+    ".dato": ("permas",),
+    ".f3grid": ("flac3d",),
+    ".fem": ("nastran",),
+    ".mdpa": ("mdpa",),
+    ".mesh": ("medit",),
+    ".meshb": ("medit",),
+    ".msh": ("gmsh", "ansys"),
+    ".nas": ("nastran",),
+    ".obj": ("obj",),
+    ".off": ("off",),
+    ".ply": ("ply",),
+    ".post": ("permas",),
+    ".stl": ("stl",),
+    ".su2": ("su2",),
+    ".tec": ("tecplot",),
+    ".ugrid": ("ugrid",),
+    ".vol": ("netgen",),
+    ".vtk": ("vtk",),
+    ".vtu": ("vtu",),
+    ".wkt": ("wkt",),
+}
+ADVICE = f"{VARIABLE}=2 in the environment doubles the limits"
 
 
 def read_mesh_file(path: Path) -> Mesh:
-    """Read triangles or tetrahedra from any format that meshio knows (.obj, .vtu, .msh, .ply ...).
+    """Read triangles or tetrahedra from a file of one of `FORMATS`.
 
     Raises
     ------
     MeshError
-        The file is missing or unreadable, holds other cells, or mixes triangles and tetrahedra.
+        The file is missing or unreadable, of another format, needs more time or memory than
+        `mesh_limits` allows, holds other cells, or mixes triangles and tetrahedra.
     """
-    # a fifth of a second that only scenes with a mesh file pay
-    import meshio
-
     if not path.is_file():
         raise MeshError(f"{path}: no such mesh file")
-    if path.stat().st_size > MAX_BYTES:
-        raise MeshError(f"{path}: larger than {MAX_BYTES} bytes")
-    try:
-        # meshio reports some faults by printing and leaving the process
-        with redirect_stdout(io.StringIO()) as said, redirect_stderr(said):
-            raw = meshio.read(path)
-    except (SystemExit, Exception) as error:
-        raise MeshError(f"{path}: not a readable mesh ({_reason(error)})") from error
-    cells = {block.type: [] for block in raw.cells}
-    for block in raw.cells:
-        cells[block.type].append(block.data)
-    kinds = [kind for kind in cells if kind not in ("vertex", "line")]
-    if len(kinds) != 1 or kinds[0] not in ALLOWED_CELLS:
+    if path.suffix.lower() not in FORMATS:
         raise MeshError(
-            f"{path}: holds cells {kinds or 'of no kind'}, "
-            f"allowed: only one of {', '.join(ALLOWED_CELLS)}"
+            f"{path}: no format that keeps the whole mesh in one file (allowed: "
+            f"{', '.join(FORMATS)}), `meshio convert {path.name} {path.stem}.vtu` makes one"
         )
+    limits = mesh_limits()
+    if path.stat().st_size > limits.file_bytes:
+        raise MeshError(f"{path}: larger than {limits.file_bytes} bytes; {ADVICE}")
     try:
-        elements = np.concatenate(cells[kinds[0]])
-        points = np.ascontiguousarray(raw.points, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise MeshError(f"{path}: not a readable mesh ({_reason(error)})") from error
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise MeshError(f"{path}: points of shape {points.shape}, required: (N, 3)")
-    check_indices(elements, len(points), kinds[0], str(path))
-    if kinds[0] == "triangle":
-        return Mesh(points, elements.astype(np.int32))
+        with path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise MeshError(f"{path}: cannot be read ({error.strerror})") from error
+    points, cells = _arrays(path, digest, limits)
+    kind = "triangle" if cells.shape[1] == 3 else "tetrahedron"
+    check_indices(cells, len(points), kind, str(path))
+    if kind == "triangle":
+        return Mesh(points.copy(), cells.astype(np.int32))
     # formats differ in how they number the corners
-    tetrahedra = orient(points, elements)
-    return Mesh(points, boundary(tetrahedra), tetrahedra)
+    tetrahedra = orient(points, cells)
+    return Mesh(points.copy(), boundary(tetrahedra), tetrahedra)
 
 
-def _reason(error: BaseException) -> str:
-    """What went wrong, on one short line."""
-    if isinstance(error, SystemExit):
-        return "no reader takes it"
-    return f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+@lru_cache(maxsize=8)
+def _arrays(path: Path, digest: str, limits: MeshLimits) -> tuple[np.ndarray, np.ndarray]:
+    """Points and cells of a file, read once as long as its content (``digest``) is the same."""
+    numbers = (limits.seconds, limits.memory, limits.vertices, limits.cells)
+    # -P: the modules beside the script must not hide those of the standard library
+    command = [sys.executable, "-P", "-X", "utf8", "-W", "ignore", reader.__file__, str(path)]
+    command += [",".join(FORMATS[path.suffix.lower()]), *map(str, numbers)]
+    # every thread of the linear algebra, which is not used here, would reserve memory
+    single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    try:
+        ended = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=limits.deadline,
+            env=os.environ | single,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise MeshError(f"{path}: not read after {limits.deadline:g} s; {ADVICE}") from error
+    except OSError as error:
+        raise MeshError(f"{path}: the reader does not start ({error.strerror})") from error
+    if ended.returncode:
+        raise MeshError(f"{path}: {_fault(ended, limits)}")
+    pipe = io.BytesIO(ended.stdout)
+    points, cells = np.load(pipe, allow_pickle=False), np.load(pipe, allow_pickle=False)
+    points.flags.writeable = cells.flags.writeable = False
+    return points, cells
+
+
+def _fault(ended: subprocess.CompletedProcess[bytes], limits: MeshLimits) -> str:
+    """Why a reader ended without a mesh."""
+    status = ended.returncode
+    if status == reader.REFUSED:
+        return ended.stdout.decode(errors="replace")
+    if status == reader.NO_MEMORY:
+        return f"not a readable mesh in {limits.memory / 1e9:g} GB of memory; {ADVICE}"
+    if status == -getattr(signal, "SIGXCPU", 0):
+        return f"not a readable mesh in {limits.seconds} s of processor time: cut off, or very large; {ADVICE}"
+    if status < 0:
+        return f"the reader was ended by signal {-status} ({signal.strsignal(-status)})"
+    said = ended.stderr.decode(errors="replace").split("\n")
+    last = next((line for line in reversed(said) if line.strip()), "without a word")
+    return f"the reader failed with status {status}: {last[:200]}"
