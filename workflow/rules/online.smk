@@ -10,6 +10,7 @@ rule online:
         settings=PLAN.online_settings(),
         protocol=PLAN.settings.timing.model_dump(),
         root=str(PLAN.root),
+        content=lambda w: PLAN.mesh_content(w.scene),
         code=lambda w: PLAN.online_code(w.scene),
     message:
         "Online cost of {wildcards.scene} (alone on the machine)"

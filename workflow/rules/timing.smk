@@ -43,6 +43,7 @@ rule scaling:
         settings=PLAN.scaling_settings(),
         solver=PLAN.settings.solver,
         root=str(PLAN.root),
+        content=lambda w: PLAN.mesh_content(w.scene),
         factor=lambda w: float(w.factor),
         code=lambda w: PLAN.scene_code("pdrom.experiments.scaling", w.scene),
     message:

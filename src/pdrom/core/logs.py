@@ -64,6 +64,23 @@ def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
             handler.close()
 
 
+@contextmanager
+def planning_log(quiet: bool) -> Iterator[None]:
+    """Show the package's warnings on stderr, or drop them if ``quiet``.
+
+    Every job plans again in a process of its own: what the main process said is enough.
+    """
+    logger = logging.getLogger("pdrom")
+    handler = logging.NullHandler() if quiet else logging.StreamHandler()
+    handler.setLevel(logging.WARNING)
+    handler.setFormatter(logging.Formatter("pdrom: warning: %(message)s"))
+    logger.addHandler(handler)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+
+
 def _fault(error: Exception) -> str:
     if isinstance(error, MemoryError):
         return f"out of memory ({error})" if str(error) else "out of memory"

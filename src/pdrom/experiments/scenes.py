@@ -13,4 +13,7 @@ def scene_of(config: Any, mesh_path: Any, run: str = "train", threads: int = 1) 
     scene = SceneConfig.model_validate(config)
     if run == "heldout":
         scene = scene.held_out_variant()
-    return Scene.build(scene, load_mesh(getattr(mesh_path, "path", mesh_path)), threads)
+    mesh = load_mesh(getattr(mesh_path, "path", mesh_path))
+    bound = Scene.build(scene, mesh, threads)
+    bound.log_holds()
+    return bound

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pdrom.core.errors import ConfigurationError, PdromError, choices
+from pdrom.core.logs import planning_log
 from pdrom.experiments.hard_cases.catalogue import reducible_cases
 from pdrom.experiments.hard_cases.expectations import load_expectations
 from pdrom.model.effects import EFFECTS
@@ -52,18 +53,22 @@ TABLES = (
 )
 
 
-def load_plan(config: dict[str, Any], root: Path, files: Sequence[str | Path] = ()) -> "Plan":
+def load_plan(
+    config: dict[str, Any], root: Path, files: Sequence[str | Path] = (), quiet: bool = False
+) -> "Plan":
     """Plan of a configuration; a faulty one ends the process with one line, before any job.
 
     Parameters
     ----------
     files : where the configuration came from, for the messages
+    quiet : whether warnings are dropped, see `pdrom.core.logs.planning_log`
     """
     names = [os.path.relpath(path, root) for path in files] or ["config/default.yaml"]
     source = f"configuration ({', '.join(sorted(set(names)))})"
     try:
-        plan = Plan(Study.load(config, root, source))
-        plan.check()
+        with planning_log(quiet):
+            plan = Plan(Study.load(config, root, source))
+            plan.check()
         return plan
     except PdromError as error:
         sys.exit(f"pdrom: {error}")
@@ -133,6 +138,11 @@ class Plan:
         """The file that a mesh is read from, an empty list for one that is generated."""
         config = self.study.meshes[mesh]
         return [config.path] if isinstance(config, MeshFile) else []
+
+    def mesh_content(self, scene: str) -> str:
+        """Checksum of the file that a scene's mesh is read from (for jobs that read it)."""
+        config = {**self.study.scenes, **self.study.online}[scene].mesh
+        return self.digest(config.path) if isinstance(config, MeshFile) else ""
 
     def digest(self, *paths: str) -> str:
         """See `pdrom.pipeline.jobs.digest`."""

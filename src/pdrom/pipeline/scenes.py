@@ -50,9 +50,11 @@ def load_bound_scene(root: Path, name: str, coarsen: Coarsen | None = None) -> S
     try:
         mesh = scene.mesh.build(root)
         Scene.build(scene.held_out_variant(), mesh)
-        return Scene.build(scene, mesh)
+        bound = Scene.build(scene, mesh)
     except PdromError as error:
         raise ConfigurationError(f"{scene_file(root, name)}: {error}") from error
+    bound.log_holds()
+    return bound
 
 
 def read_scene(root: Path, name: str, coarsen: Coarsen | None = None) -> SceneConfig:

@@ -1,12 +1,10 @@
-"""Generators, checks, files and selections."""
+"""Generators, checks and selections."""
 
-import meshio
 import numpy as np
 import pytest
 
 from pdrom.core.errors import DegenerateElementError, MeshError, SceneError, StorageError
 from pdrom.model.mesh.checks import check_mesh
-from pdrom.model.mesh.files import read_mesh_file
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.select import farthest_points, select_vertices
 from pdrom.model.mesh.types import Mesh, load_mesh, save_mesh
@@ -85,6 +83,8 @@ def _changed(index, value):
         (SQUARE, np.array([[0, 1, 2], [0, 3, 3]]), DegenerateElementError, "twice"),
         (_changed(2, [2, 0, 0]), CELLS[:, :], DegenerateElementError, "zero area"),
         (SQUARE, np.empty((0, 3), dtype=np.int32), MeshError, "no triangles"),
+        (SQUARE, np.vstack([CELLS, [2, 0, 1]]), MeshError, r"2 \[2, 0, 1\] repeats triangle 0"),
+        (SQUARE, np.vstack([CELLS, [1, 0, 2]]), MeshError, r"2 \[1, 0, 2\] repeats triangle 0"),
     ],
 )
 def test_faults_are_named(points, cells, error, message):
@@ -95,34 +95,6 @@ def test_faults_are_named(points, cells, error, message):
 def test_flat_tetrahedron_is_named():
     with pytest.raises(DegenerateElementError, match="zero volume"):
         check_mesh(Mesh(SQUARE, CELLS, np.array([[0, 1, 2, 3]], dtype=np.int32)), "flat")
-
-
-@pytest.mark.parametrize("suffix", [".obj", ".vtu", ".ply"])
-def test_files_of_several_formats(tmp_path, suffix):
-    path = tmp_path / f"sheet{suffix}"
-    mesh = cloth(3, 4)
-    meshio.Mesh(mesh.points, [("triangle", mesh.triangles)]).write(path)
-    loaded = read_mesh_file(path)
-    assert loaded.points == pytest.approx(mesh.points)
-    assert np.array_equal(loaded.triangles, mesh.triangles)
-
-
-def test_volume_file_gets_its_boundary(tmp_path):
-    mesh = bar(4, 3, 3)
-    meshio.Mesh(mesh.points, [("tetra", mesh.tetrahedra)]).write(tmp_path / "bar.vtu")
-    assert len(read_mesh_file(tmp_path / "bar.vtu").triangles) == len(mesh.triangles)
-
-
-def test_unreadable_files_are_named(tmp_path):
-    with pytest.raises(MeshError, match="no such mesh file"):
-        read_mesh_file(tmp_path / "missing.obj")
-    (tmp_path / "empty.vtu").write_text("")
-    with pytest.raises(MeshError, match="not a readable mesh"):
-        read_mesh_file(tmp_path / "empty.vtu")
-    quads = meshio.Mesh(SQUARE, [("quad", np.array([[0, 1, 2, 3]]))])
-    quads.write(tmp_path / "quads.vtu")
-    with pytest.raises(MeshError, match="triangle, tetra"):
-        read_mesh_file(tmp_path / "quads.vtu")
 
 
 def test_sides_of_a_sheet():

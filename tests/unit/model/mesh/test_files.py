@@ -1,0 +1,200 @@
+"""Mesh files: which are read, and how the process that reads them may end."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+from mesh_files import KINDS, write_mesh, zeros_vtu
+from pdrom.core.errors import ConfigurationError, MeshError
+from pdrom.model.mesh import files, reader
+from pdrom.model.mesh.files import read_mesh_file
+from pdrom.model.mesh.limits import MeshLimits, mesh_limits
+from pdrom.model.mesh.types import Mesh
+
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nf 1 2 3\nf 1 3 4\n"
+
+
+@pytest.fixture
+def square(tmp_path: Path) -> Path:
+    path = tmp_path / "square.obj"
+    path.write_text(SQUARE)
+    return path
+
+
+def limited(monkeypatch: pytest.MonkeyPatch, **limits: int) -> None:
+    """Other limits than the usual ones."""
+    monkeypatch.setattr(files, "mesh_limits", lambda: MeshLimits(**limits))
+
+
+def replaced(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, script: str) -> None:
+    """Another script in place of the reader."""
+    path = tmp_path / "script.py"
+    path.write_text(script)
+    monkeypatch.setattr(reader, "__file__", str(path))
+
+
+@pytest.mark.parametrize(("suffix", "name"), KINDS)
+def test_every_format_is_read(tmp_path, suffix, name):
+    """Also where the path holds a blank and letters that are not ASCII."""
+    folder = tmp_path / "Étude du maillage"
+    folder.mkdir()
+    mesh = write_mesh(folder / f"größe{suffix}", name)
+    loaded = read_mesh_file(folder / f"größe{suffix}")
+    assert loaded.vertices == mesh.vertices
+    for kind in ("triangles", "tetrahedra"):
+        assert np.array_equal(centres(loaded, kind), centres(mesh, kind))
+
+
+def centres(mesh: Mesh, kind: str) -> np.ndarray:
+    """Centres of all cells, in an order of their own: some formats number the vertices anew."""
+    return np.unique(mesh.points[getattr(mesh, kind)].mean(axis=1).round(5), axis=0)
+
+
+# Opens every file of its arguments with meshio, and says which files Python opened meanwhile.
+WATCHED = """
+import json, sys
+import meshio
+opened = []
+sys.addaudithook(lambda event, args: opened.append(args[0]) if event == "open" else None)
+for path, name in json.load(sys.stdin):
+    meshio.read(path, file_format=name)
+here = sys.argv[1]
+print(json.dumps([str(path) for path in opened if str(path).startswith(here)]))
+"""
+
+
+def test_readers_open_no_second_file(tmp_path):
+    """Neither of files beside the mesh nor of those that the mesh names."""
+    jobs = []
+    for suffix, name in KINDS:
+        path = tmp_path / f"mesh_{name}{suffix}"
+        write_mesh(path, name)
+        jobs.append((str(path), name))
+    (tmp_path / "mesh_obj.mtl").write_text("newmtl x\n")
+    (tmp_path / "mesh_nastran.h5").write_text("")
+    obj = tmp_path / "mesh_obj.obj"
+    obj.write_text(f"mtllib mesh_obj.mtl\ncall {tmp_path}/mesh_nastran.h5\n" + obj.read_text())
+    nastran = tmp_path / "mesh_nastran.nas"
+    include = f"INCLUDE '{tmp_path}/mesh_nastran.h5'\nBEGIN BULK"
+    nastran.write_text(nastran.read_text().replace("BEGIN BULK", include))
+    vtu = tmp_path / "mesh_vtu.vtu"
+    outside = f'<!DOCTYPE VTKFile SYSTEM "file://{obj}"><VTKFile '
+    vtu.write_text(vtu.read_text().replace("<VTKFile ", outside, 1))
+    ended = subprocess.run(
+        [sys.executable, "-c", WATCHED, str(tmp_path)],
+        input=json.dumps(jobs),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert list(dict.fromkeys(json.loads(ended.stdout))) == [path for path, _ in jobs]
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [("h.off", "OFF\n"), ("cut.ply", "ply\nformat ascii 1.0\n"), ("cut.ply", "ply\n")],
+)
+def test_cut_files_that_are_read_for_ever(tmp_path, monkeypatch, name, content):
+    limited(monkeypatch, seconds=1)
+    (tmp_path / name).write_text(content)
+    with pytest.raises(MeshError, match=f"{name}: not a readable mesh in 1 s of processor time"):
+        read_mesh_file(tmp_path / name)
+
+
+def test_a_small_file_that_unpacks_to_gigabytes(tmp_path, monkeypatch):
+    limited(monkeypatch, memory=600_000_000)
+    path = tmp_path / "zeros.vtu"
+    path.write_text(zeros_vtu(160))
+    assert path.stat().st_size < 1_000_000
+    with pytest.raises(MeshError, match=r"in 0.6 GB of memory; PDROM_MESH_LIMITS=2"):
+        read_mesh_file(path)
+
+
+@pytest.mark.parametrize(
+    ("limit", "message"),
+    [
+        ({"vertices": 3}, "holds 4 vertices, allowed: at most 3"),
+        ({"cells": 1}, "holds 2 cells, allowed: at most 1"),
+        ({"file_bytes": 10}, "larger than 10 bytes"),
+    ],
+)
+def test_large_meshes_are_named(square, monkeypatch, limit, message):
+    limited(monkeypatch, **limit)
+    with pytest.raises(MeshError, match=message):
+        read_mesh_file(square)
+
+
+@pytest.mark.parametrize(
+    ("script", "message"),
+    [
+        ("import os\nos.kill(os.getpid(), 9)", r"ended by signal 9 \(Killed\)"),
+        ("raise RuntimeError('boom')", "failed with status 1: RuntimeError: boom"),
+        ("raise SystemExit(7)", "failed with status 7: without a word"),
+    ],
+)
+def test_a_reader_that_ends_early_is_named(square, tmp_path, monkeypatch, script, message):
+    replaced(monkeypatch, tmp_path, script)
+    with pytest.raises(MeshError, match=f"square.obj: the reader .*{message}"):
+        read_mesh_file(square)
+
+
+def test_a_reader_that_waits_is_ended(square, tmp_path, monkeypatch):
+    limited(monkeypatch, seconds=0)
+    replaced(monkeypatch, tmp_path, "import signal\nsignal.pause()")
+    with pytest.raises(MeshError, match="square.obj: not read after 0 s"):
+        read_mesh_file(square)
+
+
+def test_an_interrupt_ends_the_reader(square, tmp_path, monkeypatch):
+    script = "import os, signal\nos.kill(os.getppid(), signal.SIGINT)\nsignal.pause()"
+    replaced(monkeypatch, tmp_path, script)
+    with pytest.raises(KeyboardInterrupt):
+        read_mesh_file(square)
+
+
+def test_a_file_is_read_once_as_long_as_it_stays(square, monkeypatch):
+    started = []
+    run = subprocess.run
+    monkeypatch.setattr(
+        files.subprocess, "run", lambda *args, **more: started.append(1) or run(*args, **more)
+    )
+    first, again = read_mesh_file(square), read_mesh_file(square)
+    assert len(started) == 1
+    first.points[0] = 7.0  # what one caller does to its mesh is not seen by the next
+    assert again.points[0].tolist() == read_mesh_file(square).points[0].tolist() == [0.0, 0.0, 0.0]
+    square.write_text(SQUARE.replace("v 0 0 1", "v 0 0 2"))
+    assert read_mesh_file(square).points[3].tolist() == [0.0, 0.0, 2.0]
+    assert len(started) == 2
+
+
+def test_unreadable_files_are_named(tmp_path):
+    with pytest.raises(MeshError, match="no such mesh file"):
+        read_mesh_file(tmp_path / "missing.obj")
+    (tmp_path / "empty.vtu").write_text("")
+    with pytest.raises(MeshError, match="not a readable mesh"):
+        read_mesh_file(tmp_path / "empty.vtu")
+    quads = meshio.Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [("quad", [[0, 1, 2, 3]])])
+    quads.write(tmp_path / "quads.vtu")
+    with pytest.raises(MeshError, match="triangle, tetra"):
+        read_mesh_file(tmp_path / "quads.vtu")
+
+
+def test_the_environment_raises_all_limits(monkeypatch):
+    monkeypatch.delenv("PDROM_MESH_LIMITS", raising=False)
+    plain = mesh_limits()
+    monkeypatch.setenv("PDROM_MESH_LIMITS", "2.5")
+    raised = mesh_limits()
+    assert (raised.seconds, raised.vertices) == (25, 2_500_000)
+    assert (raised.memory, raised.cells) == (2.5 * plain.memory, 2.5 * plain.cells)
+
+
+@pytest.mark.parametrize("value", ["", "many", "nan", "inf", "0.5", "-1", "1001"])
+def test_faulty_limits_are_named(monkeypatch, value):
+    monkeypatch.setenv("PDROM_MESH_LIMITS", value)
+    with pytest.raises(ConfigurationError, match="PDROM_MESH_LIMITS = .* from 1 to 1000"):
+        mesh_limits()
