@@ -9,7 +9,7 @@ import scipy.linalg  # noqa: F401  -- loads libraries that have threads
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from pdrom.core.errors import MeshError
-from pdrom.core.logs import INTERRUPTED, job_log
+from pdrom.core.logs import INTERRUPTED, job_log, planning_log
 
 LOGGER = logging.getLogger("pdrom")
 
@@ -124,3 +124,12 @@ def test_a_full_disk_prints_no_traceback_for_each_message(path, capfd, monkeypat
         patch.setattr(logger.handlers[-1], "stream", stream)
         logger.info("a message")
     assert capfd.readouterr().err == ""
+
+
+def test_warnings_of_the_planning_are_shown_once(capsys):
+    for quiet in (False, True):
+        with planning_log(quiet):
+            logging.getLogger("pdrom.anything").warning("look")
+            logging.getLogger("pdrom.anything").info("not shown")
+    assert capsys.readouterr().err == "pdrom: warning: look\n"
+    assert logging.getLogger("pdrom").handlers == []

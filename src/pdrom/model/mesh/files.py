@@ -121,7 +121,8 @@ def _fault(ended: subprocess.CompletedProcess[bytes], limits: MeshLimits) -> str
     if status == reader.NO_MEMORY:
         return f"not a readable mesh in {limits.memory / 1e9:g} GB of memory; {ADVICE}"
     if status == -getattr(signal, "SIGXCPU", 0):
-        return f"not a readable mesh in {limits.seconds} s of processor time: cut off, or very large; {ADVICE}"
+        time = f"{limits.seconds} s of processor time"
+        return f"not a readable mesh in {time}: cut off, or very large; {ADVICE}"
     if status < 0:
         return f"the reader was ended by signal {-status} ({signal.strsignal(-status)})"
     said = ended.stderr.decode(errors="replace").split("\n")

@@ -146,7 +146,7 @@ def test_a_reader_that_ends_early_is_named(square, tmp_path, monkeypatch, script
 def test_a_reader_that_waits_is_ended(square, tmp_path, monkeypatch):
     limited(monkeypatch, seconds=0)
     replaced(monkeypatch, tmp_path, "import signal\nsignal.pause()")
-    with pytest.raises(MeshError, match="square.obj: not read after 0 s"):
+    with pytest.raises(MeshError, match=r"square\.obj: not read after 0 s"):
         read_mesh_file(square)
 
 
@@ -196,5 +196,5 @@ def test_the_environment_raises_all_limits(monkeypatch):
 @pytest.mark.parametrize("value", ["", "many", "nan", "inf", "0.5", "-1", "1001"])
 def test_faulty_limits_are_named(monkeypatch, value):
     monkeypatch.setenv("PDROM_MESH_LIMITS", value)
-    with pytest.raises(ConfigurationError, match="PDROM_MESH_LIMITS = .* from 1 to 1000"):
+    with pytest.raises(ConfigurationError, match=r"PDROM_MESH_LIMITS = .* from 1 to 1000"):
         mesh_limits()

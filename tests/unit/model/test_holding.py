@@ -1,0 +1,43 @@
+"""What the log says about held vertices."""
+
+import logging
+
+import numpy as np
+
+from pdrom.model.mesh.generators import cloth
+from pdrom.model.mesh.types import Mesh
+from pdrom.model.scene import Scene, SceneConfig
+
+SHEET = {"kind": "cloth", "rows": 5, "columns": 4}
+
+
+def held(caplog, mesh: Mesh, *effects: dict) -> list[tuple[str, str]]:
+    """Levels and messages about a scene with ``effects``."""
+    spring = {"effect": "spring", "weight": 1.0}
+    config = {"name": "sheet", "title": "t", "mesh": SHEET, "frames": 4}
+    scene = Scene.build(SceneConfig(**config, effects=[*effects, spring]), mesh)
+    with caplog.at_level(logging.INFO, logger="pdrom"):
+        scene.log_holds()
+    return [(record.levelname, record.getMessage()) for record in caplog.records]
+
+
+def test_every_hold_is_counted(caplog):
+    pins = {"effect": "pins", "select": "left"}
+    poke = {"effect": "poke", "count": 2, "avoid": ["left", [19]]}
+    listed = {"effect": "translate", "select": [19], "offset": [0, 0, 1], "over": 2}
+    assert held(caplog, cloth(5, 4), pins, poke, listed) == [
+        ("INFO", "scene 'sheet', effect 'pins': holds 4 of 20 vertices (select: left)"),
+        ("INFO", "scene 'sheet', effect 'poke': holds 2 of 20 vertices"),
+        ("INFO", "scene 'sheet', effect 'translate': holds 1 of 20 vertices"),
+    ]
+
+
+def test_a_side_of_one_vertex_is_a_warning(caplog):
+    """An unstructured sheet: no two vertices lie on one line along y."""
+    mesh = cloth(5, 4)
+    moved = mesh.points + np.random.default_rng(1).uniform(-0.01, 0.01, mesh.points.shape)
+    ((level, message),) = held(
+        caplog, Mesh(moved, mesh.triangles), {"effect": "pins", "select": "left"}
+    )
+    assert level == "WARNING"
+    assert "effect 'pins': holds 1 of 20 vertices, fewer than 3 (select: left" in message
