@@ -47,6 +47,8 @@ FORMATS = {
     ".vtu": ("vtu",),
     ".wkt": ("wkt",),
 }
+# The workflow replaces `sys.executable` by words for a shell.
+PYTHON = sys.executable
 ADVICE = f"{VARIABLE}=2 in the environment doubles the limits"
 
 
@@ -89,7 +91,7 @@ def _arrays(path: Path, digest: str, limits: MeshLimits) -> tuple[np.ndarray, np
     """Points and cells of a file, read once as long as its content (``digest``) is the same."""
     numbers = (limits.seconds, limits.memory, limits.vertices, limits.cells)
     # -P: the modules beside the script must not hide those of the standard library
-    command = [sys.executable, "-P", "-X", "utf8", "-W", "ignore", reader.__file__, str(path)]
+    command = [PYTHON, "-P", "-X", "utf8", "-W", "ignore", reader.__file__, str(path)]
     command += [",".join(FORMATS[path.suffix.lower()]), *map(str, numbers)]
     # every thread of the linear algebra, which is not used here, would reserve memory
     single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
