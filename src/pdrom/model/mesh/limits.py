@@ -18,24 +18,19 @@ class MeshLimits:
 
     file_bytes : size of the file
     seconds : processor time to read it
+    deadline : seconds after which a reader is ended that waits instead of computing; also the limit
+        of time where a process has none. Far above ``seconds``, so that a busy machine does not
+        decide which meshes are read.
     memory : bytes of address space of the process that reads it
     vertices, cells : size of the mesh inside
     """
 
     file_bytes: int = 500_000_000
     seconds: int = 10
+    deadline: int = 100
     memory: int = 1_000_000_000
     vertices: int = MAX_VERTICES
     cells: int = 6 * MAX_VERTICES
-
-    @property
-    def deadline(self) -> float:
-        """Seconds after which a reader is ended that waits instead of computing.
-
-        Also the limit of time where the platform has none on a process. It is far above
-        ``seconds``, so that a busy machine does not decide which meshes are read.
-        """
-        return 10.0 * self.seconds
 
 
 def mesh_limits() -> MeshLimits:

@@ -144,7 +144,7 @@ def test_a_reader_that_ends_early_is_named(square, tmp_path, monkeypatch, script
 
 
 def test_a_reader_that_waits_is_ended(square, tmp_path, monkeypatch):
-    limited(monkeypatch, seconds=0)
+    limited(monkeypatch, deadline=0)
     replaced(monkeypatch, tmp_path, "import signal\nsignal.pause()")
     with pytest.raises(MeshError, match=r"square\.obj: not read after 0 s"):
         read_mesh_file(square)
