@@ -87,12 +87,11 @@ class CommandLine:
                     f"hyphens before the targets: {shlex.join([*options, '--', *targets])}"
                 )
 
-    def with_targets(self, made: Mapping[str, Sequence[str]]) -> list[str]:
-        """The arguments with every target replaced by the files that are to be made for it."""
-        if not self.targets:
-            return list(self.arguments)
+    def rewritten(self, more: Sequence[str], made: Mapping[str, Sequence[str]]) -> list[str]:
+        """The arguments with more options, and each target replaced by what is made for it."""
         options = [a for a in self.arguments if a not in (*self.targets, "--")]
-        return [*options, "--", *dict.fromkeys(f for t in self.targets for f in made[t])]
+        targets = dict.fromkeys(file for target in self.targets for file in made[target])
+        return [*options, *more, *(["--", *targets] if targets else [])]
 
 
 def _texts(values: Any) -> tuple[str, ...]:

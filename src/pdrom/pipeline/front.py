@@ -8,12 +8,16 @@ hands the others to pytest.
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from pdrom.core.errors import PdromError
 from pdrom.core.logs import INTERRUPTED
+from pdrom.core.yamlfile import read_yaml
 from pdrom.pipeline.commandline import CommandLine
 from pdrom.pipeline.configfiles import check_files
 from pdrom.pipeline.environment import settle
+from pdrom.pipeline.folders import Folders
+from pdrom.pipeline.last_run import recall
 
 # The jobs are short: an integer program for each choice among them takes longer than it saves.
 # After every choice a timer of the rate limit's length causes another one; at the default length
@@ -30,9 +34,30 @@ def completed(arguments: Sequence[str]) -> list[str]:
         A configuration file is missing or no mapping; a target was taken for an option's value.
     """
     command = CommandLine.parse(arguments)
+    if command.report and not command.configfiles and not command.settings and recall():
+        _say(f"a report of the last run, {' '.join(recall())}")
+        command = CommandLine.parse(command.rewritten(recall(), {t: [t] for t in command.targets}))
     check_files(command.configfiles)
+    own = Folders()
+    made = files_of(command.targets, own) if command.targets else {}
+    for target, files in made.items():
+        if files != [target]:
+            _say(f"{target}: {', '.join(files)}")
     cores = () if command.cores else ("--cores", "all")
-    return [*cores, *OPTIONS, *arguments]
+    return command.rewritten([*cores, *OPTIONS], made)
+
+
+def files_of(targets: Sequence[str], own: Folders) -> dict[str, list[str]]:
+    """What is to be made for each target, see `Names.files`."""
+    # late: it loads the whole package
+    from pdrom.pipeline.targets import TABLES, Names
+
+    names = Names(list(read_yaml(Path("config/figures.yaml"))), TABLES)
+    return {target: names.files(target, own) for target in targets}
+
+
+def _say(line: str) -> None:
+    sys.stderr.write(f"reproduce: {line}\n")
 
 
 def main() -> None:

@@ -11,7 +11,7 @@ Labels = dict[str, str]
 
 def labels_of(study: Study, place: Place) -> list[Labels]:
     """Labels of every file of a kind, in the order of the configuration, without repetition."""
-    found = _HELD[place](study)
+    found = HELD[place](study)
     return list({tuple(labels.items()): labels for labels in found}.values())
 
 
@@ -90,7 +90,7 @@ def _one(study: Study) -> Iterator[Labels]:
 
 _subspaces = _among(lambda study: study.settings.subspace.scenes)
 
-_HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
+HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.MESH: _meshes,
     paths.FULL_ORDER: _runs,
     paths.SENSITIVITY: _scenes,

@@ -54,20 +54,25 @@ TABLES = (
 
 
 def load_plan(
-    config: dict[str, Any], root: Path, files: Sequence[str | Path] = (), quiet: bool = False
+    config: dict[str, Any],
+    root: Path,
+    files: Sequence[str | Path] = (),
+    results: str = RESULTS,
+    quiet: bool = False,
 ) -> "Plan":
     """Plan of a configuration; a faulty one ends the process with one line, before any job.
 
     Parameters
     ----------
     files : where the configuration came from, for the messages
+    results : folder of its results
     quiet : whether warnings are dropped, see `pdrom.core.logs.planning_log`
     """
     names = [os.path.relpath(path, root) for path in files] or ["config/default.yaml"]
     source = f"configuration ({', '.join(sorted(set(names)))})"
     try:
         with planning_log(quiet):
-            plan = Plan(Study.load(config, root, source))
+            plan = Plan(Study.load(config, root, source), results)
             plan.check()
         return plan
     except PdromError as error:
@@ -124,6 +129,8 @@ class Plan:
 
     def scene_config(self, scene: str) -> dict[str, Any]:
         """Plain configuration of a scene; a change of it reruns the scene's jobs."""
+        if scene not in self._scene_configs:
+            self._scene_configs[scene] = self.study.scene(scene).model_dump(mode="json")
         return self._scene_configs[scene]
 
     @cached_property
@@ -132,11 +139,11 @@ class Plan:
 
     def mesh_config(self, mesh: str) -> dict[str, Any]:
         """Plain configuration of a mesh."""
-        return self.study.meshes[mesh].model_dump(mode="json")
+        return self.study.mesh(mesh).model_dump(mode="json")
 
     def mesh_file(self, mesh: str) -> list[str]:
         """The file that a mesh is read from, an empty list for one that is generated."""
-        config = self.study.meshes[mesh]
+        config = self.study.mesh(mesh)
         return [config.path] if isinstance(config, MeshFile) else []
 
     def mesh_content(self, scene: str) -> str:
@@ -478,4 +485,4 @@ class Plan:
 
     def scene_code(self, stage: str, scene: str) -> str:
         """Fingerprint of a stage together with the effects that a scene lists."""
-        return fingerprint(stage, *self.study.scenes[scene].modules)
+        return fingerprint(stage, *self.study.scene(scene).modules)

@@ -1,13 +1,19 @@
 """What every run does first and last, whether ``./reproduce`` or ``snakemake`` started it."""
 
 import sys
+from collections.abc import Iterable
+from pathlib import Path
 
-from pdrom.core.errors import PdromError
+from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.pipeline.commandline import CommandLine
 from pdrom.pipeline.dates import settle_dates
 from pdrom.pipeline.failures import Failures, listen
+from pdrom.pipeline.folders import Folders
+from pdrom.pipeline.last_run import recall, remember
+from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.running import hold, remove_stale_locks
 from pdrom.pipeline.scheduler import cancel_timers
+from pdrom.pipeline.targets import Rule, known
 from pdrom.pipeline.warm import start_server, stop_server
 
 # What Snakemake compares by date.
@@ -34,9 +40,27 @@ class Run:
             else:
                 hold()
                 settle_dates(DATED)
+                remember(command)
         except PdromError as error:
             sys.exit(f"pdrom: {error}")
         return cls(command, listen())
+
+    def check(self, plan: Plan, folders: Folders, rules: Iterable[Rule]) -> None:
+        """End the process with one line if a target or a report cannot be made."""
+        try:
+            known(plan).check(self.command.targets, list(rules))
+            self._check_report(folders)
+        except PdromError as error:
+            sys.exit(f"pdrom: {error}")
+
+    def _check_report(self, folders: Folders) -> None:
+        asked = self.command.report and not self.command.targets
+        if asked and not Path(folders.manuscript).is_file():
+            last = " ".join(recall())
+            hint = f"the last run was of another one: add {last}" if last else "run it first"
+            raise ConfigurationError(
+                f"report: this configuration has no {folders.manuscript}; {hint}"
+            )
 
     def start(self) -> None:
         """Before the first job: the process that jobs are forked from."""

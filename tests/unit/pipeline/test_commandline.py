@@ -69,5 +69,21 @@ def test_a_forgotten_separator_is_explained(arguments, expected):
 def test_targets_are_replaced_and_options_kept():
     command = parse("--configfile a.yaml -n -- b a")
     made = {"a": ["x"], "b": ["y", "z"]}
-    assert command.with_targets(made) == ["--configfile", "a.yaml", "-n", "--", "y", "z", "x"]
-    assert parse("-n").with_targets({}) == ["-n"]
+    assert command.rewritten(["-q"], made) == [
+        "--configfile",
+        "a.yaml",
+        "-n",
+        "-q",
+        "--",
+        "y",
+        "z",
+        "x",
+    ]
+    assert parse("-n").rewritten([], {}) == ["-n"]
+    assert parse("x -n").rewritten(["--cores", "2"], {"x": ["x"]}) == [
+        "-n",
+        "--cores",
+        "2",
+        "--",
+        "x",
+    ]

@@ -1,0 +1,29 @@
+"""The configuration of the last run, which the report is to show."""
+
+import json
+from pathlib import Path
+
+from pdrom.core.store import atomic_path
+from pdrom.pipeline.commandline import CommandLine
+
+RECORD = Path(".snakemake/last_run.json")
+
+
+def remember(command: CommandLine) -> None:
+    """Note which configuration runs."""
+    text = json.dumps({"configfiles": command.configfiles, "settings": command.settings})
+    with atomic_path(RECORD) as path:
+        path.write_text(text + "\n", encoding="utf-8")
+
+
+def recall() -> list[str]:
+    """Options that name the configuration of the last run; none of the default one or of no run."""
+    try:
+        record = json.loads(RECORD.read_text(encoding="utf-8"))
+        files, settings = list(record["configfiles"]), list(record["settings"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+    return [
+        *(["--configfile", *map(str, files)] if files else []),
+        *(["--config", *map(str, settings)] if settings else []),
+    ]

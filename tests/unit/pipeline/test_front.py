@@ -1,0 +1,52 @@
+"""What ``./reproduce ARGS...`` hands to Snakemake."""
+
+import pytest
+
+from pdrom.core.errors import ConfigurationError
+from pdrom.pipeline.commandline import CommandLine
+from pdrom.pipeline.front import OPTIONS, completed
+from pdrom.pipeline.last_run import RECORD, recall, remember
+
+
+@pytest.fixture(autouse=True)
+def project(tmp_path, monkeypatch):
+    """A folder with a configuration."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my.yaml").write_text("ranks: [3]\n")
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config" / "figures.yaml").write_text("scaling: {}\n")
+
+
+def test_options_are_added_and_cores_unless_given():
+    assert completed(["-n"]) == ["-n", "--cores", "all", *OPTIONS]
+    assert completed(["-j2"]) == ["-j2", *OPTIONS]
+    assert completed(["--cores", "1"]) == ["--cores", "1", *OPTIONS]
+
+
+def test_names_become_files_and_it_is_said(capsys):
+    made = ["results/figures/scaling.pdf", "results/tables/scaling.csv"]
+    assert completed(["-n", "--", "scaling", "x"])[-4:] == ["--", *made, "x"]
+    assert capsys.readouterr().err == f"reproduce: scaling: {', '.join(made)}\n"
+
+
+def test_a_faulty_configuration_file_is_named_before_snakemake_reads_it():
+    with pytest.raises(ConfigurationError, match=r"none\.yaml: no such configuration file"):
+        completed(["--configfile", "none.yaml"])
+
+
+def test_the_report_is_of_the_last_run(capsys):
+    assert completed(["--report"]) == ["--report", "--cores", "all", *OPTIONS]
+    remember(CommandLine.parse(["--configfile", "my.yaml", "--config", "a=b", "c=d"]))
+    last = ["--configfile", "my.yaml", "--config", "a=b", "c=d"]
+    assert recall() == last
+    assert completed(["--report"]) == ["--report", *last, "--cores", "all", *OPTIONS]
+    assert "a report of the last run, --configfile my.yaml" in capsys.readouterr().err
+    own = ["--report", "--configfile", "my.yaml"]
+    assert completed(own) == [*own, "--cores", "all", *OPTIONS]
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"configfiles": 3, "settings": []}', "\x00"])
+def test_a_damaged_record_counts_as_none(content):
+    RECORD.parent.mkdir()
+    RECORD.write_text(content)
+    assert recall() == []
