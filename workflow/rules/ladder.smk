@@ -17,7 +17,11 @@ rule ladder:
             "threshold": PLAN.settings.sensitivity.threshold,
         },
         blowup_extent=PLAN.settings.blowup_extent,
-        code=lambda w: PLAN.scene_code("pdrom.experiments.ladder", w.scene),
+        code=lambda w: PLAN.scene_code(
+            "pdrom.experiments.ladder",
+            w.scene,
+            [*PLAN.study.ladder.up, *PLAN.study.ladder.down],
+        ),
     message:
         "Ladder of {wildcards.group} in {wildcards.scene}"
     script:

@@ -40,7 +40,9 @@ rule reruns:
         blowup_extent=PLAN.settings.blowup_extent,
         guard=PLAN.guard_settings(),
         solver=PLAN.settings.solver,
-        code=lambda w: PLAN.scene_code("pdrom.experiments.reduction", w.scene),
+        code=lambda w: PLAN.scene_code(
+            "pdrom.experiments.reduction", w.scene, [PLAN.study.methods[w.method]]
+        ),
     message:
         "Sampling and reruns of {wildcards.scene}, {wildcards.group} by {wildcards.method}"
     script:

@@ -45,7 +45,9 @@ rule scaling:
         root=str(PLAN.root),
         content=lambda w: PLAN.mesh_content(w.scene),
         factor=lambda w: float(w.factor),
-        code=lambda w: PLAN.scene_code("pdrom.experiments.scaling", w.scene),
+        code=lambda w: PLAN.scene_code(
+            "pdrom.experiments.scaling", w.scene, PLAN.scaling_methods.values()
+        ),
     message:
         "Cost of {wildcards.scene} on a mesh with {wildcards.factor} times the vertices along a side (alone)"
     script:

@@ -105,8 +105,8 @@ class SceneConfig(_Model):
 
     @property
     def modules(self) -> list[str]:
-        """Modules that implement the listed effects (for the code fingerprint)."""
-        return sorted({EFFECTS.module(e.effect) for e in self.effects})
+        """Places of the listed effects (for the code fingerprint), "module:attribute"."""
+        return sorted({EFFECTS[e.effect] for e in self.effects})
 
     def coarsened(self, resolution: float, frames: float) -> Self:
         """The scene on a coarser mesh and with fewer frames; schedules shrink alike."""

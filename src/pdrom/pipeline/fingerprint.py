@@ -11,31 +11,38 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from pdrom.core.errors import ConfigurationError
+from pdrom.core.registry import Registry
 
 PACKAGE = "pdrom"
 
 
-def fingerprint(*modules: str) -> str:
+def fingerprint(*places: str) -> str:
     """SHA-256 over the named modules and everything of the package that they import.
 
-    Imports are found statically, inside functions too. Names that a registry loads on demand are
-    not followed: the caller lists the modules that it will ask for.
+    Imports are found statically, inside functions too. What a registry loads on demand is not
+    followed, nor do its entries for other modules count: the caller lists those that it will ask
+    for, as the registry names them.
+
+    Parameters
+    ----------
+    places : modules, or "module:attribute" for an entry of a registry
 
     Raises
     ------
     ConfigurationError
         If a module does not exist.
     """
-    reached = sorted(_closure(modules))
     digest = hashlib.sha256()
-    for name in reached:
-        digest.update(f"{name} {_digest(_source(name))}\n".encode())
+    for place in sorted({place for place in places if ":" in place}):
+        digest.update(f"{place}\n".encode())
+    for name in closure(*places):
+        digest.update(f"{name} {_digest(_source(name), name)}\n".encode())
     return digest.hexdigest()
 
 
-def closure(*modules: str) -> list[str]:
+def closure(*places: str) -> list[str]:
     """Names of the modules that `fingerprint` covers, sorted."""
-    return sorted(_closure(modules))
+    return sorted(_closure(tuple(place.partition(":")[0] for place in places)))
 
 
 def _closure(modules: tuple[str, ...]) -> set[str]:
@@ -99,20 +106,42 @@ def _tree(path: Path) -> ast.Module:
 
 
 @cache
-def _digest(path: Path) -> str:
+def _digest(path: Path, module: str) -> str:
     """Hash of a file's syntax tree without docstrings; layout and comments do not count."""
-    return digest_of_source(path.read_text(encoding="utf-8"))
+    return digest_of_source(path.read_text(encoding="utf-8"), module)
 
 
-def digest_of_source(source: str) -> str:
-    """Hash of source text without comments, layout and docstrings."""
+def digest_of_source(source: str, module: str = "") -> str:
+    """Hash of source text without comments, layout, docstrings and names of other modules' code.
+
+    The latter are the entries of a registry that lie outside of ``module``.
+    """
     tree = ast.parse(source)
     for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and _is_registry(node):
+            _drop_others(node.args[1], module)
         body = getattr(node, "body", None)
         if isinstance(body, list):
             # a string that stands alone does nothing: docstrings, also those of attributes
             node.body = [s for s in body if not _is_string(s)] or [ast.Pass()]
     return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
+
+
+def _is_registry(call: ast.Call) -> bool:
+    """``Registry(kind, {name: place, ...})``."""
+    named = isinstance(call.func, ast.Name) and call.func.id == Registry.__name__
+    return named and len(call.args) == 2 and isinstance(call.args[1], ast.Dict)
+
+
+def _drop_others(entries: ast.Dict, module: str) -> None:
+    """Keep the entries that are code of the module itself, and those that are no plain text."""
+    kept = [
+        (key, value)
+        for key, value in zip(entries.keys, entries.values, strict=True)
+        if not (isinstance(value, ast.Constant) and isinstance(value.value, str))
+        or value.value.partition(":")[0] == module
+    ]
+    entries.keys, entries.values = [key for key, _ in kept], [value for _, value in kept]
 
 
 def _is_string(statement: ast.stmt) -> bool:

@@ -2,14 +2,14 @@
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from pdrom.core.errors import ConfigurationError, PdromError, choices
 from pdrom.core.logs import planning_log
-from pdrom.experiments.hard_cases.catalogue import reducible_cases
+from pdrom.experiments.hard_cases.catalogue import modules_of, reducible_cases
 from pdrom.experiments.hard_cases.expectations import load_expectations
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.config import MeshFile
@@ -323,6 +323,11 @@ class Plan:
 
     def scaling_specs(self) -> dict[str, Any]:
         """Plain specifications of the methods that are timed on growing meshes."""
+        return {name: s.model_dump(mode="json") for name, s in self.scaling_methods.items()}
+
+    @cached_property
+    def scaling_methods(self) -> dict[str, MethodSpec]:
+        """Methods that are timed on growing meshes."""
         settings, methods = self.settings.scaling, load_methods(self.root / "config/methods.yaml")
         wanted = {
             "scaling.method": (settings.method,),
@@ -332,7 +337,7 @@ class Plan:
             for name in set(names) - set(methods):
                 raise ConfigurationError(f"{key} = '{name}': unknown{choices(name, methods)}")
         names = dict.fromkeys(name for group in wanted.values() for name in group)
-        return {name: methods[name].model_dump(mode="json") for name in names}
+        return {name: methods[name] for name in names}
 
     def scaling_settings(self) -> dict[str, Any]:
         """Plain settings of a mesh size; which sizes there are is no parameter of one."""
@@ -356,8 +361,10 @@ class Plan:
         }
 
     def hard_cases_code(self) -> str:
-        """Fingerprint of the hard cases, which use every effect there is."""
-        return fingerprint("pdrom.experiments.hard_cases.experiment", *map(EFFECTS.module, EFFECTS))
+        """Fingerprint of the hard cases with their effects and the selections of all methods."""
+        methods = load_methods(self.root / "config" / "methods.yaml").values()
+        modules = [*modules_of(self.hard_cases()["cases"]), *_modules(methods)]
+        return fingerprint("pdrom.experiments.hard_cases.experiment", *modules)
 
     # Large scenes ---------------------------------------------------------------------------
 
@@ -428,7 +435,7 @@ class Plan:
 
     def figure_code(self, figure: str) -> str:
         """Fingerprint of the code that draws a figure."""
-        return fingerprint("pdrom.report.drawing", FIGURES.module(figure))
+        return fingerprint("pdrom.report.drawing", FIGURES[figure])
 
     # Manuscript -----------------------------------------------------------------------------
 
@@ -483,6 +490,10 @@ class Plan:
         """Fingerprint of the code that a stage runs; a change of it reruns the stage."""
         return fingerprint(*modules)
 
-    def scene_code(self, stage: str, scene: str) -> str:
-        """Fingerprint of a stage together with the effects that a scene lists."""
-        return fingerprint(stage, *self.study.scene(scene).modules)
+    def scene_code(self, stage: str, scene: str, methods: Iterable[MethodSpec] = ()) -> str:
+        """Fingerprint of a stage with the effects that a scene lists and what ``methods`` name."""
+        return fingerprint(stage, *self.study.scene(scene).modules, *_modules(methods))
+
+
+def _modules(methods: Iterable[MethodSpec]) -> list[str]:
+    return [module for spec in methods for module in spec.modules]

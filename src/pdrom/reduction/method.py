@@ -4,17 +4,17 @@ import re
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from pdrom.core.errors import ConfigurationError
+from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.yamlfile import ConfigModel, read_yaml, shown, validate
+from pdrom.reduction.selections import SELECTIONS
 
 METHOD_NAME = "[a-z0-9][a-z0-9-]{0,63}"
 Weighting = Literal["none", "mass"]
 Centring = Literal["none", "affine", "mean-in-modes"]
 Layout = Literal["vectorised", "per-axis"]
 Rows = Literal["all", "scalar", "joint", "element"]
-Selection = Literal["greedy", "pivoted-qr", "s-opt"]
 Solve = Literal["square", "qr", "tikhonov"]
 Bounds = Literal["none", "training"]
 
@@ -46,7 +46,7 @@ class MethodSpec(BasisSpec):
     rows : "all" is the orthogonal projection, "scalar" samples single entries (classical DEIM),
         "joint" one row for x, y and z with separate coefficients (the paper's variant), "element"
         all 3p entries of an element
-    selection : "greedy" residual (DEIM), "pivoted-qr" (Q-DEIM) or "s-opt" (S-OPT)
+    selection : name in `SELECTIONS`, such as "greedy" (the residual, DEIM)
     solve : of the sampled equations: "square", least squares by "qr", or normal equations with
         Tikhonov term ("tikhonov", the published code)
     oversampling : samples per mode; further ones by S-OPT after selection "s-opt", otherwise by
@@ -62,7 +62,7 @@ class MethodSpec(BasisSpec):
 
     title: str
     rows: Rows
-    selection: Selection = "greedy"
+    selection: str = "greedy"
     solve: Solve = "qr"
     repeat_rows: bool = False
     oversampling: Annotated[int, Field(ge=1, le=100)] = 1
@@ -71,6 +71,13 @@ class MethodSpec(BasisSpec):
     margin: Annotated[float, Field(ge=0.0, le=10.0)] = 0.1
     coefficients: Literal["shared", "per-axis"] | None = None
     tikhonov: Annotated[float, Field(gt=0.0, le=1.0)] = 1e-8
+
+    @field_validator("selection")
+    @classmethod
+    def _selection_exists(cls, name: str) -> str:
+        if name not in SELECTIONS:
+            raise ValueError(f"unknown{choices(name, sorted(SELECTIONS))}")
+        return name
 
     @model_validator(mode="after")
     def _combination_exists(self) -> Self:
@@ -105,6 +112,11 @@ class MethodSpec(BasisSpec):
         if self.repeat_rows and self.solve == "square":
             raise ValueError("repeat_rows with solve = 'square': a repeated row is singular")
         return self
+
+    @property
+    def modules(self) -> list[str]:
+        """Places of the code that the method names (for fingerprints), "module:attribute"."""
+        return [SELECTIONS[self.selection]] if self.rows in ("scalar", "element") else []
 
     @property
     def may_oversample(self) -> bool:

@@ -7,6 +7,7 @@ import numpy as np
 
 from pdrom.core.yamlfile import validate
 from pdrom.model.dynamics.stepper import State
+from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene, SceneConfig
 
@@ -14,6 +15,26 @@ from pdrom.model.scene import Scene, SceneConfig
 def at_rest(scene: Scene) -> State:
     """The state that the scene itself starts from."""
     return scene.initial_state()
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A scene that is built when it is called: what `build` takes, the mesh by a function."""
+
+    mesh: Callable[[], Mesh]
+    effects: tuple[dict, ...]
+    settings: dict
+    masses: Callable[[Mesh], np.ndarray] | None = None
+
+    def __call__(self) -> Scene:
+        mesh = self.mesh()
+        masses = None if self.masses is None else self.masses(mesh)
+        return build(mesh, *self.effects, masses=masses, **self.settings)
+
+    @property
+    def modules(self) -> list[str]:
+        """Places of the effects (for the code fingerprint), "module:attribute"."""
+        return sorted({EFFECTS[effect["effect"]] for effect in self.effects})
 
 
 @dataclass(frozen=True)
@@ -29,7 +50,7 @@ class HardCase:
     """
 
     name: str
-    scene: Callable[[], Scene]
+    scene: Recipe
     why: str
     holds: tuple[str, ...]
     start: Callable[[Scene], State] = at_rest

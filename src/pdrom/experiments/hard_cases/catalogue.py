@@ -1,11 +1,11 @@
 """The hard cases, by name."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 
 import numpy as np
 
-from pdrom.experiments.hard_cases.case import HardCase, build
+from pdrom.experiments.hard_cases.case import HardCase, Recipe
 from pdrom.experiments.hard_cases.shapes import (
     both,
     folded,
@@ -24,7 +24,6 @@ from pdrom.experiments.hard_cases.shapes import (
     small_bar,
 )
 from pdrom.model.mesh.types import Mesh
-from pdrom.model.scene import Scene
 
 GRAVITY = {"effect": "gravity"}
 FLOOR = {"effect": "floor"}
@@ -46,20 +45,18 @@ def _with(effect: dict, **changes: object) -> dict:
     return {**effect, **changes}
 
 
-def _scene(mesh: Callable[[], Mesh], *effects: dict, **settings) -> Callable[[], Scene]:
-    return lambda: build(mesh(), *effects, **settings)
+def _scene(mesh: Callable[[], Mesh], *effects: dict, **settings) -> Recipe:
+    return Recipe(mesh, effects, settings)
 
 
-def _heavy_and_light(mesh: Callable[[], Mesh], *effects: dict, **settings) -> Callable[[], Scene]:
+def _heavy_and_light(mesh: Callable[[], Mesh], *effects: dict, **settings) -> Recipe:
     """Masses over eight decades, heavy beside light."""
 
-    def scene() -> Scene:
-        made = mesh()
+    def masses(made: Mesh) -> np.ndarray:
         order = np.random.default_rng(3).permutation(made.vertices)
-        masses = np.logspace(-4, 4, made.vertices)[order]
-        return build(made, *effects, masses=masses, **settings)
+        return np.logspace(-4, 4, made.vertices)[order]
 
-    return scene
+    return Recipe(mesh, effects, settings, masses)
 
 
 def _all_but(*free: int) -> dict:
@@ -283,3 +280,8 @@ CASES: dict[str, HardCase] = {
 def reducible_cases(slow: bool = False) -> list[str]:
     """Names of the cases that a reduction can repeat: those that are not refused."""
     return [name for name, c in CASES.items() if c.slow == slow and c.holds != ("refused",)]
+
+
+def modules_of(names: Iterable[str]) -> list[str]:
+    """Places of the effects of some cases (for the code fingerprint), "module:attribute"."""
+    return sorted({module for name in names for module in CASES[name].scene.modules})

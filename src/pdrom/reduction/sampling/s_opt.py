@@ -5,10 +5,13 @@ algorithm for hyper-reduction in reduced order models, SIAM J. Sci. Comput. 46 (
 and Xiu (2016). Points are generalised to blocks of rows (the elements).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy import linalg
 
 from pdrom.core.errors import SamplingError
+from pdrom.reduction.sampling.selection import Selection
 
 # Columns of length one depend on each other when what the others leave of one of them is below
 # this. Round-off leaves up to 1e-15 sqrt(r) of a column that is a copy; a column with less than
@@ -70,6 +73,17 @@ def extend(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np.nda
     while len(state.chosen) < count:
         state.add(state.best())
     return state.chosen
+
+
+class SOpt(Selection):
+    """One element a mode, nested in r, and further ones by the same measure."""
+
+    def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
+        path = s_opt_path(v, size)
+        return {r: path[:r] for r in ranks}
+
+    def extend(self, v: np.ndarray, size: int, chosen: np.ndarray, count: int) -> np.ndarray:
+        return extend(v, size, chosen, count)
 
 
 class _Sampled:

@@ -6,15 +6,11 @@ import numpy as np
 
 from pdrom.reduction.basis.types import Basis
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.sampling.block import block_elements
-from pdrom.reduction.sampling.block_qdeim import block_qdeim_elements
-from pdrom.reduction.sampling.deim import deim_entries
-from pdrom.reduction.sampling.gappy_pod_e import bound_gain, oversample
+from pdrom.reduction.sampling.gappy_pod_e import bound_gain
 from pdrom.reduction.sampling.joint import joint_rows
-from pdrom.reduction.sampling.qdeim import qdeim_entries
-from pdrom.reduction.sampling.s_opt import extend as extend_s_opt
-from pdrom.reduction.sampling.s_opt import s_opt_path
+from pdrom.reduction.sampling.selection import Selection
 from pdrom.reduction.sampling.types import Sampling
+from pdrom.reduction.selections import SELECTIONS
 
 
 def select(basis: Basis, spec: MethodSpec, r: int) -> Sampling:
@@ -57,32 +53,15 @@ def _sampled_blocks(
 
     Blocks beyond the modes are not nested in r: they depend on where the first r modes are weak.
     """
+    selection: Selection = SELECTIONS.load(spec.selection)()
     chosen = {}
-    for r, start in _one_a_mode(v, size, spec, ranks).items():
-        add = extend_s_opt if spec.selection == "s-opt" else oversample
+    for r, start in selection.one_a_mode(v, size, ranks).items():
         if spec.oversampling > 1:
-            start = add(v[:, :r], size, start, spec.oversampling * r)
+            start = selection.extend(v[:, :r], size, start, spec.oversampling * r)
         if spec.gain_bound is not None:
             start = bound_gain(v[:, :r], size, start, spec.gain_bound)
         chosen[r] = start
     return chosen
-
-
-def _one_a_mode(
-    v: np.ndarray, size: int, spec: MethodSpec, ranks: Sequence[int]
-) -> dict[int, np.ndarray]:
-    """As many blocks as modes (or as there are), by the method's selection."""
-    if spec.selection == "pivoted-qr":
-        return {r: _pivots(v[:, :r], size) for r in ranks}
-    if spec.selection == "s-opt":
-        path = s_opt_path(v, size)
-    else:
-        path = deim_entries(v) if size == 1 else block_elements(v, size)
-    return {r: path[:r] for r in ranks}
-
-
-def _pivots(v: np.ndarray, size: int) -> np.ndarray:
-    return qdeim_entries(v) if size == 1 else block_qdeim_elements(v, size)
 
 
 def _of_entries(entries: np.ndarray, basis: Basis, spec: MethodSpec) -> Sampling:

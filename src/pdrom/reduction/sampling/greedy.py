@@ -1,0 +1,17 @@
+"""The greedy selection: largest residual of the next mode, of single entries or whole elements."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pdrom.reduction.sampling.block import block_elements
+from pdrom.reduction.sampling.deim import deim_entries
+from pdrom.reduction.sampling.selection import Selection
+
+
+class Greedy(Selection):
+    """DEIM, nested in r."""
+
+    def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
+        path = deim_entries(v) if size == 1 else block_elements(v, size)
+        return {r: path[:r] for r in ranks}
