@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 import yaml
@@ -137,6 +138,80 @@ def test_a_scene_reruns_alone(finished: Checkout) -> None:
 
 
 SCENE = "config/scenes/spring_oop.yaml"
+SELECTION = '''"""The first blocks."""
+
+import numpy as np
+
+from pdrom.reduction.sampling.selection import Selection
+
+
+class First(Selection):
+    def one_a_mode(self, v, size, ranks):
+        return {r: np.arange(min(r, len(v) // size)) for r in ranks}
+'''
+EFFECT = '''"""Nothing at all."""
+
+from pdrom.model.effects.gravity import Gravity
+
+
+class Nothing(Gravity):
+    pass
+'''
+
+
+def _registered(checkout: Checkout, registry: str, entry: str, module: str, code: str) -> Path:
+    """Register ``entry`` (a name and a class) of a new module, before the first one."""
+    name, attribute = entry.split(":")
+    path = checkout.folder / "src" / Path(*module.split(".")).with_suffix(".py")
+    path.write_text(code, encoding="utf-8")
+    checkout.edit(registry, "    {\n", f'    {{\n        "{name}": "{module}:{attribute}",\n')
+    return path
+
+
+def test_registering_an_effect_reruns_nothing(finished: Checkout) -> None:
+    module = "pdrom.model.effects.nothing"
+    registry = "src/pdrom/model/effects/__init__.py"
+    path = _registered(finished, registry, "nothing:Nothing", module, EFFECT)
+    try:
+        assert finished.planned(*MICRO_ARGUMENTS) == set()
+    finally:
+        path.unlink()
+
+
+def test_registering_a_selection_reruns_the_methods_that_use_it(finished: Checkout) -> None:
+    module = "pdrom.reduction.sampling.first"
+    registry = "src/pdrom/reduction/selections.py"
+    path = _registered(finished, registry, "first:First", module, SELECTION)
+    try:
+        assert finished.planned(*MICRO_ARGUMENTS) == set()
+        # one method of the study takes it
+        finished.edit(
+            "config/methods.yaml",
+            "rows: element, selection: greedy, solve: qr}",
+            "rows: element, selection: first, solve: qr}",
+        )
+        planned = finished.planned(*MICRO_ARGUMENTS)
+    finally:
+        path.unlink()
+    assert {p for p in planned if _stage(p) == "reruns"}
+    assert {Path(p).stem for p in planned if _stage(p) == "sampling"} == {"block-deim"}
+    assert not {p for p in planned if _stage(p) in ("fom", "pod", "sensitivity")}
+
+
+def test_a_selection_reruns_the_methods_that_use_it(finished: Checkout) -> None:
+    """In the full order and in other methods it has no say."""
+    greedy = "src/pdrom/reduction/sampling/pivoted_qr.py"
+    finished.edit(greedy, "for r in ranks}", "for r in sorted(ranks)}")
+    planned = finished.planned(*MICRO_ARGUMENTS)
+    assert not {p for p in planned if _stage(p) in ("sampling", "reruns", "fom", "pod")}
+    greedy = "src/pdrom/reduction/sampling/greedy.py"
+    finished.edit(greedy, "for r in ranks}", "for r in sorted(ranks)}")
+    planned = finished.planned(*MICRO_ARGUMENTS)
+    methods = {Path(p).stem for p in planned if _stage(p) == "sampling"}
+    assert methods == {"deim", "block-deim"}
+    assert not {p for p in planned if _stage(p) in ("fom", "pod")}
+
+
 FAULTS = {
     "unknown key of the study": (
         "config/default.yaml", "solver: cholespy", "sovler: cholespy",
@@ -185,6 +260,11 @@ FAULTS = {
     "unknown method": (
         "config/default.yaml", "methods: [pod,", "methods: [pood,",
         ("methods", "'pood'", "allowed: pod"),
+    ),
+    "unknown selection": (
+        "config/methods.yaml", "selection: pivoted-qr", "selection: pivoted-rq",
+        ("config/methods.yaml", "qdeim", "pivoted-rq", "allowed: greedy, pivoted-qr, s-opt",
+         "did you mean 'pivoted-qr'"),
     ),
     "impossible combination": (
         "config/methods.yaml", "rows: element, selection: greedy, solve: qr",

@@ -9,7 +9,10 @@ import pytest
 
 import pdrom
 from pdrom.core.errors import ConfigurationError
+from pdrom.model.effects import EFFECTS
 from pdrom.pipeline.fingerprint import closure, digest_of_source, fingerprint
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.selections import SELECTIONS
 
 PACKAGE = Path(pdrom.__file__).parent
 SOURCE = '''"""Module."""
@@ -105,6 +108,50 @@ def test_effects_are_in_no_closure_that_does_not_list_them():
     assert not kernels & set(closure("pdrom.experiments.fom"))
     with_spring = closure("pdrom.experiments.fom", "pdrom.model.constraints.spring")
     assert kernels & set(with_spring) == {"pdrom.model.constraints.spring"}
+
+
+REGISTRY = """
+from pdrom.core.registry import Registry
+
+THINGS = Registry("thing", {"own": "pdrom.here:Own", "other": "pdrom.there:Other"})
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "counts"),
+    [
+        ('"other": "pdrom.there:Other"', '"other": "pdrom.there:Another"', False),
+        ('"other": "pdrom.there:Other"', '"more": "pdrom.more:More"', False),
+        (', "other": "pdrom.there:Other"', "", False),
+        ('"own": "pdrom.here:Own"', '"own": "pdrom.here:Other"', True),
+        ('"own": "pdrom.here:Own", ', "", True),
+        ('"thing"', '"kind"', True),
+        ("Registry(", "dict(", True),
+    ],
+)
+def test_entries_of_a_registry_for_other_modules_do_not_count(old, new, counts):
+    """Who asks for one lists it; entries for the module itself are its code."""
+    assert old in REGISTRY
+    edited = digest_of_source(REGISTRY.replace(old, new), "pdrom.here")
+    assert (edited != digest_of_source(REGISTRY, "pdrom.here")) == counts
+
+
+def test_an_entry_counts_by_its_attribute_too():
+    """Two effects of one module."""
+    pins, rotate = (fingerprint(EFFECTS[name]) for name in ("pins", "rotate"))
+    assert EFFECTS.module("pins") == EFFECTS.module("rotate")
+    assert pins != rotate
+    assert closure(EFFECTS["pins"]) == closure(EFFECTS.module("pins"))
+
+
+def test_selections_are_in_no_closure_that_does_not_list_them():
+    own = set(map(SELECTIONS.module, SELECTIONS))
+    for name in SELECTIONS:
+        method = MethodSpec(title="test", rows="element", selection=name)
+        found = closure("pdrom.reduction.sampling.select", *method.modules)
+        assert own & set(found) == {SELECTIONS.module(name)}
+    everything = MethodSpec(title="test", rows="all")
+    assert not own & set(closure("pdrom.reduction.sampling.select", *everything.modules))
 
 
 def test_order_and_repetition_of_modules_do_not_matter():
