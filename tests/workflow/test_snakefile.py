@@ -20,6 +20,8 @@ MICRO = {
     "sensitivity": {"perturbations": [1e-10], "seeds": [1]},
     "subspace": {"scenes": ["strain_oop"], "sizes": [4], "tolerances": [1e-2]},
 }
+# Folders of results that belong to no single scene.
+SHARED = ("tables", "figures", "paper", "hard_cases", "guard", "offline")
 MICRO_FILE = "micro.yaml"
 MICRO_ARGUMENTS = ("--configfile", MICRO_FILE)
 
@@ -108,7 +110,7 @@ def test_a_kernel_reruns_the_scenes_that_use_it_and_what_follows(finished: Check
         "src/pdrom/model/constraints/spring.py", "choose(scale == 0.0", "choose(scale <= 0.0"
     )
     planned = finished.planned(*MICRO_ARGUMENTS)
-    per_scene = {p for p in planned if _stage(p) not in ("tables", "figures", "paper")}
+    per_scene = {p for p in planned if _stage(p) not in SHARED}
     assert {p.split("/")[2].removesuffix(".csv") for p in per_scene} == {"spring_oop"}
     stages = {"fom", "snapshots", "pod", "sampling", "reruns", "sensitivity", "timings"}
     assert {_stage(p) for p in per_scene} >= stages
@@ -133,7 +135,7 @@ def test_a_caption_rerenders_its_figure_and_the_manuscript_only(finished: Checko
 def test_a_scene_reruns_alone(finished: Checkout) -> None:
     finished.edit("config/scenes/strain_oop.yaml", "weight: 1.0e+7", "weight: 2.0e+7")
     planned = finished.planned(*MICRO_ARGUMENTS)
-    per_scene = {p for p in planned if _stage(p) not in ("tables", "figures", "paper")}
+    per_scene = {p for p in planned if _stage(p) not in SHARED}
     assert {p.split("/")[2].removesuffix(".csv") for p in per_scene} == {"strain_oop"}
 
 

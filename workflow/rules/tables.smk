@@ -280,3 +280,24 @@ rule claims_table:
         "Verdicts on the claims of the paper"
     script:
         "../scripts/claims.py"
+
+
+# Tables that an experiment writes as they are
+for name, place in PLAN.measured_tables.items():
+
+    rule:
+        name:
+            f"{name}_table"
+        input:
+            part=place,
+        output:
+            report(f"results/tables/{name}.csv", category="Tables"),
+        log:
+            f"results/logs/tables/{name}.log",
+        params:
+            name=name,
+            code=PLAN.code("pdrom.tables.make"),
+        message:
+            f"Table {name}"
+        script:
+            "../scripts/table.py"

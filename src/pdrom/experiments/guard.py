@@ -1,29 +1,35 @@
-"""Rule guard: what the guard costs, and what falling back to full projections buys."""
+"""What a guard at run time costs, and what falling back to full projections buys."""
 
 import logging
-from collections.abc import Callable
+from dataclasses import dataclass
 from time import perf_counter
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
+from pydantic import Field
 
-from pdrom.core.metrics import trajectory_error
-from pdrom.core.store import open_hdf5, write_table
-from pdrom.experiments.scenes import scene_of
-from pdrom.model.dynamics.stepper import FrameReport, State
+from pdrom.core.paths import BASIS, GUARD, MESH, SAMPLING, TRAIN, File
+from pdrom.core.reads import EachOf
+from pdrom.core.store import write_table
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.scenes import positions_of, scene_of
+from pdrom.experiments.settings import BlowupExtent, Solver
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.energy import EnergyScale
-from pdrom.model.scene import Scene
+from pdrom.model.runs.bounded import Advance, BoundedRun
+from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import load_basis
 from pdrom.reduction.local.guard import Guard, largest_extent
 from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.local.guarded import guarded_rerun
 from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.ranks import resolve_ranks
-from pdrom.reduction.local.rerun import displacement_norms, replace_group
+from pdrom.reduction.local.ranks import Rank, resolve_ranks
+from pdrom.reduction.local.rerun import replace_group
 from pdrom.reduction.local.watched import WatchedLocalStep
 from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.rerun import displacement_norms
 from pdrom.reduction.sampling import Reduction
 from pdrom.reduction.sampling.load import load_reduction
 
@@ -35,91 +41,129 @@ COLUMNS = [
     "relative_error", "energy_ratio", "guard_frame", "guard_reason", "guard_count",
     "fallback_frames", "fallback_share", "ms_per_frame", "relative_cost",
 ]  # fmt: skip
-Advance = Callable[[State, int], tuple[State, FrameReport]]
 
 
-def try_guard(
-    cases: list[dict[str, Any]],
-    guard: dict[str, Any],
-    repeats: int,
-    blowup_extent: float,
-    solver: str,
-    files: list[dict[str, str]],
-    output: str,
-) -> None:
-    """Run every case without a guard, watched, and with fall-back, and write the table guard.
+class TriedGuard(GuardSettings):
+    """A guard whose actions are compared, each timed ``repeats`` times."""
 
-    Parameters
-    ----------
-    cases : scene (its configuration), group, method (its specification), name and r
-    files : mesh, fom, basis and sampling of each case
-    """
-    settings = GuardSettings.model_validate(guard)
+    repeats: Annotated[int, Field(ge=1)] = 3
+
+
+class GuardCase(ConfigModel):
+    """A reduction on which the guard is tried, if the study holds scene, method and size."""
+
+    scene: str
+    method: str
+    r: Rank
+
+
+class GuardSection(TriedGuard):
+    """Section ``guard``: the guard of the reruns, and the ``cases`` that compare its actions."""
+
+    cases: tuple[GuardCase, ...] = ()
+
+
+class Trial(ConfigModel):
+    """A case with everything that it depends on; ``name`` is that of the method."""
+
+    scene: SceneConfig
+    group: str
+    name: str
+    method: MethodSpec
+    r: Rank
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Labels of the files of this case."""
+        return {"scene": self.scene.name, "group": self.group, "method": self.name}
+
+
+class Settings(JobSettings):
+    """What the trials of the guard depend on."""
+
+    trials: tuple[Trial, ...]
+    guard: TriedGuard
+    blowup_extent: BlowupExtent
+    solver: Solver
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read, one of each kind for every trial."""
+
+    meshes: Annotated[list[File], EachOf("trials", MESH)]
+    runs: Annotated[list[File], EachOf("trials", TRAIN)]
+    bases: Annotated[list[File], EachOf("trials", BASIS)]
+    samplings: Annotated[list[File], EachOf("trials", SAMPLING)]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written."""
+
+    table: Annotated[File, GUARD]
+
+
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+    """Run every trial without a guard, watched, and with fall-back, and time all three."""
     rows = []
-    for case, paths in zip(cases, files, strict=True):
-        trial = _Trial(case, paths, settings, blowup_extent, solver)
-        seconds = trial.seconds(repeats)
+    files = zip(inputs.meshes, inputs.runs, inputs.bases, inputs.samplings, strict=True)
+    for case, paths in zip(settings.trials, files, strict=True):
+        trial = _Trial(case, settings, *paths)
+        seconds = trial.seconds(settings.guard.repeats)
         rows += [
             {**row, "ms_per_frame": 1e3 * seconds[i], "relative_cost": seconds[i] / seconds[0]}
             for i, row in enumerate(trial.rows())
         ]
-        log.info("%s, %s", case["scene"]["name"], case["name"])
+        log.info("%s, %s", case.scene.name, case.name)
     table = pd.DataFrame(rows, columns=COLUMNS)
     whole = ["r", "blowup_frame", "guard_frame", "guard_count", "fallback_frames"]
-    write_table(table.astype(dict.fromkeys(whole, "Int64")), output)
+    write_table(table.astype(dict.fromkeys(whole, "Int64")), outputs.table.path)
 
 
 class _Trial:
     """One failing reduction."""
 
     def __init__(
-        self,
-        case: dict[str, Any],
-        paths: dict[str, str],
-        settings: GuardSettings,
-        limit: float,
-        solver: str,
+        self, case: Trial, settings: Settings, mesh: File, run: File, basis: File, sampling: File
     ) -> None:
-        self.scene: Scene = scene_of(case["scene"], paths["mesh"])
-        self.system: GlobalSystem = self.scene.system_with(solver)
-        self.group: str = case["group"]
-        self.name: str = case["name"]
-        self.limit = limit
-        self.settings = [settings.model_copy(update={"action": action}) for action in ACTIONS]
-        with open_hdf5(paths["fom"]) as file:
-            self.reference = file["positions"][...]
+        self.case = case
+        self.limit = settings.blowup_extent
+        self.scene: Scene = scene_of(case.scene, mesh)
+        self.system: GlobalSystem = self.scene.system_with(settings.solver)
+        self.settings: list[GuardSettings] = [
+            settings.guard.model_copy(update={"action": action}) for action in ACTIONS
+        ]
+        self.reference = positions_of(run)
         self.trained_extent = largest_extent(self.reference)
-        basis = load_basis(paths["basis"])
-        r = min(resolve_ranks([case["r"]], basis.rank)[0], basis.rank)
-        method = MethodSpec.model_validate(case["method"])
-        self.reduction: Reduction = load_reduction(basis, paths["sampling"], method, r)
+        space = load_basis(basis.path)
+        r = min(resolve_ranks([case.r], space.rank)[0], space.rank)
+        self.reduction: Reduction = load_reduction(space, sampling.path, case.method, r)
 
     def rows(self) -> list[dict[str, Any]]:
         """The full-order run, then the actions."""
         name = self.scene.config.name
-        full = {"scene": name, "group": self.group, "method": "full", "action": "none"}
+        full = {"scene": name, "group": self.case.group, "method": "full", "action": "none"}
         frames = self.scene.config.frames
         full |= {"frames": frames, "finite": True, "relative_error": 0.0, "energy_ratio": 1.0}
         return [full, *(self._row(settings) for settings in self.settings)]
 
     def _row(self, settings: GuardSettings) -> dict[str, Any]:
         outcome, seen = guarded_rerun(
-            self.scene, self.system, self.group, self.reduction, self.reference, self.limit,
+            self.scene, self.system, self.case.group, self.reduction, self.reference, self.limit,
             settings, self.trained_extent,
         )  # fmt: skip
-        whole = outcome.blowup_frame is None
-        displacement = displacement_norms(self.reference)
         share = seen.fallback_frames / outcome.frames if seen.watched else None
         return {
             "scene": self.scene.config.name,
-            "group": self.group,
-            "method": self.name,
+            "group": self.case.group,
+            "method": self.case.name,
             "r": self.reduction.r,
             "action": settings.action,
             "frames": outcome.frames,
-            "finite": whole,
+            "finite": outcome.finite,
             "blowup_frame": outcome.blowup_frame,
-            "relative_error": trajectory_error(outcome.difference, displacement) if whole else None,
+            "relative_error": outcome.error(displacement_norms(self.reference)),
             "energy_ratio": EnergyScale.of(self.scene, self.reference).ratio(outcome.positions),
             **seen.columns(),
             "fallback_share": share,
@@ -135,13 +179,13 @@ class _Trial:
         return self.scene.stepper(self.system, self.scene.groups, track_objective=False).step
 
     def _guarded(self, settings: GuardSettings) -> Advance:
-        group = self.scene.group(self.group)
+        group = self.scene.group(self.case.group)
         watches = settings.action != "none"
         if watches:
             step = WatchedLocalStep(group, self.reduction, self.scene.config.iterations)
         else:
             step = ReducedLocalStep(group, self.reduction)
-        steps = replace_group(self.scene, self.group, step)
+        steps = replace_group(self.scene, self.case.group, step)
         loop = self.scene.stepper(self.system, steps, track_objective=watches)
         if not watches:
             return loop.step
@@ -151,12 +195,10 @@ class _Trial:
 
 def _time(advance: Advance, scene: Scene) -> float:
     """Seconds per frame of a run, which ends where it is no longer finite."""
-    state, frames = scene.initial_state(), 0
+    run = BoundedRun(advance, scene.initial_state(), scene.config.frames)
     started = perf_counter()
-    with np.errstate(over="ignore", invalid="ignore"):
-        for frame in range(scene.config.frames):
-            state, _ = advance(state, frame)
-            frames += 1
-            if not np.isfinite(state.positions.sum()):
-                break
-    return (perf_counter() - started) / frames
+    frames = sum(1 for _ in run)
+    return (perf_counter() - started) / max(1, frames)
+
+
+EXPERIMENT = Experiment("guard", "Guard at run time: what falling back buys", run, alone=True)

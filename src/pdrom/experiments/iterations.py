@@ -1,21 +1,26 @@
-"""Rule iterations: what K costs in accuracy, against the limit K -> infinity."""
+"""What the number of iterations K costs in accuracy, against the limit K -> infinity."""
 
 import logging
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
+from pydantic import Field
 
-from pdrom.core.metrics import trajectory_error
-from pdrom.core.store import open_hdf5, read_table, write_table
-from pdrom.experiments.scenes import scene_of
+from pdrom.core.paths import ITERATIONS, MESH, SENSITIVITY, TRAIN, File
+from pdrom.core.store import write_table
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.scenes import positions_of, scene_of
+from pdrom.experiments.settings import Horizon, Solver, Tolerance
 from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.runs.converged import ConvergedStepper
-from pdrom.model.runs.horizon import floor_of, horizon
-from pdrom.model.scene import Scene
-from pdrom.reduction.local.rerun import displacement_norms
+from pdrom.model.runs.horizon import error_within
+from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.rerun import displacement_norms
 
 log = logging.getLogger(__name__)
 
@@ -24,54 +29,84 @@ COLUMNS = [
 ]  # fmt: skip
 
 
-def sweep_iterations(
-    config: dict[str, Any],
-    settings: dict[str, Any],
-    floor: dict[str, float],
-    solver: str,
-    mesh: str,
-    fom: str,
-    sensitivity_table: str,
-    output: str,
-) -> None:
-    """Run a scene with every K of ``settings`` up to its horizon, and once to convergence.
+class IterationCounts(ConfigModel):
+    """Full-order runs with K in ``counts``.
+
+    Every K runs with Anderson acceleration over ``anderson_window`` iterates, too (0: not).
+    """
+
+    counts: tuple[Annotated[int, Field(ge=1, le=10_000)], ...] = (1, 2, 5, 10, 20, 40)
+    anderson_window: Annotated[int, Field(ge=0, le=50)] = 5
+
+
+class IterationSweep(IterationCounts):
+    """Section ``iterations``: the counts, against a run whose every frame is converged.
+
+    A frame is converged when one more iteration moves no vertex by more than ``tolerance`` times
+    the extent; ``limit`` bounds the evaluations it may take.
+    """
+
+    tolerance: Tolerance = 1e-8
+    limit: Annotated[int, Field(ge=2)] = 4000
+
+
+class Settings(JobSettings):
+    """What the sweep over K depends on."""
+
+    scene: SceneConfig
+    iterations: IterationSweep
+    horizon: Horizon
+    solver: Solver
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read."""
+
+    mesh: Annotated[File, MESH]
+    fom: Annotated[File, TRAIN]
+    sensitivity: Annotated[File, SENSITIVITY]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written."""
+
+    table: Annotated[File, ITERATIONS]
+
+
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+    """Run a scene with every K up to its horizon, and once to convergence.
 
     Each K runs plainly (``window`` 0) and with Anderson acceleration. Each row has the error of a
     K against the converged run and against the scene's own run; the last row is the converged run
     itself (``iterations`` empty) with its largest residual: the change by one more iteration,
     relative to the extent. If a frame stays above the tolerance there is no converged reference,
     and the errors against it are empty.
-
-    Parameters
-    ----------
-    settings : counts, anderson_window, tolerance, limit (see `pdrom.pipeline.study.IterationSweep`)
-    floor : perturbation and threshold that define the horizon
     """
-    scene = scene_of(config, mesh)
-    system = scene.system_with(solver)
+    scene, sweep = scene_of(settings.scene, inputs.mesh), settings.iterations
+    system = scene.system_with(settings.solver)
     name = scene.config.name
-    spread = floor_of(read_table(sensitivity_table), name, floor["perturbation"])
-    frames = max(1, horizon(spread, floor["threshold"]))
-    with open_hdf5(fom) as file:
-        own = file["positions"][: frames + 1]
-    best = ConvergedStepper(scene, system, settings["tolerance"], settings["limit"])
+    frames = max(1, settings.horizon.frames(inputs.sensitivity))
+    own = positions_of(inputs.fom, frames)
+    best = ConvergedStepper(scene, system, sweep.tolerance, sweep.limit)
     limit = _run(best, scene, frames)
     if not best.converged:
-        log.warning("%s: no convergence in %d evaluations", name, settings["limit"])
+        log.warning("%s: no convergence in %d evaluations", name, sweep.limit)
     log.info("%s: %.0f evaluations a frame", name, np.mean(best.evaluations))
     rows = []
-    counts = sorted({*settings["counts"], scene.config.iterations})
-    for count, window in accelerated(counts, settings["anderson_window"]):
-        run = own
+    counts = sorted({*sweep.counts, scene.config.iterations})
+    for count, window in accelerated(counts, sweep.anderson_window):
+        reached = own
         if (count, window) != (scene.config.iterations, scene.config.anderson_window):
-            run = _run(stepper_of(scene, system, count, window), scene, frames)
-        converged = _error(run, limit) if best.converged else None
-        rows.append((name, count, window, frames, converged, _error(run, own), None))
+            reached = _run(stepper_of(scene, system, count, window), scene, frames)
+        converged = _error(reached, limit) if best.converged else None
+        rows.append((name, count, window, frames, converged, _error(reached, own), None))
     residual = max(best.changes) / scene.mesh.extent
     converged = 0.0 if best.converged else None
     rows.append((name, None, None, frames, converged, _error(limit, own), residual))
     table = pd.DataFrame(rows, columns=COLUMNS).astype({"iterations": "Int64", "window": "Int64"})
-    write_table(table, output)
+    write_table(table, outputs.table.path)
 
 
 def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
@@ -99,4 +134,7 @@ def _run(loop: Stepper, scene: Scene, frames: int) -> np.ndarray:
 
 def _error(run: np.ndarray, reference: np.ndarray) -> float | None:
     difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
-    return trajectory_error(difference, displacement_norms(reference))
+    return error_within(difference, displacement_norms(reference), len(difference))
+
+
+EXPERIMENT = Experiment("iterations", "Accuracy of {scene} against the number of iterations", run)

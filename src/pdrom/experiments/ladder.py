@@ -1,20 +1,27 @@
-"""Rule ladder: all rungs on one group of one scene."""
+"""The ladder: from the published choices to sound ones, one ingredient at a time."""
 
 import logging
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
+from pydantic import Field
 
 from pdrom.core.metrics import relative_errors
-from pdrom.core.store import open_hdf5, read_table, write_table
-from pdrom.experiments.ladder_spec import LadderSpec
-from pdrom.experiments.scenes import scene_of
-from pdrom.model.runs.horizon import error_within, floor_of, horizon
+from pdrom.core.paths import LADDER, MESH, SENSITIVITY, SNAPSHOTS, TRAIN, File
+from pdrom.core.store import write_table
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.scenes import positions_of, scene_of
+from pdrom.experiments.settings import BlowupExtent, Horizon
+from pdrom.model.runs.horizon import error_within
+from pdrom.model.scene import SceneConfig
 from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.rerun import Rerun, displacement_norms, replace_group, rerun
+from pdrom.reduction.local.rerun import replace_group, rerun
 from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.snapshots import SPLITS, SnapshotSet, load_snapshots
 
@@ -24,49 +31,83 @@ COLUMNS = [
     "scene", "group", "direction", "rung", "r", "condition", "gain", "error_train", "error_test",
     "error_heldout", "finite", "blowup_frame", "relative_error_within_horizon",
 ]  # fmt: skip
+Rungs = Annotated[tuple[MethodSpec, ...], Field(min_length=1)]
 
 
-def climb(
-    labels: dict[str, str],
-    scene: dict[str, Any],
-    ladder: dict[str, Any],
-    floor: dict[str, float],
-    blowup_extent: float,
-    mesh: str,
-    fom: str,
-    snapshots: str,
-    sensitivity: str,
-    output: str,
-) -> None:
-    """Reduce and rerun the scene with every rung and write the rows of the table ladder.
+class Ladder(ConfigModel):
+    """The rungs of a ladder.
 
-    Parameters
-    ----------
-    floor : perturbation and threshold that define the horizon
+    r : basis size of all rungs (the numerical rank where that is smaller)
+    signs : how many choices of the singular vectors' signs the first rung is repeated with
+    up, down : methods, from the published one upwards, and the sound one less one ingredient
     """
-    bound, data = scene_of(scene, mesh), load_snapshots(snapshots)
-    with open_hdf5(fom) as file:
-        reference = file["positions"][...]
-    spread = floor_of(read_table(sensitivity), labels["scene"], floor["perturbation"])
-    end = horizon(spread, floor["threshold"])
+
+    r: Annotated[int, Field(ge=1, le=100_000)]
+    signs: Annotated[int, Field(ge=0, le=100)]
+    up: Rungs
+    down: Rungs
+
+    def rungs(self) -> list[tuple[str, MethodSpec, int | None]]:
+        """(direction, method, seed of the signs) of all rows, in order."""
+        rows = [("up", method, None) for method in self.up]
+        rows += [("down", method, None) for method in self.down]
+        return rows + [("signs", self.up[0], seed) for seed in range(1, self.signs + 1)]
+
+
+class LadderFile(Ladder):
+    """Content of config/ladder.yaml: the rungs, and ``scenes`` where it is climbed if held."""
+
+    scenes: tuple[str, ...]
+
+
+class Settings(JobSettings):
+    """What a climb depends on."""
+
+    scene: SceneConfig
+    ladder: Ladder
+    horizon: Horizon
+    blowup_extent: BlowupExtent
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read."""
+
+    mesh: Annotated[File, MESH]
+    fom: Annotated[File, TRAIN]
+    snapshots: Annotated[File, SNAPSHOTS]
+    sensitivity: Annotated[File, SENSITIVITY]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written: a row for every rung."""
+
+    table: Annotated[File, LADDER]
+
+
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+    """Reduce and rerun the scene with every rung."""
+    labels, ladder = outputs.table.labels, settings.ladder
+    scene, data = scene_of(settings.scene, inputs.mesh), load_snapshots(inputs.snapshots.path)
+    reference = positions_of(inputs.fom)
+    end = settings.horizon.frames(inputs.sensitivity)
     displacement = displacement_norms(reference)
-    system = bound.system
-    group = bound.group(labels["group"])
-    spec = LadderSpec.model_validate(ladder)
+    group, system = scene.group(labels["group"]), scene.system
     rows = []
-    for direction, method, seed in spec.rungs():
-        row = {**labels, "direction": direction, "rung": _name(method, seed), "r": spec.r}
-        reduction = _reduce(data, method, spec.r, seed)
+    for direction, method, seed in ladder.rungs():
+        row = {**labels, "direction": direction, "rung": _name(method, seed), "r": ladder.r}
+        reduction = _reduce(data, method, ladder.r, seed)
         if reduction is not None:
-            steps = replace_group(bound, group.name, ReducedLocalStep(group, reduction))
-            outcome = rerun(bound, system, steps, reference, blowup_extent)
+            steps = replace_group(scene, group.name, ReducedLocalStep(group, reduction))
+            outcome = rerun(scene, system, steps, reference, settings.blowup_extent)
             row |= {"r": reduction.r, **_measures(reduction, data)}
-            row |= _run(outcome, displacement, end)
+            row |= _ran(outcome, displacement, end)
         rows.append(row)
         log.info("%s, %s", direction, row["rung"])
     table = pd.DataFrame(rows, columns=COLUMNS)
     table["blowup_frame"] = table["blowup_frame"].astype("Int64")
-    write_table(table, output)
+    write_table(table, outputs.table.path)
 
 
 def _name(method: MethodSpec, seed: int | None) -> str:
@@ -91,9 +132,12 @@ def _measures(reduction: Reduction, data: SnapshotSet) -> dict[str, Any]:
     return {"condition": reduction.condition, "gain": reduction.gain, **errors}
 
 
-def _run(outcome: Rerun, displacement: np.ndarray, end: int) -> dict[str, Any]:
+def _ran(outcome: Rerun, displacement: np.ndarray, end: int) -> dict[str, Any]:
     return {
-        "finite": outcome.blowup_frame is None,
+        "finite": outcome.finite,
         "blowup_frame": outcome.blowup_frame,
         "relative_error_within_horizon": error_within(outcome.difference, displacement, end),
     }
+
+
+EXPERIMENT = Experiment("ladder", "Ladder of {group} in {scene}", run)

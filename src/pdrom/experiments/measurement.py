@@ -8,13 +8,25 @@ median time counts: an interruption hits one frame of one repeat, and is left ou
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.settings import Count, Repeats
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.reduction.local.local_step import ReducedLocalStep
 
 Progress = Callable[[int, int], None]
+
+
+class Protocol(ConfigModel):
+    """``frames`` of each run, after ``warmup`` unmeasured runs, in ``repeats`` measured ones."""
+
+    frames: Count = 10
+    warmup: Annotated[int, Field(ge=0, le=1000)] = 1
+    repeats: Repeats = 5
 
 
 @dataclass(frozen=True)

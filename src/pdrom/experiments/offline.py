@@ -1,14 +1,21 @@
-"""Rule offline: time of the algorithms that run before a reduced model does, at full size."""
+"""Time of the algorithms that run before a reduced model does, at full size."""
 
 import logging
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from time import perf_counter
-from typing import Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 import pandas as pd
+from pydantic import Field, model_validator
 
+from pdrom.core.paths import OFFLINE, File
 from pdrom.core.store import write_table
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.declaration import Experiment, JobSettings, Nothing
+from pdrom.experiments.settings import Tolerance
+from pdrom.model.effects.base import Seed
 from pdrom.reduction.basis.pod import pod
 from pdrom.reduction.sampling.deim import deim_entries
 from pdrom.reduction.sampling.qdeim import qdeim_entries
@@ -20,20 +27,54 @@ COLUMNS = ["task", "implementation", "rows", "columns", "seconds", "difference"]
 Task = Callable[[], np.ndarray]
 
 
-def measure_offline(settings: dict[str, Any], output: str) -> None:
-    """Write the table offline_cost: each algorithm, pyMOR's beside it where it has one.
+class Offline(ConfigModel):
+    """Section ``offline``: sizes of the algorithms that are timed, on random matrices.
 
-    Parameters
-    ----------
-    settings : rows and snapshots of the matrix, r of the interpolation, elements and equations of
-        the non-negative least squares with their tolerance, seed
+    POD of ``rows`` x ``snapshots``, interpolation with ``r`` modes of it, non-negative least
+    squares with ``elements`` columns and ``equations`` rows to ``tolerance``.
     """
-    small = {name: min(int(size), 40) for name, size in settings.items() if name != "tolerance"}
-    for _, *tasks in _tasks({**small, "tolerance": settings["tolerance"], "rows": 80}):
+
+    rows: Annotated[int, Field(ge=10, le=10_000_000)] = 100_000
+    snapshots: Annotated[int, Field(ge=2, le=5000)] = 200
+    r: Annotated[int, Field(ge=1, le=5000)] = 200
+    elements: Annotated[int, Field(ge=10, le=10_000_000)] = 100_000
+    equations: Annotated[int, Field(ge=2, le=20_000)] = 1000
+    tolerance: Tolerance = 1e-3
+    seed: Seed = 0
+
+    @model_validator(mode="after")
+    def _modes_exist(self) -> Self:
+        if self.r > min(self.snapshots, self.rows):
+            raise ValueError(f"r = {self.r}: at most snapshots = {self.snapshots} and rows")
+        return self
+
+    def small(self) -> Self:
+        """Sizes that load and compile what a measurement needs."""
+        sizes = ("snapshots", "r", "elements", "equations")
+        changes = {name: min(getattr(self, name), 40) for name in sizes}
+        return self.model_copy(update={**changes, "rows": 80})
+
+
+class Settings(JobSettings):
+    """What the measurement depends on."""
+
+    offline: Offline
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written: each algorithm, pyMOR's beside it where it has one."""
+
+    table: Annotated[File, OFFLINE]
+
+
+def run(settings: Settings, inputs: Nothing, outputs: Outputs) -> None:
+    """Time every algorithm."""
+    for _, *tasks in _tasks(settings.offline.small()):
         for task in filter(None, tasks):
-            task()  # loads and compiles what the measurement needs
+            task()
     rows = []
-    for labels, own, other in _tasks(settings):
+    for labels, own, other in _tasks(settings.offline):
         seconds, result = _timed(own)
         row = {**labels, "implementation": "pdrom", "seconds": seconds}
         if other is not None:
@@ -43,7 +84,8 @@ def measure_offline(settings: dict[str, Any], output: str) -> None:
         rows.append(row)
         log.info("%s: %.2f s", labels["task"], seconds)
     table = pd.DataFrame(rows, columns=COLUMNS)
-    write_table(table.sort_values(["task", "implementation"], kind="stable"), output)
+    ordered = table.sort_values(["task", "implementation"], kind="stable")
+    write_table(ordered, outputs.table.path)
 
 
 def _timed(task: Task) -> tuple[float, np.ndarray]:
@@ -59,22 +101,21 @@ def _difference(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.linalg.norm(a - b) / np.linalg.norm(b))
 
 
-def _tasks(settings: dict[str, Any]) -> Iterator[tuple[dict[str, Any], Task, Task | None]]:
+def _tasks(sizes: Offline) -> Iterator[tuple[dict[str, Any], Task, Task | None]]:
     """Labels, our algorithm and pyMOR's (None: it has none), on the same input."""
-    generator = np.random.default_rng(settings["seed"])
-    n, m, r = settings["rows"], settings["snapshots"], settings["r"]
+    generator = np.random.default_rng(sizes.seed)
+    n, m = sizes.rows, sizes.snapshots
     matrix = decaying(generator, n, m)
     size = {"rows": n, "columns": m}
     yield {"task": "pod", **size}, lambda: pod(matrix)[1], lambda: _pymor_pod(matrix)
-    basis = pod(matrix)[0][:, :r]
+    basis = pod(matrix)[0][:, : sizes.r]
     size = {"rows": n, "columns": basis.shape[1]}
     yield {"task": "deim", **size}, lambda: deim_entries(basis), lambda: _pymor_deim(basis)
     yield {"task": "q-deim", **size}, lambda: qdeim_entries(basis), None
-    elements, equations = settings["elements"], settings["equations"]
-    columns = decaying(generator, elements, equations).T
+    columns = decaying(generator, sizes.elements, sizes.equations).T
     target = columns.sum(axis=1)
-    size = {"rows": equations, "columns": elements}
-    tolerance = settings["tolerance"]
+    size = {"rows": sizes.equations, "columns": sizes.elements}
+    tolerance = sizes.tolerance
     yield {"task": "nnls", **size}, lambda: nnls_early_stop(columns, target, tolerance)[0], None
 
 
@@ -108,3 +149,6 @@ def _pymor_deim(basis: np.ndarray) -> np.ndarray:
     _quiet()
     vectors = NumpyVectorSpace(len(basis)).from_numpy(basis)
     return np.asarray(deim(vectors, pod=False)[0])
+
+
+EXPERIMENT = Experiment("offline", "Cost of the offline algorithms", run, alone=True)

@@ -1,4 +1,4 @@
-"""Rule online: one large scene, hyper-reduced, against its own full-order run in the same job.
+"""One large scene, hyper-reduced, against its own full-order run in the same job.
 
 Everything is made here and nothing is kept but the rows of the table: full-order runs of both
 motions, columns from training frames, element sampling, reduced runs, and times. Full-order and
@@ -6,20 +6,26 @@ reduced steps are timed in turn by the protocol of `pdrom.experiments.measuremen
 """
 
 import logging
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
 
-from pdrom.core.metrics import trajectory_error
+from pdrom.core.paths import ONLINE, File
+from pdrom.core.reads import SourcesOf
 from pdrom.core.store import write_table
-from pdrom.experiments.measurement import Variant, measure
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.measurement import Protocol, Variant, measure
+from pdrom.experiments.motion import training_indices
+from pdrom.experiments.settings import Modes, PositionBasis, Tolerance
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.local.rerun import displacement_norms
-from pdrom.reduction.snapshots import training_frames
-from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
+from pdrom.reduction.rerun import displacement_norms
+from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
+from pdrom.reduction.subspace.rerun import rerun_model
 
 log = logging.getLogger(__name__)
 
@@ -30,72 +36,105 @@ COLUMNS = [
 ]  # fmt: skip
 
 
-def run_online(
-    scene: dict[str, Any],
-    settings: dict[str, Any],
-    protocol: dict[str, int],
-    root: str,
-    output: str,
-) -> None:
-    """Reduce a scene by every size and tolerance of ``settings`` and write its rows."""
-    config = SceneConfig.model_validate(scene)
-    mesh = config.mesh.build(Path(root))
+class OnlineModels(ConfigModel):
+    """Models of a large scene: kinds of basis, numbers of modes, tolerances of the sampling."""
+
+    bases: tuple[PositionBasis, ...] = ("pod",)
+    sizes: tuple[Modes, ...] = (20,)
+    tolerances: tuple[Tolerance, ...] = (1e-2,)
+
+
+class Online(OnlineModels):
+    """Section ``online``: the models, and the large ``scenes`` that are reduced by them."""
+
+    scenes: tuple[str, ...] = ()
+
+
+class Settings(JobSettings):
+    """What the rows of a large scene depend on, beside the machine."""
+
+    scene: SceneConfig
+    online: OnlineModels
+    timing: Protocol
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read: that of the mesh, nothing for a generated one."""
+
+    sources: Annotated[list[str], SourcesOf("scene.mesh")]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written: a row for every basis, size and tolerance."""
+
+    table: Annotated[File, ONLINE]
+
+
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+    """Reduce a scene by every model and time each beside the full order."""
+    config, asked, timing = settings.scene, settings.online, settings.timing
+    mesh = config.mesh.build(Path())
     train = Scene.build(config, mesh)
     heldout = Scene.build(config.held_out_variant(), mesh)
     references = [trajectory(motion, track_objective=False) for motion in (train, heldout)]
     log.info("%s: full-order runs of %d vertices", config.name, mesh.vertices)
-    frames = training_frames(config.frames, max(p.train for p in config.reduce.values()))
+    frames = training_indices(train)
     rows, variants = [], []
-    for kind in settings["bases"]:
-        for k in settings["sizes"]:
+    for kind in asked.bases:
+        for k in asked.sizes:
             columns = make_columns(train, references[0][1:][frames], kind, k)
-            found = sample_elements(train, columns, frames, settings["tolerances"])
-            for tolerance, samples in zip(settings["tolerances"], found, strict=True):
+            found = sample_elements(train, columns, frames, asked.tolerances)
+            for tolerance, samples in zip(asked.tolerances, found, strict=True):
                 model = SubspaceModel(kind, columns, samples)
                 errors = [
                     relative_error(motion, model, reference)
                     for motion, reference in zip((train, heldout), references, strict=True)
                 ]
-                count = sum(len(chosen.elements) for chosen in samples.values())
-                rows.append(
-                    {
-                        "scene": config.name,
-                        "vertices": mesh.vertices,
-                        "elements": sum(group.elements for group in train.groups),
-                        "position_basis": kind,
-                        "k": k,
-                        "tau": tolerance,
-                        "elements_sampled": count,
-                        "relative_error_train": errors[0],
-                        "relative_error_heldout": errors[1],
-                    }
-                )
-                variants.append(_variant(*model.loop(train), protocol, config))
-                log.info("%s k=%d tau=%g: %d elements", kind, k, tolerance, count)
+                rows.append(_row(train, kind, k, tolerance, samples, errors))
+                variants.append(_variant(*model.loop(train), timing, config))
+                log.info("%s k=%d tau=%g", kind, k, tolerance)
     stepper = train.stepper(track_objective=False)
-    variants.append(_variant(stepper, train.initial_state(), protocol, config))
-    *reduced, full = measure(variants, protocol["warmup"], protocol["repeats"])
+    variants.append(_variant(stepper, train.initial_state(), timing, config))
+    *reduced, full = measure(variants, timing.warmup, timing.repeats)
     for row, measurement in zip(rows, reduced, strict=True):
         row["ms_per_frame"] = measurement.frame
         row["ms_per_iteration"] = measurement.frame / config.iterations
         row["fom_ms_per_frame"] = full.frame
         row["speedup"] = full.frame / measurement.frame
-    write_table(pd.DataFrame(rows, columns=COLUMNS), output)
+    write_table(pd.DataFrame(rows, columns=COLUMNS), outputs.table.path)
+
+
+def _row(
+    scene: Scene,
+    kind: str,
+    k: int,
+    tolerance: float,
+    samples: dict[str, Samples],
+    errors: list[float | None],
+) -> dict[str, Any]:
+    return {
+        "scene": scene.config.name,
+        "vertices": scene.mesh.vertices,
+        "elements": sum(group.elements for group in scene.groups),
+        "position_basis": kind,
+        "k": k,
+        "tau": tolerance,
+        "elements_sampled": sum(len(chosen.elements) for chosen in samples.values()),
+        "relative_error_train": errors[0],
+        "relative_error_heldout": errors[1],
+    }
 
 
 def relative_error(scene: Scene, model: SubspaceModel, reference: np.ndarray) -> float | None:
     """Relative error of a run against ``reference`` (F + 1, N, 3); None if it blows up."""
-    loop, state = model.loop(scene)
-    difference = np.empty(scene.config.frames)
-    for frame in range(scene.config.frames):
-        with np.errstate(over="ignore", invalid="ignore"):
-            state, _ = loop.step(state, frame)
-            moved = model.positions(state.positions) - reference[frame + 1]
-            difference[frame] = np.linalg.norm(moved)
-        if not np.isfinite(difference[frame]):
-            return None
-    return trajectory_error(difference, displacement_norms(reference))
+    error = rerun_model(scene, model, reference).error(displacement_norms(reference))
+    return error if error is not None and np.isfinite(error) else None
 
 
-def _variant(loop, state, protocol: dict[str, int], config: SceneConfig) -> Variant:
-    return Variant({}, loop, state, min(protocol["frames"], config.frames))
+def _variant(loop, state, timing: Protocol, config: SceneConfig) -> Variant:
+    return Variant({}, loop, state, min(timing.frames, config.frames))
+
+
+EXPERIMENT = Experiment("online", "Online cost of {scene}", run, alone=True)

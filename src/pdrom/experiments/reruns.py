@@ -1,27 +1,43 @@
-"""Rule reruns, second part: the scene with one group's projections reduced, for every asked r."""
+"""Sampling of a group by one method, then the scene again with the group reduced, for every r."""
 
 import logging
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import h5py
 import numpy as np
 import pandas as pd
 
-from pdrom.core.metrics import trajectory_error
+from pdrom.core.paths import (
+    BASIS,
+    HELDOUT,
+    MESH,
+    RECONSTRUCTION,
+    RERUNS,
+    RERUNS_HELDOUT,
+    RERUNS_TRAIN,
+    SAMPLING,
+    SNAPSHOTS,
+    TRAIN,
+    File,
+)
 from pdrom.core.provenance import attributes
-from pdrom.core.store import open_hdf5, write_hdf5, write_table
-from pdrom.experiments.scenes import RUNS, scene_of
+from pdrom.core.store import write_hdf5, write_table
+from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.sampling import Sweep, sample
+from pdrom.experiments.scenes import positions_of, scene_of
+from pdrom.experiments.settings import BlowupExtent, Solver
 from pdrom.model.energy import EnergyScale
-from pdrom.model.scene import Scene
+from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, load_basis
 from pdrom.reduction.local.guard import GUARD_COLUMNS, GuardRecord, largest_extent
 from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.local.guarded import guarded_rerun
-from pdrom.reduction.local.ranks import resolve_ranks
-from pdrom.reduction.local.rerun import Rerun, displacement_norms
+from pdrom.reduction.local.ranks import Rank, resolve_ranks
 from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling.load import load_reduction
+from pdrom.reduction.snapshots import load_snapshots
 
 log = logging.getLogger(__name__)
 
@@ -31,42 +47,68 @@ COLUMNS = [
 ]  # fmt: skip
 
 
-def run_reduced(
-    labels: dict[str, str],
-    scene: dict[str, Any],
-    spec: dict[str, Any],
-    ranks: dict[str, list[int | str]],
-    blowup_extent: float,
-    guard: dict[str, Any],
-    solver: str,
-    mesh: str,
-    runs: dict[str, str],
-    basis: str,
-    sampling: str,
-    runs_output: str,
-    tables: dict[str, str],
-) -> None:
-    """Rerun the scene for every r, on the training motion and on the held-out one.
+class Settings(JobSettings):
+    """What samplings and reruns by one method depend on."""
 
-    Parameters
-    ----------
-    ranks, runs, tables : for "train" and "heldout" the sizes to run, the full-order run to compare
-        with, and the table to write
+    scene: SceneConfig
+    method: MethodSpec
+    sweep: Sweep
+    ranks: tuple[Rank, ...]
+    heldout_ranks: tuple[Rank, ...]
+    blowup_extent: BlowupExtent
+    guard: GuardSettings
+    solver: Solver
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read."""
+
+    mesh: Annotated[File, MESH]
+    fom: Annotated[File, TRAIN]
+    heldout: Annotated[File, HELDOUT]
+    snapshots: Annotated[File, SNAPSHOTS]
+    basis: Annotated[File, BASIS]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written: samples and reconstruction errors; runs, and a table of each motion."""
+
+    sampling: Annotated[File, SAMPLING]
+    errors: Annotated[File, RECONSTRUCTION]
+    runs: Annotated[File, RERUNS]
+    table: Annotated[File, RERUNS_TRAIN]
+    heldout: Annotated[File, RERUNS_HELDOUT]
+
+
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+    """Sample the group, then rerun the scene for every r, as trained and as held out.
+
+    One job does both: starting another process takes longer than the sampling.
     """
-    method, space = MethodSpec.model_validate(spec), load_basis(basis)
-    watch = GuardSettings.model_validate(guard)
-    with open_hdf5(runs["train"]) as file:
-        trained_extent = largest_extent(file["positions"][...])
-    with write_hdf5(runs_output) as file:
-        file.attrs.update(attributes({**labels, "spec": spec, "scene": scene}))
-        for motion in RUNS:
-            bound = scene_of(scene, mesh, motion)
-            case = _Case(bound, motion, labels, method, space, sampling, watch, trained_extent)
+    method, basis = settings.method, load_basis(inputs.basis.path)
+    data = load_snapshots(inputs.snapshots.path)
+    sample(basis, data, method, settings.sweep, settings.ranks, outputs.sampling, outputs.errors)
+    labels = outputs.runs.labels
+    trained_extent = largest_extent(positions_of(inputs.fom))
+    config = settings.scene.model_dump(mode="json")
+    spec = method.model_dump(mode="json")
+    motions = {
+        "train": (settings.ranks, inputs.fom, outputs.table),
+        "heldout": (settings.heldout_ranks, inputs.heldout, outputs.heldout),
+    }
+    with write_hdf5(outputs.runs.path) as file:
+        file.attrs.update(attributes({**labels, "spec": spec, "scene": config}))
+        for motion, (ranks, fom, table) in motions.items():
+            scene = scene_of(settings.scene, inputs.mesh, motion)
+            case = _Case(
+                scene, motion, labels, settings, basis, outputs.sampling.path, trained_extent
+            )
             store = file if motion == "train" else file.create_group(motion)
-            rows = case.run(store, ranks[motion], runs[motion], blowup_extent, solver)
-            table = pd.DataFrame(rows, columns=COLUMNS)
+            rows = pd.DataFrame(case.run(store, ranks, positions_of(fom)), columns=COLUMNS)
             whole = ["guard_frame", "guard_count", "fallback_frames"]
-            write_table(table.astype(dict.fromkeys(whole, "Int64")), tables[motion])
+            write_table(rows.astype(dict.fromkeys(whole, "Int64")), table.path)
 
 
 @dataclass(frozen=True)
@@ -76,22 +118,25 @@ class _Case:
     scene: Scene
     motion: str
     labels: dict[str, str]
-    method: MethodSpec
+    settings: Settings
     basis: Basis
     sampling: str
-    guard: GuardSettings
     trained_extent: float
 
     def run(
-        self, file: h5py.Group, ranks: list[int | str], fom: str, limit: float, solver: str
+        self, file: h5py.Group, ranks: tuple[Rank, ...], reference: np.ndarray
     ) -> list[dict[str, Any]]:
-        """Rerun for every r and return the rows; an r beyond the rank is a marked row."""
-        with open_hdf5(fom) as full_order:
-            reference = full_order["positions"][...]
+        """Rerun for every r and return the rows; an r beyond the rank is a marked row.
+
+        Parameters
+        ----------
+        reference : (F + 1, N, 3) positions of the motion's full-order run
+        """
+        settings = self.settings
         displacement = displacement_norms(reference)
         scale = EnergyScale.of(self.scene, reference)
         file["displacement"] = displacement
-        system = self.scene.system_with(solver)
+        system = self.scene.system_with(settings.solver)
         rows = []
         for r in resolve_ranks(ranks, self.basis.rank):
             store = file.create_group(f"r{r:04d}")
@@ -100,10 +145,10 @@ class _Case:
                 log.warning("r = %d exceeds the numerical rank %d: not run", r, self.basis.rank)
                 rows.append({**self.labels, "r": r, "frames": 0})
                 continue
-            reduction = load_reduction(self.basis, self.sampling, self.method, r)
+            reduction = load_reduction(self.basis, self.sampling, settings.method, r)
             outcome, seen = guarded_rerun(
-                self.scene, system, self.labels["group"], reduction, reference, limit,
-                self.guard, self.trained_extent,
+                self.scene, system, self.labels["group"], reduction, reference,
+                settings.blowup_extent, settings.guard, self.trained_extent,
             )  # fmt: skip
             energy = scale.ratio(outcome.positions)
             _store(store, outcome, displacement, seen)
@@ -120,19 +165,18 @@ def _store(store, outcome: Rerun, displacement: np.ndarray, seen: GuardRecord) -
     store["error"] = outcome.difference / np.sqrt(np.mean(displacement**2))
     store["extent"] = outcome.extent
     blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
-    store.attrs.update(
-        finite=outcome.blowup_frame is None, blowup_frame=blowup, max_extent=outcome.max_extent
-    )
+    store.attrs.update(finite=outcome.finite, blowup_frame=blowup, max_extent=outcome.max_extent)
     store.attrs.update({k: v for k, v in seen.columns().items() if v is not None})
 
 
 def _row(outcome: Rerun, displacement: np.ndarray) -> dict[str, Any]:
-    finite = outcome.blowup_frame is None
-    whole = finite and outcome.frames == len(displacement)
     return {
         "frames": outcome.frames,
-        "finite": finite,
+        "finite": outcome.finite,
         "blowup_frame": outcome.blowup_frame,
         "max_extent": outcome.max_extent,
-        "relative_error": trajectory_error(outcome.difference, displacement) if whole else None,
+        "relative_error": outcome.error(displacement),
     }
+
+
+EXPERIMENT = Experiment("reruns", "Sampling and reruns of {scene}, {group} by {method}", run)

@@ -1,4 +1,4 @@
-"""Rule reruns, first part: basis -> sampled entries, reconstruction errors over the sweep of r."""
+"""Sampled entries of a basis, and reconstruction errors over the sweep of r."""
 
 import logging
 from typing import Any
@@ -7,60 +7,72 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.metrics import relative_errors
+from pdrom.core.paths import File
 from pdrom.core.provenance import attributes
 from pdrom.core.store import write_hdf5, write_table
-from pdrom.pipeline.study import Rank, Sweep
-from pdrom.reduction.basis import load_basis
-from pdrom.reduction.local.ranks import resolve_ranks
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.settings import Count
+from pdrom.reduction.basis import Basis
+from pdrom.reduction.local.ranks import Rank, resolve_ranks
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, Sampling, select_path
-from pdrom.reduction.snapshots import SPLITS, SnapshotSet, load_snapshots
+from pdrom.reduction.snapshots import SPLITS, SnapshotSet
 
 log = logging.getLogger(__name__)
 
-
-def sample(
-    labels: dict[str, str],
-    spec: dict[str, Any],
-    sweep: dict[str, int],
-    ranks: list[Rank],
-    snapshots: str,
-    basis: str,
-    sampling_output: str,
-    errors_output: str,
-) -> None:
-    """Select samples for every r of the sweep and of the reruns; write them and the error table.
-
-    Parameters
-    ----------
-    labels : scene, group and method, the first columns of the table
-    """
-    method = MethodSpec.model_validate(spec)
-    space, data = load_basis(basis), load_snapshots(snapshots)
-    wanted = _sizes(Sweep.model_validate(sweep), ranks, space.rank)
-    path = select_path(space, method, wanted) if wanted else {}
-    rows = []
-    with write_hdf5(sampling_output) as file:
-        file.attrs.update(attributes({**labels, "spec": spec}))
-        for r in wanted:
-            reduction = Reduction(space, path[r], method, r)
-            _store(file, r, path[r], reduction)
-            rows += [{**labels, "r": r, **row} for row in _errors(reduction, data)]
-    beyond = [r for r in resolve_ranks(ranks, space.rank) if r > space.rank]
-    rows += [{**labels, "r": r, "split": split} for r in beyond for split in SPLITS]
-    if beyond:
-        log.warning("r = %s exceeds the numerical rank %d: marked rows", beyond, space.rank)
-    write_table(pd.DataFrame(rows, columns=_COLUMNS), errors_output)
-
-
-_COLUMNS = [
+COLUMNS = [
     "scene", "group", "method", "r", "split",
     "relative_error", "relative_error_x", "relative_error_y", "relative_error_z",
     "gain", "rows_sampled", "elements_sampled",
 ]  # fmt: skip
 
 
-def _sizes(sweep: Sweep, ranks: list[Rank], rank: int) -> list[int]:
+class Sweep(ConfigModel):
+    """Basis sizes of the reconstruction error: all up to ``dense_to``, then every ``step``-th."""
+
+    dense_to: Count = 10
+    step: Count = 10
+
+    def ranks(self, largest: int) -> list[int]:
+        """Sizes 1 .. ``largest``, which is always among them."""
+        dense = range(1, min(self.dense_to, largest) + 1)
+        coarse = range(self.dense_to + self.step, largest + 1, self.step)
+        return sorted({*dense, *coarse, largest} - {0})
+
+
+def sample(
+    basis: Basis,
+    data: SnapshotSet,
+    method: MethodSpec,
+    sweep: Sweep,
+    ranks: tuple[Rank, ...],
+    sampling: File,
+    errors: File,
+) -> None:
+    """Select samples for every r of the sweep and of the reruns; write them and the error table.
+
+    Parameters
+    ----------
+    sampling, errors : files to write; their labels are the first columns of the table
+    """
+    labels = sampling.labels
+    wanted = _sizes(sweep, ranks, basis.rank)
+    path = select_path(basis, method, wanted) if wanted else {}
+    rows = []
+    with write_hdf5(sampling.path) as file:
+        file.attrs.update(attributes({**labels, "spec": method.model_dump(mode="json")}))
+        for r in wanted:
+            reduction = Reduction(basis, path[r], method, r)
+            _store(file, r, path[r], reduction)
+            rows += [{**labels, "r": r, **row} for row in _errors(reduction, data)]
+    beyond = [r for r in resolve_ranks(ranks, basis.rank) if r > basis.rank]
+    rows += [{**labels, "r": r, "split": split} for r in beyond for split in SPLITS]
+    if beyond:
+        log.warning("r = %s exceeds the numerical rank %d: marked rows", beyond, basis.rank)
+    write_table(pd.DataFrame(rows, columns=COLUMNS), errors.path)
+
+
+def _sizes(sweep: Sweep, ranks: tuple[Rank, ...], rank: int) -> list[int]:
     """Sizes of sweep and reruns that the basis can have, ascending."""
     if rank == 0:
         return []

@@ -1,4 +1,4 @@
-"""Rule scaling: full-order and reduced iterations of one scene on growing meshes."""
+"""Full-order and reduced iterations of one scene on growing meshes."""
 
 import ctypes
 import gc
@@ -7,16 +7,22 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
 import psutil
+from pydantic import Field
 
+from pdrom.core.paths import BREAK_EVEN_SIZED, SCALING, File
+from pdrom.core.reads import SourcesOf
 from pdrom.core.store import write_table
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.declaration import Experiment, JobSettings
 from pdrom.experiments.local_costs import local_costs
-from pdrom.experiments.measurement import Measurement, Variant, measure
+from pdrom.experiments.measurement import Measurement, Protocol, Variant, measure
 from pdrom.experiments.names import FOM
+from pdrom.experiments.settings import Modes, Repeats, Solver, Tolerance
 from pdrom.model.dynamics.stepper import LocalStep
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig
@@ -35,6 +41,67 @@ ITERATIONS = [
     "factorisation_ms", "memory_mb", "ms_per_iteration", "local_ms", "global_ms", "local_share",
 ]  # fmt: skip
 STATES = 4  # states of the training run at which local steps are timed alone
+TrainingFrames = Annotated[int, Field(ge=3, le=1000)]
+
+
+class SizedBreakEven(ConfigModel):
+    """Reduced local steps timed alone on every mesh size: methods, sizes r, short repeats.
+
+    Bases come from the first ``training_frames`` frames.
+    """
+
+    methods: tuple[str, ...] = ("deim-joint", "block-deim")
+    sizes: tuple[Modes, ...] = (5, 10, 20, 40, 80)
+    training_frames: TrainingFrames = 84
+    repeats: Repeats = 20
+
+
+class Sized(Protocol):
+    """Cost on one mesh size.
+
+    ``training_frames`` frames train ``method`` with r modes (only the local step reduced) and
+    energy-conserving sampling to ``tolerance`` with k modes; ``frames`` are timed.
+    """
+
+    method: str = "block-deim"
+    r: Modes = 10
+    k: Modes = 20
+    tolerance: Tolerance = 1e-2
+    training_frames: TrainingFrames = 16
+    repeats: Repeats = 9
+    breakeven: SizedBreakEven = SizedBreakEven()
+
+
+class Scaling(Sized):
+    """Section ``scaling``: factors on the vertices along a side for each of ``scenes``."""
+
+    scenes: dict[str, tuple[Annotated[float, Field(gt=0.0, le=100.0)], ...]] = Field(
+        default_factory=dict
+    )
+
+
+class Settings(JobSettings):
+    """What the cost on a mesh size depends on, beside the machine."""
+
+    scene: SceneConfig
+    scaled_methods: dict[str, MethodSpec]
+    scaling: Sized
+    solver: Solver
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read: that of the mesh, nothing for a generated one."""
+
+    sources: Annotated[list[str], SourcesOf("scene.mesh")]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written."""
+
+    iterations: Annotated[File, SCALING]
+    breakeven: Annotated[File, BREAK_EVEN_SIZED]
 
 
 @dataclass(frozen=True)
@@ -53,54 +120,36 @@ class Training:
         return Training(self.positions[:frames], self.projections[:frames], self.roundoff[:frames])
 
 
-def scale_scene(
-    scene: dict[str, Any],
-    factor: float,
-    methods: dict[str, dict[str, Any]],
-    settings: dict[str, Any],
-    solver: str,
-    root: str,
-    outputs: dict[str, str],
-) -> None:
-    """Measure a scene on one mesh size and write its parts of the tables scaling and breakeven.
-
-    Parameters
-    ----------
-    factor : on the vertices along each side of the mesh
-    methods : specifications of the reductions of the local step that ``settings`` name
-    settings : of `pdrom.pipeline.study.Scaling`, without the scenes
-    outputs : iterations, breakeven
-    """
-    config = SceneConfig.model_validate(scene)
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+    """Measure a scene on one mesh: ``factor`` times the vertices along each side."""
+    config, solver, sized = settings.scene, settings.solver, settings.scaling
+    specs, alone = settings.scaled_methods, settings.scaling.breakeven
+    factor = float(outputs.iterations["factor"])
     # libraries and kernels are loaded before anything is measured
-    _factorised(Scene.build(config, config.mesh.build(Path(root))), solver)
+    _factorised(Scene.build(config, config.mesh.build(Path())), solver)
     config = config.coarsened(factor, 1.0)
-    bound = Scene.build(config, config.mesh.build(Path(root)))
+    scene = Scene.build(config, config.mesh.build(Path()))
     idle = _memory()
-    system, seconds = _factorised(bound, solver)
+    system, seconds = _factorised(scene, solver)
     measured = {"factorisation_ms": 1e3 * seconds, "memory_mb": _memory() - idle}
-    alone = settings["breakeven"]
-    training = _train(bound, system, max(settings["training_frames"], alone["training_frames"]))
-    first = training.first(settings["training_frames"])
-    specs = {name: MethodSpec.model_validate(spec) for name, spec in methods.items()}
-    method = settings["method"]
-    basis = _basis(bound, first, specs[method])
-    two = Scene.build(config, bound.mesh, threads=2)
+    training = _train(scene, system, max(sized.training_frames, alone.training_frames))
+    first = training.first(sized.training_frames)
+    basis = _basis(scene, first, specs[sized.method])
+    two = Scene.build(config, scene.mesh, threads=2)
     variants = [
-        _full_order(bound, system, settings, measured),
-        _full_order(two, system, settings, {"threads": 2}),
-        _reduced(bound, system, basis, specs[method], settings),
-        _hyper(bound, first, settings),
+        _full_order(scene, system, sized, measured),
+        _full_order(two, system, sized, {"threads": 2}),
+        _reduced(scene, system, basis, specs[sized.method], sized),
+        _subspace(scene, first, sized),
     ]
-    results = measure(variants, settings["warmup"], settings["repeats"])
-    rows = [{"scene": config.name, "threads": 1, **m.labels, **_times(bound, m)} for m in results]
-    table = pd.DataFrame(rows, columns=ITERATIONS)
-    write_table(table, outputs["iterations"])
-    steps = _steps_alone(bound, training.first(alone["training_frames"]), specs, alone)
+    results = measure(variants, sized.warmup, sized.repeats)
+    rows = [{"scene": config.name, "threads": 1, **m.labels, **_times(scene, m)} for m in results]
+    write_table(pd.DataFrame(rows, columns=ITERATIONS), outputs.iterations.path)
+    steps = _steps_alone(scene, training.first(alone.training_frames), specs, alone)
     states = training.positions[:: len(training.positions) // STATES][:STATES]
-    times = local_costs(bound, steps, states, settings["warmup"], alone["repeats"])
-    write_table(times.assign(factor=factor), outputs["breakeven"])
-    log.info("%s: %d vertices done", config.name, bound.mesh.vertices)
+    times = local_costs(scene, steps, states, sized.warmup, alone.repeats)
+    write_table(times.assign(factor=factor), outputs.breakeven.path)
+    log.info("%s: %d vertices done", config.name, scene.mesh.vertices)
 
 
 def _factorised(scene: Scene, solver: str) -> tuple[GlobalSystem, float]:
@@ -137,13 +186,13 @@ def _basis(scene: Scene, training: Training, spec: MethodSpec) -> Basis:
 
 
 def _steps_alone(
-    scene: Scene, training: Training, specs: dict[str, MethodSpec], settings: dict[str, Any]
+    scene: Scene, training: Training, specs: dict[str, MethodSpec], settings: SizedBreakEven
 ) -> dict[tuple[str, str, int], ReducedLocalStep]:
     """Local steps of the first group by group, method and size, as far as the rank allows."""
     group, steps = scene.groups[0], {}
-    for name in settings["methods"]:
+    for name in settings.methods:
         spec, basis = specs[name], _basis(scene, training, specs[name])
-        sizes = sorted({min(r, basis.rank) for r in settings["sizes"]})
+        sizes = sorted({min(r, basis.rank) for r in settings.sizes})
         for size, sampling in select_path(basis, spec, sizes).items():
             reduction = Reduction(basis, sampling, spec, size)
             steps[group.name, name, size] = ReducedLocalStep(group, reduction)
@@ -151,44 +200,44 @@ def _steps_alone(
 
 
 def _full_order(
-    scene: Scene, system: GlobalSystem, settings: dict[str, Any], labels: dict[str, Any]
+    scene: Scene, system: GlobalSystem, settings: Sized, labels: dict[str, Any]
 ) -> Variant:
     return _variant(scene, system, scene.groups, settings, {"method": FOM, **labels})
 
 
 def _reduced(
-    scene: Scene, system: GlobalSystem, basis: Basis, spec: MethodSpec, settings: dict[str, Any]
+    scene: Scene, system: GlobalSystem, basis: Basis, spec: MethodSpec, settings: Sized
 ) -> Variant:
-    group, method = scene.groups[0], settings["method"]
-    size = min(settings["r"], basis.rank)
+    group, method = scene.groups[0], settings.method
+    size = min(settings.r, basis.rank)
     reduction = Reduction(basis, select(basis, spec, size), spec, size)
     steps = replace_group(scene, group.name, ReducedLocalStep(group, reduction))
     labels = {"r": reduction.r, "elements_sampled": len(reduction.elements)}
     return _variant(scene, system, steps, settings, {"method": method, **labels})
 
 
-def _hyper(scene: Scene, training: Training, settings: dict[str, Any]) -> Variant:
-    columns = make_columns(scene, training.positions, "pod", settings["k"])
+def _subspace(scene: Scene, training: Training, settings: Sized) -> Variant:
+    columns = make_columns(scene, training.positions, "pod", settings.k)
     frames = np.arange(len(training.positions))
-    (samples,) = sample_elements(scene, columns, frames, [settings["tolerance"]])
+    (samples,) = sample_elements(scene, columns, frames, [settings.tolerance])
     model = SubspaceModel("pod", columns, samples)
     labels = {
         "method": "ecsw",
         "k": columns.modes,
         "elements_sampled": sum(len(chosen.elements) for chosen in samples.values()),
     }
-    return Variant(labels, *model.loop(scene), settings["frames"])
+    return Variant(labels, *model.loop(scene), settings.frames)
 
 
 def _variant(
     scene: Scene,
     system: GlobalSystem,
     steps: list[LocalStep],
-    settings: dict[str, Any],
+    settings: Sized,
     labels: dict[str, Any],
 ) -> Variant:
     loop = scene.stepper(system, steps, track_objective=False)
-    return Variant(labels, loop, scene.initial_state(), settings["frames"])
+    return Variant(labels, loop, scene.initial_state(), settings.frames)
 
 
 def _times(scene: Scene, measured: Measurement) -> dict[str, Any]:
@@ -212,3 +261,11 @@ def _memory() -> float:
     if hasattr(library, "malloc_trim"):  # glibc; elsewhere small sizes may fit into free memory
         library.malloc_trim(0)
     return psutil.Process().memory_info().rss / 1e6
+
+
+EXPERIMENT = Experiment(
+    "scaling",
+    "Cost of {scene} on a mesh with {factor} times the vertices along a side",
+    run,
+    alone=True,
+)

@@ -1,17 +1,46 @@
-"""Rule snapshots: two runs -> train, test and held-out snapshots of one group."""
+"""Two runs -> train, test and held-out snapshots of one group."""
 
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated
 
+from pdrom.core.paths import HELDOUT, MESH, SNAPSHOTS, TRAIN, File
 from pdrom.core.provenance import attributes
+from pdrom.experiments.declaration import Experiment, JobSettings
 from pdrom.experiments.scenes import scene_of
+from pdrom.model.scene import SceneConfig
 from pdrom.reduction.snapshots import collect, save_snapshots, training_frames
 
 
-def collect_snapshots(
-    config: dict[str, Any], group: str, mesh: str, training_run: str, heldout_run: str, output: str
-) -> None:
-    """Split the stored projections of ``group`` and save them."""
-    scene = scene_of(config, mesh)
+class Settings(JobSettings):
+    """What the snapshots of a scene depend on."""
+
+    scene: SceneConfig
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read."""
+
+    mesh: Annotated[File, MESH]
+    train: Annotated[File, TRAIN]
+    heldout: Annotated[File, HELDOUT]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written."""
+
+    snapshots: Annotated[File, SNAPSHOTS]
+
+
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+    """Split the stored projections of a group and save them."""
+    group = outputs.snapshots["group"]
+    scene = scene_of(settings.scene, inputs.mesh)
     train = training_frames(scene.config.frames, scene.config.reduce[group].train)
-    snapshots = collect(training_run, heldout_run, scene.group(group), scene.masses, train)
-    save_snapshots(snapshots, output, attributes({"scene": config, "group": group}))
+    found = collect(inputs.train.path, inputs.heldout.path, scene.group(group), scene.masses, train)
+    metadata = {"scene": settings.scene.model_dump(mode="json"), "group": group}
+    save_snapshots(found, outputs.snapshots.path, attributes(metadata))
+
+
+EXPERIMENT = Experiment("snapshots", "Snapshots of {group} in {scene}", run)

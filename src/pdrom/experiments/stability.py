@@ -1,32 +1,36 @@
-"""Rule stability: one scene over the time step and over the stiffness, by every method."""
+"""One scene over the time step and over the stiffness, by every method."""
 
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 import pandas as pd
+from pydantic import Field, model_validator
 
-from pdrom.core.metrics import trajectory_error
+from pdrom.core.paths import BASIS, MESH, SAMPLING, STABILITY, SUBSPACES, File
+from pdrom.core.reads import Every
 from pdrom.core.store import write_table
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.declaration import Experiment, JobSettings
 from pdrom.experiments.scenes import scene_of
+from pdrom.experiments.settings import BlowupExtent, Solver
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.energy import EnergyScale
-from pdrom.model.scene import Scene
+from pdrom.model.scene import Scene, SceneConfig
 from pdrom.model.variation import varied
-from pdrom.pipeline.study import Stability
 from pdrom.reduction.basis import load_basis
 from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.ranks import resolve_ranks
-from pdrom.reduction.local.rerun import Rerun, displacement_norms, replace_group, rerun
+from pdrom.reduction.local.ranks import Rank, resolve_ranks
+from pdrom.reduction.local.rerun import replace_group, rerun
 from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling import Reduction
-from pdrom.reduction.sampling.load import load_reduction
-from pdrom.reduction.subspace.load import load_models
+from pdrom.reduction.sampling.load import basis_of, load_reduction
 from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.rerun import rerun_model
+from pdrom.reduction.subspace.store import load_models
 
 log = logging.getLogger(__name__)
 
@@ -36,38 +40,101 @@ COLUMNS = [
 ]  # fmt: skip
 
 
-def sweep(
-    scene: dict[str, Any],
-    methods: dict[str, dict[str, Any]],
-    settings: dict[str, Any],
-    blowup_extent: float,
-    solver: str,
-    mesh: str,
-    bases: list[str],
-    samplings: list[str],
-    hyper: list[str],
-    output: str,
-) -> None:
+class ShortRuns(ConfigModel):
+    """Short runs over the time step and over the stiffness of the reduced groups.
+
+    The bases and samplings are those of the scene's own setting.
+
+    ranks : basis sizes, as far as the study holds them; position subspaces run at their largest
+    time_steps : h in seconds, beside the scene's own
+    stiffness_ratios : factors on the weights of the reduced groups, beside 1
+    duration : seconds of simulated time, within ``min_frames`` and ``max_frames``
+    """
+
+    ranks: tuple[Rank, ...] = ()
+    time_steps: tuple[Annotated[float, Field(gt=0.0, le=10.0)], ...] = ()
+    stiffness_ratios: tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...] = ()
+    duration: Annotated[float, Field(gt=0.0)] = 1.0
+    min_frames: Annotated[int, Field(ge=2)] = 30
+    max_frames: Annotated[int, Field(ge=2)] = 120
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.max_frames < self.min_frames:
+            raise ValueError(
+                f"max_frames = {self.max_frames}: at least min_frames = {self.min_frames}"
+            )
+        return self
+
+
+class Stability(ShortRuns):
+    """Section ``stability``: the short runs, and how they are judged.
+
+    scenes : where, as far as the study holds them
+    wrong : relative error above which a run is finite but wrong
+    departure : multiple of the full-order run's largest extent above which a run has left the
+        scene; the key is ``left``
+    """
+
+    scenes: tuple[str, ...] = ()
+    wrong: Annotated[float, Field(gt=0.0)] = 0.1
+    departure: Annotated[float, Field(gt=1.0, alias="left")] = 2.0
+
+    @property
+    def left(self) -> float:
+        """`departure`, by its key."""
+        return self.departure
+
+
+class Settings(JobSettings):
+    """What the short runs of a scene depend on."""
+
+    scene: SceneConfig
+    methods: dict[str, MethodSpec]
+    stability: ShortRuns
+    blowup_extent: BlowupExtent
+    solver: Solver
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read."""
+
+    mesh: Annotated[File, MESH]
+    bases: Annotated[list[File], Every(BASIS)]
+    samplings: Annotated[list[File], Every(SAMPLING)]
+    subspaces: Annotated[list[File], Every(SUBSPACES)]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written."""
+
+    table: Annotated[File, STABILITY]
+
+
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     """Run the full order, every local reduction and the largest subspaces at every setting.
 
     Bases and samplings are those of the scene's own setting: how far do they carry?
     """
-    bound, chosen = scene_of(scene, mesh), Stability.model_validate(settings)
-    reductions = list(_reductions(methods, chosen.ranks, bases, samplings))
-    models = [model for path in hyper for model in _largest(load_models(path))]
+    scene, chosen = scene_of(settings.scene, inputs.mesh), settings.stability
+    reductions = list(_reductions(settings.methods, chosen.ranks, inputs))
+    models = [model for file in inputs.subspaces for model in _largest(load_models(file.path))]
     rows = []
-    for h, ratio in _settings(bound.config.time_step, chosen):
+    for h, ratio in _grid(scene.config.time_step, chosen):
         limits = (chosen.min_frames, chosen.max_frames)
-        config = varied(bound.config, h, ratio, chosen.duration, limits)
-        case = _Case(Scene.build(config, bound.mesh), ratio, solver, blowup_extent)
+        config = varied(scene.config, h, ratio, chosen.duration, limits)
+        varied_scene = Scene.build(config, scene.mesh)
+        case = _Case(varied_scene, ratio, settings.solver, settings.blowup_extent)
         rows += case.rows(reductions, models)
         log.info("h = %g s, stiffness times %g: %d frames", h, ratio, config.frames)
     table = pd.DataFrame(rows, columns=COLUMNS)
     whole = ["r", "blowup_frame", "k", "frames"]
-    write_table(table.astype(dict.fromkeys(whole, "Int64")), output)
+    write_table(table.astype(dict.fromkeys(whole, "Int64")), outputs.table.path)
 
 
-def _settings(own: float, chosen: Stability) -> list[tuple[float, float]]:
+def _grid(own: float, chosen: ShortRuns) -> list[tuple[float, float]]:
     """(h, stiffness ratio) pairs: one of them at a time leaves the scene's own setting."""
     steps = sorted({own, *chosen.time_steps})
     ratios = sorted({1.0, *chosen.stiffness_ratios})
@@ -85,16 +152,16 @@ class _Local:
 
 
 def _reductions(
-    methods: dict[str, dict[str, Any]], ranks: Any, bases: list[str], samplings: list[str]
+    methods: dict[str, MethodSpec], ranks: tuple[Rank, ...], inputs: Inputs
 ) -> Iterator[_Local]:
-    for path in map(Path, samplings):
-        group, method = path.parent.name, path.stem
-        spec = MethodSpec.model_validate(methods[method])
-        place = (group, spec.basis_id)
-        basis = load_basis(next(b for b in bases if (Path(b).parent.name, Path(b).stem) == place))
+    for file in inputs.samplings:
+        group, method = file["group"], file["method"]
+        spec = methods[method]
+        basis = load_basis(basis_of(file, spec, inputs.bases).path)
         for r in resolve_ranks(ranks, basis.rank):
             known = r <= basis.rank
-            yield _Local(group, method, r, load_reduction(basis, path, spec, r) if known else None)
+            reduction = load_reduction(basis, file.path, spec, r) if known else None
+            yield _Local(group, method, r, reduction)
 
 
 def _largest(
@@ -125,7 +192,7 @@ class _Case:
         """Rows of the full order and, if that is finite, of everything else."""
         full = {"method": "full", "position_basis": "full"}
         rows = [self._row(full, self.full_order)]
-        if self.full_order.blowup_frame is not None:
+        if not self.full_order.finite:
             log.warning("the full-order run blew up: nothing to compare with")
             return rows
         rows[0]["relative_error"] = 0.0
@@ -140,21 +207,21 @@ class _Case:
             outcome = rerun(self.scene, self.system, steps, self.reference, self.limit)
             rows.append(self._row({**labels, "gain": local.reduction.gain}, outcome))
         for labels, model in models:
-            outcome, _ = rerun_model(self.scene, model, self.reference, self.limit)
+            outcome = rerun_model(self.scene, model, self.reference, self.limit)
             rows.append(self._row({"group": "all", **labels}, outcome))
         return rows
 
     def _row(self, labels: dict[str, Any], outcome: Rerun) -> dict[str, Any]:
-        finite = outcome.blowup_frame is None
         return {
             **self.labels,
             **labels,
             "frames": outcome.frames,
-            "finite": finite,
+            "finite": outcome.finite,
             "blowup_frame": outcome.blowup_frame,
             "max_extent": outcome.max_extent,
             "energy_ratio": self.scale.ratio(outcome.positions),
-            "relative_error": trajectory_error(outcome.difference, self.displacement)
-            if finite
-            else None,
+            "relative_error": outcome.error(self.displacement),
         }
+
+
+EXPERIMENT = Experiment("stability", "Time step and stiffness of {scene}", run)

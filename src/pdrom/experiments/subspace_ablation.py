@@ -1,20 +1,27 @@
-"""Rule subspace_ablation: variants of block DEIM in a position subspace, on one scene."""
+"""Why does block DEIM fail in a position subspace, and what mends it? Variants on one scene."""
 
 import logging
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import pandas as pd
+from pydantic import Field
 
 from pdrom.core.errors import SamplingError
-from pdrom.core.store import read_table, write_table
-from pdrom.experiments.hyper import Motion, training_positions
+from pdrom.core.paths import HELDOUT, MESH, SENSITIVITY, SUBSPACE_ABLATION, TRAIN, File
+from pdrom.core.store import write_table
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.motion import Motion, training_positions
 from pdrom.experiments.scenes import RUNS, scene_of
-from pdrom.experiments.subspace_ablation_spec import AblationSpec
-from pdrom.model.runs.horizon import HELDOUT, error_within, floor_of, horizon
+from pdrom.experiments.settings import BlowupExtent, Horizon, Modes
+from pdrom.model.runs.horizon import error_within
+from pdrom.model.scene import SceneConfig
+from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.interpolated import Training, interpolate
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns
-from pdrom.reduction.subspace.specs import InterpolationSpec
+from pdrom.reduction.subspace.specs import InterpolationSpec, InterpolationVariant
 
 log = logging.getLogger(__name__)
 
@@ -24,70 +31,98 @@ COLUMNS = [
     "max_extent", "relative_error_within_horizon", "relative_error_full_projections",
     "heldout_error_within_horizon", "heldout_error_full_projections",
 ]  # fmt: skip
+Sizes = Annotated[tuple[Modes, ...], Field(min_length=1)]
 
 
-def ablate(
-    scene: dict[str, Any],
-    ablation: dict[str, Any],
-    floor: dict[str, float],
-    blowup_extent: float,
-    mesh: str,
-    runs: dict[str, str],
-    sensitivity: str,
-    output: str,
-) -> None:
-    """Run every variant with all groups interpolated and write the rows of subspace_ablation.
+class Ablation(ConfigModel):
+    """Variants of the interpolation in a position subspace.
 
-    Parameters
-    ----------
-    floor : perturbation and threshold that define the horizon
-    runs : full-order runs of the training and of the held-out motion
+    sizes : modes k of the position basis
+    modes : modes r of the projections
+    variants : name -> interpolation
     """
-    spec = AblationSpec.model_validate(ablation)
-    study = _Study(scene, floor, blowup_extent, mesh, runs, sensitivity)
-    bound = study.motions["train"].scene
-    training = training_positions(bound, study.motions["train"].reference)
+
+    sizes: Sizes
+    modes: Sizes
+    variants: Annotated[dict[str, InterpolationVariant], Field(min_length=1)]
+
+    def cases(self) -> list[tuple[str, InterpolationSpec]]:
+        """(variant, interpolation) for every number of modes, in order."""
+        return [
+            (name, InterpolationSpec(modes=r, **variant.model_dump()))
+            for r in self.modes
+            for name, variant in self.variants.items()
+        ]
+
+
+class AblationFile(Ablation):
+    """Content of config/subspace_ablation.yaml: the variants, and ``scenes`` where they run."""
+
+    scenes: tuple[str, ...]
+
+
+class Settings(JobSettings):
+    """What the ablation on a scene depends on."""
+
+    scene: SceneConfig
+    ablation: Ablation
+    horizon: Horizon
+    blowup_extent: BlowupExtent
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read."""
+
+    mesh: Annotated[File, MESH]
+    train: Annotated[File, TRAIN]
+    heldout: Annotated[File, HELDOUT]
+    sensitivity: Annotated[File, SENSITIVITY]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written: a row for every variant."""
+
+    table: Annotated[File, SUBSPACE_ABLATION]
+
+
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+    """Run every variant with all groups interpolated."""
+    trials = _Trials(settings, inputs)
+    motion = trials.motions["train"]
+    scene, training = motion.scene, training_positions(motion)
     rows = []
-    for k in spec.sizes:
-        columns = make_columns(bound, training, POSITION_BASIS, k)
-        trained = Training(bound, columns, training)
+    for k in settings.ablation.sizes:
+        columns = make_columns(scene, training, POSITION_BASIS, k)
+        trained = Training(scene, columns, training)
         row = {
-            "scene": bound.config.name,
-            "group": ", ".join(group.name for group in bound.groups),
+            "scene": scene.config.name,
+            "group": ", ".join(group.name for group in scene.groups),
             "position_basis": POSITION_BASIS,
             "k": k,
-            **study.full_projections(columns),
+            **trials.full_projections(columns),
         }
-        for variant, settings in spec.cases():
-            row = row | {"r": settings.modes, "variant": variant}
-            rows.append(row | study.outcome(columns, trained, settings))
-            log.info("k = %d, r = %d, %s: %s", k, settings.modes, variant, rows[-1])
+        for variant, spec in settings.ablation.cases():
+            row = row | {"r": spec.modes, "variant": variant}
+            rows.append(row | trials.outcome(columns, trained, spec))
+            log.info("k = %d, r = %d, %s: %s", k, spec.modes, variant, rows[-1])
     table = pd.DataFrame(rows, columns=COLUMNS)
     table["finite"] = table["finite"].astype("boolean")
     table["elements_sampled"] = table["elements_sampled"].astype("Int64")
-    write_table(table, output)
+    write_table(table, outputs.table.path)
 
 
-class _Study:
+class _Trials:
     """Both motions of a scene with their horizons."""
 
-    def __init__(
-        self,
-        scene: dict[str, Any],
-        floor: dict[str, float],
-        blowup_extent: float,
-        mesh: str,
-        runs: dict[str, str],
-        sensitivity: str,
-    ) -> None:
-        self._limit = blowup_extent
-        self.motions = {m: Motion(scene_of(scene, mesh, m), runs[m]) for m in RUNS}
-        spread, name = read_table(sensitivity), scene["name"]
-        labels = {"train": floor["perturbation"], "heldout": HELDOUT}
-        self._ends = {
-            motion: horizon(floor_of(spread, name, label), floor["threshold"])
-            for motion, label in labels.items()
+    def __init__(self, settings: Settings, inputs: Inputs) -> None:
+        self._limit = settings.blowup_extent
+        self.motions = {
+            name: Motion(scene_of(settings.scene, inputs.mesh, name), getattr(inputs, name))
+            for name in RUNS
         }
+        self._ends = {name: settings.horizon.frames(inputs.sensitivity, name) for name in RUNS}
 
     def full_projections(self, columns: Columns) -> dict[str, Any]:
         """Errors of the runs without interpolation: what the subspace itself leaves."""
@@ -99,27 +134,32 @@ class _Study:
         }
 
     def outcome(
-        self, columns: Columns, trained: Training, settings: InterpolationSpec
+        self, columns: Columns, trained: Training, spec: InterpolationSpec
     ) -> dict[str, Any]:
         """What a variant did; a refused one has not run, and its cells are empty."""
         try:
-            found = interpolate(self.motions["train"].scene, columns, trained, settings)
+            found = interpolate(self.motions["train"].scene, columns, trained, spec)
         except SamplingError as error:
             log.info("refused: %s", error)
             return {}
         model = SubspaceModel(POSITION_BASIS, columns, found)
-        run, error = self._run("train", model)
+        outcome, error = self._run("train", model)
         return {
             "elements_sampled": sum(len(chosen.elements) for chosen in found.values()),
             "gain": max(chosen.gain for chosen in found.values()),
-            "finite": run["blowup_frame"] is None,
-            "max_extent": float(run["extent"].max(initial=0.0)),
+            "finite": outcome.finite,
+            "max_extent": outcome.max_extent,
             "relative_error_within_horizon": error,
             "heldout_error_within_horizon": self._run("heldout", model)[1],
         }
 
-    def _run(self, motion: str, model: SubspaceModel) -> tuple[dict[str, Any], float | None]:
+    def _run(self, motion: str, model: SubspaceModel) -> tuple[Rerun, float | None]:
         """A run and its error before the horizon; None if it did not get there."""
         case, end = self.motions[motion], self._ends[motion]
-        run = case.run(model, self._limit)
-        return run, error_within(run["difference"], case.displacement, end)
+        outcome = case.run(model, self._limit)
+        return outcome, error_within(outcome.difference, case.displacement, end)
+
+
+EXPERIMENT = Experiment(
+    "subspace_ablation", "Variants of block DEIM in a position subspace of {scene}", run
+)

@@ -1,39 +1,54 @@
-"""Rule timing: ms per frame of full-order and reduced runs, of local steps and of effects."""
+"""Milliseconds a frame of full-order and reduced runs, of local steps alone, and of effects."""
 
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain
-from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
+from pydantic import Field
 
+from pdrom.core.paths import (
+    BASIS,
+    BREAK_EVEN,
+    EFFECTS,
+    LEFT_OUT,
+    MESH,
+    SAMPLING,
+    SUBSPACES,
+    TIMINGS,
+    TRAIN,
+    File,
+)
+from pdrom.core.reads import Every
 from pdrom.core.store import open_hdf5, write_table
+from pdrom.experiments.declaration import Experiment, JobSettings
 from pdrom.experiments.effect_costs import effect_costs, left_out
-from pdrom.experiments.iterations import accelerated, stepper_of
+from pdrom.experiments.iterations import IterationCounts, accelerated, stepper_of
 from pdrom.experiments.local_costs import local_costs
-from pdrom.experiments.measurement import LiftTimed, Measurement, Variant, measure
+from pdrom.experiments.measurement import LiftTimed, Measurement, Protocol, Variant, measure
 from pdrom.experiments.names import ANDERSON, FOM
 from pdrom.experiments.scenes import scene_of
+from pdrom.experiments.settings import Count, Solver, Threads
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.constraints.implementations import IMPLEMENTATIONS
 from pdrom.model.dynamics.stepper import LocalStep
 from pdrom.model.dynamics.system import GlobalSystem
-from pdrom.model.scene import Scene
+from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import load_basis
 from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.ranks import resolve_ranks
+from pdrom.reduction.local.ranks import Rank, resolve_ranks
 from pdrom.reduction.local.rerun import replace_group
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.sampling.load import load_reduction
-from pdrom.reduction.subspace.load import load_models
+from pdrom.reduction.sampling.load import basis_of, load_reduction
+from pdrom.reduction.subspace.store import load_models
 
 log = logging.getLogger(__name__)
 
 Make = Callable[[dict[str, Any], Sequence[LocalStep]], Variant]
+Alone = dict[tuple[str, str, int], ReducedLocalStep]
 
 COLUMNS = [
     "scene", "group", "method", "position_basis", "k", "r", "iterations", "vertices",
@@ -43,81 +58,116 @@ COLUMNS = [
 STATES = 5  # states of the full-order run at which local steps are timed alone
 
 
-def time_scene(
-    scene: dict[str, Any],
-    methods: dict[str, dict[str, Any]],
-    ranks: list[int | str],
-    counts: list[int],
-    window: int,
-    protocol: dict[str, Any],
-    solver: str,
-    threads: int,
-    inputs: dict[str, Any],
-    outputs: dict[str, str],
-) -> None:
-    """Measure one scene and write its tables: frames, local steps over r, cost of effects.
+class Timing(Protocol):
+    """Section ``timing``: the protocol of the timing jobs.
 
-    Parameters
-    ----------
-    counts : numbers of iterations K of the full-order run that are timed beside the scene's own
-    window : of the Anderson acceleration that each K is timed with, too
-    protocol : settings of `pdrom.pipeline.study.Timing`
-    inputs : mesh, fom (full-order run), and lists of bases, samplings, hyper
-    outputs : frames, breakeven, effects, left_out
+    The slow implementations of the full-order run are timed over fewer frames, the interpreted one
+    over fewer iterations, too. ``breakeven`` are the sizes r of the reduced local steps that are
+    timed alone, in ``breakeven_repeats`` short repeats.
     """
-    bound = scene_of(scene, inputs["mesh"], threads=threads)
-    system = bound.system_with(solver)
-    warmup, repeats = protocol["warmup"], protocol["repeats"]
-    frames = min(protocol["frames"], bound.config.frames)
-    make = partial(_variant, bound, system, frames)
-    variants = _full_order(bound, make, protocol) + _other_counts(
-        bound, system, frames, counts, window
-    )
-    alone: dict[tuple[str, str, int], ReducedLocalStep] = {}
-    for path in inputs["samplings"]:
-        group, method = Path(path).parent.name, Path(path).stem
-        source = _Source(bound.group(group), method, methods[method], inputs["bases"], path)
-        for r in source.sizes(ranks):
-            step, labels = source.step(r), {"group": group, "method": method, "r": r}
-            steps = replace_group(bound, group, LiftTimed(step))
-            variants.append(make({**labels, "implementation": "compiled"}, steps))
-        if source.spec.rows != "all":
-            for r in source.sizes(protocol["breakeven"]):
-                alone[group, method, r] = source.step(r)
-    for labels, model in chain.from_iterable(load_models(path) for path in inputs["hyper"]):
-        labels = {"group": "all", **labels, "implementation": "compiled"}
-        variants.append(Variant(labels, *model.loop(bound), frames))
+
+    numpy_frames: Count = 4
+    interpreted_frames: Count = 1
+    interpreted_iterations: Annotated[int, Field(ge=1)] = 2
+    breakeven: tuple[Rank, ...] = (5, 10, 20, 40, 60, 80, "full")
+    breakeven_repeats: Annotated[int, Field(ge=5)] = 20
+
+
+class Settings(JobSettings):
+    """What the times of a scene depend on, beside the machine."""
+
+    scene: SceneConfig
+    methods: dict[str, MethodSpec]
+    ranks: tuple[Rank, ...]
+    iterations: IterationCounts
+    timing: Timing
+    solver: Solver
+    threads: Threads
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read."""
+
+    mesh: Annotated[File, MESH]
+    fom: Annotated[File, TRAIN]
+    bases: Annotated[list[File], Every(BASIS)]
+    samplings: Annotated[list[File], Every(SAMPLING)]
+    subspaces: Annotated[list[File], Every(SUBSPACES)]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written: frames, local steps over r, cost of effects, scenes without some of them."""
+
+    frames: Annotated[File, TIMINGS]
+    breakeven: Annotated[File, BREAK_EVEN]
+    effects: Annotated[File, EFFECTS]
+    left_out: Annotated[File, LEFT_OUT]
+
+
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+    """Measure one scene."""
+    scene = scene_of(settings.scene, inputs.mesh, threads=settings.threads)
+    system, timing = scene.system_with(settings.solver), settings.timing
+    frames, name = min(timing.frames, scene.config.frames), scene.config.name
+    variants, alone = _variants(scene, system, frames, settings, inputs)
     slow = [v for v in variants if v.labels["implementation"] == "interpreted"]
     quick = [v for v in variants if v.labels["implementation"] != "interpreted"]
-    name = bound.config.name
     told = partial(log.info, f"{name}: repeat %d of %d")
-    results = measure(quick, warmup, repeats, told) + measure(slow, 0, repeats)
-    write_table(pd.DataFrame([_row(bound, m) for m in results], columns=COLUMNS), outputs["frames"])
+    results = measure(quick, timing.warmup, timing.repeats, told)
+    results += measure(slow, 0, timing.repeats)
+    table = pd.DataFrame([_row(scene, m) for m in results], columns=COLUMNS)
+    write_table(table, outputs.frames.path)
     log.info("%s: %d reduced local steps alone", name, len(alone))
-    states = _states(inputs["fom"])
-    times = local_costs(bound, alone, states, warmup, protocol["breakeven_repeats"])
-    write_table(times.assign(factor=1.0), outputs["breakeven"])
+    states = _states(inputs.fom)
+    times = local_costs(scene, alone, states, timing.warmup, timing.breakeven_repeats)
+    write_table(times.assign(factor=1.0), outputs.breakeven.path)
     log.info("%s: effects", name)
-    costs = effect_costs(bound, system, frames, warmup, repeats)
-    write_table(costs, outputs["effects"])
-    without = left_out(bound, costs, frames, warmup, repeats, solver)
-    write_table(without, outputs["left_out"])
+    costs = effect_costs(scene, system, frames, timing.warmup, timing.repeats)
+    write_table(costs, outputs.effects.path)
+    without = left_out(scene, costs, frames, timing.warmup, timing.repeats, settings.solver)
+    write_table(without, outputs.left_out.path)
+
+
+def _variants(
+    scene: Scene, system: GlobalSystem, frames: int, settings: Settings, inputs: Inputs
+) -> tuple[list[Variant], Alone]:
+    """Everything whose frames are timed, and the reduced local steps that are timed alone."""
+    make = partial(_variant, scene, system, frames)
+    variants = _full_order(scene, make, settings.timing)
+    variants += _other_counts(scene, system, frames, settings.iterations)
+    alone: Alone = {}
+    for sampling in inputs.samplings:
+        group, method = sampling["group"], sampling["method"]
+        source = _Source(scene.group(group), sampling, settings.methods[method], inputs.bases)
+        for r in source.sizes(settings.ranks):
+            step, labels = source.step(r), {"group": group, "method": method, "r": r}
+            steps = replace_group(scene, group, LiftTimed(step))
+            variants.append(make({**labels, "implementation": "compiled"}, steps))
+        if source.spec.rows != "all":
+            for r in source.sizes(settings.timing.breakeven):
+                alone[group, method, r] = source.step(r)
+    for file in inputs.subspaces:
+        for labels, model in load_models(file.path):
+            labels = {"group": "all", **labels, "implementation": "compiled"}
+            variants.append(Variant(labels, *model.loop(scene), frames))
+    return variants, alone
 
 
 class _Source:
     """Reduced local steps of one group and method, by size."""
 
     def __init__(
-        self, group: ConstraintGroup, method: str, spec: dict[str, Any], bases: list[str], path: str
+        self, group: ConstraintGroup, sampling: File, spec: MethodSpec, bases: list[File]
     ) -> None:
-        self.spec = MethodSpec.model_validate(spec)
-        place = (group.name, self.spec.basis_id)
-        file = next(b for b in bases if (Path(b).parent.name, Path(b).stem) == place)
-        self._group, self._path, self._space = group, path, load_basis(file)
-        with open_hdf5(path) as stored:
+        self.spec = spec
+        self._group, self._path = group, sampling.path
+        self._space = load_basis(basis_of(sampling, spec, bases).path)
+        with open_hdf5(sampling.path) as stored:
             self._stored = {int(key[1:]) for key in stored if key.startswith("r")}
 
-    def sizes(self, asked: Sequence[int | str]) -> list[int]:
+    def sizes(self, asked: Sequence[Rank]) -> list[int]:
         """The asked sizes that the basis can have and the file holds."""
         return [r for r in resolve_ranks(asked, self._space.rank) if r in self._stored]
 
@@ -139,27 +189,28 @@ def _variant(
     return Variant(labels, loop, scene.initial_state(), frames)
 
 
-def _full_order(scene: Scene, make: Make, protocol: dict[str, Any]) -> list[Variant]:
+def _full_order(scene: Scene, make: Make, timing: Timing) -> list[Variant]:
     """The full-order run in every implementation; the slowest does only some iterations."""
     variants = [make({"implementation": "compiled"}, scene.groups)]
     for name, step in IMPLEMENTATIONS.items():
         variant = make({"implementation": name}, [step(g) for g in scene.groups])
-        frames = min(variant.frames, protocol[f"{name}_frames"])
+        frames = min(variant.frames, getattr(timing, f"{name}_frames"))
         variants.append(replace(variant, frames=frames))
     slow = variants[-1]
     whole = scene.config.iterations
-    slow.loop.iterations = min(whole, protocol["interpreted_iterations"])
+    slow.loop.iterations = min(whole, timing.interpreted_iterations)
     variants[-1] = replace(slow, share=slow.loop.iterations / whole)
     return variants
 
 
 def _other_counts(
-    scene: Scene, system: GlobalSystem, frames: int, counts: list[int], window: int
+    scene: Scene, system: GlobalSystem, frames: int, asked: IterationCounts
 ) -> list[Variant]:
     """The compiled full-order run with other numbers of iterations, plain and accelerated."""
     variants = []
+    counts = sorted({*asked.counts, scene.config.iterations})
     own = (scene.config.iterations, scene.config.anderson_window)
-    for count, size in accelerated(sorted({*counts, scene.config.iterations}), window):
+    for count, size in accelerated(counts, asked.anderson_window):
         if (count, size) != own:
             loop = stepper_of(scene, system, count, size)
             method = ANDERSON if size else FOM
@@ -168,9 +219,9 @@ def _other_counts(
     return variants
 
 
-def _states(fom: str) -> np.ndarray:
+def _states(run: File) -> np.ndarray:
     """Positions (n, N, 3) spread over a full-order run."""
-    with open_hdf5(fom) as file:
+    with open_hdf5(run.path) as file:
         positions = file["positions"]
         return np.stack([positions[i * (len(positions) - 1) // STATES] for i in range(STATES)])
 
@@ -189,3 +240,6 @@ def _row(scene: Scene, measurement: Measurement) -> dict[str, Any]:
         "spread_ms": measurement.spread,
         "repeats": measurement.repeats,
     }
+
+
+EXPERIMENT = Experiment("timing", "Timings of {scene}", run, alone=True)

@@ -88,7 +88,13 @@ def _one(study: Study) -> Iterator[Labels]:
     yield {}
 
 
-_subspaces = _among(lambda study: study.settings.subspace.scenes)
+def _subspaces(study: Study) -> Iterator[Labels]:
+    """The listed scenes, or all; none where no model is asked for."""
+    section = study.settings.subspace
+    for scene in study.scenes if section.bases and section.sizes else ():
+        if scene in section.scenes or not section.scenes:
+            yield {"scene": scene}
+
 
 HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.MESH: _meshes,

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from pdrom.core.reads import EachOf, Every, ProjectFile, SourcesOf
 from pdrom.experiments.declaration import Experiment, JobSettings, Source, experiments
 from pdrom.pipeline.fingerprint import fingerprint
 from pdrom.pipeline.holdings import labels_of
-from pdrom.pipeline.providers import provide
+from pdrom.pipeline.providers import provide, scaled_methods
 from pdrom.pipeline.study import Study
 
 Labels = Mapping[str, str]
@@ -43,6 +44,10 @@ class Jobs:
     def experiments(self) -> list[Experiment]:
         """All experiments, sorted by name."""
         return experiments(self._package)
+
+    def check(self) -> None:
+        """ConfigurationError for settings that name what does not exist."""
+        scaled_methods(self._study, {})
 
     def outputs(self, experiment: Experiment) -> dict[str, str]:
         """Paths with labels in braces."""
@@ -115,7 +120,7 @@ class Jobs:
             case ProjectFile(path):
                 return path
             case SourcesOf(key):
-                return list(getattr(job.settings, key).sources)
+                return list(attrgetter(key)(job.settings).sources)
 
     def _one(self, place: Place, labels: Labels) -> str:
         return place.at(self._results, **self._labels(place, labels))

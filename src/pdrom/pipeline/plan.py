@@ -2,18 +2,18 @@
 
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from pdrom.core import paths
 from pdrom.core.errors import ConfigurationError, PdromError, choices
 from pdrom.core.logs import planning_log
-from pdrom.experiments.hard_cases.catalogue import modules_of, reducible_cases
 from pdrom.experiments.hard_cases.expectations import load_expectations
 from pdrom.model.effects import EFFECTS
-from pdrom.model.mesh.config import MeshFile
 from pdrom.pipeline.fingerprint import fingerprint
+from pdrom.pipeline.holdings import labels_of
 from pdrom.pipeline.jobs import Jobs, digest
 from pdrom.pipeline.scenes import require_scenes
 from pdrom.pipeline.study import Study, StudySettings
@@ -98,10 +98,9 @@ class Plan:
         folder = self.root / "config"
         load_claims(folder / "claims.yaml")
         load_expectations(folder / "hard_cases.yaml")
-        self.hard_cases()
         self._check_scenes(folder)
         self._check_figures(folder)
-        self.scaling_specs()
+        self.jobs.check()
 
     def _check_scenes(self, folder: Path) -> None:
         settings = self.settings
@@ -127,30 +126,6 @@ class Plan:
 
     # Parameters -----------------------------------------------------------------------------
 
-    def scene_config(self, scene: str) -> dict[str, Any]:
-        """Plain configuration of a scene; a change of it reruns the scene's jobs."""
-        if scene not in self._scene_configs:
-            self._scene_configs[scene] = self.study.scene(scene).model_dump(mode="json")
-        return self._scene_configs[scene]
-
-    @cached_property
-    def _scene_configs(self) -> dict[str, dict[str, Any]]:
-        return {name: s.model_dump(mode="json") for name, s in self.study.scenes.items()}
-
-    def mesh_config(self, mesh: str) -> dict[str, Any]:
-        """Plain configuration of a mesh."""
-        return self.study.mesh(mesh).model_dump(mode="json")
-
-    def mesh_file(self, mesh: str) -> list[str]:
-        """The file that a mesh is read from, an empty list for one that is generated."""
-        config = self.study.mesh(mesh)
-        return [config.path] if isinstance(config, MeshFile) else []
-
-    def mesh_content(self, scene: str) -> str:
-        """Checksum of the file that a scene's mesh is read from (for jobs that read it)."""
-        config = {**self.study.scenes, **self.study.online}[scene].mesh
-        return self.digest(config.path) if isinstance(config, MeshFile) else ""
-
     def digest(self, *paths: str) -> str:
         """See `pdrom.pipeline.jobs.digest`."""
         return digest(self.root, *paths)
@@ -163,33 +138,10 @@ class Plan:
         """Plain specifications of all methods of the study."""
         return {name: self.method_spec(name) for name in self.study.methods}
 
-    def basis_spec(self, basis: str) -> dict[str, Any]:
-        """Plain specification of the first method that uses ``basis``."""
-        names = [m for m, spec in self.study.methods.items() if spec.basis_id == basis]
-        return {k: self.method_spec(names[0])[k] for k in ("weighting", "centring", "layout")}
-
-    def subspace_settings(self) -> dict[str, Any]:
-        """Plain settings of the position subspaces; which scenes have them is no parameter."""
-        return self.settings.subspace.model_dump(mode="json", exclude={"scenes"})
-
     def _method(self, method: str) -> MethodSpec:
         return self.study.methods[method]
 
     # Files ----------------------------------------------------------------------------------
-
-    def mesh_path(self, scene: str) -> str:
-        """Mesh file of a scene."""
-        return f"{RESULTS}/meshes/{self.study.mesh_of(scene)}.h5"
-
-    def basis_path(self, scene: str, group: str, method: str) -> str:
-        """Basis file that a method needs."""
-        return f"{RESULTS}/pod/{scene}/{group}/{self._method(method).basis_id}.h5"
-
-    def bases_of(self, scene: str) -> list[str]:
-        """All basis files of a scene."""
-        groups = self.study.scenes[scene].reduce
-        paths = [self.basis_path(scene, g, m) for g in groups for m in self.study.methods]
-        return sorted(set(paths))
 
     def reference_bases(self) -> list[str]:
         """One basis file per experiment, for its singular values: uncentred if there."""
@@ -199,10 +151,6 @@ class Plan:
             chosen = sorted(ids, key=lambda i: (i != REFERENCE_BASIS, ids.index(i)))[0]
             paths.append(f"{RESULTS}/pod/{scene}/{group}/{chosen}.h5")
         return paths
-
-    def samplings_of(self, scene: str) -> list[str]:
-        """All sampling files of a scene."""
-        return self._per_method("sampling", ".h5", scene)
 
     def per_experiment(self, stage: str, tail: str) -> list[str]:
         """Files of a stage over all scenes, groups and methods, in configuration order."""
@@ -214,13 +162,8 @@ class Plan:
 
     def hyper(self, tail: str) -> list[str]:
         """Files of the position subspaces over the scenes that have them."""
-        scenes = [s for s in self.study.scenes if s in self.settings.subspace.scenes]
-        return [f"{RESULTS}/hyper/{scene}/{tail}" for scene in scenes]
-
-    def hyper_of(self, scene: str) -> list[str]:
-        """The models of one scene, an empty list if it has none."""
-        path = f"{RESULTS}/hyper/{scene}/models.h5"
-        return [path] if path in self.hyper("models.h5") else []
+        held = labels_of(self.study, paths.SUBSPACES)
+        return [f"{RESULTS}/hyper/{labels['scene']}/{tail}" for labels in held]
 
     def _per_method(self, stage: str, tail: str, scene: str) -> list[str]:
         return [
@@ -228,6 +171,17 @@ class Plan:
             for group in self.study.scenes[scene].reduce
             for method in self.study.methods
         ]
+
+    @property
+    def measured_tables(self) -> dict[str, str]:
+        """Files of the tables that an experiment writes as they are."""
+        places = {
+            "guard": paths.GUARD,
+            "hard_cases": paths.HARD_CASES,
+            "kernel_accuracy": paths.KERNEL_ACCURACY,
+            "offline_cost": paths.OFFLINE,
+        }
+        return {name: place.at(self.results) for name, place in places.items()}
 
     @property
     def tables(self) -> list[str]:
@@ -242,63 +196,11 @@ class Plan:
         scenes = [s for s in self.study.scenes if s in self.settings.stability.scenes]
         return [f"{RESULTS}/stability/{scene}.csv" for scene in scenes]
 
-    def stability_settings(self) -> dict[str, Any]:
-        """Plain settings of the short runs; which scenes have them is no parameter."""
-        settings = self.settings.stability
-        ranks = [r for r in settings.ranks if r in self.settings.ranks]
-        other = {"scenes", "wrong", "left"}
-        return {**settings.model_dump(mode="json", exclude=other), "ranks": ranks}
-
     def time_steps(self) -> dict[str, float]:
         """Time step of every scene in seconds."""
         return {name: scene.time_step for name, scene in self.study.scenes.items()}
 
-    def guard_settings(self) -> dict[str, Any]:
-        """Plain settings of the guard of the reruns."""
-        return self.settings.guard.watching.model_dump(mode="json")
-
-    @cached_property
-    def _guard_cases(self) -> list[tuple[str, str, str, int | str]]:
-        """(scene, group, method, r) of the guard's cases that this configuration holds."""
-        held = [c for c in self.settings.guard.cases if c.scene in self.study.scenes]
-        held = [c for c in held if c.method in self.study.methods and c.r in self.settings.ranks]
-        return [
-            (c.scene, group, c.method, c.r)
-            for c in held
-            for group in self.study.scenes[c.scene].reduce
-        ]
-
-    def guard_cases(self) -> list[dict[str, Any]]:
-        """Plain cases of the guard."""
-        return [
-            {"scene": self.scene_config(scene), "group": group, "name": method, "r": r,
-             "method": self.method_spec(method)}
-            for scene, group, method, r in self._guard_cases
-        ]  # fmt: skip
-
-    def guard_files(self, kind: str) -> list[str]:
-        """Mesh, fom, basis or sampling file of each case, in order."""
-        places = {
-            "mesh": lambda scene, group, method: self.mesh_path(scene),
-            "fom": lambda scene, group, method: f"{RESULTS}/fom/{scene}/train.h5",
-            "basis": self.basis_path,
-            "sampling": lambda scene, group, method: (
-                f"{RESULTS}/sampling/{scene}/{group}/{method}.h5"
-            ),
-        }
-        return [places[kind](*case[:3]) for case in self._guard_cases]
-
-    def guard_code(self) -> str:
-        """Fingerprint of the guard's stage with the effects of its scenes."""
-        scenes = dict.fromkeys(case[0] for case in self._guard_cases)
-        modules = [m for scene in scenes for m in self.study.scenes[scene].modules]
-        return fingerprint("pdrom.experiments.guard", *modules)
-
     # Ladder ---------------------------------------------------------------------------------
-
-    def ladder_rungs(self) -> dict[str, Any]:
-        """Plain ladder; which scenes climb it is no parameter of one climb."""
-        return {**self.study.ladder.model_dump(mode="json"), "scenes": []}
 
     def ladder_files(self) -> list[str]:
         """Files of the scenes that climb the ladder and are in this configuration."""
@@ -321,74 +223,13 @@ class Plan:
         own = self.per_scene("breakeven", ".csv")
         return own + [path for path in self.scaling_files("breakeven") if Path(path).stem != "x1"]
 
-    def scaling_specs(self) -> dict[str, Any]:
-        """Plain specifications of the methods that are timed on growing meshes."""
-        return {name: s.model_dump(mode="json") for name, s in self.scaling_methods.items()}
-
-    @cached_property
-    def scaling_methods(self) -> dict[str, MethodSpec]:
-        """Methods that are timed on growing meshes."""
-        settings, methods = self.settings.scaling, load_methods(self.root / "config/methods.yaml")
-        wanted = {
-            "scaling.method": (settings.method,),
-            "scaling.breakeven.methods": settings.breakeven.methods,
-        }
-        for key, names in wanted.items():
-            for name in set(names) - set(methods):
-                raise ConfigurationError(f"{key} = '{name}': unknown{choices(name, methods)}")
-        names = dict.fromkeys(name for group in wanted.values() for name in group)
-        return {name: methods[name] for name in names}
-
-    def scaling_settings(self) -> dict[str, Any]:
-        """Plain settings of a mesh size; which sizes there are is no parameter of one."""
-        return self.settings.scaling.model_dump(mode="json", exclude={"scenes"})
-
-    # Hard cases -----------------------------------------------------------------------------
-
-    def hard_cases(self) -> dict[str, Any]:
-        """Parameters of the hard cases: every method of config/methods.yaml runs in them."""
-        settings, known = self.settings.hard_cases, reducible_cases()
-        for name in settings.cases:
-            if name not in known:
-                raise ConfigurationError(
-                    f"hard_cases.cases: unknown case '{name}' (allowed: {', '.join(known)})"
-                )
-        methods = load_methods(self.root / "config" / "methods.yaml")
-        return {
-            "methods": {name: spec.model_dump(mode="json") for name, spec in methods.items()},
-            "cases": list(settings.cases or known),
-            "matrices": settings.matrices,
-        }
-
-    def hard_cases_code(self) -> str:
-        """Fingerprint of the hard cases with their effects and the selections of all methods."""
-        methods = load_methods(self.root / "config" / "methods.yaml").values()
-        modules = [*modules_of(self.hard_cases()["cases"]), *_modules(methods)]
-        return fingerprint("pdrom.experiments.hard_cases.experiment", *modules)
-
     # Large scenes ---------------------------------------------------------------------------
-
-    def online_scene(self, scene: str) -> dict[str, Any]:
-        """Plain configuration of a large scene."""
-        return self.study.online[scene].model_dump(mode="json")
-
-    def online_settings(self) -> dict[str, Any]:
-        """Plain settings of the large scenes; which there are is no parameter of one."""
-        return self.settings.online.model_dump(mode="json", exclude={"scenes"})
 
     def online_files(self) -> list[str]:
         """Files of the large scenes of this configuration."""
         return [f"{RESULTS}/online/{scene}.csv" for scene in self.study.online]
 
-    def online_code(self, scene: str) -> str:
-        """Fingerprint of the stage together with the effects that a large scene lists."""
-        return fingerprint("pdrom.experiments.online", *self.study.online[scene].modules)
-
     # Ablation in position subspaces ---------------------------------------------------------
-
-    def ablation_settings(self) -> dict[str, Any]:
-        """Plain ablation; which scenes it runs on is no parameter of one run."""
-        return {**self.study.ablation.model_dump(mode="json", exclude_unset=True), "scenes": []}
 
     def ablation_files(self) -> list[str]:
         """Files of the scenes of the ablation that this configuration holds."""
@@ -489,11 +330,3 @@ class Plan:
     def code(self, *modules: str) -> str:
         """Fingerprint of the code that a stage runs; a change of it reruns the stage."""
         return fingerprint(*modules)
-
-    def scene_code(self, stage: str, scene: str, methods: Iterable[MethodSpec] = ()) -> str:
-        """Fingerprint of a stage with the effects that a scene lists and what ``methods`` name."""
-        return fingerprint(stage, *self.study.scene(scene).modules, *_modules(methods))
-
-
-def _modules(methods: Iterable[MethodSpec]) -> list[str]:
-    return [module for spec in methods for module in spec.modules]

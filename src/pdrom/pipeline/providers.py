@@ -1,12 +1,19 @@
-"""What a job's settings are made of: one value for each name that an experiment may ask for.
+"""What a job's settings are made of: a value for each name that an experiment may ask for.
 
-A name that is not listed here is a key of the configuration.
+A name that is not listed here is a key of the configuration. A setting of the type of a section's
+base class gets the fields of that class only, so that a job depends on nothing else.
 """
 
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from pdrom.experiments.guard import Trial
+from pdrom.experiments.settings import Horizon
+from pdrom.experiments.stability import Stability
+from pdrom.model.mesh.config import MeshConfig
+from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.study import Study
+from pdrom.reduction.method import BasisSpec, MethodSpec
 
 Labels = Mapping[str, str]
 
@@ -18,10 +25,74 @@ def provide(study: Study, name: str, labels: Labels) -> Any:
     return getattr(study.settings, name)
 
 
-def _scene(study: Study, labels: Labels) -> Any:
+def _scene(study: Study, labels: Labels) -> SceneConfig:
     return study.scene(labels["scene"])
+
+
+def _mesh(study: Study, labels: Labels) -> MeshConfig:
+    return study.mesh(labels["mesh"])
+
+
+def _method(study: Study, labels: Labels) -> MethodSpec:
+    return study.method(labels["method"])
+
+
+def _basis(study: Study, labels: Labels) -> BasisSpec:
+    """What the first method that uses the basis says of it."""
+    return study.basis(labels["basis"])
+
+
+def _horizon(study: Study, labels: Labels) -> Horizon:
+    section = study.settings.sensitivity
+    return Horizon(perturbation=section.reference, threshold=section.threshold)
+
+
+def _stability(study: Study, labels: Labels) -> Stability:
+    """The short runs at the sizes that the study has samples of."""
+    section = study.settings.stability
+    held = tuple(r for r in section.ranks if r in study.settings.ranks)
+    return section.model_copy(update={"ranks": held})
+
+
+def _trials(study: Study, labels: Labels) -> tuple[Trial, ...]:
+    """The guard's cases that the study holds, one for each reduced group."""
+    settings = study.settings
+    held = [
+        case
+        for case in settings.guard.cases
+        if case.scene in study.scenes and case.method in study.methods and case.r in settings.ranks
+    ]
+    return tuple(
+        Trial(
+            scene=study.scenes[case.scene],
+            group=group,
+            name=case.method,
+            method=study.methods[case.method],
+            r=case.r,
+        )
+        for case in held
+        for group in study.scenes[case.scene].reduce
+    )
+
+
+def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
+    """The methods that are timed on growing meshes; they need not be among the study's."""
+    section = study.settings.scaling
+    found = study.named_methods([section.method], "scaling.method")
+    return found | study.named_methods(section.breakeven.methods, "scaling.breakeven.methods")
 
 
 PROVIDERS: dict[str, Callable[[Study, Labels], Any]] = {
     "scene": _scene,
+    "mesh": _mesh,
+    "method": _method,
+    "methods": lambda study, labels: study.methods,
+    "every_method": lambda study, labels: study.every_method,
+    "scaled_methods": scaled_methods,
+    "basis": _basis,
+    "horizon": _horizon,
+    "stability": _stability,
+    "trials": _trials,
+    "ladder": lambda study, labels: study.ladder,
+    "ablation": lambda study, labels: study.ablation,
 }

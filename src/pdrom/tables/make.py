@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from pdrom.core.store import read_table, write_table
+from pdrom.core.store import read_table, write_table, write_text
 from pdrom.tables.accuracy_cost import accuracy_cost
 from pdrom.tables.breakeven import breakeven
 from pdrom.tables.budget import budget
@@ -67,4 +67,7 @@ def make_table(name: str, inputs: Any, params: Any, output: str) -> None:
         "effects_cost": lambda: effects_cost(inputs.parts),
         "effects_left_out": lambda: effects_left_out(inputs.parts),
     }
+    if name not in makers:
+        write_text(Path(inputs.part).read_text(encoding="utf-8"), output)
+        return
     write_table(makers[name](), Path(output))

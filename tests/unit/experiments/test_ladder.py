@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from conftest import ROOT
-from pdrom.experiments.ladder_spec import load_ladder
+from pdrom.core.yamlfile import read_yaml, validate
+from pdrom.experiments.ladder import LadderFile
 from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.sampling import Reduction, select
 
-LADDER = load_ladder(ROOT / "config" / "ladder.yaml")
+FILE = ROOT / "config" / "ladder.yaml"
+LADDER = validate(LadderFile, read_yaml(FILE), str(FILE))
 
 
 @pytest.mark.parametrize("direction", ["up", "down"])

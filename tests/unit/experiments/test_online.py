@@ -5,13 +5,15 @@ import pytest
 
 from conftest import make_scene
 from pdrom.core.errors import ConfigurationError
+from pdrom.core.paths import File
 from pdrom.core.store import read_table
 from pdrom.core.yamlfile import validate
-from pdrom.experiments.online import relative_error, run_online
+from pdrom.experiments import online as experiment
+from pdrom.experiments.measurement import Protocol
+from pdrom.experiments.online import COLUMNS, Online, OnlineModels, relative_error
 from pdrom.model.runs.full_order import trajectory
-from pdrom.pipeline.study import Online
+from pdrom.model.scene import SceneConfig
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns
-from pdrom.tables.columns import COLUMNS
 from pdrom.tables.online import online
 
 EFFECTS = (
@@ -24,19 +26,23 @@ EFFECTS = (
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     scene = make_scene(*EFFECTS, mesh={"kind": "cloth", "rows": 8, "columns": 7}, frames=10)
-    config = scene.config.model_dump(mode="json") | {
-        "reduce": {"spring": {"train": 5}}, "held_out": {"kick": 0.5},
-    }  # fmt: skip
+    changes = {"reduce": {"spring": {"train": 5}}, "held_out": {"kick": 0.5}}
+    config = SceneConfig.model_validate(scene.config.model_dump(mode="json") | changes)
     path = tmp_path_factory.mktemp("online") / "scene.csv"
-    settings = {"bases": ["pod", "skinning"], "sizes": [3], "tolerances": [0.3, 1e-2]}
-    run_online(config, settings, {"frames": 3, "warmup": 1, "repeats": 2}, ".", str(path))
+    settings = experiment.Settings(
+        scene=config,
+        online=OnlineModels(bases=("pod", "skinning"), sizes=(3,), tolerances=(0.3, 1e-2)),
+        timing=Protocol(frames=3, warmup=1, repeats=2),
+    )
+    output = experiment.Outputs(File(str(path), {"scene": "test"}))
+    experiment.run(settings, experiment.Inputs([]), output)
     return scene, path
 
 
 def test_rows_of_a_scene(written):
     scene, path = written
     table = read_table(path)
-    assert tuple(table.columns) == COLUMNS["online"]
+    assert table.columns.tolist() == COLUMNS
     assert table.position_basis.tolist() == ["pod", "pod", "skinning", "skinning"]
     assert table.tau.tolist() == [0.3, 1e-2] * 2
     assert (table.vertices == 56).all()
@@ -56,7 +62,7 @@ def test_table_is_the_rows_of_all_scenes(written):
     _, path = written
     assert len(online([path, path])) == 8
     empty = online([])
-    assert tuple(empty.columns) == COLUMNS["online"]
+    assert empty.columns.tolist() == COLUMNS
     assert len(empty) == 0
 
 

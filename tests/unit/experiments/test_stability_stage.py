@@ -1,37 +1,56 @@
-"""Rules stability and guard on a small study, made by the stages before them."""
+"""Experiments stability and guard on a small study, made by the experiments before them."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
 from conftest import ROOT, make_scene
+from pdrom.core.paths import File
 from pdrom.core.store import read_table
-from pdrom.experiments.fom import run_fom
-from pdrom.experiments.guard import try_guard
-from pdrom.experiments.hyper import run_hyper
-from pdrom.experiments.mesh import make_mesh
-from pdrom.experiments.pod import make_basis
-from pdrom.experiments.sampling import sample
-from pdrom.experiments.snapshots import collect_snapshots
-from pdrom.experiments.stability import sweep
-from pdrom.pipeline.study import Subspace
+from pdrom.experiments import fom, guard, mesh, pod, reruns, snapshots, stability, subspaces
+from pdrom.experiments.guard import Trial, TriedGuard
+from pdrom.experiments.sampling import Sweep
+from pdrom.experiments.stability import ShortRuns
+from pdrom.experiments.subspaces import SubspaceModels
+from pdrom.model.scene import SceneConfig
+from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.method import load_methods
-from pdrom.tables.columns import COLUMNS
 
 METHODS = {
-    name: spec.model_dump(mode="json")
+    name: spec
     for name, spec in load_methods(ROOT / "config" / "methods.yaml").items()
     if name in ("pod", "deim-joint")
 }
-SETTINGS = {"time_steps": [0.1], "stiffness_ratios": [0.01], "ranks": [4, 30],
-            "duration": 0.16, "min_frames": 8, "max_frames": 12}  # fmt: skip
+SHORT = ShortRuns(
+    time_steps=(0.1,), stiffness_ratios=(0.01,), ranks=(4, 30), duration=0.16, min_frames=8,
+    max_frames=12,
+)  # fmt: skip
+LIMITS = {"blowup_extent": 100.0, "solver": "cholespy"}
+
+
+@dataclass(frozen=True)
+class Made:
+    """Files of one scene."""
+
+    scene: SceneConfig
+    folder: Path
+    mesh: File
+    runs: dict[str, File]
+    bases: list[File]
+    samplings: list[File]
+    subspaces: File
+    tables: dict[str, File]
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory) -> dict:
-    """Files of one scene: mesh, runs, bases, samplings, subspaces."""
+def study(tmp_path_factory) -> Made:
     folder: Path = tmp_path_factory.mktemp("study")
+
+    def file(name: str, **labels: str) -> File:
+        return File(str(folder / name), {"scene": "test", **labels})
+
     effects = [{"effect": "gravity"}, {"effect": "pins", "select": "left"}]
     effects.append({"effect": "strain", "weight": 1e6})
     scene = make_scene(
@@ -39,39 +58,59 @@ def study(tmp_path_factory) -> dict:
         mesh={"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"},
         frames=16,
         reduce={"strain": {"train": 8}},
-    ).config.model_dump(mode="json")
-    mesh, runs = str(folder / "mesh.h5"), {}
-    make_mesh(scene["mesh"], ROOT, mesh)
-    for run in ("train", "heldout"):
-        runs[run] = str(folder / f"{run}.h5")
-        run_fom(scene, mesh, run, "cholespy", 1, runs[run])
-    snapshots = str(folder / "snapshots.h5")
-    collect_snapshots(scene, "strain", mesh, runs["train"], runs["heldout"], snapshots)
+    ).config
+    grid = file("mesh.h5")
+    mesh.run(mesh.Settings(mesh=scene.mesh), mesh.Inputs([]), mesh.Outputs(grid))
+    runs = {run: file(f"{run}.h5", run=run) for run in ("train", "heldout")}
+    for run in runs.values():
+        settings = fom.Settings(scene=scene, solver="cholespy", threads=1)
+        fom.run(settings, fom.Inputs(grid), fom.Outputs(run))
+    stored = file("snapshots.h5", group="strain")
+    inputs = snapshots.Inputs(grid, runs["train"], runs["heldout"])
+    snapshots.run(snapshots.Settings(scene=scene), inputs, snapshots.Outputs(stored))
     bases, samplings = [], []
     for name, spec in METHODS.items():
-        identifier = f"{spec['weighting']}-{spec['centring']}-{spec['layout']}"
-        bases.append(str(folder / "pod" / "strain" / f"{identifier}.h5"))
-        basis = {key: spec[key] for key in ("weighting", "centring", "layout")}
-        make_basis(basis, snapshots, bases[-1])
-        samplings.append(str(folder / "sampling" / "strain" / f"{name}.h5"))
-        labels = {"scene": "test", "group": "strain", "method": name}
-        errors = str(folder / f"{name}.csv")
-        sample(labels, spec, {"dense_to": 4, "step": 4}, [4], snapshots, bases[-1],
-               samplings[-1], errors)  # fmt: skip
-    hyper = str(folder / "models.h5")
-    tables = {run: str(folder / f"models_{run}.csv") for run in runs}
-    settings = Subspace(bases=("pod",), sizes=(2, 4), tolerances=(1e-2,)).model_dump(mode="json")
-    run_hyper(scene, settings, 100.0, mesh, runs, hyper, tables)
-    return {"scene": scene, "mesh": mesh, "fom": runs["train"], "bases": bases,
-            "samplings": samplings, "hyper": hyper, "folder": folder, "tables": tables}  # fmt: skip
+        bases.append(file(f"pod/{name}.h5", group="strain", basis=spec.basis_id))
+        pod.run(pod.Settings(basis=spec), pod.Inputs(stored), pod.Outputs(bases[-1]))
+        labels = {"group": "strain", "method": name}
+        names = ("sampling.h5", "errors.csv", "runs.h5", "train.csv", "heldout.csv")
+        outputs = reruns.Outputs(*(file(f"{name}/{kind}", **labels) for kind in names))
+        settings = reruns.Settings(
+            scene=scene, method=spec, sweep=Sweep(dense_to=4, step=4), ranks=(4,),
+            heldout_ranks=(), guard=GuardSettings(), **LIMITS,
+        )  # fmt: skip
+        reruns.run(settings, reruns.Inputs(grid, *runs.values(), stored, bases[-1]), outputs)
+        samplings.append(outputs.sampling)
+    models = file("models.h5")
+    tables = {run: file(f"models_{run}.csv") for run in runs}
+    asked = SubspaceModels(
+        bases=("pod",), sizes=(2, 4), tolerances=(1e-2,), interpolated_sizes=(),
+    )  # fmt: skip
+    subspaces.run(
+        subspaces.Settings(scene=scene, subspace=asked, blowup_extent=100.0),
+        subspaces.Inputs(grid, *runs.values()),
+        subspaces.Outputs(models, *tables.values()),
+    )
+    return Made(scene, folder, grid, runs, bases, samplings, models, tables)
 
 
 @pytest.fixture(scope="module")
 def table(study) -> pd.DataFrame:
-    output = str(study["folder"] / "stability.csv")
-    sweep(study["scene"], METHODS, SETTINGS, 100.0, "cholespy", study["mesh"], study["bases"],
-          study["samplings"], [study["hyper"]], output)  # fmt: skip
-    return read_table(output)
+    output = File(str(study.folder / "stability.csv"), {"scene": "test"})
+    stability.run(
+        stability.Settings(scene=study.scene, methods=METHODS, stability=SHORT, **LIMITS),
+        stability.Inputs(study.mesh, study.bases, study.samplings, [study.subspaces]),
+        stability.Outputs(output),
+    )
+    return read_table(output.path)
+
+
+def try_guard(folder: Path, trials: tuple[Trial, ...], inputs: guard.Inputs) -> pd.DataFrame:
+    output = File(str(folder / "guard.csv"), {})
+    asked = TriedGuard(margin=1e-6, repeats=1)
+    settings = guard.Settings(trials=trials, guard=asked, **LIMITS)
+    guard.run(settings, inputs, guard.Outputs(output))
+    return read_table(output.path)
 
 
 def test_every_setting_holds_every_model_once(table):
@@ -108,21 +147,17 @@ def test_the_orthogonal_projection_is_accurate_at_the_own_setting(table):
 
 def test_the_subspaces_know_their_energy(study):
     for motion in ("train", "heldout"):
-        ratios = read_table(study["tables"][motion]).energy_ratio
+        ratios = read_table(study.tables[motion].path).energy_ratio
         assert ((ratios > 0.5) & (ratios < 1.5)).all()
 
 
 def test_guard_compares_its_actions_with_the_full_order(study):
     name = "deim-joint"
-    case = {"scene": study["scene"], "group": "strain", "name": name, "r": 4,
-            "method": METHODS[name]}  # fmt: skip
     index = list(METHODS).index(name)
-    files = {"mesh": study["mesh"], "fom": study["fom"], "basis": study["bases"][index],
-             "sampling": study["samplings"][index]}  # fmt: skip
-    output = str(study["folder"] / "guard.csv")
-    try_guard([case], {"margin": 1e-6}, 1, 100.0, "cholespy", [files], output)
-    table = read_table(output)
-    assert tuple(table.columns) == COLUMNS["guard"]
+    trial = Trial(scene=study.scene, group="strain", name=name, r=4, method=METHODS[name])
+    files = (study.mesh, study.runs["train"], study.bases[index], study.samplings[index])
+    table = try_guard(study.folder, (trial,), guard.Inputs(*([file] for file in files)))
+    assert table.columns.tolist() == guard.COLUMNS
     full, plain, reported, fallen = (row for _, row in table.iterrows())
     assert [full.method, plain.action, reported.action, fallen.action] == [
         "full", "none", "report", "fall-back",
@@ -137,6 +172,6 @@ def test_guard_compares_its_actions_with_the_full_order(study):
 
 
 def test_guard_without_cases_is_an_empty_table(tmp_path):
-    output = str(tmp_path / "guard.csv")
-    try_guard([], {}, 1, 100.0, "cholespy", [], output)
-    assert tuple(read_table(output).columns) == COLUMNS["guard"]
+    table = try_guard(tmp_path, (), guard.Inputs([], [], [], []))
+    assert table.columns.tolist() == guard.COLUMNS
+    assert len(table) == 0

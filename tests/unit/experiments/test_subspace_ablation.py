@@ -6,14 +6,16 @@ import pytest
 
 from conftest import make_scene
 from pdrom.core.errors import ConfigurationError
+from pdrom.core.paths import File
 from pdrom.core.store import read_table, write_hdf5, write_table
-from pdrom.experiments.subspace_ablation import ablate
-from pdrom.experiments.subspace_ablation_spec import AblationSpec, load_ablation
+from pdrom.core.yamlfile import read_yaml, validate
+from pdrom.experiments import subspace_ablation as experiment
+from pdrom.experiments.settings import Horizon
+from pdrom.experiments.subspace_ablation import COLUMNS, Ablation, AblationFile
 from pdrom.model.mesh.types import save_mesh
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
-from pdrom.reduction.subspace.specs import InterpolationSpec
-from pdrom.tables import COLUMNS
+from pdrom.reduction.subspace.specs import InterpolationVariant
 from pdrom.tables.subspace_ablation import subspace_ablation
 from places import ROOT
 
@@ -22,9 +24,10 @@ HORIZON = 30
 
 def test_the_projects_ablation_changes_one_thing_at_a_time_first():
     """Up to the first combination a variant differs from the plain method in a single setting."""
-    spec = load_ablation(ROOT / "config" / "subspace_ablation.yaml")
+    path = ROOT / "config" / "subspace_ablation.yaml"
+    spec = validate(AblationFile, read_yaml(path), str(path))
     first, *others = spec.variants.items()
-    assert first[1] == InterpolationSpec()
+    assert first[1] == InterpolationVariant()
     for name, variant in others:
         assert len(variant.model_fields_set) == 1 + name.count("+"), name
     assert len(spec.cases()) == len(spec.modes) * len(spec.variants)
@@ -34,7 +37,7 @@ def test_the_projects_ablation_changes_one_thing_at_a_time_first():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("variants: {a: {modes: 5}}", "variants.a.modes: given by 'modes'"),
+        ("variants: {a: {modes: 5}}", "unknown key 'variants.a.modes'"),
         ("variants: {a: {states: guessed}}", "states"),
         ("variants: {}", "variants"),
         ("variants: {a: {}}\nranks: [3]", "ranks"),
@@ -44,7 +47,7 @@ def test_faults_of_the_file_are_named(tmp_path, text, message):
     path = tmp_path / "ablation.yaml"
     path.write_text(f"scenes: []\nsizes: [4]\nmodes: [6]\n{text}\n")
     with pytest.raises(ConfigurationError, match=message) as caught:
-        load_ablation(path)
+        validate(AblationFile, read_yaml(path), str(path))
     assert str(path) in str(caught.value)
 
 
@@ -61,14 +64,15 @@ def rows(tmp_path_factory) -> pd.DataFrame:
         reduce={"strain": {"train": 30}},
         held_out={"kick": 0.5, "kick_axes": ["y"], "seed": 3},
     )
-    mesh = folder / "mesh.h5"
-    save_mesh(scene.mesh, mesh)
+
+    def file(name: str) -> File:
+        return File(str(folder / name), {"scene": "test"})
+
+    save_mesh(scene.mesh, folder / "mesh.h5")
     motions = {"train": scene, "heldout": Scene.build(scene.config.held_out_variant(), scene.mesh)}
-    runs = {}
     for motion, bound in motions.items():
-        runs[motion] = str(folder / f"{motion}.h5")
-        with write_hdf5(runs[motion]) as file:
-            file["positions"] = trajectory(bound)
+        with write_hdf5(folder / f"{motion}.h5") as stored:
+            stored["positions"] = trajectory(bound)
     floor = [
         ("test", label, seed, frame, 1.0 if label == "1e-10" and frame >= HORIZON else 1e-9)
         for label in ("1e-10", "heldout")
@@ -77,32 +81,33 @@ def rows(tmp_path_factory) -> pd.DataFrame:
     ]
     columns = ["scene", "perturbation", "seed", "frame", "relative_difference"]
     write_table(pd.DataFrame(floor, columns=columns), folder / "sensitivity.csv")
-    spec = AblationSpec(
-        scenes=(),
+    variants = Ablation(
         sizes=(8,),
         modes=(15,),
         variants={
-            "plain": InterpolationSpec(),
-            "refused": InterpolationSpec(refuse_above=1.01),
-            "residual": InterpolationSpec(interpolates="residual"),
-            "mended": InterpolationSpec(states="visited", oversampling=3),
+            "plain": InterpolationVariant(),
+            "refused": InterpolationVariant(refuse_above=1.01),
+            "residual": InterpolationVariant(interpolates="residual"),
+            "mended": InterpolationVariant(states="visited", oversampling=3),
         },
     )
-    ablate(
-        scene.config.model_dump(mode="json"),
-        spec.model_dump(mode="json", exclude_unset=True),
-        {"perturbation": 1e-10, "threshold": 1e-3},
-        5.0,
-        str(mesh),
-        runs,
-        str(folder / "sensitivity.csv"),
-        str(folder / "rows.csv"),
+    experiment.run(
+        experiment.Settings(
+            scene=scene.config,
+            ablation=variants,
+            horizon=Horizon(perturbation=1e-10, threshold=1e-3),
+            blowup_extent=5.0,
+        ),
+        experiment.Inputs(
+            file("mesh.h5"), file("train.h5"), file("heldout.h5"), file("sensitivity.csv")
+        ),
+        experiment.Outputs(file("rows.csv")),
     )
     return read_table(folder / "rows.csv").set_index("variant", drop=False)
 
 
 def test_every_variant_is_a_row_beside_the_full_projections(rows):
-    assert set(rows.columns) == set(COLUMNS["subspace_ablation"])
+    assert set(rows.columns) == set(COLUMNS)
     assert rows.variant.tolist() == ["plain", "refused", "residual", "mended"]
     for column in ("relative_error_full_projections", "heldout_error_full_projections"):
         assert rows[column].nunique() == 1
@@ -140,6 +145,6 @@ def test_table_joins_the_scenes(tmp_path, rows):
         write_table(rows.assign(scene=scene), tmp_path / f"{scene}.csv")
     table = subspace_ablation([str(tmp_path / "a.csv"), str(tmp_path / "b.csv")])
     assert table.scene.tolist() == ["a"] * 4 + ["b"] * 4
-    assert tuple(table.columns) == COLUMNS["subspace_ablation"]
-    assert tuple(subspace_ablation([]).columns) == COLUMNS["subspace_ablation"]
+    assert tuple(table.columns) == tuple(COLUMNS)
+    assert tuple(subspace_ablation([]).columns) == tuple(COLUMNS)
     assert np.isnan(table.gain[1])

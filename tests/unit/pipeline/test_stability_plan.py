@@ -1,19 +1,23 @@
-"""Sections stability and guard of the configuration, and what the plan makes of them."""
+"""Sections stability and guard of the configuration, and the jobs that come of them."""
 
 import pytest
 
 from conftest import ROOT
+from pdrom.core import paths
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import read_yaml, validate
-from pdrom.pipeline.plan import Plan
-from pdrom.pipeline.study import Guard, Stability, Study, StudySettings
+from pdrom.experiments import guard, stability
+from pdrom.experiments.guard import GuardSection
+from pdrom.pipeline.holdings import labels_of
+from pdrom.pipeline.jobs import Jobs
+from pdrom.pipeline.study import Study, StudySettings
 from pdrom.reduction.local.guard_settings import GuardSettings
 
 STUDY = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "gappy"], "ranks": [6, "full"]}
 
 
-def plan(**sections) -> Plan:
-    return Plan(Study.load(STUDY | sections, ROOT))
+def study(**sections) -> Study:
+    return Study.load(STUDY | sections, ROOT)
 
 
 @pytest.mark.parametrize(
@@ -29,6 +33,7 @@ def plan(**sections) -> Plan:
         ({"stability": {"stiffness_ratios": [-1.0]}}, "stability.stiffness_ratios"),
         ({"stability": {"min_frames": 50, "max_frames": 40}}, "max_frames = 40: at least"),
         ({"stability": {"left": 1.0}}, "stability.left = 1.0"),
+        ({"stability": {"departure": 3.0}}, "unknown key 'stability.departure'"),
     ],
 )
 def test_faults_are_named(section, message):
@@ -37,19 +42,25 @@ def test_faults_are_named(section, message):
     assert message in str(error.value)
 
 
-def test_the_guard_alone_has_no_cases():
+def test_reruns_depend_on_the_guard_but_not_on_its_cases():
     """A further case must not rerun what was watched."""
-    settings = Guard(action="stop", margin=0.5, cases=[{"scene": "a", "method": "b", "r": 6}])
-    assert settings.watching == GuardSettings(action="stop", margin=0.5)
+    cases = [{"scene": "strain_oop", "method": "deim", "r": 6}]
+    made = Jobs(study(guard={"action": "stop", "margin": 0.5, "cases": cases}), "results")
+    (reruns,) = (e for e in made.experiments if e.name == "reruns")
+    labels = {"scene": "strain_oop", "group": "strain", "method": "deim"}
+    plain = made.settings(reruns, labels).model_dump(mode="json")["guard"]
+    assert plain == GuardSettings(action="stop", margin=0.5).model_dump(mode="json")
 
 
 def test_short_runs_are_planned_where_the_study_holds_them():
-    chosen = Stability(scenes=("strain_oop", "bar_release"), ranks=(6, 20))
-    made = plan(stability=chosen.model_dump())
-    assert made.sweeps == ["results/stability/strain_oop.csv"]
-    assert made.stability_settings()["ranks"] == [6]
-    assert "scenes" not in made.stability_settings()
-    assert made.time_steps() == {"spring_oop": 0.016, "strain_oop": 0.016}
+    asked = {"scenes": ["strain_oop", "bar_release"], "ranks": [6, 20]}
+    made = study(stability=asked)
+    assert labels_of(made, paths.STABILITY) == [{"scene": "strain_oop"}]
+    settings = Jobs(made, "results").settings(stability.EXPERIMENT, {"scene": "strain_oop"})
+    plain = settings.model_dump(mode="json")["stability"]
+    assert plain["ranks"] == [6]
+    # which scenes have short runs and how they are judged makes no run anew
+    assert not {"scenes", "wrong", "left", "departure"} & set(plain)
 
 
 def test_cases_are_planned_where_the_study_holds_them():
@@ -60,19 +71,23 @@ def test_cases_are_planned_where_the_study_holds_them():
         {"scene": "spring_oop", "method": "deim", "r": 20},
         {"scene": "spring_oop", "method": "deim", "r": 6},
     ]
-    made = plan(guard={"cases": cases})
-    found = [(c["scene"]["name"], c["group"], c["name"], c["r"]) for c in made.guard_cases()]
+    made = Jobs(study(guard={"cases": cases}), "elsewhere")
+    trials = made.settings(guard.EXPERIMENT, {}).trials
+    found = [(t.scene.name, t.group, t.name, t.r) for t in trials]
     assert found == [("strain_oop", "strain", "gappy", "full"), ("spring_oop", "spring", "deim", 6)]
-    assert made.guard_files("sampling") == [
-        "results/sampling/strain_oop/strain/gappy.h5",
-        "results/sampling/spring_oop/spring/deim.h5",
+    inputs = {name: files({}) for name, files in made.inputs(guard.EXPERIMENT).items()}
+    assert inputs["samplings"] == [
+        "elsewhere/sampling/strain_oop/strain/gappy.h5",
+        "elsewhere/sampling/spring_oop/spring/deim.h5",
     ]
-    assert [len(made.guard_files(kind)) for kind in ("mesh", "fom", "basis")] == [2, 2, 2]
+    assert [len(files) for files in inputs.values()] == [2, 2, 2, 2]
 
 
 def test_nothing_to_plan_is_no_fault():
-    made = plan()
-    assert made.sweeps == made.guard_cases() == made.guard_files("mesh") == []
+    made = study()
+    assert labels_of(made, paths.STABILITY) == []
+    inputs = Jobs(made, "results").inputs(guard.EXPERIMENT)
+    assert all(files({}) == [] for files in inputs.values())
 
 
 @pytest.mark.parametrize("name", ["default", "tiny"])
@@ -86,6 +101,7 @@ def test_the_configurations_hold_what_they_ask_for(name):
     settings = validate(StudySettings, config, name)
     assert set(settings.stability.scenes) <= set(settings.scenes)
     assert set(settings.stability.ranks) <= set(settings.ranks)
+    assert isinstance(settings.guard, GuardSection)
     for case in settings.guard.cases:
         assert case.scene in settings.scenes
         assert case.method in settings.methods

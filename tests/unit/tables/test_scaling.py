@@ -5,14 +5,16 @@ import pandas as pd
 import pytest
 
 from conftest import ROOT
-from pdrom.experiments.scaling import scale_scene
-from pdrom.pipeline.study import Scaling, Study
+from pdrom.core.paths import File
+from pdrom.experiments.scaling import Inputs, Outputs, Settings, Sized, SizedBreakEven, run
+from pdrom.pipeline.scenes import load_scene
+from pdrom.reduction.method import MethodSpec
 from pdrom.tables.breakeven import breakeven
 from pdrom.tables.columns import BREAKEVEN_CURVE, COLUMNS
 from pdrom.tables.scaling import QUANTITIES, scaling, scaling_fit
 
-SPEC = {"title": "block DEIM", "centring": "affine", "rows": "element"}
-JOINT = {"title": "joint DEIM", "centring": "affine", "rows": "joint"}
+SPEC = MethodSpec(title="block DEIM", centring="affine", rows="element")
+JOINT = MethodSpec(title="joint DEIM", centring="affine", rows="joint")
 
 
 def power_laws(exponents, sizes=(100, 1000, 10000)):
@@ -44,18 +46,21 @@ def test_no_scene_gives_empty_tables():
 
 @pytest.mark.parametrize("name", ["strain_oop", "bar_release"])
 def test_every_size_is_measured(tmp_path, name):
-    study = Study.load({"scenes": [name], "methods": ["pod"]}, ROOT)
-    alone = {"sizes": [2, 3, 1000], "training_frames": 9, "repeats": 2}
-    settings = Scaling(r=4, k=5, training_frames=8, frames=1, repeats=2, breakeven=alone)
+    scene = load_scene(ROOT, name)
+    alone = SizedBreakEven(sizes=(2, 3, 1000), training_frames=9, repeats=2)
+    settings = Settings(
+        scene=scene,
+        scaled_methods={"block-deim": SPEC, "deim-joint": JOINT},
+        scaling=Sized(r=4, k=5, training_frames=8, frames=1, repeats=2, breakeven=alone),
+        solver="cholespy",
+    )
     outputs = {}
     for factor in (0.3, 0.5):
-        outputs[factor] = {k: str(tmp_path / f"{k}{factor}") for k in ("iterations", "breakeven")}
-        scale_scene(
-            study.scenes[name].model_dump(mode="json"), factor,
-            {"block-deim": SPEC, "deim-joint": JOINT}, settings.model_dump(), "cholespy",
-            str(ROOT), outputs[factor],
-        )  # fmt: skip
-    sizes = [study.scenes[name].mesh.coarsened(f).build(ROOT).vertices for f in outputs]
+        paths = {k: str(tmp_path / f"{k}{factor}") for k in ("iterations", "breakeven")}
+        files = {k: File(path, {"factor": f"{factor:g}"}) for k, path in paths.items()}
+        run(settings, Inputs([]), Outputs(**files))
+        outputs[factor] = paths
+    sizes = [scene.mesh.coarsened(f).build(ROOT).vertices for f in outputs]
     _check_iterations(scaling(files["iterations"] for files in outputs.values()), sizes)
     _check_alone(breakeven(files["breakeven"] for files in outputs.values()), sizes)
 

@@ -1,14 +1,21 @@
-"""Rule hard_cases: every reduction in the hard cases, and the accuracy of the kernels."""
+"""Every reduction in the hard cases, and the accuracy of the kernels."""
 
 import logging
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import pandas as pd
+from pydantic import AfterValidator, Field
 
+from pdrom.core.errors import choices
+from pdrom.core.paths import HARD_CASES, KERNEL_ACCURACY, File
+from pdrom.core.reads import ProjectFile
 from pdrom.core.store import write_table
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.declaration import Experiment, JobSettings
 from pdrom.experiments.hard_cases.accuracy import kernel_accuracy
-from pdrom.experiments.hard_cases.catalogue import CASES
+from pdrom.experiments.hard_cases.catalogue import CASES, modules_of, reducible_cases
 from pdrom.experiments.hard_cases.expectations import load_expectations, surprise
 from pdrom.experiments.hard_cases.outcomes import rows
 from pdrom.reduction.method import MethodSpec
@@ -21,30 +28,63 @@ COLUMNS = [
 ]  # fmt: skip
 
 
-def run_hard_cases(
-    methods: dict[str, dict[str, Any]],
-    cases: list[str],
-    matrices: int,
-    expectations: str,
-    cases_output: str,
-    kernels_output: str,
-) -> None:
-    """Write the tables hard_cases and kernel_accuracy.
+def _known(case: str) -> str:
+    if case not in reducible_cases():
+        raise ValueError(f"unknown case '{case}'{choices(case, reducible_cases())}")
+    return case
 
-    Parameters
-    ----------
-    matrices : per class, for the accuracy of the kernels
-    """
-    specs = {name: MethodSpec.model_validate(spec) for name, spec in methods.items()}
-    expected = load_expectations(Path(expectations))
-    found = []
-    for name in cases:
-        for row in rows(CASES[name], specs, expected):
+
+class HardCases(ConfigModel):
+    """Section ``hard_cases``: the cases (all that are not slow if empty), matrices a class."""
+
+    cases: tuple[Annotated[str, AfterValidator(_known)], ...] = ()
+    matrices: Annotated[int, Field(ge=1, le=10_000)] = 40
+
+
+class Settings(JobSettings):
+    """What the hard cases depend on: every method there is runs in them."""
+
+    every_method: dict[str, MethodSpec]
+    hard_cases: HardCases
+
+    @property
+    def modules(self) -> list[str]:
+        """Places of the effects of the cases."""
+        return modules_of(self.hard_cases.cases or reducible_cases())
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read."""
+
+    expectations: Annotated[str, ProjectFile("config/hard_cases.yaml")]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written: a row for every case and reduction; a row for every group and class."""
+
+    cases: Annotated[File, HARD_CASES]
+    kernels: Annotated[File, KERNEL_ACCURACY]
+
+
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+    """Put every reduction through the cases; log what contradicts the expectations."""
+    expected = load_expectations(Path(inputs.expectations))
+    asked, found = settings.hard_cases, []
+    for name in asked.cases or reducible_cases():
+        for row in rows(CASES[name], settings.every_method, expected):
             found.append(row)
             contradiction = surprise(row["outcome"], name, expected.get(row["method"]))
             if contradiction:
                 log.warning("%s, %s: %s", name, row["method"], contradiction)
         log.info("%s: done", name)
     whole = dict.fromkeys(["k", "r", "frames", "blowup_frame"], "Int64")
-    write_table(pd.DataFrame(found, columns=COLUMNS).astype(whole), cases_output)
-    write_table(pd.DataFrame(kernel_accuracy(matrices)), kernels_output)
+    table = pd.DataFrame(found, columns=COLUMNS).astype(whole)
+    write_table(table, outputs.cases.path)
+    write_table(pd.DataFrame(kernel_accuracy(asked.matrices)), outputs.kernels.path)
+
+
+EXPERIMENT = Experiment(
+    "hard_cases", "Hard cases of every reduction, and accuracy of the kernels", run
+)

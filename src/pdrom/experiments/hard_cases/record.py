@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdrom.experiments.hard_cases.roundoff import Roundoff
-from pdrom.model.dynamics.stepper import LocalStep, State, Stepper
+from pdrom.model.dynamics.stepper import FrameReport, LocalStep, State, Stepper
+from pdrom.model.runs.bounded import BoundedRun
 from pdrom.model.scene import Scene
 
 Positions = Callable[[np.ndarray], np.ndarray]
@@ -73,26 +74,29 @@ def record(
     observe : called with every frame and its last local iterate
     """
     states, rises, excesses = [(positions(state.positions), positions(state.velocities))], [], []
-    blowup = None
-    for frame in range(scene.config.frames):
-        watch = None if observe is None else (lambda y, frame=frame: observe(frame, y))
+
+    def advance(before: State, frame: int) -> tuple[State, FrameReport]:
+        watch = None if observe is None else (lambda y: observe(frame, y))
+        return loop.step(before, frame, watch)
+
+    run = BoundedRun(advance, state, scene.config.frames, limit, positions=positions)
+    for frame in run:
+        before, after, report = state, frame.state, frame.report
         with np.errstate(over="ignore", invalid="ignore"):
-            after, report = loop.step(state, frame, watch)
-            q, v = positions(after.positions), positions(after.velocities)
-        if not (np.isfinite(q).all() and np.isfinite(v).all()):
-            blowup = frame
+            v = positions(after.velocities)
+        if not np.isfinite(v).all():
+            run.blowup_frame = frame.number
             break
         rise = float(np.diff(report.objective).max(initial=0.0))
         first = float(report.objective[0])
         rises.append(rise / first if first > 0.0 else 0.0)
-        excesses.append(rise - roundoff.allowance(state, after, first))
-        states.append((q, v))
+        excesses.append(rise - roundoff.allowance(before, after, first))
+        states.append((frame.positions, v))
         state = after
-        if float(np.ptp(q, axis=0).max()) > limit:
-            blowup = frame
-            break
     q, v = (np.stack(parts) for parts in zip(*states, strict=True))
-    return Record(q, v, np.array(rises), np.array(excesses), _energies(scene, q, v), blowup)
+    return Record(
+        q, v, np.array(rises), np.array(excesses), _energies(scene, q, v), run.blowup_frame
+    )
 
 
 def _energies(scene: Scene, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:

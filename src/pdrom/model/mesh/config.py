@@ -36,6 +36,11 @@ class _Model(ConfigModel):
         canonical = json.dumps(self.model_dump(mode="json"), sort_keys=True)
         return f"{self.label}_{hashlib.sha256(canonical.encode()).hexdigest()[:8]}"
 
+    @property
+    def sources(self) -> list[str]:
+        """Files of the project that the mesh is read from; none for one that is generated."""
+        return []
+
 
 class ClothMesh(_Model):
     """Sheet of the generator `pdrom.model.mesh.generators.cloth`; lengths in metres."""
@@ -124,6 +129,11 @@ class MeshFile(_Model):
         check_range(mesh.points, self.scale, self.path)
         scaled = Mesh(mesh.points * self.scale, mesh.triangles, mesh.tetrahedra)
         return check_mesh(scaled, self.path)
+
+    @property
+    def sources(self) -> list[str]:
+        """The mesh file."""
+        return [self.path]
 
     def file(self, root: Path) -> Path:
         """The mesh file; MeshError if a link leads out of the project's folder."""

@@ -7,8 +7,9 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.local.guard import Guard, GuardRecord
 from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.rerun import Rerun, replace_group, rerun
+from pdrom.reduction.local.rerun import replace_group, rerun
 from pdrom.reduction.local.watched import WatchedLocalStep
+from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.sampling.reduction import Reduction
 
 

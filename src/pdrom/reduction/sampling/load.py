@@ -1,7 +1,10 @@
 """A reduction from its files."""
 
 import os
+from collections.abc import Sequence
 
+from pdrom.core.errors import StorageError
+from pdrom.core.paths import File
 from pdrom.core.store import open_hdf5
 from pdrom.reduction.basis.types import Basis
 from pdrom.reduction.method import MethodSpec
@@ -17,3 +20,12 @@ def load_reduction(
         store = file[f"r{r:04d}"]
         stored = Sampling(store["entries"][...], store["elements"][...])
     return Reduction(basis, stored, method, r)
+
+
+def basis_of(sampling: File, method: MethodSpec, bases: Sequence[File]) -> File:
+    """The basis of a file of samples among ``bases``; StorageError if it is not there."""
+    wanted = {"scene": sampling["scene"], "group": sampling["group"], "basis": method.basis_id}
+    for basis in bases:
+        if basis.labels == wanted:
+            return basis
+    raise StorageError(f"{sampling.path}: its basis {method.basis_id} is not among the files read")

@@ -20,10 +20,9 @@ class HrpdSpec(ConfigModel):
     samples: Annotated[int, Field(ge=1, le=1_000_000)] = 250
 
 
-class InterpolationSpec(ConfigModel):
-    """Block DEIM in a position subspace; the default is the plain method.
+class InterpolationVariant(ConfigModel):
+    """Block DEIM in a position subspace, of any size; the default is the plain method.
 
-    modes : basis size r (the numerical rank where that is smaller)
     states : what the basis is trained on: "full-order" positions, these "projected" on the
         subspace, or the last iterates that a run with full projections in the subspace "visited"
     interpolates : the "projection" p; what it adds to the strain, the "residual" p - S q; or
@@ -38,7 +37,6 @@ class InterpolationSpec(ConfigModel):
         fraction of it; None for no bounds
     """
 
-    modes: Annotated[int, Field(ge=1, le=10_000)] = 20
     states: Literal["full-order", "projected", "visited"] = "full-order"
     interpolates: Literal["projection", "residual", "both"] = "projection"
     centring: Literal["none", "affine"] = "none"
@@ -55,3 +53,9 @@ class InterpolationSpec(ConfigModel):
         if self.interpolates == "both" and (self.centring, self.margin) != ("none", None):
             raise ValueError("interpolates = 'both' with centring or margin: neither is possible")
         return self
+
+
+class InterpolationSpec(InterpolationVariant):
+    """A variant with its basis size r, ``modes`` (the numerical rank where that is smaller)."""
+
+    modes: Annotated[int, Field(ge=1, le=10_000)] = 20

@@ -11,7 +11,8 @@ from pdrom.experiments.hard_cases.expectations import (
     load_expectations,
     surprise,
 )
-from pdrom.pipeline.plan import Plan
+from pdrom.experiments.hard_cases.experiment import EXPERIMENT
+from pdrom.pipeline.jobs import Jobs
 from pdrom.pipeline.study import Study
 
 ENTRY = Expectation(why="because of something that is long enough", fails=("a",), may_fail=("b",))
@@ -59,11 +60,11 @@ def test_an_unknown_refused_or_slow_case_is_named(name):
     """Only what a reduction can repeat, and in short, may be asked for."""
     config = read_yaml(ROOT / "config" / "tiny.yaml") | {"hard_cases": {"cases": [name]}}
     with pytest.raises(ConfigurationError, match=f"unknown case '{name}' .allowed: bar_plane"):
-        Plan(Study.load(config, ROOT)).check()
+        Study.load(config, ROOT)
 
 
 def test_every_method_takes_part_not_only_those_of_the_study():
-    plan = Plan(Study.load(read_yaml(ROOT / "config" / "tiny.yaml"), ROOT))
-    asked = plan.hard_cases()
-    assert set(asked["methods"]) == set(read_yaml(ROOT / "config" / "methods.yaml"))
-    assert set(asked["methods"]) > set(plan.study.methods)
+    study = Study.load(read_yaml(ROOT / "config" / "tiny.yaml"), ROOT)
+    asked = Jobs(study, "results").settings(EXPERIMENT, {}).every_method
+    assert set(asked) == set(read_yaml(ROOT / "config" / "methods.yaml"))
+    assert set(asked) > set(study.methods)

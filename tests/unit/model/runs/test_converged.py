@@ -5,10 +5,7 @@ import pytest
 from scipy import optimize, sparse
 
 from conftest import make_scene
-from pdrom.core.store import read_table, write_hdf5, write_table
-from pdrom.experiments.iterations import COLUMNS, sweep_iterations
 from pdrom.model.dynamics.stepper import Stepper
-from pdrom.model.mesh.types import save_mesh
 from pdrom.model.runs.converged import ConvergedStepper, minimise
 
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
@@ -78,58 +75,3 @@ def test_a_frame_ends_where_very_many_iterations_end(group, rng):
         state = expected
     assert best.converged
     assert max(best.evaluations) < 500
-
-
-def test_the_sweep_approaches_the_limit(tmp_path):
-    """On a benign scene every further iteration brings the run closer to the converged one."""
-    scene = sheet(frames=12)
-    mesh, fom, floor = (tmp_path / name for name in ("mesh.h5", "fom.h5", "floor.csv"))
-    save_mesh(scene.mesh, mesh)
-    state, positions = scene.initial_state(), [scene.mesh.points]
-    loop = scene.stepper()
-    for frame in range(12):
-        state, _ = loop.step(state, frame)
-        positions.append(state.positions)
-    with write_hdf5(fom) as file:
-        file["positions"] = np.stack(positions)
-    write_floor(floor, [1e-9] * 9 + [1.0] * 3)
-    settings = {
-        "counts": [1, 3, 20, 60], "anderson_window": 4, "tolerance": 1e-10, "limit": 2000,
-    }  # fmt: skip
-    horizon = {"perturbation": 1e-10, "threshold": 1e-3}
-    config = scene.config.model_dump(mode="json")
-
-    def swept(**changes):
-        arguments = (config, settings | changes, horizon, "splu", str(mesh), str(fom), str(floor))
-        sweep_iterations(*arguments, str(tmp_path / "out.csv"))
-        return read_table(tmp_path / "out.csv", COLUMNS)
-
-    everything = swept()
-    fast = everything[everything.window == 4].set_index("iterations").error_converged
-    assert fast.index.tolist() == [3, 10, 20, 60]
-    table = everything[everything.window != 4]
-    assert (fast[[10, 20]] < 0.5 * table.set_index("iterations").error_converged[[10, 20]]).all()
-    counts = table.iterations.dropna().tolist()
-    assert counts == [1, 3, 10, 20, 60]
-    assert (table.frames == 9).all()
-    error = table.error_converged.to_numpy()
-    assert (np.diff(error[:-1]) < 0.0).all()
-    assert error[-2] < 0.1 * error[0]
-    own = table.set_index("iterations").error_scene
-    assert own[10] == 0.0
-    assert own[3] < own[1]
-    # the own run is as far from the limit as the limit is from it, but for the normalisation
-    assert table.error_scene.iloc[-1] == pytest.approx(error[2], rel=0.2)
-    assert table.residual.iloc[-1] <= 1e-10
-    unfinished = swept(limit=2)
-    assert unfinished.error_converged.isna().all()
-    assert unfinished.error_scene.notna().all()
-
-
-def write_floor(path, values) -> None:
-    import pandas as pd
-
-    rows = [("test", "1e-10", 1, frame, value) for frame, value in enumerate(values)]
-    rows.append(("test", "solver", 0, 0, 0.0))
-    columns = ["scene", "perturbation", "seed", "frame", "relative_difference"]
-    write_table(pd.DataFrame(rows, columns=columns), path)

@@ -8,8 +8,9 @@ from pdrom.core.errors import SceneError
 from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.rerun import Rerun, displacement_norms, replace_group, rerun
+from pdrom.reduction.local.rerun import replace_group, rerun
 from pdrom.reduction.method import load_methods
+from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling import Reduction, select
 from places import CONFIG
 
@@ -129,7 +130,7 @@ def test_numbers_that_are_none_end_the_run_before_them(bad):
 
 
 def test_an_empty_run_has_no_extent():
-    run = Rerun(np.zeros((1, 3, 3)), np.array([]), np.array([]), 0)
+    run = Rerun(np.zeros((1, 3, 3)), np.array([]), np.array([]), 0, np.zeros((1, 3, 3)))
     assert (run.frames, run.max_extent) == (0, 0.0)
 
 

@@ -12,10 +12,10 @@ from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.subspace.atoms import atoms
 from pdrom.reduction.subspace.columns import build_columns
 from pdrom.reduction.subspace.fused import FusedStepper
-from pdrom.reduction.subspace.load import load_models
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
 from pdrom.reduction.subspace.space import ReducedSpace, coordinates
+from pdrom.reduction.subspace.store import load_models
 
 SPRING = {"effect": "spring", "weight": 1e5}
 STRAIN = {"effect": "strain", "weight": 1e5}
@@ -279,17 +279,17 @@ def test_forces_that_cannot_be_reduced_are_refused():
 
 def test_models_survive_a_file(tmp_path):
     """The layout of rule hyper."""
-    from pdrom.experiments.hyper import _store_columns, _store_model
+    from pdrom.reduction.subspace.store import store_columns, store_model
 
     scene = SCENES["handles"]
     reference = trajectory(scene)
     columns = make_columns(scene, reference[1:], "pod", 4)
     samples = sample_elements(scene, columns, np.arange(8), [1e-2])[0]
     with write_hdf5(tmp_path / "models.h5") as file:
-        _store_columns(file.create_group("columns/pod_k004"), columns)
+        store_columns(file.create_group("columns/pod_k004"), columns)
         for method, chosen in (("full", {}), ("ecsw", samples)):
             labels = {"method": method, "position_basis": "pod", "k": 4, "base": "pod_k004"}
-            _store_model(file.create_group(f"models/pod_k004_{method}"), labels, chosen)
+            store_model(file.create_group(f"models/pod_k004_{method}"), labels, chosen)
     loaded = load_models(tmp_path / "models.h5")
     assert [labels for labels, _ in loaded] == [
         {"method": method, "position_basis": "pod", "k": 4} for method in ("full", "ecsw")

@@ -1,11 +1,35 @@
-"""Hyper-reduced models from the file that rule hyper wrote."""
+"""Models of position subspaces, stored in HDF5 and loaded again."""
 
 import os
+from typing import Any
+
+import h5py
 
 from pdrom.core.store import open_hdf5
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.model import Samples, SubspaceModel
+
+
+def store_columns(store: h5py.Group, columns: Columns) -> None:
+    """Write the columns of a subspace."""
+    store["B"], store["free"] = columns.B, columns.free
+    store.attrs["modes"] = columns.modes
+    for i, (atom, own) in enumerate(zip(columns.atoms, columns.atom_columns, strict=True)):
+        store[f"atoms/{i:04d}/vertices"], store[f"atoms/{i:04d}/columns"] = atom, own
+
+
+def store_model(
+    store: h5py.Group, labels: dict[str, Any], samples: dict[str, Samples | Interpolation]
+) -> None:
+    """Write the labels of a model and what it samples of each group."""
+    store.attrs.update(labels)
+    for name, chosen in samples.items():
+        if isinstance(chosen, Interpolation):
+            chosen.save(store.create_group(f"samples/{name}"))
+            continue
+        store[f"samples/{name}/elements"] = chosen.elements
+        store[f"samples/{name}/factors"] = chosen.factors
 
 
 def load_models(path: str | os.PathLike[str]) -> list[tuple[dict[str, object], SubspaceModel]]:
@@ -22,7 +46,7 @@ def load_models(path: str | os.PathLike[str]) -> list[tuple[dict[str, object], S
     return models
 
 
-def _columns(store) -> Columns:
+def _columns(store: h5py.Group) -> Columns:
     atoms = list(store["atoms"].values()) if "atoms" in store else []
     return Columns(
         B=store["B"][...],
@@ -33,13 +57,13 @@ def _columns(store) -> Columns:
     )
 
 
-def _samples(store) -> dict[str, Samples | Interpolation]:
+def _samples(store: h5py.Group) -> dict[str, Samples | Interpolation]:
     if "samples" not in store:
         return {}
     return {name: _sampled(chosen) for name, chosen in store["samples"].items()}
 
 
-def _sampled(chosen) -> Samples | Interpolation:
+def _sampled(chosen: h5py.Group) -> Samples | Interpolation:
     if "operator" in chosen:
         return Interpolation.load(chosen)
     return Samples(chosen["elements"][...], chosen["factors"][...])

@@ -1,0 +1,202 @@
+"""Position subspaces with full projections, with sampled elements and with interpolation."""
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+from pydantic import Field
+
+from pdrom.core.names import SceneName
+from pdrom.core.paths import (
+    HELDOUT,
+    MESH,
+    SUBSPACES,
+    SUBSPACES_HELDOUT,
+    SUBSPACES_TRAIN,
+    TRAIN,
+    File,
+)
+from pdrom.core.provenance import attributes
+from pdrom.core.store import write_hdf5, write_table
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.motion import Motion, training_indices, training_positions
+from pdrom.experiments.scenes import RUNS, scene_of
+from pdrom.experiments.settings import BlowupExtent, Modes, PositionBasis, Tolerance
+from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.rerun import Rerun
+from pdrom.reduction.subspace.columns import Columns
+from pdrom.reduction.subspace.hrpd import hrpd, sampled_space
+from pdrom.reduction.subspace.interpolated import Training, interpolate
+from pdrom.reduction.subspace.interpolation import Interpolation
+from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
+from pdrom.reduction.subspace.specs import HrpdSpec, InterpolationSpec
+from pdrom.reduction.subspace.store import store_columns, store_model
+
+log = logging.getLogger(__name__)
+
+COLUMNS = [
+    "scene", "group", "method", "position_basis", "k", "r", "frames", "finite", "blowup_frame",
+    "max_extent", "relative_error", "energy_ratio",
+]  # fmt: skip
+
+Sampled = dict[str, Samples | Interpolation]
+
+
+class SubspaceModels(ConfigModel):
+    """Position subspaces: kinds of basis, numbers of modes, tolerances of the sampling.
+
+    At the ``interpolated_sizes`` the projections are interpolated, too: by ``hrpd`` (None leaves it
+    out), and on the snapshot basis by every method of ``interpolations``.
+    """
+
+    bases: tuple[PositionBasis, ...] = ("pod", "skinning")
+    sizes: tuple[Modes, ...] = (10, 20, 40)
+    tolerances: tuple[Tolerance, ...] = (3e-2, 1e-2, 1e-3)
+    interpolated_sizes: tuple[Modes, ...] = ()
+    hrpd: HrpdSpec | None = None
+    interpolations: dict[str, InterpolationSpec] = Field(default_factory=dict)
+
+
+class Subspace(SubspaceModels):
+    """Section ``subspace``: the models, and the ``scenes`` that have them (all if empty)."""
+
+    scenes: tuple[SceneName, ...] = ()
+
+
+class Settings(JobSettings):
+    """What the position subspaces of a scene depend on."""
+
+    scene: SceneConfig
+    subspace: SubspaceModels
+    blowup_extent: BlowupExtent
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read."""
+
+    mesh: Annotated[File, MESH]
+    train: Annotated[File, TRAIN]
+    heldout: Annotated[File, HELDOUT]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written: models with their runs, and a table of each motion."""
+
+    runs: Annotated[File, SUBSPACES]
+    train: Annotated[File, SUBSPACES_TRAIN]
+    heldout: Annotated[File, SUBSPACES_HELDOUT]
+
+
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+    """Build every model (bases, sizes, tolerances) and run both motions with it."""
+    motions = {
+        name: Motion(scene_of(settings.scene, inputs.mesh, name), getattr(inputs, name))
+        for name in RUNS
+    }
+    rows: dict[str, list[dict[str, Any]]] = {name: [] for name in RUNS}
+    asked = settings.subspace.model_dump(mode="json")
+    config = settings.scene.model_dump(mode="json")
+    with write_hdf5(outputs.runs.path) as file:
+        file.attrs.update(attributes({"scene": config, "settings": asked}))
+        for name, motion in motions.items():
+            file[f"displacement/{name}"] = motion.displacement
+        for base, columns, kind, k, models in _subspaces(motions["train"], settings.subspace):
+            store_columns(file.create_group(f"columns/{base}"), columns)
+            for method, samples in models:
+                model = SubspaceModel(kind, columns, samples)
+                labels = {"method": method, "position_basis": kind, "k": k, "base": base}
+                store = file.create_group(f"models/{base}_{method}")
+                store_model(store, labels, samples)
+                for name, motion in motions.items():
+                    outcome = motion.run(model, settings.blowup_extent)
+                    for series in ("coordinates", "difference", "extent"):
+                        store[f"{name}/{series}"] = getattr(outcome, series)
+                    rows[name].append(_row(motion, labels, samples, outcome))
+                log.info("%s %s: error %s", base, method, rows["train"][-1]["relative_error"])
+    for name in RUNS:
+        table = pd.DataFrame(rows[name], columns=COLUMNS)
+        write_table(table, getattr(outputs, name).path)
+
+
+def _subspaces(
+    motion: Motion, settings: SubspaceModels
+) -> Iterator[tuple[str, Columns, str, int, Iterator[tuple[str, Sampled]]]]:
+    """Name, columns, kind and size of every subspace, with the models in it."""
+    scene, training = motion.scene, training_positions(motion)
+    spaces = _sampled_spaces(scene, settings.hrpd)
+    for kind in settings.bases:
+        for k in settings.sizes:
+            columns = make_columns(scene, training, kind, k)
+            models = _samplings(scene, columns, kind, settings)
+            if k in settings.interpolated_sizes:
+                more = _interpolations(scene, columns, training, kind, settings, spaces)
+                models = chain(models, more)
+            yield f"{kind}_k{k:03d}", columns, kind, k, models
+
+
+def _samplings(
+    scene: Scene, columns: Columns, kind: str, settings: SubspaceModels
+) -> Iterator[tuple[str, Sampled]]:
+    """(method, samples) pairs: full projections, and element sampling on the snapshot basis."""
+    yield "full", {}
+    if kind == "pod":
+        tolerances = settings.tolerances
+        found = sample_elements(scene, columns, training_indices(scene), tolerances)
+        for tolerance, samples in zip(tolerances, found, strict=True):
+            yield f"ecsw-{tolerance:.0e}", samples
+
+
+def _sampled_spaces(scene: Scene, spec: HrpdSpec | None) -> dict[str, Any]:
+    """Spaces of projections for hrpd, by group; they depend on the rest shape only."""
+    if spec is None:
+        return {}
+    return {group.name: sampled_space(group, scene.mesh.points, spec) for group in scene.groups}
+
+
+def _interpolations(
+    scene: Scene,
+    columns: Columns,
+    training: np.ndarray,
+    kind: str,
+    settings: SubspaceModels,
+    spaces: dict[str, Any],
+) -> Iterator[tuple[str, Sampled]]:
+    """(method, interpolations) pairs: hrpd, and the trained ones on the snapshot basis."""
+    if spaces:
+        yield "hrpd", {g.name: hrpd(g, columns, spaces[g.name]) for g in scene.groups}
+    if kind == "pod":
+        states = Training(scene, columns, training)
+        for method, spec in settings.interpolations.items():
+            yield method, interpolate(scene, columns, states, spec)
+
+
+def _row(
+    motion: Motion, labels: dict[str, Any], samples: Sampled, outcome: Rerun
+) -> dict[str, Any]:
+    scene = motion.scene
+    full = sum(group.elements for group in scene.groups)
+    sampled = sum(len(chosen.elements) for chosen in samples.values()) if samples else full
+    return {
+        "scene": scene.config.name,
+        "group": "all",
+        **labels,
+        "r": sampled,
+        "frames": outcome.frames,
+        "finite": outcome.finite,
+        "blowup_frame": outcome.blowup_frame,
+        "max_extent": outcome.max_extent,
+        "relative_error": outcome.error(motion.displacement),
+        "energy_ratio": motion.scale.ratio(outcome.positions),
+    }
+
+
+EXPERIMENT = Experiment(
+    "hyper", "Position subspaces of {scene}, with full and with sampled projections", run
+)

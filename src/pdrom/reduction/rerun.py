@@ -1,0 +1,88 @@
+"""A run of a reduced model, compared with the full-order run frame by frame."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdrom.core.metrics import trajectory_error
+from pdrom.model.runs.bounded import BoundedRun
+
+
+@dataclass(frozen=True)
+class Rerun:
+    """Outcome of a reduced run; a run that blows up ends there and is a result like any other.
+
+    positions : (F' + 1, N, 3) m, the initial ones first; only finite frames
+    difference : (F',) || Q_red - Q_fom ||_F of each frame, m
+    extent : (F',) longest side of the bounding box over the rest extent
+    blowup_frame : first frame whose extent exceeds the limit or is not finite, else None
+    coordinates : (F' + 1, K, 3) of the step loop; the positions themselves outside a subspace
+    """
+
+    positions: np.ndarray
+    difference: np.ndarray
+    extent: np.ndarray
+    blowup_frame: int | None
+    coordinates: np.ndarray
+
+    @property
+    def frames(self) -> int:
+        """Number of frames that ran and stayed finite."""
+        return len(self.difference)
+
+    @property
+    def finite(self) -> bool:
+        """Whether it did not blow up."""
+        return self.blowup_frame is None
+
+    @property
+    def max_extent(self) -> float:
+        """Largest extent of the run."""
+        return float(self.extent.max(initial=0.0))
+
+    def error(self, displacement: np.ndarray) -> float | None:
+        """Relative error over the whole run; None if it ended early.
+
+        Parameters
+        ----------
+        displacement : (F,) of the full-order run, see `displacement_norms`
+        """
+        if not self.finite or self.frames < len(displacement):
+            return None
+        return trajectory_error(self.difference, displacement)
+
+
+def compare(
+    run: BoundedRun, reference: np.ndarray, stopped: Callable[[], bool] = lambda: False
+) -> Rerun:
+    """Do a run and compare it with ``reference``, (F + 1, N, 3) positions of the full-order run.
+
+    Parameters
+    ----------
+    stopped : asked after every frame whether the run ends there
+    """
+    coordinates = [run.state.positions]
+    positions = [run.positions(run.state.positions)]
+    difference, extents = [], []
+    for frame in run:
+        coordinates.append(frame.state.positions)
+        positions.append(frame.positions)
+        difference.append(float(np.linalg.norm(frame.positions - reference[frame.number + 1])))
+        extents.append(frame.extent)
+        if stopped():
+            break
+    stacked = np.stack(positions)
+    same = positions[0] is coordinates[0]
+    return Rerun(
+        stacked,
+        np.array(difference),
+        np.array(extents),
+        run.blowup_frame,
+        stacked if same else np.stack(coordinates),
+    )
+
+
+def displacement_norms(reference: np.ndarray) -> np.ndarray:
+    """|| Q_fom - rest ||_F of each frame, (F,) m; rest is the initial state."""
+    return np.linalg.norm((reference[1:] - reference[0]).reshape(len(reference) - 1, -1), axis=1)
