@@ -4,7 +4,6 @@ import logging
 import re
 import shutil
 import signal
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -113,19 +112,19 @@ class Failures(logging.Handler):
             stops = [how for words, how in _STOPS.items() if words in text]
             self.stopped = stops[0] if stops else self.stopped
 
-    def end(self) -> None:
-        """End a failed run: its last lines say what went wrong.
+    def end(self) -> tuple[str, int]:
+        """Last lines of a failed run, which say what went wrong, and its exit status.
 
-        Snakemake prints its own account after a job's message. Every failed job is named once more
-        with the error in its log, and the process ends as a failure.
+        Snakemake prints its own account after a job's message, so every failed job is named once
+        more with the error in its log.
         """
         lines = [failure.line() for failure in self.jobs]
         if self.stopped:
             # jobs that ended with the run are no news
             lines = [line for line in lines if not line.endswith(tuple(_CAUSES.values()))]
             lines.append(f"pdrom: {self.stopped}")
-        sys.stderr.write("\n".join([*dict.fromkeys([*lines, *self.other]), ADVICE]) + "\n")
-        sys.exit(INTERRUPTED if self.stopped else 1)
+        text = "\n".join([*dict.fromkeys([*lines, *self.other]), ADVICE]) + "\n"
+        return text, INTERRUPTED if self.stopped else 1
 
 
 def listen() -> Failures:

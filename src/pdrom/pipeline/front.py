@@ -24,6 +24,8 @@ from pdrom.pipeline.last_run import recall
 # they take a third of a core in the end.
 OPTIONS = ("--scheduler", "greedy", "--max-jobs-per-timespan", "1000/20s", "--rerun-incomplete")
 
+LINES = ("--logger", "pdrom")
+
 
 def completed(arguments: Sequence[str]) -> list[str]:
     """Arguments for Snakemake.
@@ -44,7 +46,8 @@ def completed(arguments: Sequence[str]) -> list[str]:
         if files != [target]:
             _say(f"{target}: {', '.join(files)}")
     cores = () if command.cores else ("--cores", "all")
-    return command.rewritten([*cores, *OPTIONS], made)
+    lines = () if command.looks_only or command.own_output else LINES
+    return command.rewritten([*cores, *lines, *OPTIONS], made)
 
 
 def files_of(targets: Sequence[str], own: Folders) -> dict[str, list[str]]:

@@ -1,5 +1,6 @@
 """What every run does first and last, whether ``./reproduce`` or ``snakemake`` started it."""
 
+import atexit
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -13,6 +14,7 @@ from pdrom.pipeline.last_run import recall, remember
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.running import hold, remove_stale_locks
 from pdrom.pipeline.scheduler import cancel_timers
+from pdrom.pipeline.summary import summary
 from pdrom.pipeline.targets import Rule, known
 from pdrom.pipeline.warm import start_server, stop_server
 
@@ -66,13 +68,21 @@ class Run:
         """Before the first job: the process that jobs are forked from."""
         start_server()
 
-    def succeed(self) -> None:
-        """End a run whose jobs all succeeded."""
+    def succeed(self, plan: Plan, folders: Folders) -> None:
+        """End a run whose jobs all succeeded: it says what came of it."""
+        say_last(summary(self.command, folders, plan.figures, plan.tables))
         stop_server()
         cancel_timers()
 
     def fail(self) -> None:
-        """End a run that failed or was interrupted, as `Failures.end`."""
+        """End a run that failed or was interrupted: it says why."""
         stop_server()
         cancel_timers()
-        self.failures.end()
+        text, status = self.failures.end()
+        say_last(text)
+        sys.exit(status)
+
+
+def say_last(text: str) -> None:
+    """Write ``text`` when the process ends, after what Snakemake has still to say."""
+    atexit.register(sys.stderr.write, text)

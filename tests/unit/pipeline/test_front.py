@@ -4,7 +4,7 @@ import pytest
 
 from pdrom.core.errors import ConfigurationError
 from pdrom.pipeline.commandline import CommandLine
-from pdrom.pipeline.front import OPTIONS, completed
+from pdrom.pipeline.front import LINES, OPTIONS, completed
 from pdrom.pipeline.last_run import RECORD, recall, remember
 
 
@@ -19,8 +19,13 @@ def project(tmp_path, monkeypatch):
 
 def test_options_are_added_and_cores_unless_given():
     assert completed(["-n"]) == ["-n", "--cores", "all", *OPTIONS]
-    assert completed(["-j2"]) == ["-j2", *OPTIONS]
-    assert completed(["--cores", "1"]) == ["--cores", "1", *OPTIONS]
+    assert completed(["-j2"]) == ["-j2", *LINES, *OPTIONS]
+    assert completed(["--cores", "1"]) == ["--cores", "1", *LINES, *OPTIONS]
+
+
+@pytest.mark.parametrize("option", ["--verbose", "-p", "--quiet"])
+def test_who_asks_for_snakemakes_own_output_gets_it(option):
+    assert "--logger" not in completed([option])
 
 
 def test_names_become_files_and_it_is_said(capsys):

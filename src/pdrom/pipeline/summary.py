@@ -1,0 +1,78 @@
+"""What a finished run says last: configuration, verdicts, files, time."""
+
+import os
+import shlex
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import psutil
+
+from pdrom.core import paths
+from pdrom.core.errors import PdromError
+from pdrom.core.store import read_table
+from pdrom.pipeline.commandline import CommandLine
+from pdrom.pipeline.folders import Folders
+
+
+def processor_seconds() -> float:
+    """Processor time of this process and of all that it has started, until now."""
+    own = psutil.Process()
+    total = 0.0
+    for process in (own, *own.children(recursive=True)):
+        try:
+            times = process.cpu_times()
+        except psutil.Error:  # it has ended meanwhile
+            continue
+        total += times.user + times.system
+        total += getattr(times, "children_user", 0.0) + getattr(times, "children_system", 0.0)
+    return total
+
+
+def summary(
+    command: CommandLine, folders: Folders, figures: Sequence[str], tables: Sequence[str]
+) -> str:
+    """Lines about a run that has ended well.
+
+    Parameters
+    ----------
+    figures, tables : files that the study has when it is complete
+    """
+    wall = time.time() - psutil.Process().create_time()
+    lines = [f"configuration: {_configuration(command)}"]
+    if command.targets:
+        lines.append(f"made: {', '.join(command.targets)}")
+    else:
+        lines += _verdicts(folders)
+        lines.append(f"manuscript: {folders.manuscript}")
+        for kind, files in (("figures", figures), ("tables", tables)):
+            found = sum(Path(file).is_file() for file in files)
+            lines.append(f"{kind}: {found} in {folders.results}/{kind}")
+        lines.append(f"report: {shlex.join(['./reproduce', '--report', 'report.html'])}")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    lines.append(
+        f"time: {minutes(wall)} on {cores} cores, {minutes(processor_seconds())} of processor time"
+    )
+    return "\n".join(f"pdrom: {line}" for line in lines) + "\n"
+
+
+def minutes(seconds: float) -> str:
+    """A time in minutes and seconds."""
+    whole = round(seconds)
+    return f"{whole // 60} min {whole % 60} s" if whole >= 60 else f"{whole} s"
+
+
+def _configuration(command: CommandLine) -> str:
+    names = command.configfiles or ("config/default.yaml",)
+    return ", ".join([*names, *command.settings])
+
+
+def _verdicts(folders: Folders) -> list[str]:
+    """All verdicts in one line; none where the table cannot be read."""
+    path = paths.TABLE.at(folders.results, name="claims")
+    try:
+        table = read_table(path, ["claim", "verdict"])
+    except PdromError:
+        return []
+    verdicts = [f"{row.claim} {row.verdict}" for row in table.itertuples()]
+    return [f"verdicts: {', '.join(verdicts)}"]
