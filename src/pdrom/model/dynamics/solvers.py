@@ -1,6 +1,8 @@
 """Sparse Cholesky backends for the global step, factor once and solve often."""
 
+import logging
 from abc import ABC, abstractmethod
+from importlib.util import find_spec
 
 import numpy as np
 from scipy import sparse
@@ -13,8 +15,24 @@ SOLVERS = Registry(
     {
         "cholespy": "pdrom.model.dynamics.solvers:CholespySolver",
         "splu": "pdrom.model.dynamics.solvers:SuperLUSolver",
+        "splu-columns": "pdrom.model.dynamics.solvers:ColumnOrderedSolver",
     },
 )
+
+
+log = logging.getLogger(__name__)
+
+
+def solver_class(name: str) -> "type[SparseSolver]":
+    """Class of a registered solver.
+
+    Where cholespy is not installed (it has no wheel for Linux on ARM), SciPy's solver takes its
+    place, and every log says so.
+    """
+    if name == "cholespy" and find_spec("cholespy") is None:
+        log.warning("cholespy is not installed: SciPy's SuperLU solves the global system instead")
+        return SuperLUSolver
+    return SOLVERS.load(name)
 
 
 class SparseSolver(ABC):
@@ -50,13 +68,15 @@ class CholespySolver(SparseSolver):
 class SuperLUSolver(SparseSolver):
     """SciPy's SuperLU with a symmetric ordering; needs no further package."""
 
+    ordering = "MMD_AT_PLUS_A"
+
     def __init__(self, matrix: sparse.csr_array) -> None:
         from scipy.sparse.linalg import splu
 
         try:
             self._factor = splu(
                 matrix.tocsc(),
-                permc_spec="MMD_AT_PLUS_A",
+                permc_spec=self.ordering,
                 diag_pivot_thresh=0.0,
                 options={"SymmetricMode": True},
             )
@@ -65,3 +85,9 @@ class SuperLUSolver(SparseSolver):
 
     def solve(self, rhs: np.ndarray, out: np.ndarray) -> None:
         out[...] = self._factor.solve(rhs)
+
+
+class ColumnOrderedSolver(SuperLUSolver):
+    """The same with another order of summation, to see what the order changes."""
+
+    ordering = "COLAMD"

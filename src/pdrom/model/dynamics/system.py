@@ -9,7 +9,7 @@ from scipy import sparse
 from pdrom.core.errors import SolverError
 from pdrom.core.store import require_finite
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.dynamics.solvers import SOLVERS, SparseSolver
+from pdrom.model.dynamics.solvers import SparseSolver, solver_class
 
 DEFAULT_SOLVER = "cholespy"
 
@@ -30,7 +30,7 @@ class Elimination:
         self._solver: SparseSolver | None = None
         if len(self.free):
             block = matrix if not len(fixed) else matrix[self.free][:, self.free]
-            self._solver = SOLVERS.load(solver)(sparse.csr_array(block))
+            self._solver = solver_class(solver)(sparse.csr_array(block))
             require_accurate(block, self._solver.solve)
 
     def set_targets(self, targets: np.ndarray) -> None:

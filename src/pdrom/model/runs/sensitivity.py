@@ -8,12 +8,15 @@ the time step are changed.
 import numpy as np
 import pandas as pd
 
+from pdrom.model.dynamics.solvers import solver_class
+from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.runs.horizon import HELDOUT
 from pdrom.model.scene import Scene
 
 COLUMNS = ["scene", "perturbation", "seed", "frame", "relative_difference"]
-OTHER_SOLVER = "splu"
+# The first that is not the one that the run uses.
+OTHER_SOLVERS = ("splu", "splu-columns")
 
 
 def relative_difference(other: np.ndarray, base: np.ndarray) -> np.ndarray:
@@ -72,7 +75,9 @@ def _rows(scene: Scene, label: str, seed: int, values: np.ndarray) -> pd.DataFra
 
 
 def _other_solver(scene: Scene) -> np.ndarray:
-    return trajectory(scene, system=scene.system_with(OTHER_SOLVER))
+    own = solver_class(DEFAULT_SOLVER)
+    other = next(name for name in OTHER_SOLVERS if solver_class(name) is not own)
+    return trajectory(scene, system=scene.system_with(other))
 
 
 def _more_iterations(scene: Scene) -> np.ndarray:

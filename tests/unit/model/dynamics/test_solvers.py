@@ -8,7 +8,7 @@ from scipy import sparse
 
 from conftest import make_scene
 from pdrom.core.errors import ConfigurationError, SolverError
-from pdrom.model.dynamics.solvers import SOLVERS
+from pdrom.model.dynamics.solvers import SOLVERS, SuperLUSolver, solver_class
 from pdrom.model.dynamics.system import GlobalSystem
 
 NAMES = sorted(SOLVERS)
@@ -123,3 +123,15 @@ def test_masses_that_round_off_swallows_do_no_harm_to_a_held_body(name):
     rhs = scene.groups[0].S.T @ (scene.groups[0].row_weights[:, None] * scene.groups[0].rest)
     elimination.solve(rhs, y)
     assert y == pytest.approx(scene.mesh.points, abs=1e-9)
+
+
+def test_without_cholespy_scipy_solves_and_the_log_says_so(monkeypatch, caplog):
+    """As on Linux on ARM, for which cholespy has no wheel."""
+    monkeypatch.setattr("pdrom.model.dynamics.solvers.find_spec", lambda name: None)
+    assert solver_class("cholespy") is SuperLUSolver
+    assert "cholespy is not installed: SciPy's SuperLU" in caplog.text
+
+
+def test_with_cholespy_the_named_solver_is_taken(caplog):
+    assert [solver_class(name) for name in NAMES] == [SOLVERS.load(name) for name in NAMES]
+    assert caplog.text == ""
