@@ -216,7 +216,7 @@ def test_a_selection_reruns_the_methods_that_use_it(finished: Checkout) -> None:
 
 FAULTS = {
     "unknown key of the study": (
-        "config/default.yaml", "solver: cholespy", "sovler: cholespy",
+        "config/default.yaml", "methods: [pod,", "sovler: cholespy\nmethods: [pod,",
         ("config/default.yaml", "unknown key 'sovler'", "allowed: scenes, methods"),
     ),
     "unknown key of a scene": (
@@ -244,7 +244,7 @@ FAULTS = {
         (SCENE, "reduce.strain", "allowed: spring"),
     ),
     "no basis vector": (
-        "config/default.yaml", "ranks: [6, 10, 20, 50, full]", "ranks: [0, 10, 20, 50, full]",
+        "config/default.yaml", "methods: [pod,", "ranks: [0, 10, full]\nmethods: [pod,",
         ("config/default.yaml", "ranks.0", "= 0", "greater than or equal to 1"),
     ),
     "negative weight": (

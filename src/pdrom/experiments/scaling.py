@@ -23,6 +23,7 @@ from pdrom.experiments.local_costs import local_costs
 from pdrom.experiments.measurement import Measurement, Protocol, Variant, measure
 from pdrom.experiments.names import FOM
 from pdrom.experiments.settings import Modes, Repeats, Solver, Tolerance
+from pdrom.experiments.training import Training, train
 from pdrom.model.dynamics.stepper import LocalStep
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig
@@ -104,22 +105,6 @@ class Outputs:
     breakeven: Annotated[File, BREAK_EVEN_SIZED]
 
 
-@dataclass(frozen=True)
-class Training:
-    """Positions (n, N, 3) m after the training frames, and projections (n, e p, 3) within them.
-
-    ``roundoff`` (n,) is that of the projections.
-    """
-
-    positions: np.ndarray
-    projections: np.ndarray
-    roundoff: np.ndarray
-
-    def first(self, frames: int) -> "Training":
-        """The same of the first frames only."""
-        return Training(self.positions[:frames], self.projections[:frames], self.roundoff[:frames])
-
-
 def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     """Measure a scene on one mesh: ``factor`` times the vertices along each side."""
     config, solver, sized = settings.scene, settings.solver, settings.scaling
@@ -132,7 +117,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     idle = _memory()
     system, seconds = _factorised(scene, solver)
     measured = {"factorisation_ms": 1e3 * seconds, "memory_mb": _memory() - idle}
-    training = _train(scene, system, max(sized.training_frames, alone.training_frames))
+    training = train(scene, system, max(sized.training_frames, alone.training_frames))
     first = training.first(sized.training_frames)
     basis = _basis(scene, first, specs[sized.method])
     two = Scene.build(config, scene.mesh, threads=2)
@@ -160,22 +145,6 @@ def _factorised(scene: Scene, solver: str) -> tuple[GlobalSystem, float]:
     fixed, _ = scene.space(system).fixed(0, state.positions)
     system.eliminate(fixed)
     return system, perf_counter() - started
-
-
-def _train(scene: Scene, system: GlobalSystem, frames: int) -> Training:
-    """The first frames of the full-order run; projections at the last local iterates."""
-    group = scene.groups[0]
-    loop, state = scene.stepper(system, track_objective=False), scene.initial_state()
-    positions, projections, roundoff = [], [], []
-
-    def watch(y: np.ndarray) -> None:
-        projections.append(group.project(y))
-        roundoff.append(group.roundoff(y))
-
-    for frame in range(frames):
-        state, _ = loop.step(state, frame, watch)
-        positions.append(state.positions)
-    return Training(np.stack(positions), np.stack(projections), np.array(roundoff))
 
 
 def _basis(scene: Scene, training: Training, spec: MethodSpec) -> Basis:

@@ -9,14 +9,13 @@ import numpy as np
 from pydantic import (
     Field,
     SerializeAsAny,
-    ValidationError,
     field_validator,
     model_validator,
 )
 
-from pdrom.core.errors import ConfigurationError, SceneError
+from pdrom.core.errors import SceneError
 from pdrom.core.names import SceneName
-from pdrom.core.yamlfile import ConfigModel, describe, shown
+from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import ConstraintGroup, GroupConfig
 from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.space import VertexSpace
@@ -24,6 +23,7 @@ from pdrom.model.dynamics.stepper import LocalStep, State, Stepper
 from pdrom.model.dynamics.system import DEFAULT_SOLVER, GlobalSystem
 from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import Boundary, Contact, Effect, EffectConfig, Force, Seed, Start
+from pdrom.model.effects.entries import effect_config
 from pdrom.model.holding import check_holds, log_holds
 from pdrom.model.mesh.checks import check_mesh
 from pdrom.model.mesh.config import MeshConfig
@@ -77,7 +77,7 @@ class SceneConfig(_Model):
     def _typed_effects(cls, value: Any) -> tuple[EffectConfig, ...]:
         if not isinstance(value, (list, tuple)):
             raise ValueError("a list of effects is required")
-        return tuple(_effect_config(entry, index) for index, entry in enumerate(value))
+        return tuple(effect_config(entry, index) for index, entry in enumerate(value))
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -133,25 +133,8 @@ class SceneConfig(_Model):
             effects = [e.reversed() for e in effects]
         if plan.kick:
             kick = {"effect": "kick", "speed": plan.kick, "seed": plan.seed}
-            effects.append(_effect_config({**kick, "axes": plan.kick_axes}, len(effects)))
+            effects.append(effect_config({**kick, "axes": plan.kick_axes}, len(effects)))
         return self.model_copy(update={"effects": tuple(effects)})
-
-
-def _effect_config(entry: Any, index: int) -> EffectConfig:
-    """Typed configuration of one entry of ``effects``."""
-    if isinstance(entry, EffectConfig):
-        return entry
-    if not isinstance(entry, dict) or not isinstance(entry.get("effect"), str):
-        raise ValueError(f"effects[{index}] = {shown(entry, 60)}: a mapping with a key 'effect'")
-    try:
-        model = EFFECTS.load(entry["effect"]).Config
-    except ConfigurationError as error:
-        raise ValueError(f"effects[{index}]: {error}") from error
-    try:
-        return model.model_validate(entry)
-    except ValidationError as error:
-        fault = describe(error, model)
-        raise ValueError(f"effects[{index}] ({entry['effect']}): {fault}") from error
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,9 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.core.registry import Registry
 
 PACKAGE = "pdrom"
+# Where files lie decides nothing inside of a job, and Snakemake compares the paths themselves: a
+# further kind of file makes no job run again.
+LAYOUT = {"pdrom.core.paths", "pdrom.core.reads"}
 
 
 def fingerprint(*places: str) -> str:
@@ -92,7 +95,7 @@ def _imports(path: Path, module: str) -> tuple[str, ...]:
     parents = {parent for name in found for parent in _packages_above(name)}
     known = {name for name in found | parents if _locate(name) is not None}
     # the package's own __init__ holds the version only
-    return tuple(sorted(known - {PACKAGE, module}))
+    return tuple(sorted(known - {PACKAGE, module} - LAYOUT))
 
 
 def _packages_above(name: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""The hard cases, by name."""
+"""The hard cases, by name: one module because it is one list, without logic of its own."""
 
 from collections.abc import Callable, Iterable
 from functools import partial

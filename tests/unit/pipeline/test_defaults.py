@@ -1,0 +1,41 @@
+"""Defaults stand in the code only; the study's file holds what differs from them."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from pdrom.core.yamlfile import read_yaml, validate
+from pdrom.pipeline.defaults import defaults
+from pdrom.pipeline.study import StudySettings
+from places import CONFIG
+
+
+def given(content: dict[str, Any], known: Any) -> Iterator[tuple[str, Any, Any]]:
+    """(key, value, default) of every value that a configuration gives, inside sections too."""
+    for key, value in content.items():
+        default = known.get(key) if isinstance(known, dict) else None
+        if isinstance(value, dict) and isinstance(default, dict) and default:
+            for inner, *rest in given(value, default):
+                yield f"{key}.{inner}", *rest
+        else:
+            yield key, value, default
+
+
+def test_the_study_repeats_no_default() -> None:
+    content = read_yaml(CONFIG / "default.yaml")
+    repeated = [key for key, value, default in given(content, defaults()) if value == default]
+    assert repeated == []
+
+
+def test_defaults_are_a_valid_configuration() -> None:
+    study = {"scenes": ["spring_oop"], "methods": ["pod"]}
+    assert validate(StudySettings, defaults() | study, "defaults") == validate(
+        StudySettings, study, "nothing"
+    )
+
+
+@pytest.mark.parametrize(("key", "value"), [("sweep", 10), ("timing", 10), ("stability", 120)])
+def test_what_the_study_was_made_with(key: str, value: int) -> None:
+    """Values that the code once had differently from the file."""
+    assert value in defaults()[key].values()
