@@ -2,6 +2,7 @@
 
 import os
 import re
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import yaml
 from checkout import Checkout, copy_repository
 
 from pdrom.pipeline.plan import TABLES
+from pdrom.pipeline.running import hold
 
 MICRO = {
     "scenes": ["spring_oop", "strain_oop", "bar_release"],
@@ -87,6 +89,51 @@ def test_one_figure_needs_no_more_than_its_own_inputs(clean: Checkout) -> None:
     assert stages == {"meshes", "fom", "snapshots", "pod", "tables", "figures"}
     assert {p for p in planned if _stage(p) == "figures"} == {figure, figure[:-3] + "png"}
     assert {p for p in planned if _stage(p) == "tables"} == {"results/tables/singular_values.csv"}
+
+
+def only_line(done: subprocess.CompletedProcess[str]) -> str:
+    """The one line that says why nothing was planned."""
+    assert done.returncode != 0
+    assert "Traceback" not in done.stdout + done.stderr
+    (line,) = [line for line in done.stderr.splitlines() if line.startswith("pdrom: ")]
+    return line
+
+
+def test_a_scene_outside_the_study_is_run_for_its_own_file(clean: Checkout) -> None:
+    target = "results/fom/bar140/train.h5"
+    mesh, run = sorted(clean.planned(target), reverse=True)
+    assert mesh.startswith("results/meshes/bar_")
+    assert run == target
+
+
+@pytest.mark.parametrize(
+    ("target", "words"),
+    [
+        ("results/tabels/scaling.csv", "did you mean 'results/tables/scaling.csv'?"),
+        ("results/fom/bar_relaese/train.h5", "did you mean 'bar_release'?"),
+        ("figure_scalign", "did you mean 'figure_scaling'?"),
+    ],
+)
+def test_a_misspelt_target_gets_a_suggestion(target: str, words: str, clean: Checkout) -> None:
+    assert words in only_line(clean.snakemake("-n", target))
+
+
+def test_a_report_of_no_results_is_refused(clean: Checkout) -> None:
+    line = only_line(clean.snakemake("--report", "report.html"))
+    assert "report: this configuration has no paper/main.pdf" in line
+
+
+def test_one_run_at_a_time_and_plans_beside_it(
+    clean: Checkout, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(clean.folder)
+    descriptor = hold()
+    try:
+        line = only_line(clean.snakemake("results/fom/bar140/train.h5"))
+        assert f"another run (process {os.getpid()} on " in line
+        assert clean.planned("results/fom/bar140/train.h5")
+    finally:
+        os.close(descriptor)
 
 
 def test_nothing_to_do_when_finished(finished: Checkout) -> None:
