@@ -1,5 +1,7 @@
 """Sensitivity floor and horizon: chaos is found, and calm runs are left whole."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -26,14 +28,16 @@ def test_relative_difference_by_hand():
 
 SPRING = {"effect": "spring", "weight": 1e5}
 # the sheet is pushed together in its own plane, by its weight: it must buckle, in no preferred way
-COMPRESSED = make_scene(
+COMPRESSED = partial(
+    make_scene,
     SPRING,
     {"effect": "gravity"},
     {"effect": "pins", "select": "bottom"},
     {"effect": "translate", "select": "top", "offset": [0.0, -0.4, 0.0], "over": 10},
     frames=60,
 )
-HORIZONTAL = make_scene(
+HORIZONTAL = partial(
+    make_scene,
     SPRING,
     {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]},
     {"effect": "pins", "select": "top"},
@@ -48,7 +52,7 @@ def floor(scene, size=1e-10) -> np.ndarray:
 
 def test_chaos_is_detected():
     """In-plane compression amplifies the perturbation by many orders; bending down does not."""
-    compressed, horizontal = floor(COMPRESSED), floor(HORIZONTAL)
+    compressed, horizontal = floor(COMPRESSED()), floor(HORIZONTAL())
     assert horizon(compressed, 1e-3) < len(compressed)
     assert compressed.max() > 1e6 * compressed[0]
     assert horizon(horizontal, 1e-3) == len(horizontal)
@@ -56,7 +60,7 @@ def test_chaos_is_detected():
 
 
 def test_perturbation_has_its_size_and_its_seed():
-    scene = HORIZONTAL
+    scene = HORIZONTAL()
     field = perturbation_field(scene, 1e-6, 3)
     assert np.linalg.norm(field, axis=1) == pytest.approx(1e-6 * scene.mesh.extent, rel=1e-12)
     np.testing.assert_array_equal(field, perturbation_field(scene, 1e-6, 3))
@@ -98,4 +102,4 @@ def test_held_out_floor_is_labelled_as_such():
 
 def test_a_scene_can_be_measured_twice():
     """Handles remember where they took hold; a second run must not start from there."""
-    np.testing.assert_array_equal(trajectory(COMPRESSED), trajectory(COMPRESSED))
+    np.testing.assert_array_equal(trajectory(COMPRESSED()), trajectory(COMPRESSED()))

@@ -143,7 +143,7 @@ def test_galerkin_tests_with_interpolated_strains(group_scene, rng):
 @pytest.mark.parametrize("kind", ["pod", "skinning"])
 @pytest.mark.parametrize("name", ["pins", "handles", "bar"])
 def test_pins_and_handles_are_met_exactly(name, kind, method):
-    scene = SCENES[name]
+    scene = SCENES[name]()
     reference = trajectory(scene)
     columns = make_columns(scene, reference[1:], kind, 3)
     found = interpolations_of(scene, columns, reference[1:], method)
@@ -158,7 +158,7 @@ def test_pins_and_handles_are_met_exactly(name, kind, method):
 @pytest.mark.parametrize("name", ["handles", "bending", "bar", "poke", "damped"])
 def test_a_step_reads_nothing_of_the_mesh(name, method):
     """With everything of the length of the mesh overwritten the second run is the same."""
-    config = SCENES[name].config
+    config = SCENES[name]().config
     effects = [e.model_dump() for e in config.effects]
     scene = make_scene(*effects, mesh=config.mesh.model_dump(), frames=config.frames)
     reference = trajectory(scene)
@@ -212,7 +212,7 @@ def test_projections_that_are_round_off_need_no_element():
 
 
 def test_bounds_stop_coefficients_at_the_edge_of_the_training_range(rng):
-    scene = SCENES["pins"]
+    scene = SCENES["pins"]()
     group, points = scene.groups[0], scene.mesh.points
     states = [(points, points + 0.1 * rng.standard_normal(points.shape)) for _ in range(10)]
     columns = whole_space(scene)
@@ -232,7 +232,7 @@ def test_bounds_stop_coefficients_at_the_edge_of_the_training_range(rng):
 
 
 def test_interpolations_survive_a_file(tmp_path, rng):
-    scene = SCENES["pins"]
+    scene = SCENES["pins"]()
     reference = trajectory(scene)
     columns = make_columns(scene, reference[1:], "pod", 3)
     for method in ("hrpd", "gappy"):

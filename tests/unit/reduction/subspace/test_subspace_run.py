@@ -1,5 +1,7 @@
 """Runs in a position subspace: exact where nothing is lost, and independent of the mesh."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from meshless import assert_reads_nothing_of_the_mesh
@@ -27,23 +29,30 @@ HANDLES = (
 )
 BAR = GROUPS["tetrahedron_strain"]
 
+# each test makes its own: what a module holds is not released before the interpreter ends
 SCENES = {
-    "free": make_scene(SPRING, STRAIN, GRAVITY, frames=6),
-    "pins": make_scene(SPRING, GRAVITY, PINS, frames=6),
-    "handles": make_scene(SPRING, STRAIN, GRAVITY, *HANDLES, frames=8),
-    "damped": make_scene(SPRING, GRAVITY, {"effect": "damping", "rate": 2.0}, PINS, frames=6),
-    "bending": make_scene(
+    "free": partial(make_scene, SPRING, STRAIN, GRAVITY, frames=6),
+    "pins": partial(make_scene, SPRING, GRAVITY, PINS, frames=6),
+    "handles": partial(make_scene, SPRING, STRAIN, GRAVITY, *HANDLES, frames=8),
+    "damped": partial(
+        make_scene, SPRING, GRAVITY, {"effect": "damping", "rate": 2.0}, PINS, frames=6
+    ),
+    "bending": partial(
+        make_scene,
         {"effect": "bending", "weight": 10.0}, GRAVITY, PINS, mesh=GROUPS["bending"], frames=6
     ),
-    "bar": make_scene(
+    "bar": partial(
+        make_scene,
         {"effect": "tetrahedron_strain", "weight": 1e6}, GRAVITY,
         {"effect": "pins", "select": "left"}, mesh=BAR, frames=6,
     ),
-    "poke": make_scene(
+    "poke": partial(
+        make_scene,
         SPRING, {"effect": "poke", "over": 4, "rest": 2, "count": 2, "avoid": ["top"]}, PINS,
         frames=12,
     ),
-    "floor": make_scene(
+    "floor": partial(
+        make_scene,
         SPRING, {"effect": "gravity", "acceleration": [0.0, -300.0, 0.0]}, {"effect": "floor"},
         frames=12,
     ),
@@ -72,7 +81,7 @@ def whole_space(scene):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_whole_space_repeats_the_full_order_run(name):
-    scene = SCENES[name]
+    scene = SCENES[name]()
     reference = trajectory(scene)
     motion = np.linalg.norm(reference[-1] - reference[0])
     result = run_model(scene, SubspaceModel("pod", whole_space(scene)))
@@ -83,7 +92,7 @@ def test_the_whole_space_repeats_the_full_order_run(name):
 @pytest.mark.parametrize("kind", ["pod", "skinning"])
 @pytest.mark.parametrize("name", ["pins", "handles", "poke", "bar"])
 def test_pins_and_handles_are_met_exactly(name, kind):
-    scene = SCENES[name]
+    scene = SCENES[name]()
     reference = trajectory(scene)
     model = SubspaceModel(kind, make_columns(scene, reference[1:], kind, 3))
     result = run_model(scene, model)
@@ -104,7 +113,7 @@ def test_pins_and_handles_are_met_exactly(name, kind):
 
 
 def test_snapshot_basis_error_falls_with_its_size():
-    scene = SCENES["handles"]
+    scene = SCENES["handles"]()
     reference = trajectory(scene)
     errors = []
     for k in (1, 4, 12):
@@ -186,11 +195,7 @@ def test_step_of_all_elements_is_the_projected_full_step(group_scene, rng):
 def test_a_step_reads_nothing_of_the_mesh(name):
     """With everything of the length of the mesh overwritten after the first run, the second,
     which needs no preparation any more, is the same."""
-    scene = make_scene(
-        *[e.model_dump() for e in SCENES[name].config.effects],
-        mesh=SCENES[name].config.mesh.model_dump(),
-        frames=SCENES[name].config.frames,
-    )
+    scene = SCENES[name]()
     reference = trajectory(scene)
     columns = make_columns(scene, reference[1:], "pod", 3)
     few = {
@@ -223,7 +228,7 @@ def test_arrays_of_a_step_have_the_size_of_the_sample():
 @pytest.mark.parametrize("name", ["free", "handles", "poke", "damped", "bending", "bar"])
 def test_fused_iterations_are_the_plain_ones(name):
     """The compiled loop against the step loop with projections and solve one after the other."""
-    scene = SCENES[name]
+    scene = SCENES[name]()
     reference = trajectory(scene)
     columns = make_columns(scene, reference[1:], "pod", 4)
     few = {
@@ -248,7 +253,7 @@ def loop_start(scene, columns) -> np.ndarray:
 
 
 def test_a_group_without_a_gradient_kernel_iterates_plainly():
-    scene = SCENES["pins"]
+    scene = SCENES["pins"]()
     columns = make_columns(scene, trajectory(scene)[1:], "pod", 4)
     step = SubspaceLocalStep(scene.groups[0], columns)
     model = SubspaceModel("pod", columns)
@@ -281,7 +286,7 @@ def test_models_survive_a_file(tmp_path):
     """The layout of rule hyper."""
     from pdrom.reduction.subspace.store import store_columns, store_model
 
-    scene = SCENES["handles"]
+    scene = SCENES["handles"]()
     reference = trajectory(scene)
     columns = make_columns(scene, reference[1:], "pod", 4)
     samples = sample_elements(scene, columns, np.arange(8), [1e-2])[0]
