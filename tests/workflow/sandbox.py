@@ -18,7 +18,7 @@ import yaml
 from checkout import ROOT, copy_repository
 
 from pdrom.core.store import check_file
-from pdrom.tables.columns import TIMING_COLUMNS
+from pdrom.pipeline.tables import all_tables
 
 MICRO = {
     "scenes": ["spring_oop"],
@@ -30,7 +30,7 @@ MICRO = {
     "subspace": {"scenes": ["spring_oop"], "sizes": [4], "tolerances": [1e-2]},
 }
 MICRO_FILE = "micro.yaml"
-TIMED_FOLDERS = ("timings", "logs")
+TIMED_FOLDERS = ("timings", "breakeven", "effects", "left_out", "guard", "offline", "logs")
 TIMED_FIGURES = ("local_share", "accuracy_cost")
 SHIM = '#!/bin/sh\nPYTHONPATH="{hooks}" exec "{python}" {module} "$@"\n'
 
@@ -126,7 +126,8 @@ class Sandbox:
         sealed = [p for p in files if p.suffix != ".log"]
         assert {check_file(p) for p in sealed} == {"intact"}
         names = {str(p.relative_to(self.folder)): p for p in files}
-        return {name: _digest(path) for name, path in sorted(names.items()) if not _timed(path)}
+        kept = {name: path for name, path in sorted(names.items()) if not _timed(path)}
+        return {name: _digest(path, self.folder) for name, path in kept.items()}
 
     def temporaries(self) -> list[Path]:
         """Files of the results that have not got their names yet."""
@@ -138,14 +139,14 @@ def _timed(path: Path) -> bool:
     return path.parts[-2] in TIMED_FOLDERS or "logs" in path.parts or path.stem in TIMED_FIGURES
 
 
-def _digest(path: Path) -> str:
+def _digest(path: Path, root: Path) -> str:
     content = hashlib.sha256()
     if path.suffix == ".h5":
         with h5py.File(path) as file:
             file.visititems(lambda name, item: _update(content, name, item))
-    elif path.suffix == ".csv" and path.stem in TIMING_COLUMNS:
+    elif path.parent.name == "tables" and path.suffix == ".csv":
         table = pd.read_csv(path, dtype=str)
-        kept = table.drop(columns=[c for c in TIMING_COLUMNS[path.stem] if c in table])
+        kept = all_tables()[path.stem].without_times(table, root)
         content.update(kept.to_csv().encode())
     else:
         content.update(path.read_bytes())

@@ -10,8 +10,8 @@ import pytest
 import yaml
 from checkout import Checkout, copy_repository
 
-from pdrom.pipeline.plan import TABLES
 from pdrom.pipeline.running import hold
+from pdrom.pipeline.tables import all_tables
 
 MICRO = {
     "scenes": ["spring_oop", "strain_oop", "bar_release"],
@@ -77,7 +77,7 @@ def test_a_fresh_clone_plans_the_whole_study(clean: Checkout) -> None:
 def test_the_default_target_is_the_manuscript_with_all_tables_and_figures(clean: Checkout) -> None:
     planned = clean.planned()
     figures = yaml.safe_load((clean.folder / "config" / "figures.yaml").read_text())
-    wanted = {f"results/tables/{name}.csv" for name in TABLES}
+    wanted = {f"results/tables/{name}.csv" for name in all_tables()}
     wanted |= {f"results/figures/{name}.{kind}" for name in figures for kind in ("pdf", "png")}
     assert wanted | {"paper/main.pdf"} <= planned
 

@@ -3,7 +3,7 @@ rule paper_inputs:
     input:
         source="paper/main.tex",
         references="paper/references.bib",
-        tables=PLAN.tables,
+        tables=PLAN.tables.paths,
         machine="results/machine.json",
     output:
         expand("results/paper/{name}", name=PLAN.paper_inputs),

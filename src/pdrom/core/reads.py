@@ -45,6 +45,18 @@ class EachOf:
 
 
 @dataclass(frozen=True)
+class Preferred:
+    """One file of a kind for each set of its other labels.
+
+    The one whose ``label`` has this ``value``, where the configuration holds it, else the first.
+    """
+
+    place: Place
+    label: str
+    value: str
+
+
+@dataclass(frozen=True)
 class ProjectFile:
     """A file that people edit, by its path in the project."""
 
@@ -58,4 +70,4 @@ class SourcesOf:
     key: str
 
 
-Read = Every | TableOf | Setting | PerScene
+Read = Every | TableOf | Setting | PerScene | Preferred | ProjectFile

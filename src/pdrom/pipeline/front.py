@@ -53,9 +53,10 @@ def completed(arguments: Sequence[str]) -> list[str]:
 def files_of(targets: Sequence[str], own: Folders) -> dict[str, list[str]]:
     """What is to be made for each target, see `Names.files`."""
     # late: it loads the whole package
-    from pdrom.pipeline.targets import TABLES, Names
+    from pdrom.pipeline.tables import all_tables
+    from pdrom.pipeline.targets import Names
 
-    names = Names(list(read_yaml(Path("config/figures.yaml"))), TABLES)
+    names = Names(list(read_yaml(Path("config/figures.yaml"))), all_tables())
     return {target: names.files(target, own) for target in targets}
 
 

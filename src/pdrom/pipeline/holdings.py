@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 
 from pdrom.core import paths
 from pdrom.core.paths import Place
+from pdrom.core.reads import Preferred
 from pdrom.pipeline.study import Study
 
 Labels = dict[str, str]
@@ -18,6 +19,16 @@ def labels_of(study: Study, place: Place) -> list[Labels]:
 def paths_of(study: Study, place: Place, results: str) -> list[str]:
     """Paths of every file of a kind below the folder ``results``."""
     return [place.at(results, **labels) for labels in labels_of(study, place)]
+
+
+def preferred_paths(study: Study, read: Preferred, results: str) -> list[str]:
+    """One path for each set of a kind's other labels, see `Preferred`."""
+    chosen: dict[tuple[str, ...], Labels] = {}
+    for labels in labels_of(study, read.place):
+        others = tuple(value for label, value in labels.items() if label != read.label)
+        if others not in chosen or labels[read.label] == read.value:
+            chosen[others] = labels
+    return [read.place.at(results, **labels) for labels in chosen.values()]
 
 
 def _meshes(study: Study) -> Iterator[Labels]:
@@ -99,6 +110,8 @@ def _subspaces(study: Study) -> Iterator[Labels]:
 HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.MESH: _meshes,
     paths.FULL_ORDER: _runs,
+    paths.TRAIN: _scenes,
+    paths.HELDOUT: _scenes,
     paths.SENSITIVITY: _scenes,
     paths.ITERATIONS: _scenes,
     paths.SNAPSHOTS: _experiments,

@@ -7,16 +7,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from pdrom.core import paths
 from pdrom.core.errors import ConfigurationError, PdromError, choices
 from pdrom.core.logs import planning_log
 from pdrom.experiments.hard_cases.expectations import load_expectations
 from pdrom.model.effects import EFFECTS
 from pdrom.pipeline.fingerprint import fingerprint
-from pdrom.pipeline.holdings import labels_of
 from pdrom.pipeline.jobs import Jobs, digest
 from pdrom.pipeline.scenes import require_scenes
 from pdrom.pipeline.study import Study, StudySettings
+from pdrom.pipeline.tables import Tables
 from pdrom.reduction.method import MethodSpec, load_methods
 from pdrom.report.claims import load_claims
 from pdrom.report.figures import FIGURES, FigureSpec, Holdings, figure_inputs, load_figures
@@ -24,33 +23,6 @@ from pdrom.report.figures.sources import PUBLISHED
 from pdrom.report.paper.textables import TEX_TABLES
 
 RESULTS = "results"
-REFERENCE_BASIS = "none-none-vectorised"
-TABLES = (
-    "singular_values",
-    "reconstruction_error",
-    "reduced_reruns",
-    "heldout_reruns",
-    "accuracy_cost",
-    "local_share",
-    "sensitivity",
-    "ladder",
-    "scaling",
-    "scaling_fit",
-    "stability",
-    "guard",
-    "hard_cases",
-    "kernel_accuracy",
-    "budget",
-    "breakeven",
-    "effects_cost",
-    "effects_left_out",
-    "targets",
-    "gain_prediction",
-    "online",
-    "subspace_ablation",
-    "offline_cost",
-    "claims",
-)
 
 
 def load_plan(
@@ -87,6 +59,7 @@ class Plan:
         self.root = study.root
         self.results = results
         self.jobs = Jobs(study, results)
+        self.tables = Tables(study, results)
 
     @property
     def settings(self) -> StudySettings:
@@ -134,107 +107,8 @@ class Plan:
         """Plain specification of a method."""
         return self._method(method).model_dump(mode="json")
 
-    def method_specs(self) -> dict[str, dict[str, Any]]:
-        """Plain specifications of all methods of the study."""
-        return {name: self.method_spec(name) for name in self.study.methods}
-
     def _method(self, method: str) -> MethodSpec:
         return self.study.methods[method]
-
-    # Files ----------------------------------------------------------------------------------
-
-    def reference_bases(self) -> list[str]:
-        """One basis file per experiment, for its singular values: uncentred if there."""
-        paths = []
-        for scene, group in self.study.experiments:
-            ids = [spec.basis_id for spec in self.study.methods.values()]
-            chosen = sorted(ids, key=lambda i: (i != REFERENCE_BASIS, ids.index(i)))[0]
-            paths.append(f"{RESULTS}/pod/{scene}/{group}/{chosen}.h5")
-        return paths
-
-    def per_experiment(self, stage: str, tail: str) -> list[str]:
-        """Files of a stage over all scenes, groups and methods, in configuration order."""
-        return [p for scene in self.study.scenes for p in self._per_method(stage, tail, scene)]
-
-    def per_scene(self, stage: str, tail: str) -> list[str]:
-        """Files of a stage over all scenes; ``tail`` follows the scene's name."""
-        return [f"{RESULTS}/{stage}/{scene}{tail}" for scene in self.study.scenes]
-
-    def hyper(self, tail: str) -> list[str]:
-        """Files of the position subspaces over the scenes that have them."""
-        held = labels_of(self.study, paths.SUBSPACES)
-        return [f"{RESULTS}/hyper/{labels['scene']}/{tail}" for labels in held]
-
-    def _per_method(self, stage: str, tail: str, scene: str) -> list[str]:
-        return [
-            f"{RESULTS}/{stage}/{scene}/{group}/{method}{tail}"
-            for group in self.study.scenes[scene].reduce
-            for method in self.study.methods
-        ]
-
-    @property
-    def measured_tables(self) -> dict[str, str]:
-        """Files of the tables that an experiment writes as they are."""
-        places = {
-            "guard": paths.GUARD,
-            "hard_cases": paths.HARD_CASES,
-            "kernel_accuracy": paths.KERNEL_ACCURACY,
-            "offline_cost": paths.OFFLINE,
-        }
-        return {name: place.at(self.results) for name, place in places.items()}
-
-    @property
-    def tables(self) -> list[str]:
-        """All tables."""
-        return [f"{RESULTS}/tables/{name}.csv" for name in TABLES]
-
-    # Stability and guard --------------------------------------------------------------------
-
-    @property
-    def sweeps(self) -> list[str]:
-        """Files of the short runs over time step and stiffness."""
-        scenes = [s for s in self.study.scenes if s in self.settings.stability.scenes]
-        return [f"{RESULTS}/stability/{scene}.csv" for scene in scenes]
-
-    def time_steps(self) -> dict[str, float]:
-        """Time step of every scene in seconds."""
-        return {name: scene.time_step for name, scene in self.study.scenes.items()}
-
-    # Ladder ---------------------------------------------------------------------------------
-
-    def ladder_files(self) -> list[str]:
-        """Files of the scenes that climb the ladder and are in this configuration."""
-        pairs = [(s, g) for s, g in self.study.experiments if s in self.study.ladder.scenes]
-        return [f"{RESULTS}/ladder/{scene}/{group}.csv" for scene, group in pairs]
-
-    # Scaling --------------------------------------------------------------------------------
-
-    def scaling_files(self, stage: str = "scaling") -> list[str]:
-        """Parts of the table scaling (or breakeven), of the scenes in this configuration."""
-        return [
-            f"{RESULTS}/{stage}/{scene}/x{factor:g}.csv"
-            for scene, factors in self.settings.scaling.scenes.items()
-            if scene in self.study.scenes
-            for factor in factors
-        ]
-
-    def breakeven_files(self) -> list[str]:
-        """Parts of the table breakeven: of each scene as it is, and of it on other meshes."""
-        own = self.per_scene("breakeven", ".csv")
-        return own + [path for path in self.scaling_files("breakeven") if Path(path).stem != "x1"]
-
-    # Large scenes ---------------------------------------------------------------------------
-
-    def online_files(self) -> list[str]:
-        """Files of the large scenes of this configuration."""
-        return [f"{RESULTS}/online/{scene}.csv" for scene in self.study.online]
-
-    # Ablation in position subspaces ---------------------------------------------------------
-
-    def ablation_files(self) -> list[str]:
-        """Files of the scenes of the ablation that this configuration holds."""
-        scenes = [s for s in self.study.scenes if s in self.study.ablation.scenes]
-        return [f"{RESULTS}/subspace_ablation/{scene}.csv" for scene in scenes]
 
     # Figures --------------------------------------------------------------------------------
 

@@ -10,8 +10,9 @@ from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.paths import RESULTS, Place
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.holdings import HELD, paths_of
-from pdrom.pipeline.plan import TABLES, Plan
+from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.scenes import read_scene, scene_names
+from pdrom.pipeline.tables import all_tables
 
 PLACES = [place for place in vars(paths).values() if isinstance(place, Place)]
 
@@ -118,7 +119,7 @@ def _suggestion(value: str, allowed: Iterable[str]) -> str:
 
 def known(plan: Plan) -> Known:
     """What the study of a plan knows."""
-    study, names = plan.study, Names(list(plan.figure_specs), TABLES)
+    study, names = plan.study, Names(list(plan.figure_specs), all_tables())
     held = [path for place in HELD for path in paths_of(study, place, plan.results)]
 
     def mesh(scene: str) -> str:
@@ -126,7 +127,7 @@ def known(plan: Plan) -> Known:
 
     return Known(
         results=plan.results,
-        files=[*plan.tables, *plan.figures, *held],
+        files=[*plan.tables.paths, *plan.figures, *held],
         names=names,
         labels={
             "scene": lambda labels: scene_names(study.root),

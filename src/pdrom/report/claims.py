@@ -15,11 +15,13 @@ from pydantic import Field, FiniteFloat, model_validator
 
 from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
-from pdrom.tables.columns import BREAKEVEN_CURVE, COLUMNS
+from pdrom.tables import declared
+from pdrom.tables.break_even import CURVE
 
-HOLDS, FAILS, UNDECIDED = "holds", "does not hold", "cannot be decided"
+VERDICTS = HOLDS, FAILS, UNDECIDED = "holds", "does not hold", "cannot be decided"
 Tables = Mapping[str, pd.DataFrame]
 Value = str | int | float
+_PLACE = ("scene", "group", "method", "position_basis")
 
 
 class _Model(ConfigModel):
@@ -49,7 +51,7 @@ class TestRule(_Model):
     def _metric_exists(self) -> Self:
         if self.metric not in METRICS:
             raise ValueError(f"metric = '{self.metric}': allowed are {', '.join(METRICS)}")
-        columns = COLUMNS[METRIC_TABLES[self.metric]]
+        columns = declared()[METRICS[self.metric].table].column_names
         for column in self.where:
             if column not in columns:
                 raise ValueError(f"where: no column '{column}'{choices(column, columns)}")
@@ -177,7 +179,7 @@ def _local_ratio(tables: Tables, where: dict) -> pd.Series:
     more from some size on shows at the largest size that the basis has.
     """
     rows = _filter(tables["breakeven"], where).dropna(subset=["ratio"]).sort_values("r")
-    largest = rows.groupby(BREAKEVEN_CURVE, sort=False).tail(1)
+    largest = rows.groupby(CURVE, sort=False).tail(1)
     return largest.sort_index().ratio
 
 
@@ -192,33 +194,55 @@ def _position_basis_ratio(tables: Tables, where: dict) -> pd.Series:
     return (errors["pod"] / errors["skinning"]).dropna()
 
 
-METRICS: dict[str, Callable[[Tables, dict], pd.Series]] = {
-    "local_share": _local_share,
-    "rerun_error": _rerun_error,
-    "error_trend": _error_trend,
-    "singular_value_decay": _decay,
-    "reconstruction_error": _reconstruction,
-    "elements_per_entry": _elements_per_entry,
-    "local_time_ratio": _local_ratio,
-    "position_basis_ratio": _position_basis_ratio,
+@dataclass(frozen=True)
+class Metric:
+    """What a test compares: values from some columns of one table."""
+
+    values: Callable[[Tables, dict], pd.Series]
+    table: str
+    columns: tuple[str, ...]
+
+
+_RERUN = ("frames", "blowup_frame", "relative_error_within_horizon")
+METRICS = {
+    "local_share": Metric(_local_share, "local_share", ("local_share",)),
+    "rerun_error": Metric(_rerun_error, "reduced_reruns", (*_RERUN, *_PLACE, "r")),
+    "error_trend": Metric(_error_trend, "reduced_reruns", (*_RERUN, *_PLACE, "r")),
+    "singular_value_decay": Metric(
+        _decay, "singular_values", ("scene", "group", "above_roundoff", "relative")
+    ),
+    "reconstruction_error": Metric(
+        _reconstruction, "reconstruction_error", ("gain", "relative_error")
+    ),
+    "elements_per_entry": Metric(
+        _elements_per_entry, "reconstruction_error", ("elements_sampled", "r")
+    ),
+    "local_time_ratio": Metric(_local_ratio, "breakeven", (*CURVE, "r", "ratio")),
+    "position_basis_ratio": Metric(
+        _position_basis_ratio,
+        "reduced_reruns",
+        ("scene", "k", "position_basis", "relative_error_within_horizon"),
+    ),
 }
 
-# The table whose rows a metric compares.
-METRIC_TABLES = {
-    "local_share": "local_share",
-    "rerun_error": "reduced_reruns",
-    "error_trend": "reduced_reruns",
-    "singular_value_decay": "singular_values",
-    "reconstruction_error": "reconstruction_error",
-    "elements_per_entry": "reconstruction_error",
-    "local_time_ratio": "breakeven",
-    "position_basis_ratio": "reduced_reruns",
-}
+
+def timed_columns(rule: ClaimRule) -> set[str]:
+    """Columns of a claim's row in which a clock has a say: two runs may differ there."""
+    timed = [test for test in rule.tests if _is_timed(test)]
+    if not timed:
+        return set()
+    return {"why", "measured", "verdict"} if any(t.decides for t in timed) else {"why"}
+
+
+def _is_timed(test: TestRule) -> bool:
+    metric = METRICS[test.metric]
+    timing = declared()[metric.table].timing_columns
+    return not set(timing).isdisjoint({*metric.columns, *test.where})
 
 
 def evaluate(test: TestRule, tables: Tables) -> Outcome:
     """Compare the rows of a test with its threshold."""
-    values = METRICS[test.metric](tables, dict(test.where)).to_numpy(float)
+    values = METRICS[test.metric].values(tables, dict(test.where)).to_numpy(float)
     if len(values) == 0:
         return Outcome(None, "no data", f"{test.what}: {_why_empty(test, tables)}")
     passed = values >= test.threshold if test.compare == ">=" else values <= test.threshold
@@ -251,11 +275,9 @@ def _text(value: float) -> str:
     return f"{value:.2g}"
 
 
-def claims_table(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
-    """The table claims: one row per claim, in the order of the file."""
-    return pd.DataFrame(
-        [_row(name, rule, tables) for name, rule in rules.items()], columns=COLUMNS["claims"]
-    )
+def claims_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
+    """Rows of the table claims, in the order of the file."""
+    return pd.DataFrame([_row(name, rule, tables) for name, rule in rules.items()])
 
 
 def _row(name: str, rule: ClaimRule, tables: Tables) -> dict[str, Any]:

@@ -1,12 +1,36 @@
-"""Rule claims: tables and rules -> verdicts."""
+"""Table claims: the verdicts on the paper's claims, with the rules of config/claims.yaml."""
 
 from pathlib import Path
 
-from pdrom.core.store import read_table, write_table
-from pdrom.report.claims import claims_table, load_claims
+import pandas as pd
+
+from pdrom.core.reads import ProjectFile, TableOf
+from pdrom.report.claims import METRICS, VERDICTS, claims_rows, load_claims, timed_columns
+from pdrom.tables.declaration import table, text, timed
 
 
-def decide_claims(rules: str, tables: list[str], output: str) -> None:
-    """Evaluate config/claims.yaml on the tables."""
-    read = {Path(path).stem: read_table(path) for path in tables}
-    write_table(claims_table(load_claims(Path(rules)), read), output)
+def _timed_cells(claims: pd.DataFrame, rules: Path) -> list[set[str]]:
+    loaded = load_claims(rules)
+    return [timed_columns(loaded[claim]) for claim in claims.claim]
+
+
+@table(
+    title="Verdicts on the claims of the paper",
+    columns=(
+        text("claim", "its identifier in config/claims.yaml"),
+        text("source", "who claims it"),
+        text("paper", "what the paper says"),
+        timed(text("measured", "range of what was measured, of the tests that decide")),
+        timed(text("verdict", f"one of: {', '.join(VERDICTS)}")),
+        timed(text("why", "all tests in words")),
+        text("figure_or_table", "where to see it"),
+    ),
+    reads={
+        "rules": ProjectFile("config/claims.yaml"),
+        **{name: TableOf(name) for name in sorted({m.table for m in METRICS.values()})},
+    },
+    timed_cells=_timed_cells,
+)
+def claims(rules: Path, **tables: pd.DataFrame) -> pd.DataFrame:
+    """One row per claim, in the order of the file."""
+    return claims_rows(load_claims(rules), tables)

@@ -1,5 +1,5 @@
-"""The tables of the study: columns, and one function a table."""
+"""The tables of the study, one module a table; see `pdrom.tables.declaration`."""
 
-from pdrom.tables.columns import COLUMNS, TIMING_COLUMNS
+from pdrom.tables.find import declared, timing_columns
 
-__all__ = ["COLUMNS", "TIMING_COLUMNS"]
+__all__ = ["declared", "timing_columns"]

@@ -14,23 +14,47 @@ and ``fewer-iterations`` is the full-order run stopped earlier: what a reduction
 ``fom-anderson`` are full-order runs with accelerated iterations.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
-from pdrom.core.store import read_table
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every, PerScene, TableOf
 from pdrom.experiments.names import ANDERSON, FOM
-from pdrom.tables.columns import conform
+from pdrom.tables.declaration import flag, integer, table, timed
+from pdrom.tables.parts import joined
+from pdrom.tables.vocabulary import ERROR_WITHIN, METHOD, MS_PER_FRAME, POSITION_BASIS, SCENE, K, R
 
 FEWER = "fewer-iterations"
 CONVERGED, OWN = "converged", "own iterations"
 
 
+@table(
+    title="Every method and size as a point of accuracy and cost",
+    columns=(
+        SCENE,
+        METHOD,
+        POSITION_BASIS,
+        K,
+        R,
+        integer("iterations", "local/global iterations of a frame"),
+        ERROR_WITHIN,
+        MS_PER_FRAME,
+        timed(flag("pareto", "no point of the same reference is as good in both, better in one")),
+    ),
+    reads={
+        "reruns": TableOf("reduced_reruns"),
+        "timings": Every(paths.TIMINGS),
+        "sweeps": Every(paths.ITERATIONS),
+        "iterations": PerScene("iterations"),
+    },
+)
 def accuracy_cost(
     reruns: pd.DataFrame,
-    timings: Iterable[str],
-    sweeps: Iterable[str],
+    timings: list[File],
+    sweeps: list[File],
     iterations: Mapping[str, int],
 ) -> pd.DataFrame:
     """Points of the reruns whose error within the horizon and time exist, and full-order runs.
@@ -44,43 +68,41 @@ def accuracy_cost(
     sweeps : tables of the scenes' full-order runs with other numbers of iterations
     iterations : scene -> its own local/global iterations K per frame
     """
-    times = pd.concat([read_table(path) for path in timings], ignore_index=True)
+    times = joined(timings)
     times = times[times.implementation == "compiled"]
     full = times[times.method.isna()].copy()
     full = full.assign(method="full", position_basis="full", relative_error_within_horizon=0.0)
-    sweep = _sweep(pd.concat([read_table(path) for path in sweeps], ignore_index=True), times)
+    sweep = _sweep(joined(sweeps), times)
     points = reruns.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
     points = points.assign(iterations=points.scene.map(iterations))
     parts = [full.assign(iterations=full.scene.map(iterations)), points, sweep]
     points = pd.concat([part for part in parts if len(part)], ignore_index=True)
-    for column in ("k", "r", "iterations"):
-        points[column] = points[column].astype("Int64")
     points["pareto"] = False
     for _, rows in points.groupby(["scene", reference_of(points)], sort=False):
         error = rows.relative_error_within_horizon.to_numpy(float)
         points.loc[rows.index, "pareto"] = pareto(error, rows.ms_per_frame.to_numpy(float))
     order = points.scene.map({scene: i for i, scene in enumerate(iterations)})
-    return conform(points.iloc[np.argsort(order, kind="stable")], "accuracy_cost")
+    return points.iloc[np.argsort(order, kind="stable")]
 
 
 def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     """Full-order runs of every K against the converged one, and those stopped early."""
     full = times[times.method.isna() | times.method.isin([FOM, ANDERSON])]
     cost = full[["scene", "method", "iterations", "ms_per_frame"]]
-    cost = cost.astype({"iterations": "Int64"}).fillna({"method": FOM})
-    errors = errors.dropna(subset=["iterations"]).astype({"iterations": "Int64"})
+    cost = cost.fillna({"method": FOM})
+    errors = errors.dropna(subset=["iterations"])
     errors["method"] = (errors.window > 0).map({True: ANDERSON, False: FOM})
     errors = errors.merge(cost, on=["scene", "method", "iterations"])
     own = full[full.method.isna()].set_index("scene").iterations
     early = (errors.iterations < errors.scene.map(own)) & (errors.method == FOM)
     parts = [(errors.method, errors, "error_converged")]
-    parts.append((FEWER, errors[early.astype(bool)], "error_scene"))
+    parts.append((FEWER, errors[early], "error_scene"))
     named = [
         rows.assign(method=method, relative_error_within_horizon=rows[column])
         for method, rows, column in parts
     ]
-    table = pd.concat(named, ignore_index=True).assign(position_basis="full", k=None, r=None)
-    return table.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
+    points = pd.concat(named, ignore_index=True).assign(position_basis="full", k=None, r=None)
+    return points.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
 
 
 def reference_of(points: pd.DataFrame) -> pd.Series:

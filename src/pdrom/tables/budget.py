@@ -4,10 +4,29 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from pdrom.tables.accuracy_cost import reference_of
-from pdrom.tables.columns import COLUMNS, conform
+from pdrom.core.reads import Setting, TableOf
+from pdrom.tables.accuracy_cost import CONVERGED, OWN, reference_of
+from pdrom.tables.declaration import integer, number, table, text, timed
+from pdrom.tables.vocabulary import ERROR_WITHIN, METHOD, MS_PER_FRAME, POSITION_BASIS, SCENE, K, R
 
 
+# A time decides which point of accuracy_cost a row names, hence all that the row says of it.
+@table(
+    title="What a frame's budget of time buys",
+    columns=(
+        SCENE,
+        number("budget_ms", "time that a frame may take", "ms"),
+        text("reference", f"what the error is taken against: {CONVERGED} or {OWN}"),
+        timed(METHOD),
+        timed(POSITION_BASIS),
+        timed(K),
+        timed(R),
+        timed(integer("iterations", "local/global iterations of a frame")),
+        timed(ERROR_WITHIN),
+        MS_PER_FRAME,
+    ),
+    reads={"points": TableOf("accuracy_cost"), "budgets": Setting("budgets")},
+)
 def budget(points: pd.DataFrame, budgets: Sequence[float]) -> pd.DataFrame:
     """One row per scene, budget and reference; the cheapest of equally accurate settings.
 
@@ -26,5 +45,4 @@ def budget(points: pd.DataFrame, budgets: Sequence[float]) -> pd.DataFrame:
             fits = part[part.ms_per_frame <= limit].head(1)
             best = fits.iloc[0].to_dict() if len(fits) else {}
             rows.append(best | {"scene": scene, "reference": reference, "budget_ms": limit})
-    table = pd.DataFrame(rows, columns=list(COLUMNS["budget"]))
-    return conform(table.astype(dict.fromkeys(("k", "r", "iterations"), "Int64")), "budget")
+    return pd.DataFrame(rows, columns=budget.column_names)

@@ -1,25 +1,26 @@
-"""Tables effects_cost and effects_left_out: what effects cost, and what leaving them out saves."""
-
-from collections.abc import Iterable
+"""Table effects_cost: what each effect of a scene costs."""
 
 import pandas as pd
 
-from pdrom.core.store import read_table
-from pdrom.tables.columns import COLUMNS, conform
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every
+from pdrom.tables.declaration import integer, number, table, text, timed
+from pdrom.tables.parts import joined
+from pdrom.tables.vocabulary import MS_PER_FRAME, SCENE
 
 
-def effects_cost(paths: Iterable[str]) -> pd.DataFrame:
-    """The scenes' tables one after the other; the shares of a scene add up to one."""
-    return _joined(paths, "effects_cost")
-
-
-def effects_left_out(paths: Iterable[str]) -> pd.DataFrame:
-    """Scenes with several groups, as they are and without some of their effects."""
-    return _joined(paths, "effects_left_out")
-
-
-def _joined(paths: Iterable[str], name: str) -> pd.DataFrame:
-    parts = [part for part in map(read_table, paths) if len(part)]
-    if not parts:
-        return pd.DataFrame(columns=COLUMNS[name])
-    return conform(pd.concat(parts, ignore_index=True), name)
+@table(
+    title="Cost of each effect in a full-order frame",
+    columns=(
+        SCENE,
+        text("effect", "name of the effect; the global solve and the rest have rows, too"),
+        integer("elements", "elements of a group, vertices of another effect"),
+        MS_PER_FRAME,
+        timed(number("share", "of the frame; those of a scene add up to one")),
+    ),
+    reads={"parts": Every(paths.EFFECTS)},
+)
+def effects_cost(parts: list[File]) -> pd.DataFrame:
+    """The scenes' tables one after the other."""
+    return joined(parts)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pandas as pd
-from scipy.stats import rankdata, spearmanr
 
-from pdrom.tables.columns import COLUMNS, conform
-from pdrom.tables.joined import ORTHOGONAL, reruns_with_gain
+from pdrom.core.reads import TableOf
+from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.gains import ORTHOGONAL, reruns_with_gain
 
 FAILED = 0.1  # error within the horizon above which a run counts as failed
 EVERY = "all"
@@ -17,6 +17,23 @@ PREDICTORS = {
 }
 
 
+@table(
+    title="What numbers known before a run say about its failure",
+    columns=(
+        text("predictor", f"one of: {', '.join(PREDICTORS)}"),
+        text("lower", f"smallest gain of the decade, or {EVERY}"),
+        text("upper", f"largest gain of the decade, or {EVERY}"),
+        integer("runs", "runs that count"),
+        integer("failed", "runs among them that fail"),
+        number("failed_share", "their share"),
+        number("median_error", "of the runs before the horizon"),
+        number("rank_correlation", "of predictor and error (Spearman)"),
+        number("threshold", "of the predictor that separates failed runs best"),
+        number("misclassified_share", "runs on its wrong side"),
+        number("failures_ordered", "probability that a failed run has the larger value of two"),
+    ),
+    reads={"reruns": TableOf("reduced_reruns"), "reconstruction": TableOf("reconstruction_error")},
+)
 def gain_prediction(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFrame:
     """Failures by decade of the gain, then how well each predictor orders and separates the runs.
 
@@ -32,13 +49,13 @@ def gain_prediction(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.Da
     """
     runs = judged_runs(reruns, reconstruction)
     if runs.empty:
-        return pd.DataFrame(columns=COLUMNS["gain_prediction"])
+        return runs
     rows = [{"predictor": "gain", **row} for row in _decades(runs)]
     for name, value in PREDICTORS.items():
         rows.append(
             {"predictor": name, "lower": EVERY, "upper": EVERY, **_judge(value(runs), runs)}
         )
-    return conform(pd.DataFrame(rows, columns=COLUMNS["gain_prediction"]), "gain_prediction")
+    return pd.DataFrame(rows)
 
 
 def judged_runs(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFrame:
@@ -90,7 +107,7 @@ def _judge(value: pd.Series, runs: pd.DataFrame) -> dict:
 
 def _ranks(x: np.ndarray, y: np.ndarray) -> float:
     """Spearman's correlation; infinite values are tied."""
-    return float(spearmanr(rankdata(x), rankdata(y)).statistic)
+    return float(pd.Series(x).rank().corr(pd.Series(y).rank()))
 
 
 def best_threshold(x: np.ndarray, failed: np.ndarray) -> tuple[float, int]:
@@ -110,4 +127,5 @@ def _ordered(x: np.ndarray, failed: np.ndarray) -> float | None:
     many, others = int(failed.sum()), int((~failed).sum())
     if not many or not others:
         return None
-    return float((rankdata(x)[failed].sum() - many * (many + 1) / 2) / (many * others))
+    ranks = pd.Series(x).rank()[failed].sum()
+    return float((ranks - many * (many + 1) / 2) / (many * others))

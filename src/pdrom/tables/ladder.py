@@ -1,18 +1,37 @@
 """Table ladder: every rung on every scene that climbs it."""
 
-from collections.abc import Iterable
-
 import pandas as pd
 
-from pdrom.core.store import read_table
-from pdrom.tables.columns import COLUMNS, conform
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every
+from pdrom.tables.declaration import number, table, text
+from pdrom.tables.parts import joined
+from pdrom.tables.vocabulary import BLOWUP_FRAME, ERROR_WITHIN, FINITE, GAIN, GROUP, SCENE, R
 
 
-def ladder(paths: Iterable[str]) -> pd.DataFrame:
-    """Concatenation of the per-scene files, in order; empty if there is none."""
-    parts = [read_table(path) for path in paths]
-    if not parts:
-        return pd.DataFrame(columns=COLUMNS["ladder"])
-    table = pd.concat(parts, ignore_index=True)
-    table["blowup_frame"] = table["blowup_frame"].astype("Int64")
-    return conform(table, "ladder")
+@table(
+    title="From the published choices to sound ones, one at a time",
+    columns=(
+        SCENE,
+        GROUP,
+        text(
+            "direction",
+            "up from published choices, down from sound ones, signs of the modes",
+        ),
+        text("rung", "choice that changes on this rung"),
+        R,
+        number("condition", "condition number of the sampled modes"),
+        GAIN,
+        number("error_train", "reconstruction error of the training snapshots"),
+        number("error_test", "the same of the snapshots between them"),
+        number("error_heldout", "the same of the held-out motion"),
+        FINITE,
+        BLOWUP_FRAME,
+        ERROR_WITHIN,
+    ),
+    reads={"parts": Every(paths.LADDER)},
+)
+def ladder(parts: list[File]) -> pd.DataFrame:
+    """Rows of all scenes, in order."""
+    return joined(parts)

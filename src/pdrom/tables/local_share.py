@@ -1,24 +1,41 @@
 """Table local_share: what part of a full-order frame the local step takes (claim C1)."""
 
-from collections.abc import Iterable
-
 import pandas as pd
 
-from pdrom.core.store import read_table
-from pdrom.tables.columns import conform
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every
+from pdrom.tables.declaration import number, table, text, timed
+from pdrom.tables.parts import joined
+from pdrom.tables.vocabulary import GLOBAL_MS, LOCAL_MS, LOCAL_SHARE, SCENE, VERTICES
+
+IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")
 
 
-def local_share(timings: Iterable[str]) -> pd.DataFrame:
-    """One row per scene and implementation; the share is local over local, assembly and global.
+@table(
+    title="Share of the local step in a full-order frame",
+    columns=(
+        SCENE,
+        text("implementation", f"of the local step: {', '.join(IMPLEMENTATIONS)}"),
+        VERTICES,
+        LOCAL_MS,
+        timed(number("assembly_ms", "time of the right-hand side in a frame", "ms")),
+        GLOBAL_MS,
+        LOCAL_SHARE,
+    ),
+    reads={"timings": Every(paths.TIMINGS)},
+)
+def local_share(timings: list[File]) -> pd.DataFrame:
+    """One row per scene and implementation; assembly counts as a part of the local step.
 
     Compiled kernels project and scatter in one pass: their assembly time is part of the local step.
     """
-    table = pd.concat([read_table(path) for path in timings], ignore_index=True)
-    full = table[table.method.isna()].copy()
+    times = joined(timings)
+    full = times[times.method.isna()].copy()
     full["local_share"] = (full.local_ms + full.assembly_ms) / (
         full.local_ms + full.assembly_ms + full.global_ms
     )
-    order = {"interpreted": 0, "numpy": 1, "compiled": 2}
-    scenes = {scene: i for i, scene in enumerate(table.scene.unique())}
-    keys = full.scene.map(scenes) * 10 + full.implementation.map(order)
-    return conform(full.iloc[keys.argsort(kind="stable")], "local_share")
+    order = {name: place for place, name in enumerate(IMPLEMENTATIONS)}
+    scenes = {scene: place for place, scene in enumerate(times.scene.unique())}
+    keys = full.scene.map(scenes) * len(order) + full.implementation.map(order)
+    return full.iloc[keys.argsort(kind="stable")]

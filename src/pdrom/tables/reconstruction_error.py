@@ -1,16 +1,35 @@
 """Table reconstruction_error: all methods, sizes and splits."""
 
-from collections.abc import Iterable
-
 import pandas as pd
 
-from pdrom.core.store import read_table
-from pdrom.tables.columns import conform
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every
+from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.parts import joined
+from pdrom.tables.vocabulary import ELEMENTS_SAMPLED, GAIN, GROUP, METHOD, SCENE, R
+
+_SMALL = "empty at round-off level"
 
 
-def reconstruction_error(paths: Iterable[str]) -> pd.DataFrame:
-    """Concatenation of the per-method files, in order."""
-    table = pd.concat([read_table(path) for path in paths], ignore_index=True)
-    for column in ("rows_sampled", "elements_sampled"):
-        table[column] = table[column].astype("Int64")
-    return conform(table, "reconstruction_error")
+@table(
+    title="Reconstruction error of every method and size",
+    columns=(
+        SCENE,
+        GROUP,
+        METHOD,
+        R,
+        text("split", "snapshots that are reconstructed: train, test, heldout"),
+        number("relative_error", f"of the projections; {_SMALL}"),
+        number("relative_error_x", f"of their x-coordinates; {_SMALL}"),
+        number("relative_error_y", f"of their y-coordinates; {_SMALL}"),
+        number("relative_error_z", f"of their z-coordinates; {_SMALL}"),
+        GAIN,
+        integer("rows_sampled", "rows of the projections that are evaluated"),
+        ELEMENTS_SAMPLED,
+    ),
+    reads={"parts": Every(paths.RECONSTRUCTION)},
+)
+def reconstruction_error(parts: list[File]) -> pd.DataFrame:
+    """Rows of all methods, in order."""
+    return joined(parts)

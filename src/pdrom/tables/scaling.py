@@ -1,28 +1,54 @@
-"""Tables scaling and scaling_fit: time and memory against the number of vertices."""
+"""Table scaling: time and memory against the number of vertices."""
 
-from collections.abc import Iterable
-
-import numpy as np
 import pandas as pd
 
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every
 from pdrom.core.store import read_table
 from pdrom.experiments.names import FOM
-from pdrom.tables.columns import COLUMNS, conform
+from pdrom.tables.declaration import integer, number, table, text, timed
+from pdrom.tables.vocabulary import (
+    ELEMENTS_SAMPLED,
+    LOCAL_SHARE,
+    SCENE,
+    SPEEDUP,
+    THREADS,
+    VERTICES,
+    K,
+    R,
+)
 
-QUANTITIES = ("ms_per_iteration", "local_ms", "global_ms", "factorisation_ms", "memory_mb")
 
-
-def scaling(paths: Iterable[str]) -> pd.DataFrame:
-    """All scenes, one row per mesh size and method (``fom``, a reduced local step, ``ecsw``).
+@table(
+    title="Cost of an iteration against the size of the mesh",
+    columns=(
+        SCENE,
+        text("method", f"{FOM} (full order), a reduced local step, or ecsw"),
+        THREADS,
+        VERTICES,
+        integer("elements", "elements of all groups"),
+        R,
+        K,
+        ELEMENTS_SAMPLED,
+        timed(number("factorisation_ms", "assembly and factorisation of the system", "ms")),
+        timed(number("memory_mb", "memory that both took", "MB")),
+        timed(number("ms_per_iteration", "time of an iteration", "ms")),
+        timed(number("local_ms", "time of the local step in an iteration", "ms")),
+        timed(number("global_ms", "time of the global solve in an iteration", "ms")),
+        LOCAL_SHARE,
+        SPEEDUP,
+        timed(number("local_speedup", "the same of the local step alone")),
+    ),
+    reads={"parts": Every(paths.SCALING)},
+)
+def scaling(parts: list[File]) -> pd.DataFrame:
+    """All scenes, one row per mesh size and method.
 
     The speed-ups, of an iteration and of its local step, are over the full-order run on one thread.
     """
-    parts = [_with_speedups(read_table(path)) for path in paths]
-    if not parts:
-        return pd.DataFrame(columns=list(COLUMNS["scaling"]))
-    table = pd.concat(parts, ignore_index=True)
-    counts = dict.fromkeys(("r", "k", "elements_sampled"), "Int64")
-    return conform(table.astype(counts), "scaling")
+    sizes = [_with_speedups(read_table(part.path)) for part in parts]
+    return pd.concat(sizes, ignore_index=True) if sizes else pd.DataFrame()
 
 
 def _with_speedups(part: pd.DataFrame) -> pd.DataFrame:
@@ -31,20 +57,3 @@ def _with_speedups(part: pd.DataFrame) -> pd.DataFrame:
         speedup=own.ms_per_iteration / part.ms_per_iteration,
         local_speedup=own.local_ms / part.local_ms,
     )
-
-
-def scaling_fit(table: pd.DataFrame) -> pd.DataFrame:
-    """Exponents of power laws in the number of vertices, by least squares on the logarithms.
-
-    A quantity with fewer than two sizes has no row.
-    """
-    rows = []
-    for labels, part in table.groupby(["scene", "method", "threads"], sort=False):
-        for quantity in QUANTITIES:
-            points = part[["vertices", quantity]].dropna()
-            points = points[points[quantity] > 0.0].astype(float)
-            if points.vertices.nunique() < 2:
-                continue
-            exponent, _ = np.polyfit(np.log(points.vertices), np.log(points[quantity]), 1)
-            rows.append([*labels, quantity, exponent, len(points)])
-    return pd.DataFrame(rows, columns=list(COLUMNS["scaling_fit"]))

@@ -1,16 +1,27 @@
 """Table sensitivity: how far runs drift apart that should be the same."""
 
-from collections.abc import Iterable
-
 import pandas as pd
 
-from pdrom.core.store import read_table
-from pdrom.tables.columns import conform
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every
+from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.parts import joined
+from pdrom.tables.vocabulary import SCENE
 
 
-def sensitivity(paths: Iterable[str]) -> pd.DataFrame:
+@table(
+    title="Drift of perturbed full-order runs",
+    columns=(
+        SCENE,
+        text("perturbation", "of the start, over the extent; or what else was changed"),
+        integer("frame", "number of the frame, from 0"),
+        number("relative_difference", "largest over the seeds"),
+    ),
+    reads={"parts": Every(paths.SENSITIVITY)},
+)
+def sensitivity(parts: list[File]) -> pd.DataFrame:
     """Largest difference over the seeds, per scene, perturbation and frame."""
-    every = pd.concat([read_table(path) for path in paths], ignore_index=True)
     keys = ["scene", "perturbation", "frame"]
-    table = every.groupby(keys, sort=False, as_index=False)["relative_difference"].max()
-    return conform(table, "sensitivity")
+    rows = joined(parts).groupby(keys, sort=False, as_index=False)
+    return rows["relative_difference"].max()

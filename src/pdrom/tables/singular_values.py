@@ -1,25 +1,39 @@
 """Table singular_values: decay of the centred training snapshots of each group."""
 
-from collections.abc import Iterable
-from pathlib import Path
-
 import pandas as pd
 
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Preferred
 from pdrom.reduction.basis import load_basis
-from pdrom.tables.columns import conform
+from pdrom.tables.declaration import flag, integer, number, table
+from pdrom.tables.vocabulary import GROUP, SCENE
 
 
-def singular_values(bases: Iterable[str]) -> pd.DataFrame:
-    """Rows of all bases, given as paths ``.../{scene}/{group}/{basis}.h5`` in order."""
+@table(
+    title="Singular values of the training snapshots",
+    columns=(
+        SCENE,
+        GROUP,
+        integer("component", "number of the mode, from 1"),
+        number("singular_value", "of the snapshot matrix", "that of the group's projections"),
+        number("relative", "over the first one"),
+        flag("above_roundoff", "larger than the rounding errors of the projections"),
+    ),
+    # of an experiment's bases the one without weights and centring: every study may hold others
+    reads={"bases": Preferred(paths.BASIS, "basis", "none-none-vectorised")},
+)
+def singular_values(bases: list[File]) -> pd.DataFrame:
+    """Rows of all bases, in order."""
     parts = []
-    for path in bases:
-        basis = load_basis(path)
+    for file in bases:
+        basis = load_basis(file.path)
         sigma = basis.singular_values
         parts.append(
             pd.DataFrame(
                 {
-                    "scene": Path(path).parent.parent.name,
-                    "group": Path(path).parent.name,
+                    "scene": file["scene"],
+                    "group": file["group"],
                     "component": range(1, len(sigma) + 1),
                     "singular_value": sigma,
                     "relative": sigma / sigma[0] if sigma[0] > 0.0 else float("nan"),
@@ -27,4 +41,4 @@ def singular_values(bases: Iterable[str]) -> pd.DataFrame:
                 }
             )
         )
-    return conform(pd.concat(parts, ignore_index=True), "singular_values")
+    return pd.concat(parts, ignore_index=True)

@@ -1,24 +1,78 @@
 """Table stability: where each method can be trusted, over scenes, sizes, time step, stiffness."""
 
-from collections.abc import Iterable, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
 
-from pdrom.core.store import open_hdf5, read_table
-from pdrom.tables.columns import conform
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every, PerScene, Setting, TableOf
+from pdrom.core.store import open_hdf5
+from pdrom.tables.declaration import number, table, text
+from pdrom.tables.parts import joined
+from pdrom.tables.reruns import KEYS
+from pdrom.tables.vocabulary import (
+    BLOWUP_FRAME,
+    ENERGY_RATIO,
+    FINITE,
+    GAIN,
+    GROUP,
+    GUARD_COUNT,
+    GUARD_FRAME,
+    GUARD_REASON,
+    MAX_EXTENT,
+    METHOD,
+    POSITION_BASIS,
+    RELATIVE_ERROR,
+    SCENE,
+    K,
+    R,
+)
 
 OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
-KEYS = ["scene", "group", "method", "position_basis", "k", "r"]
-SETTING = ["experiment", "scene", "h", "stiffness_ratio"]
+SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # what has one full-order run
 
 
+@table(
+    title="Where each method can be trusted",
+    columns=(
+        SCENE,
+        METHOD,
+        R,
+        number("h", "time step", "s"),
+        number("stiffness_ratio", "factor on the weights of the reduced groups"),
+        FINITE,
+        BLOWUP_FRAME,
+        MAX_EXTENT,
+        ENERGY_RATIO,
+        GAIN,
+        GROUP,
+        POSITION_BASIS,
+        K,
+        text("experiment", "rerun (of the study) or sweep (a short run)"),
+        RELATIVE_ERROR,
+        text("outcome", f"one of: {', '.join(OUTCOMES)}"),
+        GUARD_FRAME,
+        GUARD_REASON,
+        GUARD_COUNT,
+    ),
+    reads={
+        "full_order": Every(paths.TRAIN),
+        "reruns": Every(paths.RERUNS_TRAIN),
+        "subspaces": Every(paths.SUBSPACES_TRAIN),
+        "sweeps": Every(paths.STABILITY),
+        "reduced_reruns": TableOf("reduced_reruns"),
+        "time_steps": PerScene("time_step"),
+        "wrong": Setting("stability.wrong"),
+        "left": Setting("stability.left"),
+    },
+)
 def stability(
-    full_order: Iterable[str],
-    reruns: Iterable[str],
-    hyper: Iterable[str],
-    sweeps: Iterable[str],
+    full_order: list[File],
+    reruns: list[File],
+    subspaces: list[File],
+    sweeps: list[File],
     reduced_reruns: pd.DataFrame,
     time_steps: Mapping[str, float],
     wrong: float,
@@ -34,34 +88,27 @@ def stability(
 
     Parameters
     ----------
-    full_order, reruns, hyper, sweeps : files ``fom/{scene}/train.h5``, ``reruns/{scene}/{group}/
-        {method}.csv``, ``hyper/{scene}/models.csv`` and ``stability/{scene}.csv``
+    full_order : full-order runs
+    reruns, subspaces, sweeps : tables of the reruns, of those in subspaces, of the short runs
     time_steps : scene -> h in seconds
     wrong, left : see `pdrom.pipeline.study.Stability`
     """
     runs = pd.concat(
-        [_full_order_rows(full_order), _rerun_rows(reruns, hyper, reduced_reruns)],
+        [_full_order_rows(full_order), _rerun_rows(reruns, subspaces, reduced_reruns)],
         ignore_index=True,
     )
     runs = runs.assign(h=runs.scene.map(time_steps), stiffness_ratio=1.0, experiment="rerun")
-    parts = [runs, *(read_table(path).assign(experiment="sweep") for path in sweeps)]
-    table = pd.concat(parts, ignore_index=True)
-    # a file in which nothing ran brings a column of floats
-    flags = [None if pd.isna(cell) else bool(cell) for cell in table.finite]
-    table["finite"] = pd.array(flags, dtype="boolean")
-    for column in ("k", "r", "blowup_frame", "guard_frame", "guard_count"):
-        table[column] = table[column].astype("Int64")
-    table["outcome"] = outcomes(table, wrong, left)
-    return conform(table, "stability")
+    rows = pd.concat([runs, joined(sweeps).assign(experiment="sweep")], ignore_index=True)
+    return rows.assign(outcome=outcomes(rows, wrong, left))
 
 
-def outcomes(table: pd.DataFrame, wrong: float, left: float) -> list[str]:
+def outcomes(runs: pd.DataFrame, wrong: float, left: float) -> list[str]:
     """One of `OUTCOMES` for each row; needs the full-order row of every setting."""
-    full = table[(table.method == "full") & (table.position_basis == "full")]
+    full = runs[(runs.method == "full") & (runs.position_basis == "full")]
     extents = full.set_index(SETTING).max_extent.to_dict()
     return [
         _outcome(row, extents[tuple(getattr(row, key) for key in SETTING)], wrong, left)
-        for row in table.itertuples()
+        for row in runs.itertuples()
     ]
 
 
@@ -77,15 +124,15 @@ def _outcome(row, full_extent: float, wrong: float, left: float) -> str:
     return "wrong" if row.relative_error > wrong else "accurate"
 
 
-def _full_order_rows(paths: Iterable[str]) -> pd.DataFrame:
+def _full_order_rows(files: list[File]) -> pd.DataFrame:
     """The full-order runs themselves; their energy ratio is one by definition."""
     rows = []
-    for path in paths:
-        with open_hdf5(path) as file:
+    for run in files:
+        with open_hdf5(run.path) as file:
             extents = np.ptp(file["positions"][...], axis=1).max(axis=1)
         rows.append(
             {
-                "scene": Path(path).parent.name,
+                "scene": run["scene"],
                 "method": "full",
                 "position_basis": "full",
                 "finite": bool(np.isfinite(extents).all()),
@@ -98,21 +145,12 @@ def _full_order_rows(paths: Iterable[str]) -> pd.DataFrame:
 
 
 def _rerun_rows(
-    reruns: Iterable[str], hyper: Iterable[str], reduced_reruns: pd.DataFrame
+    reruns: list[File], subspaces: list[File], reduced_reruns: pd.DataFrame
 ) -> pd.DataFrame:
     """Reruns with their energy ratio and gain, and with the error that reduced_reruns judges by."""
-    local = [read_table(path).assign(position_basis="full") for path in reruns]
-    table = pd.concat([*local, *(read_table(path) for path in hyper)], ignore_index=True)
-    table = table.drop(columns="relative_error")
+    local = joined(reruns).assign(position_basis="full", k=np.nan)
+    runs = pd.concat([local, joined(subspaces)], ignore_index=True)
+    runs = runs.drop(columns="relative_error")
     errors = reduced_reruns[[*KEYS, "relative_error_within_horizon"]]
     errors = errors.rename(columns={"relative_error_within_horizon": "relative_error"})
-    if "k" not in table:
-        table["k"] = np.nan
-    return _with_plain_keys(table).merge(
-        _with_plain_keys(errors), on=KEYS, how="left", validate="one_to_one"
-    )
-
-
-def _with_plain_keys(table: pd.DataFrame) -> pd.DataFrame:
-    """``k`` and ``r`` as nullable integers on both sides of a merge."""
-    return table.astype({"k": "Int64", "r": "Int64"})
+    return runs.merge(errors, on=KEYS, how="left", validate="one_to_one")

@@ -1,19 +1,44 @@
 """Table subspace_ablation: variants of block DEIM in position subspaces, all scenes."""
 
-from collections.abc import Iterable
-
 import pandas as pd
 
-from pdrom.core.store import read_table
-from pdrom.tables.columns import COLUMNS, conform
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every
+from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.parts import joined
+from pdrom.tables.vocabulary import (
+    ELEMENTS_SAMPLED,
+    ERROR_WITHIN,
+    FINITE,
+    GAIN,
+    MAX_EXTENT,
+    POSITION_BASIS,
+    SCENE,
+    K,
+)
 
 
-def subspace_ablation(paths: Iterable[str]) -> pd.DataFrame:
-    """Concatenation of the per-scene files, in order; empty if there is none."""
-    parts = [read_table(path) for path in paths]
-    if not parts:
-        return pd.DataFrame(columns=COLUMNS["subspace_ablation"])
-    table = pd.concat(parts, ignore_index=True)
-    table["elements_sampled"] = table["elements_sampled"].astype("Int64")
-    table["finite"] = table["finite"].astype("boolean")
-    return conform(table, "subspace_ablation")
+@table(
+    title="Variants of block DEIM in a position subspace",
+    columns=(
+        SCENE,
+        text("group", "all groups of the scene"),
+        POSITION_BASIS,
+        K,
+        integer("r", "modes of the projections of each group"),
+        text("variant", "what differs from plain block DEIM"),
+        ELEMENTS_SAMPLED,
+        GAIN,
+        FINITE,
+        MAX_EXTENT,
+        ERROR_WITHIN,
+        number("relative_error_full_projections", "the same with all elements evaluated"),
+        number("heldout_error_within_horizon", "error of the held-out motion before its horizon"),
+        number("heldout_error_full_projections", "the same with all elements evaluated"),
+    ),
+    reads={"parts": Every(paths.SUBSPACE_ABLATION)},
+)
+def subspace_ablation(parts: list[File]) -> pd.DataFrame:
+    """Rows of all scenes, in order."""
+    return joined(parts)

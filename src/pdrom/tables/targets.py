@@ -3,13 +3,34 @@
 import numpy as np
 import pandas as pd
 
-from pdrom.tables.columns import conform
-from pdrom.tables.joined import ORTHOGONAL, reruns_with_gain
+from pdrom.core.reads import TableOf
+from pdrom.tables.declaration import flag, number, table
+from pdrom.tables.gains import ORTHOGONAL, reruns_with_gain
+from pdrom.tables.vocabulary import ELEMENTS_SAMPLED, GAIN, GROUP, METHOD, SCENE, R
 
 FACTOR = 1.5  # of the orthogonal projection's error
 SIZES_FROM = 20  # basis sizes for which the target is set
 
 
+@table(
+    title="Who comes near the orthogonal projection",
+    columns=(
+        SCENE,
+        GROUP,
+        METHOD,
+        R,
+        number("error", "of the run before the horizon; inf if it ended earlier"),
+        number("orthogonal_error", "the same of the orthogonal projection at the same size"),
+        number("ratio", "the first over the second, neither below the sensitivity floor"),
+        flag("asked", f"r is at least {SIZES_FROM}, the sizes for which the target is set"),
+        flag("within", f"ratio is at most {FACTOR}, the target"),
+        GAIN,
+        ELEMENTS_SAMPLED,
+        number("elements_share", "elements that are evaluated over all elements"),
+        number("spread", "gain sqrt(elements_share)"),
+    ),
+    reads={"reruns": TableOf("reduced_reruns"), "reconstruction": TableOf("reconstruction_error")},
+)
 def targets(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFrame:
     """One row per run of a sampled method on a well-posed scene, compared with `ORTHOGONAL`.
 
@@ -24,11 +45,11 @@ def targets(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFrame:
     complete = runs[(runs.method == ORTHOGONAL) & runs.finite.fillna(False).astype(bool)]
     length = runs.scene.map(complete.groupby("scene").frames.max())
     judged = (runs.horizon_frame >= length) & runs.orthogonal_error.notna()
-    table = runs[judged & (runs.method != ORTHOGONAL) & runs.error.notna()].copy()
-    floor = table.sensitivity_floor
-    table["ratio"] = np.maximum(table.error, floor) / np.maximum(table.orthogonal_error, floor)
-    table["asked"] = table.r >= SIZES_FROM
-    table["within"] = table.ratio <= FACTOR
-    table["elements_share"] = table.elements_sampled.astype(float) / table.elements.astype(float)
-    table["spread"] = table.gain * np.sqrt(table.elements_share)
-    return conform(table, "targets")
+    rows = runs[judged & (runs.method != ORTHOGONAL) & runs.error.notna()].copy()
+    floor = rows.sensitivity_floor
+    rows["ratio"] = np.maximum(rows.error, floor) / np.maximum(rows.orthogonal_error, floor)
+    rows["asked"] = rows.r >= SIZES_FROM
+    rows["within"] = rows.ratio <= FACTOR
+    rows["elements_share"] = rows.elements_sampled.astype(float) / rows.elements.astype(float)
+    rows["spread"] = rows.gain * np.sqrt(rows.elements_share)
+    return rows

@@ -60,9 +60,9 @@ def test_rows_of_a_scene(written):
 
 def test_table_is_the_rows_of_all_scenes(written):
     _, path = written
-    assert len(online([path, path])) == 8
+    assert len(online(2 * [File(str(path), {})])) == 8
     empty = online([])
-    assert empty.columns.tolist() == COLUMNS
+    assert list(empty.columns) == COLUMNS
     assert len(empty) == 0
 
 

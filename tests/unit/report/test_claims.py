@@ -12,12 +12,15 @@ from pdrom.report.claims import (
     HOLDS,
     METRICS,
     UNDECIDED,
+    ClaimRule,
     TestRule,
-    claims_table,
+    claims_rows,
     load_claims,
+    timed_columns,
 )
 from pdrom.report.claims import evaluate as evaluated
-from pdrom.tables.columns import COLUMNS
+from pdrom.report.decide import claims
+from pdrom.tables import declared
 
 RERUNS = [
     # scene, group, method, position_basis, k, r, frames, blowup, error within, local_ms
@@ -104,7 +107,7 @@ def rule(metric: str, compare: str = "<=", threshold: float = 1.0, **settings) -
 
 def measured(metric: str, **where) -> list[float]:
     chosen = {k: v if isinstance(v, tuple) else (v,) for k, v in where.items()}
-    return METRICS[metric](tables(), chosen).tolist()
+    return METRICS[metric].values(tables(), chosen).tolist()
 
 
 @pytest.mark.parametrize(
@@ -200,9 +203,7 @@ def verdict(tmp_path, *tests: dict) -> pd.Series:
 
     path = tmp_path / "claims.yaml"
     path.write_text(yaml.safe_dump({"C1": claim(*tests)}))
-    table = claims_table(load_claims(path), tables())
-    assert tuple(table.columns) == COLUMNS["claims"]
-    return table.iloc[0]
+    return claims(path, **tables()).iloc[0]
 
 
 ABSENT = {"where": {"scene": ["absent"]}}
@@ -298,6 +299,53 @@ def test_the_claims_are_those_of_the_paper():
 @pytest.mark.parametrize("name", RULES)
 def test_without_data_nothing_is_decided(name):
     """Every rule names columns that exist, and none passes for lack of rows."""
-    empty = {table: pd.DataFrame(columns=list(columns)) for table, columns in COLUMNS.items()}
-    row = claims_table({name: RULES[name]}, empty).iloc[0]
+    empty = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
+    row = claims_rows({name: RULES[name]}, empty).iloc[0]
     assert (row.claim, row.verdict) == (name, UNDECIDED)
+
+
+# Which cells a clock decides ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", RULES)
+def test_a_metric_reads_no_column_that_it_does_not_name(name):
+    """So that a claim counts as timed if and only if it uses times."""
+    for test in RULES[name].tests:
+        metric = METRICS[test.metric]
+        whole = tables()
+        absent = {
+            c: allowed[0] for c, allowed in test.where.items() if c not in whole[metric.table]
+        }
+        whole[metric.table] = whole[metric.table].assign(**absent)
+        kept = {*metric.columns, *test.where} & set(whole[metric.table].columns)
+        part = {**whole, metric.table: whole[metric.table][sorted(kept)]}
+        where = dict(test.where)
+        np.testing.assert_array_equal(metric.values(part, where), metric.values(whole, where))
+
+
+def test_only_claims_about_times_are_timed():
+    timed = {name: timed_columns(rule) for name, rule in RULES.items()}
+    assert timed["C1"] == timed["C9"] == {"measured", "verdict", "why"}
+    assert timed["C2"] == timed["C7"] == timed["C12"] == set()
+
+
+def test_another_verdict_is_seen_where_no_clock_decides():
+    made = pd.DataFrame(
+        [{"claim": c, "verdict": HOLDS, "why": "a", "measured": "1"} for c in RULES]
+    )
+    made = made.reindex(columns=claims.column_names, fill_value="")
+    kept = claims.without_times(made, ROOT)
+    for place, name in enumerate(RULES):
+        other = made.copy()
+        other.loc[place, "verdict"] = UNDECIDED
+        changed = not claims.without_times(other, ROOT).equals(kept)
+        assert changed == ("verdict" not in timed_columns(RULES[name])), name
+
+
+def test_a_test_beside_the_verdict_makes_its_reason_timed():
+    own = {"what": "rows", "compare": ">=", "threshold": 0.5}
+    decides = TestRule(metric="rerun_error", **own)
+    beside = TestRule(metric="local_share", decides=False, **own)
+    base = {"text": "t", "source": "s", "paper": "p", "figure_or_table": "f"}
+    assert timed_columns(ClaimRule(tests=(decides, beside), **base)) == {"why"}
+    assert timed_columns(ClaimRule(tests=(decides,), **base)) == set()

@@ -6,11 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pdrom.core.paths import File
 from pdrom.core.store import write_table
-from pdrom.tables.breakeven import breakeven
+from pdrom.tables.break_even import breakeven
 from pdrom.tables.budget import budget
-from pdrom.tables.columns import COLUMNS
-from pdrom.tables.effects_cost import effects_cost, effects_left_out
+from pdrom.tables.effects_cost import effects_cost
+from pdrom.tables.effects_left_out import effects_left_out
 
 METHODS = ("fom", "fewer-iterations", "full", "block-deim")
 
@@ -36,7 +37,6 @@ ROWS = st.lists(
 def test_a_budget_buys_the_smallest_error_that_fits(rows):
     limits = (0.5, 2.0, 9.0)
     table = budget(points(rows), limits)
-    assert tuple(table.columns) == COLUMNS["budget"]
     for row in table.itertuples():
         rivals = [
             (error, cost)
@@ -63,7 +63,7 @@ def test_a_budget_that_buys_nothing_is_a_row():
 # Break-even ---------------------------------------------------------------------------------------
 
 
-def curve(folder, scene: str, offset: float, slope: float, full: float, sizes, shuffle=0) -> str:
+def curve(folder, scene: str, offset: float, slope: float, full: float, sizes, shuffle=0) -> File:
     """A local step that costs offset + slope r, as a file."""
     r = np.array(sizes)
     table = pd.DataFrame({"r": r, "local_ms": offset + slope * r}).sample(
@@ -74,7 +74,7 @@ def curve(folder, scene: str, offset: float, slope: float, full: float, sizes, s
         threads=1, full_ms=full,
     )  # fmt: skip
     write_table(table, folder / f"{scene}.csv")
-    return str(folder / f"{scene}.csv")
+    return File(str(folder / f"{scene}.csv"), {})
 
 
 @pytest.mark.parametrize(
@@ -89,8 +89,7 @@ def curve(folder, scene: str, offset: float, slope: float, full: float, sizes, s
 )
 def test_break_even_of_a_line(tmp_path, offset, slope, full, expected):
     path = curve(tmp_path, "a", offset, slope, full, [5, 10, 20, 40, 100])
-    table = breakeven([path])
-    assert tuple(table.columns) == COLUMNS["breakeven"]
+    table = breakeven([path], [])
     np.testing.assert_allclose(table.ratio, (offset + slope * table.r) / full)
     if expected is None:
         assert table.breakeven_r.isna().all()
@@ -103,7 +102,7 @@ def test_every_curve_has_its_own_break_even(tmp_path):
         curve(tmp_path, "a", 1.0, 0.1, 4.0, [5, 20, 40]),
         curve(tmp_path, "b", 1.0, 0.1, 2.0, [5, 20, 40]),
     ]
-    table = breakeven(paths)
+    table = breakeven(paths, [])
     assert table.groupby("scene").breakeven_r.unique().map(list).to_dict() == {"a": [30], "b": [10]}
 
 
@@ -114,11 +113,10 @@ def test_effects_are_joined_and_scenes_without_rows_left_out(tmp_path):
     cost = {"scene": "a", "effect": "spring", "elements": 3, "ms_per_frame": 1.0, "share": 1.0}
     write_table(pd.DataFrame([cost]), tmp_path / "a.csv")
     write_table(pd.DataFrame([cost | {"scene": "b"}]), tmp_path / "b.csv")
-    table = effects_cost([str(tmp_path / "a.csv"), str(tmp_path / "b.csv")])
-    assert tuple(table.columns) == COLUMNS["effects_cost"]
+    table = effects_cost([File(str(tmp_path / f"{name}.csv"), {}) for name in "ab"])
     assert table.scene.tolist() == ["a", "b"]
-    empty = pd.DataFrame(columns=list(COLUMNS["effects_left_out"]))
+    empty = pd.DataFrame(columns=effects_left_out.column_names)
     write_table(empty, tmp_path / "none.csv")
-    table = effects_left_out([str(tmp_path / "none.csv")])
-    assert tuple(table.columns) == COLUMNS["effects_left_out"]
+    table = effects_left_out([File(str(tmp_path / "none.csv"), {})])
+    assert tuple(table.columns) == effects_left_out.column_names
     assert len(table) == 0

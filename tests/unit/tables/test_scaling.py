@@ -9,9 +9,9 @@ from pdrom.core.paths import File
 from pdrom.experiments.scaling import Inputs, Outputs, Settings, Sized, SizedBreakEven, run
 from pdrom.pipeline.scenes import load_scene
 from pdrom.reduction.method import MethodSpec
-from pdrom.tables.breakeven import breakeven
-from pdrom.tables.columns import BREAKEVEN_CURVE, COLUMNS
-from pdrom.tables.scaling import QUANTITIES, scaling, scaling_fit
+from pdrom.tables.break_even import CURVE, breakeven
+from pdrom.tables.scaling import scaling
+from pdrom.tables.scaling_fit import QUANTITIES, scaling_fit
 
 SPEC = MethodSpec(title="block DEIM", centring="affine", rows="element")
 JOINT = MethodSpec(title="joint DEIM", centring="affine", rows="joint")
@@ -40,8 +40,8 @@ def test_one_size_or_nothing_measured_has_no_exponent():
 
 def test_no_scene_gives_empty_tables():
     table = scaling([])
-    assert tuple(table.columns) == COLUMNS["scaling"]
-    assert tuple(scaling_fit(table).columns) == COLUMNS["scaling_fit"]
+    assert tuple(table.columns) == scaling.column_names
+    assert tuple(scaling_fit(table).columns) == scaling_fit.column_names
 
 
 @pytest.mark.parametrize("name", ["strain_oop", "bar_release"])
@@ -61,12 +61,11 @@ def test_every_size_is_measured(tmp_path, name):
         run(settings, Inputs([]), Outputs(**files))
         outputs[factor] = paths
     sizes = [scene.mesh.coarsened(f).build(ROOT).vertices for f in outputs]
-    _check_iterations(scaling(files["iterations"] for files in outputs.values()), sizes)
-    _check_alone(breakeven(files["breakeven"] for files in outputs.values()), sizes)
+    _check_iterations(scaling([File(made["iterations"], {}) for made in outputs.values()]), sizes)
+    _check_alone(breakeven([File(made["breakeven"], {}) for made in outputs.values()], []), sizes)
 
 
 def _check_iterations(table: pd.DataFrame, sizes: list[int]) -> None:
-    assert tuple(table.columns) == COLUMNS["scaling"]
     assert table.method.tolist() == 2 * ["fom", "fom", "block-deim", "ecsw"]
     assert table.threads.tolist() == 2 * [1, 2, 1, 1]
     assert table.vertices.tolist() == [n for n in sizes for _ in range(4)]
@@ -82,10 +81,9 @@ def _check_iterations(table: pd.DataFrame, sizes: list[int]) -> None:
 
 
 def _check_alone(table: pd.DataFrame, sizes: list[int]) -> None:
-    assert tuple(table.columns) == COLUMNS["breakeven"]
     assert (table.local_ms > 0.0).all()
     assert (table.full_ms > 0.0).all()
-    curves = table.groupby(BREAKEVEN_CURVE)
+    curves = table.groupby(CURVE)
     assert len(curves) == 2 * 2 * 2
     assert [g.vertices.iloc[0] for _, g in curves if g.threads.iloc[0] == 1] == 2 * sizes
     for _, curve in curves:

@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pdrom.core import paths
+from pdrom.core.paths import File
 from pdrom.core.store import write_hdf5, write_table
-from pdrom.tables.columns import COLUMNS
 from pdrom.tables.stability import OUTCOMES, outcomes, stability
 
 RERUN = {"scene": "a", "group": "spring", "frames": 9, "finite": True, "blowup_frame": None,
@@ -42,19 +43,19 @@ def files(tmp_path):
     rows = [FULL | {"h": 0.2, "frames": 5}, FULL | {"h": 0.2} | own]
     sweep = pd.DataFrame(rows).drop(columns="experiment")
     sweep = sweep.assign(blowup_frame=None, energy_ratio=1.0, gain=None, k=None)
-    paths = {}
+    written = {}
     for name, table in (("reruns", local), ("hyper", hyper), ("sweep", sweep)):
-        paths[name] = str(tmp_path / name / "a.csv")
-        write_table(table, paths[name])
-    judged = pd.concat([local.assign(position_basis="full", k=None), hyper])
+        written[name] = [File(str(tmp_path / name / "a.csv"), {"scene": "a"})]
+        write_table(table, written[name][0].path)
+    judged = pd.concat([local.assign(position_basis="full", k=np.nan), hyper])
     errors = [0.05, None, None, 0.01, 0.5]
     judged = judged.assign(relative_error_within_horizon=errors)
-    return [str(fom)], [paths["reruns"]], [paths["hyper"]], [paths["sweep"]], judged
+    runs = paths.TRAIN.files([str(fom)])
+    return runs, written["reruns"], written["hyper"], written["sweep"], judged
 
 
 def test_every_run_has_its_row_and_outcome(files):
     table = stability(*files, {"a": 0.016}, 0.1, 2.0)
-    assert tuple(table.columns) == COLUMNS["stability"]
     assert table.outcome.tolist() == [
         "accurate", "accurate", "blow-up", "not run", "accurate", "wrong", "accurate", "wrong",
     ]  # fmt: skip

@@ -1,21 +1,24 @@
 """Tables of the study from small files, against values worked out by hand."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pdrom.core import paths
 from pdrom.core.errors import StorageError
+from pdrom.core.paths import File, Place
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.model.runs.horizon import floor_of
 from pdrom.reduction.basis import Basis, save_basis
-from pdrom.tables import COLUMNS, TIMING_COLUMNS
 from pdrom.tables.accuracy_cost import accuracy_cost, pareto, reference_of
-from pdrom.tables.columns import conform
+from pdrom.tables.heldout_reruns import heldout_reruns
 from pdrom.tables.local_share import local_share
 from pdrom.tables.reconstruction_error import reconstruction_error
-from pdrom.tables.reduced_reruns import heldout_reruns, reduced_reruns
+from pdrom.tables.reduced_reruns import reduced_reruns
 from pdrom.tables.sensitivity import sensitivity
 from pdrom.tables.singular_values import singular_values
 
@@ -37,53 +40,31 @@ HYPER = [
 ]  # fmt: skip
 
 
-def written(path, columns, *rows) -> str:
+def written(path, columns, *rows) -> File:
     """CSV of rows given as mappings; missing cells stay empty."""
     write_table(pd.DataFrame(list(rows), columns=columns), path)
-    return str(path)
-
-
-# Columns ------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", COLUMNS)
-def test_conform_orders_and_drops(name):
-    table = pd.DataFrame([{c: i for i, c in enumerate(reversed(COLUMNS[name]))} | {"more": 1}])
-    result = conform(table.set_axis([5]), name)
-    assert tuple(result.columns) == COLUMNS[name]
-    assert list(result.index) == [0]
-
-
-def test_conform_names_what_is_missing():
-    with pytest.raises(StorageError, match=r"sensitivity: lacks the column\(s\) scene, frame"):
-        conform(pd.DataFrame({"perturbation": [1], "relative_difference": [2]}), "sensitivity")
-
-
-def test_timing_columns_exist():
-    for name, columns in TIMING_COLUMNS.items():
-        assert set(columns) <= set(COLUMNS[name])
+    return File(str(path), {})
 
 
 # Singular values ----------------------------------------------------------------------------------
 
 
-def basis_file(path, sigma, rank) -> str:
+def basis_file(path, sigma, rank) -> File:
     basis = Basis(
         np.zeros((6, rank)), np.zeros(6), np.array(sigma), rank, 1e-9, 1, False, (True,) * 3,
         np.zeros((1, 2, rank)),
     )  # fmt: skip
     path.parent.mkdir(parents=True, exist_ok=True)
     save_basis(basis, path, {})
-    return str(path)
+    return paths.BASIS.file(str(path))
 
 
 def test_singular_values_with_their_share_and_round_off(tmp_path):
-    paths = [
-        basis_file(tmp_path / "b_scene" / "spring" / "x.h5", [4.0, 1.0, 1e-12], 2),
-        basis_file(tmp_path / "a_scene" / "bending" / "x.h5", [0.0, 0.0], 0),
+    bases = [
+        basis_file(tmp_path / "pod" / "b_scene" / "spring" / "x.h5", [4.0, 1.0, 1e-12], 2),
+        basis_file(tmp_path / "pod" / "a_scene" / "bending" / "x.h5", [0.0, 0.0], 0),
     ]
-    table = singular_values(paths)
-    assert tuple(table.columns) == COLUMNS["singular_values"]
+    table = singular_values(bases)
     assert table.scene.tolist() == ["b_scene"] * 3 + ["a_scene"] * 2
     assert table.group.tolist() == ["spring"] * 3 + ["bending"] * 2
     assert table.component.tolist() == [1, 2, 3, 1, 2]
@@ -96,14 +77,14 @@ def test_singular_values_with_their_share_and_round_off(tmp_path):
 
 
 def test_reconstruction_keeps_order_and_empty_cells(tmp_path):
-    columns = COLUMNS["reconstruction_error"]
+    columns = reconstruction_error.column_names
     row = dict.fromkeys(columns, 1.0) | {"scene": "s", "group": "g", "method": "deim"}
     empty = row | {"rows_sampled": None, "elements_sampled": None, "relative_error_z": None}
-    paths = [
+    parts = [
         written(tmp_path / "one.csv", columns, row | {"r": 20}, empty | {"r": 30}),
         written(tmp_path / "two.csv", columns, row | {"r": 6}),
     ]
-    table = reconstruction_error(paths)
+    table = reconstruction_error(parts)
     assert table.r.tolist() == [20, 30, 6]
     assert table.rows_sampled.dtype == "Int64"
     assert table.elements_sampled.isna().tolist() == [False, True, False]
@@ -115,7 +96,7 @@ def test_reconstruction_keeps_order_and_empty_cells(tmp_path):
 # Sensitivity --------------------------------------------------------------------------------------
 
 
-def sensitivity_files(tmp_path) -> list[str]:
+def sensitivity_files(tmp_path) -> list[File]:
     """Scene a leaves the threshold in frame 2 (held out: 1), scene b never does."""
     columns = ["scene", "perturbation", "seed", "frame", "relative_difference"]
     values = {
@@ -126,7 +107,7 @@ def sensitivity_files(tmp_path) -> list[str]:
         ("b", "1e-10", 1): [1e-12, 3e-12, 2e-12, 1e-12],
         ("b", "heldout", 1): [1e-12] * 4,
     }
-    paths = []
+    parts = []
     for scene in ("a", "b"):
         rows = [
             dict(zip(columns, (*key, frame, v), strict=True))
@@ -134,13 +115,12 @@ def sensitivity_files(tmp_path) -> list[str]:
             if key[0] == scene
             for frame, v in enumerate(series)
         ]
-        paths.append(written(tmp_path / f"sensitivity_{scene}.csv", columns, *rows))
-    return paths
+        parts.append(written(tmp_path / f"sensitivity_{scene}.csv", columns, *rows))
+    return parts
 
 
 def test_floor_is_the_largest_over_the_seeds(tmp_path):
     table = sensitivity(sensitivity_files(tmp_path))
-    assert tuple(table.columns) == COLUMNS["sensitivity"]
     assert floor_of(table, "a", 1e-10).tolist() == [0.0, 2e-9, 5e-3, 1.0]
     assert floor_of(table, "a", "heldout").tolist() == [1e-12, 1.0, 1.0, 1.0]
 
@@ -150,10 +130,49 @@ def test_floor_is_the_largest_over_the_seeds(tmp_path):
 DISPLACEMENT = np.array([1.0, 2.0, 3.0, 4.0])
 
 
+@dataclass(frozen=True)
+class Files:
+    """What the tables of the reruns read: paths of runs, timings and the table sensitivity."""
+
+    reruns: list[str]
+    subspaces: list[str]
+    timings: list[File]
+    sensitivity: pd.DataFrame
+
+    def reduced(self) -> pd.DataFrame:
+        """The table reduced_reruns of these files."""
+        return reduced_reruns(
+            **self._beside(paths.RERUNS_TRAIN, paths.SUBSPACES_TRAIN, ""),
+            timings=self.timings,
+            sensitivity=self.sensitivity,
+            perturbation=1e-10,
+            threshold=1e-3,
+        )
+
+    def heldout(self) -> pd.DataFrame:
+        """The table heldout_reruns of these files."""
+        return heldout_reruns(
+            **self._beside(paths.RERUNS_HELDOUT, paths.SUBSPACES_HELDOUT, "_heldout"),
+            sensitivity=self.sensitivity,
+            threshold=1e-3,
+        )
+
+    def _beside(self, rows: Place, subspace_rows: Place, suffix: str) -> dict[str, list[File]]:
+        """Runs with the tables of one motion."""
+        return {
+            "runs": paths.RERUNS.files(self.reruns),
+            "rows": rows.files(p.replace(".h5", f"{suffix}.csv") for p in self.reruns),
+            "subspaces": paths.SUBSPACES.files(self.subspaces),
+            "subspace_rows": subspace_rows.files(
+                p.replace(".h5", f"{suffix}.csv") for p in self.subspaces
+            ),
+        }
+
+
 @pytest.fixture
-def files(tmp_path):
+def files(tmp_path) -> Files:
     """Reruns of scene a (horizon 2) and b (whole), subspace runs of b, and their timings."""
-    reruns, hyper = [], []
+    reruns = []
     cases = {
         # differences of each run by frame; short ones blew up
         "a": {6: [0.1, 0.2, 9.0, 9.0], 10: [0.5], 20: None},
@@ -199,7 +218,7 @@ def files(tmp_path):
     ]  # fmt: skip
     for name in ("models.csv", "models_heldout.csv"):
         written(folder / name, HYPER, *rows)
-    hyper.append(str(folder / "models.h5"))
+    subspaces = [str(folder / "models.h5")]
 
     def time(scene, implementation="compiled", ms=8.0, **labels):
         return {
@@ -223,8 +242,7 @@ def files(tmp_path):
             time("b", ms=0.5, group="all", method="ecsw-1e-02", position_basis="pod", k=8),
         ),
     ]  # fmt: skip
-    table = sensitivity(sensitivity_files(tmp_path))
-    return reruns, hyper, timings, table
+    return Files(reruns, subspaces, timings, sensitivity(sensitivity_files(tmp_path)))
 
 
 def error(difference, end) -> float:
@@ -232,9 +250,7 @@ def error(difference, end) -> float:
 
 
 def test_errors_within_the_horizon(files):
-    reruns, hyper, timings, floor = files
-    table = reduced_reruns(reruns, hyper, timings, floor, 1e-10, 1e-3)
-    assert tuple(table.columns) == COLUMNS["reduced_reruns"]
+    table = files.reduced()
     within = table.relative_error_within_horizon
     assert table.scene.tolist() == ["a", "a", "a", "b", "b", "b", "b"]
     assert within[0] == pytest.approx(error([0.1, 0.2], 2))
@@ -252,8 +268,7 @@ def test_errors_within_the_horizon(files):
 
 
 def test_times_go_to_their_runs(files):
-    reruns, hyper, timings, floor = files
-    table = reduced_reruns(reruns, hyper, timings, floor, 1e-10, 1e-3)
+    table = files.reduced()
     expected = [4.0, 5.0, np.nan, 2.0, np.nan, 1.0, 0.5]
     np.testing.assert_array_equal(table.ms_per_frame, expected)
     np.testing.assert_allclose(table.speedup, [2.0, 1.6, np.nan, 5.0, np.nan, 10.0, 20.0])
@@ -262,17 +277,14 @@ def test_times_go_to_their_runs(files):
 
 
 def test_there_need_be_no_subspace(files):
-    reruns, _, timings, floor = files
-    table = reduced_reruns(reruns, [], timings[:1] + timings[1:], floor, 1e-10, 1e-3)
+    table = replace(files, subspaces=[]).reduced()
     assert len(table) == 5
     assert table.k.isna().all()
     assert table.ms_per_frame.notna().sum() == 3
 
 
 def test_held_out_runs_are_judged_by_their_own_horizon(files):
-    reruns, hyper, _, floor = files
-    table = heldout_reruns(reruns, hyper, floor, 1e-3)
-    assert tuple(table.columns) == COLUMNS["heldout_reruns"]
+    table = files.heldout()
     assert table.horizon_frame.tolist() == [1, 1, 1, 4, 4, 4, 4]
     assert table.relative_error_within_horizon[0] == pytest.approx(0.1)
     # it blew up in frame 1, which is behind the horizon
@@ -280,11 +292,10 @@ def test_held_out_runs_are_judged_by_their_own_horizon(files):
 
 
 def test_damaged_runs_are_named(files):
-    reruns, hyper, timings, floor = files
-    with open(reruns[0], "r+b") as file:
+    with open(files.reruns[0], "r+b") as file:
         file.truncate(100)
     with pytest.raises(StorageError, match=r"deim\.h5"):
-        reduced_reruns(reruns, hyper, timings, floor, 1e-10, 1e-3)
+        files.reduced()
 
 
 # Accuracy against cost ----------------------------------------------------------------------------
@@ -311,15 +322,13 @@ def test_pareto_keeps_what_nothing_beats(points):
         assert keep != beaten
 
 
-def no_sweep(folder) -> str:
+def no_sweep(folder) -> File:
     return written(folder / "sweep.csv", SWEEP, {"scene": "absent"})
 
 
 def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
-    reruns, hyper, timings, floor = files
-    runs = reduced_reruns(reruns, hyper, timings, floor, 1e-10, 1e-3)
+    runs, timings = files.reduced(), files.timings
     table = accuracy_cost(runs, timings, [no_sweep(tmp_path)], {"a": 10, "b": 20})
-    assert tuple(table.columns) == COLUMNS["accuracy_cost"]
     points = list(zip(table.scene, table.method, table.ms_per_frame, strict=True))
     assert points == [
         ("a", "full", 8.0), ("a", "deim", 4.0),
@@ -334,7 +343,7 @@ def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
     assert table.pareto.tolist() == [True, False, True, False, False, False]
 
 
-def sweep(folder, **changes) -> str:
+def sweep(folder, **changes) -> File:
     """Scene a with K = 2, 10 (its own) and 40, and the converged run."""
     rows = [
         {"iterations": 2, "window": 0, "error_converged": 0.4, "error_scene": 0.3},
@@ -348,8 +357,7 @@ def sweep(folder, **changes) -> str:
 
 
 def test_runs_with_other_iterations_have_their_own_reference(files, tmp_path):
-    reruns, hyper, timings, floor = files
-    runs = reduced_reruns(reruns, hyper, timings, floor, 1e-10, 1e-3)
+    runs, timings = files.reduced(), files.timings
     table = accuracy_cost(runs, timings, [sweep(tmp_path)], {"a": 10, "b": 20})
     fom = table[table.method == "fom"]
     assert fom.iterations.tolist() == [2, 10, 40]
@@ -375,8 +383,7 @@ def test_runs_with_other_iterations_have_their_own_reference(files, tmp_path):
 
 
 def test_without_a_converged_run_there_is_no_point_against_it(files, tmp_path):
-    reruns, hyper, timings, floor = files
-    runs = reduced_reruns(reruns, hyper, timings, floor, 1e-10, 1e-3)
+    runs, timings = files.reduced(), files.timings
     sweeps = [sweep(tmp_path, error_converged=None)]
     table = accuracy_cost(runs, timings, sweeps, {"a": 10, "b": 20})
     assert "fom" not in set(table.method)
@@ -387,9 +394,7 @@ def test_without_a_converged_run_there_is_no_point_against_it(files, tmp_path):
 
 
 def test_local_share_counts_assembly_with_the_local_step(tmp_path, files):
-    _, _, timings, _ = files
-    table = local_share(timings)
-    assert tuple(table.columns) == COLUMNS["local_share"]
+    table = local_share(files.timings)
     assert table.scene.tolist() == ["a", "a", "a", "b"]
     assert table.implementation.tolist() == ["interpreted", "numpy", "compiled", "compiled"]
     assert table.local_share.tolist() == pytest.approx([0.6] * 4)

@@ -11,9 +11,9 @@ from pdrom.report.figures import style
 from pdrom.report.figures.multiples import label_outer, small_multiples
 from pdrom.report.figures.sources import Sources
 from pdrom.report.figures.spec import FigureSpec
-from pdrom.tables.columns import BREAKEVEN_CURVE
+from pdrom.tables.break_even import CURVE
 
-COLUMNS = [*BREAKEVEN_CURVE, "vertices", "r", "ratio", "breakeven_r"]
+COLUMNS = [*CURVE, "vertices", "r", "ratio", "breakeven_r"]
 LINES = {1: "-", 2: "--"}
 PAYS, COSTS = "^", "v"
 
@@ -64,7 +64,7 @@ def _sizes(table: pd.DataFrame) -> pd.DataFrame:
     """One row per curve on scenes with several meshes: where it breaks even, or the last size."""
     several = table.groupby("scene").factor.transform("nunique") > 1
     rows = []
-    for labels, curve in table[several].groupby(BREAKEVEN_CURVE, sort=False):
+    for labels, curve in table[several].groupby(CURVE, sort=False):
         curve = curve.sort_values("r")
         first, size = curve.iloc[0], curve.breakeven_r.iloc[0]
         if pd.isna(size):
@@ -72,7 +72,7 @@ def _sizes(table: pd.DataFrame) -> pd.DataFrame:
         else:
             mark = COSTS if first.ratio >= 1.0 and size == first.r else ""
         rows.append((*labels, first.vertices, float(size), mark))
-    return pd.DataFrame(rows, columns=[*BREAKEVEN_CURVE, "vertices", "size", "mark"])
+    return pd.DataFrame(rows, columns=[*CURVE, "vertices", "size", "mark"])
 
 
 def _draw_scene(ax: Axes, points: pd.DataFrame, styles: dict[str, tuple[str, str]]) -> None:

@@ -16,7 +16,7 @@ from pdrom.reduction.sampling.block import block_elements
 from pdrom.reduction.sampling.deim import deim_entries
 from pdrom.report.figures import FIGURES, FigureSpec, Holdings, Sources, load_figures
 from pdrom.report.figures.sources import MethodHolding, SceneHolding
-from pdrom.tables.scaling import scaling_fit
+from pdrom.tables.scaling_fit import scaling_fit
 from places import ROOT
 
 FRAMES = 20

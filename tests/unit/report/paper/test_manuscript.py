@@ -7,12 +7,12 @@ from matplotlib.figure import Figure
 
 from conftest import ROOT
 from pdrom.core.yamlfile import read_yaml
-from pdrom.pipeline.plan import TABLES, Plan
+from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.study import Study
+from pdrom.pipeline.tables import all_tables
 from pdrom.report.paper.bibliography import bibliography, cited_keys
 from pdrom.report.paper.macros import keys_of
 from pdrom.report.paper.tex import build_pdf, packages_of
-from pdrom.tables.columns import COLUMNS
 
 SOURCE = (ROOT / "paper" / "main.tex").read_text(encoding="utf-8")
 
@@ -86,7 +86,7 @@ def test_only_packages_of_both_tex_systems():
 def test_every_key_names_a_column_of_a_table():
     study = Study.load(read_yaml(ROOT / "config" / "default.yaml"), ROOT)
     facts = Plan(study).facts()
-    columns = {name: set(COLUMNS[name]) for name in TABLES}
+    columns = {name: set(table.column_names) for name, table in all_tables().items()}
     columns |= {name: set(rows[0]) for name, rows in facts.items()}
     for key in keys_of(SOURCE):
         table, *parts = key.split("|")

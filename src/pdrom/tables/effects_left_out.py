@@ -1,0 +1,28 @@
+"""Table effects_left_out: what leaving effects out saves."""
+
+import pandas as pd
+
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every
+from pdrom.tables.declaration import integer, number, table, text, timed
+from pdrom.tables.parts import joined
+from pdrom.tables.vocabulary import MS_PER_FRAME, SCENE
+
+
+@table(
+    title="Time of scenes without some of their effects",
+    columns=(
+        SCENE,
+        text("left_out", "effects that the scene is built without"),
+        integer("groups", "constraint groups that are left"),
+        integer("elements", "elements of what is left out, as in the table effects_cost"),
+        MS_PER_FRAME,
+        timed(number("saved_ms", "time of the whole scene less that of the row", "ms")),
+        timed(number("own_ms", "time of what is left out, inside the whole scene", "ms")),
+    ),
+    reads={"parts": Every(paths.LEFT_OUT)},
+)
+def effects_left_out(parts: list[File]) -> pd.DataFrame:
+    """Scenes with several groups, as they are and without some of their effects."""
+    return joined(parts)

@@ -1,0 +1,52 @@
+"""Table guard: what the guard of a run costs, and what falling back buys."""
+
+import pandas as pd
+
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every
+from pdrom.tables.declaration import integer, number, table, text, timed
+from pdrom.tables.parts import joined
+from pdrom.tables.vocabulary import (
+    BLOWUP_FRAME,
+    ENERGY_RATIO,
+    FINITE,
+    FRAMES,
+    GROUP,
+    GUARD_COUNT,
+    GUARD_FRAME,
+    GUARD_REASON,
+    METHOD,
+    MS_PER_FRAME,
+    RELATIVE_ERROR,
+    SCENE,
+    R,
+)
+
+
+@table(
+    title="Guard at run time: what it costs and what falling back buys",
+    columns=(
+        SCENE,
+        GROUP,
+        METHOD,
+        R,
+        text("action", "of the guard: none, report, fall-back"),
+        FRAMES,
+        FINITE,
+        BLOWUP_FRAME,
+        RELATIVE_ERROR,
+        ENERGY_RATIO,
+        GUARD_FRAME,
+        GUARD_REASON,
+        GUARD_COUNT,
+        integer("fallback_frames", "frames computed with full projections"),
+        number("fallback_share", "their share of the frames that ran"),
+        MS_PER_FRAME,
+        timed(number("relative_cost", "time of a frame over that of the full-order run")),
+    ),
+    reads={"parts": Every(paths.GUARD)},
+)
+def guard(parts: list[File]) -> pd.DataFrame:
+    """Rows of all cases, each after its full-order run."""
+    return joined(parts)

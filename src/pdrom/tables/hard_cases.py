@@ -1,0 +1,33 @@
+"""Table hard_cases: every reduction in every hard case."""
+
+import pandas as pd
+
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every
+from pdrom.tables.declaration import number, table, text
+from pdrom.tables.parts import joined
+from pdrom.tables.vocabulary import BLOWUP_FRAME, FINITE, FRAMES, GAIN, METHOD, K, R
+
+
+@table(
+    title="Every reduction in every hard case",
+    columns=(
+        text("case", "name of the hard case"),
+        METHOD,
+        K,
+        R,
+        GAIN,
+        FRAMES,
+        FINITE,
+        BLOWUP_FRAME,
+        number("max_extent", "largest extent over the scale of the full-order run"),
+        number("objective_rise", "largest in one iteration, over the first value of its frame"),
+        text("outcome", "how the reduction fared"),
+        text("why", "reason of a refusal or of an expected failure"),
+    ),
+    reads={"parts": Every(paths.HARD_CASES)},
+)
+def hard_cases(parts: list[File]) -> pd.DataFrame:
+    """Rows in the order of the cases and methods."""
+    return joined(parts)

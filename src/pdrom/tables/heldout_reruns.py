@@ -1,0 +1,36 @@
+"""Table heldout_reruns: errors of the reruns on motions that no basis and no sampling has seen."""
+
+import pandas as pd
+
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every, Setting, TableOf
+from pdrom.model.runs.horizon import HELDOUT
+from pdrom.tables.declaration import table
+from pdrom.tables.reruns import COLUMNS, judged_reruns
+
+
+@table(
+    title="Reduced runs of the held-out motions",
+    columns=COLUMNS,
+    reads={
+        "runs": Every(paths.RERUNS),
+        "rows": Every(paths.RERUNS_HELDOUT),
+        "subspaces": Every(paths.SUBSPACES),
+        "subspace_rows": Every(paths.SUBSPACES_HELDOUT),
+        "sensitivity": TableOf("sensitivity"),
+        "threshold": Setting("sensitivity.threshold"),
+    },
+)
+def heldout_reruns(
+    runs: list[File],
+    rows: list[File],
+    subspaces: list[File],
+    subspace_rows: list[File],
+    sensitivity: pd.DataFrame,
+    threshold: float,
+) -> pd.DataFrame:
+    """Runs judged by the horizon of their own motion, see `judged_reruns`."""
+    return judged_reruns(
+        runs, rows, subspaces, subspace_rows, sensitivity, HELDOUT, threshold, "heldout"
+    )

@@ -1,0 +1,26 @@
+"""Table kernel_accuracy: the compiled projections against high precision."""
+
+import pandas as pd
+
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every
+from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.parts import joined
+
+
+@table(
+    title="Accuracy of the compiled projections",
+    columns=(
+        text("group", "constraint group of the projection"),
+        text("matrix_class", "kind of matrices that are projected"),
+        integer("cases", "matrices of the class"),
+        number("condition", "largest condition number of the projection at them"),
+        number("worst_relative_error", "largest relative error"),
+        number("worst_over_condition", "largest relative error over its condition number"),
+    ),
+    reads={"parts": Every(paths.KERNEL_ACCURACY)},
+)
+def kernel_accuracy(parts: list[File]) -> pd.DataFrame:
+    """Rows by group and class."""
+    return joined(parts)

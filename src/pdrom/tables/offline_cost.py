@@ -1,0 +1,26 @@
+"""Table offline_cost: time of the algorithms that run before a reduced model does."""
+
+import pandas as pd
+
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every
+from pdrom.tables.declaration import integer, number, table, text, timed
+from pdrom.tables.parts import joined
+
+
+@table(
+    title="Cost of the offline algorithms beside those of a library",
+    columns=(
+        text("task", "algorithm"),
+        text("implementation", "whose: pdrom, pymor"),
+        integer("rows", "rows of the matrix"),
+        integer("columns", "columns of the matrix"),
+        timed(number("seconds", "time that it took", "s")),
+        number("difference", "of both results: relative, or the share of indices not in both"),
+    ),
+    reads={"parts": Every(paths.OFFLINE)},
+)
+def offline_cost(parts: list[File]) -> pd.DataFrame:
+    """Rows by task and implementation."""
+    return joined(parts)

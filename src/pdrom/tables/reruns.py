@@ -1,0 +1,95 @@
+"""Reruns of both motions with their errors, horizons and floors."""
+
+import h5py
+import numpy as np
+import pandas as pd
+
+from pdrom.core.paths import File
+from pdrom.core.store import open_hdf5, read_table
+from pdrom.model.runs.horizon import error_within, floor_of, horizons
+from pdrom.tables.vocabulary import (
+    BLOWUP_FRAME,
+    ERROR_WITHIN,
+    FINITE,
+    FLOOR,
+    FRAMES,
+    GROUP,
+    HORIZON_FRAME,
+    MAX_EXTENT,
+    METHOD,
+    POSITION_BASIS,
+    RELATIVE_ERROR,
+    SCENE,
+    K,
+    R,
+)
+
+COLUMNS = (
+    SCENE, GROUP, METHOD, POSITION_BASIS, K, R, FRAMES, FINITE, BLOWUP_FRAME, MAX_EXTENT,
+    RELATIVE_ERROR, ERROR_WITHIN, HORIZON_FRAME, FLOOR,
+)  # fmt: skip
+KEYS = ["scene", "group", "method", "position_basis", "k", "r"]  # what tells runs apart
+TRAIN = "train"
+
+
+def judged_reruns(
+    runs: list[File],
+    rows: list[File],
+    subspaces: list[File],
+    subspace_rows: list[File],
+    sensitivity: pd.DataFrame,
+    perturbation: float | str,
+    threshold: float,
+    motion: str,
+) -> pd.DataFrame:
+    """One row per scene, group, method and r, then the runs in position subspaces.
+
+    In a subspace all groups are reduced, and r counts the evaluated elements. The error within the
+    horizon uses the frames before it only; a run that blew up before has none.
+
+    Parameters
+    ----------
+    runs, rows : HDF5 files of the runs and their tables of the motion, in the same order
+    subspaces, subspace_rows : the same in position subspaces
+    motion : "train" or "heldout"
+    """
+    ends = horizons(sensitivity, perturbation, threshold)
+    parts = [_local_only(run, row, ends, motion) for run, row in zip(runs, rows, strict=True)]
+    inside = zip(subspaces, subspace_rows, strict=True)
+    parts += [_subspace(run, row, ends, motion) for run, row in inside]
+    table = pd.concat(parts, ignore_index=True)
+    table["horizon_frame"] = table.scene.map(ends)
+    floors = {s: floor_of(sensitivity, s, perturbation)[:end] for s, end in ends.items()}
+    table["sensitivity_floor"] = table.scene.map(
+        {scene: float(floor.max(initial=0.0)) for scene, floor in floors.items()}
+    )
+    return table
+
+
+def _local_only(run: File, row: File, ends: dict[str, int], motion: str) -> pd.DataFrame:
+    """Rows of runs whose positions are not reduced."""
+    table, end = read_table(row.path), ends[run["scene"]]
+    with open_hdf5(run.path) as file:
+        store = file if motion == TRAIN else file[motion]
+        displacement = store["displacement"][...]
+        table["relative_error_within_horizon"] = [
+            _error_within(store[f"r{r:04d}"], displacement, end) for r in table.r
+        ]
+    return table.assign(position_basis="full", k=None)
+
+
+def _subspace(run: File, row: File, ends: dict[str, int], motion: str) -> pd.DataFrame:
+    """Rows of runs in position subspaces."""
+    table, end = read_table(row.path), ends[run["scene"]]
+    with open_hdf5(run.path) as file:
+        displacement = file[f"displacement/{motion}"][...]
+        models = [f"{t.position_basis}_k{t.k:03d}_{t.method}" for t in table.itertuples()]
+        table["relative_error_within_horizon"] = [
+            _error_within(file[f"models/{model}/{motion}"], displacement, end) for model in models
+        ]
+    return table
+
+
+def _error_within(run: h5py.Group, displacement: np.ndarray, end: int) -> float | None:
+    """Relative error before the horizon; a run of a size beyond the rank has no frames."""
+    return error_within(run["difference"][...], displacement, end) if "difference" in run else None

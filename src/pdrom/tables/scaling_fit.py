@@ -1,0 +1,40 @@
+"""Table scaling_fit: how time and memory grow with the number of vertices."""
+
+import numpy as np
+import pandas as pd
+
+from pdrom.core.reads import TableOf
+from pdrom.tables.declaration import integer, number, table, text, timed
+from pdrom.tables.vocabulary import METHOD, SCENE, THREADS
+
+QUANTITIES = ("ms_per_iteration", "local_ms", "global_ms", "factorisation_ms", "memory_mb")
+
+
+@table(
+    title="Exponents of cost against the size of the mesh",
+    columns=(
+        SCENE,
+        METHOD,
+        THREADS,
+        text("quantity", "column of the table scaling"),
+        timed(number("exponent", "of the power law in the number of vertices")),
+        integer("points", "sizes of the mesh that it is fitted to"),
+    ),
+    reads={"scaling": TableOf("scaling")},
+)
+def scaling_fit(scaling: pd.DataFrame) -> pd.DataFrame:
+    """Exponents of power laws in the number of vertices, by least squares on the logarithms.
+
+    A quantity with fewer than two sizes has no row.
+    """
+    rows = []
+    for labels, part in scaling.groupby(["scene", "method", "threads"], sort=False):
+        for quantity in QUANTITIES:
+            points = part[["vertices", quantity]].dropna()
+            points = points[points[quantity] > 0.0].astype(float)
+            if points.vertices.nunique() < 2:
+                continue
+            exponent, _ = np.polyfit(np.log(points.vertices), np.log(points[quantity]), 1)
+            row = dict(zip(("scene", "method", "threads"), labels, strict=True))
+            rows.append({**row, "quantity": quantity, "exponent": exponent, "points": len(points)})
+    return pd.DataFrame(rows)
