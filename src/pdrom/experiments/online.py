@@ -1,4 +1,4 @@
-"""One large scene, hyper-reduced, against its own full-order run in the same job.
+"""One large scene in position subspaces, against its own full-order run in the same job.
 
 Everything is made here and nothing is kept but the rows of the table: full-order runs of both
 motions, columns from training frames, element sampling, reduced runs, and times. Full-order and

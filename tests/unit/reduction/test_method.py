@@ -11,7 +11,7 @@ PATH = CONFIG / "methods.yaml"
 
 
 def test_presets_are_the_methods_of_the_literature():
-    """The ingredients of EXPERIMENTS table 3, method by method."""
+    """The ingredients that each method is known by."""
     chosen = {
         name: (m.weighting, m.centring, m.layout, m.rows, m.selection, m.solve, m.repeat_rows)
         for name, m in load_methods(PATH).items()

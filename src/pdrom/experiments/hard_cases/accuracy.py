@@ -11,18 +11,21 @@ from pdrom.experiments.hard_cases.matrices import CLASSES, VECTORS, MatrixClass
 from pdrom.experiments.hard_cases.reference import clamped, digits_for, exact, half_sphere, spring
 from pdrom.experiments.hard_cases.shapes import one_tetrahedron, one_triangle, sheet
 from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.effects import EFFECTS
 
 SEED = 11
-CLAMPED = {
-    "strain": one_triangle,
-    "tetrahedron_strain": one_tetrahedron,
-    "deformation_gradient": one_tetrahedron,
-}
+
+
+def groups_on(manifold: str) -> list[str]:
+    """Registered groups that project on ``manifold``, see `ConstraintGroup`."""
+    classes = {name: EFFECTS.load(name) for name in EFFECTS}
+    return [name for name, c in classes.items() if getattr(c, "manifold", None) == manifold]
 
 
 def unit_group(effect: str) -> ConstraintGroup:
     """Group of one element whose rest edges are the unit vectors, so that S q holds q itself."""
-    mesh = one_triangle() if effect == "spring" else CLAMPED[effect]()
+    volume = EFFECTS.load(effect).rows_per_element == 3
+    mesh = one_tetrahedron() if volume else one_triangle()
     return build(mesh, {"effect": effect, "weight": 1.0}, frames=1).groups[0]
 
 
@@ -39,7 +42,7 @@ def clamped_error(group: ConstraintGroup, d: np.ndarray, unique: bool) -> tuple[
     Where p is not unique any nearest point is right: the error is that of the distance |d - p|, or
     of the singular values of p, whichever is larger, and the condition number is 1.
     """
-    low, high = _range(group)
+    low, high = group.kernel_parameters()
     found = projected(group, d)
     if not np.isfinite(found).all():
         return np.inf, 1.0
@@ -51,12 +54,6 @@ def clamped_error(group: ConstraintGroup, d: np.ndarray, unique: bool) -> tuple[
         distance, best = mp.norm(exact(d) - exact(found)), mp.norm(exact(d) - p)
         outside = _outside(found, low, high)
         return max(float(abs(distance - best) / size), outside), 1.0
-
-
-def _range(group: ConstraintGroup) -> tuple[float, float]:
-    if group.name == "deformation_gradient":
-        return 1.0, 1.0
-    return group.config.minimum, group.config.maximum
 
 
 def _outside(p: np.ndarray, low: float, high: float) -> float:
@@ -87,9 +84,9 @@ def _bending_states() -> dict[str, Any]:
     }
 
 
-def bending_errors(cases: int) -> Iterator[tuple[str, float, float]]:
+def bending_errors(cases: int, effect: str = "bending") -> Iterator[tuple[str, float, float]]:
     """(class, relative error, condition number) of projected curvature vectors."""
-    scene = build(sheet(wave=0.1), {"effect": "bending", "weight": 1.0}, frames=1)
+    scene = build(sheet(wave=0.1), {"effect": effect, "weight": 1.0}, frames=1)
     group, points = scene.groups[0], scene.mesh.points
     for name, state in _bending_states().items():
         rng = np.random.default_rng(SEED)
@@ -114,13 +111,15 @@ def _samples(kind: MatrixClass, rows: int, cases: int) -> Iterator[np.ndarray]:
 
 def _errors(cases: int) -> Iterator[tuple[str, str, float, float]]:
     """(group, class, relative error, condition number) of every case."""
-    group = unit_group("spring")
-    for kind in VECTORS:
-        for d in _samples(kind, 1, cases):
-            yield "spring", kind.name, *spring_error(group, d)
-    for name, error, condition in bending_errors(cases):
-        yield "bending", name, error, condition
-    for effect in CLAMPED:
+    for effect in groups_on("length"):
+        group = unit_group(effect)
+        for kind in VECTORS:
+            for d in _samples(kind, 1, cases):
+                yield effect, kind.name, *spring_error(group, d)
+    for effect in groups_on("half sphere"):
+        for name, error, condition in bending_errors(cases, effect):
+            yield effect, name, error, condition
+    for effect in groups_on("clamped"):
         group = unit_group(effect)
         for kind in CLASSES:
             if group.rows_per_element in kind.rows:

@@ -36,19 +36,19 @@ INTERPOLATIONS = {
 BASES = {"pod": ("full", "ecsw", "hrpd", *INTERPOLATIONS), "skinning": ("full", "hrpd")}
 
 
-def _hyper(
-    hyper: str, scene: Scene, columns: Columns, positions: np.ndarray, start: State
+def _samples(
+    sampling: str, scene: Scene, columns: Columns, positions: np.ndarray, start: State
 ) -> dict[str, Samples | Interpolation]:
-    """What a hyper-reduction samples of each group, from a run's ``positions`` (n, N, 3) m."""
-    if hyper == "full":
+    """What a position subspace samples of each group, from a run's ``positions`` (n, N, 3) m."""
+    if sampling == "full":
         return {}
-    if hyper == "ecsw":
+    if sampling == "ecsw":
         frames = np.arange(scene.config.frames)
         return sample_elements(scene, columns, frames, [TOLERANCE], start)[0]
-    if hyper == "hrpd":
+    if sampling == "hrpd":
         points = scene.mesh.points
         return {g.name: hrpd(g, columns, sampled_space(g, points, HRPD)) for g in scene.groups}
-    return interpolate(scene, columns, States(scene, columns, positions), INTERPOLATIONS[hyper])
+    return interpolate(scene, columns, States(scene, columns, positions), INTERPOLATIONS[sampling])
 
 
 class Training:
@@ -101,8 +101,8 @@ class ReducedRun:
 
 
 def names(methods: Mapping[str, MethodSpec]) -> list[str]:
-    """All reductions: the methods, then the position subspaces with their hyper-reductions."""
-    return [*methods, *(f"{basis}-{hyper}" for basis in BASES for hyper in BASES[basis])]
+    """All reductions: the methods, then the position subspaces with what is sampled in them."""
+    return [*methods, *(f"{basis}-{sampling}" for basis in BASES for sampling in BASES[basis])]
 
 
 def reduced_run(
@@ -117,8 +117,8 @@ def reduced_run(
     """
     if name in methods:
         return _local(training, methods[name], limit)
-    basis, _, hyper = name.partition("-")
-    return _subspace(training, basis, hyper, limit)
+    basis, _, sampling = name.partition("-")
+    return _subspace(training, basis, sampling, limit)
 
 
 def _local(training: Training, spec: MethodSpec, limit: float) -> ReducedRun:
@@ -133,13 +133,13 @@ def _local(training: Training, spec: MethodSpec, limit: float) -> ReducedRun:
     return ReducedRun(run, r, None, reduction.gain)
 
 
-def _subspace(training: Training, kind: str, hyper: str, limit: float) -> ReducedRun:
+def _subspace(training: Training, kind: str, sampling: str, limit: float) -> ReducedRun:
     scene, positions = training.scene, training.run.positions
     columns = make_columns(scene, positions[1::2], kind, K)
     start = training.state()
     fields = (start.positions, start.velocities)
     state = State(*(coordinates(columns, scene.masses, field) for field in fields))
-    samples = _hyper(hyper, scene, columns, positions[1::2], state)
+    samples = _samples(sampling, scene, columns, positions[1::2], state)
     model = SubspaceModel(kind, columns, samples)
     untracked, _ = model.loop(scene)
     steps = untracked.local_steps

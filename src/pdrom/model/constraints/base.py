@@ -5,7 +5,7 @@ Energy of a group (Bouaziz et al. 2014, eq. 4): W(q) = 1/2 sum_e w_e || S_e q - 
 
 from abc import abstractmethod
 from copy import copy
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -45,6 +45,10 @@ class ConstraintGroup(Effect):
     """Threads of `accumulate`, 1 or 2; the result is the same bit for bit."""
     gradient_kernel: Any = None
     """Compiled projection from S q (module `gradient_kernel` beside), if there is one."""
+    manifold: ClassVar[str | None] = None
+    """What it projects on, if that is one of "clamped" (signed singular values in a range, which
+    are the `kernel_parameters`), "length" or "half sphere": kernels are then compared with its
+    projection in high precision."""
     frame_lagged: bool = False
     """Whether ``begin_frame`` freezes anything."""
 

@@ -57,6 +57,7 @@ class VertexBending(ConstraintGroup):
     rows_per_element = 1
     split_from = 4096
     frame_lagged = True
+    manifold = "half sphere"
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)

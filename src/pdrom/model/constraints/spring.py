@@ -114,6 +114,7 @@ class EdgeSpring(SimplexGroup):
     split_from = 8192
     project_kernel = staticmethod(_project)
     accumulate_kernel = staticmethod(_accumulate)
+    manifold = "length"
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)

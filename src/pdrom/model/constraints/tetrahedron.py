@@ -131,6 +131,7 @@ class TetrahedronGroup(SimplexGroup):
     split_from = 1024
     project_kernel = staticmethod(_project)
     accumulate_kernel = staticmethod(_accumulate)
+    manifold = "clamped"
     minimum: float
     maximum: float
 

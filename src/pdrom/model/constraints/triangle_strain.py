@@ -177,6 +177,7 @@ class TriangleStrain(SimplexGroup):
     split_from = 4096
     project_kernel = staticmethod(_project)
     accumulate_kernel = staticmethod(_accumulate)
+    manifold = "clamped"
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)

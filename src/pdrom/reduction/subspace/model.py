@@ -1,4 +1,4 @@
-"""A hyper-reduced model of a scene: columns, sampled elements of every group, and its step loop."""
+"""A scene in a position subspace: columns, sampled elements of every group, and its step loop."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from mpmath import mp
 
 from pdrom.experiments.hard_cases.accuracy import (
-    CLAMPED,
     bending_errors,
     clamped_error,
+    groups_on,
     kernel_accuracy,
     projected,
     spring_error,
@@ -18,6 +18,7 @@ from pdrom.experiments.hard_cases.matrices import CLASSES, VECTORS, rotation
 from pdrom.experiments.hard_cases.reference import clamped, digits_for, half_sphere, spring
 from strategies import hard_matrices
 
+CLAMPED = groups_on("clamped")
 EPS = np.finfo(float).eps
 # A backward stable projection is wrong by a few round-offs times the condition number.
 STABLE = 20.0 * EPS
@@ -116,3 +117,10 @@ def test_the_table_has_every_group_and_class():
     assert named == {k.name for k in CLASSES}
     assert all(r["cases"] == 1 for r in rows)
     assert all(r["worst_over_condition"] <= r["worst_relative_error"] for r in rows)
+
+
+def test_groups_are_those_of_the_registry():
+    """A further group that says what it projects on is measured, without a list of names."""
+    assert CLAMPED == ["strain", "tetrahedron_strain", "deformation_gradient"]
+    assert groups_on("length") == ["spring"]
+    assert groups_on("half sphere") == ["bending"]

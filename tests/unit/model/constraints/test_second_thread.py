@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from pdrom.model.constraints.second_thread import _second_thread, both
+from pdrom.model.constraints.second_thread import _nothing, _second_thread, both
 
 
 @pytest.mark.parametrize("threads", [1, 2])
@@ -73,7 +73,7 @@ def test_faults_of_either_are_raised_and_the_next_work_is_done():
 def test_nothing_of_the_work_is_kept():
     """A scene's arrays go when the scene goes."""
     both(float, float, 2)
-    assert _second_thread()._work is None
+    assert _second_thread()._work is _nothing
 
 
 def test_callers_in_several_threads_take_turns():
