@@ -21,7 +21,6 @@ KNOWN = {
     "pdrom.report.figures.sources imports pdrom.pipeline.study",
     ("pdrom.report.figures.catalogue", "pdrom.report.figures.spec"),
     ("pdrom.pipeline", "pdrom.report", "pdrom.report.figures"),
-    "pdrom.pipeline.plan",
     "pdrom.report.claims",
     "pdrom.report.paper.textables",
 }

@@ -65,7 +65,7 @@ SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # what has one full-o
         "reduced_reruns": TableOf("reduced_reruns"),
         "time_steps": PerScene("time_step"),
         "wrong": Setting("stability.wrong"),
-        "left": Setting("stability.left"),
+        "departure": Setting("stability.left"),
     },
 )
 def stability(
@@ -76,7 +76,7 @@ def stability(
     reduced_reruns: pd.DataFrame,
     time_steps: Mapping[str, float],
     wrong: float,
-    left: float,
+    departure: float,
 ) -> pd.DataFrame:
     """Rows of the study's reruns (experiment "rerun"), then of the short runs ("sweep").
 
@@ -91,7 +91,7 @@ def stability(
     full_order : full-order runs
     reruns, subspaces, sweeps : tables of the reruns, of those in subspaces, of the short runs
     time_steps : scene -> h in seconds
-    wrong, left : see `pdrom.pipeline.study.Stability`
+    wrong, departure : see `pdrom.experiments.stability.Stability`
     """
     runs = pd.concat(
         [_full_order_rows(full_order), _rerun_rows(reruns, subspaces, reduced_reruns)],
@@ -99,25 +99,25 @@ def stability(
     )
     runs = runs.assign(h=runs.scene.map(time_steps), stiffness_ratio=1.0, experiment="rerun")
     rows = pd.concat([runs, joined(sweeps).assign(experiment="sweep")], ignore_index=True)
-    return rows.assign(outcome=outcomes(rows, wrong, left))
+    return rows.assign(outcome=outcomes(rows, wrong, departure))
 
 
-def outcomes(runs: pd.DataFrame, wrong: float, left: float) -> list[str]:
+def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
     """One of `OUTCOMES` for each row; needs the full-order row of every setting."""
     full = runs[(runs.method == "full") & (runs.position_basis == "full")]
     extents = full.set_index(SETTING).max_extent.to_dict()
     return [
-        _outcome(row, extents[tuple(getattr(row, key) for key in SETTING)], wrong, left)
+        _outcome(row, extents[tuple(getattr(row, key) for key in SETTING)], wrong, departure)
         for row in runs.itertuples()
     ]
 
 
-def _outcome(row, full_extent: float, wrong: float, left: float) -> str:
+def _outcome(row, full_extent: float, wrong: float, departure: float) -> str:
     if pd.isna(row.finite):
         return "not run"
     if not row.finite:
         return "blow-up"
-    if row.max_extent > left * full_extent:
+    if row.max_extent > departure * full_extent:
         return "left the scene"
     if pd.isna(row.relative_error):
         return "not judged"
