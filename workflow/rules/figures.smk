@@ -1,28 +1,28 @@
-# One rule per entry of config/figures.yaml, named figure_<name>:
+# One rule for each figure that src/pdrom/report/figures declares, named figure_<name>:
 #   ./reproduce results/figures/<name>.pdf   makes just that figure and what it needs
-for figure in PLAN.figure_specs:
+for name, job in PLAN.figure_jobs.items():
 
     rule:
         name:
-            f"figure_{figure}"
+            f"figure_{name}"
         input:
-            PLAN.figure_inputs(figure),
+            job.inputs,
         output:
             pdf=report(
-                f"results/figures/{figure}.pdf",
+                job.pdf,
                 caption="../report/figure.rst",
                 category="Figures",
-                labels={"figure": PLAN.figure_label(figure)},
+                labels={"figure": job.label},
             ),
-            png=f"results/figures/{figure}.png",
+            png=job.png,
         log:
-            f"results/logs/figures/{figure}.log",
+            job.log,
         params:
-            name=figure,
-            spec=PLAN.figure_spec(figure),
-            holdings=PLAN.figure_holdings(figure),
-            code=PLAN.figure_code(figure),
+            order=job.order.model_dump(mode="json"),
+            rst=job.rst,
+            results=PLAN.results,
+            code=job.code,
         message:
-            f"Figure {figure}"
+            f"Figure {name}"
         script:
             "../scripts/figure.py"

@@ -4,13 +4,13 @@ rule paper_inputs:
         source="paper/main.tex",
         references="paper/references.bib",
         tables=PLAN.tables.paths,
-        machine="results/machine.json",
+        machine=PLAN.paper.machine,
     output:
-        expand("results/paper/{name}", name=PLAN.paper_inputs),
+        PLAN.paper.inputs,
     log:
-        "results/logs/paper/inputs.log",
+        f"{PLAN.results}/logs/paper/inputs.log",
     params:
-        facts=PLAN.facts(),
+        facts=PLAN.paper.facts.model_dump(mode="json"),
         content=PLAN.digest("paper/main.tex", "paper/references.bib"),
         code=PLAN.code("pdrom.report.paper.build"),
     message:
@@ -27,7 +27,7 @@ rule paper:
     output:
         report("paper/main.pdf", category="Manuscript"),
     log:
-        "results/logs/paper/main.log",
+        f"{PLAN.results}/logs/paper/main.log",
     params:
         content=PLAN.digest("paper/main.tex"),
         code=PLAN.code("pdrom.report.paper.build"),

@@ -70,4 +70,22 @@ class SourcesOf:
     key: str
 
 
+@dataclass(frozen=True)
+class Chosen:
+    """Files of a kind for the scenes, groups and methods that the artifact's options choose.
+
+    first : only for the first experiment and the first method that exist
+    """
+
+    place: Place
+    first: bool = False
+
+
+@dataclass(frozen=True)
+class Published:
+    """A table of the published code's own output, by name, where the options ask for one."""
+
+    name: str
+
+
 Read = Every | TableOf | Setting | PerScene | Preferred | ProjectFile

@@ -8,11 +8,9 @@ hands the others to pytest.
 import os
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 from pdrom.core.errors import PdromError
 from pdrom.core.logs import INTERRUPTED
-from pdrom.core.yamlfile import read_yaml
 from pdrom.pipeline.commandline import CommandLine
 from pdrom.pipeline.configfiles import check_files
 from pdrom.pipeline.environment import settle
@@ -55,8 +53,9 @@ def files_of(targets: Sequence[str], own: Folders) -> dict[str, list[str]]:
     # late: it loads the whole package
     from pdrom.pipeline.tables import all_tables
     from pdrom.pipeline.targets import Names
+    from pdrom.report.figures.kit.catalogue import declarations
 
-    names = Names(list(read_yaml(Path("config/figures.yaml"))), all_tables())
+    names = Names(list(declarations()), all_tables())
     return {target: names.files(target, own) for target in targets}
 
 

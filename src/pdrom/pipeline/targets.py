@@ -119,7 +119,7 @@ def _suggestion(value: str, allowed: Iterable[str]) -> str:
 
 def known(plan: Plan) -> Known:
     """What the study of a plan knows."""
-    study, names = plan.study, Names(list(plan.figure_specs), all_tables())
+    study, names = plan.study, Names(list(plan.figure_jobs), all_tables())
     held = [path for place in HELD for path in paths_of(study, place, plan.results)]
 
     def mesh(scene: str) -> str:

@@ -1,21 +1,36 @@
-"""Rules of the figures: results -> PDF and PNG."""
+"""Rule of a figure: results -> PDF and PNG."""
 
-from typing import Any
+from pathlib import Path
 
-from pdrom.report.figures.output import make_figure
-from pdrom.report.figures.sources import Holdings, Sources
-from pdrom.report.figures.spec import FigureSpec
+from pydantic import BaseModel, ConfigDict, JsonValue
+
+from pdrom.report.figures.kit.catalogue import declaration
+from pdrom.report.figures.kit.holdings import Holdings
+from pdrom.report.figures.kit.output import draw_figure, write_figure
+from pdrom.report.figures.kit.results import Results
 
 
-def draw(
-    name: str,
-    spec: dict[str, Any],
-    holdings: dict[str, Any],
-    results: str,
-    published: str,
-    pdf: str,
-    png: str,
-) -> None:
-    """Draw figure ``name`` from the results of this configuration."""
-    sources = Sources(results, Holdings.model_validate(holdings), published)
-    make_figure(name, sources, FigureSpec.model_validate(spec), pdf, png)
+class Order(BaseModel):
+    """What a job is told to draw: the figure, its options, and what the configuration holds.
+
+    published : folder with the published code's output, None where none of it is drawn
+    full : whether the configuration is that of the full study
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str
+    title: str
+    options: dict[str, JsonValue]
+    holdings: Holdings
+    settings: dict[str, float]
+    published: str | None
+    full: bool
+
+
+def draw(order: Order, results: str, pdf: str, png: str) -> None:
+    """Draw a figure from the results of a configuration and write both of its files."""
+    options = declaration(order.name).options.model_validate(order.options)
+    published = Path(order.published) if order.published else None
+    read = Results(results, order.holdings, order.settings, published)
+    write_figure(draw_figure(order.name, read, options, order.full), order.title, pdf, png)

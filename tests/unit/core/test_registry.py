@@ -12,7 +12,6 @@ from pdrom.core.registry import Registry
 from pdrom.model.dynamics.solvers import SOLVERS
 from pdrom.model.effects import EFFECTS
 from pdrom.reduction.selections import SELECTIONS
-from pdrom.report.figures import FIGURES
 
 REGISTRY = Registry("thing", {"loads": "json:loads", "absent": "no.such.module:x"})
 
@@ -57,7 +56,7 @@ def test_nothing_is_imported_before_it_is_asked_for():
     assert done.stdout.split() == ["False", "True"]
 
 
-@pytest.mark.parametrize("registry", [EFFECTS, SOLVERS, FIGURES, SELECTIONS], ids=lambda r: r.kind)
+@pytest.mark.parametrize("registry", [EFFECTS, SOLVERS, SELECTIONS], ids=lambda r: r.kind)
 def test_every_entry_of_the_package_exists(registry):
     for name in registry:
         assert find_spec(registry.module(name)) is not None

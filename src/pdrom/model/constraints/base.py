@@ -4,6 +4,7 @@ Energy of a group (Bouaziz et al. 2014, eq. 4): W(q) = 1/2 sum_e w_e || S_e q - 
 """
 
 from abc import abstractmethod
+from collections.abc import Callable
 from copy import copy
 from typing import Annotated, Any, ClassVar
 
@@ -15,6 +16,13 @@ from pdrom.core.errors import SceneError
 from pdrom.model.effects.base import Effect, EffectConfig
 from pdrom.model.mesh.types import Mesh
 
+# What an element may lie on, and all of its kind on a mesh, as vertices.
+CELLS: dict[str, Callable[[Mesh], np.ndarray]] = {
+    "vertex": lambda mesh: np.arange(mesh.vertices)[:, None],
+    "edge": lambda mesh: mesh.edges(),
+    "triangle": lambda mesh: mesh.triangles,
+    "tetrahedron": lambda mesh: mesh.tetrahedra,
+}
 Weight = Annotated[float, Field(gt=0.0, le=1e16, allow_inf_nan=False)]
 
 
@@ -51,6 +59,15 @@ class ConstraintGroup(Effect):
     projection in high precision."""
     frame_lagged: bool = False
     """Whether ``begin_frame`` freezes anything."""
+    cells: ClassVar[str]
+    """What an element lies on: a key of `CELLS`."""
+    unit: ClassVar[str] = ""
+    """Unit of a projection; empty where it has none."""
+
+    @classmethod
+    def element_vertices(cls, mesh: Mesh) -> np.ndarray:
+        """Vertices (e, m) of each element on a mesh, in the order of the elements."""
+        return CELLS[cls.cells](mesh)
 
     @property
     def elements(self) -> int:

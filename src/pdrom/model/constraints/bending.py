@@ -54,6 +54,8 @@ class VertexBending(ConstraintGroup):
 
         effect: Literal["bending"] = "bending"
 
+    cells = "vertex"
+    unit = "1/m"
     rows_per_element = 1
     split_from = 4096
     frame_lagged = True
@@ -72,6 +74,10 @@ class VertexBending(ConstraintGroup):
         self.S.sort_indices()
         self._set_rest(mesh.points)
         self._set_buffers()
+
+    @classmethod
+    def element_vertices(cls, mesh: Mesh) -> np.ndarray:
+        return interior_vertices(mesh.triangles, mesh.vertices)[:, None]
 
     def _set_rest(self, points: np.ndarray) -> None:
         curvature = self.S @ points

@@ -109,6 +109,8 @@ class EdgeSpring(SimplexGroup):
 
         effect: Literal["spring"] = "spring"
 
+    cells = "edge"
+    unit = "m"
     rows_per_element = 1
     per_element = ("rest",)
     split_from = 8192

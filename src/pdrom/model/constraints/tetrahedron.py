@@ -126,6 +126,7 @@ def _project_gradients(d_pointer, range_pointer, p_pointer, m):
 class TetrahedronGroup(SimplexGroup):
     """One constraint per tetrahedron on the signed singular values of F, weight w V_t."""
 
+    cells = "tetrahedron"
     rows_per_element = 3
     work_size = FOUND + 1
     split_from = 1024

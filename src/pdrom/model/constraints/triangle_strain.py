@@ -173,6 +173,7 @@ class TriangleStrain(SimplexGroup):
 
         effect: Literal["strain"] = "strain"
 
+    cells = "triangle"
     rows_per_element = 2
     split_from = 4096
     project_kernel = staticmethod(_project)

@@ -1,4 +1,4 @@
-"""Cloth and bar of the study (20 x 20 sheet, 40 x 5 x 5 bar), at any resolution."""
+"""Cloth and bar of the study (docs/study.md: 20 x 20 sheet, 40 x 5 x 5 bar), at any resolution."""
 
 from typing import Literal
 

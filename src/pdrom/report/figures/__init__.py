@@ -1,10 +1,6 @@
-"""Figures of the paper: what each one draws (`spec`), reads (`catalogue`) and how it looks.
+"""Figures of the paper and the report, one module each: what a figure is, reads and lets choose.
 
-Importing this package loads no plotting library; the modules that draw are loaded on demand.
+Every module of this package declares one figure, ``FIGURE``, and loads no plotting library. It is
+drawn by the module of `drawings` with the same name unless it names another; `kit` holds what
+figures share.
 """
-
-from pdrom.report.figures.catalogue import FIGURES, figure_inputs
-from pdrom.report.figures.sources import Holdings, Sources
-from pdrom.report.figures.spec import FigureSpec, load_figures
-
-__all__ = ["FIGURES", "FigureSpec", "Holdings", "Sources", "figure_inputs", "load_figures"]

@@ -1,101 +1,27 @@
-"""The iterations of DEIM, drawn on the mesh (figure 2)."""
+"""The iterations of DEIM, drawn on the mesh."""
 
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-
-from pdrom.model.mesh.types import load_mesh
-from pdrom.report.figures import style
-from pdrom.report.figures.camera import Camera, window_of
-from pdrom.report.figures.elements import ElementMap, element_map
-from pdrom.report.figures.mesh_render import set_window
-from pdrom.report.figures.panels import fit_aspect
-from pdrom.report.figures.read import read_basis, read_samplings
-from pdrom.report.figures.residual import Iteration, iterations
-from pdrom.report.figures.snapshots_and_modes import MAGNITUDE
-from pdrom.report.figures.sources import Sources
-from pdrom.report.figures.spec import FigureSpec
-
-NEWEST, EARLIER = style.SKY, "#FFFFFF"
+from pdrom.core.paths import BASIS, MESH, SAMPLING
+from pdrom.core.reads import Chosen
+from pdrom.report.figures.kit.declaration import Declaration
+from pdrom.report.figures.kit.options import Columns, Count, Experiments, Methods, View
 
 
-@style.styled
-def draw(sources: Sources, spec: FigureSpec) -> Figure:
-    """Per step: the residual of the current mode on the mesh and the elements picked so far.
-
-    The first experiment and the first method that exist are drawn.
-
-    Raises
-    ------
-    StorageError
-        A file of the results is missing, damaged or does not fit the mesh.
-    """
-    holdings = sources.holdings
-    found = holdings.first(spec.scenes, spec.groups, spec.methods)
-    if found is None or holdings.reductions[found[2]].rows == "all":
-        return style.no_data(f"{', '.join(spec.scenes)} sampled by {', '.join(spec.methods)}")
-    scene, group, method = found
-    path = sources.sampling(scene, group, method)
-    basis, samplings = read_basis(sources.basis(scene, group, method)), read_samplings(path)
-    if not samplings:
-        return style.no_data(f"nothing was sampled for {sources.title(scene, group)}")
-    rows = holdings.reductions[method].rows
-    steps = iterations(basis.V, samplings[-1].entries, basis.rows_per_element, rows, spec.count)
-    mesh = load_mesh(sources.mesh(scene))
-    elements = element_map(group, mesh, basis.elements, str(path))
-    title = f"{sources.title(scene, group)}, {holdings.title(method)}"
-    return _draw_steps(steps, elements, Camera(spec.azimuth, spec.elevation), spec.columns, title)
+class Options(Experiments, Methods, Count, Columns, View):
+    """What may be chosen."""
 
 
-def _draw_steps(
-    steps: list[Iteration], elements: ElementMap, camera: Camera, columns: int, title: str
-) -> Figure:
-    columns = min(columns, len(steps))
-    rows = -(-len(steps) // columns)
-    window = fit_aspect(window_of(camera, [elements.mesh.points], 0.06))
-    height = rows * (style.WIDTH / columns * min(window.height / window.width, 1.0) * 0.9 + 0.45)
-    figure = Figure(figsize=(style.WIDTH, height + 0.35), layout="constrained")
-    figure.suptitle(title, fontsize=9)
-    axes = figure.subplots(rows, columns, squeeze=False).ravel()
-    norm = Normalize(0.0, 1.0)
-    for ax, step in zip(axes, steps, strict=False):
-        relative = step.magnitude / max(float(step.magnitude.max()), np.finfo(float).tiny)
-        elements.draw(ax, elements.mesh.points, relative, camera, MAGNITUDE, norm)
-        _mark(ax, step, elements, camera)
-        set_window(ax, window)
-        ax.set_title(f"k = {step.k}: element {step.newest}, {'xyz'[step.entry % 3]} entry")
-        ax.set_xlabel(f"largest residual {step.magnitude.max():.2g}", fontsize=7.5)
-    for ax in axes[len(steps) :]:
-        ax.remove()
-    bar = figure.colorbar(
-        ScalarMappable(norm, MAGNITUDE), ax=list(axes[: len(steps)]), aspect=25, pad=0.01,
-        fraction=0.03,
-    )  # fmt: skip
-    bar.set_label("residual / largest")
-    _legend(figure)
-    return figure
-
-
-def _mark(ax: Axes, step: Iteration, elements: ElementMap, camera: Camera) -> None:
-    centres = camera.project(elements.centres(elements.mesh.points))
-    if len(step.earlier):
-        ax.scatter(*centres[step.earlier].T, s=16, zorder=5, **_dot(EARLIER))
-    newest = centres[step.newest]
-    ax.scatter(*newest, s=110, zorder=6, facecolors="none", edgecolors=style.BLACK, linewidths=1.2)
-    ax.scatter(*newest, s=20, zorder=7, **_dot(NEWEST))
-
-
-def _dot(colour: str) -> dict:
-    return {"facecolors": colour, "edgecolors": style.BLACK, "linewidths": 0.8}
-
-
-def _legend(figure: Figure) -> None:
-    common = {"linestyle": "none", "marker": "o", "markeredgecolor": style.BLACK}
-    handles = [
-        Line2D([], [], markerfacecolor=EARLIER, markersize=4.5, label="picked before", **common),
-        Line2D([], [], markerfacecolor=NEWEST, markersize=5, label="picked in this step", **common),
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+FIGURE = Declaration(
+    number=2,
+    title="The first iterations of DEIM",
+    caption=(
+        "In step $k$ the residual of mode $k$ is taken against the modes before it, interpolated "
+        "at the entries picked so far, and the entry where it is largest is picked next (ringed). "
+        "Dark elements have a large residual; it vanishes at every entry that was picked before."
+    ),
+    reads=(
+        Chosen(MESH, first=True),
+        Chosen(BASIS, first=True),
+        Chosen(SAMPLING, first=True),
+    ),
+    options=Options,
+)

@@ -1,108 +1,26 @@
 """Does the gain of an interpolation predict whether the run fails?"""
 
-import numpy as np
-import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-
-from pdrom.core.store import read_table
-from pdrom.report.figures import style
-from pdrom.report.figures.multiples import clipped, log_axis
-from pdrom.report.figures.sources import Sources
-from pdrom.report.figures.spec import FigureSpec
-from pdrom.tables.gain_prediction import EVERY, FAILED, judged_runs
-
-ERRORS, GAINS = (1e-5, 1e2), (1.0, 1e5)  # limits; what lies outside is drawn on the rim
-DECADES = ["predictor", "lower", "upper", "runs", "failed_share", "threshold"]
+from pdrom.core.reads import TableOf
+from pdrom.report.figures.kit.declaration import Declaration
+from pdrom.report.figures.kit.options import Experiments, Methods
 
 
-@style.styled
-def draw(sources: Sources, spec: FigureSpec) -> Figure:
-    """Left a dot per run, gain against error within the horizon; right failures by decade of gain.
-
-    Runs that ended before their horizon lie on the upper rim, singular interpolations on the right
-    one. Shown are the runs that the table gain_prediction counts. Raises StorageError if a table is
-    missing or lacks a column.
-    """
-    reruns = read_table(sources.table("reduced_reruns"))
-    reconstruction = read_table(sources.table("reconstruction_error"))
-    prediction = read_table(sources.table("gain_prediction"), DECADES)
-    runs = judged_runs(reruns, reconstruction)
-    runs = _chosen(runs, sources, spec)
-    if runs.empty:
-        return style.no_data("no run with a gain")
-    figure = Figure(figsize=(style.WIDTH, 3.3), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
-    methods = [m for m in sources.holdings.reductions if (runs.method == m).any()]
-    styles = style.method_styles(methods)
-    for method in methods:
-        _draw_method(left, runs[runs.method == method], *styles[method])
-    _draw_limits(left, prediction)
-    _draw_decades(right, prediction[prediction.lower != EVERY])
-    handles = [
-        Line2D([], [], linestyle="none", color=c, marker=m, label=sources.holdings.title(method))
-        for method, (c, m) in styles.items()
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
-    return figure
+class Options(Experiments, Methods):
+    """What may be chosen."""
 
 
-def _chosen(runs: pd.DataFrame, sources: Sources, spec: FigureSpec) -> pd.DataFrame:
-    """Runs of the scenes and methods that are asked for and held."""
-    pairs = sources.holdings.experiments(spec.scenes, spec.groups)
-    held = pd.MultiIndex.from_frame(runs[["scene", "group"]]).isin(pairs)
-    return runs[held & runs.method.isin(sources.holdings.methods(spec.methods))]
-
-
-def _draw_method(ax: Axes, runs: pd.DataFrame, colour: str, marker: str) -> None:
-    gain = clipped(runs.gain.to_numpy(float), *GAINS)
-    error = clipped(runs.error.to_numpy(float), *ERRORS)
-    ax.plot(
-        gain, error, linestyle="none", color=colour, marker=marker, markersize=3.2, alpha=0.7,
-        markeredgewidth=0.0, clip_on=False,
-    )  # fmt: skip
-
-
-def _draw_limits(ax: Axes, prediction: pd.DataFrame) -> None:
-    """Axes, the error above which a run counts as failed, and the best threshold of the gain."""
-    ax.set_xscale("log")
-    ax.set_xlim(*GAINS)
-    log_axis(ax, *ERRORS)
-    ax.set_xlabel("gain of the interpolation")
-    ax.set_ylabel("error within the horizon (relative)")
-    ax.axhline(FAILED, color="#333333", linewidth=0.8, linestyle="--", zorder=0)
-    ax.text(GAINS[1], FAILED * 1.1, "failed ", ha="right", va="bottom", fontsize=7)
-    ax.text(GAINS[0] * 1.1, ERRORS[1] * 0.8, "ended early: upper rim", va="top", fontsize=7)
-    whole = prediction[(prediction.lower == EVERY) & (prediction.predictor == "gain")]
-    threshold = float(whole.threshold.iloc[0]) if len(whole) else np.nan
-    if GAINS[0] < threshold < GAINS[1]:
-        ax.axvline(threshold, color="#333333", linewidth=0.8, linestyle=":", zorder=0)
-        ax.text(
-            threshold * 1.08, ERRORS[0] * 1.3, f"best threshold {threshold:.2g}", fontsize=7,
-            va="bottom",
-        )  # fmt: skip
-
-
-def _draw_decades(ax: Axes, decades: pd.DataFrame) -> None:
-    """Share of failed runs, the number of runs above each bar."""
-    places = np.arange(len(decades))
-    ax.bar(places, 100.0 * decades.failed_share, width=0.7, color=style.FAILED, alpha=0.75)
-    for place, row in zip(places, decades.itertuples(), strict=True):
-        ax.text(place, 100.0 * row.failed_share + 1.5, f"{row.runs}", ha="center", fontsize=7)
-    ax.set_xticks(places, [_span(row.lower, row.upper) for row in decades.itertuples()])
-    ax.set_ylim(0, 112)
-    ax.set_yticks([0, 25, 50, 75, 100])
-    ax.tick_params(axis="x", labelrotation=35)
-    ax.set_xlabel("gain of the interpolation")
-    ax.set_ylabel("failed runs (%)")
-    ax.set_title("number of runs above each bar")
-    style.grid(ax)
-
-
-def _span(lower: str, upper: str) -> str:
-    """Name of a decade."""
-    low = round(np.log10(float(lower)))
-    if np.isinf(float(upper)):
-        return rf"over $10^{{{low}}}$"
-    return rf"$10^{{{low}}}$ to $10^{{{low + 1}}}$"
+FIGURE = Declaration(
+    title="Error of the run against the gain",
+    caption=(
+        "Left: every run of a sampled method whose basis suffices (the orthogonal projection does "
+        "not fail at the same size), over all scenes and sizes. Dashed: the error from which on a "
+        "run counts as failed; dotted: the gain that separates failed runs from others with the "
+        "fewest mistakes. Right: how many of them failed, by decade of the gain."
+    ),
+    reads=(
+        TableOf("reduced_reruns"),
+        TableOf("reconstruction_error"),
+        TableOf("gain_prediction"),
+    ),
+    options=Options,
+)

@@ -1,68 +1,22 @@
 """What an iteration of the full-order run buys, plain and accelerated."""
 
-import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import NullFormatter
-
-from pdrom.core.store import read_table
-from pdrom.experiments.names import ANDERSON, FOM
-from pdrom.report.figures import style
-from pdrom.report.figures.multiples import clipped, label_outer, log_axis, small_multiples
-from pdrom.report.figures.sources import Sources
-from pdrom.report.figures.spec import FigureSpec
-
-ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
-COLUMNS = ["scene", "method", "iterations", ERROR, TIME]
-LOW, HIGH = 1e-5, 1e1
-RUNS = {
-    FOM: ("plain iterations", style.BLACK, "o"),
-    ANDERSON: ("with Anderson acceleration", style.VERMILLION, "s"),
-}
+from pdrom.core.reads import TableOf
+from pdrom.report.figures.kit.declaration import Declaration
+from pdrom.report.figures.kit.options import Columns, Scenes
 
 
-@style.styled
-def draw(sources: Sources, spec: FigureSpec) -> Figure:
-    """A panel per scene, error against the converged run over the time of a frame; dots are K.
-
-    Raises
-    ------
-    StorageError
-        The table is missing or lacks a column.
-    """
-    table = read_table(sources.table("accuracy_cost"), COLUMNS).dropna(subset=[ERROR, TIME])
-    table = table[table.method.isin(list(RUNS))]
-    held = list(dict.fromkeys(s for s, _ in sources.holdings.experiments(spec.scenes)))
-    scenes = [scene for scene in held if (table.scene == scene).any()]
-    if not scenes:
-        return style.no_data("no full-order run with both an error and a time")
-    figure, axes = small_multiples(len(scenes), spec.columns, height=1.6)
-    for ax, scene in zip(axes, scenes, strict=True):
-        log_axis(ax, LOW, HIGH)
-        ax.set_xscale("log")
-        ax.xaxis.set_minor_formatter(NullFormatter())
-        for method in RUNS:
-            rows = table[(table.scene == scene) & (table.method == method)]
-            _draw_run(ax, rows.sort_values("iterations"), method)
-        ax.set_title(style.words(scene))
-    label_outer(axes, spec.columns, "time per frame (ms)", "error against K \N{INFINITY}")
-    handles = [
-        Line2D([], [], color=colour, marker=marker, label=label)
-        for label, colour, marker in RUNS.values()
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-    return figure
+class Options(Scenes, Columns):
+    """What may be chosen."""
 
 
-def _draw_run(ax: Axes, rows: pd.DataFrame, method: str) -> None:
-    _, colour, marker = RUNS[method]
-    error = clipped(rows[ERROR].to_numpy(float), LOW, HIGH)
-    ax.plot(rows[TIME], error, color=colour, marker=marker, markersize=3.2)
-    if method != FOM:
-        return
-    for time, height, count in zip(rows[TIME], error, rows.iterations, strict=True):
-        ax.annotate(
-            f"{count:.0f}", (time, height), (0, 4), textcoords="offset points", fontsize=6.5,
-            ha="center",
-        )  # fmt: skip
+FIGURE = Declaration(
+    title="What an iteration buys",
+    caption=(
+        "Error of the full-order run within the horizon against the same run with every frame "
+        "solved to convergence, over the time of a frame. Dots are the numbers of local/global "
+        "iterations, printed at the plain ones; accelerated runs combine the last iterates so "
+        "that their combined residual is smallest, and have the same fixed point."
+    ),
+    reads=(TableOf("accuracy_cost"),),
+    options=Options,
+)

@@ -1,80 +1,18 @@
 """The ladder: which choice breaks the reduction, and by how much."""
 
-import numpy as np
-import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
+from pdrom.core.reads import TableOf
+from pdrom.report.figures.kit.declaration import Declaration
+from pdrom.report.figures.kit.options import Scenes
 
-from pdrom.core.store import read_table
-from pdrom.report.figures import style
-from pdrom.report.figures.multiples import clipped
-from pdrom.report.figures.sources import Sources
-from pdrom.report.figures.spec import FigureSpec
-
-COLUMNS = ["scene", "direction", "rung", "gain", "relative_error_within_horizon"]
-ERRORS, GAINS = (1e-4, 1e2), (1.0, 1e5)  # limits; what lies outside is drawn on the rim
-
-
-@style.styled
-def draw(sources: Sources, spec: FigureSpec) -> Figure:
-    """Rungs from top (published) to bottom; left the error of the rerun, right the gain.
-
-    Below the line each row lacks one ingredient of the sound method. A bar shows the spread over
-    choices of the singular vectors' signs for the published method. Runs that blew up before their
-    horizon, and singular interpolations, lie on the right rim. Raises StorageError if the table is
-    missing or lacks a column.
-    """
-    table = read_table(sources.table("ladder"), COLUMNS)
-    if spec.scenes:
-        table = table[table.scene.isin(spec.scenes)]
-    table = table[table.gain.notna()]
-    if table.empty:
-        return style.no_data("no scene that climbs the ladder")
-    climbed = table[table.direction != "signs"]
-    rungs = list(dict.fromkeys(zip(climbed.direction, climbed.rung, strict=True)))
-    scenes = list(dict.fromkeys(table.scene))
-    figure = Figure(figsize=(style.WIDTH, 0.26 * len(rungs) + 1.3), layout="constrained")
-    left, right = figure.subplots(1, 2, sharey=True)
-    _draw_quantity(left, table, rungs, scenes, "relative_error_within_horizon", ERRORS)
-    _draw_quantity(right, table, rungs, scenes, "gain", GAINS)
-    left.set_xlabel("error of the rerun within the horizon (relative)")
-    right.set_xlabel("gain of the interpolation")
-    left.set_yticks(range(len(rungs)), [rung for _, rung in rungs])
-    left.invert_yaxis()
-    _legend(figure, scenes)
-    return figure
-
-
-def _draw_quantity(
-    ax: Axes,
-    table: pd.DataFrame,
-    rungs: list[tuple[str, str]],
-    scenes: list[str],
-    column: str,
-    limits: tuple[float, float],
-) -> None:
-    ax.set_xscale("log")
-    ax.set_xlim(limits[0], limits[1] * 1.3)
-    style.grid(ax)
-    for i, scene in enumerate(scenes):
-        rows = table[table.scene == scene].set_index(["direction", "rung"])[column]
-        values = [rows.get(rung, np.nan) for rung in rungs]
-        values = clipped(np.nan_to_num(np.array(values, float), nan=np.inf), *limits)
-        heights = np.arange(len(rungs)) + 0.09 * (i - 0.5 * (len(scenes) - 1))
-        colour, marker = style.scene_style(i)
-        ax.plot(values, heights, linestyle="none", color=colour, marker=marker, markersize=3.2)
-        signs = table[(table.scene == scene) & (table.direction == "signs")][column]
-        if len(signs):
-            spread = clipped(np.nan_to_num(signs.to_numpy(float), nan=np.inf), *limits)
-            ax.hlines(
-                heights[0], spread.min(), spread.max(), color=colour, linewidth=0.9, alpha=0.6
-            )
-    first_down = next((i for i, (d, _) in enumerate(rungs) if d == "down"), len(rungs))
-    ax.axhline(first_down - 0.5, color="#333333", linewidth=0.8)
-
-
-def _legend(figure: Figure, scenes: list[str]) -> None:
-    handles = style.scene_handles(scenes)
-    handles.append(Line2D([], [], color=style.GREY, label="spread over sign choices"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+FIGURE = Declaration(
+    title="The ladder from the published choices to sound ones",
+    caption=(
+        "Above the line one ingredient after the other is changed, from the published code to "
+        "whole elements with oversampling; below it each row takes a single ingredient away from "
+        "the sound method or exchanges it. Left the error of the rerun within the horizon, right "
+        "the gain of the interpolation; what blew up or is singular lies on the right rim. Bars "
+        "show the spread over choices of the arbitrary signs of the singular vectors."
+    ),
+    reads=(TableOf("ladder"),),
+    options=Scenes,
+)

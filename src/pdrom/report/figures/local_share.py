@@ -1,86 +1,17 @@
 """Where the time of a frame goes, by implementation (claim C1)."""
 
-import numpy as np
-import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from pdrom.core.reads import TableOf
+from pdrom.report.figures.kit.declaration import Declaration
+from pdrom.report.figures.kit.options import Scenes
 
-from pdrom.core.store import read_table
-from pdrom.report.figures import style
-from pdrom.report.figures.sources import Sources
-from pdrom.report.figures.spec import FigureSpec
-
-PHASES = {
-    "local_ms": ("local projections", style.ORANGE),
-    "assembly_ms": ("right-hand side", style.SKY),
-    "global_ms": ("global solve", style.BLUE),
-}
-COLUMNS = ["scene", "implementation", *PHASES, "local_share"]
-ORDER = ("interpreted", "numpy", "compiled")
-TITLES = {"interpreted": "interpreted loop", "numpy": "vectorised NumPy", "compiled": "compiled"}
-CLAIM = 70.0  # per cent, claim C1
-
-
-@style.styled
-def draw(sources: Sources, spec: FigureSpec) -> Figure:
-    """A panel per implementation, a bar per scene; the time per frame is printed at its end.
-
-    Raises
-    ------
-    StorageError
-        The table is missing or lacks a column.
-    """
-    table = read_table(sources.table("local_share"), COLUMNS)
-    held = list(dict.fromkeys(s for s, _ in sources.holdings.experiments(spec.scenes)))
-    scenes = [scene for scene in held if (table.scene == scene).any()]
-    present = set(table[table.scene.isin(scenes)].implementation)
-    implementations = [i for i in (*ORDER, *sorted(present - set(ORDER))) if i in present]
-    if not scenes or not implementations:
-        return style.no_data("no timings")
-    height = 0.27 * len(scenes) + 1.15
-    figure = Figure(figsize=(style.WIDTH, height), layout="constrained")
-    axes = figure.subplots(1, len(implementations), sharey=True, squeeze=False)[0]
-    for ax, implementation in zip(axes, implementations, strict=True):
-        rows = table[table.implementation == implementation].drop_duplicates("scene")
-        _draw_bars(ax, rows.set_index("scene"), scenes)
-        ax.set_title(TITLES.get(implementation, implementation))
-        ax.set_xlabel("share of a frame (%)")
-    axes[0].set_yticks(range(len(scenes)), [style.words(scene) for scene in scenes])
-    axes[0].set_ylim(len(scenes) - 0.4, -0.6)
-    _legend(figure)
-    return figure
-
-
-def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
-    for y, scene in enumerate(scenes):
-        if scene not in rows.index:
-            continue
-        times = rows.loc[scene, list(PHASES)].to_numpy(float)
-        total = np.nansum(times)
-        start = 0.0
-        for time, (_, colour) in zip(times, PHASES.values(), strict=True):
-            share = 100.0 * np.nan_to_num(time) / total
-            ax.barh(y, share, left=start, color=colour, height=0.72)
-            start += share
-        printed = f"{100.0 * rows.local_share[scene]:.0f} %"
-        ax.text(2.0, y, printed, va="center", ha="left", fontsize=7.5, fontweight="bold")
-        ax.text(102.0, y, _milliseconds(total), va="center", ha="left", fontsize=7)
-    ax.axvline(CLAIM, color=style.BLACK, linewidth=1.0, linestyle="--")
-    ax.set_xlim(0, 100)
-    ax.set_xticks([0, 25, 50, 75, 100])
-    ax.tick_params(axis="y", length=0)
-
-
-def _milliseconds(value: float) -> str:
-    """Time of a frame with two significant digits."""
-    return f"{value:.2g} ms" if value < 99.5 else f"{value:.0f} ms"
-
-
-def _legend(figure: Figure) -> None:
-    handles: list = [Patch(color=colour, label=label) for label, colour in PHASES.values()]
-    handles.append(
-        Line2D([], [], color=style.BLACK, linestyle="--", label=f"{CLAIM:.0f} % (claim C1)")
-    )
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+FIGURE = Declaration(
+    title="Where the time of a frame goes",
+    caption=(
+        "Share of local projections, right-hand side and global solve in the time of a full-order "
+        "frame, for three implementations of the same local step; the dashed line is the 70 % of "
+        "claim C1. The printed number is the share of the local projections, beside the bar "
+        "stands the time per frame."
+    ),
+    reads=(TableOf("local_share"),),
+    options=Scenes,
+)

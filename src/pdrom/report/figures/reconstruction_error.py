@@ -1,128 +1,25 @@
-"""Reconstruction error of snapshots against the basis size (figure 8)."""
+"""Reconstruction error of snapshots against the basis size, on the paper's scenes."""
 
-import numpy as np
-import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-
-from pdrom.core.store import read_table
-from pdrom.report.figures import style
-from pdrom.report.figures.multiples import clipped, label_outer, log_axis, small_multiples
-from pdrom.report.figures.sources import Sources
-from pdrom.report.figures.spec import FigureSpec
-
-COLUMNS = ["scene", "group", "method", "r", "split", "relative_error"]
-LOW, HIGH = 1e-7, 1e3  # errors outside are drawn on the limit
-PUBLISHED = "#B5B5B5"
+from pdrom.core.reads import Published, TableOf
+from pdrom.report.figures.kit.declaration import Declaration
+from pdrom.report.figures.kit.options import Beside, Columns, Experiments, Methods, Splits
 
 
-@style.styled
-def draw(sources: Sources, spec: FigureSpec) -> Figure:
-    """A panel per experiment, a line per method and split; errors outside the axis lie on its rim.
-
-    An experiment without any error (its projections are round-off) has a panel that says so.
-
-    Raises
-    ------
-    StorageError
-        The table is missing or lacks a column.
-    """
-    table = read_table(sources.table("reconstruction_error"), COLUMNS)
-    pairs = [
-        (scene, group, rows)
-        for scene, group in sources.holdings.experiments(spec.scenes, spec.groups)
-        if len(rows := table[(table.scene == scene) & (table.group == group)])
-    ]
-    methods = [m for m in sources.holdings.methods(spec.methods) if (table.method == m).any()]
-    if not pairs or not methods:
-        return style.no_data(f"reconstruction errors of {', '.join(spec.scenes) or 'any scene'}")
-    published = _published(sources)
-    figure, axes = small_multiples(len(pairs), spec.columns, legend_rows=3)
-    reference_drawn = False
-    for ax, (scene, group, rows) in zip(axes, pairs, strict=True):
-        log_axis(ax, LOW, HIGH)
-        if published is not None and scene in spec.published:
-            reference_drawn |= _draw_published(ax, published, spec.published[scene], group)
-        drawn = [_draw_method(ax, rows, method, spec.splits) for method in methods]
-        if not any(drawn):
-            style_note(ax, "projections are round-off:\nno relative error exists")
-        ax.set_title(sources.title(scene, group))
-        ax.set_xlim(0, max(float(rows.r.max()), 1.0) * 1.02)
-    label_outer(axes, spec.columns, "basis size r", "relative error")
-    _legend(figure, sources, methods, spec.splits, reference_drawn)
-    return figure
+class Options(Experiments, Methods, Splits, Columns, Beside):
+    """What may be chosen."""
 
 
-def _draw_method(ax: Axes, rows: pd.DataFrame, method: str, splits: tuple[str, ...]) -> bool:
-    colour, marker = style.method_styles([method])[method]
-    drawn = False
-    for split in splits:
-        line = rows[(rows.method == method) & (rows.split == split)].sort_values("r")
-        error = line.relative_error.to_numpy(float)
-        if not np.isfinite(error).any():
-            continue
-        drawn = True
-        shown = clipped(np.where(np.isfinite(error), error, np.nan), LOW, HIGH)
-        train = split == "train"
-        ax.plot(
-            line.r, shown, linestyle=style.SPLITS[split], color=colour,
-            linewidth=1.2 if train else 0.9, marker=marker if train else None, markersize=2.8,
-            markevery=max(1, len(shown) // 5), clip_on=False,
-        )  # fmt: skip
-        if train:
-            _mark_clipped(ax, line.r.to_numpy(float), error, colour)
-    return drawn
-
-
-def _mark_clipped(ax: Axes, r: np.ndarray, error: np.ndarray, colour: str) -> None:
-    """Arrow heads on the upper rim where the error lies above it."""
-    above = error > HIGH
-    if above.any():
-        ax.plot(
-            r[above], np.full(above.sum(), HIGH), linestyle="none", marker=6, markersize=5,
-            color=colour, clip_on=False, zorder=5,
-        )  # fmt: skip
-
-
-def style_note(ax: Axes, text: str) -> None:
-    """Grey remark in the middle of a panel."""
-    ax.text(
-        0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color="#666666",
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 2},
-    )  # fmt: skip
-
-
-def _published(sources: Sources) -> pd.DataFrame | None:
-    """The published code's own errors, if the project holds them."""
-    if sources.published is None:
-        return None
-    columns = ["experiment", "group", "split", "num_points", "relative_error_x"]
-    return read_table(sources.published / "reconstruction_error.csv", columns, result=False)
-
-
-def _draw_published(ax: Axes, table: pd.DataFrame, experiment: str, group: str) -> bool:
-    """Errors of the x and y axes on the training snapshots: the published table has no total."""
-    rows = table[
-        (table.experiment == experiment) & (table.group == group) & (table.split == "train")
-    ].sort_values("num_points")
-    for axis in ("x", "y"):
-        error = clipped(rows[f"relative_error_{axis}"].to_numpy(float), LOW, HIGH)
-        ax.plot(rows.num_points, error, color=PUBLISHED, linewidth=0.7, zorder=1)
-    return len(rows) > 0
-
-
-def _legend(
-    figure: Figure, sources: Sources, methods: list[str], splits: tuple[str, ...], published: bool
-) -> None:
-    handles = []
-    for method, (colour, marker) in style.method_styles(methods).items():
-        title = sources.holdings.title(method)
-        handles.append(Line2D([], [], color=colour, marker=marker, label=title))
-    for split in splits:
-        label = style.SPLIT_NAMES[split]
-        handles.append(Line2D([], [], color="#555555", linestyle=style.SPLITS[split], label=label))
-    if published:
-        label = "published code's output (x, y)"
-        handles.append(Line2D([], [], color=PUBLISHED, linewidth=1.0, label=label))
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+FIGURE = Declaration(
+    number=8,
+    title="Reconstruction error of the paper's scenes",
+    caption=(
+        "Relative error of reconstructed projections against the number $r$ of basis vectors, for "
+        "the snapshots used (train), the frames between them (test) and another run (held out). "
+        "Errors above the axis are drawn on its rim with an arrow head."
+    ),
+    reads=(
+        TableOf("reconstruction_error"),
+        Published("reconstruction_error"),
+    ),
+    options=Options,
+)

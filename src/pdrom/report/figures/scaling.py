@@ -1,118 +1,21 @@
-"""Time of an iteration against the number of vertices, for the full model and reduced ones."""
+"""Time of an iteration against the number of vertices."""
 
-import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import NullFormatter
+from pdrom.core.reads import TableOf
+from pdrom.report.figures.kit.declaration import Declaration
+from pdrom.report.figures.kit.options import Scenes
 
-from pdrom.core.store import read_table
-from pdrom.report.figures import style
-from pdrom.report.figures.sources import Sources
-from pdrom.report.figures.spec import FigureSpec
-
-COLUMNS = [
-    "scene", "method", "threads", "vertices", "ms_per_iteration", "local_ms", "global_ms",
-    "factorisation_ms", "memory_mb",
-]  # fmt: skip
-PHASES = {
-    "ms_per_iteration": ("whole iteration", "-"),
-    "local_ms": ("local step", "--"),
-    "global_ms": ("global solve", ":"),
-}
-OFFLINE = {
-    "factorisation_ms": ("factorisation (ms)", style.VERMILLION, "s"),
-    "memory_mb": ("memory for it (MB)", style.PURPLE, "^"),
-}
-TWO = "two threads"  # a method of its own here: the full-order run with two threads
-NAMES = {"fom": "full order", TWO: "full order, two threads", "ecsw": "POD subspace, ecsw"}
-COLOURS = {"fom": style.BLACK, TWO: "#8C8C8C", "ecsw": "#1B6E6E"}
-# whose exponent is printed, and how many points above the end of the line
-BESIDE = {"fom": 6, "ecsw": 5}
-MARKERS = {"fom": "o", TWO: "s", "ecsw": ">"}
-
-
-@style.styled
-def draw(sources: Sources, spec: FigureSpec) -> Figure:
-    """A column per scene: above the time of an iteration by phase, below what comes before it.
-
-    Raises
-    ------
-    StorageError
-        A table is missing or lacks a column.
-    """
-    table = _two_threads_apart(read_table(sources.table("scaling"), COLUMNS))
-    fits = _two_threads_apart(read_table(sources.table("scaling_fit")))
-    asked = spec.scenes or tuple(dict.fromkeys(table.scene))
-    scenes = [scene for scene in asked if (table.scene == scene).any()]
-    if not scenes:
-        return style.no_data("no mesh sizes")
-    figure = Figure(figsize=(style.WIDTH, 4.6), layout="constrained")
-    times, offline = figure.subplots(
-        2, len(scenes), sharex=True, sharey="row", squeeze=False, height_ratios=(1.7, 1.0)
-    )
-    for ax, lower, scene in zip(times, offline, scenes, strict=True):
-        rows = table[table.scene == scene].sort_values("vertices")
-        _draw_times(ax, rows, fits[fits.scene == scene])
-        _draw_offline(lower, rows[rows.method == "fom"])
-        ax.set_title(style.words(scene))
-        lower.set_xlabel("vertices")
-    times[0].set_ylabel("time of an iteration (ms)")
-    offline[0].set_ylabel("before the first frame")
-    _legend(figure, sources, list(dict.fromkeys(table.method)))
-    return figure
-
-
-def _two_threads_apart(table: pd.DataFrame) -> pd.DataFrame:
-    return table.assign(method=table.method.mask(table.threads == 2, TWO))
-
-
-def _draw_times(ax: Axes, rows: pd.DataFrame, fits: pd.DataFrame) -> None:
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    style.grid(ax)
-    for method, part in rows.groupby("method", sort=False):
-        colour, marker = _style(str(method))
-        for quantity, (_, line) in PHASES.items():
-            if (method, quantity) == (TWO, "global_ms"):
-                continue  # the solves have one thread
-            ax.plot(
-                part.vertices, part[quantity], line, color=colour,
-                marker=marker if line == "-" else None, linewidth=1.3 if line == "-" else 0.9,
-            )  # fmt: skip
-        own = (fits.method == method) & (fits.quantity == "ms_per_iteration")
-        if own.any() and method in BESIDE:
-            end = part.iloc[-1]
-            ax.annotate(
-                rf"$N^{{{fits[own].exponent.iloc[0]:.2f}}}$",
-                (end.vertices, end.ms_per_iteration), xytext=(-3, BESIDE[str(method)]),
-                textcoords="offset points", ha="right", color=colour, fontsize=7.5,
-            )  # fmt: skip
-
-
-def _draw_offline(ax: Axes, rows: pd.DataFrame) -> None:
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    style.grid(ax)
-    ax.xaxis.set_minor_formatter(NullFormatter())
-    for quantity, (label, colour, marker) in OFFLINE.items():
-        shown = rows[rows[quantity] > 0.0]
-        ax.plot(shown.vertices, shown[quantity], color=colour, marker=marker, label=label)
-
-
-def _style(method: str) -> tuple[str, str]:
-    colour, marker = style.method_styles([method])[method]
-    return COLOURS.get(method, colour), MARKERS.get(method, marker)
-
-
-def _legend(figure: Figure, sources: Sources, methods: list[str]) -> None:
-    handles = []
-    for method in methods:
-        colour, marker = _style(method)
-        label = NAMES.get(method) or sources.holdings.title(method)
-        handles.append(Line2D([], [], color=colour, marker=marker, label=label))
-    for label, line in PHASES.values():
-        handles.append(Line2D([], [], color="#555555", linestyle=line, label=label))
-    for label, colour, marker in OFFLINE.values():
-        handles.append(Line2D([], [], color=colour, marker=marker, label=label))
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+FIGURE = Declaration(
+    title="Cost against mesh size",
+    caption=(
+        "Time of one local/global iteration against the number of vertices, with the exponent of "
+        "a fitted power law: the full-order run with one thread and with two, the same with only "
+        "the local step reduced, and the hyper-reduced run in a position subspace, whose cost "
+        "does not depend on the mesh. Below, the time of assembly and factorisation and the "
+        "memory that they take."
+    ),
+    reads=(
+        TableOf("scaling"),
+        TableOf("scaling_fit"),
+    ),
+    options=Scenes,
+)

@@ -4,37 +4,48 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from pydantic import ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from pdrom.core.errors import StorageError
 from pdrom.core.machine import Machine
 from pdrom.core.store import read_table, read_text, require_intact, write_text
 from pdrom.core.yamlfile import describe
 from pdrom.report.paper.bibliography import bibliography
+from pdrom.report.paper.figuretex import captions
+from pdrom.report.paper.known import decisions, provenance
 from pdrom.report.paper.macros import macros
 from pdrom.report.paper.tex import build_pdf
 from pdrom.report.paper.textables import TEX_TABLES
+from pdrom.report.words.text import replaced
+
+
+class Facts(BaseModel):
+    """What the manuscript states beside results.
+
+    captions : titles and captions of the figures, as TeX, by name
+    part : what the study was read from where it is not the full one, else None
+    full_study : the configuration of the full study
+    tables : facts of the configuration (scenes, methods, study), as rows of tables
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    captions: dict[str, str]
+    part: str | None
+    full_study: str
+    tables: dict[str, list[dict[str, Any]]]
 
 
 def write_inputs(
-    source: str,
-    references: str,
-    tables: list[str],
-    machine: str,
-    facts: dict[str, list[dict[str, Any]]],
-    folder: str,
+    source: str, references: str, tables: list[str], machine: str, facts: Facts, folder: str
 ) -> None:
-    """Write macros.tex, the TeX tables and main.bbl into ``folder``.
-
-    Parameters
-    ----------
-    facts : further tables from the configuration (scenes, methods, study), as lists of rows
-    """
+    """Write macros.tex, figures.tex, the TeX tables and main.bbl into ``folder``."""
     text = Path(source).read_text(encoding="utf-8")
     data = {Path(path).stem: read_table(path) for path in tables}
-    data |= {name: pd.DataFrame(rows) for name, rows in facts.items()}
+    data |= {name: pd.DataFrame(rows) for name, rows in facts.tables.items()}
     data["machine"] = _machine_table(Path(machine))
-    outputs = {"macros.tex": macros(text, data)}
+    known = provenance(decisions(text, data), facts.part, facts.full_study)
+    outputs = {"macros.tex": macros(text, data) + known, "figures.tex": captions(facts.captions)}
     outputs |= {f"{name}.tex": make(data) for name, make in TEX_TABLES.items()}
     outputs["main.bbl"] = bibliography(text, Path(references))
     for name, content in outputs.items():
@@ -50,7 +61,10 @@ def _machine_table(path: Path) -> pd.DataFrame:
     versions = {f"version_{name}": version for name, version in record.libraries.items()}
     architectures = ", ".join(sorted({k.architecture for k in record.kernels if k.architecture}))
     plain = record.model_dump(exclude={"libraries", "kernels"})
-    return pd.DataFrame([{**plain, **versions, "kernels": architectures}])
+    row = {**plain, **versions, "kernels": architectures}
+    # names of a machine are not ours and may hold any character
+    words = {key: replaced(value) for key, value in row.items() if isinstance(value, str)}
+    return pd.DataFrame([{**row, **words}])
 
 
 def build(source: str, figures: list[str], inputs: list[str], output: str) -> None:

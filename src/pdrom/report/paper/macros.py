@@ -11,15 +11,19 @@ one TeX macro each. No number is typed, and none is generated that the text does
 
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from pdrom.core.errors import PaperError
+from pdrom.report.words.text import escape
 
 _KEY = re.compile(r"\\val\{([^{}]*)\}")
 MISSING = "n/a"
+# Columns that say what was run; the others say what came out.
+_LABELS = ("scene", "group", "method", "position_basis", "variant", "direction", "experiment")
 AGGREGATES: dict[str, Callable[[pd.Series], Any]] = {
     "max": lambda column: column.max(),
     "min": lambda column: column.min(),
@@ -54,27 +58,66 @@ def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:
 
 
 def resolve(key: str, tables: Mapping[str, pd.DataFrame]) -> str:
-    """TeX text of one key; `MISSING` where this configuration has no such number."""
+    """TeX text of one key; `MISSING` where there is no such number.
+
+    Raises
+    ------
+    PaperError
+        An unknown table or column, or several rows without an aggregate.
+    """
+    parsed = _parse(key, tables)
+    rows = _matching(tables[parsed.table], parsed.filters)
+    cells = rows[parsed.column].dropna()
+    if parsed.aggregate == "count":
+        return str(len(cells)) if is_held(key, tables) else MISSING
+    if parsed.aggregate is not None:
+        return format_number(AGGREGATES[parsed.aggregate](cells)) if len(cells) else MISSING
+    if len(rows) > 1:
+        raise PaperError(f"\\val{{{key}}}: matches {len(rows)} rows of table '{parsed.table}'")
+    return format_number(cells.iloc[0]) if len(cells) else MISSING
+
+
+def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
+    """Whether a configuration holds what ``key`` asks for, be its cell empty or not.
+
+    A count of none is a number where there are runs to count, whatever became of them.
+    """
+    parsed = _parse(key, tables)
+    filters = parsed.filters
+    if parsed.aggregate == "count":
+        filters = {field: value for field, value in filters.items() if field in _LABELS}
+    return len(_matching(tables[parsed.table], filters)) > 0
+
+
+@dataclass(frozen=True)
+class _Key:
+    """A key in its parts."""
+
+    table: str
+    filters: dict[str, str]
+    column: str
+    aggregate: str | None
+
+
+def _parse(key: str, tables: Mapping[str, pd.DataFrame]) -> _Key:
     name, *parts = key.split("|")
     if name not in tables:
         raise PaperError(f"\\val{{{key}}}: no table '{name}' (allowed: {', '.join(tables)})")
-    aggregate = AGGREGATES[parts.pop()] if parts and parts[-1] in AGGREGATES else None
+    aggregate = parts.pop() if parts and parts[-1] in AGGREGATES else None
     if not parts or "=" in parts[-1]:
         raise PaperError(f"\\val{{{key}}}: names no column of table '{name}'")
     *filters, column = parts
-    rows = tables[name]
-    for entry in filters:
-        field, _, value = entry.partition("=")
-        _require(field, rows, key)
+    pairs = {field: value for field, _, value in (entry.partition("=") for entry in filters)}
+    for field in (*pairs, column):
+        _require(field, tables[name], key)
+    return _Key(name, pairs, column, aggregate)
+
+
+def _matching(rows: pd.DataFrame, filters: Mapping[str, str]) -> pd.DataFrame:
+    for field, value in filters.items():
         matches = rows[field].map(lambda cell, value=value: _same(cell, value))
         rows = rows[matches.astype(bool)]
-    _require(column, rows, key)
-    cells = rows[column].dropna()
-    if aggregate is not None:
-        return format_number(aggregate(cells)) if len(cells) else MISSING
-    if len(rows) > 1:
-        raise PaperError(f"\\val{{{key}}}: matches {len(rows)} rows of table '{name}'")
-    return format_number(cells.iloc[0]) if len(cells) else MISSING
+    return rows
 
 
 def _require(field: str, rows: pd.DataFrame, key: str) -> None:
@@ -112,14 +155,3 @@ def format_number(value: Any) -> str:
         digits = max(0, 1 - power)
         return f"{number:.{digits}f}"
     return rf"\ensuremath{{{mantissa}\cdot 10^{{{power}}}}}"
-
-
-_SPECIAL = {
-    "\\": r"\textbackslash{}", "_": r"\_", "%": r"\%", "&": r"\&", "#": r"\#", "$": r"\$",
-    "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
-}  # fmt: skip
-
-
-def escape(text: str) -> str:
-    """Plain text for TeX."""
-    return "".join(_SPECIAL.get(character, character) for character in text)

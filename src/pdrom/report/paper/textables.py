@@ -6,7 +6,8 @@ import pandas as pd
 
 from pdrom.experiments.hard_cases.catalogue import CASES
 from pdrom.experiments.hard_cases.expectations import FAILURES
-from pdrom.report.paper.macros import escape, format_number
+from pdrom.report.paper.macros import format_number
+from pdrom.report.words.text import escape
 
 Tables = Mapping[str, pd.DataFrame]
 _VERDICT_COLOUR = {"holds": "okgreen", "does not hold": "okred"}

@@ -8,18 +8,23 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pdrom.core.paths import BASIS, FULL_ORDER, MESH, RERUNS, SAMPLING, SNAPSHOTS, TABLE
 from pdrom.core.store import write_hdf5, write_table
-from pdrom.model.constraints.surface import interior_vertices
+from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh, save_mesh
 from pdrom.reduction.sampling.block import block_elements
 from pdrom.reduction.sampling.deim import deim_entries
-from pdrom.report.figures import FIGURES, FigureSpec, Holdings, Sources, load_figures
-from pdrom.report.figures.sources import MethodHolding, SceneHolding
+from pdrom.report.figures.kit.catalogue import declarations, load_choices
+from pdrom.report.figures.kit.holdings import GroupHolding, Holdings, MethodHolding, SceneHolding
+from pdrom.report.figures.kit.options import Options
+from pdrom.report.figures.kit.results import Results
 from pdrom.tables.scaling_fit import scaling_fit
 from places import ROOT
 
 FRAMES = 20
+SETTINGS = {"sensitivity.reference": 1e-10, "sensitivity.threshold": 1e-3,
+            "stability.wrong": 0.1, "stability.left": 2.0}  # fmt: skip
 ROWS = {"bending": 1, "spring": 1, "strain": 2, "deformation_gradient": 3, "tetrahedron_strain": 3}
 METHOD_ROWS = {"pod": "all", "deim": "scalar", "qdeim": "scalar", "deim-joint": "joint",
                "published": "joint", "block-deim": "element"}  # fmt: skip
@@ -51,8 +56,8 @@ class Study:
     """An invented study on disk."""
 
     root: Path
-    sources: Sources
-    specs: dict[str, FigureSpec]
+    results: Results
+    specs: dict[str, Options]
 
 
 def mesh_of(scene: str) -> Mesh:
@@ -64,12 +69,17 @@ def mesh_of(scene: str) -> Mesh:
 
 def element_count(mesh: Mesh, group: str) -> int:
     """Elements of a group on a mesh."""
-    counts = {
-        "bending": lambda: len(interior_vertices(mesh.triangles, mesh.vertices)),
-        "spring": lambda: len(mesh.edges()),
-        "strain": lambda: len(mesh.triangles),
+    return len(EFFECTS.load(group).element_vertices(mesh))
+
+
+def group_holdings() -> dict[str, GroupHolding]:
+    """All constraint groups."""
+    return {
+        name: GroupHolding(
+            place=place, cells=EFFECTS.load(name).cells, unit=EFFECTS.load(name).unit
+        )
+        for place, name in enumerate(ROWS)
     }
-    return counts.get(group, lambda: len(mesh.tetrahedra))()
 
 
 def make_results(root: Path, scenes: dict[str, tuple[str, ...]], methods: list[str]) -> Holdings:
@@ -80,26 +90,27 @@ def make_results(root: Path, scenes: dict[str, tuple[str, ...]], methods: list[s
             name: SceneHolding(mesh="bar" if name.startswith("bar") else name, groups=groups)
             for name, groups in scenes.items()
         },
-        reductions={
+        methods={
             name: MethodHolding(title=name, basis="none-none-vectorised", rows=METHOD_ROWS[name])
             for name in methods
         },
+        groups=group_holdings(),
     )
-    sources = Sources(root, holdings)
+    results = Results(str(root), holdings, SETTINGS)
     for scene, groups in scenes.items():
         mesh = mesh_of(scene)
-        save_mesh(mesh, sources.mesh(scene))
+        save_mesh(mesh, results.path(MESH, scene))
         positions = _trajectory(mesh)
-        with write_hdf5(sources.run(scene)) as file:
+        with write_hdf5(results.path(FULL_ORDER, scene)) as file:
             file["positions"] = positions
         for group in groups:
             rank = 0 if scene in FLAT else 14
             count = element_count(mesh, group)
-            basis = _write_basis(sources, scene, group, count, rank, methods[0], rng)
+            basis = _write_basis(results, scene, group, count, rank, methods[0], rng)
             for method in methods:
-                _write_sampling(sources.sampling(scene, group, method), basis, group, method)
-                _write_reruns(sources, scene, group, method, positions, rank, rng)
-    _write_tables(sources, scenes, methods, rng)
+                _write_sampling(results.path(SAMPLING, scene, group, method), basis, group, method)
+                _write_reruns(results, scene, group, method, positions, rank, rng)
+    _write_tables(results, scenes, methods, rng)
     return holdings
 
 
@@ -112,14 +123,14 @@ def _trajectory(mesh: Mesh) -> np.ndarray:
     return q
 
 
-def _write_basis(sources, scene, group, count, rank, method, rng) -> np.ndarray:
+def _write_basis(results, scene, group, count, rank, method, rng) -> np.ndarray:
     rows = ROWS[group]
     V = np.linalg.qr(rng.standard_normal((3 * rows * count, 14)))[0][:, :rank]
-    with write_hdf5(sources.basis(scene, group, method)) as file:
+    with write_hdf5(results.path(BASIS, scene, group, method)) as file:
         file["V"], file["mean"] = V, np.zeros(len(V))
         file["singular_values"] = 0.5 ** np.arange(14)
         file.attrs.update(rank=rank, roundoff=1e-12, rows_per_element=rows)
-    with write_hdf5(sources.snapshots(scene, group)) as file:
+    with write_hdf5(results.path(SNAPSHOTS, scene, group)) as file:
         for split in ("train", "test", "heldout"):
             file[split] = rng.standard_normal((10, rows * count, 3))
             file[f"{split}_frames"] = np.arange(0, FRAMES, 2) + (split != "train")
@@ -128,7 +139,7 @@ def _write_basis(sources, scene, group, count, rank, method, rng) -> np.ndarray:
     return V
 
 
-def _write_sampling(path: Path, V: np.ndarray, group: str, method: str) -> None:
+def _write_sampling(path: str, V: np.ndarray, group: str, method: str) -> None:
     size = 3 * ROWS[group]
     with write_hdf5(path) as file:
         for r in range(1, V.shape[1] + 1):
@@ -144,8 +155,8 @@ def _write_sampling(path: Path, V: np.ndarray, group: str, method: str) -> None:
             store["elements"] = np.unique(entries // size)
 
 
-def _write_reruns(sources, scene, group, method, positions, rank, rng) -> None:
-    with write_hdf5(sources.rerun(scene, group, method)) as file:
+def _write_reruns(results, scene, group, method, positions, rank, rng) -> None:
+    with write_hdf5(results.path(RERUNS, scene, group, method)) as file:
         file["displacement"] = np.ones(FRAMES)
         for r in (6, 10, 14, 20):
             store = file.create_group(f"r{r:04d}")
@@ -172,7 +183,7 @@ def _outcome(scene: str, method: str, r: int) -> tuple[float, float, float]:
     return np.nan, error, error
 
 
-def _write_tables(sources, scenes, methods, rng) -> None:
+def _write_tables(results, scenes, methods, rng) -> None:
     pairs = [(scene, group) for scene, groups in scenes.items() for group in groups]
     values, errors = [], []
     for scene, group in pairs:
@@ -324,8 +335,10 @@ def _write_tables(sources, scenes, methods, rng) -> None:
     )  # fmt: skip
     rows = dict(zip(columns, made, strict=True))
     for name, header in columns.items():
-        write_table(pd.DataFrame(rows[name], columns=header.split()), sources.table(name))
-    _write_scaling(sources, scenes)
+        write_table(
+            pd.DataFrame(rows[name], columns=header.split()), TABLE.at(results.folder, name=name)
+        )
+    _write_scaling(results, scenes)
 
 
 def _ratio(method, r, threads):
@@ -335,7 +348,7 @@ def _ratio(method, r, threads):
     return (0.2 * r, 6) if method == "qdeim" else (0.05 * r * threads, 20 // threads)
 
 
-def _write_scaling(sources, scenes) -> None:
+def _write_scaling(results, scenes) -> None:
     header = (
         "scene method threads vertices ms_per_iteration local_ms global_ms factorisation_ms"
         " memory_mb"
@@ -352,14 +365,14 @@ def _write_scaling(sources, scenes) -> None:
         )
     ]
     table = pd.DataFrame(rows, columns=header.split())
-    write_table(table, sources.table("scaling"))
-    write_table(scaling_fit(table), sources.table("scaling_fit"))
+    write_table(table, TABLE.at(results.folder, name="scaling"))
+    write_table(scaling_fit(table), TABLE.at(results.folder, name="scaling_fit"))
 
 
 @pytest.fixture(scope="session")
-def specs() -> dict[str, FigureSpec]:
+def specs() -> dict[str, Options]:
     """The figures of the project."""
-    return load_figures(ROOT / "config" / "figures.yaml")
+    return load_choices(ROOT / "config" / "figures.yaml")
 
 
 @pytest.fixture(scope="session")
@@ -367,7 +380,7 @@ def study(tmp_path_factory, specs) -> Study:
     """An invented study with all methods."""
     root = tmp_path_factory.mktemp("results")
     holdings = make_results(root, SCENES, list(METHOD_ROWS))
-    return Study(root, Sources(root, holdings), specs)
+    return Study(root, Results(str(root), holdings, SETTINGS), specs)
 
 
 @pytest.fixture
@@ -376,12 +389,12 @@ def small_study(tmp_path, specs) -> Callable[..., Study]:
 
     def make(scenes: dict[str, tuple[str, ...]], methods: list[str]) -> Study:
         holdings = make_results(tmp_path, scenes, methods)
-        return Study(tmp_path, Sources(tmp_path, holdings), specs)
+        return Study(tmp_path, Results(str(tmp_path), holdings, SETTINGS), specs)
 
     return make
 
 
-@pytest.fixture(params=list(FIGURES))
+@pytest.fixture(params=list(declarations()))
 def figure_name(request) -> str:
     """Every figure in turn."""
     return request.param

@@ -1,5 +1,6 @@
 """Every figure draws from invented results; what it says about failures and missing data."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -12,20 +13,28 @@ import pytest
 from matplotlib.figure import Figure
 
 from pdrom.core.errors import StorageError
+from pdrom.core.paths import MESH, RERUNS, TABLE
+from pdrom.core.reads import Chosen, TableOf
 from pdrom.core.store import atomic_path, seal_path
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import save_mesh
-from pdrom.report.figures import FIGURES, Sources, figure_inputs
-from pdrom.report.figures.output import draw_figure, make_figure
+from pdrom.report.figures.kit.catalogue import declaration, declarations
+from pdrom.report.figures.kit.options import Options
+from pdrom.report.figures.kit.output import draw_figure, write_figure
+from pdrom.report.figures.kit.results import Results
 
-from .conftest import BLOWN_UP, BLOWUP_FRAME, ROOT, Study
+from .conftest import BLOWN_UP, BLOWUP_FRAME, ROOT, SETTINGS, Study
 
 PICTURES = ("snapshots_and_modes", "deim_iterations", "cloth_all_grid", "bending_runs",
             "spring_runs", "strain_runs", "bar_runs")  # fmt: skip
 
 
 def draw(study: Study, name: str, **changes: object) -> Figure:
-    return draw_figure(name, study.sources, study.specs[name].model_copy(update=changes))
+    return draw_figure(name, study.results, study.specs[name].model_copy(update=changes))
+
+
+def make_figure(name: str, results: Results, options: Options, pdf: Path, png: Path) -> None:
+    write_figure(draw_figure(name, results, options), name, pdf, png)
 
 
 def texts(figure: Figure) -> list[str]:
@@ -38,7 +47,7 @@ def test_draws_without_warnings_and_writes_both_files(study, figure_name, tmp_pa
     pdf, png = tmp_path / "a.pdf", tmp_path / "a.png"
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        make_figure(figure_name, study.sources, study.specs[figure_name], pdf, png)
+        make_figure(figure_name, study.results, study.specs[figure_name], pdf, png)
     assert pdf.read_bytes().startswith(b"%PDF")
     assert png.read_bytes().startswith(b"\x89PNG")
     assert pdf.stat().st_size < 1_500_000
@@ -57,7 +66,7 @@ def test_every_panel_holds_data(study, figure_name):
         assert ax.has_data() or ax.texts or ax.images, ax.get_title()
 
 
-@pytest.mark.parametrize("name", sorted(set(FIGURES) - set(PICTURES)))
+@pytest.mark.parametrize("name", sorted(set(declarations()) - set(PICTURES)))
 def test_axes_are_labelled(study, name):
     figure = draw(study, name)
     labels = {ax.get_xlabel() for ax in figure.axes} | {ax.get_ylabel() for ax in figure.axes}
@@ -70,16 +79,19 @@ def test_units_stand_on_the_axes(study, name, unit):
 
 
 DRAW_ALL = """
+import json
 import sys
 from pathlib import Path
-from pdrom.report.figures import FIGURES, Holdings, Sources, load_figures
-from pdrom.report.figures.output import make_figure
+from pdrom.report.figures.kit.catalogue import load_choices
+from pdrom.report.figures.kit.holdings import Holdings
+from pdrom.report.figures.kit.output import draw_figure, write_figure
+from pdrom.report.figures.kit.results import Results
 
-config, holdings, root, out = sys.argv[1:]
-sources = Sources(root, Holdings.model_validate_json(holdings))
-for name, spec in load_figures(config).items():
-    make_figure(name, sources, spec, Path(out, name + ".pdf"), Path(out, name + ".png"))
-"""
+config, holdings, settings, root, out = sys.argv[1:]
+results = Results(root, Holdings.model_validate_json(holdings), json.loads(settings))
+for name, options in load_choices(config).items():
+    write_figure(draw_figure(name, results, options), name, Path(out, name + ".pdf"), Path(out, name + ".png"))
+"""  # noqa: E501
 
 
 def test_bytes_are_equal_in_another_process(study, tmp_path):
@@ -92,32 +104,48 @@ def test_bytes_are_equal_in_another_process(study, tmp_path):
         "SOURCE_DATE_EPOCH": "86400",
     }
     (tmp_path / "matplotlibrc").write_text("font.size: 31\nsavefig.bbox: tight\nfigure.dpi: 50\n")
-    arguments = [study.sources.holdings.model_dump_json(), str(study.root), str(tmp_path)]
+    holdings, settings = study.results.holdings.model_dump_json(), json.dumps(SETTINGS)
+    arguments = [holdings, settings, str(study.root), str(tmp_path)]
     config = str(ROOT / "config" / "figures.yaml")
     subprocess.run(
         [sys.executable, "-c", DRAW_ALL, config, *arguments], check=True, env=environment
     )
     for name, spec in study.specs.items():
         files = tmp_path / "own.pdf", tmp_path / "own.png"
-        make_figure(name, study.sources, spec, *files)
+        make_figure(name, study.results, spec, *files)
         for file in files:
             assert file.read_bytes() == (tmp_path / f"{name}{file.suffix}").read_bytes(), name
 
 
+def inputs(study: Study, name: str) -> list[Path]:
+    """Files that a figure declares."""
+    options, root, paths = study.specs[name], str(study.root), []
+    for read in declaration(name).reads:
+        if isinstance(read, TableOf):
+            paths.append(TABLE.at(root, name=read.name))
+        elif isinstance(read, Chosen):
+            paths += study.results.holdings.files(read.place, options, root, read.first)
+    return [Path(path) for path in paths]
+
+
 def test_reads_only_what_it_declares(study, figure_name, tmp_path):
-    spec, holdings = study.specs[figure_name], study.sources.holdings
-    for path in map(Path, figure_inputs(figure_name, spec, holdings, str(study.root))):
+    options, holdings = study.specs[figure_name], study.results.holdings
+    settings = {r.key: SETTINGS[r.key] for r in declaration(figure_name).reads if hasattr(r, "key")}
+    for path in inputs(study, figure_name):
         target = tmp_path / path.relative_to(study.root).parent
         target.mkdir(parents=True, exist_ok=True)
         for file in (path, seal_path(path)):
             shutil.copy(file, target)
-    assert draw_figure(figure_name, Sources(tmp_path, holdings), spec).axes
+    chosen = Results(str(tmp_path), holdings.chosen(options), settings)
+    figure = draw_figure(figure_name, chosen, options)
+    whole = draw_figure(figure_name, study.results, options)
+    assert texts(figure) == texts(whole) != []
 
 
 def test_a_missing_file_is_named(study, figure_name, tmp_path):
-    spec, holdings = study.specs[figure_name], study.sources.holdings
+    results = Results(str(tmp_path), study.results.holdings, SETTINGS)
     with pytest.raises(StorageError, match=str(tmp_path)):
-        draw_figure(figure_name, Sources(tmp_path, holdings), spec)
+        draw_figure(figure_name, results, study.specs[figure_name])
 
 
 def test_a_failed_run_is_marked_and_never_drawn_with_nan(study):
@@ -157,7 +185,7 @@ def test_a_run_that_never_began_says_why(study):
 
 def test_a_run_out_of_view_is_drawn_to_a_stated_scale(small_study):
     study = small_study({"spring_twist": ("spring",)}, ["deim-joint"])
-    path = study.sources.rerun("spring_twist", "spring", "deim-joint")
+    path = study.results.path(RERUNS, "spring_twist", "spring", "deim-joint")
     with atomic_path(path) as copy:
         shutil.copyfile(path, copy)
         with h5py.File(copy, "a") as file:
@@ -219,8 +247,8 @@ def test_published_values_are_drawn_where_they_are_given(study, tmp_path):
     (tmp_path / "singular_values.csv").write_text(
         "experiment,group,component,singular_value\nall_three,spring,1,5\nall_three,spring,2,1\n"
     )
-    sources = Sources(study.root, study.sources.holdings, tmp_path)
-    figure = draw_figure("singular_values", sources, study.specs["singular_values"])
+    results = Results(str(study.root), study.results.holdings, SETTINGS, tmp_path)
+    figure = draw_figure("singular_values", results, study.specs["singular_values"])
     assert "published code's output" in texts(figure)
     without = draw(study, "singular_values")
     assert "published code's output" not in texts(without)
@@ -228,7 +256,7 @@ def test_published_values_are_drawn_where_they_are_given(study, tmp_path):
 
 def test_a_mesh_that_does_not_fit_is_refused(small_study):
     study = small_study({"strain_oop": ("strain",)}, ["deim"])
-    save_mesh(cloth(4, 4), study.sources.mesh("strain_oop"))
+    save_mesh(cloth(4, 4), study.results.path(MESH, "strain_oop"))
     with pytest.raises(StorageError, match="elements of 'strain'"):
         draw(study, "deim_iterations")
 

@@ -7,13 +7,15 @@ import pytest
 from matplotlib.colors import Normalize, to_rgb
 from matplotlib.figure import Figure
 
-from pdrom.core.errors import StorageError
+from pdrom.core.errors import ConfigurationError, StorageError
+from pdrom.core.paths import RERUNS
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.reduction.sampling.deim import deim_entries
-from pdrom.report.figures import style
-from pdrom.report.figures.camera import Camera, Window, bounds, window_of
-from pdrom.report.figures.elements import element_map
-from pdrom.report.figures.mesh_render import (
+from pdrom.report.figures.drawings.snapshots_and_modes import MAGNITUDE
+from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.camera import Camera, Window, bounds, window_of
+from pdrom.report.figures.kit.elements import element_map
+from pdrom.report.figures.kit.mesh_render import (
     AMBIENT,
     RASTER_ABOVE,
     Surface,
@@ -24,10 +26,9 @@ from pdrom.report.figures.mesh_render import (
     outline_edges,
     shade,
 )
-from pdrom.report.figures.panels import RunPanel, fit_aspect
-from pdrom.report.figures.read import choose_ranks, frame_numbers, rerun_infos, rerun_positions
-from pdrom.report.figures.residual import iterations
-from pdrom.report.figures.snapshots_and_modes import MAGNITUDE
+from pdrom.report.figures.kit.panels import RunPanel, fit_aspect
+from pdrom.report.figures.kit.read import choose_ranks, frame_numbers, rerun_infos, rerun_positions
+from pdrom.report.figures.kit.residual import iterations
 
 from .conftest import BLOWN_UP, BLOWUP_FRAME
 
@@ -160,9 +161,11 @@ def test_elements_are_drawn_where_they_lie(group, mesh, kind):
         element_map(group, mesh, count + 1, "file")
 
 
-def test_an_unknown_group_cannot_be_drawn():
-    with pytest.raises(StorageError, match="'magic' cannot be drawn"):
+def test_what_has_no_elements_cannot_be_drawn():
+    with pytest.raises(ConfigurationError, match="unknown effect 'magic'"):
         element_map("magic", cloth(4, 4), 3, "file")
+    with pytest.raises(StorageError, match="'gravity' has no elements"):
+        element_map("gravity", cloth(4, 4), 3, "file")
 
 
 def test_boundary_triangles_take_the_value_of_their_tetrahedron():
@@ -183,8 +186,8 @@ def test_vertex_values_reach_the_faces_around():
 
 
 def test_colours_and_markers_are_unique():
-    for table in (style.METHODS, style.GROUPS):
-        for (_, first), (_, second) in combinations(table.items(), 2):
+    for looks in (style.METHODS.values(), style.GROUP_LOOKS):
+        for first, second in combinations(looks, 2):
             assert first[0] != second[0]
             assert first[1] != second[1]
     named = style.method_styles(["pod", "mine", "yours"])
@@ -228,7 +231,7 @@ def test_entries_outside_the_basis_are_refused():
 
 def test_runs_are_read_only_where_finite(study):
     scene, method, r = BLOWN_UP
-    path = study.sources.rerun(scene, "spring", method)
+    path = study.results.path(RERUNS, scene, "spring", method)
     infos = {info.r: info for info in rerun_infos(path)}
     assert list(infos) == [6, 10, 14, 20]
     assert infos[14].full

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pdrom.core.errors import PaperError
-from pdrom.report.paper.macros import MISSING, escape, format_number, keys_of, macros, resolve
+from pdrom.report.paper.macros import MISSING, format_number, keys_of, macros, resolve
 
 TABLES = {
     "runs": pd.DataFrame(
@@ -124,9 +124,3 @@ def test_text_of_a_number_is_close_to_it(value):
     assert float(text) == pytest.approx(value, rel=0.051)
     assert format_number(-value) in (f"-{format_number(value)}",
                                      format_number(value).replace("{", "{-", 1))  # fmt: skip
-
-
-def test_every_special_character_is_escaped():
-    assert escape("a_b%&#$") == r"a\_b\%\&\#\$"
-    assert escape("\\{}~^") == r"\textbackslash{}\{\}\textasciitilde{}\textasciicircum{}"
-    assert escape("plain é 1") == "plain é 1"

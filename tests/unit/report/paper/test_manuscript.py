@@ -10,7 +10,9 @@ from pdrom.core.yamlfile import read_yaml
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.study import Study
 from pdrom.pipeline.tables import all_tables
+from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.paper.bibliography import bibliography, cited_keys
+from pdrom.report.paper.known import sentences
 from pdrom.report.paper.macros import keys_of
 from pdrom.report.paper.tex import build_pdf, packages_of
 
@@ -23,7 +25,7 @@ _NOT_PROSE = [
     r"\\(val|cite|label|ref|eqref|input|includegraphics|scene|method|figureof|fontsize)"
     r"(\[[^\]]*\])?\{[^{}]*\}",
     r"\\(setlength|vspace|hspace)\{[^{}]*\}(\{[^{}]*\})?",
-    r"\{fig:[a-z]+\}|\\begin\{[a-z]+\}(\[[^\]]*\])?(\{[^{}]*\})?",
+    r"\{fig:[a-z_]+\}|\\begin\{[a-z]+\}(\[[^\]]*\])?(\{[^{}]*\})?",
     r"\bC\d+(?=[:.\s])",
 ]
 
@@ -85,7 +87,7 @@ def test_only_packages_of_both_tex_systems():
 
 def test_every_key_names_a_column_of_a_table():
     study = Study.load(read_yaml(ROOT / "config" / "default.yaml"), ROOT)
-    facts = Plan(study).facts()
+    facts = Plan(study).paper.facts.tables
     columns = {name: set(table.column_names) for name, table in all_tables().items()}
     columns |= {name: set(rows[0]) for name, rows in facts.items()}
     for key in keys_of(SOURCE):
@@ -98,9 +100,22 @@ def test_every_key_names_a_column_of_a_table():
 
 
 def test_every_figure_of_the_study_is_shown():
-    shown = set(re.findall(r"\\figureof\{([a-z_]+)\}", SOURCE))
-    missing = set(read_yaml(ROOT / "config" / "figures.yaml")) - shown
-    assert missing <= {"reconstruction_error_sound"}
+    shown = re.findall(r"\\figureof\{([a-z_]+)\}", SOURCE)
+    assert len(set(shown)) == len(shown)
+    assert set(declarations()) - set(shown) <= {"reconstruction_error_sound"}
+    assert set(shown) <= set(declarations())
+
+
+def test_numbers_that_a_configuration_may_lack_stand_in_sentences_that_can_be_left_out():
+    """Outside of them only what every configuration holds."""
+    blocks = [sentence.text for sentence in sentences(SOURCE)]
+    outside = SOURCE
+    for block in blocks:
+        outside = outside.replace(rf"\known{{{block}}}", "")
+    for key in keys_of(outside):
+        table = key.split("|")[0]
+        assert table in ("study", "claims", "machine") or re.fullmatch(r"scenes\|\w+\|max", key)
+    assert all(keys_of(block) for block in blocks)
 
 
 def test_every_citation_has_an_entry():

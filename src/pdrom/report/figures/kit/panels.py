@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
 from pdrom.model.mesh.types import Mesh
-from pdrom.report.figures.camera import Camera, Window, bounds, window_of
-from pdrom.report.figures.mesh_render import (
+from pdrom.report.figures.kit.camera import Camera, Window, bounds, window_of
+from pdrom.report.figures.kit.mesh_render import (
     Colour,
     Surface,
     draw_floor,
@@ -17,7 +17,7 @@ from pdrom.report.figures.mesh_render import (
     outline_edges,
     set_window,
 )
-from pdrom.report.figures.style import FAILED
+from pdrom.report.figures.kit.style import FAILED
 
 SAME_SCALE = 1.25  # a run that needs more than this multiple of the window is drawn smaller
 SLACK = 1.05  # a picture this much smaller than its neighbours is not pointed out

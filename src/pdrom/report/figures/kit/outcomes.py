@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
-from pdrom.report.figures import style
+from pdrom.report.figures.kit import style
 
 GAP = 0.45  # between blocks, in cells
 DENSE = 30  # cells across, from which on labels stand upright and titles take two lines

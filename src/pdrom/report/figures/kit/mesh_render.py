@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 
-from pdrom.report.figures.camera import Camera, Window
+from pdrom.report.figures.kit.camera import Camera, Window
 
 AMBIENT = 0.45
 RASTER_ABOVE = 1000  # faces; more are drawn as pixels, to keep the PDF small

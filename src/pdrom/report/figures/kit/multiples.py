@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from pdrom.report.figures import style
+from pdrom.report.figures.kit import style
 
 PANEL_HEIGHT = 1.45  # inches
 

@@ -1,7 +1,6 @@
 """One look for all figures: fonts, palette, markers, small helpers."""
 
-import functools
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -10,6 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+
+from pdrom.report.figures.kit.holdings import Holdings
 
 WIDTH = 7.0  # inches, text width of the paper
 
@@ -43,13 +44,11 @@ METHODS: dict[str, tuple[str, str]] = {
 }
 _RESERVE = (("#5A5A5A", "1"), ("#9A6A00", "2"), ("#6B3F00", "3"), ("#2B2B80", "4"))
 
-GROUPS: dict[str, tuple[str, str]] = {
-    "bending": (GREEN, "^"),
-    "spring": (ORANGE, "s"),
-    "strain": (BLUE, "o"),
-    "tetrahedron_strain": (SKY, "D"),
-    "deformation_gradient": (PURPLE, "v"),
-}
+# Of constraint groups, by their place among all of them.
+GROUP_LOOKS = (
+    (GREEN, "^"), (ORANGE, "s"), (BLUE, "o"), (SKY, "D"), (PURPLE, "v"), (VERMILLION, "P"),
+    ("#7A5C00", "X"), ("#5A5A5A", "<"), ("#2B2B80", ">"),
+)  # fmt: skip
 AXES = {"x": VERMILLION, "y": GREEN, "z": BLUE}
 SPLITS = {"train": "-", "test": "--", "heldout": ":"}
 SPLIT_NAMES = {"train": "train", "test": "test", "heldout": "held-out run"}
@@ -96,17 +95,6 @@ def look() -> Iterator[None]:
         yield
 
 
-def styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
-    """Decorator: ``draw`` runs with this style."""
-
-    @functools.wraps(draw)
-    def wrapper(*args: Any, **kwargs: Any) -> Figure:
-        with look():
-            return draw(*args, **kwargs)
-
-    return wrapper
-
-
 def method_styles(names: Iterable[str]) -> dict[str, tuple[str, str]]:
     """(colour, marker) of methods; names that are not preset share a reserve, in sorted order."""
     names = list(names)
@@ -129,14 +117,15 @@ def scene_handles(scenes: Iterable[str]) -> list[Line2D]:
     ]
 
 
-def group_colour(group: str) -> str:
-    """Colour of a constraint group; grey for one without a colour of its own."""
-    return GROUPS.get(group, (GREY, "o"))[0]
+def group_looks(holdings: Holdings) -> dict[str, tuple[str, str]]:
+    """(colour, marker) of every constraint group that is held, in the order of the groups."""
+    held = sorted(holdings.groups.items(), key=lambda item: item[1].place)
+    return {name: GROUP_LOOKS[group.place % len(GROUP_LOOKS)] for name, group in held}
 
 
-def surface_colour(group: str) -> tuple[float, float, float]:
-    """Colour of a group on a shaded surface: lightened, so that the shading has room."""
-    return tuple(0.72 * c + 0.28 for c in to_rgb(group_colour(group)))
+def surface_colour(colour: str) -> tuple[float, float, float]:
+    """``colour`` on a shaded surface: lightened, so that the shading has room."""
+    return tuple(0.72 * c + 0.28 for c in to_rgb(colour))
 
 
 def words(name: str) -> str:
@@ -154,8 +143,3 @@ def note(text: str) -> Figure:
     figure = Figure(figsize=(WIDTH, 0.6))
     figure.text(0.5, 0.5, text, ha="center", va="center", fontsize=9, color="#444444")
     return figure
-
-
-def no_data(missing: str) -> Figure:
-    """The note of a figure whose data a configuration does not hold."""
-    return note(f"no data in this configuration: {missing}")

@@ -7,19 +7,12 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, Normalize
 
 from pdrom.core.errors import StorageError
-from pdrom.model.constraints.surface import interior_vertices
+from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.types import Mesh
-from pdrom.report.figures.camera import Camera
-from pdrom.report.figures.mesh_render import Surface, draw_lines, draw_surface
+from pdrom.report.figures.kit.camera import Camera
+from pdrom.report.figures.kit.mesh_render import Surface, draw_lines, draw_surface
 
-KINDS = {
-    "bending": "vertex",
-    "spring": "edge",
-    "strain": "triangle",
-    "deformation_gradient": "tetrahedron",
-    "tetrahedron_strain": "tetrahedron",
-}
-UNITS = {"bending": "1/m", "spring": "m"}  # of a projection; strains have no unit
 NEUTRAL = "#E4E1DA"
 
 
@@ -93,21 +86,18 @@ def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMa
     Raises
     ------
     StorageError
-        The group is not known to lie on vertices, edges, triangles or tetrahedra, or ``source``
-        holds another number of elements than the mesh.
+        The effect is no constraint group, or ``source`` holds another number of elements than the
+        mesh.
+    ConfigurationError
+        There is no such effect.
     """
-    kind = KINDS.get(group)
-    if kind is None:
-        raise StorageError(f"{source}: group '{group}' cannot be drawn (allowed: {list(KINDS)})")
-    cells = {
-        "vertex": lambda: interior_vertices(mesh.triangles, mesh.vertices)[:, None],
-        "edge": mesh.edges,
-        "triangle": lambda: mesh.triangles,
-        "tetrahedron": lambda: mesh.tetrahedra,
-    }[kind]()
+    effect = EFFECTS.load(group)
+    if not issubclass(effect, ConstraintGroup):
+        raise StorageError(f"{source}: '{group}' has no elements that could be drawn")
+    cells = effect.element_vertices(mesh)
     if len(cells) != elements:
         raise StorageError(f"{source}: {elements} elements of '{group}', the mesh has {len(cells)}")
-    return ElementMap(kind, cells, mesh)
+    return ElementMap(effect.cells, cells, mesh)
 
 
 def magnitude(vector: np.ndarray, rows_per_element: int) -> np.ndarray:

@@ -1,6 +1,5 @@
 """Reading what figures draw from the results."""
 
-import os
 from dataclasses import dataclass
 
 import h5py
@@ -9,15 +8,13 @@ import numpy as np
 from pdrom.core.errors import StorageError
 from pdrom.core.store import open_hdf5
 
-Path = str | os.PathLike[str]
-
 
 def frame_numbers(fractions: tuple[float, ...], frames: int) -> list[int]:
     """Entries of ``positions`` (0 .. frames) at fractions of a run, without repetition."""
     return list(dict.fromkeys(round(fraction * frames) for fraction in fractions))
 
 
-def positions_at(path: Path, fractions: tuple[float, ...]) -> tuple[list[int], np.ndarray]:
+def positions_at(path: str, fractions: tuple[float, ...]) -> tuple[list[int], np.ndarray]:
     """Frame numbers and positions (n, N, 3) m of a run at fractions of it.
 
     Raises
@@ -57,7 +54,7 @@ class RerunInfo:
         return f"r = {self.r} (full rank)" if self.full else f"r = {self.r}"
 
 
-def rerun_infos(path: Path) -> list[RerunInfo]:
+def rerun_infos(path: str) -> list[RerunInfo]:
     """Basis sizes in a file of reduced runs, ascending."""
     with open_hdf5(path) as file:
         infos = [_info(label, file[label]) for label in file if _is_size(label)]
@@ -82,7 +79,7 @@ def _info(label: str, group: h5py.Group) -> RerunInfo:
     )
 
 
-def rerun_errors(path: Path, info: RerunInfo) -> np.ndarray:
+def rerun_errors(path: str, info: RerunInfo) -> np.ndarray:
     """Relative error of every frame that ran (F',)."""
     with open_hdf5(path) as file:
         return file[info.label]["error"][...]
@@ -98,7 +95,7 @@ def choose_ranks(infos: list[RerunInfo], asked: tuple[int | str, ...]) -> list[R
     return list(chosen.values()) or infos
 
 
-def rerun_positions(path: Path, info: RerunInfo, frame: int) -> tuple[int, np.ndarray] | None:
+def rerun_positions(path: str, info: RerunInfo, frame: int) -> tuple[int, np.ndarray] | None:
     """Last finite positions (N, 3) m up to entry ``frame``, and their entry; None without any.
 
     A run that blew up holds fewer entries than the full-order run.
@@ -127,7 +124,7 @@ class BasisView:
         return len(self.V) // (3 * self.rows_per_element)
 
 
-def read_basis(path: Path) -> BasisView:
+def read_basis(path: str) -> BasisView:
     """Basis of a group; StorageError if the file is damaged."""
     with open_hdf5(path) as file:
         return BasisView(
@@ -147,7 +144,7 @@ class SamplingView:
     elements: np.ndarray
 
 
-def read_samplings(path: Path) -> list[SamplingView]:
+def read_samplings(path: str) -> list[SamplingView]:
     """Selections of all basis sizes, ascending in r."""
     with open_hdf5(path) as file:
         views = [

@@ -1,0 +1,105 @@
+"""What the rules of the manuscript need from a study."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from pdrom.core.paths import MACHINE, PAPER_INPUT
+from pdrom.pipeline.full import FULL_STUDY, is_full
+from pdrom.pipeline.study import Study
+from pdrom.report.claims import load_claims
+from pdrom.report.paper.build import Facts
+from pdrom.report.paper.textables import TEX_TABLES
+from pdrom.report.words.text import require_typeset
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class PaperJob:
+    """The manuscript: generated files that main.tex reads, and what they state beside results."""
+
+    machine: str
+    inputs: list[str]
+    facts: Facts
+
+
+def paper_job(study: Study, captions: dict[str, str], configuration: str, results: str) -> PaperJob:
+    """The manuscript of a study.
+
+    Parameters
+    ----------
+    captions : titles and captions of the figures, as TeX, by name
+    configuration : what the study was read from, for a manuscript that is not of the full one
+    results : folder of the results
+    """
+    facts = Facts(
+        captions=captions,
+        part=None if is_full(study) else configuration,
+        full_study=FULL_STUDY,
+        tables={
+            "study": [_study(study)],
+            "methods": [
+                {"method": name, **method.model_dump(mode="json")}
+                for name, method in study.methods.items()
+            ],
+            "scenes": [_scene(study, name) for name in study.scenes],
+        },
+    )
+    tables = [f"{name}.tex" for name in TEX_TABLES]
+    names = ["macros.tex", "figures.tex", "main.bbl", *tables]
+    inputs = [PAPER_INPUT.at(results, name=name) for name in names]
+    return PaperJob(MACHINE.at(results), inputs, facts)
+
+
+def check_texts(study: Study) -> None:
+    """ConfigurationError for a text of the configuration that figures or TeX cannot typeset."""
+    folder = study.root / "config"
+    for name, method in study.methods.items():
+        require_typeset(method.title, f"{folder / 'methods.yaml'}: {name}.title")
+    for key, rungs in {"up": study.ladder.up, "down": study.ladder.down}.items():
+        for i, rung in enumerate(rungs):
+            require_typeset(rung.title, f"{folder / 'ladder.yaml'}: {key}.{i}.title")
+    for variant in study.ablation.variants:
+        require_typeset(variant, f"{folder / 'subspace_ablation.yaml'}: variants")
+    for name, claim in load_claims(folder / "claims.yaml").items():
+        texts = {"text": claim.text, "source": claim.source, "paper": claim.paper}
+        texts |= {f"tests.{i}.what": test.what for i, test in enumerate(claim.tests)}
+        for key, text in texts.items():
+            require_typeset(text, f"{folder / 'claims.yaml'}: {name}.{key}")
+
+
+def _study(study: Study) -> Row:
+    settings = study.settings
+    return {
+        "scenes": len(study.scenes),
+        "experiments": len(study.experiments),
+        "threshold": settings.sensitivity.threshold,
+        "perturbation": settings.sensitivity.reference,
+        "seeds": len(settings.sensitivity.seeds),
+        "repeats": settings.timing.repeats,
+        "timed_frames": settings.timing.frames,
+        "blowup_extent": settings.blowup_extent,
+        "ranks": ", ".join(str(r) for r in settings.ranks),
+        "wrong": settings.stability.wrong,
+        "left": settings.stability.left,
+        "guard_action": settings.guard.action,
+        "guard_margin": settings.guard.margin,
+        "guard_extent": settings.guard.extent,
+        "guard_rise": settings.guard.rise,
+        "tolerance": settings.iterations.tolerance,
+    }
+
+
+def _scene(study: Study, name: str) -> Row:
+    config, scene = study.scenes[name], study.bound[name]
+    weights = {e.effect: e.weight for e in config.effects if e.effect in config.groups}
+    return {
+        "scene": name,
+        "groups": ", ".join(f"{group} ({weights[group]:g})" for group in config.groups),
+        "vertices": scene.mesh.vertices,
+        "elements": sum(group.elements for group in scene.groups),
+        "frames": config.frames,
+        "iterations": config.iterations,
+        "time_step": config.time_step,
+        "vertex_mass": config.vertex_mass,
+    }

@@ -1,0 +1,62 @@
+"""The list of figures for readers: ``python -m pdrom.report.document`` writes docs/figures.md."""
+
+import re
+from pathlib import Path
+
+from pdrom.core.reads import Chosen, Published, Setting, TableOf
+from pdrom.report.figures.kit.catalogue import declarations
+from pdrom.report.figures.kit.declaration import Declaration, FigureRead
+from pdrom.report.words.markup import to_plain
+
+PAGE = Path("docs/figures.md")
+HEAD = """\
+# Figures
+
+Made from the declarations in `src/pdrom/report/figures` by
+`.venv/bin/python -m pdrom.report.document`; a test compares the two.
+
+A figure is drawn to `results/figures/NAME.pdf` and `.png`. What it shows is chosen in
+`config/figures.yaml`, by the keys given here.
+"""
+
+
+def figures_page() -> str:
+    """docs/figures.md."""
+    parts = [HEAD]
+    for name, figure in declarations().items():
+        number = f" (figure {figure.number} of the paper)" if figure.number else ""
+        keys = ", ".join(f"`{key}`" for key in figure.options.model_fields)
+        reads = ", ".join(dict.fromkeys(_words(read) for read in figure.reads))
+        parts.append(
+            f"## `{name}`{number}\n\n**{_text(figure.title)}.** {_text(figure.caption)}\n\n"
+            f"Keys: {keys}. Reads: {reads}.{_drawing(figure)}\n"
+        )
+    return "\n".join(parts)
+
+
+def _text(marked: str) -> str:
+    """Mark-up for this page: names in typewriter, settings by their key."""
+    plain = re.sub(r"\{([a-z_.]+)\}", r"@\1@", marked)
+    pieces = re.split(r"(`[^`]*`)", plain)
+    words = "".join(p if p.startswith("`") else to_plain(p) for p in pieces)
+    return re.sub(r"@([a-z_.]+)@", r"`\1`", words)
+
+
+def _words(read: FigureRead) -> str:
+    match read:
+        case TableOf():
+            return f"table `{read.name}`"
+        case Chosen():
+            return f"`{read.place.pattern}`"
+        case Published():
+            return f"`config/reference/published_code/{read.name}.csv`"
+        case Setting():
+            return f"`{read.key}`"
+
+
+def _drawing(figure: Declaration) -> str:
+    return f" Drawn by `drawings/{figure.drawing}.py`." if figure.drawing else ""
+
+
+if __name__ == "__main__":
+    PAGE.write_text(figures_page(), encoding="utf-8")

@@ -1,0 +1,27 @@
+"""Runs of sheets with bending only, reduced."""
+
+from pdrom.core.paths import FULL_ORDER, MESH, RERUNS
+from pdrom.core.reads import Chosen, Setting, TableOf
+from pdrom.report.figures.kit.declaration import Declaration
+from pdrom.report.figures.kit.options import ReducedRuns
+
+FIGURE = Declaration(
+    number=5,
+    title="Bending only, reduced",
+    caption=(
+        "Sheets with bending constraints only, near the end of the run: full order against "
+        "reduced projections. The projections of a flat sheet are round-off, so that there is "
+        "nothing to reduce in the paper's two scenes; the curved sheet has projections that "
+        "matter."
+    ),
+    reads=(
+        Chosen(MESH),
+        Chosen(FULL_ORDER),
+        Chosen(RERUNS),
+        TableOf("sensitivity"),
+        Setting("sensitivity.reference"),
+        Setting("sensitivity.threshold"),
+    ),
+    options=ReducedRuns,
+    drawing="reduced_runs",
+)

@@ -1,0 +1,1 @@
+"""Drawings: ``draw(results, options)`` returns a matplotlib figure."""

@@ -1,0 +1,79 @@
+"""The ladder: which choice breaks the reduction, and by how much."""
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.multiples import clipped
+from pdrom.report.figures.kit.options import Scenes
+from pdrom.report.figures.kit.results import NothingToDraw, Results
+from pdrom.report.words.text import plain_words
+
+COLUMNS = ["scene", "direction", "rung", "gain", "relative_error_within_horizon"]
+ERRORS, GAINS = (1e-4, 1e2), (1.0, 1e5)  # limits; what lies outside is drawn on the rim
+
+
+def draw(results: Results, options: Scenes) -> Figure:
+    """Rungs from top (published) to bottom; left the error of the rerun, right the gain.
+
+    Below the line each row lacks one ingredient of the sound method. A bar shows the spread over
+    choices of the singular vectors' signs for the published method. Runs that blew up before their
+    horizon, and singular interpolations, lie on the right rim. Raises StorageError if the table is
+    missing or lacks a column.
+    """
+    table = results.table("ladder", COLUMNS)
+    if options.scenes:
+        table = table[table.scene.isin(options.scenes)]
+    table = table[table.gain.notna()]
+    if table.empty:
+        raise NothingToDraw("no scene that climbs the ladder")
+    climbed = table[table.direction != "signs"]
+    rungs = list(dict.fromkeys(zip(climbed.direction, climbed.rung, strict=True)))
+    scenes = list(dict.fromkeys(table.scene))
+    figure = Figure(figsize=(style.WIDTH, 0.26 * len(rungs) + 1.3), layout="constrained")
+    left, right = figure.subplots(1, 2, sharey=True)
+    _draw_quantity(left, table, rungs, scenes, "relative_error_within_horizon", ERRORS)
+    _draw_quantity(right, table, rungs, scenes, "gain", GAINS)
+    left.set_xlabel("error of the rerun within the horizon (relative)")
+    right.set_xlabel("gain of the interpolation")
+    left.set_yticks(range(len(rungs)), [plain_words(rung) for _, rung in rungs])
+    left.invert_yaxis()
+    _legend(figure, scenes)
+    return figure
+
+
+def _draw_quantity(
+    ax: Axes,
+    table: pd.DataFrame,
+    rungs: list[tuple[str, str]],
+    scenes: list[str],
+    column: str,
+    limits: tuple[float, float],
+) -> None:
+    ax.set_xscale("log")
+    ax.set_xlim(limits[0], limits[1] * 1.3)
+    style.grid(ax)
+    for i, scene in enumerate(scenes):
+        rows = table[table.scene == scene].set_index(["direction", "rung"])[column]
+        values = [rows.get(rung, np.nan) for rung in rungs]
+        values = clipped(np.nan_to_num(np.array(values, float), nan=np.inf), *limits)
+        heights = np.arange(len(rungs)) + 0.09 * (i - 0.5 * (len(scenes) - 1))
+        colour, marker = style.scene_style(i)
+        ax.plot(values, heights, linestyle="none", color=colour, marker=marker, markersize=3.2)
+        signs = table[(table.scene == scene) & (table.direction == "signs")][column]
+        if len(signs):
+            spread = clipped(np.nan_to_num(signs.to_numpy(float), nan=np.inf), *limits)
+            ax.hlines(
+                heights[0], spread.min(), spread.max(), color=colour, linewidth=0.9, alpha=0.6
+            )
+    first_down = next((i for i, (d, _) in enumerate(rungs) if d == "down"), len(rungs))
+    ax.axhline(first_down - 0.5, color="#333333", linewidth=0.8)
+
+
+def _legend(figure: Figure, scenes: list[str]) -> None:
+    handles = style.scene_handles(scenes)
+    handles.append(Line2D([], [], color=style.GREY, label="spread over sign choices"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=4)

@@ -1,0 +1,109 @@
+"""Error of reduced runs against time, with the sensitivity floor behind it."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from pdrom.core.paths import RERUNS
+from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.floor import Floors
+from pdrom.report.figures.kit.multiples import clipped, label_outer, log_axis, small_multiples
+from pdrom.report.figures.kit.read import RerunInfo, choose_ranks, rerun_errors, rerun_infos
+from pdrom.report.figures.kit.results import NothingToDraw, Results, asked
+from pdrom.report.figures.run_error import Options
+
+LOW, HIGH = 1e-7, 1e3
+LINES = ("--", "-", ":", "-.")
+FLOOR = "#DDD9D0"
+
+
+def draw(results: Results, options: Options) -> Figure:
+    """A panel per experiment, a line per method and basis size; a cross ends a run that blew up.
+
+    Experiments without a reduced run are left out; errors outside the axis lie on its rim.
+
+    Raises
+    ------
+    StorageError
+        A file of the results is missing or damaged.
+    """
+    floors = Floors(results)
+    methods = results.methods(options)
+    pairs = results.experiments(options)
+    if not pairs or not methods:
+        raise NothingToDraw(asked(options))
+    pairs = [pair for pair in pairs if any(_ran(results, *pair, m, options) for m in methods)]
+    if not pairs:
+        raise NothingToDraw("no reduced run: all projections are round-off")
+    figure, axes = small_multiples(len(pairs), options.columns, legend_rows=2)
+    for ax, (scene, group) in zip(axes, pairs, strict=True):
+        log_axis(ax, LOW, HIGH)
+        _draw_floor(ax, floors.of(scene), floors.horizon(scene))
+        for method in methods:
+            runs = _ran(results, scene, group, method, options)
+            _draw_runs(ax, results.path(RERUNS, scene, group, method), runs, options.ranks, method)
+        ax.set_title(results.experiment_title(scene, group))
+        ax.set_xlim(0, None)
+    label_outer(axes, options.columns, "frame", "relative error")
+    _legend(figure, results, methods, options.ranks)
+    return figure
+
+
+def _draw_floor(ax: Axes, floor: np.ndarray, end: int | None) -> None:
+    if len(floor) == 0:
+        return
+    frames, shown = np.arange(len(floor)), clipped(floor, LOW, HIGH)
+    ax.fill_between(frames, LOW, shown, color=FLOOR, linewidth=0.0, zorder=0)
+    if end is not None:
+        ax.axvline(end, color="#8A857A", linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
+
+
+def _ran(
+    results: Results, scene: str, group: str, method: str, options: Options
+) -> list[RerunInfo]:
+    """Reduced runs of the asked sizes; without those whose size exceeds the numerical rank."""
+    infos = choose_ranks(rerun_infos(results.path(RERUNS, scene, group, method)), options.ranks)
+    return [info for info in infos if not info.marked]
+
+
+def _draw_runs(
+    ax: Axes, path: str, infos: list[RerunInfo], ranks: tuple[int | str, ...], method: str
+) -> None:
+    colour, _ = style.method_styles([method])[method]
+    for info in infos:
+        error = rerun_errors(path, info)
+        frames = np.arange(1, len(error) + 1)
+        shown = clipped(np.where(np.isfinite(error), error, HIGH), LOW, HIGH)
+        ax.plot(frames, shown, color=colour, linestyle=_line(info, ranks), linewidth=1.0)
+        if info.blowup_frame >= 0 and len(error):
+            ax.plot(
+                frames[-1:], shown[-1:], marker="x", markersize=5, markeredgewidth=1.3,
+                color=colour, clip_on=False, zorder=6,
+            )  # fmt: skip
+
+
+def _line(info: RerunInfo, ranks: tuple[int | str, ...]) -> str:
+    """Line style of a basis size: its place in ``ranks``."""
+    for place, rank in enumerate(ranks):
+        if info.full if rank == "full" else info.r == rank:
+            return LINES[place % len(LINES)]
+    return LINES[1]
+
+
+def _legend(
+    figure: Figure, results: Results, methods: list[str], ranks: tuple[int | str, ...]
+) -> None:
+    handles: list = []
+    for method, (colour, _) in style.method_styles(methods).items():
+        handles.append(Line2D([], [], color=colour, label=results.method_title(method)))
+    for line, rank in zip(LINES, ranks, strict=False):
+        label = "full rank" if rank == "full" else f"r = {rank}"
+        handles.append(Line2D([], [], color="#555555", linestyle=line, label=label))
+    cross = {"linestyle": "none", "marker": "x", "markeredgewidth": 1.3, "markersize": 5}
+    handles.append(Line2D([], [], color="#555555", label="blew up", **cross))
+    handles.append(Patch(color=FLOOR, label="sensitivity floor"))
+    dots = {"color": "#8A857A", "linestyle": (0, (1, 1.5))}
+    handles.append(Line2D([], [], label="horizon", **dots))
+    figure.legend(handles=handles, loc="outside lower center", ncols=4)

@@ -1,0 +1,83 @@
+"""What the drawing of a figure reads."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from pdrom.core.paths import TABLE, Place
+from pdrom.core.store import read_table
+from pdrom.report.figures.kit.holdings import Holdings
+from pdrom.report.figures.kit.options import Options
+from pdrom.report.words.text import plain_words
+
+
+class NothingToDraw(Exception):
+    """A configuration holds nothing of what a figure shows; the message names what is missing."""
+
+
+def asked(options: Options) -> str:
+    """Words for what the options ask for."""
+    scenes = ", ".join(options.names("scenes")) or "any scene"
+    methods = ", ".join(options.names("methods"))
+    return f"{scenes} with {methods}" if methods else scenes
+
+
+class Results:
+    """Results of one configuration, as far as it holds them.
+
+    Parameters
+    ----------
+    folder : where the results lie
+    settings : values of the configuration by their keys
+    published : folder with the published code's own output (CSV); None: nothing of it is drawn
+    """
+
+    def __init__(
+        self,
+        folder: str,
+        holdings: Holdings,
+        settings: Mapping[str, float] | None = None,
+        published: Path | None = None,
+    ) -> None:
+        self.folder = folder
+        self.holdings = holdings
+        self.settings = dict(settings or {})
+        self.published = published
+
+    def experiments(self, options: Options) -> list[tuple[str, str]]:
+        """(scene, group) pairs that are drawn."""
+        return self.holdings.experiments(options)
+
+    def scenes(self, options: Options) -> list[str]:
+        """Scenes that are drawn and in which a group is reduced."""
+        return list(dict.fromkeys(scene for scene, _ in self.experiments(options)))
+
+    def methods(self, options: Options) -> list[str]:
+        """Methods that are drawn."""
+        return self.holdings.reductions(options)
+
+    def method_title(self, method: str) -> str:
+        """Title of a method, ready to be drawn; its name where it is not held."""
+        held = self.holdings.methods.get(method)
+        return plain_words(held.title if held else method)
+
+    def experiment_title(self, scene: str, group: str) -> str:
+        """Title of an experiment; the group is named only where the scene reduces several."""
+        several = len(self.holdings.scenes[scene].groups) > 1
+        name = scene.replace("_", " ")
+        return f"{name}: {group.replace('_', ' ')}" if several else name
+
+    def path(self, place: Place, scene: str, group: str = "", method: str = "") -> str:
+        """Path of a result."""
+        return self.holdings.path(place, self.folder, scene, group, method)
+
+    def table(self, name: str, columns: Sequence[str] = ()) -> pd.DataFrame:
+        """A table of the study; StorageError if it is missing or lacks one of ``columns``."""
+        return read_table(TABLE.at(self.folder, name=name), columns)
+
+    def published_table(self, name: str, columns: Sequence[str]) -> pd.DataFrame | None:
+        """A table of the published code's own output; None where none of it is drawn."""
+        if self.published is None:
+            return None
+        return read_table(self.published / f"{name}.csv", columns, result=False)

@@ -1,0 +1,26 @@
+"""Runs of sheets with springs only, reduced."""
+
+from pdrom.core.paths import FULL_ORDER, MESH, RERUNS
+from pdrom.core.reads import Chosen, Setting, TableOf
+from pdrom.report.figures.kit.declaration import Declaration
+from pdrom.report.figures.kit.options import ReducedRuns
+
+FIGURE = Declaration(
+    number=6,
+    title="Springs only, reduced",
+    caption=(
+        "Sheets with edge springs only: full order against reduced projections, by basis size. "
+        "The grey outline is the full-order run at the same instant; a framed picture is drawn to "
+        "the smaller scale given below it."
+    ),
+    reads=(
+        Chosen(MESH),
+        Chosen(FULL_ORDER),
+        Chosen(RERUNS),
+        TableOf("sensitivity"),
+        Setting("sensitivity.reference"),
+        Setting("sensitivity.threshold"),
+    ),
+    options=ReducedRuns,
+    drawing="reduced_runs",
+)

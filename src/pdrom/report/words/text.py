@@ -1,0 +1,110 @@
+"""Text that a user wrote, in figures and in the manuscript: what can be typeset, and how.
+
+The manuscript is typeset by pdfTeX with T1 fonts: Latin letters stand as they are, Greek letters
+and signs go through mathematics. Figures are drawn with DejaVu Sans, which has all of them.
+"""
+
+import unicodedata
+from collections.abc import Iterator
+
+from pdrom.core.errors import ConfigurationError, PaperError
+
+_SPECIAL = {
+    "\\": r"\textbackslash{}", "_": r"\_", "%": r"\%", "&": r"\&", "#": r"\#", "$": r"\$",
+    "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
+    "<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}", '"': r"\textquotedbl{}",
+}  # fmt: skip
+# Latin letters that T1 fonts lack
+_NO_LETTERS = "ĦħĸĿŀŉŦŧ"
+_PUNCTUATION = "¡¿«»–—‘’‚“”„…‹›"
+_SIGNS = {
+    "±": r"\pm", "×": r"\times", "÷": r"\div", "·": r"\cdot", "¬": r"\neg", "°": r"{}^\circ",
+    "¹": "{}^1", "²": "{}^2", "³": "{}^3", "µ": r"\mu", "−": "-", "∞": r"\infty", "√": r"\surd",
+    "≤": r"\le", "≥": r"\ge", "≠": r"\ne", "≈": r"\approx", "≡": r"\equiv", "∝": r"\propto",
+    "≪": r"\ll", "≫": r"\gg", "∈": r"\in", "∂": r"\partial", "∇": r"\nabla", "∑": r"\sum",
+    "∏": r"\prod", "∫": r"\int", "→": r"\to", "←": r"\leftarrow", "↔": r"\leftrightarrow",
+    "⇒": r"\Rightarrow", "∥": r"\parallel", "⊥": r"\perp", "∪": r"\cup", "∩": r"\cap",
+    "ϑ": r"\vartheta", "ϕ": r"\phi", "ϱ": r"\varrho", "ϵ": r"\epsilon", "ς": r"\varsigma",
+    "σ": r"\sigma", "φ": r"\varphi", "ε": r"\varepsilon", "ο": "o",
+}  # fmt: skip
+# Capital Greek letters that look like Latin ones have no command of their own.
+_LATIN_CAPITALS = dict(zip("ΑΒΕΖΗΙΚΜΝΟΡΤΧ", "ABEZHIKMNOPTX", strict=True))
+_GREEK_NAMES = {"lamda": "lambda"}  # Unicode's spelling -> TeX's
+
+
+def escape(text: str) -> str:
+    """Plain text for TeX; PaperError, naming the character, for one that cannot be typeset."""
+    pieces = []
+    for character in unicodedata.normalize("NFC", text):
+        piece = _typeset(character)
+        if piece is None:
+            raise PaperError(f"'{text}': {_named(character)} cannot be typeset")
+        pieces.append(piece)
+    return "".join(pieces)
+
+
+def require_typeset(text: str, place: str) -> None:
+    """ConfigurationError, which ``place`` opens, for a text that cannot be typeset."""
+    for character in unicodedata.normalize("NFC", text):
+        if _typeset(character) is None:
+            raise ConfigurationError(
+                f"{place} = '{_shown(text)}': {_named(character)} cannot be typeset (allowed: "
+                "Latin and Greek letters, digits, ASCII and common mathematical signs)"
+            )
+
+
+def replaced(text: str) -> str:
+    """``text`` with a question mark in place of what cannot be typeset (a machine's name)."""
+    characters = unicodedata.normalize("NFC", text)
+    return "".join("?" if _typeset(character) is None else character for character in characters)
+
+
+def plain_words(text: str) -> str:
+    """``text`` for a figure, in which a dollar sign would begin mathematics."""
+    return unicodedata.normalize("NFC", text).replace("$", r"\$")
+
+
+def characters() -> Iterator[str]:
+    """Every character that can be typeset."""
+    every = (chr(code) for code in range(0x20, 0x2300))
+    return (c for c in every if unicodedata.normalize("NFC", c) == c and _typeset(c) is not None)
+
+
+def _typeset(character: str) -> str | None:
+    """TeX of one character; None if it cannot be typeset."""
+    if character in _SPECIAL:
+        return _SPECIAL[character]
+    if " " <= character <= "~" or character in _PUNCTUATION or _is_latin(character):
+        return character
+    if character == "\N{NO-BREAK SPACE}":
+        return "~"
+    command = _SIGNS.get(character) or _LATIN_CAPITALS.get(character) or _greek(character)
+    return None if command is None else rf"\ensuremath{{{command}}}"
+
+
+def _is_latin(character: str) -> bool:
+    """Whether T1 fonts hold the letter: Latin-1 and Latin Extended-A, and the Romanian ones."""
+    inside = "\u00c0" <= character <= "\u017e" or "\u0218" <= character <= "\u021b"
+    return inside and character.isalpha() and character not in _NO_LETTERS
+
+
+def _greek(character: str) -> str | None:
+    """TeX command of a Greek letter without accents, by its Unicode name."""
+    words = unicodedata.name(character, "").split()
+    if len(words) != 4 or words[0] != "GREEK" or words[2] != "LETTER":
+        return None
+    name = words[3].lower()
+    name = _GREEK_NAMES.get(name, name)
+    known = "alpha beta gamma delta zeta eta theta iota kappa lambda mu nu xi pi rho tau upsilon chi psi omega sigma phi"  # noqa: E501
+    if name not in known.split():
+        return None
+    return "\\" + (name.capitalize() if words[1] == "CAPITAL" else name)
+
+
+def _named(character: str) -> str:
+    name = unicodedata.name(character, "a control character")
+    return f"'{_shown(character)}' (U+{ord(character):04X}, {name})"
+
+
+def _shown(text: str) -> str:
+    return "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in text)
