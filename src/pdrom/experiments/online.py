@@ -77,7 +77,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     config, asked, timing = settings.scene, settings.online, settings.timing
     mesh = config.mesh.build(Path())
     train = Scene.build(config, mesh)
-    heldout = Scene.build(config.held_out_variant(), mesh)
+    heldout = Scene.build(config.heldout_variant(), mesh)
     references = [trajectory(motion, track_objective=False) for motion in (train, heldout)]
     log.info("%s: full-order runs of %d vertices", config.name, mesh.vertices)
     frames = training_indices(train)

@@ -12,7 +12,7 @@ RUNS = ("train", "heldout")
 
 def scene_of(config: SceneConfig, mesh: File, run: str = "train", threads: int = 1) -> Scene:
     """Scene of ``run`` ("train" or "heldout") on its mesh file."""
-    chosen = config.held_out_variant() if run == "heldout" else config
+    chosen = config.heldout_variant() if run == "heldout" else config
     scene = Scene.build(chosen, load_mesh(mesh.path), threads)
     scene.log_holds()
     return scene

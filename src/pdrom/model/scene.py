@@ -125,7 +125,7 @@ class SceneConfig(_Model):
             }
         )
 
-    def held_out_variant(self) -> Self:
+    def heldout_variant(self) -> Self:
         """The scene of the held-out trajectory (see `HeldOut`)."""
         plan = self.held_out
         effects = [e.with_frames_scaled(plan.frames_factor) for e in self.effects]

@@ -49,7 +49,7 @@ def load_bound_scene(root: Path, name: str, coarsen: Coarsen | None = None) -> S
     scene = read_scene(root, name, coarsen)
     try:
         mesh = scene.mesh.build(root)
-        Scene.build(scene.held_out_variant(), mesh)
+        Scene.build(scene.heldout_variant(), mesh)
         bound = Scene.build(scene, mesh)
     except PdromError as error:
         raise ConfigurationError(f"{scene_file(root, name)}: {error}") from error

@@ -69,7 +69,7 @@ def rows(tmp_path_factory) -> pd.DataFrame:
         return File(str(folder / name), {"scene": "test"})
 
     save_mesh(scene.mesh, folder / "mesh.h5")
-    motions = {"train": scene, "heldout": Scene.build(scene.config.held_out_variant(), scene.mesh)}
+    motions = {"train": scene, "heldout": Scene.build(scene.config.heldout_variant(), scene.mesh)}
     for motion, bound in motions.items():
         with write_hdf5(folder / f"{motion}.h5") as stored:
             stored["positions"] = trajectory(bound)

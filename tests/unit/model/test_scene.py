@@ -140,11 +140,11 @@ def test_coarsening_scales_every_frame_number():
 
 def test_held_out_run_differs_in_speed_direction_and_seed():
     scene = load_scene(ROOT, "bar_twist")
-    held = scene.held_out_variant()
+    held = scene.heldout_variant()
     turn = next(e for e in held.effects if e.effect == "rotate")
     assert (turn.degrees, turn.over) == (-90.0, 125)
     assert held.frames == scene.frames
-    assert load_scene(ROOT, "bar_release").held_out_variant().effects[-1].effect == "kick"
+    assert load_scene(ROOT, "bar_release").heldout_variant().effects[-1].effect == "kick"
 
 
 def test_every_scene_file_is_valid():
