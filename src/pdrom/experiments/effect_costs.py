@@ -59,9 +59,10 @@ def effect_costs(
     An effect that a scene lists several times has one row. Elements are those of a group, the
     vertices that a hold may ever hold, else all vertices. The shares add up to one.
     """
+    roles: tuple[Sequence[Effect], ...]
     roles = (scene.groups, scene.forces, scene.boundaries, scene.contacts)
-    kinds = zip(roles, _QUESTIONS.values(), strict=True)
-    timed = [[Timed(effect, asked) for effect in effects] for effects, asked in kinds]
+    questions = zip(roles, _QUESTIONS.values(), strict=True)
+    timed: Any = [[Timed(effect, asked) for effect in role] for role, asked in questions]
     groups, *others = timed
     space = VertexSpace(system, *others)
     config = scene.config

@@ -143,7 +143,12 @@ class _Trial:
     def rows(self) -> list[dict[str, Any]]:
         """The full-order run, then the actions."""
         name = self.scene.config.name
-        full = {"scene": name, "group": self.case.group, "method": "full", "action": "none"}
+        full: dict[str, Any] = {
+            "scene": name,
+            "group": self.case.group,
+            "method": "full",
+            "action": "none",
+        }
         frames = self.scene.config.frames
         full |= {"frames": frames, "finite": True, "relative_error": 0.0, "energy_ratio": 1.0}
         return [full, *(self._row(settings) for settings in self.settings)]
@@ -181,13 +186,14 @@ class _Trial:
     def _guarded(self, settings: GuardSettings) -> Advance:
         group = self.scene.group(self.case.group)
         watches = settings.action != "none"
+        step: ReducedLocalStep | WatchedLocalStep
         if watches:
             step = WatchedLocalStep(group, self.reduction, self.scene.config.iterations)
         else:
             step = ReducedLocalStep(group, self.reduction)
         steps = replace_group(self.scene, self.case.group, step)
         loop = self.scene.stepper(self.system, steps, track_objective=watches)
-        if not watches:
+        if not isinstance(step, WatchedLocalStep):
             return loop.step
         guard = Guard(settings, [step], self.trained_extent)
         return lambda state, frame: guard.step(loop, state, frame)

@@ -94,7 +94,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     if not best.converged:
         log.warning("%s: no convergence in %d evaluations", name, sweep.limit)
     log.info("%s: %.0f evaluations a frame", name, np.mean(best.evaluations))
-    rows = []
+    rows: list[tuple[object, ...]] = []
     counts = sorted({*sweep.counts, scene.config.iterations})
     for count, window in accelerated(counts, sweep.anderson_window):
         reached = own

@@ -1,6 +1,6 @@
 """Time of local steps alone: reduced ones beside the full one of their group (claim C9)."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 
 import numpy as np
 import pandas as pd
@@ -34,7 +34,11 @@ def local_costs(
     states : (n, N, 3) positions in m; frame-lagged data are those of the first
     """
     groups = {name: scene.group(name) for name, _, _ in reduced}
-    steps: dict[object, LocalStep] = {**groups, **reduced}
+    steps: dict[Hashable, LocalStep] = {}
+    for name, group in groups.items():
+        steps[name] = group
+    for key, step in reduced.items():
+        steps[key] = step
     calls = {key: _all_states(step, states) for key, step in steps.items()}
     before = {name: group.threads for name, group in groups.items()}
     rows = []

@@ -155,7 +155,10 @@ def _inner(loop: Stepper, name: str) -> float:
 def _summary(labels: dict[str, object], samples: np.ndarray) -> Measurement:
     means = samples[:, :, 0].mean(axis=1)
     spread = float(np.subtract(*np.percentile(means, [75, 25])))
-    return Measurement(labels, *median_frames(samples), spread, len(samples))
+    frame, inertia, local, assembly, lift, solve = median_frames(samples).tolist()
+    return Measurement(
+        labels, frame, inertia, local, assembly, lift, solve, spread, repeats=len(samples)
+    )
 
 
 def median_frames(samples: np.ndarray) -> np.ndarray:

@@ -21,10 +21,11 @@ from pdrom.experiments.declaration import Experiment, JobSettings
 from pdrom.experiments.measurement import Protocol, Variant, measure
 from pdrom.experiments.motion import training_indices
 from pdrom.experiments.settings import Modes, PositionBasis, Tolerance
+from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import displacement_norms
-from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
+from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
 from pdrom.reduction.subspace.rerun import rerun_model
 
 log = logging.getLogger(__name__)
@@ -92,7 +93,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
                     relative_error(motion, model, reference)
                     for motion, reference in zip((train, heldout), references, strict=True)
                 ]
-                rows.append(_row(train, kind, k, tolerance, samples, errors))
+                rows.append(_row(train, model, k, tolerance, errors))
                 variants.append(_variant(*model.loop(train), timing, config))
                 log.info("%s k=%d tau=%g", kind, k, tolerance)
     stepper = train.stepper(track_objective=False)
@@ -108,20 +109,19 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
 
 def _row(
     scene: Scene,
-    kind: str,
+    model: SubspaceModel,
     k: int,
     tolerance: float,
-    samples: dict[str, Samples],
     errors: list[float | None],
 ) -> dict[str, Any]:
     return {
         "scene": scene.config.name,
         "vertices": scene.mesh.vertices,
         "elements": sum(group.elements for group in scene.groups),
-        "position_basis": kind,
+        "position_basis": model.position_basis,
         "k": k,
         "tau": tolerance,
-        "elements_sampled": sum(len(chosen.elements) for chosen in samples.values()),
+        "elements_sampled": model.elements_evaluated(scene),
         "relative_error_train": errors[0],
         "relative_error_heldout": errors[1],
     }
@@ -133,7 +133,7 @@ def relative_error(scene: Scene, model: SubspaceModel, reference: np.ndarray) ->
     return error if error is not None and np.isfinite(error) else None
 
 
-def _variant(loop, state, timing: Protocol, config: SceneConfig) -> Variant:
+def _variant(loop: Stepper, state: State, timing: Protocol, config: SceneConfig) -> Variant:
     return Variant({}, loop, state, min(timing.frames, config.frames))
 
 

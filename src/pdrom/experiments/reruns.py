@@ -160,7 +160,7 @@ class _Case:
         return rows
 
 
-def _store(store, outcome: Rerun, displacement: np.ndarray, seen: GuardRecord) -> None:
+def _store(store: h5py.Group, outcome: Rerun, displacement: np.ndarray, seen: GuardRecord) -> None:
     store["difference"] = outcome.difference
     store["error"] = outcome.difference / np.sqrt(np.mean(displacement**2))
     store["extent"] = outcome.extent

@@ -3,6 +3,7 @@
 import logging
 from typing import Any
 
+import h5py
 import numpy as np
 import pandas as pd
 
@@ -80,7 +81,7 @@ def _sizes(sweep: Sweep, ranks: tuple[Rank, ...], rank: int) -> list[int]:
     return sorted({*sweep.ranks(rank), *asked})
 
 
-def _store(file, r: int, sampling: Sampling, reduction: Reduction) -> None:
+def _store(file: h5py.File, r: int, sampling: Sampling, reduction: Reduction) -> None:
     store = file.create_group(f"r{r:04d}")
     store["entries"], store["elements"] = sampling.entries, sampling.elements
     store.attrs["gain"], store.attrs["condition"] = reduction.gain, reduction.condition

@@ -4,6 +4,7 @@ import ctypes
 import gc
 import logging
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -193,7 +194,7 @@ def _subspace(scene: Scene, training: Training, settings: Sized) -> Variant:
     labels = {
         "method": "ecsw",
         "k": columns.modes,
-        "elements_sampled": sum(len(chosen.elements) for chosen in samples.values()),
+        "elements_sampled": model.elements_evaluated(scene),
     }
     return Variant(labels, *model.loop(scene), settings.frames)
 
@@ -201,7 +202,7 @@ def _subspace(scene: Scene, training: Training, settings: Sized) -> Variant:
 def _variant(
     scene: Scene,
     system: GlobalSystem,
-    steps: list[LocalStep],
+    steps: Sequence[LocalStep],
     settings: Sized,
     labels: dict[str, Any],
 ) -> Variant:
@@ -226,9 +227,9 @@ def _times(scene: Scene, measured: Measurement) -> dict[str, Any]:
 def _memory() -> float:
     """Resident memory of this process, in MB, after what is free went back to the system."""
     gc.collect()
-    library = ctypes.CDLL(None) if os.name == "posix" else None
-    if hasattr(library, "malloc_trim"):  # glibc; elsewhere small sizes may fit into free memory
-        library.malloc_trim(0)
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
+    if trim is not None:  # glibc; elsewhere small sizes may fit into free memory
+        trim(0)
     return psutil.Process().memory_info().rss / 1e6
 
 

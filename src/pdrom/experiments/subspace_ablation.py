@@ -143,13 +143,13 @@ class _Trials:
             log.info("refused: %s", error)
             return {}
         model = SubspaceModel(POSITION_BASIS, columns, found)
-        outcome, error = self._run("train", model)
+        outcome, within = self._run("train", model)
         return {
-            "elements_sampled": sum(len(chosen.elements) for chosen in found.values()),
+            "elements_sampled": model.elements_evaluated(self.motions["train"].scene),
             "gain": max(chosen.gain for chosen in found.values()),
             "finite": outcome.finite,
             "max_extent": outcome.max_extent,
-            "relative_error_within_horizon": error,
+            "relative_error_within_horizon": within,
             "heldout_error_within_horizon": self._run("heldout", model)[1],
         }
 

@@ -1,7 +1,7 @@
 """Position subspaces with full projections, with sampled elements and with interpolation."""
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from typing import Annotated, Any
@@ -44,7 +44,7 @@ COLUMNS = [
     "max_extent", "relative_error", "energy_ratio",
 ]  # fmt: skip
 
-Sampled = dict[str, Samples | Interpolation]
+Sampled = Mapping[str, Samples | Interpolation]
 
 
 class SubspaceModels(ConfigModel):
@@ -118,7 +118,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
                     outcome = motion.run(model, settings.blowup_extent)
                     for series in ("coordinates", "difference", "extent"):
                         store[f"{name}/{series}"] = getattr(outcome, series)
-                    rows[name].append(_row(motion, labels, samples, outcome))
+                    rows[name].append(_row(motion, labels, model, outcome))
                 log.info("%s %s: error %s", base, method, rows["train"][-1]["relative_error"])
     for name in RUNS:
         table = pd.DataFrame(rows[name], columns=COLUMNS)
@@ -178,16 +178,14 @@ def _interpolations(
 
 
 def _row(
-    motion: Motion, labels: dict[str, Any], samples: Sampled, outcome: Rerun
+    motion: Motion, labels: dict[str, Any], model: SubspaceModel, outcome: Rerun
 ) -> dict[str, Any]:
     scene = motion.scene
-    full = sum(group.elements for group in scene.groups)
-    sampled = sum(len(chosen.elements) for chosen in samples.values()) if samples else full
     return {
         "scene": scene.config.name,
         "group": "all",
         **labels,
-        "r": sampled,
+        "r": model.elements_evaluated(scene),
         "frames": outcome.frames,
         "finite": outcome.finite,
         "blowup_frame": outcome.blowup_frame,

@@ -7,9 +7,10 @@ rule therefore carries the fingerprint of the modules it uses as a parameter.
 import ast
 import hashlib
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
+from typing import cast
 
+import pdrom
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.registry import Registry
 
@@ -71,7 +72,7 @@ def _source(module: str) -> Path:
 
 @cache
 def _locate(module: str) -> Path | None:
-    root = Path(find_spec(PACKAGE).origin).parent
+    root = Path(pdrom.__file__).parent
     parts = module.split(".")
     if parts[0] != PACKAGE:
         return None
@@ -122,11 +123,12 @@ def digest_of_source(source: str, module: str = "") -> str:
     tree = ast.parse(source)
     for node in ast.walk(tree):
         if isinstance(node, ast.Call) and _is_registry(node):
-            _drop_others(node.args[1], module)
+            _drop_others(cast(ast.Dict, node.args[1]), module)
         body = getattr(node, "body", None)
         if isinstance(body, list):
             # a string that stands alone does nothing: docstrings, also those of attributes
-            node.body = [s for s in body if not _is_string(s)] or [ast.Pass()]
+            kept = [s for s in body if not _is_string(s)]
+            setattr(node, "body", kept or [ast.Pass()])  # noqa: B010 (many kinds of nodes have one)
     return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
 
 

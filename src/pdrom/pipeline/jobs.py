@@ -70,10 +70,11 @@ class Jobs:
 
     def inputs(self, experiment: Experiment) -> dict[str, Callable[..., Any]]:
         """Files of each input, by the job's labels."""
-        return {
-            name: self._of(experiment, lambda job, source=source: self._files(job, source))
-            for name, source in experiment.inputs.items()
-        }
+        return {name: self._input(experiment, name) for name in experiment.inputs}
+
+    def _input(self, experiment: Experiment, name: str) -> Callable[..., Any]:
+        source = experiment.inputs[name]
+        return self._of(experiment, lambda job: self._files(job, source))
 
     def params(self, experiment: Experiment) -> dict[str, Any]:
         """What a job depends on, beside the dates of its files: settings, edited files, code."""

@@ -70,7 +70,7 @@ class Run:
 
     def succeed(self, plan: Plan, folders: Folders) -> None:
         """End a run whose jobs all succeeded: it says what came of it."""
-        say_last(summary(self.command, folders, plan.figures, plan.tables))
+        say_last(summary(self.command, folders, plan.figures, plan.tables.paths))
         stop_server()
         cancel_timers()
 

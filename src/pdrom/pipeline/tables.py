@@ -1,5 +1,6 @@
 """The tables of a study: what their rules need."""
 
+from collections.abc import Iterator
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
@@ -33,7 +34,7 @@ class Tables:
     def __init__(self, study: Study, results: str) -> None:
         self._study, self._results = study, results
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[str]:
         return iter(all_tables())
 
     @property

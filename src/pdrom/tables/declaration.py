@@ -153,7 +153,7 @@ class Table(Generic[P]):
         ----------
         root : folder of the project, for the files that the table reads there
         """
-        cells = [self.timing_columns] * len(table)
+        cells: Sequence[Collection[str]] = [self.timing_columns] * len(table)
         if self.timed_cells is not None:
             files = {k: r.path for k, r in self.reads.items() if isinstance(r, ProjectFile)}
             cells = self.timed_cells(table, **{name: root / path for name, path in files.items()})

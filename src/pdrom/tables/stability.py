@@ -1,6 +1,7 @@
 """Table stability: where each method can be trusted, over scenes, sizes, time step, stiffness."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -112,7 +113,7 @@ def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
     ]
 
 
-def _outcome(row, full_extent: float, wrong: float, departure: float) -> str:
+def _outcome(row: Any, full_extent: float, wrong: float, departure: float) -> str:
     if pd.isna(row.finite):
         return "not run"
     if not row.finite:

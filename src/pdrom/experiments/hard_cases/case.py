@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -59,7 +60,11 @@ class HardCase:
 
 
 def build(
-    mesh: Mesh, *effects: dict, frames: int = 30, masses: np.ndarray | None = None, **settings
+    mesh: Mesh,
+    *effects: dict[str, Any],
+    frames: int = 30,
+    masses: np.ndarray | None = None,
+    **settings: Any,
 ) -> Scene:
     """Scene of ``effects`` on ``mesh``; ``masses`` (N,) kg in place of equal ones."""
     config = validate(

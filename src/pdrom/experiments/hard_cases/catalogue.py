@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -45,11 +46,11 @@ def _with(effect: dict, **changes: object) -> dict:
     return {**effect, **changes}
 
 
-def _scene(mesh: Callable[[], Mesh], *effects: dict, **settings) -> Recipe:
+def _scene(mesh: Callable[[], Mesh], *effects: dict, **settings: Any) -> Recipe:
     return Recipe(mesh, effects, settings)
 
 
-def _heavy_and_light(mesh: Callable[[], Mesh], *effects: dict, **settings) -> Recipe:
+def _heavy_and_light(mesh: Callable[[], Mesh], *effects: dict, **settings: Any) -> Recipe:
     """Masses over eight decades, heavy beside light."""
 
     def masses(made: Mesh) -> np.ndarray:

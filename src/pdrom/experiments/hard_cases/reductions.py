@@ -38,7 +38,7 @@ BASES = {"pod": ("full", "ecsw", "hrpd", *INTERPOLATIONS), "skinning": ("full", 
 
 def _samples(
     sampling: str, scene: Scene, columns: Columns, positions: np.ndarray, start: State
-) -> dict[str, Samples | Interpolation]:
+) -> Mapping[str, Samples | Interpolation]:
     """What a position subspace samples of each group, from a run's ``positions`` (n, N, 3) m."""
     if sampling == "full":
         return {}
@@ -146,6 +146,4 @@ def _subspace(training: Training, kind: str, sampling: str, limit: float) -> Red
     loop = Stepper(untracked.space, untracked.time_step, untracked.iterations, steps)
     roundoff = Roundoff(scene, loop, columns)
     run = record(scene, loop, state, roundoff, model.positions, limit)
-    everything = sum(group.elements for group in scene.groups)
-    sampled = sum(len(chosen.elements) for chosen in samples.values()) if samples else everything
-    return ReducedRun(run, sampled, columns.B.shape[1], None)
+    return ReducedRun(run, model.elements_evaluated(scene), columns.B.shape[1], None)

@@ -51,7 +51,7 @@ class Roundoff:
         evaluation = 2.0 * np.sqrt(abs(first) * noise) + noise
         if self.columns is None:
             return evaluation + self._sparse(size)
-        return evaluation + self._dense(size, largest)
+        return evaluation + self._dense(self.columns, size, largest)
 
     def _noise(self, size: float) -> float:
         """R: the objective of rounding errors where all coordinates are of ``size``."""
@@ -73,8 +73,8 @@ class Roundoff:
         smallest = float(self.scene.system.inertia.min())
         return 1.5 * float(residual @ residual) / smallest
 
-    def _dense(self, size: float, largest: np.ndarray) -> float:
-        b = self.columns.B
+    def _dense(self, columns: Columns, size: float, largest: np.ndarray) -> float:
+        b = columns.B
         matrix = b.T @ (self.scene.masses[:, None] * b) / self.loop.time_step**2
         matrix = matrix + sum(step.matrix for step in self.loop.local_steps)
         # coordinates have sizes of their own: the scaling of columns must not count as condition

@@ -1,6 +1,7 @@
 """Small meshes and the states that hard cases start from."""
 
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 
@@ -13,7 +14,9 @@ Start = Callable[[Scene], State]
 SEED = 7
 
 
-def sheet(plane: str = "xz", wave: float = 0.0, rows: int = 6, columns: int = 6) -> Mesh:
+def sheet(
+    plane: Literal["xy", "xz"] = "xz", wave: float = 0.0, rows: int = 6, columns: int = 6
+) -> Mesh:
     """A sheet of 36 vertices, 50 triangles."""
     return cloth(rows, columns, plane, wave=wave)
 

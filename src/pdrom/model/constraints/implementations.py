@@ -3,7 +3,9 @@
 Each does what the compiled kernels of a group do, in another way; results agree to round-off.
 """
 
+from collections.abc import Callable
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -69,4 +71,8 @@ class InterpretedLocalStep:
         return energy
 
 
-IMPLEMENTATIONS = {"numpy": NumpyLocalStep, "interpreted": InterpretedLocalStep}
+# Makers of a local step of the step loop, by name.
+IMPLEMENTATIONS: dict[str, Callable[[ConstraintGroup], Any]] = {
+    "numpy": NumpyLocalStep,
+    "interpreted": InterpretedLocalStep,
+}

@@ -81,8 +81,8 @@ def _check_neighbours(cells: np.ndarray, kind: str, name: str) -> None:
             f"{cells[first].tolist()}"
         )
     corners = cells.shape[1]
-    sides = [np.delete(cells, corner, axis=1) for corner in range(corners)]
-    sides = np.sort(np.concatenate(sides), axis=1)
+    each = [np.delete(cells, corner, axis=1) for corner in range(corners)]
+    sides = np.sort(np.concatenate(each), axis=1)
     shared = _largest_group(sides)
     if len(shared) > 2:
         side, owners = ("edge", "triangles") if corners == 3 else ("face", "tetrahedra")

@@ -31,6 +31,11 @@ class _Model(ConfigModel):
     """Base of the kinds of meshes."""
 
     @property
+    def label(self) -> str:
+        """What messages call the mesh."""
+        raise NotImplementedError(f"{type(self).__name__} has no label")
+
+    @property
     def identifier(self) -> str:
         """File name of the mesh: readable, and different for different parameters."""
         canonical = json.dumps(self.model_dump(mode="json"), sort_keys=True)

@@ -1,10 +1,11 @@
 """A scene in a position subspace: columns, sampled elements of every group, and its step loop."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.atoms import atoms
@@ -35,7 +36,15 @@ class SubspaceModel:
 
     position_basis: str
     columns: Columns
-    samples: dict[str, Samples | Interpolation] = field(default_factory=dict)
+    samples: Mapping[str, Samples | Interpolation] = field(default_factory=dict)
+
+    def elements_evaluated(self, scene: Scene) -> int:
+        """Elements of all groups that a local step evaluates."""
+        return sum(self._evaluated(group) for group in scene.groups)
+
+    def _evaluated(self, group: ConstraintGroup) -> int:
+        elements = self.samples.get(group.name, Samples()).elements
+        return group.elements if elements is None else len(elements)
 
     def loop(self, scene: Scene) -> tuple[Stepper, State]:
         """Step loop in the coordinates of the subspace, and the initial state."""

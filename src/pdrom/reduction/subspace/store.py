@@ -1,6 +1,7 @@
 """Models of position subspaces, stored in HDF5 and loaded again."""
 
 import os
+from collections.abc import Mapping
 from typing import Any
 
 import h5py
@@ -20,7 +21,7 @@ def store_columns(store: h5py.Group, columns: Columns) -> None:
 
 
 def store_model(
-    store: h5py.Group, labels: dict[str, Any], samples: dict[str, Samples | Interpolation]
+    store: h5py.Group, labels: dict[str, Any], samples: Mapping[str, Samples | Interpolation]
 ) -> None:
     """Write the labels of a model and what it samples of each group."""
     store.attrs.update(labels)
