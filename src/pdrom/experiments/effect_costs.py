@@ -59,8 +59,8 @@ def effect_costs(
     An effect that a scene lists several times has one row. Elements are those of a group, the
     vertices that a hold may ever hold, else all vertices. The shares add up to one.
     """
-    roles: tuple[Sequence[Effect], ...]
-    roles = (scene.groups, scene.forces, scene.boundaries, scene.contacts)
+    roles: list[Sequence[Effect]] = []
+    roles += [scene.groups, scene.forces, scene.boundaries, scene.contacts]
     questions = zip(roles, _QUESTIONS.values(), strict=True)
     timed: Any = [[Timed(effect, asked) for effect in role] for role, asked in questions]
     groups, *others = timed

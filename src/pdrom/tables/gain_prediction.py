@@ -1,5 +1,7 @@
 """Table gain_prediction: does a number known before the run say whether the run fails?"""
 
+from collections.abc import Callable
+
 import numpy as np
 import pandas as pd
 
@@ -10,7 +12,7 @@ from pdrom.tables.gains import ORTHOGONAL, reruns_with_gain
 FAILED = 0.1  # error within the horizon above which a run counts as failed
 EVERY = "all"
 DECADES = 4  # gains above 10^4 are counted together
-PREDICTORS = {
+PREDICTORS: dict[str, Callable[[pd.DataFrame], pd.Series]] = {
     "gain": lambda runs: runs.gain,
     "reconstruction error": lambda runs: runs.reconstruction_error,
     "gain x best error": lambda runs: runs.gain * runs.orthogonal_reconstruction,
