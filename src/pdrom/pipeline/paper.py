@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pdrom.core.paths import MACHINE, PAPER_INPUT
+from pdrom.model.constraints.base import GroupConfig
 from pdrom.pipeline.full import FULL_STUDY, is_full
 from pdrom.pipeline.study import Study
 from pdrom.report.claims import load_claims
@@ -92,7 +93,7 @@ def _study(study: Study) -> Row:
 
 def _scene(study: Study, name: str) -> Row:
     config, scene = study.scenes[name], study.bound[name]
-    weights = {e.effect: e.weight for e in config.effects if e.effect in config.groups}
+    weights = {e.effect: e.weight for e in config.effects if isinstance(e, GroupConfig)}
     return {
         "scene": name,
         "groups": ", ".join(f"{group} ({weights[group]:g})" for group in config.groups),

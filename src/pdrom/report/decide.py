@@ -6,15 +6,16 @@ import pandas as pd
 
 from pdrom.core.reads import ProjectFile, TableOf
 from pdrom.report.claims import METRICS, VERDICTS, claims_rows, load_claims, timed_columns
-from pdrom.tables.declaration import table, text, timed
+from pdrom.tables.declaration import table as declare
+from pdrom.tables.declaration import text, timed
 
 
-def _timed_cells(claims: pd.DataFrame, rules: Path) -> list[set[str]]:
-    loaded = load_claims(rules)
-    return [timed_columns(loaded[claim]) for claim in claims.claim]
+def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
+    loaded = load_claims(files["rules"])
+    return [timed_columns(loaded[claim]) for claim in table.claim]
 
 
-@table(
+@declare(
     title="Verdicts on the claims of the paper",
     columns=(
         text("claim", "its identifier in config/claims.yaml"),

@@ -1,34 +1,25 @@
 """A job that reads a mesh file depends on what is in it."""
 
-import re
 from pathlib import Path
 
 import pytest
 
 from bad_input.project import MESH, SCENE, SQUARE, STUDY, Replace, load_project, make_project
-from places import ROOT
+from pdrom.experiments.mesh import EXPERIMENT as MESHES
+from pdrom.experiments.online import EXPERIMENT as ONLINE
+from pdrom.experiments.scaling import EXPERIMENT as SCALING
 
 USED = Replace("{kind: cloth, rows: 5, columns: 4, plane: xz}", f"{{kind: file, path: {MESH}}}")
 
 
-@pytest.mark.parametrize("section", ["", "online: {scenes: [small]}\n"])
-def test_an_edited_mesh_has_another_checksum(tmp_path: Path, section: str) -> None:
+@pytest.mark.parametrize("experiment", [MESHES, ONLINE, SCALING], ids=lambda e: e.name)
+def test_an_edited_mesh_has_another_checksum(tmp_path: Path, experiment) -> None:
     root = make_project(tmp_path, {SCENE: USED})
-    (root / STUDY).write_text((root / STUDY).read_text() + section)
+    (root / STUDY).write_text((root / STUDY).read_text() + "online: {scenes: [small]}\n")
     plan = load_project(root)
-    before = plan.mesh_content("small")
-    assert before == plan.mesh_content("small")
+    content = plan.jobs.params(experiment)["content"]
+    job = {"scene": "small", "mesh": plan.study.mesh_of("small"), "factor": "1"}
+    before = content(job)
+    assert before == content(dict(job))
     (root / MESH).write_text(SQUARE.replace("v 1 0 1", "v 1 0 2"))
-    assert plan.mesh_content("small") != before
-
-
-def test_rules_that_read_meshes_themselves_depend_on_the_content() -> None:
-    """A stage that is given the project's folder builds its mesh there."""
-    rules = [
-        rule
-        for path in sorted((ROOT / "workflow" / "rules").glob("*.smk"))
-        for rule in re.split(r"^rule ", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
-        if "root=" in rule and "scene=" in rule
-    ]
-    assert len(rules) >= 2
-    assert [rule.split(":")[0] for rule in rules if "content=" not in rule] == []
+    assert content(job) != before

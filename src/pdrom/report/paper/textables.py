@@ -1,6 +1,7 @@
 """Tables of the manuscript as TeX, generated from the tables of the study."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import pandas as pd
 
@@ -79,7 +80,7 @@ def methods(tables: Tables) -> str:
     return tabular(header, rows, "lllllll")
 
 
-def _samples(row) -> str:
+def _samples(row: Any) -> str:
     """How many samples a method takes."""
     if row.rows == "all":
         return "--"
@@ -206,7 +207,7 @@ def hard_cases(tables: Tables) -> str:
     return longtable(header, rows, rf"l{left}p{{5.2cm}}" + f"{left}p{{2.6cm}}" * len(reductions))
 
 
-def _failure(row) -> str:
+def _failure(row: Any) -> str:
     """How a reduction failed, with what tells it apart from others."""
     if row.outcome == "singular":
         return "singular"

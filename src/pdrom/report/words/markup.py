@@ -5,11 +5,12 @@ in with a setting of the configuration (`filled`).
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from pdrom.core.errors import ConfigurationError, choices
 from pdrom.report.words.text import escape
 
+_Words = Callable[[str], str]
 _MARK = re.compile(r"`([^`]*)`|\$([^$]*)\$")
 _KEY = re.compile(r"\{([a-z_.]+)\}")
 _SIGNS = {
@@ -61,7 +62,7 @@ def to_rst(text: str) -> str:
     return re.sub(r"([^\w\s]|_)", r"\\\1", words)
 
 
-def _converted(text, words, name, mathematics) -> str:
+def _converted(text: str, words: _Words, name: _Words, mathematics: _Words) -> str:
     pieces, end = [], 0
     for found in _MARK.finditer(text):
         pieces.append(words(text[end : found.start()]))

@@ -1,5 +1,7 @@
 """Accuracy of reduced models against their time per frame."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -68,7 +70,7 @@ def draw(results: Results, options: Options) -> Figure:
     return figure
 
 
-def model_name(row) -> str:
+def model_name(row: Any) -> str:
     """Method of a row; in a position subspace its kind comes first."""
     if row.position_basis == "full":
         return str(row.method)

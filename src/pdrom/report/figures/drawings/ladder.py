@@ -58,8 +58,8 @@ def _draw_quantity(
     style.grid(ax)
     for i, scene in enumerate(scenes):
         rows = table[table.scene == scene].set_index(["direction", "rung"])[column]
-        values = [rows.get(rung, np.nan) for rung in rungs]
-        values = clipped(np.nan_to_num(np.array(values, float), nan=np.inf), *limits)
+        found = np.array([rows.get(rung, np.nan) for rung in rungs], float)
+        values = clipped(np.nan_to_num(found, nan=np.inf), *limits)
         heights = np.arange(len(rungs)) + 0.09 * (i - 0.5 * (len(scenes) - 1))
         colour, marker = style.scene_style(i)
         ax.plot(values, heights, linestyle="none", color=colour, marker=marker, markersize=3.2)

@@ -61,11 +61,11 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, look: tuple[str, str]) -> None:
     _shade_roundoff(ax, shown, above)
     ax.plot(component[above], shown[above], color=colour, linewidth=0.8)
     hollow = {"markerfacecolor": "white", "markeredgecolor": "#777777", "markeredgewidth": 0.5}
-    for mask, look in ((above, {"color": colour}), (~above, hollow)):
+    for mask, marks in ((above, {"color": colour}), (~above, hollow)):
         if mask.any():
             ax.plot(
                 component[mask], shown[mask], linestyle="none", marker=marker, markersize=2.8,
-                clip_on=False, **look,
+                clip_on=False, **marks,
             )  # fmt: skip
     ax.set_xlim(0, 1.02 * max(component.max(), 1.0))
 

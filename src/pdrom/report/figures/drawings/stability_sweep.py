@@ -1,8 +1,11 @@
 """Where each method can be trusted over the time step and over the stiffness."""
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pdrom.report.figures.kit import style
@@ -66,7 +69,7 @@ def draw(results: Results, options: Options) -> Figure:
     return figure
 
 
-def _model(row) -> _Model:
+def _model(row: Any) -> _Model:
     size = row.r if row.position_basis == "full" else row.k
     return _Model(row.method, row.position_basis, None if pd.isna(size) else int(size))
 
@@ -80,7 +83,14 @@ def _own_steps(table: pd.DataFrame) -> dict[str, float]:
     return steps
 
 
-def _panel(ax, rows, models, column, own, text) -> None:
+def _panel(
+    ax: Axes,
+    rows: pd.DataFrame,
+    models: Sequence[_Model],
+    column: str,
+    own: Mapping[str, float],
+    text: Callable[[float], str],
+) -> None:
     """One quantity: blocks of scenes (and groups, where a scene reduces several)."""
     blocks, cells = [], []
     for (scene, group), title in _experiments(rows).items():

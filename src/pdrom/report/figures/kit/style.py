@@ -125,7 +125,8 @@ def group_looks(holdings: Holdings) -> dict[str, tuple[str, str]]:
 
 def surface_colour(colour: str) -> tuple[float, float, float]:
     """``colour`` on a shaded surface: lightened, so that the shading has room."""
-    return tuple(0.72 * c + 0.28 for c in to_rgb(colour))
+    red, green, blue = (0.72 * c + 0.28 for c in to_rgb(colour))
+    return red, green, blue
 
 
 def words(name: str) -> str:
