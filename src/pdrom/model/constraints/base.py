@@ -46,7 +46,8 @@ class ConstraintGroup(Effect):
 
     rows_per_element: int
     split_from: int
-    """Elements from which the group has two parts (`pdrom.model.constraints.parts`)."""
+    """Elements from which the group has two parts (`pdrom.model.constraints.parts`); a group that
+    always is one part does not set it."""
     S: sparse.csr_array
     weights: np.ndarray
     threads: int = 1

@@ -43,6 +43,8 @@ def _call_kernel(address, d, parameters, p, m):
 def test_gradient_kernels_equal_the_numpy_reference(group_scene, rng, state):
     """The kernel sees S q and its parameters only, of some elements, called by its address."""
     group = group_scene.groups[0]
+    if group.gradient_kernel is None:
+        pytest.skip("a group without a gradient kernel")
     y = STATES[state](group_scene.mesh.points, rng)
     group.begin_frame(y)
     elements = np.arange(0, group.elements, 3)

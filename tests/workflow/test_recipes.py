@@ -1,0 +1,190 @@
+"""Each recipe of CONTRIBUTING.md is typed into a copy, and the pipeline makes what it adds."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from checkout import Checkout, copy_repository
+from recipes import recipe
+
+from pdrom.core.store import check_file, read_table
+from places import ROOT
+
+# Files that a recipe may touch at most; pages that a command writes from the declarations (a list
+# of tables, one of figures) are not counted.
+MOST = {
+    "A figure": 3,
+    "A table": 2,
+    "A selection": 3,
+    "A constraint group": 3,
+    "An experiment": 1,
+}
+SCENE = {
+    "name": "cable_sheet",
+    "title": "A sheet of cables, hanging from one side",
+    "mesh": {"kind": "cloth", "rows": 20, "columns": 20, "plane": "xz", "lift": 2.0},
+    "frames": 200,
+    "effects": [
+        {"effect": "gravity"},
+        {"effect": "pins", "select": "left"},
+        {"effect": "cable", "weight": 1e5},
+    ],
+    "reduce": {"cable": {"train": 100}},
+}
+STUDY = {
+    "scenes": ["spring_oop", "cable_sheet"],
+    "methods": ["leverage", "block-deim"],
+    "ranks": [2],
+    "heldout_ranks": [],
+    "coarsen": {"resolution": 0.25, "frames": 0.05},
+    "guard": {"cases": []},
+    "sensitivity": {"perturbations": [1e-10], "seeds": [1]},
+}
+ARGUMENTS = ("--configfile", "own.yaml")
+EXPERIMENT = "src/pdrom/experiments/rest_lengths.py"
+GROUP_TESTS = ("tests/physics", "tests/unit/model/constraints", "tests/unit/model/dynamics")
+
+
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
+    """A copy with everything that the recipes add, and a study that uses it."""
+    made = copy_repository(tmp_path_factory.mktemp("recipes"))
+    shutil.copytree(ROOT / "tests", made.folder / "tests", ignore=shutil.ignore_patterns("_*"))
+    shutil.copy(ROOT / "pyproject.toml", made.folder)
+    for title in MOST:
+        for block in recipe(title):
+            block.add_to(made)
+    (made.folder / "own.yaml").write_text(yaml.safe_dump(STUDY), encoding="utf-8")
+    scene = made.folder / "config" / "scenes" / "cable_sheet.yaml"
+    scene.write_text(yaml.safe_dump(SCENE), encoding="utf-8")
+    return made
+
+
+@pytest.fixture(scope="module")
+def planned(checkout: Checkout) -> set[str]:
+    """What a run of the whole study would make."""
+    return checkout.planned(*ARGUMENTS)
+
+
+@pytest.fixture(scope="module")
+def results(planned: set[str]) -> str:
+    """Folder of the study's results."""
+    (figure,) = (path for path in planned if path.endswith("/figures/rest_shapes.pdf"))
+    return figure.removesuffix("/figures/rest_shapes.pdf")
+
+
+@pytest.mark.parametrize("title", MOST)
+def test_a_recipe_touches_few_files(title: str) -> None:
+    paths = [block.path for block in recipe(title)]
+    assert 0 < len(paths) == len(set(paths)) <= MOST[title]
+
+
+def test_what_was_added_belongs_to_the_study(planned: set[str], results: str) -> None:
+    assert {
+        f"{results}/figures/rest_shapes.png",
+        f"{results}/tables/durations.csv",
+        f"{results}/reruns/spring_oop/spring/leverage.csv",
+        f"{results}/reruns/cable_sheet/cable/leverage.csv",
+        f"{results}/reruns/cable_sheet/cable/block-deim.csv",
+    } <= planned
+
+
+def test_a_figures_option_is_typed_without_another_line(checkout: Checkout) -> None:
+    figures = checkout.folder / "config" / "figures.yaml"
+    before = figures.read_text(encoding="utf-8")
+    figures.write_text(before + "rest_shapes:\n  ranks: [6]\n", encoding="utf-8")
+    done = checkout.snakemake("-n", *ARGUMENTS)
+    figures.write_text(before, encoding="utf-8")
+    assert done.returncode != 0
+    assert "rest_shapes: unknown key 'ranks' (allowed: scenes)" in done.stderr
+
+
+def _targets(results: str) -> list[str]:
+    """One file of each recipe."""
+    names = (
+        "figures/rest_shapes.pdf",
+        "tables/durations.csv",
+        "reruns/spring_oop/spring/leverage.csv",
+        "reruns/cable_sheet/cable/block-deim.csv",
+        "rest_lengths/spring_oop.csv",
+    )
+    return [f"{results}/{name}" for name in names]
+
+
+@pytest.fixture(scope="module")
+def ran(checkout: Checkout, results: str) -> str:
+    """What a run said that made what the recipes add."""
+    done = checkout.snakemake(*ARGUMENTS, "--", *_targets(results))
+    assert done.returncode == 0, done.stderr
+    return done.stdout + done.stderr
+
+
+@pytest.fixture
+def made(checkout: Checkout, results: str, ran: str) -> Path:
+    """Folder of the results, with a file of each recipe."""
+    return checkout.folder / results
+
+
+@pytest.mark.slow
+class TestMade:
+    """Files that the pipeline made by the added code."""
+
+    def test_everything_has_its_checksum(self, made: Path) -> None:
+        assert {check_file(path) for path in _targets(str(made))} == {"intact"}
+
+    def test_the_figure_is_drawn(self, made: Path) -> None:
+        assert (made / "figures/rest_shapes.pdf").read_bytes().startswith(b"%PDF")
+        assert (made / "figures/rest_shapes.png").is_file()
+
+    def test_the_table_holds_every_scene(self, made: Path) -> None:
+        table = read_table(made / "tables/durations.csv")
+        assert list(table.scene) == STUDY["scenes"]
+        assert np.allclose(table.duration, 0.016 * table.planned_frames)
+
+    def test_the_selection_samples_three_elements_a_mode(self, made: Path) -> None:
+        table = read_table(made / "sampling/spring_oop/spring/leverage.csv")
+        assert len(table)
+        assert (table.elements_sampled == 3 * table.r).all()
+
+    def test_the_group_is_reduced(self, made: Path) -> None:
+        table = read_table(made / "reruns/cable_sheet/cable/block-deim.csv")
+        assert list(table.r) == [2]
+        assert table.finite.all()
+        assert (table.relative_error < 1.0).all()
+
+    def test_the_experiment_says_its_label_and_writes_its_file(self, made: Path, ran: str) -> None:
+        assert "Rest lengths of the springs of spring_oop" in ran
+        table = read_table(made / "rest_lengths/spring_oop.csv")
+        # sides and diagonals of the cells of a square sheet
+        short, long = sorted(set(table.length.round(9)))
+        assert np.isclose(long, np.sqrt(2.0) * short)
+
+    def test_settings_and_code_of_the_experiment_make_it_run_again(
+        self, checkout: Checkout, results: str, ran: str
+    ) -> None:
+        target = f"{results}/rest_lengths/spring_oop.csv"
+        arguments = (target, *ARGUMENTS)
+        assert checkout.planned(*arguments) == set()
+        assert checkout.planned(*arguments, "--config", "blowup_extent=50") == {target}
+        checkout.edit(EXPERIMENT, "lengths / allowed", "lengths / allowed / 1.0")
+        assert checkout.planned(*arguments) == {target}
+
+
+@pytest.mark.slow
+def test_the_group_has_the_properties_of_every_group(checkout: Checkout) -> None:
+    """The copy's own tests of groups, on the group that its list of groups names now."""
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-k", "cable", *GROUP_TESTS],
+        cwd=checkout.folder,
+        env={**os.environ, "PYTHONPATH": str(checkout.folder / "src")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+    assert " passed" in done.stdout
