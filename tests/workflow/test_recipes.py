@@ -47,6 +47,7 @@ STUDY = {
 }
 ARGUMENTS = ("--configfile", "own.yaml")
 EXPERIMENT = "src/pdrom/experiments/rest_lengths.py"
+TABLE = "src/pdrom/tables/mesh_sizes.py"
 GROUP_TESTS = ("tests/physics", "tests/unit/model/constraints", "tests/unit/model/dynamics")
 
 
@@ -87,7 +88,7 @@ def test_a_recipe_touches_few_files(title: str) -> None:
 def test_what_was_added_belongs_to_the_study(planned: set[str], results: str) -> None:
     assert {
         f"{results}/figures/rest_shapes.png",
-        f"{results}/tables/durations.csv",
+        f"{results}/tables/mesh_sizes.csv",
         f"{results}/reruns/spring_oop/spring/leverage.csv",
         f"{results}/reruns/cable_sheet/cable/leverage.csv",
         f"{results}/reruns/cable_sheet/cable/block-deim.csv",
@@ -108,7 +109,7 @@ def _targets(results: str) -> list[str]:
     """One file of each recipe."""
     names = (
         "figures/rest_shapes.pdf",
-        "tables/durations.csv",
+        "tables/mesh_sizes.csv",
         "reruns/spring_oop/spring/leverage.csv",
         "reruns/cable_sheet/cable/block-deim.csv",
         "rest_lengths/spring_oop.csv",
@@ -141,10 +142,11 @@ class TestMade:
         assert (made / "figures/rest_shapes.pdf").read_bytes().startswith(b"%PDF")
         assert (made / "figures/rest_shapes.png").is_file()
 
-    def test_the_table_holds_every_scene(self, made: Path) -> None:
-        table = read_table(made / "tables/durations.csv")
-        assert list(table.scene) == STUDY["scenes"]
-        assert np.allclose(table.duration, 0.016 * table.planned_frames)
+    def test_the_table_has_a_row_per_mesh_and_its_types(self, made: Path) -> None:
+        table = read_table(made / "tables/mesh_sizes.csv")
+        assert list(table) == ["mesh", "vertices", "large"]
+        assert list(table.vertices) == [25] * len(table)
+        assert list(table.large) == [False] * len(table)
 
     def test_the_selection_samples_three_elements_a_mode(self, made: Path) -> None:
         table = read_table(made / "sampling/spring_oop/spring/leverage.csv")
@@ -164,14 +166,21 @@ class TestMade:
         short, long = sorted(set(table.length.round(9)))
         assert np.isclose(long, np.sqrt(2.0) * short)
 
-    def test_settings_and_code_of_the_experiment_make_it_run_again(
-        self, checkout: Checkout, results: str, ran: str
+    @pytest.mark.parametrize(
+        ("name", "module", "old", "new"),
+        [
+            ("rest_lengths/spring_oop.csv", EXPERIMENT, "/ allowed", "/ allowed / 1.0"),
+            ("tables/mesh_sizes.csv", TABLE, "> extents", ">= extents"),
+        ],
+    )
+    def test_its_settings_and_its_code_make_it_again(
+        self, checkout: Checkout, results: str, ran: str, name: str, module: str, old: str, new: str
     ) -> None:
-        target = f"{results}/rest_lengths/spring_oop.csv"
+        target = f"{results}/{name}"
         arguments = (target, *ARGUMENTS)
         assert checkout.planned(*arguments) == set()
         assert checkout.planned(*arguments, "--config", "blowup_extent=50") == {target}
-        checkout.edit(EXPERIMENT, "lengths / allowed", "lengths / allowed / 1.0")
+        checkout.edit(module, old, new)
         assert checkout.planned(*arguments) == {target}
 
 

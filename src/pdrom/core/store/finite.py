@@ -1,4 +1,4 @@
-"""Numbers that are none are refused before anything is computed with them."""
+"""NaN and infinity are refused before anything is computed with them."""
 
 import numpy as np
 
