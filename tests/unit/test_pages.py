@@ -1,0 +1,60 @@
+"""What the pages for readers name is there: links, and paths of the project."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from pdrom.pipeline.front import completed
+from places import ROOT
+
+PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "docs").rglob("*.md")])
+NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
+# Examples of names that a reader chooses.
+EXAMPLES = {"config/scenes/my_sheet.yaml"}
+LINK = re.compile(r"\]\(([^)#]+)[^)]*\)")
+PATH = re.compile(r"`((?:config|docs|paper|src|tests|workflow)/[\w./-]+)`")
+BUILT = {"paper/main.pdf"}
+COMMAND = re.compile(r"\./reproduce ([^`#\n]+)")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_links_lead_somewhere(page: Path) -> None:
+    inside = [link for link in LINK.findall(page.read_text("utf-8")) if "://" not in link]
+    assert [link for link in inside if not (page.parent / link).exists()] == []
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "CONTRIBUTING.md"], ids=[*NAMES, "CONTRIBUTING"])
+def test_paths_of_the_project_exist(page: Path) -> None:
+    """A recipe's own files stand before its code, with a colon."""
+    text = page.read_text("utf-8")
+    made = set(re.findall(r"^`([^`]+)`:$", text, re.MULTILINE)) | EXAMPLES | BUILT
+    assert [p for p in PATH.findall(text) if p not in made and not (ROOT / p).exists()] == []
+
+
+def test_every_page_is_listed() -> None:
+    listed = LINK.findall((ROOT / "docs" / "README.md").read_text("utf-8"))
+    pages = {page.name for page in (ROOT / "docs").glob("*.md")} - {"README.md"}
+    assert pages <= set(listed)
+
+
+def commands() -> list[str]:
+    """Arguments of ./reproduce on pages and in comments of the configuration."""
+    files = [
+        *PAGES,
+        ROOT / "CONTRIBUTING.md",
+        ROOT / "reproduce",
+        *(ROOT / "config").glob("*.yaml"),
+    ]
+    texts = [path.read_text("utf-8").replace("\\\n", " ") for path in files]
+    found = {line.split("  ")[0].strip() for text in texts for line in COMMAND.findall(text)}
+    # names in capitals stand for others; a plugin of the executor need not be installed
+    left_out = re.compile(r"test|--help|--executor|.*[A-Z]{4}")
+    return sorted(command for command in found if command and not left_out.match(command))
+
+
+@pytest.mark.parametrize("command", commands())
+def test_commands_are_understood(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    assert completed(shlex.split(command))
