@@ -1,4 +1,4 @@
-"""Honest timings: in-process, warm, interleaved between the compared variants, median.
+"""Timings in one process, after a warm-up, with the compared variants in turn; medians count.
 
 A variant makes a step loop and its initial state. Every repeat runs each variant once, from there,
 so that drifts of the machine's clock hit all variants alike. Of each frame the repeat with the

@@ -1,4 +1,4 @@
-"""Names of methods that are no reduction, as the tables give them."""
+"""What the column ``method`` of tables says of runs without any reduction."""
 
 FOM = "fom"  # the full-order run with its own or another number of iterations
 ANDERSON = "fom-anderson"  # the same with accelerated iterations

@@ -19,8 +19,8 @@ def core_type(system: str, machine: str, features: set[str]) -> str | None:
     """Kernels that every processor of a family has; None where there is nothing to choose.
 
     Haswell (2013; also AMD's Zen) where the processor has its instructions, otherwise Nehalem,
-    whose instructions NumPy demands anyway; on ARM those of the architecture itself. The libraries
-    of other systems are not OpenBLAS, or do not say what the processor has.
+    whose instructions NumPy demands anyway; on ARM those of the architecture itself. None on other
+    systems: their library is not OpenBLAS, or they do not say what the processor has.
 
     Parameters
     ----------

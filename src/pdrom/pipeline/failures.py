@@ -46,7 +46,7 @@ class Failure:
         """Name of the job and cause."""
         folder = next((p for p in Path(self.output).parents if p.is_dir()), Path())
         errors = _ERROR.findall(_content(self.log))
-        # what did not even start has an older run's log
+        # the log of a job that did not even start is that of an older run
         if errors and cause(self.said, folder) not in _STATUSES.values():
             return f"pdrom: job {self.rule} failed: {errors[-1]}"
         return (
@@ -91,7 +91,7 @@ class Failures(logging.Handler):
         self.jobs: list[Failure] = []
         self.other: list[str] = []
         self.stopped: str | None = None
-        # what was said last in each thread: the message of a job precedes the job's name
+        # last message of each thread: why a job failed is said before which job it was
         self._said: dict[int | None, str] = {}
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -120,7 +120,7 @@ class Failures(logging.Handler):
         """
         lines = [failure.line() for failure in self.jobs]
         if self.stopped:
-            # jobs that ended with the run are no news
+            # jobs that were ended together with the run did not fail themselves
             lines = [line for line in lines if not line.endswith(tuple(_CAUSES.values()))]
             lines.append(f"pdrom: {self.stopped}")
         text = "\n".join([*dict.fromkeys([*lines, *self.other]), ADVICE]) + "\n"

@@ -15,8 +15,8 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.core.registry import Registry
 
 PACKAGE = "pdrom"
-# Where files lie decides nothing inside of a job, and Snakemake compares the paths themselves: a
-# further kind of file makes no job run again.
+# Left out of fingerprints: these modules say where files lie, which changes no result; Snakemake
+# compares the paths of a job's files itself. So adding a kind of file makes no job run again.
 LAYOUT = {"pdrom.core.paths", "pdrom.core.reads"}
 
 

@@ -17,9 +17,10 @@ from pdrom.pipeline.environment import settle
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.last_run import recall
 
-# The jobs are short: an integer program for each choice among them takes longer than it saves.
-# After every choice a timer of the rate limit's length causes another one; at the default length
-# they take a third of a core in the end.
+# Snakemake's default scheduler solves an integer program for each choice among the jobs; they are
+# short, so that this takes longer than it saves. After every choice it starts a timer, as long as
+# the span of its rate limit, to choose again: at the default span these choices take a third of a
+# core towards the end of a run.
 OPTIONS = ("--scheduler", "greedy", "--max-jobs-per-timespan", "1000/20s", "--rerun-incomplete")
 
 LINES = ("--logger", "pdrom")

@@ -8,8 +8,8 @@ SCHEDULER = "snakemake.scheduling.job_scheduler"
 def cancel_timers() -> None:
     """Cancel the timers of Snakemake's rate limit, which would make it choose jobs once more.
 
-    It starts one of the limit's length after every choice, and the process would wait for the last
-    of them. Timers of others go on.
+    Snakemake starts such a timer after every choice, and the process would not end before the last
+    one has run out. Timers that anything else has started go on.
     """
     for thread in threading.enumerate():
         if isinstance(thread, threading.Timer) and _module(thread) == SCHEDULER:

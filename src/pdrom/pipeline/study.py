@@ -42,7 +42,8 @@ from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
 class StudySettings(ConfigModel):
     """Content of config/default.yaml, possibly overridden by --configfile.
 
-    Sections are declared by the experiments that they set; a default stands there or here only.
+    A section is declared by the experiment whose settings it holds; a default stands there, or here
+    for keys without a section, and nowhere else.
     """
 
     scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]

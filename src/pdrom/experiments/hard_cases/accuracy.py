@@ -91,7 +91,7 @@ def bending_errors(cases: int, effect: str = "bending") -> Iterator[tuple[str, f
     for name, state in _bending_states().items():
         rng = np.random.default_rng(SEED)
         y = state(points, rng)
-        # the normals are data of the frame, not of the projection: taken from the rest shape
+        # the projection gets the normals as data: those of the rest shape in every state
         group.begin_frame(points)
         for element in rng.permutation(group.elements)[:cases]:
             row = group.S[[element]].toarray()[0]

@@ -12,7 +12,7 @@ from pdrom.experiments.hard_cases.expectations import FAILURES, HOLDS, NOTHING, 
 from pdrom.experiments.hard_cases.reductions import ReducedRun, Training, names, reduced_run
 from pdrom.reduction.method import MethodSpec
 
-# An extent beyond these multiples of the full-order run's scale.
+# Multiples of the full-order run's scale: a larger extent is a blow-up, or a distorted shape.
 BLOWUP, DISTORTED = 100.0, 3.0
 
 
@@ -32,7 +32,8 @@ def outcome_of(case: HardCase, training: Training, reduced: ReducedRun) -> str:
         return "blow-up"
     if run.extent > DISTORTED * scale_of(training):
         return "distorted"
-    # in a subspace the local step is a descent step again; an interpolation promises nothing
+    # a position subspace has to bring the objective down in every iteration, as the full order does;
+    # interpolated projections of unreduced positions promise nothing of the kind
     if reduced.k is not None and run.excess.max() > 0.0:
         return "objective rises"
     # S^T W p sums to zero whatever p is

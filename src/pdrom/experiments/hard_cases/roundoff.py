@@ -30,7 +30,10 @@ OPERATIONS = 32.0
 
 @dataclass(frozen=True)
 class Roundoff:
-    """Rounding of one step loop. ``B`` (N, K) maps its coordinates to vertices, None: they are."""
+    """Rounding of one step loop.
+
+    columns : map B (N, K) from its coordinates to vertices; None: its coordinates are the vertices
+    """
 
     scene: Scene
     loop: Stepper
@@ -77,7 +80,8 @@ class Roundoff:
         b = columns.B
         matrix = b.T @ (self.scene.masses[:, None] * b) / self.loop.time_step**2
         matrix = matrix + sum(step.matrix for step in self.loop.local_steps)
-        # coordinates have sizes of their own: the scaling of columns must not count as condition
+        # coordinates may have different sizes, which says nothing about the condition: columns are
+        # scaled to length one
         scale = np.sqrt(np.diag(matrix))
         eigenvalues = np.linalg.eigvalsh(matrix / np.outer(scale, scale))
         smallest, greatest = max(eigenvalues[0], EPS * eigenvalues[-1]), eigenvalues[-1]

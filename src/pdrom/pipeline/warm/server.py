@@ -70,7 +70,8 @@ class Server:
                 os.read(self.wake, 4096)
             self._collect()
             for number in ready:
-                # a client sends nothing after its request: it is gone, and its job goes, too
+                # a client sends nothing after its request, so that something to read means that it
+                # is gone: its job is ended, too
                 if number in clients and clients[number].process in self.jobs:
                     clients[number].kill()
             if self.listener.fileno() in ready and (script := self._accept()):
@@ -92,7 +93,7 @@ class Server:
             return None
         parts, streams = request
         process = os.fork()
-        # both sides do it: whoever comes second finds it done
+        # the server and the fork both ask for the group, so that it exists before either goes on
         os.setpgid(process, process)
         if process:
             for stream in streams:

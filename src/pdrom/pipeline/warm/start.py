@@ -48,7 +48,8 @@ def start_server(python: str = sys.executable, libraries: Sequence[str] = LIBRAR
         return
     folder = Path(tempfile.mkdtemp(prefix="pdrom-"))
     place = folder / "jobs"
-    # the server holds the other end: when this process is gone, it reads the end of the pipe
+    # the server reads one end of a pipe whose other end only this process holds: when this process
+    # is gone, the server notices
     owner, _kept_open = os.pipe()
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
         listener.bind(str(place))
