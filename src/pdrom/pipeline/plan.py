@@ -126,5 +126,5 @@ class Plan:
     # Code -----------------------------------------------------------------------------------
 
     def code(self, *modules: str) -> str:
-        """Fingerprint of the code that a stage runs; a change of it reruns the stage."""
+        """Fingerprint of the code that a job runs; a change of it reruns the job."""
         return fingerprint(*modules)

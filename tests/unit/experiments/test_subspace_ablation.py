@@ -1,4 +1,4 @@
-"""The ablation in position subspaces: its configuration, and its stage on a small scene."""
+"""The ablation in position subspaces: its configuration, and a run on a small scene."""
 
 import numpy as np
 import pandas as pd
@@ -53,7 +53,7 @@ def test_faults_of_the_file_are_named(tmp_path, text, message):
 
 @pytest.fixture(scope="module")
 def rows(tmp_path_factory) -> pd.DataFrame:
-    """Rows of the stage for a hanging sheet whose training motion has a horizon."""
+    """Rows for a hanging sheet whose training motion has a horizon."""
     folder = tmp_path_factory.mktemp("ablation")
     scene = make_scene(
         {"effect": "strain", "weight": 1e6},

@@ -32,7 +32,7 @@ def outcome_of(case: HardCase, training: Training, reduced: ReducedRun) -> str:
         return "blow-up"
     if run.extent > DISTORTED * scale_of(training):
         return "distorted"
-    # a position subspace has to bring the objective down in every iteration, as the full order does;
+    # in a position subspace the objective has to fall in every iteration, as in the full order;
     # interpolated projections of unreduced positions promise nothing of the kind
     if reduced.k is not None and run.excess.max() > 0.0:
         return "objective rises"

@@ -1,4 +1,4 @@
-"""The mesh that every later stage works on."""
+"""The mesh that everything later works on."""
 
 import os
 from dataclasses import dataclass, field
