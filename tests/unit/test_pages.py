@@ -5,8 +5,11 @@ import shlex
 from pathlib import Path
 
 import pytest
+import yaml
 
+from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.front import completed
+from pdrom.reduction.method import MethodSpec
 from places import ROOT
 
 PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "docs").rglob("*.md")])
@@ -58,3 +61,10 @@ def commands() -> list[str]:
 def test_commands_are_understood(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     assert completed(shlex.split(command))
+
+
+def test_the_readmes_scene_and_method_are_valid() -> None:
+    blocks = re.findall(r"```yaml\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
+    scene, methods = map(yaml.safe_load, blocks)
+    assert SceneConfig.model_validate(scene).groups == ["spring"]
+    assert [MethodSpec.model_validate(method).rows for method in methods.values()] == ["scalar"]
