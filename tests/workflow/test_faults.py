@@ -21,12 +21,13 @@ import pytest
 from sandbox import Sandbox, kill_all, wait_for
 
 from pdrom.core.store import seal_path
+from places import MICRO_MANUSCRIPT, MICRO_RESULTS
 
-TABLE = "results/tables/reconstruction_error.csv"
-SNAPSHOTS = "results/snapshots/spring_oop/spring.h5"
-BASIS = "results/pod/spring_oop/spring/none-affine-vectorised.h5"
-SAMPLING = "results/sampling/spring_oop/spring/block-deim"
-RUN = "results/fom/spring_oop/train.h5"
+TABLE = f"{MICRO_RESULTS}/tables/reconstruction_error.csv"
+SNAPSHOTS = f"{MICRO_RESULTS}/snapshots/spring_oop/spring.h5"
+BASIS = f"{MICRO_RESULTS}/pod/spring_oop/spring/none-affine-vectorised.h5"
+SAMPLING = f"{MICRO_RESULTS}/sampling/spring_oop/spring/block-deim"
+RUN = f"{MICRO_RESULTS}/fom/spring_oop/train.h5"
 slow = pytest.mark.slow
 
 
@@ -79,15 +80,15 @@ def test_a_killed_job_is_named_and_made_again(undisturbed: Sandbox, sandbox: San
 
 # rule -> an output of it
 RULES = {
-    "mesh": "results/meshes/*.h5",
+    "mesh": f"{MICRO_RESULTS}/meshes/*.h5",
     "fom": RUN,
     "snapshots": SNAPSHOTS,
     "pod": BASIS,
-    "reruns": "results/reruns/spring_oop/spring/block-deim_heldout.csv",
-    "reduced_reruns_table": "results/tables/reduced_reruns.csv",
-    "figure_singular_values": "results/figures/singular_values.png",
-    "paper_inputs": "results/paper/main.bbl",
-    "paper": "paper/main.pdf",
+    "reruns": f"{MICRO_RESULTS}/reruns/spring_oop/spring/block-deim_heldout.csv",
+    "reduced_reruns_table": f"{MICRO_RESULTS}/tables/reduced_reruns.csv",
+    "figure_singular_values": f"{MICRO_RESULTS}/figures/singular_values.png",
+    "paper_inputs": f"{MICRO_RESULTS}/paper/main.bbl",
+    "paper": MICRO_MANUSCRIPT,
 }
 
 
@@ -123,8 +124,8 @@ def test_a_run_that_is_killed_with_all_its_jobs(undisturbed: Sandbox, tmp_path: 
 
 def _caught_writing(sandbox: Sandbox, folder: str) -> subprocess.Popen[str]:
     """A run one of whose jobs is at a file of ``folder``, kept there for seconds by a slow disk."""
-    process = sandbox.start(TABLE, fault=f"slow:/results/{folder}/")
-    place = sandbox.path("results") / folder
+    process = sandbox.start(TABLE, fault=f"slow:/{MICRO_RESULTS}/{folder}/")
+    place = sandbox.path(MICRO_RESULTS) / folder
     wait_for(lambda: any(place in p.parents for p in sandbox.temporaries()), process)
     return process
 
@@ -263,7 +264,7 @@ def test_a_limit_on_the_size_of_files(undisturbed: Sandbox, sandbox: Sandbox) ->
 def test_results_that_are_read_only(
     undisturbed: Sandbox, sandbox: Sandbox, mount: Callable[..., None]
 ) -> None:
-    results = sandbox.path("results")
+    results = sandbox.path(MICRO_RESULTS)
     sandbox.path(TABLE).unlink()
     mount(results, "--bind", str(results))
     subprocess.run(["mount", "-o", "remount,ro,bind", results], check=True)
@@ -391,10 +392,10 @@ def test_a_damaged_result(
 @pytest.mark.parametrize(
     ("name", "missing"),
     [
-        ("results/machine.json", "results/paper/main.bbl"),
-        ("results/tables/claims.csv", "results/paper/main.bbl"),
-        ("results/paper/macros.tex", "paper/main.pdf"),
-        ("results/figures/singular_values.pdf", "paper/main.pdf"),
+        (f"{MICRO_RESULTS}/machine.json", f"{MICRO_RESULTS}/paper/main.bbl"),
+        (f"{MICRO_RESULTS}/tables/claims.csv", f"{MICRO_RESULTS}/paper/main.bbl"),
+        (f"{MICRO_RESULTS}/paper/macros.tex", MICRO_MANUSCRIPT),
+        (f"{MICRO_RESULTS}/figures/singular_values.pdf", MICRO_MANUSCRIPT),
     ],
 )
 def test_what_the_manuscript_is_made_from(
@@ -402,7 +403,7 @@ def test_what_the_manuscript_is_made_from(
 ) -> None:
     sandbox = finished_study.copy(tmp_path / "run")
     flip_a_bit(sandbox.path(name))
-    damage_and_rerun(sandbox, name, [missing], "paper/main.pdf")
+    damage_and_rerun(sandbox, name, [missing], MICRO_MANUSCRIPT)
     assert sandbox.results() == finished_study.results()
 
 
@@ -413,7 +414,7 @@ def test_what_the_manuscript_is_made_from(
 @pytest.mark.parametrize("days", [-4000, 4000])
 def test_a_clock_that_jumped(days: int, undisturbed: Sandbox, sandbox: Sandbox) -> None:
     """The files of a finished run bear the wrong date, in the order of the run."""
-    for path in sandbox.path("results").rglob("*"):
+    for path in sandbox.path(MICRO_RESULTS).rglob("*"):
         stat = path.stat()
         os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + days * 86_400 * 10**9))
     sandbox.finish(TABLE)
@@ -424,7 +425,7 @@ def test_a_clock_that_jumped(days: int, undisturbed: Sandbox, sandbox: Sandbox) 
 def test_dates_in_no_order(undisturbed: Sandbox, sandbox: Sandbox) -> None:
     """As after a copy that kept no dates, or a clock that jumped several times during a run."""
     generator = random.Random(1)
-    for path in sandbox.path("results").rglob("*"):
+    for path in sandbox.path(MICRO_RESULTS).rglob("*"):
         date = time.time() + generator.uniform(-1e6, 1e6)
         os.utime(path, (date, date))
     sandbox.finish(TABLE)

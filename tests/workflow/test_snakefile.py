@@ -13,6 +13,7 @@ from checkout import Checkout, copy_repository
 from pdrom.pipeline.running import hold
 from pdrom.pipeline.tables import all_tables
 from pdrom.report.figures.kit.catalogue import declarations
+from places import MICRO_MANUSCRIPT, MICRO_RESULTS
 
 MICRO = {
     "scenes": ["spring_oop", "strain_oop", "bar_release"],
@@ -159,34 +160,34 @@ def test_a_kernel_reruns_the_scenes_that_use_it_and_what_follows(finished: Check
     )
     planned = finished.planned(*MICRO_ARGUMENTS)
     per_scene = {p for p in planned if _stage(p) not in SHARED}
-    assert {p.split("/")[2].removesuffix(".csv") for p in per_scene} == {"spring_oop"}
+    assert {_below(p)[1].removesuffix(".csv") for p in per_scene} == {"spring_oop"}
     stages = {"fom", "snapshots", "pod", "sampling", "reruns", "sensitivity", "timings"}
     assert {_stage(p) for p in per_scene} >= stages
-    assert "paper/main.pdf" in planned
+    assert MICRO_MANUSCRIPT in planned
 
 
 def test_a_threshold_of_a_claim_reruns_verdicts_and_manuscript_only(finished: Checkout) -> None:
     finished.edit("config/claims.yaml", "threshold: 0.7", "threshold: 0.71")
     planned = finished.planned(*MICRO_ARGUMENTS)
-    assert "paper/main.pdf" in planned
+    assert MICRO_MANUSCRIPT in planned
     others = {p for p in planned if _stage(p) != "paper"}
-    assert others == {"results/tables/claims.csv"}
+    assert others == {f"{MICRO_RESULTS}/tables/claims.csv"}
 
 
 def test_a_caption_rerenders_its_figure_and_the_manuscript_only(finished: Checkout) -> None:
     source = "src/pdrom/report/figures/singular_values.py"
     finished.edit(source, 'Decay of the singular values"', 'Singular values"')
     planned = finished.planned(*MICRO_ARGUMENTS)
-    figure = {f"results/figures/singular_values.{kind}" for kind in ("pdf", "png")}
+    figure = {f"{MICRO_RESULTS}/figures/singular_values.{kind}" for kind in ("pdf", "png")}
     assert {path for path in planned if _stage(path) != "paper"} == figure
-    assert "paper/main.pdf" in planned
+    assert MICRO_MANUSCRIPT in planned
 
 
 def test_a_scene_reruns_alone(finished: Checkout) -> None:
     finished.edit("config/scenes/strain_oop.yaml", "weight: 1.0e+7", "weight: 2.0e+7")
     planned = finished.planned(*MICRO_ARGUMENTS)
     per_scene = {p for p in planned if _stage(p) not in SHARED}
-    assert {p.split("/")[2].removesuffix(".csv") for p in per_scene} == {"strain_oop"}
+    assert {_below(p)[1].removesuffix(".csv") for p in per_scene} == {"strain_oop"}
 
 
 SCENE = "config/scenes/spring_oop.yaml"
@@ -345,6 +346,12 @@ def test_a_faulty_configuration_ends_with_one_line_before_any_job(
     assert [part for part in expected if part not in line] == [], line
 
 
+def _below(path: str) -> list[str]:
+    """Parts of a path below the results of its study."""
+    inside = f"{MICRO_RESULTS}/" if path.startswith(MICRO_RESULTS) else "results/"
+    return path.removeprefix(inside).split("/")
+
+
 def _stage(path: str) -> str:
-    """Folder below results, "paper" for the manuscript."""
-    return path.removeprefix("results/").split("/")[0]
+    """Folder below the results, "paper" for the manuscript."""
+    return _below(path)[0]

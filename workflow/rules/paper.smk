@@ -25,13 +25,13 @@ rule paper:
         inputs=rules.paper_inputs.output,
         figures=PLAN.figures,
     output:
-        report("paper/main.pdf", category="Manuscript"),
+        report(FOLDERS.manuscript, category="Manuscript"),
     log:
         f"{PLAN.results}/logs/paper/main.log",
     params:
         content=PLAN.digest("paper/main.tex"),
         code=PLAN.code("pdrom.report.paper.build"),
     message:
-        "Manuscript paper/main.pdf"
+        f"Manuscript {FOLDERS.manuscript}"
     script:
         "../scripts/paper.py"

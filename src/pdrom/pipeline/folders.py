@@ -1,9 +1,11 @@
 """Where the results of a configuration lie: each one has a folder of its own."""
 
 import re
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.paths import RESULTS
@@ -51,6 +53,15 @@ def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folde
         )
     results = f"{RESULTS}/studies/{name}"
     return Folders(results, f"{results}/paper/main.pdf")
+
+
+def folders_of(workflow: Any) -> Folders:
+    """`folders` of Snakemake's workflow; a faulty name ends the process with one line."""
+    settings = [f"{key}={value}" for key, value in workflow.config_settings.config.items()]
+    try:
+        return folders(workflow.overwrite_configfiles, settings)
+    except ConfigurationError as error:
+        sys.exit(f"pdrom: {error}")
 
 
 def _name(files: list[str], settings: list[str]) -> str:

@@ -14,7 +14,7 @@ from pdrom.core.logs import INTERRUPTED
 from pdrom.pipeline.commandline import CommandLine
 from pdrom.pipeline.configfiles import check_files
 from pdrom.pipeline.environment import settle
-from pdrom.pipeline.folders import Folders
+from pdrom.pipeline.folders import Folders, folders
 from pdrom.pipeline.last_run import recall
 
 # Snakemake's default scheduler solves an integer program for each choice among the jobs; they are
@@ -39,7 +39,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
         _say(f"a report of the last run, {' '.join(recall())}")
         command = CommandLine.parse(command.rewritten(recall(), {t: [t] for t in command.targets}))
     check_files(command.configfiles)
-    own = Folders()
+    own = folders(command.configfiles, command.settings)
     made = files_of(command.targets, own) if command.targets else {}
     for target, files in made.items():
         if files != [target]:

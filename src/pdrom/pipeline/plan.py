@@ -9,6 +9,7 @@ from typing import Any
 
 from pdrom.core.errors import PdromError
 from pdrom.core.logs import planning_log
+from pdrom.core.paths import RESULTS
 from pdrom.experiments.hard_cases.expectations import load_expectations
 from pdrom.pipeline.figures import FigureJob, figure_jobs
 from pdrom.pipeline.fingerprint import fingerprint
@@ -20,8 +21,6 @@ from pdrom.pipeline.study import Study, StudySettings
 from pdrom.pipeline.tables import Tables
 from pdrom.reduction.method import MethodSpec
 from pdrom.report.claims import load_claims
-
-RESULTS = "results"
 
 
 def load_plan(

@@ -44,6 +44,7 @@ class StudySettings(ConfigModel):
 
     A section is declared by the experiment whose settings it holds; a default stands there, or here
     for keys without a section, and nowhere else.
+    ``study`` names the folder of the results, see `pdrom.pipeline.folders`.
     """
 
     scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
@@ -66,6 +67,7 @@ class StudySettings(ConfigModel):
     guard: GuardSection = GuardSection()
     hard_cases: HardCases = HardCases()
     online: Online = Online()
+    study: str | None = None
 
     @model_validator(mode="after")
     def _given_once(self) -> Self:

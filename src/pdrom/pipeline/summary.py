@@ -9,8 +9,7 @@ from pathlib import Path
 import psutil
 
 from pdrom.core import paths
-from pdrom.core.errors import PdromError
-from pdrom.core.store import read_table
+from pdrom.core.store import Condition, check_file, read_table
 from pdrom.pipeline.commandline import CommandLine
 from pdrom.pipeline.folders import Folders
 
@@ -70,9 +69,9 @@ def _configuration(command: CommandLine) -> str:
 def _verdicts(folders: Folders) -> list[str]:
     """All verdicts in one line; none where the table cannot be read."""
     path = paths.TABLE.at(folders.results, name="claims")
-    try:
-        table = read_table(path, ["claim", "verdict"])
-    except PdromError:
+    # only looked at: a job sets a damaged one aside
+    if not Path(path).is_file() or check_file(path) is not Condition.INTACT:
         return []
+    table = read_table(path, ["claim", "verdict"])
     verdicts = [f"{row.claim} {row.verdict}" for row in table.itertuples()]
     return [f"verdicts: {', '.join(verdicts)}"]
