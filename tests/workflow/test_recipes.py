@@ -55,7 +55,8 @@ GROUP_TESTS = ("tests/physics", "tests/unit/model/constraints", "tests/unit/mode
 def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
     """A copy with everything that the recipes add, and a study that uses it."""
     made = copy_repository(tmp_path_factory.mktemp("recipes"))
-    shutil.copytree(ROOT / "tests", made.folder / "tests", ignore=shutil.ignore_patterns("__pycache__"))
+    compiled = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(ROOT / "tests", made.folder / "tests", ignore=compiled)
     shutil.copy(ROOT / "pyproject.toml", made.folder)
     for title in MOST:
         for block in recipe(title):
