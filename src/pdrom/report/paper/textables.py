@@ -1,37 +1,17 @@
 """Tables of the manuscript as TeX, generated from the tables of the study."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
 
-from pdrom.experiments.hard_cases.catalogue import CASES
-from pdrom.experiments.hard_cases.expectations import FAILURES
+from pdrom.report.paper.hard_tables import hard_cases, hard_reductions, kernel_accuracy
 from pdrom.report.paper.macros import format_number
+from pdrom.report.paper.tabular import longtable, name, tabular
 from pdrom.report.words.text import escape
 
 Tables = Mapping[str, pd.DataFrame]
 _VERDICT_COLOUR = {"holds": "okgreen", "does not hold": "okred"}
-
-
-def tabular(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
-    """A tabular with a ruled head; cells are TeX already."""
-    lines = [rf"\begin{{tabular}}{{{columns}}}", r"\hline", " & ".join(header) + r" \\", r"\hline"]
-    lines += [" & ".join(row) + r" \\" for row in rows]
-    return "\n".join([*lines, r"\hline", r"\end{tabular}"]) + "\n"
-
-
-def longtable(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
-    """A table that may break across pages."""
-    head = " & ".join(header) + r" \\"
-    lines = [rf"\begin{{longtable}}{{{columns}}}", r"\hline", head, r"\hline", r"\endhead"]
-    lines += [" & ".join(row) + r" \\" for row in rows]
-    return "\n".join([*lines, r"\hline", r"\end{longtable}"]) + "\n"
-
-
-def name(text: str) -> str:
-    """A scene, group or method name, in typewriter."""
-    return rf"\texttt{{{escape(text)}}}"
 
 
 def claims(tables: Tables) -> str:
@@ -190,71 +170,6 @@ def guard(tables: Tables) -> str:
     header = ["scene", "method", "guard", "error", "energy", "first frame, reason", "fallen back",
               "ms per frame"]  # fmt: skip
     return tabular(header, rows, "lllrrlrr")
-
-
-def hard_cases(tables: Tables) -> str:
-    """Hard cases in which some reduction fails: what makes them hard, and how each one fails."""
-    table = tables["hard_cases"]
-    failed = table[table.outcome.isin(FAILURES)]
-    reductions = list(dict.fromkeys(failed.method))
-    rows = []
-    for case, part in failed.groupby("case", sort=False):
-        by = {row.method: row for row in part.itertuples()}
-        cells = [_failure(by[m]) if m in by else "--" for m in reductions]
-        rows.append([name(case), escape(CASES[case].why), *cells])
-    header = ["case", "why it is hard", *map(name, reductions)]
-    left = r">{\raggedright\arraybackslash}"
-    return longtable(header, rows, rf"l{left}p{{5.2cm}}" + f"{left}p{{2.6cm}}" * len(reductions))
-
-
-def _failure(row: Any) -> str:
-    """How a reduction failed, with what tells it apart from others."""
-    if row.outcome == "singular":
-        return "singular"
-    if row.outcome == "blow-up":
-        text = f"blow-up, {int(row.blowup_frame)}"
-    elif row.outcome == "distorted":
-        text = rf"{format_number(row.max_extent)}\,$\times$ the extent"
-    else:
-        text = escape(row.outcome)
-    return text if pd.isna(row.gain) else rf"{text}; gain {format_number(row.gain)}"
-
-
-def hard_reductions(tables: Tables) -> str:
-    """Every reduction over the hard cases: how many it passes, how it fails, and why."""
-    rows = []
-    for method, part in tables["hard_cases"].groupby("method", sort=False):
-        count = part.outcome.value_counts()
-        failed = part[part.outcome.isin(FAILURES)]
-        why = failed.why.dropna()
-        cells = [count.get(o, 0) for o in ("holds", "nothing to reduce", "singular", "blow-up")]
-        other = len(part) - sum(cells)
-        shown = escape(why.iloc[0]) if len(why) else "--"
-        rows.append([name(method), *(str(c) for c in (*cells, other)), shown])
-    header = ["reduction", "holds", "nothing", "singular", "blow-up", "distorted", "why it fails"]
-    left = r">{\raggedright\arraybackslash}"
-    return tabular(header, rows, rf"lrrrrr{left}p{{6cm}}")
-
-
-def kernel_accuracy(tables: Tables) -> str:
-    """Worst error of each group's projections over its condition number, by class of matrix."""
-    table = tables["kernel_accuracy"]
-    rows = []
-    for group, part in table.groupby("group", sort=False):
-        worst = part.loc[part.worst_over_condition.idxmax()]
-        far = part.loc[part.worst_relative_error.idxmax()]
-        rows.append(
-            [
-                escape(group.replace("_", " ")), str(len(part)), str(int(part.cases.sum())),
-                format_number(worst.worst_over_condition), escape(worst.matrix_class),
-                format_number(far.worst_relative_error), escape(far.matrix_class),
-                format_number(far.condition),
-            ]
-        )  # fmt: skip
-    header = [
-        "group", "classes", "cases", "error/cond.", "in class", "error", "in class", "cond.",
-    ]  # fmt: skip
-    return tabular(header, rows, "lrrrlrlr")
 
 
 TEX_TABLES = {

@@ -1,0 +1,149 @@
+"""What claims are decided by: a number for each chosen row of a table."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from pdrom.core.errors import ConfigurationError
+from pdrom.tables.break_even import CURVE
+
+Tables = Mapping[str, pd.DataFrame]
+Value = str | int | float
+_PLACE = ("scene", "group", "method", "position_basis")
+
+
+def filtered(table: pd.DataFrame, where: Mapping[str, tuple[Value, ...]]) -> pd.DataFrame:
+    for column, allowed in where.items():
+        if column not in table.columns:
+            raise ConfigurationError(
+                f"claims: no column '{column}' (allowed: {', '.join(table.columns)})"
+            )
+        table = table[table[column].isin(allowed)]
+    return table
+
+
+def _full_rank_only(table: pd.DataFrame, where: dict) -> tuple[pd.DataFrame, dict]:
+    """Handles ``r: [full]``: the largest size tried for each scene, group and method.
+
+    A run that blew up before its first frame was tried, too: leaving it out would put a smaller
+    size, which survived, in the place of full rank.
+    """
+    if "r" not in where or "full" not in where["r"]:
+        return table, where
+    ran = _tried(table)
+    largest = ran.groupby(["scene", "group", "method"]).r.transform("max")
+    return ran[ran.r == largest], {k: v for k, v in where.items() if k != "r"}
+
+
+def _reruns(tables: Tables, where: dict) -> pd.DataFrame:
+    """Reruns; only those whose positions are not reduced, unless ``where`` says otherwise.
+
+    A method may have the same name with full and with reduced positions.
+    """
+    table = tables["reduced_reruns"]
+    return table if "position_basis" in where else table[table.position_basis == "full"]
+
+
+def _tried(rows: pd.DataFrame) -> pd.DataFrame:
+    """Reruns that started: not the marked ones, whose size exceeds the numerical rank."""
+    return rows[(rows.frames > 0) | rows.blowup_frame.notna()]
+
+
+def _local_share(tables: Tables, where: dict) -> pd.Series:
+    return filtered(tables["local_share"], where).local_share
+
+
+def _rerun_error(tables: Tables, where: dict) -> pd.Series:
+    """Error within the horizon; a run that blew up before its horizon counts as infinite."""
+    table, where = _full_rank_only(_reruns(tables, where), where)
+    return _tried(filtered(table, where)).relative_error_within_horizon.fillna(np.inf)
+
+
+def _error_trend(tables: Tables, where: dict) -> pd.Series:
+    """Spearman's rank correlation of error and size, per scene, group and method.
+
+    1 where the error rises with every size, -1 where it falls; blow-ups share the highest rank.
+    Fewer than three sizes have no trend; errors that are all equal have the trend 0.
+    """
+    rows = _tried(filtered(_reruns(tables, where), where))
+    trends = []
+    for _, run in rows.groupby(["scene", "group", "method"], sort=False):
+        error = run.relative_error_within_horizon.fillna(np.inf)
+        if len(run) >= 3:
+            trend = 0.0 if error.nunique() == 1 else error.rank().corr(run.r.rank())
+            trends.append(trend)
+    return pd.Series(trends, dtype=float)
+
+
+def _decay(tables: Tables, where: dict) -> pd.Series:
+    rows = filtered(tables["singular_values"], where)
+    real = rows.groupby(["scene", "group"]).above_roundoff.transform("any")
+    return rows[real].relative
+
+
+def _reconstruction(tables: Tables, where: dict) -> pd.Series:
+    """Reconstruction error; a singular interpolation counts as infinite."""
+    rows = filtered(tables["reconstruction_error"], where)
+    return rows[rows.gain.notna()].relative_error.fillna(np.inf)
+
+
+def _elements_per_entry(tables: Tables, where: dict) -> pd.Series:
+    rows = filtered(tables["reconstruction_error"], where)
+    rows = rows[rows.elements_sampled.notna()]
+    return rows.elements_sampled.astype(float) / rows.r
+
+
+def _local_ratio(tables: Tables, where: dict) -> pd.Series:
+    """Time of the reduced local step over that of the full compiled one, at the largest size.
+
+    One value per scene, group, method, mesh and number of threads: whether the dense solve costs
+    more from some size on shows at the largest size that the basis has.
+    """
+    rows = filtered(tables["breakeven"], where).dropna(subset=["ratio"]).sort_values("r")
+    largest = rows.groupby(CURVE, sort=False).tail(1)
+    return largest.sort_index().ratio
+
+
+def _position_basis_ratio(tables: Tables, where: dict) -> pd.Series:
+    """Error of the snapshot basis over that of the skinning basis at equal k, per scene."""
+    rows = filtered(tables["reduced_reruns"], where)
+    keys = ["scene", "k"]
+    errors = {
+        kind: rows[rows.position_basis == kind].set_index(keys).relative_error_within_horizon
+        for kind in ("pod", "skinning")
+    }
+    return (errors["pod"] / errors["skinning"]).dropna()
+
+
+@dataclass(frozen=True)
+class Metric:
+    """What a test compares: values from some columns of one table."""
+
+    values: Callable[[Tables, dict], pd.Series]
+    table: str
+    columns: tuple[str, ...]
+
+
+_RERUN = ("frames", "blowup_frame", "relative_error_within_horizon")
+METRICS = {
+    "local_share": Metric(_local_share, "local_share", ("local_share",)),
+    "rerun_error": Metric(_rerun_error, "reduced_reruns", (*_RERUN, *_PLACE, "r")),
+    "error_trend": Metric(_error_trend, "reduced_reruns", (*_RERUN, *_PLACE, "r")),
+    "singular_value_decay": Metric(
+        _decay, "singular_values", ("scene", "group", "above_roundoff", "relative")
+    ),
+    "reconstruction_error": Metric(
+        _reconstruction, "reconstruction_error", ("gain", "relative_error")
+    ),
+    "elements_per_entry": Metric(
+        _elements_per_entry, "reconstruction_error", ("elements_sampled", "r")
+    ),
+    "local_time_ratio": Metric(_local_ratio, "breakeven", (*CURVE, "r", "ratio")),
+    "position_basis_ratio": Metric(
+        _position_basis_ratio,
+        "reduced_reruns",
+        ("scene", "k", "position_basis", "relative_error_within_horizon"),
+    ),
+}

@@ -1,0 +1,25 @@
+"""Rows of text as tables of TeX."""
+
+from collections.abc import Sequence
+
+from pdrom.report.words.text import escape
+
+
+def tabular(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
+    """A tabular with a ruled head; cells are TeX already."""
+    lines = [rf"\begin{{tabular}}{{{columns}}}", r"\hline", " & ".join(header) + r" \\", r"\hline"]
+    lines += [" & ".join(row) + r" \\" for row in rows]
+    return "\n".join([*lines, r"\hline", r"\end{tabular}"]) + "\n"
+
+
+def longtable(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
+    """A table that may break across pages."""
+    head = " & ".join(header) + r" \\"
+    lines = [rf"\begin{{longtable}}{{{columns}}}", r"\hline", head, r"\hline", r"\endhead"]
+    lines += [" & ".join(row) + r" \\" for row in rows]
+    return "\n".join([*lines, r"\hline", r"\end{longtable}"]) + "\n"
+
+
+def name(text: str) -> str:
+    """A scene, group or method name, in typewriter."""
+    return rf"\texttt{{{escape(text)}}}"
