@@ -1,5 +1,6 @@
 """Shared builders of small scenes."""
 
+import signal
 from collections.abc import Callable
 
 import numpy as np
@@ -12,6 +13,11 @@ from places import ROOT
 # The same examples in every run: a failure can be repeated, and no run depends on the clock.
 settings.register_profile("pdrom", derandomize=True, deadline=None)
 settings.load_profile("pdrom")
+
+
+def pytest_configure() -> None:
+    """A shell that runs the tests in the background may have them ignore interrupts."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 GROUPS = {

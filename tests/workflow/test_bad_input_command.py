@@ -58,7 +58,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
     [
         ("ranks=six", ("config/default.yaml", "ranks = 'six'", "valid list")),
         ("coarsen={resolution: many}", ("coarsen.resolution = 'many'", "valid number")),
-        ("scenes=[../../etc/passwd]", ("scenes.0 = '../../etc/passwd'", "pattern")),
+        ("scenes=[../../etc/passwd]", ("scenes.0 = '../../etc/passwd'", "a small letter")),
         ("rnaks=[3]", ("unknown key 'rnaks'", "did you mean 'ranks'?")),
     ],
 )
