@@ -327,7 +327,14 @@ FAULTS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+# The corpus of bad input has the same faults without Snakemake; some are tried with it in every run.
+QUICK = ("unknown scene", "wrong type", "missing mesh file")
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in FAULTS],
+)
 def test_a_faulty_configuration_ends_with_one_line_before_any_job(
     fault: str, clean: Checkout
 ) -> None:

@@ -20,7 +20,6 @@ for name, job in PLAN.figure_jobs.items():
         params:
             order=job.order.model_dump(mode="json"),
             rst=job.rst,
-            results=PLAN.results,
             code=job.code,
         message:
             f"Figure {name}"

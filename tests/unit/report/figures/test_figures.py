@@ -94,6 +94,7 @@ for name, options in load_choices(config).items():
 """  # noqa: E501
 
 
+@pytest.mark.slow
 def test_bytes_are_equal_in_another_process(study, tmp_path):
     """Another hash seed and other settings of the user must not change a byte."""
     environment = {
