@@ -327,7 +327,7 @@ FAULTS = {
 }  # fmt: skip
 
 
-# The corpus of bad input has the same faults without Snakemake; some are tried with it in every run.
+# The corpus of bad input has these faults without Snakemake; some are tried with it in every run.
 QUICK = ("unknown scene", "wrong type", "missing mesh file")
 
 
