@@ -122,9 +122,9 @@ def test_a_run_that_is_killed_with_all_its_jobs(undisturbed: Sandbox, tmp_path: 
     assert no_leftovers(sandbox)
 
 
-def _caught_writing(sandbox: Sandbox, folder: str) -> subprocess.Popen[str]:
-    """A run one of whose jobs is at a file of ``folder``, kept there for seconds by a slow disk."""
-    process = sandbox.start(TABLE, fault=f"slow:/{MICRO_RESULTS}/{folder}/")
+def _caught_writing(sandbox: Sandbox, folder: str, kind: str = "slow") -> subprocess.Popen[str]:
+    """A run one of whose jobs is at a file of ``folder``, kept there as ``kind`` says."""
+    process = sandbox.start(TABLE, fault=f"{kind}:/{MICRO_RESULTS}/{folder}/")
     place = sandbox.path(MICRO_RESULTS) / folder
     wait_for(lambda: any(place in p.parents for p in sandbox.temporaries()), process)
     return process
@@ -160,13 +160,14 @@ def test_an_interrupted_run_goes_on(undisturbed: Sandbox, tmp_path: Path) -> Non
 def test_the_second_run_at_once_says_so_and_ends(undisturbed: Sandbox, tmp_path: Path) -> None:
     """Whether by ``./reproduce`` or by ``snakemake``; what only looks works meanwhile."""
     sandbox = Sandbox.make(tmp_path / "run")
-    first = _caught_writing(sandbox, "fom")
+    first = _caught_writing(sandbox, "fom", "hold")
     for second in (sandbox.run(TABLE), sandbox.snakemake(TABLE), sandbox.snakemake("--unlock")):
         assert second[0] != 0
         line = second[1].splitlines()[-1]
         assert line.startswith(f"pdrom: another run (process {first.pid} on ")
     status, output = sandbox.snakemake("-n", TABLE)
     assert status == 0, output
+    sandbox.path("release").touch()
     said, _ = first.communicate(timeout=300)
     assert first.returncode == 0, said
     assert sandbox.results() == undisturbed.results()
@@ -264,7 +265,7 @@ def test_a_limit_on_the_size_of_files(undisturbed: Sandbox, sandbox: Sandbox) ->
 def test_results_that_are_read_only(
     undisturbed: Sandbox, sandbox: Sandbox, mount: Callable[..., None]
 ) -> None:
-    results = sandbox.path(MICRO_RESULTS)
+    results = sandbox.path("results")
     sandbox.path(TABLE).unlink()
     mount(results, "--bind", str(results))
     subprocess.run(["mount", "-o", "remount,ro,bind", results], check=True)
@@ -403,7 +404,7 @@ def test_what_the_manuscript_is_made_from(
 ) -> None:
     sandbox = finished_study.copy(tmp_path / "run")
     flip_a_bit(sandbox.path(name))
-    damage_and_rerun(sandbox, name, [missing], MICRO_MANUSCRIPT)
+    damage_and_rerun(sandbox, name, sorted({missing, MICRO_MANUSCRIPT}), MICRO_MANUSCRIPT)
     assert sandbox.results() == finished_study.results()
 
 

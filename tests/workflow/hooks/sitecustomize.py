@@ -2,8 +2,8 @@
 
 Python imports this module at its start. ``PDROM_FAULT`` is ``kind:pattern``: when a result is
 complete whose temporary file (not its seal) matches the pattern, but has not got its name yet, the
-process is killed ("kill"), told that the disk is full ("full") or kept waiting by a slow disk
-("slow").
+process is killed ("kill"), told that the disk is full ("full"), kept waiting by a slow disk
+("slow") or held until there is a file `release` in its folder ("hold").
 """
 
 import errno
@@ -24,7 +24,11 @@ def _faulty_fsync(descriptor):
             os.kill(os.getpid(), signal.SIGKILL)
         if _kind == "full":
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        time.sleep(3)
+        if _kind == "hold":
+            while not os.path.exists("release"):
+                time.sleep(0.05)
+        else:
+            time.sleep(3)
     _fsync(descriptor)
 
 
