@@ -1,13 +1,15 @@
 """``./reproduce ARGS...``: Snakemake with this project's options, names and words.
 
 ``python -m pdrom.pipeline.front`` does what the console command ``snakemake`` does, after the
-arguments were completed and the configuration files were checked. ``test`` as the first argument
-hands the others to pytest.
+arguments were completed and the configuration files were checked. ``scene`` as the first argument
+names what is made of one scene, ``test`` hands the others to pytest, and ``run`` starts a program
+of the environment.
 """
 
 import os
 import sys
 from collections.abc import Sequence
+from typing import NoReturn
 
 from pdrom.core.errors import PdromError
 from pdrom.core.logs import INTERRUPTED
@@ -32,8 +34,14 @@ def completed(arguments: Sequence[str]) -> list[str]:
     Raises
     ------
     ConfigurationError
-        A configuration file is missing or no mapping; a target was taken for an option's value.
+        A configuration file is missing or no mapping; a target was taken for an option's value;
+        there is no such scene.
     """
+    if arguments[:1] == ["scene"]:
+        # late: it loads the whole package
+        from pdrom.pipeline.scene_command import scene_arguments
+
+        arguments = scene_arguments(arguments[1:])
     command = CommandLine.parse(arguments)
     if command.report and not command.configfiles and not command.settings and recall():
         _say(f"a report of the last run, {' '.join(recall())}")
@@ -64,11 +72,25 @@ def _say(line: str) -> None:
     sys.stderr.write(f"reproduce: {line}\n")
 
 
+def _start(command: Sequence[str]) -> NoReturn:
+    """Become a program of the environment, found as the shell finds it."""
+    if not command:
+        sys.exit(
+            "pdrom: run: the name of a program is missing, as in: ./reproduce run pdrom --help"
+        )
+    try:
+        os.execvp(command[0], list(command))
+    except OSError as error:
+        sys.exit(f"pdrom: run: {command[0]}: {error.strerror}")
+
+
 def main() -> None:
     """Run Snakemake or the tests; end the process with their status."""
     settle()
     if sys.argv[1:2] == ["test"]:
         os.execv(sys.executable, [sys.executable, "-m", "pytest", *sys.argv[2:]])
+    if sys.argv[1:2] == ["run"]:
+        _start(sys.argv[2:])
     from snakemake.cli import main as snakemake
 
     try:

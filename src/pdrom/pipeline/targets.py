@@ -1,5 +1,6 @@
 """Targets on the command line: figures, tables and files, with help for misspelt ones."""
 
+import re
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -13,7 +14,9 @@ from pdrom.pipeline.holdings import HELD, paths_of
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.scenes import read_scene, scene_names
 from pdrom.pipeline.tables import all_tables
+from pdrom.report.scenes.catalogue import default_files
 
+SCENE = re.compile(rf"{RESULTS}/scenes/([a-z][a-z0-9_]*)/?")
 PLACES = [place for place in vars(paths).values() if isinstance(place, Place)]
 
 
@@ -41,8 +44,12 @@ class Names:
     def files(self, target: str, folders: Folders) -> list[str]:
         """What is to be made for a target; itself unless it is a name.
 
-        A file below ``results`` is the study's own, wherever that has its results.
+        A file below ``results`` is the study's own, wherever that has its results; the folder of a
+        scene stands for what is made of it by default.
         """
+        of_scene = SCENE.fullmatch(target)
+        if of_scene:
+            return default_files(folders.results, of_scene[1])
         found = [paths.FIGURE.at(folders.results, name=target)] if target in self.figures else []
         if target in self.tables:
             found.append(paths.TABLE.at(folders.results, name=target))
@@ -104,7 +111,8 @@ class Known:
         scenes = self.labels["scene"]({})
         if target in scenes:
             example = paths.FULL_ORDER.at(self.results, scene=target, run="train")
-            return f"target '{target}': a scene; name one of its files, as {example}"
+            command = f"./reproduce scene {target}"
+            return f"target '{target}': a scene; name one of its files, as {example}, or: {command}"
         allowed = self.files if "/" in target else [*names, *scenes]
         return (
             f"target '{target}': nothing makes it{_suggestion(target, allowed)}; targets are names "

@@ -83,13 +83,13 @@ def run_panel(
     return RunPanel(title, colour, positions, failure, remark)
 
 
-def draw_rows(rows: list[Row], camera: Camera) -> Figure:
-    """The figure of these rows, one below the other, no higher than a page."""
+def draw_rows(rows: list[Row], camera: Camera, height_limit: float = HEIGHT_LIMIT) -> Figure:
+    """The figure of these rows, one below the other, no higher (inches) than a page."""
     columns = max(len(row.panels) for row in rows)
     width = (style.WIDTH - LEFT) / columns
     texts = sum(ABOVE + BELOW + LINE * row.lines for row in rows)
     pictures = sum(0.96 * width * row.aspect for row in rows)
-    shrink = min(1.0, (HEIGHT_LIMIT - texts) / pictures)
+    shrink = min(1.0, (height_limit - texts) / pictures)
     heights = [
         shrink * 0.96 * width * row.aspect + ABOVE + BELOW + LINE * row.lines for row in rows
     ]

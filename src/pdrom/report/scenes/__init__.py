@@ -1,0 +1,1 @@
+"""What is made of a single scene, in the study or outside it, beside the study's own artifacts."""

@@ -1,0 +1,77 @@
+"""Which artifacts there are of a single scene; read at every plan, so nothing is drawn here."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pdrom.core.paths import (
+    MESH,
+    RECONSTRUCTION,
+    RERUNS,
+    RERUNS_TRAIN,
+    SCENE_PICTURE,
+    SCENE_PICTURE_PNG,
+    SCENE_RUNS,
+    SENSITIVITY,
+    TRAIN,
+    Place,
+)
+
+
+@dataclass(frozen=True)
+class SceneArtifact:
+    """An artifact of one scene. A module of this package with its name makes it.
+
+    title : what it shows
+    outputs : files written, which the scene's name labels
+    reads : kinds of files of the scene, one for each of its groups and methods where they say so
+    by_default : made by ``./reproduce scene NAME``; the others are asked for by name
+    """
+
+    title: str
+    outputs: Mapping[str, Place]
+    reads: tuple[Place, ...]
+    by_default: bool = True
+
+    def files(self, results: str, scene: str) -> list[str]:
+        """Paths of what is written for a scene below the folder ``results``."""
+        return [place.at(results, scene=scene) for place in self.outputs.values()]
+
+
+def _picture(name: str) -> dict[str, Place]:
+    return {
+        "pdf": SCENE_PICTURE.where(name=name),
+        "png": SCENE_PICTURE_PNG.where(name=name),
+    }
+
+
+ARTIFACTS: dict[str, SceneArtifact] = {
+    "frames": SceneArtifact(
+        "Frames of the full-order run and of reduced ones",
+        _picture("frames"),
+        (MESH, TRAIN, SENSITIVITY, RERUNS),
+    ),
+    "error_against_r": SceneArtifact(
+        "Errors against the basis size",
+        _picture("error_against_r"),
+        (SENSITIVITY, RECONSTRUCTION, RERUNS, RERUNS_TRAIN),
+    ),
+    "error_against_time": SceneArtifact(
+        "Errors against time", _picture("error_against_time"), (SENSITIVITY, RERUNS)
+    ),
+    "runs": SceneArtifact(
+        "Table of the reduced runs",
+        {"table": SCENE_RUNS},
+        (SENSITIVITY, RECONSTRUCTION, RERUNS, RERUNS_TRAIN),
+    ),
+}
+
+
+def module(name: str) -> str:
+    """The module that makes an artifact."""
+    return f"{__package__}.{name}"
+
+
+def default_files(results: str, scene: str) -> list[str]:
+    """What ``./reproduce scene NAME`` makes."""
+    made = [a for a in ARTIFACTS.values() if a.by_default]
+    return [file for artifact in made for file in artifact.files(results, scene)]

@@ -1,0 +1,65 @@
+"""The results of one scene, as drawings read them."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import pandas as pd
+
+from pdrom.core.errors import StorageError
+from pdrom.core.paths import RECONSTRUCTION, RERUNS, RERUNS_TRAIN, SENSITIVITY, File, Place
+from pdrom.core.store import read_table
+from pdrom.report.figures.kit.holdings import Holdings
+from pdrom.report.figures.kit.results import Results
+from pdrom.tables.reconstruction_error import reconstruction_error
+from pdrom.tables.reruns import COLUMNS, TRAIN, judged_reruns
+
+
+class SceneResults(Results):
+    """Results of ``scene``; what drawings call tables of the study are made of its own files."""
+
+    def __init__(
+        self, scene: str, folder: str, holdings: Holdings, settings: Mapping[str, float]
+    ) -> None:
+        super().__init__(folder, holdings, settings)
+        self.scene = scene
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Groups that are reduced."""
+        return self.holdings.scenes[self.scene].groups
+
+    @property
+    def reductions(self) -> list[tuple[str, str]]:
+        """(group, method) pairs that were run."""
+        return [(group, method) for group in self.groups for method in self.holdings.methods]
+
+    def table(self, name: str, columns: Sequence[str] = ()) -> pd.DataFrame:
+        """Rows of the scene as the study's table has them; StorageError for another table."""
+        if name == "sensitivity":
+            return read_table(self.path(SENSITIVITY, self.scene), columns)
+        if name == "reconstruction_error":
+            return reconstruction_error(self._files(RECONSTRUCTION))
+        raise StorageError(f"scene {self.scene}: the table {name} is made of whole studies only")
+
+    def runs(self) -> pd.DataFrame:
+        """Reduced runs of the training motion with what was sampled, a row per group, method, r."""
+        names = [column.name for column in COLUMNS]
+        if not self.reductions:
+            return pd.DataFrame(columns=[*names, *_SAMPLED])
+        runs = judged_reruns(
+            self._files(RERUNS), self._files(RERUNS_TRAIN), [], [], self.table("sensitivity"),
+            self.settings["sensitivity.reference"], self.settings["sensitivity.threshold"], TRAIN,
+        )  # fmt: skip
+        errors = self.table("reconstruction_error")
+        sampled = errors[errors.split == "train"]
+        keys = ["scene", "group", "method", "r"]
+        return runs[names].merge(sampled[[*keys, *_SAMPLED]], on=keys, how="left")
+
+    def _files(self, place: Place) -> list[File]:
+        return place.files(self._paths(place))
+
+    def _paths(self, place: Place) -> Iterable[str]:
+        for group, method in self.reductions:
+            yield self.path(place, self.scene, group, method)
+
+
+_SAMPLED = ["gain", "rows_sampled", "elements_sampled"]

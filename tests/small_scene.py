@@ -1,0 +1,73 @@
+"""A small project whose scene lies outside the study, with all results that its artifacts read."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+from bad_input.project import SMALL_SCENE, make_project
+from pdrom.core.yamlfile import read_yaml
+from pdrom.experiments.declaration import Experiment
+from pdrom.pipeline.jobs import Jobs
+from pdrom.pipeline.scene_artifacts import SceneArtifacts
+from pdrom.pipeline.study import Study
+from pdrom.report.scenes.job import SceneOrder
+
+SCENE = "own"
+NEEDED = ("mesh", "fom", "sensitivity", "snapshots", "pod", "reruns")
+CHANGES = {"ranks": [2, "full"], "sensitivity": {"perturbations": [1e-10], "seeds": [1]}}
+
+
+def small_study(root: Path) -> Study:
+    """Study of the small project, with a scene beside those that it lists."""
+    make_project(root, {})
+    own = SMALL_SCENE.replace("name: small", f"name: {SCENE}")
+    (root / "config" / "scenes" / f"{SCENE}.yaml").write_text(own, encoding="utf-8")
+    config = read_yaml(root / "config" / "default.yaml")
+    return Study.load({**config, **CHANGES}, root)
+
+
+def run_jobs(study: Study, results: str) -> None:
+    """Every job that the scene's artifacts need, in this process, as the workflow runs them."""
+    jobs = Jobs(study, results)
+    known = {experiment.name: experiment for experiment in jobs.experiments}
+    for name in NEEDED:
+        for labels in _labels(study, name):
+            _run(jobs, known[name], labels)
+
+
+def order(study: Study, results: str, artifact: str) -> SceneOrder:
+    """What the job of an artifact is told."""
+    params = SceneArtifacts(study, results).params(artifact)
+    return SceneOrder.model_validate(params["order"](SimpleNamespace(scene=SCENE)))
+
+
+def _labels(study: Study, name: str) -> Iterator[dict[str, str]]:
+    only = study.only(SCENE)
+    match name:
+        case "mesh":
+            yield {"mesh": study.mesh_of(SCENE)}
+        case "fom":
+            yield from ({"scene": SCENE, "run": run} for run in ("train", "heldout"))
+        case "sensitivity":
+            yield {"scene": SCENE}
+        case "snapshots":
+            yield from ({"scene": s, "group": g} for s, g in only.experiments)
+        case "pod":
+            bases = {method.basis_id for method in study.methods.values()}
+            found = [(s, g, b) for s, g in only.experiments for b in sorted(bases)]
+            yield from ({"scene": s, "group": g, "basis": b} for s, g, b in found)
+        case "reruns":
+            found = [(s, g, m) for s, g in only.experiments for m in study.methods]
+            yield from ({"scene": s, "group": g, "method": m} for s, g, m in found)
+
+
+def _run(jobs: Jobs, experiment: Experiment, labels: dict[str, str]) -> None:
+    wildcards = _Wildcards(labels)
+    inputs = {name: files(wildcards) for name, files in jobs.inputs(experiment).items()}
+    outputs = {n: path.format(**labels) for n, path in jobs.outputs(experiment).items()}
+    settings = jobs.settings(experiment, labels).model_dump(mode="json")
+    experiment.perform(settings, inputs, outputs)
+
+
+class _Wildcards(dict[str, str]):
+    """Labels of a job, as Snakemake hands them over."""

@@ -1,0 +1,104 @@
+"""What is made of one scene: files that show its runs, from its own results alone."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from pdrom.core.errors import ConfigurationError
+from pdrom.core.store import check_file, read_table
+from pdrom.pipeline.scene_command import scene_arguments
+from pdrom.pipeline.study import Study
+from pdrom.report.figures.kit.read import RerunInfo
+from pdrom.report.scenes.catalogue import ARTIFACTS, default_files
+from pdrom.report.scenes.frames import SHOWN, shown
+from pdrom.report.scenes.job import make
+from small_scene import SCENE, order, run_jobs, small_study
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, str]:
+    """A study and its results folder, with everything that the scene's artifacts read."""
+    root = tmp_path_factory.mktemp("own")
+    study, results = small_study(root), str(root / "results")
+    run_jobs(study, results)
+    return study, results
+
+
+def made(finished: tuple[Study, str], name: str) -> dict[str, str]:
+    """Files of an artifact, made."""
+    study, results = finished
+    files = {k: p.at(results, scene=SCENE) for k, p in ARTIFACTS[name].outputs.items()}
+    make(order(study, results, name), files)
+    return files
+
+
+@pytest.mark.parametrize("name", ["frames", "error_against_r", "error_against_time"])
+def test_pictures_are_drawn(finished, name):
+    files = made(finished, name)
+    picture = imread(files["png"])[..., :3]
+    assert np.mean(np.any(picture < 0.99, axis=2)) > 0.01
+    assert {check_file(path) for path in files.values()} == {"intact"}
+
+
+def test_a_picture_is_the_same_the_second_time(finished):
+    before = [Path(path).read_bytes() for path in made(finished, "error_against_time").values()]
+    after = [Path(path).read_bytes() for path in made(finished, "error_against_time").values()]
+    assert after == before
+
+
+def test_the_table_has_a_row_for_each_run_with_its_error_and_gain(finished):
+    study, _ = finished
+    table = read_table(made(finished, "runs")["table"])
+    assert set(table.method) == set(study.methods)
+    assert set(table.scene) == {SCENE}
+    ran = table[table.frames > 0]
+    assert len(ran)
+    assert (ran.relative_error_within_horizon < 1.0).all()
+    # an orthogonal projection amplifies nothing
+    assert table.gain[table.method == "pod"].to_numpy() == pytest.approx(1.0)
+
+
+def test_the_study_does_not_hold_the_scene(finished):
+    study, results = finished
+    assert SCENE not in study.scenes
+    assert not (Path(results) / "tables").exists()
+    assert not (Path(results) / "figures").exists()
+
+
+def test_the_run_shown_is_the_largest_small_one_that_ran():
+    info = RerunInfo("r0006", 6, False, False, -1, 1.0, 9)
+    sizes = [replace(info, r=r, label=f"r{r:04d}") for r in (6, SHOWN, SHOWN + 1)]
+    assert shown(sizes).r == SHOWN
+    assert shown(sizes[2:]).r == SHOWN + 1
+    assert shown([replace(info, marked=True)]) is None
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """A folder with a scene."""
+    small_study(tmp_path)
+    return tmp_path
+
+
+def test_the_command_names_the_files(project):
+    files = default_files("results", SCENE)
+    assert scene_arguments([SCENE, "-n", "--cores", "1"], project) == [
+        "-n", "--cores", "1", "--", *files,
+    ]  # fmt: skip
+    assert scene_arguments([SCENE, "runs"], project) == ["--", f"results/scenes/{SCENE}/runs.csv"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "scene: the name of a scene is missing"),
+        (["owm"], "scene: unknown scene 'owm'.*did you mean 'own'"),
+        ([SCENE, "frame"], "nothing is called 'frame'.*did you mean 'frames'"),
+    ],
+)
+def test_what_is_misspelt_is_named(project, words, message):
+    with pytest.raises(ConfigurationError, match=message):
+        scene_arguments(words, project)
