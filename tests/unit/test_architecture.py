@@ -11,7 +11,9 @@ from places import ROOT
 
 PACKAGE = ROOT / "src" / "pdrom"
 # A room imports from itself and from rooms left of it.
-ROOMS = ("core", "model", "reduction", "experiments", "tables", "report", "pipeline")
+ROOMS = (
+    "core", "model", "reduction", "experiments", "tables", "report", "pipeline", "api", "command",
+)  # fmt: skip
 NUMERICS = ROOMS[: ROOMS.index("report")]
 MODULE_LINES, CLASS_LINES = 250, 200
 # Words with which a docstring says why a module is longer.

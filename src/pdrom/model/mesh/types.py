@@ -3,9 +3,12 @@
 import os
 from dataclasses import dataclass, field
 
+import h5py
 import numpy as np
 
 from pdrom.core.store import open_hdf5, write_hdf5
+
+_ARRAYS = ("points", "triangles", "tetrahedra")
 
 
 @dataclass(frozen=True)
@@ -42,13 +45,23 @@ class Mesh:
 def save_mesh(mesh: Mesh, path: str | os.PathLike[str], attributes: dict | None = None) -> None:
     """Write a mesh to HDF5 (datasets points, triangles, tetrahedra)."""
     with write_hdf5(path) as file:
-        for name in ("points", "triangles", "tetrahedra"):
-            file[name] = getattr(mesh, name)
-        file["points"].attrs["unit"] = "m"
+        store_mesh(mesh, file)
         file.attrs.update(attributes or {})
+
+
+def store_mesh(mesh: Mesh, group: h5py.Group) -> None:
+    """Write the arrays of a mesh into a group of a file."""
+    for name in _ARRAYS:
+        group[name] = getattr(mesh, name)
+    group["points"].attrs["unit"] = "m"
 
 
 def load_mesh(path: str | os.PathLike[str]) -> Mesh:
     """Read a mesh written by `save_mesh`; StorageError if the file is damaged."""
     with open_hdf5(path) as file:
-        return Mesh(*(file[name][...] for name in ("points", "triangles", "tetrahedra")))
+        return stored_mesh(file)
+
+
+def stored_mesh(group: h5py.Group) -> Mesh:
+    """The mesh that `store_mesh` wrote."""
+    return Mesh(*(group[name][...] for name in _ARRAYS))

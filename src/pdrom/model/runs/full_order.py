@@ -10,6 +10,7 @@ import numpy as np
 
 from pdrom.core.store import write_hdf5
 from pdrom.model.dynamics.stepper import PHASES, FrameReport, State
+from pdrom.model.mesh.types import store_mesh
 from pdrom.model.scene import Scene
 
 log = logging.getLogger(__name__)
@@ -39,6 +40,8 @@ def run(
     snapshot_frames: Mapping[str, np.ndarray],
     attributes: Mapping[str, Any],
     solver: str = "cholespy",
+    with_mesh: bool = False,
+    on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
 ) -> None:
     """Run a scene and write positions, velocities, objective, timings and the asked snapshots.
 
@@ -46,6 +49,8 @@ def run(
     ----------
     snapshot_frames : group -> frames (ascending) whose last local iterate is stored; a group that
         is not listed stores nothing.
+    with_mesh : stores the mesh, too, for a file that is to be looked at alone
+    on_frame : called after each frame with its number
     """
     frames = scene.config.frames
     system = scene.system_with(solver)
@@ -53,6 +58,8 @@ def run(
     state = scene.initial_state()
     with write_hdf5(path) as file:
         file.attrs.update(attributes)
+        if with_mesh:
+            store_mesh(scene.mesh, file.create_group("mesh"))
         series = _create_series(file, scene)
         recorder = _SnapshotRecorder(file, scene, snapshot_frames)
         series["positions"][0], series["velocities"][0] = state.positions, state.velocities
@@ -63,6 +70,7 @@ def run(
             series["velocities"][frame + 1] = state.velocities
             series["objective"][frame] = report.objective
             series["timings"][frame] = 1e3 * report.seconds
+            on_frame(frame, report)
             if (frame + 1) % max(1, frames // 10) == 0:
                 log.info("%s: frame %d of %d", scene.config.name, frame + 1, frames)
         file.attrs["factorisations"] = system.factorisations

@@ -1,0 +1,5 @@
+"""``python -m pdrom``: the command line."""
+
+from pdrom.command.main import main
+
+main()

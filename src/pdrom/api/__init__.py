@@ -1,0 +1,23 @@
+"""pdrom from Python: a scene, its run, a basis of projections, the run with them reduced, pictures.
+
+docs/python.md has a worked example.
+"""
+
+from pdrom.api.files import load, save
+from pdrom.api.pictures import plot
+from pdrom.api.runs import FullRun, ReducedRun, basis, methods, reduce, run
+from pdrom.api.scenes import build_scene, load_scene
+
+__all__ = [
+    "FullRun",
+    "ReducedRun",
+    "basis",
+    "build_scene",
+    "load",
+    "load_scene",
+    "methods",
+    "plot",
+    "reduce",
+    "run",
+    "save",
+]

@@ -1,0 +1,77 @@
+"""``pdrom COMMAND ...``: the parser, messages and exit codes; each command is a module of its own.
+
+A command's module says how it is called (`Command`); what it needs is imported when it runs.
+"""
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+
+from pdrom.command.base import Command, Status
+from pdrom.core.errors import PdromError
+from pdrom.core.logs import INTERRUPTED
+from pdrom.pipeline.environment import settle
+
+COMMANDS = ("new", "run", "reduce", "show")
+CODES = """exit codes: 0 done; 1 faulty input, or a file that cannot be read or written;
+2 the command was not understood; 3 a reduced run blew up (its file is written all the
+same); 130 interrupted"""
+CACHE = Path(__file__).resolve().parents[3] / ".cache"
+
+
+def parser() -> argparse.ArgumentParser:
+    """Parser of the whole command line."""
+    plain = argparse.RawDescriptionHelpFormatter
+    top = argparse.ArgumentParser(
+        prog="pdrom",
+        description="Run and reduce scenes of projective dynamics, and look at what came out.",
+        epilog=f"{CODES}\n\nexample: pdrom new sheet.yaml && pdrom run sheet.yaml",
+        formatter_class=plain,
+    )
+    below = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for name in COMMANDS:
+        command: Command = import_module(f"pdrom.command.{name}").COMMAND
+        own = below.add_parser(
+            name,
+            help=command.title,
+            description=command.title,
+            epilog=f"example: {command.example}",
+            formatter_class=plain,
+        )
+        command.declare(own)
+        own.set_defaults(perform=command.perform)
+    return top
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Do what the command line asks; the exit code."""
+    asked = parser().parse_args(arguments)
+    try:
+        return int(asked.perform(asked))
+    except PdromError as error:
+        return _fail(str(error))
+    except MemoryError:
+        return _fail("out of memory")
+    except BrokenPipeError:  # who read the output has had enough
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 : until the end
+        return Status.DONE
+    except KeyboardInterrupt:
+        sys.stderr.write("\npdrom: interrupted\n")
+        return INTERRUPTED
+
+
+def _fail(message: str) -> int:
+    sys.stderr.write(f"pdrom: {message}\n")
+    return Status.FAULTY
+
+
+def main() -> None:
+    """Run the command line of this process in the project's environment; end with its code."""
+    if os.access(CACHE, os.W_OK):  # compiled kernels are shared with ./reproduce
+        os.environ.setdefault("NUMBA_CACHE_DIR", str(CACHE / "numba"))
+        os.environ.setdefault("MPLCONFIGDIR", str(CACHE / "matplotlib"))
+    settle()
+    sys.exit(run(sys.argv[1:]))

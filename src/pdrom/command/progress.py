@@ -1,0 +1,46 @@
+"""How far a run has come: one line on stderr, rewritten on a terminal."""
+
+import sys
+from time import monotonic
+from typing import TextIO
+
+from pdrom.model.dynamics.stepper import FrameReport
+
+WIDTH = 24
+EVERY = 0.2  # seconds between two lines on a terminal
+
+
+class Progress:
+    """Frame, milliseconds of a frame and the time that is left.
+
+    Where the stream is no terminal there is a line each tenth of the run.
+    """
+
+    def __init__(self, name: str, frames: int, stream: TextIO | None = None) -> None:
+        self._name, self._frames = name, frames
+        self._stream = stream or sys.stderr
+        self._terminal = self._stream.isatty()
+        self._started = self._shown = monotonic()
+
+    def __call__(self, frame: int, report: FrameReport) -> None:
+        """Frame number ``frame``, from 0, is done."""
+        done, now = frame + 1, monotonic()
+        if self._terminal:
+            if done < self._frames and now - self._shown < EVERY:
+                return
+        elif done < self._frames and done % max(1, self._frames // 10):
+            return
+        self._shown = now
+        left = (now - self._started) / done * (self._frames - done)
+        text = line(self._name, done, self._frames, 1e3 * float(report.seconds.sum()), left)
+        self._stream.write(f"\r{text}  " if self._terminal else f"{text}\n")
+        if self._terminal and done == self._frames:
+            self._stream.write("\n")
+        self._stream.flush()
+
+
+def line(name: str, done: int, frames: int, ms: float, left: float) -> str:
+    """The line of a run of which ``done`` frames are done, ``ms`` the last one's milliseconds."""
+    full = WIDTH * done // frames
+    bar = "#" * full + "." * (WIDTH - full)
+    return f"{name} [{bar}] frame {done} of {frames}, {ms:.2f} ms a frame, {left:.0f} s left"

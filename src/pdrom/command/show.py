@@ -1,0 +1,128 @@
+"""``pdrom show FILE``: what a result is."""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from pdrom.command.base import Command, Status
+
+LONGEST = 100  # characters of an attribute's value
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """The file."""
+    parser.add_argument("file", metavar="FILE", help="a result of the pipeline or of this command")
+    parser.add_argument(
+        "--configuration", action="store_true", help="the whole configuration, as YAML"
+    )
+
+
+def perform(arguments: argparse.Namespace) -> Status:
+    """Say what a file holds; nothing is changed."""
+    from pdrom.core.store import check_file
+
+    path = Path(arguments.file)
+    condition = check_file(path)
+    lines = [f"{path}: {path.stat().st_size:,} bytes, {condition.value}"]
+    lines += _content(path, arguments.configuration)
+    sys.stdout.write("\n".join(lines) + "\n")
+    return Status.DONE
+
+
+def _content(path: Path, whole: bool) -> Iterator[str]:
+    match path.suffix:
+        case ".h5" | ".hdf5":
+            yield from _hdf5(path, whole)
+        case ".csv":
+            yield from _table(path)
+        case ".json":
+            yield from (f"  {line}" for line in path.read_text("utf-8").splitlines())
+
+
+def _hdf5(path: Path, whole: bool) -> Iterator[str]:
+    import h5py
+
+    from pdrom.core.errors import StorageError
+
+    try:
+        with h5py.File(path, "r") as file:
+            attributes = dict(file.attrs)
+            found: list[str] = []
+            file.visititems(lambda name, item: found.extend(_item(name, item)))
+    except OSError as error:
+        raise StorageError(f"{path}: no readable HDF5 file ({error})") from error
+    yield "holds:"
+    yield from found
+    configuration = attributes.pop("configuration", None)
+    if configuration is not None:
+        yield from _configuration(json.loads(configuration), whole)
+    yield "provenance and attributes:"
+    yield from (f"  {name}: {_short(value)}" for name, value in attributes.items())
+
+
+def _item(name: str, item: Any) -> Iterator[str]:
+    import h5py
+
+    if isinstance(item, h5py.Dataset):
+        unit = item.attrs.get("unit", "")
+        shape = " x ".join(map(str, item.shape)) or "one value"
+        more = [f"{k}: {_short(v)}" for k, v in item.attrs.items() if k != "unit"]
+        told = ", ".join(filter(None, [f"{shape} {item.dtype}", unit and f"in {unit}", *more]))
+        yield f"  {name}: {told}"
+    elif item.attrs:
+        yield f"  {name}/: {', '.join(f'{k} = {_short(v)}' for k, v in item.attrs.items())}"
+
+
+def _configuration(configuration: Any, whole: bool) -> Iterator[str]:
+    import yaml
+
+    yield "configuration:"
+    if whole or not isinstance(configuration, dict):
+        text = yaml.safe_dump(configuration, sort_keys=False, width=100)
+        yield from (f"  {line}" for line in text.splitlines())
+        return
+    for name, value in configuration.items():
+        if name == "scene" and isinstance(value, dict):
+            value = f"{value['name']} ({value['title']})"
+        yield f"  {name}: {_short(value)}"
+
+
+def _table(path: Path) -> Iterator[str]:
+    from pandas.api.types import is_numeric_dtype
+
+    from pdrom.core.store import read_table
+    from pdrom.pipeline.tables import all_tables
+
+    table = read_table(path, result=False)
+    declared = all_tables().get(path.stem)
+    known = {column.name: column for column in declared.columns} if declared else {}
+    if declared:
+        yield f"table of the study: {declared.title}"
+    yield f"{len(table)} rows of {len(table.columns)} columns:"
+    for name in table.columns:
+        values, column = table[name].dropna(), known.get(name)
+        parts = [column.meaning, column.unit and f"in {column.unit}"] if column else []
+        if not len(values):
+            parts.append("empty")
+        elif not is_numeric_dtype(values):
+            different = list(dict.fromkeys(map(str, values)))
+            parts.append(", ".join(different[:4]) + (" ..." if len(different) > 4 else ""))
+        else:
+            parts.append(f"{values.min():.4g} to {values.max():.4g}")
+        yield f"  {name}: {'; '.join(filter(None, parts))}"
+
+
+def _short(value: Any) -> str:
+    text = " ".join(str(value).split())
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+
+
+COMMAND = Command(
+    "Say what a result is: content, shapes, units, configuration, provenance",
+    "pdrom show results/fom/spring_oop/train.h5",
+    declare,
+    perform,
+)

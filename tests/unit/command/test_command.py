@@ -1,0 +1,171 @@
+"""The command line: each command does its work, says it in a line, and ends with its code."""
+
+import io
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from pdrom.command.base import Status
+from pdrom.command.main import COMMANDS, parser, run
+from pdrom.command.new import template
+from pdrom.command.progress import Progress, line
+from pdrom.core.store import check_file
+from pdrom.model.dynamics.stepper import FrameReport
+from pdrom.model.scene import SceneConfig
+
+SCENE = """\
+name: small
+title: Small
+frames: 12
+mesh: {kind: cloth, rows: 6, columns: 5, plane: xz}
+effects:
+  - {effect: gravity}
+  - {effect: pins, select: left}
+  - {effect: spring, weight: 1.0e+5}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder with a scene, in which the commands run."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "small.yaml").write_text(SCENE, encoding="utf-8")
+    return tmp_path
+
+
+def test_a_scene_is_run_reduced_and_shown(folder, capsys):
+    assert run(["run", "small.yaml"]) == Status.DONE
+    said = capsys.readouterr()
+    assert said.out.startswith("small.h5: 12 frames of 30 vertices")
+    assert "frame 12 of 12" in said.err
+    asked = ["reduce", "small.yaml", "--group", "spring", "--r", "2", "--run", "small.h5"]
+    assert run([*asked, "--plot", "e.png"]) == Status.DONE
+    assert capsys.readouterr().out.startswith("small_spring_gappy_2.h5: spring, gappy, r = 2: rel")
+    assert check_file("e.png") == "intact"
+    assert run(["show", "small_spring_gappy_2.h5"]) == Status.DONE
+    shown = capsys.readouterr().out
+    for words in ("intact", "reduced: 13 x 30 x 3 float32, in m", "method: gappy", "scene: small"):
+        assert words in shown
+
+
+def test_the_whole_configuration_is_shown_as_yaml(folder, capsys):
+    run(["run", "small.yaml", "--out", "x.h5"])
+    capsys.readouterr()
+    assert run(["show", "x.h5", "--configuration"]) == Status.DONE
+    text = capsys.readouterr().out.split("configuration:\n")[1].split("provenance")[0]
+    assert yaml.safe_load(text)["scene"]["name"] == "small"
+
+
+def test_a_table_is_shown_with_what_its_columns_mean(folder, capsys):
+    (folder / "singular_values.csv").write_text("scene,component\na,1\nb,3\n")
+    assert run(["show", "singular_values.csv"]) == Status.DONE
+    said = capsys.readouterr().out
+    assert "2 rows of 2 columns" in said
+    assert "unsealed" in said
+    assert "table of the study" in said
+    assert "1 to 3" in said
+
+
+def test_a_new_scene_is_valid_and_replaces_nothing(folder, capsys):
+    assert run(["new", "My Sheet-1"]) == Status.DONE
+    text = (folder / "My Sheet-1.yaml").read_text("utf-8")
+    scene = SceneConfig.model_validate(yaml.safe_load(text))
+    assert scene.name == "my_sheet_1"
+    assert run(["new", "My Sheet-1.yaml"]) == Status.FAULTY
+    assert "there is such a file already" in capsys.readouterr().err
+    assert (folder / "My Sheet-1.yaml").read_text("utf-8") == text
+
+
+def test_every_commented_effect_of_a_new_scene_is_valid():
+    text = template("a", "m.obj").replace("  # - {", "  - {")
+    scene = SceneConfig.model_validate(yaml.safe_load(text))
+    assert {"translate", "strain", "bending"} <= {effect.effect for effect in scene.effects}
+    assert scene.mesh.sources == ["m.obj"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "none.yaml"], "none.yaml: no such configuration file"),
+        (["show", "none.h5"], "none.h5: no such file"),
+        (["reduce", "small.yaml", "--group", "sprin"], "no group 'sprin'"),
+        (["reduce", "small.yaml", "--group", "spring", "--method", "gapy"], "did you mean 'gappy'"),
+        (["reduce", "small.yaml", "--group", "spring", "--r", "99"], "r = 99"),
+        (["run", "small.yaml", "--out", "nowhere.d/../small.yaml/x.h5"], "cannot be written"),
+        (["new", "nowhere/x"], "No such file"),
+    ],
+)
+def test_faults_are_one_line_and_code_1(folder, arguments, words, capsys):
+    assert run(arguments) == Status.FAULTY
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last.startswith("pdrom: ")
+    assert words in last
+
+
+def test_a_run_of_another_scene_is_not_reduced(folder, capsys):
+    run(["run", "small.yaml"])
+    (folder / "small.yaml").write_text(SCENE.replace("1.0e+5", "2.0e+5"))
+    assert run(["reduce", "small.yaml", "--group", "spring", "--run", "small.h5"]) == Status.FAULTY
+    assert "a run of another scene" in capsys.readouterr().err
+
+
+def test_a_blow_up_has_a_code_of_its_own(folder, monkeypatch, capsys):
+    monkeypatch.setattr("pdrom.api.runs.BLOWUP_EXTENT", 1e-3)
+    assert run(["reduce", "small.yaml", "--group", "spring", "--r", "2"]) == Status.BLEW_UP
+    assert "blew up at frame 0" in capsys.readouterr().out
+    assert (folder / "small_spring_gappy_2.h5").is_file()
+
+
+@pytest.mark.parametrize("arguments", [[], ["frobnicate"], ["run"], ["reduce", "x", "--r", "0"]])
+def test_what_is_not_understood_has_code_2(arguments, capsys):
+    with pytest.raises(SystemExit) as caught:
+        run(arguments)
+    assert caught.value.code == 2
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_has_an_example(name, capsys):
+    with pytest.raises(SystemExit) as caught:
+        run([name, "--help"])
+    assert caught.value.code == 0
+    said = capsys.readouterr().out
+    example = said.split("example: pdrom ")[1].split()
+    assert example[0] == name
+    assert parser().parse_args(example).perform
+
+
+def test_an_interrupt_is_said(folder, monkeypatch, capsys):
+    def interrupted(*arguments, **named):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pdrom.api.run", interrupted)
+    assert run(["run", "small.yaml"]) == 130
+    assert capsys.readouterr().err == "\npdrom: interrupted\n"
+
+
+def test_progress_is_a_line_each_tenth_where_nobody_watches():
+    stream = io.StringIO()
+    told = Progress("small", 40, stream)
+    for frame in range(40):
+        told(frame, FrameReport(np.zeros(0), np.full(4, 5e-4)))
+    lines = stream.getvalue().splitlines()
+    assert len(lines) == 10
+    assert "frame 40 of 40, 2.00 ms a frame, 0 s left" in lines[-1]
+    assert (
+        line("a", 1, 2, 1.0, 3.0)
+        == f"a [{'#' * 12}{'.' * 12}] frame 1 of 2, 1.00 ms a frame, 3 s left"
+    )
+
+
+def test_the_module_is_the_program(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "pdrom", "new", "x"],
+        cwd=tmp_path, capture_output=True, text=True, env=dict(os.environ), check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "x.yaml").is_file()
