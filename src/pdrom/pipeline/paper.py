@@ -63,8 +63,12 @@ def check_texts(study: Study) -> None:
     for variant in study.ablation.variants:
         require_typeset(variant, f"{folder / 'subspace_ablation.yaml'}: variants")
     for name, claim in load_claims(folder / "claims.yaml").items():
-        texts = {"text": claim.text, "source": claim.source, "paper": claim.paper}
-        texts |= {f"tests.{i}.what": test.what for i, test in enumerate(claim.tests)}
+        words = ("text", "source", "paper", "section", "shown", "qualifiers")
+        texts = {key: getattr(claim, key) for key in words}
+        for part in ("published", "beyond"):
+            tests = enumerate(getattr(claim, part))
+            texts |= {f"{part}.{i}.what": test.what for i, test in tests}
+        texts |= {f"changes.{i}.reason": c.reason for i, c in enumerate(claim.changes)}
         for key, text in texts.items():
             require_typeset(text, f"{folder / 'claims.yaml'}: {name}.{key}")
 

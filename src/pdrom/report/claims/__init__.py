@@ -1,12 +1,14 @@
 """Verdicts on the paper's claims, by rules of config/claims.yaml that code evaluates.
 
-A claim is decided by tests: a metric over chosen rows of the tables, compared with a threshold. The
-first tests marked ``decides`` give the verdict, the others stand beside it in the reason.
+A claim is decided twice, as published and beyond, each time by tests: a metric over chosen rows of
+the tables, compared with a threshold. Tests marked ``decides`` give the verdict, the others stand
+beside it in the reason.
 """
 
 from pdrom.report.claims.metrics import METRICS, Metric, Tables
 from pdrom.report.claims.rules import ClaimRule, TestRule, load_claims
 from pdrom.report.claims.verdicts import (
+    DEPENDS,
     FAILS,
     HOLDS,
     UNDECIDED,
@@ -18,6 +20,6 @@ from pdrom.report.claims.verdicts import (
 )
 
 __all__ = [
-    "FAILS", "HOLDS", "METRICS", "UNDECIDED", "VERDICTS", "ClaimRule", "Metric", "Outcome",
-    "Tables", "TestRule", "claims_rows", "evaluate", "load_claims", "timed_columns",
+    "DEPENDS", "FAILS", "HOLDS", "METRICS", "UNDECIDED", "VERDICTS", "ClaimRule", "Metric",
+    "Outcome", "Tables", "TestRule", "claims_rows", "evaluate", "load_claims", "timed_columns",
 ]  # fmt: skip

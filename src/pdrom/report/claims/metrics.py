@@ -1,4 +1,4 @@
-"""What claims are decided by: a number for each chosen row of a table."""
+"""What claims are decided by: a number for each chosen row of a table, with the row's labels."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -11,6 +11,12 @@ from pdrom.tables.break_even import CURVE
 
 Tables = Mapping[str, pd.DataFrame]
 Value = str | int | float
+VALUE = "value"
+LABELS = (
+    "scene", "group", "method", "position_basis", "k", "r", "split", "axis", "component",
+    "implementation", "factor", "threads",
+)  # fmt: skip
+AXES = ("x", "y", "z")
 _PLACE = ("scene", "group", "method", "position_basis")
 
 
@@ -51,17 +57,38 @@ def _tried(rows: pd.DataFrame) -> pd.DataFrame:
     return rows[(rows.frames > 0) | rows.blowup_frame.notna()]
 
 
-def _local_share(tables: Tables, where: dict) -> pd.Series:
-    return filtered(tables["local_share"], where).local_share
+def _labelled(rows: pd.DataFrame, values: pd.Series) -> pd.DataFrame:
+    """Labels of ``rows``, as far as they have them, and a value for each."""
+    return rows[[label for label in LABELS if label in rows]].assign(**{VALUE: values})
 
 
-def _rerun_error(tables: Tables, where: dict) -> pd.Series:
+def _local_share(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
+    rows = filtered(tables["local_share"], where)
+    return _labelled(rows, rows.local_share)
+
+
+def _rerun_error(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
     """Error within the horizon; a run that blew up before its horizon counts as infinite."""
     table, where = _full_rank_only(_reruns(tables, where), where)
-    return _tried(filtered(table, where)).relative_error_within_horizon.fillna(np.inf)
+    rows = _tried(filtered(table, where))
+    return _labelled(rows, rows.relative_error_within_horizon.fillna(np.inf))
 
 
-def _error_trend(tables: Tables, where: dict) -> pd.Series:
+def _useful_speedup(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
+    """Speed-up over the full-order run; 0 for a run that is not accurate."""
+    table, where = _full_rank_only(_reruns(tables, where), where)
+    rows = _tried(filtered(table, where))
+    accurate = rows.relative_error_within_horizon <= accuracy
+    return _labelled(rows, rows.speedup.where(accurate, 0.0)).dropna(subset=[VALUE])
+
+
+def _best_useful_speedup(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
+    """The largest useful speed-up over sizes and methods, per scene and group."""
+    runs = _useful_speedup(tables, where, accuracy)
+    return runs.groupby(["scene", "group"], sort=False)[VALUE].max().reset_index()
+
+
+def _error_trend(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
     """Spearman's rank correlation of error and size, per scene, group and method.
 
     1 where the error rises with every size, -1 where it falls; blow-ups share the highest rank.
@@ -69,73 +96,110 @@ def _error_trend(tables: Tables, where: dict) -> pd.Series:
     """
     rows = _tried(filtered(_reruns(tables, where), where))
     trends = []
-    for _, run in rows.groupby(["scene", "group", "method"], sort=False):
+    for labels, run in rows.groupby(["scene", "group", "method"], sort=False):
         error = run.relative_error_within_horizon.fillna(np.inf)
         if len(run) >= 3:
             trend = 0.0 if error.nunique() == 1 else error.rank().corr(run.r.rank())
-            trends.append(trend)
-    return pd.Series(trends, dtype=float)
+            trends.append((*labels, trend))
+    return pd.DataFrame(trends, columns=["scene", "group", "method", VALUE])
 
 
-def _decay(tables: Tables, where: dict) -> pd.Series:
+def _decay(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
     rows = filtered(tables["singular_values"], where)
-    real = rows.groupby(["scene", "group"]).above_roundoff.transform("any")
-    return rows[real].relative
+    rows = rows[rows.groupby(["scene", "group"]).above_roundoff.transform("any")]
+    return _labelled(rows, rows.relative)
 
 
-def _reconstruction(tables: Tables, where: dict) -> pd.Series:
+def _reconstruction(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
     """Reconstruction error; a singular interpolation counts as infinite."""
     rows = filtered(tables["reconstruction_error"], where)
-    return rows[rows.gain.notna()].relative_error.fillna(np.inf)
+    rows = rows[rows.gain.notna()]
+    return _labelled(rows, rows.relative_error.fillna(np.inf))
 
 
-def _elements_per_entry(tables: Tables, where: dict) -> pd.Series:
+def _axis_reconstruction(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
+    """Reconstruction error of each axis; infinite where the interpolation is singular.
+
+    An axis whose projections are round-off at every size has no error.
+    """
+    chosen = {key: value for key, value in where.items() if key != "axis"}
+    rows = filtered(tables["reconstruction_error"], chosen)
+    rows = rows[rows.gain.notna()]
+    parts = []
+    for axis in where.get("axis", AXES):
+        error = rows[f"relative_error_{axis}"]
+        curve = [rows[label] for label in ("scene", "group", "method", "split") if label in rows]
+        real = error.notna().groupby(curve).transform("any") if len(rows) else error.notna()
+        one = rows[real]
+        parts.append(_labelled(one, error[real].fillna(np.inf)).assign(axis=axis))
+    return pd.concat(parts, ignore_index=True)
+
+
+def _elements_per_entry(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
     rows = filtered(tables["reconstruction_error"], where)
     rows = rows[rows.elements_sampled.notna()]
-    return rows.elements_sampled.astype(float) / rows.r
+    return _labelled(rows, rows.elements_sampled.astype(float) / rows.r)
 
 
-def _local_ratio(tables: Tables, where: dict) -> pd.Series:
+def _local_ratio(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
     """Time of the reduced local step over that of the full compiled one, at the largest size.
 
     One value per scene, group, method, mesh and number of threads: whether the dense solve costs
     more from some size on shows at the largest size that the basis has.
     """
     rows = filtered(tables["breakeven"], where).dropna(subset=["ratio"]).sort_values("r")
-    largest = rows.groupby(CURVE, sort=False).tail(1)
-    return largest.sort_index().ratio
+    largest = rows.groupby(CURVE, sort=False).tail(1).sort_index()
+    return _labelled(largest, largest.ratio)
 
 
-def _position_basis_ratio(tables: Tables, where: dict) -> pd.Series:
-    """Error of the snapshot basis over that of the skinning basis at equal k, per scene."""
+def _position_basis_ratio(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
+    """Error of the snapshot basis over that of the skinning basis at equal k, per scene.
+
+    Only where at least one of the two is accurate: the better of two failures says nothing.
+    """
     rows = filtered(tables["reduced_reruns"], where)
     keys = ["scene", "k"]
     errors = {
         kind: rows[rows.position_basis == kind].set_index(keys).relative_error_within_horizon
         for kind in ("pod", "skinning")
     }
-    return (errors["pod"] / errors["skinning"]).dropna()
+    both = pd.DataFrame(errors).dropna()
+    both = both[both.min(axis=1) <= accuracy]
+    return both.assign(**{VALUE: both["pod"] / both["skinning"]})[[VALUE]].reset_index()
 
 
 @dataclass(frozen=True)
 class Metric:
-    """What a test compares: values from some columns of one table."""
+    """What a test compares: values from some columns of one table.
 
-    values: Callable[[Tables, dict], pd.Series]
+    values : from tables, ``where`` and ``accuracy`` to a row of labels and a `VALUE` for each
+    labels : columns that rows may be chosen by, beside those of the table
+    """
+
+    values: Callable[[Tables, dict, float], pd.DataFrame]
     table: str
     columns: tuple[str, ...]
+    labels: tuple[str, ...] = ()
 
 
-_RERUN = ("frames", "blowup_frame", "relative_error_within_horizon")
+_RERUN = ("frames", "blowup_frame", "relative_error_within_horizon", *_PLACE, "r")
 METRICS = {
     "local_share": Metric(_local_share, "local_share", ("local_share",)),
-    "rerun_error": Metric(_rerun_error, "reduced_reruns", (*_RERUN, *_PLACE, "r")),
-    "error_trend": Metric(_error_trend, "reduced_reruns", (*_RERUN, *_PLACE, "r")),
+    "rerun_error": Metric(_rerun_error, "reduced_reruns", _RERUN),
+    "useful_speedup": Metric(_useful_speedup, "reduced_reruns", (*_RERUN, "speedup")),
+    "best_useful_speedup": Metric(_best_useful_speedup, "reduced_reruns", (*_RERUN, "speedup")),
+    "error_trend": Metric(_error_trend, "reduced_reruns", _RERUN),
     "singular_value_decay": Metric(
         _decay, "singular_values", ("scene", "group", "above_roundoff", "relative")
     ),
     "reconstruction_error": Metric(
         _reconstruction, "reconstruction_error", ("gain", "relative_error")
+    ),
+    "axis_reconstruction_error": Metric(
+        _axis_reconstruction,
+        "reconstruction_error",
+        ("scene", "group", "method", "split", "gain", *(f"relative_error_{a}" for a in AXES)),
+        ("axis",),
     ),
     "elements_per_entry": Metric(
         _elements_per_entry, "reconstruction_error", ("elements_sampled", "r")

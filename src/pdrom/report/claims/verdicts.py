@@ -1,34 +1,49 @@
 """Verdicts: the tests of a claim, evaluated."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from pdrom.report.claims.metrics import METRICS, Tables, filtered
-from pdrom.report.claims.rules import ClaimRule, TestRule
+from pdrom.report.claims.metrics import METRICS, VALUE, Tables, filtered
+from pdrom.report.claims.rules import Change, ClaimRule, TestRule
 from pdrom.tables import declared
 
-VERDICTS = HOLDS, FAILS, UNDECIDED = "holds", "does not hold", "cannot be decided"
+VERDICTS = HOLDS, FAILS, DEPENDS, UNDECIDED = (
+    "holds", "does not hold", "depends", "cannot be decided",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of one test: None where there was nothing to compare."""
+    """Result of one test.
 
-    passed: bool | None
+    verdict : one of `VERDICTS`; undecided where there was nothing to compare
+    measured : range of the values
+    sentence : how many rows satisfy the comparison, in words
+    condition : where it depends, how many do so for each value of the column that it names
+    """
+
+    verdict: str
     measured: str
     sentence: str
+    condition: str = ""
 
 
 def timed_columns(rule: ClaimRule) -> set[str]:
     """Columns of a claim's row in which a clock has a say: two runs may differ there."""
-    timed = [test for test in rule.tests if _is_timed(test)]
-    if not timed:
-        return set()
-    return {"why", "measured", "verdict"} if any(t.decides for t in timed) else {"why"}
+    found: set[str] = set()
+    for part, suffix in (("published", ""), ("beyond", "_beyond")):
+        tests: Sequence[TestRule] = getattr(rule, part)
+        timed = [test for test in tests if _is_timed(test)]
+        if timed:
+            found.add(f"why{suffix}")
+        if any(test.decides for test in timed):
+            found |= {f"{name}{suffix}" for name in ("measured", "verdict", "condition")}
+            found.add("answer")
+    return found
 
 
 def _is_timed(test: TestRule) -> bool:
@@ -37,17 +52,50 @@ def _is_timed(test: TestRule) -> bool:
     return not set(timing).isdisjoint({*metric.columns, *test.where})
 
 
+def values_of(test: TestRule, tables: Tables) -> pd.DataFrame:
+    """What a test compares: labels and a value for each row."""
+    return METRICS[test.metric].values(tables, dict(test.where), test.accuracy)
+
+
+def satisfied(test: TestRule, values: np.ndarray) -> np.ndarray:
+    """Whether each value satisfies the comparison."""
+    return values >= test.threshold if test.compare == ">=" else values <= test.threshold
+
+
+def answer(share: float, good: int, total: int) -> str:
+    """Verdict of a test that ``good`` of ``total`` rows satisfy, see `TestRule`."""
+    if total == 0:
+        return UNDECIDED
+    if good >= share * total:
+        return HOLDS
+    return FAILS if total - good >= share * total else DEPENDS
+
+
 def evaluate(test: TestRule, tables: Tables) -> Outcome:
     """Compare the rows of a test with its threshold."""
-    values = METRICS[test.metric].values(tables, dict(test.where)).to_numpy(float)
+    rows = values_of(test, tables)
+    values = rows[VALUE].to_numpy(float)
     if len(values) == 0:
-        return Outcome(None, "no data", f"{test.what}: {_why_empty(test, tables)}")
-    passed = values >= test.threshold if test.compare == ">=" else values <= test.threshold
+        return Outcome(UNDECIDED, "no data", f"{test.what}: {_why_empty(test, tables)}")
+    passed = satisfied(test, values)
     good, total = int(passed.sum()), len(values)
     spread = _range(values)
     sign = "at least" if test.compare == ">=" else "at most"
     sentence = f"{test.what}: {good} of {total} {sign} {test.threshold:g} (measured {spread})"
-    return Outcome(good >= test.share * total, spread, sentence)
+    verdict = answer(test.share, good, total)
+    condition = ""
+    if verdict == DEPENDS:
+        condition = f"{test.what}, {sign} {test.threshold:g}: {_broken_down(test, rows, passed)}"
+    return Outcome(verdict, spread, sentence, condition)
+
+
+def _broken_down(test: TestRule, rows: pd.DataFrame, passed: np.ndarray) -> str:
+    """How many rows satisfy the comparison for each value of the column ``by``."""
+    if test.by is None or test.by not in rows:
+        return f"{int(passed.sum())} of {len(passed)}"
+    counts = pd.Series(passed).groupby(rows[test.by].to_numpy(), sort=False)
+    parts = [f"{value} {int(part.sum())} of {len(part)}" for value, part in counts]
+    return ", ".join(parts).replace("_", " ")
 
 
 def _why_empty(test: TestRule, tables: Tables) -> str:
@@ -60,8 +108,12 @@ def _why_empty(test: TestRule, tables: Tables) -> str:
 
 
 def _range(values: np.ndarray) -> str:
+    """Smallest to largest, and the median of three and more."""
     low, high = _text(values.min()), _text(values.max())
-    return low if low == high else f"{low} to {high}"
+    if low == high:
+        return low
+    middle = f", median {_text(float(np.median(values)))}" if len(values) > 2 else ""
+    return f"{low} to {high}{middle}"
 
 
 def _text(value: float) -> str:
@@ -72,24 +124,54 @@ def _text(value: float) -> str:
     return f"{value:.2g}"
 
 
+def combined(verdicts: Sequence[str]) -> str:
+    """Verdict of a claim whose parts have these: it holds where all of them hold."""
+    for verdict in (UNDECIDED, FAILS, DEPENDS):
+        if verdict in verdicts:
+            return verdict
+    return HOLDS
+
+
 def claims_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
     """Rows of the table claims, in the order of the file."""
     return pd.DataFrame([_row(name, rule, tables) for name, rule in rules.items()])
 
 
 def _row(name: str, rule: ClaimRule, tables: Tables) -> dict[str, Any]:
-    outcomes = [(test, evaluate(test, tables)) for test in rule.tests]
-    deciding = [o for test, o in outcomes if test.decides]
-    if any(o.passed is None for o in deciding):
-        verdict = UNDECIDED
-    else:
-        verdict = HOLDS if all(o.passed for o in deciding) else FAILS
+    published, beyond = _decided(rule.published, tables), _decided(rule.beyond, tables)
     return {
         "claim": name,
         "source": rule.source,
         "paper": rule.paper,
-        "measured": "; ".join(o.measured for o in deciding),
-        "verdict": verdict,
-        "why": "; ".join(o.sentence for _, o in outcomes) + ".",
+        **published,
         "figure_or_table": rule.figure_or_table,
+        "section": rule.section,
+        "shown": rule.shown,
+        "text": rule.text,
+        "qualifiers": rule.qualifiers,
+        **{f"{key}_beyond": value for key, value in beyond.items()},
+        "answer": f"as published, it {_said(published)}; beyond, it {_said(beyond)}",
+        "history": " ".join(_told(change) for change in rule.changes),
     }
+
+
+def _decided(tests: Sequence[TestRule], tables: Tables) -> dict[str, str]:
+    outcomes = [(test, evaluate(test, tables)) for test in tests]
+    deciding = [o for test, o in outcomes if test.decides]
+    return {
+        "measured": "; ".join(o.measured for o in deciding),
+        "verdict": combined([o.verdict for o in deciding]),
+        "condition": "; ".join(o.condition for o in deciding if o.condition),
+        "why": "; ".join(o.sentence for _, o in outcomes) + ".",
+    }
+
+
+def _said(decided: Mapping[str, str]) -> str:
+    """A verdict, with the condition that it depends on."""
+    condition = decided["condition"]
+    return f"{decided['verdict']} ({condition})" if condition else decided["verdict"]
+
+
+def _told(change: Change) -> str:
+    known = " (results were known)" if change.after_data else ""
+    return f"{change.date.isoformat()}{known}: {change.reason}"

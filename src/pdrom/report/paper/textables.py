@@ -5,26 +5,13 @@ from typing import Any
 
 import pandas as pd
 
+from pdrom.report.paper.claim_tables import claims, claims_in_full
 from pdrom.report.paper.hard_tables import hard_cases, hard_reductions, kernel_accuracy
 from pdrom.report.paper.macros import format_number
 from pdrom.report.paper.tabular import longtable, name, tabular
 from pdrom.report.words.text import escape
 
 Tables = Mapping[str, pd.DataFrame]
-_VERDICT_COLOUR = {"holds": "okgreen", "does not hold": "okred"}
-
-
-def claims(tables: Tables) -> str:
-    """Verdict on each claim, with what was measured."""
-    rows = []
-    for row in tables["claims"].itertuples():
-        colour = _VERDICT_COLOUR.get(row.verdict, "okgrey")
-        verdict = rf"\textcolor{{{colour}}}{{{escape(row.verdict)}}}"
-        measured = escape(str(row.measured)).replace("; ", r"; \newline ")
-        rows.append([row.claim, escape(row.paper), measured, verdict, name(row.figure_or_table)])
-    header = ["claim", "the paper says", "measured", "verdict", "shown in"]
-    left = r">{\raggedright\arraybackslash}"
-    return longtable(header, rows, rf"l{left}p{{3.6cm}}{left}p{{3cm}}{left}p{{2.4cm}}l")
 
 
 def scenes(tables: Tables) -> str:
@@ -174,6 +161,7 @@ def guard(tables: Tables) -> str:
 
 TEX_TABLES = {
     "tab_claims": claims,
+    "tab_claims_in_full": claims_in_full,
     "tab_scenes": scenes,
     "tab_methods": methods,
     "tab_ranks": ranks,

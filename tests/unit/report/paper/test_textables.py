@@ -111,6 +111,15 @@ TABLES = {
             "measured": ["0.1; 0.2", "no data", "3"],
             "verdict": ["holds", "cannot be decided", "does not hold"],
             "figure_or_table": ["local_share", "a", "b"],
+            "verdict_beyond": ["depends", "holds", "does not hold"],
+            "measured_beyond": ["1", "2", "3"],
+            "section": "4",
+            "shown": ["5", "none", "6"],
+            "text": ["a claim_1", "t", "t"],
+            "qualifiers": ["often", "q", "q"],
+            "why": ["some: 1 of 2.", "w", "w"],
+            "why_beyond": ["all: 2 of 2.", "w", "w"],
+            "history": ["2026-01-31: first.", "h", "h"],
         }
     ),
     "hard_cases": pd.DataFrame(
@@ -231,6 +240,13 @@ def test_verdicts_have_their_colour():
     assert r"\textcolor{okred}{does not hold}" in fails
     assert r"70 \% or more" in holds
     assert r"0.1; \newline 0.2" in holds
+    assert r"\textcolor{okgrey}{depends}\newline 1" in holds
+
+
+def test_claims_are_stated_with_place_and_qualifiers():
+    first, *_ = rows(TEX_TABLES["tab_claims_in_full"](TABLES))
+    for words in ("section 4", "figures: 5", r"a claim\_1", "often", "1 of 2", "2 of 2", "2026"):
+        assert words in first
 
 
 def test_stability_counts_what_ran():
