@@ -30,6 +30,26 @@ def relative_errors(p: np.ndarray, p_hat: np.ndarray, roundoff: float) -> list[f
     ]
 
 
+def shape_differences(positions: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Norm of what a rigid motion cannot explain, frame by frame: min || R q + t - q_ref ||_F (F,).
+
+    R is the best rotation, never a reflection (Kabsch 1976), t joins the centroids.
+
+    Parameters
+    ----------
+    positions, reference : (F, N, 3), finite
+    """
+    # the same scale for both: products of a run that has grown out of bounds would overflow
+    largest = np.abs(positions).max(initial=0.0, axis=(1, 2), keepdims=True)
+    scale = np.maximum(np.maximum(largest, np.abs(reference).max(initial=0.0)), 1.0)
+    a, b = positions / scale, reference / scale
+    a = a - a.mean(axis=1, keepdims=True)
+    b = b - b.mean(axis=1, keepdims=True)
+    u, _, vt = np.linalg.svd(np.einsum("fni,fnj->fij", a, b))
+    u[..., -1] *= np.sign(np.linalg.det(u @ vt))[:, None]
+    return np.linalg.norm(a @ u @ vt - b, axis=(1, 2)) * scale[:, 0, 0]
+
+
 def trajectory_error(difference: np.ndarray, displacement: np.ndarray) -> float | None:
     """|| Q_red - Q_fom ||_F / || Q_fom - rest ||_F from the norms of each frame (F,).
 

@@ -35,7 +35,7 @@ from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.local.guarded import guarded_rerun
 from pdrom.reduction.local.ranks import Rank, resolve_ranks
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.rerun import Rerun, displacement_norms
+from pdrom.reduction.rerun import Rerun, displacement_norms, extent_norm
 from pdrom.reduction.sampling.load import load_reduction
 from pdrom.reduction.snapshots import load_snapshots
 
@@ -105,6 +105,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
             case = _Case(
                 scene, motion, labels, settings, basis, outputs.sampling.path, trained_extent
             )
+            file.attrs["extent_norm"] = extent_norm(positions_of(fom), scene.mesh.extent)
             store = file if motion == "train" else file.create_group(motion)
             rows = pd.DataFrame(case.run(store, ranks, positions_of(fom)), columns=COLUMNS)
             whole = ["guard_frame", "guard_count", "fallback_frames"]
@@ -162,6 +163,7 @@ class _Case:
 
 def _store(store: h5py.Group, outcome: Rerun, displacement: np.ndarray, seen: GuardRecord) -> None:
     store["difference"] = outcome.difference
+    store["shape_difference"] = outcome.shape_difference
     store["error"] = outcome.difference / np.sqrt(np.mean(displacement**2))
     store["extent"] = outcome.extent
     blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame

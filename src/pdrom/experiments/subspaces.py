@@ -28,7 +28,7 @@ from pdrom.experiments.motion import Motion, training_indices, training_position
 from pdrom.experiments.scenes import RUNS, scene_of
 from pdrom.experiments.settings import BlowupExtent, Modes, PositionBasis, Tolerance
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.rerun import Rerun
+from pdrom.reduction.rerun import Rerun, extent_norm
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.hrpd import hrpd, sampled_space
 from pdrom.reduction.subspace.interpolated import Training, interpolate
@@ -107,6 +107,8 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
         file.attrs.update(attributes({"scene": config, "settings": asked}))
         for name, motion in motions.items():
             file[f"displacement/{name}"] = motion.displacement
+        start = motions["train"]
+        file.attrs["extent_norm"] = extent_norm(start.reference, start.scene.mesh.extent)
         for base, columns, kind, k, models in _subspaces(motions["train"], settings.subspace):
             store_columns(file.create_group(f"columns/{base}"), columns)
             for method, samples in models:
@@ -116,7 +118,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
                 store_model(store, labels, samples)
                 for name, motion in motions.items():
                     outcome = motion.run(model, settings.blowup_extent)
-                    for series in ("coordinates", "difference", "extent"):
+                    for series in ("coordinates", "difference", "shape_difference", "extent"):
                         store[f"{name}/{series}"] = getattr(outcome, series)
                     rows[name].append(_row(motion, labels, model, outcome))
                 log.info("%s %s: error %s", base, method, rows["train"][-1]["relative_error"])

@@ -72,6 +72,6 @@ def _verdicts(folders: Folders) -> list[str]:
     # only looked at: a job sets a damaged one aside
     if not Path(path).is_file() or check_file(path) is not Condition.INTACT:
         return []
-    table = read_table(path, ["claim", "verdict"])
-    verdicts = [f"{row.claim} {row.verdict}" for row in table.itertuples()]
-    return [f"verdicts: {', '.join(verdicts)}"]
+    table = read_table(path, ["claim", "verdict", "verdict_beyond"])
+    verdicts = [f"{r.claim} {r.verdict} / {r.verdict_beyond}" for r in table.itertuples()]
+    return [f"verdicts (as published / beyond): {', '.join(verdicts)}"]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pdrom.core.metrics import trajectory_error
+from pdrom.core.metrics import shape_differences, trajectory_error
 from pdrom.model.runs.bounded import BoundedRun
 
 
@@ -15,6 +15,7 @@ class Rerun:
 
     positions : (F' + 1, N, 3) m, the initial ones first; only finite frames
     difference : (F',) || Q_red - Q_fom ||_F of each frame, m
+    shape_difference : (F',) what is left of it without the best rigid motion of each frame, m
     extent : (F',) longest side of the bounding box over the rest extent
     blowup_frame : first frame whose extent exceeds the limit or is not finite, else None
     coordinates : (F' + 1, K, 3) of the step loop; the positions themselves outside a subspace
@@ -22,6 +23,7 @@ class Rerun:
 
     positions: np.ndarray
     difference: np.ndarray
+    shape_difference: np.ndarray
     extent: np.ndarray
     blowup_frame: int | None
     coordinates: np.ndarray
@@ -77,10 +79,16 @@ def compare(
     return Rerun(
         stacked,
         np.array(difference),
+        shape_differences(stacked[1:], reference[1 : len(stacked)]),
         np.array(extents),
         run.blowup_frame,
         stacked if same else np.stack(coordinates),
     )
+
+
+def extent_norm(reference: np.ndarray, extent: float) -> float:
+    """Frobenius norm of a frame in which every vertex is off by the rest extent, m."""
+    return extent * float(np.sqrt(reference.shape[1]))
 
 
 def displacement_norms(reference: np.ndarray) -> np.ndarray:

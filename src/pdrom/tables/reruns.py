@@ -1,14 +1,17 @@
 """Reruns of both motions with their errors, horizons and floors."""
 
+from collections.abc import Callable, Sequence
+
 import h5py
 import numpy as np
 import pandas as pd
 
 from pdrom.core.paths import File
 from pdrom.core.store import open_hdf5, read_table
-from pdrom.model.runs.horizon import error_within, floor_of, horizons
+from pdrom.model.runs.horizon import error_within, floor_of, horizons, rms_within
 from pdrom.tables.vocabulary import (
     BLOWUP_FRAME,
+    ERROR_OVER_EXTENT,
     ERROR_WITHIN,
     FINITE,
     FLOOR,
@@ -20,6 +23,7 @@ from pdrom.tables.vocabulary import (
     POSITION_BASIS,
     RELATIVE_ERROR,
     SCENE,
+    SHAPE_ERROR,
     K,
     R,
 )
@@ -28,6 +32,7 @@ COLUMNS = (
     SCENE, GROUP, METHOD, POSITION_BASIS, K, R, FRAMES, FINITE, BLOWUP_FRAME, MAX_EXTENT,
     RELATIVE_ERROR, ERROR_WITHIN, HORIZON_FRAME, FLOOR,
 )  # fmt: skip
+LENGTHS = (ERROR_OVER_EXTENT, SHAPE_ERROR)
 KEYS = ["scene", "group", "method", "position_basis", "k", "r"]  # what tells runs apart
 TRAIN = "train"
 
@@ -72,9 +77,8 @@ def _local_only(run: File, row: File, ends: dict[str, int], motion: str) -> pd.D
     with open_hdf5(run.path) as file:
         store = file if motion == TRAIN else file[motion]
         displacement = store["displacement"][...]
-        table["relative_error_within_horizon"] = [
-            _error_within(store[f"r{r:04d}"], displacement, end) for r in table.r
-        ]
+        runs = [store[f"r{r:04d}"] for r in table.r]
+        table = table.assign(**_errors(runs, displacement, file.attrs["extent_norm"], end))
     return table.assign(position_basis="full", k=None)
 
 
@@ -84,12 +88,26 @@ def _subspace(run: File, row: File, ends: dict[str, int], motion: str) -> pd.Dat
     with open_hdf5(run.path) as file:
         displacement = file[f"displacement/{motion}"][...]
         models = [f"{t.position_basis}_k{t.k:03d}_{t.method}" for t in table.itertuples()]
-        table["relative_error_within_horizon"] = [
-            _error_within(file[f"models/{model}/{motion}"], displacement, end) for model in models
-        ]
+        runs = [file[f"models/{model}/{motion}"] for model in models]
+        table = table.assign(**_errors(runs, displacement, file.attrs["extent_norm"], end))
     return table
 
 
-def _error_within(run: h5py.Group, displacement: np.ndarray, end: int) -> float | None:
-    """Relative error before the horizon; a run of a size beyond the rank has no frames."""
-    return error_within(run["difference"][...], displacement, end) if "difference" in run else None
+def _errors(
+    runs: Sequence[h5py.Group], displacement: np.ndarray, extent_norm: float, end: int
+) -> dict[str, list[float | None]]:
+    """Errors before the horizon; a run of a size beyond the rank has no frames and no errors."""
+
+    def each(series: str, error: Callable[[np.ndarray], float | None]) -> list[float | None]:
+        return [error(run[series][...]) if series in run else None for run in runs]
+
+    def over_extent(difference: np.ndarray) -> float | None:
+        return rms_within(difference, extent_norm, end)
+
+    return {
+        "relative_error_within_horizon": each(
+            "difference", lambda difference: error_within(difference, displacement, end)
+        ),
+        "error_over_extent": each("difference", over_extent),
+        "shape_error": each("shape_difference", over_extent),
+    }

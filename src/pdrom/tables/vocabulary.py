@@ -20,6 +20,13 @@ GAIN = number("gain", "norm of the inverse of the sampled modes; inf if they are
 ENERGY_RATIO = number("energy_ratio", "largest energy over that of the full-order run")
 RELATIVE_ERROR = number("relative_error", "error of the positions over all frames")
 ERROR_WITHIN = number("relative_error_within_horizon", "error of the positions before the horizon")
+ERROR_OVER_EXTENT = number(
+    "error_over_extent",
+    "distance of a vertex (root mean square) before the horizon, over the extent",
+)
+SHAPE_ERROR = number(
+    "shape_error", "the same with the best rigid motion of each frame taken out: of the shape"
+)
 HORIZON_FRAME = integer("horizon_frame", "first frame that cannot be judged: the scene's horizon")
 FLOOR = number("sensitivity_floor", "largest drift of perturbed runs before the horizon")
 GUARD_FRAME = integer("guard_frame", "first frame in which the guard saw something")

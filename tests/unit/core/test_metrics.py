@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
-from pdrom.core.metrics import relative_errors, squared_norms, trajectory_error
+from pdrom.core.metrics import relative_errors, shape_differences, squared_norms, trajectory_error
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -83,3 +84,33 @@ def test_trajectory_error_weighs_frames_by_their_motion():
 @pytest.mark.parametrize("frames", [0, 3])
 def test_a_run_at_rest_has_no_trajectory_error(frames):
     assert trajectory_error(np.ones(frames), np.zeros(frames)) is None
+
+
+@settings(max_examples=25)
+@given(SEEDS)
+def test_a_rigid_motion_leaves_the_shape(seed):
+    """Its error is round-off; that of SciPy's best rotation is met otherwise."""
+    rng = np.random.default_rng(seed)
+    shape, moved = rng.normal(size=(2, 9, 3)), rng.normal(size=3)
+    rotation = Rotation.random(random_state=seed)
+    rigid = np.stack([rotation.apply(frame) + moved for frame in shape])
+    assert shape_differences(rigid, shape) == pytest.approx(np.zeros(2), abs=1e-13)
+    other = rng.normal(size=(2, 9, 3))
+    centred = [x - x.mean(axis=1, keepdims=True) for x in (other, shape)]
+    expected = [Rotation.align_vectors(b, a)[1] for a, b in zip(*centred, strict=True)]
+    assert shape_differences(other, shape) == pytest.approx(expected)
+
+
+def test_a_mirror_image_is_another_shape():
+    shape = np.random.default_rng(1).normal(size=(1, 9, 3))
+    assert shape_differences(shape * [1.0, 1.0, -1.0], shape)[0] > 0.1
+
+
+def test_shapes_of_flat_and_of_far_grown_frames_are_finite():
+    flat = np.random.default_rng(2).normal(size=(1, 9, 3)) * [1.0, 1.0, 0.0]
+    assert shape_differences(flat, flat)[0] == pytest.approx(0.0, abs=1e-13)
+    assert shape_differences(np.zeros((1, 9, 3)), flat)[0] == pytest.approx(
+        np.linalg.norm(flat - flat.mean(axis=1))
+    )
+    assert np.isfinite(shape_differences(1e200 * flat, flat)).all()
+    assert len(shape_differences(np.zeros((0, 9, 3)), np.zeros((0, 9, 3)))) == 0

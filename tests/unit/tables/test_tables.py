@@ -183,12 +183,14 @@ def files(tmp_path) -> Files:
         folder.mkdir(parents=True)
         rows = []
         with write_hdf5(folder / "deim.h5") as file:
+            file.attrs["extent_norm"] = 2.0
             for store in (file, file.create_group("heldout")):
                 store["displacement"] = DISPLACEMENT
                 for r, difference in runs.items():
                     run = store.create_group(f"r{r:04d}")
                     if difference is not None:
                         run["difference"] = difference
+                        run["shape_difference"] = np.divide(difference, 10.0)
         for r, difference in runs.items():
             row = {"scene": scene, "group": "spring", "method": "deim", "r": r, "frames": 0}
             if difference is not None:
@@ -206,11 +208,14 @@ def files(tmp_path) -> Files:
     folder.mkdir(parents=True)
     models = {("pod", 8, "full"): [0.4] * 4, ("pod", 8, "ecsw-1e-02"): [0.8] * 4}
     with write_hdf5(folder / "models.h5") as file:
+        file.attrs["extent_norm"] = 4.0
         for motion in ("train", "heldout"):
             file[f"displacement/{motion}"] = DISPLACEMENT
         for (base, k, method), difference in models.items():
             for motion in ("train", "heldout"):
-                file[f"models/{base}_k{k:03d}_{method}/{motion}/difference"] = difference
+                run = f"models/{base}_k{k:03d}_{method}/{motion}"
+                file[f"{run}/difference"] = difference
+                file[f"{run}/shape_difference"] = np.divide(difference, 10.0)
     rows = [
         {"scene": "b", "group": "all", "method": m, "position_basis": p, "k": k, "r": 33,
          "frames": 4, "finite": True, "max_extent": 1.0, "relative_error": 0.1}
@@ -243,6 +248,15 @@ def files(tmp_path) -> Files:
         ),
     ]  # fmt: skip
     return Files(reruns, subspaces, timings, sensitivity(sensitivity_files(tmp_path)))
+
+
+def test_errors_in_units_of_the_extent(files):
+    """Root mean squares before the horizon, which is 2 for scene a, over the norm of the extent."""
+    table = files.reduced()
+    assert table.error_over_extent[0] == pytest.approx(np.sqrt(0.025) / 2.0)
+    assert table.error_over_extent[[3, 5]].tolist() == pytest.approx([0.05, 0.1])
+    assert table.error_over_extent[[1, 2, 4]].isna().all()
+    np.testing.assert_allclose(table.shape_error, table.error_over_extent / 10.0)
 
 
 def error(difference, end) -> float:

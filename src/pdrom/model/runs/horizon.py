@@ -41,6 +41,13 @@ def horizons(table: pd.DataFrame, perturbation: float | str, threshold: float) -
     return {s: horizon(floor_of(table, s, perturbation), threshold) for s in scenes}
 
 
+def rms_within(difference: np.ndarray, norm: float, end: int) -> float | None:
+    """Root mean square over the frames before ``end``, over ``norm``; None as `error_within`."""
+    if len(difference) < end or end == 0:
+        return None
+    return float(np.sqrt(np.mean(np.square(difference[:end] / norm))))
+
+
 def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> float | None:
     """Relative error over the frames before ``end``; None if the run did not get there.
 
