@@ -31,6 +31,10 @@ class SceneError(PdromError):
     """A scene contradicts itself or its mesh: an empty selection, a wrong element."""
 
 
+class NotReducibleError(SceneError):
+    """An effect of the scene that a position subspace does not take."""
+
+
 class SolverError(PdromError):
     """The global system cannot be factored or solved."""
 

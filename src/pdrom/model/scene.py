@@ -176,6 +176,8 @@ class Scene:
         check_holds(scene.boundaries, config.name, config.frames)
         for group in scene.groups:
             group.threads = threads
+        for force in scene.forces:
+            force.time_step = config.time_step
         return scene
 
     def log_holds(self) -> None:

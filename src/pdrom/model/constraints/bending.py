@@ -24,12 +24,12 @@ from pdrom.model.constraints.half_spheres import (
 from pdrom.model.constraints.lanes import workspace
 from pdrom.model.constraints.parts import Parts
 from pdrom.model.constraints.surface import (
-    barycentric_areas,
     cotangent_laplacian,
     fan_normals,
     interior_vertices,
     vertex_fans,
 )
+from pdrom.model.mesh.measures import barycentric_areas
 from pdrom.model.mesh.types import Mesh
 
 # Rest curvature below this (relative to the cancelling terms) is flat: it has no side to keep.

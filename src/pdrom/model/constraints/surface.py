@@ -1,4 +1,4 @@
-"""Vertices of a triangle mesh: areas, normals, cotangent Laplacian."""
+"""Vertices of a triangle mesh: normals, cotangent Laplacian."""
 
 import math
 
@@ -23,13 +23,6 @@ def interior_vertices(triangles: np.ndarray, vertices: int) -> np.ndarray:
     inside = np.ones(vertices, dtype=bool)
     inside[unique[count == 1]] = False
     return np.flatnonzero(inside)
-
-
-def barycentric_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """A third of the area of the adjacent triangles, (N,) m^2."""
-    a, b, c = (points[triangles[:, i]] for i in range(3))
-    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return np.bincount(triangles.ravel(), np.repeat(area / 3.0, 3), minlength=len(points))
 
 
 def cotangent_laplacian(points: np.ndarray, triangles: np.ndarray) -> sparse.csr_array:

@@ -7,6 +7,8 @@ EFFECTS = Registry(
     {
         "gravity": "pdrom.model.effects.gravity:Gravity",
         "damping": "pdrom.model.effects.damping:Damping",
+        "drag": "pdrom.model.effects.drag:Drag",
+        "wind": "pdrom.model.effects.wind:Wind",
         "floor": "pdrom.model.effects.floor:Floor",
         "kick": "pdrom.model.effects.kick:Kick",
         "pins": "pdrom.model.effects.hold:Pins",

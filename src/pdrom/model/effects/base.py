@@ -8,7 +8,7 @@ asks each role only for the effects that the scene lists:
 role           question of the step loop                            examples
 =============  ===================================================  =========================
 `Start`        initial velocity                                     kick
-`Force`        acceleration of the frame                            gravity
+`Force`        acceleration of the frame                            gravity, wind
 `Boundary`     which vertices are held, and where                   pins, translate, poke
 `Contact`      correction of the end-of-frame positions             floor
 constraint     local projection and its operator                    spring, strain (in
@@ -17,7 +17,7 @@ group                                                               `pdrom.model
 """
 
 from abc import ABC, abstractmethod
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from pydantic import Field
@@ -73,6 +73,9 @@ class Effect(ABC):
 
     Config: type[EffectConfig]
 
+    in_subspace: ClassVar[bool] = True
+    """Whether a position subspace takes the effect; one that it does not take is refused there."""
+
     def __init__(self, config: EffectConfig, mesh: Mesh, masses: np.ndarray) -> None:
         self.config: Any = config
         self.name: str = config.effect
@@ -87,7 +90,13 @@ class Start(Effect):
 
 
 class Force(Effect):
-    """Accelerates the vertices."""
+    """Accelerates the vertices.
+
+    A position subspace takes forces that are affine in the velocity, with a rate for each vertex.
+    """
+
+    time_step: float
+    """Step h of the run in seconds, which the scene sets: no force may overshoot in a frame."""
 
     @abstractmethod
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:

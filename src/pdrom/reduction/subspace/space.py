@@ -10,11 +10,11 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import linalg
 
-from pdrom.core.errors import SceneError, SolverError
+from pdrom.core.errors import NotReducibleError, SolverError
 from pdrom.model.dynamics.space import Solve, Space
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.dynamics.system import require_accurate
-from pdrom.model.effects.base import Boundary, Contact
+from pdrom.model.effects.base import Boundary, Contact, Effect
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.columns import Columns
 
@@ -69,6 +69,7 @@ class ReducedSpace(Space):
     """
 
     def __init__(self, scene: Scene, columns: Columns, matrices: Sequence[np.ndarray]) -> None:
+        _require_reducible([*scene.forces, *scene.boundaries, *scene.contacts])
         h = scene.config.time_step
         self.columns = columns
         mass = columns.B.T @ (scene.masses[:, None] * columns.B)
@@ -83,7 +84,7 @@ class ReducedSpace(Space):
         total = np.zeros_like(positions)
         for constant, rate in self._forces:
             total += constant
-            total += rate * velocities
+            total += rate @ velocities if np.ndim(rate) else rate * velocities
         return total
 
     def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -111,6 +112,13 @@ class ReducedSpace(Space):
     def correct(self, y: np.ndarray) -> None:
         for contact in self._contacts:
             contact.correct(y)
+
+
+def _require_reducible(effects: Sequence[Effect]) -> None:
+    """NotReducibleError for the first effect that no position subspace takes."""
+    for effect in effects:
+        if not effect.in_subspace:
+            raise NotReducibleError(f"effect '{effect.name}' needs all vertices in every frame")
 
 
 def coordinates(columns: Columns, masses: np.ndarray, field: np.ndarray) -> np.ndarray:
@@ -141,17 +149,24 @@ def reduced_state(scene: Scene, columns: Columns) -> State:
 def _reduce_force(force, columns: Columns, mass: np.ndarray, scene: Scene):
     """A force as (constant coordinates (K, 3), rate): a = constant + rate v.
 
-    The forces of this project are affine in the velocity with one rate for all vertices; another
-    one is refused, not approximated.
+    It has to be affine in the velocity, with one rate for all vertices (a number) or one for each
+    of them (a matrix (K, K), which is exact as well); another force is refused, not approximated.
     """
     shape = scene.mesh.points.shape
     rng = np.random.default_rng(0)
     q, v = rng.standard_normal(shape), rng.standard_normal(shape)
     constant = np.broadcast_to(force.acceleration(scene.mesh.points, np.zeros(shape)), shape)
     rate = float(np.sum((force.acceleration(q, v) - constant) * v) / np.sum(v * v))
-    if not np.allclose(force.acceleration(q, v), constant + rate * v, rtol=1e-12, atol=1e-12):
-        raise SceneError(f"effect '{force.name}' is not affine in the velocity: not reducible")
-    return coordinates(columns, scene.masses, constant), rate
+    found = force.acceleration(q, v)
+    if np.allclose(found, constant + rate * v, rtol=1e-12, atol=1e-12):
+        return coordinates(columns, scene.masses, constant), rate
+    rates = (force.acceleration(q, np.ones(shape)) - constant)[:, :1]
+    if not np.allclose(found, constant + rates * v, rtol=1e-12, atol=1e-12):
+        raise NotReducibleError(f"effect '{force.name}' is not affine in the velocity")
+    return (
+        coordinates(columns, scene.masses, constant),
+        coordinates(columns, scene.masses, rates * columns.B),
+    )
 
 
 class _ReducedBoundary:
