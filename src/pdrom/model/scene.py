@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import (
@@ -22,9 +22,11 @@ from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import LocalStep, State, Stepper
 from pdrom.model.dynamics.system import DEFAULT_SOLVER, GlobalSystem
 from pdrom.model.effects import EFFECTS
-from pdrom.model.effects.base import Boundary, Contact, Effect, EffectConfig, Force, Seed, Start
-from pdrom.model.effects.entries import effect_config
+from pdrom.model.effects.base import Boundary, Contact, EffectConfig, Force, Start
+from pdrom.model.effects.entries import bind, effect_config
+from pdrom.model.held_out import HeldOut
 from pdrom.model.holding import check_holds, log_holds
+from pdrom.model.masses import Mass, MassConfig, vertex_masses
 from pdrom.model.mesh.checks import check_mesh
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.mesh.types import Mesh
@@ -35,20 +37,6 @@ MAX_VERTEX_FRAMES = 160_000_000
 
 class _Model(ConfigModel):
     """Base of the sections of a scene."""
-
-
-class HeldOut(_Model):
-    """How the held-out trajectory differs from the training one.
-
-    ``frames_factor`` stretches every handle and schedule in time (another speed), ``reverse`` turns
-    the handles' direction round, ``kick`` adds an initial velocity (m/s, seeded).
-    """
-
-    frames_factor: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.25
-    reverse: bool = False
-    kick: Annotated[float, Field(ge=0.0, le=1e3)] = 0.0
-    kick_axes: Annotated[tuple[Literal["x", "y", "z"], ...], Field(min_length=1)] = ("x", "y", "z")
-    seed: Seed = 1
 
 
 class ReductionPlan(_Model):
@@ -67,7 +55,8 @@ class SceneConfig(_Model):
     iterations: Annotated[int, Field(ge=1, le=10_000)] = 10
     anderson_window: Annotated[int, Field(ge=0, le=50)] = 0
     frames: Annotated[int, Field(ge=1, le=1_000_000)]
-    vertex_mass: Annotated[float, Field(ge=1e-150, le=1e150)] = 10.0
+    vertex_mass: Mass = 10.0
+    masses: tuple[MassConfig, ...] = ()
     effects: tuple[SerializeAsAny[EffectConfig], ...]
     reduce: dict[str, ReductionPlan] = Field(default_factory=dict)
     held_out: HeldOut = HeldOut()
@@ -127,14 +116,7 @@ class SceneConfig(_Model):
 
     def heldout_variant(self) -> Self:
         """The scene of the held-out trajectory (see `HeldOut`)."""
-        plan = self.held_out
-        effects = [e.with_frames_scaled(plan.frames_factor) for e in self.effects]
-        if plan.reverse:
-            effects = [e.reversed() for e in effects]
-        if plan.kick:
-            kick = {"effect": "kick", "speed": plan.kick, "seed": plan.seed}
-            effects.append(effect_config({**kick, "axes": plan.kick_axes}, len(effects)))
-        return self.model_copy(update={"effects": tuple(effects)})
+        return self.model_copy(update={"effects": self.held_out.variant(self.effects)})
 
 
 @dataclass(frozen=True)
@@ -151,8 +133,19 @@ class Scene:
     starts: list[Start]
 
     @classmethod
-    def build(cls, config: SceneConfig, mesh: Mesh, threads: int = 1) -> "Scene":
-        """Bind ``config`` to ``mesh``; ``threads`` (1 or 2) share the local step of large groups.
+    def build(
+        cls,
+        config: SceneConfig,
+        mesh: Mesh,
+        threads: int = 1,
+        masses: np.ndarray | None = None,
+    ) -> "Scene":
+        """Bind ``config`` to ``mesh``.
+
+        Parameters
+        ----------
+        threads : 1 or 2 of them share the local step of large groups
+        masses : (N,) kg in place of those of ``config``
 
         Raises
         ------
@@ -161,8 +154,9 @@ class Scene:
         """
         check_mesh(mesh, config.name)
         _check_size(config, mesh)
-        masses = np.full(mesh.vertices, config.vertex_mass)
-        effects = [_bind(entry, config.name, mesh, masses) for entry in config.effects]
+        if masses is None:
+            masses = vertex_masses(mesh, config.name, config.vertex_mass, config.masses)
+        effects = [bind(entry, config.name, mesh, masses) for entry in config.effects]
         scene = cls(
             config,
             mesh,
@@ -234,13 +228,6 @@ class Scene:
     def space(self, system: GlobalSystem) -> VertexSpace:
         """Vertex positions as the coordinates of the step loop."""
         return VertexSpace(system, self.forces, self.boundaries, self.contacts)
-
-
-def _bind(config: EffectConfig, scene: str, mesh: Mesh, masses: np.ndarray) -> Effect:
-    try:
-        return EFFECTS.load(config.effect)(config, mesh, masses)
-    except SceneError as error:
-        raise SceneError(f"scene '{scene}', effect '{config.effect}': {error}") from error
 
 
 def _check_size(config: SceneConfig, mesh: Mesh) -> None:

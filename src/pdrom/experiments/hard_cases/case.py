@@ -79,8 +79,4 @@ def build(
         },
         "hard case",
     )
-    scene = Scene.build(config, mesh)
-    if masses is None:
-        return scene
-    fields = {name: getattr(scene, name) for name in Scene.__dataclass_fields__}
-    return Scene(**{**fields, "masses": masses})
+    return Scene.build(config, mesh, masses=masses)

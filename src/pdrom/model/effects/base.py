@@ -33,7 +33,6 @@ class ScaledWithFrames:
 FrameNumber = Annotated[int, Field(ge=0, le=1_000_000), ScaledWithFrames()]
 Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
 Vector = tuple[Length, Length, Length]
-Selection = str | tuple[int, ...]
 
 
 class EffectConfig(ConfigModel):

@@ -1,13 +1,15 @@
-"""Entries of a scene's list of effects, as typed configurations."""
+"""Entries of a scene's list of effects: as typed configurations, and bound to a mesh."""
 
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
-from pdrom.core.errors import ConfigurationError
+from pdrom.core.errors import ConfigurationError, SceneError
 from pdrom.core.yamlfile import describe, shown
 from pdrom.model.effects import EFFECTS
-from pdrom.model.effects.base import EffectConfig
+from pdrom.model.effects.base import Effect, EffectConfig
+from pdrom.model.mesh.types import Mesh
 
 
 def effect_config(entry: Any, index: int) -> EffectConfig:
@@ -25,3 +27,11 @@ def effect_config(entry: Any, index: int) -> EffectConfig:
     except ValidationError as error:
         fault = describe(error, model)
         raise ValueError(f"effects[{index}] ({entry['effect']}): {fault}") from error
+
+
+def bind(config: EffectConfig, scene: str, mesh: Mesh, masses: np.ndarray) -> Effect:
+    """The effect on a mesh with vertex ``masses`` (N,) kg; SceneError names scene and effect."""
+    try:
+        return EFFECTS.load(config.effect)(config, mesh, masses)
+    except SceneError as error:
+        raise SceneError(f"scene '{scene}', effect '{config.effect}': {error}") from error

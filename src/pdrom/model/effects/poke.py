@@ -7,9 +7,10 @@ from pydantic import Field
 
 from pdrom.core.errors import SceneError
 from pdrom.core.yamlfile import Length
-from pdrom.model.effects.base import Boundary, EffectConfig, FrameNumber, Selection
+from pdrom.model.effects.base import Boundary, EffectConfig, FrameNumber
 from pdrom.model.effects.hold import AXES
 from pdrom.model.mesh.select import farthest_points, select_vertices
+from pdrom.model.mesh.selection import Selection
 from pdrom.model.mesh.types import Mesh
 
 # displacement over amplitude at equally spaced times: 0 -> -z -> +z -> -z -> 0

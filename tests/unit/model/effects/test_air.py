@@ -70,7 +70,11 @@ def test_energy_relative_to_the_air_never_grows(seed, speed, mass, effect):
     """For any wind up to 1e6 m/s, any state, light and heavy vertices."""
     rng = np.random.default_rng(seed)
     wind = 10.0**speed * rng.uniform(-1.0, 1.0, 3) if effect else np.zeros(3)
-    air = {"effect": "wind", "velocity": tuple(wind)} if effect else {"effect": "drag", "coefficient": 10.0**speed}
+    air = (
+        {"effect": "wind", "velocity": tuple(wind)}
+        if effect
+        else {"effect": "drag", "coefficient": 10.0**speed}
+    )
     scene = make_scene(SPRING, air, vertex_mass=10.0**mass)
     q = rng.standard_normal(scene.mesh.points.shape)
     v = rng.standard_normal(q.shape) * 10.0 ** rng.uniform(-2, 5)

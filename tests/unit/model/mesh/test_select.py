@@ -1,0 +1,154 @@
+"""Selections: each picks what a loop over the vertices picks, and faults name key and value."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import TypeAdapter, ValidationError
+
+from conftest import make_scene
+from pdrom.core.errors import SceneError
+from pdrom.model.mesh.generators import bar, cloth
+from pdrom.model.mesh.select import select_vertices
+from pdrom.model.mesh.selection import KINDS, Selection
+from pdrom.model.mesh.types import Mesh
+
+SELECTION = TypeAdapter(Selection)
+SHEET = cloth(6, 5, "xy")
+SPRING = {"effect": "spring", "weight": 1.0}
+
+
+def chosen(selection, mesh=SHEET):
+    return select_vertices(mesh, SELECTION.validate_python(selection)).tolist()
+
+
+def where(holds, mesh=SHEET):
+    return [v for v, point in enumerate(mesh.points) if holds(point)]
+
+
+def disc_with_holes():
+    """A sheet of 9 x 9 without three of its inner vertices, two of them neighbours."""
+    mesh = cloth(9, 9, "xz")
+    gone = [20, 59, 60]
+    kept = ~np.isin(mesh.triangles, gone).any(axis=1)
+    left = np.setdiff1d(np.arange(81), gone)
+    number = np.full(81, -1)
+    number[left] = np.arange(len(left))
+    return Mesh(mesh.points[left], number[mesh.triangles[kept]].astype(np.int32))
+
+
+def test_box():
+    box = {"kind": "box", "lower": [-0.23, 2.13, -1], "upper": [0.33, 2.41, 1]}
+    expected = where(lambda p: -0.23 <= p[0] <= 0.33 and 2.13 <= p[1] <= 2.41)
+    assert chosen(box) == expected != []
+
+
+def test_sphere():
+    centre, radius = np.array([0.1, 2.3, 0.0]), 0.31
+    expected = where(lambda p: np.linalg.norm(p - centre) <= radius)
+    assert chosen({"kind": "sphere", "centre": list(centre), "radius": radius}) == expected != []
+
+
+def test_plane_of_any_length_of_normal():
+    point, normal = np.array([0.0, 2.1, 0.0]), np.array([3.0, -4.0, 0.0])
+    expected = where(lambda p: (p - point) @ normal >= -1e-9)
+    assert chosen({"kind": "plane", "point": list(point), "normal": list(normal)}) == expected != []
+
+
+@pytest.mark.parametrize("point", [0, 13, 29])
+def test_nearest(point):
+    near = SHEET.points[point] + [0.01, -0.01, 3.0]
+    assert chosen({"kind": "nearest", "point": near.tolist()}) == [point]
+    five = chosen({"kind": "nearest", "point": near.tolist(), "count": 5})
+    distance = np.linalg.norm(SHEET.points - near, axis=1)
+    assert distance[five].max() <= np.delete(distance, five).min() + 1e-9
+
+
+def test_equally_near_vertices_are_taken_from_the_first():
+    square = cloth(3, 3, "xz")
+    assert chosen({"kind": "nearest", "point": [0, 2, 0], "count": 2}, square) == [1, 4]
+
+
+def test_boundary_loops_from_the_longest():
+    mesh = disc_with_holes()
+    loops = [chosen({"kind": "boundary_loop", "index": i}, mesh) for i in range(3)]
+    rim = {v for side in ("left", "right", "back", "front") for v in chosen(side, mesh)}
+    assert set(loops[0]) == rim
+    # a hole of two vertices has a longer rim than a hole of one
+    assert [len(loop) for loop in loops] == [32, 8, 6]
+    with pytest.raises(SceneError, match="index = 3, the mesh has 3"):
+        chosen({"kind": "boundary_loop", "index": 3}, mesh)
+
+
+def test_a_closed_surface_has_no_loop():
+    with pytest.raises(SceneError, match="boundary loop: index = 0, the mesh has 0"):
+        chosen({"kind": "boundary_loop"}, bar(3, 3, 3))
+
+
+def test_components_from_the_largest():
+    small, large = cloth(3, 3, "xz"), cloth(4, 4, "xz")
+    points = np.concatenate([small.points, large.points + np.array([5.0, 0.0, 0.0])])
+    mesh = Mesh(points, np.concatenate([small.triangles, large.triangles + 9]).astype(np.int32))
+    assert chosen({"kind": "component"}, mesh) == list(range(9, 25))
+    assert chosen({"kind": "component", "index": 1}, mesh) == list(range(9))
+
+
+def test_combinations_are_those_of_sets():
+    left, top, ball = "left", [1, 2, 3, 7], {"kind": "sphere", "centre": [0, 2.5, 0], "radius": 0.4}
+    sets = [set(chosen(part)) for part in (left, top, ball)]
+    assert set(chosen({"kind": "union", "of": [left, top, ball]})) == set.union(*sets)
+    both = {"kind": "intersection", "of": [top, {"kind": "complement", "of": ball}]}
+    assert set(chosen(both)) == sets[1] - sets[2]
+
+
+@given(
+    first=st.sets(st.integers(0, 29), min_size=1), second=st.sets(st.integers(0, 29), min_size=1)
+)
+def test_de_morgan(first, second):
+    def without(of):
+        return {"kind": "complement", "of": of}
+
+    a, b = sorted(first), sorted(second)
+    left = without({"kind": "union", "of": [a, b]})
+    right = {"kind": "intersection", "of": [without(a), without(b)]}
+    if first | second == set(range(30)):
+        for empty in (left, right):
+            with pytest.raises(SceneError, match="selects no vertex"):
+                chosen(empty)
+    else:
+        assert chosen(left) == chosen(right)
+
+
+@pytest.mark.parametrize(
+    ("select", "message"),
+    [
+        (3.5, r"select = 3.5: a side, a list of vertices, or a mapping whose kind is one of box"),
+        ({"kind": "bxo"}, f"one of {', '.join(KINDS)}"),
+        ({"kind": "box", "lower": [0, 0, 0]}, "select.box.upper' is missing"),
+        ({"kind": "box", "lower": [0, 0, 1], "upper": [1, 1, 0]}, "lower = 1 exceeds upper = 0 al"),
+        ({"kind": "sphere", "centre": [0, 0, 0], "radius": 0}, "select.sphere.radius = 0"),
+        ({"kind": "plane", "point": [0, 0, 0], "normal": [0, 0, 0]}, "has no direction"),
+        ({"kind": "union", "of": []}, "select.union.of"),
+        ({"kind": "complement", "of": {"kind": "nearest", "pt": 1}}, "complement.of.nearest.pt"),
+        ([0, "a"], "select.vertices.1 = 'a'"),
+    ],
+)
+def test_faults_name_key_and_value(select, message):
+    with pytest.raises(ValidationError, match=message):
+        make_scene(SPRING, {"effect": "pins", "select": select})
+
+
+@pytest.mark.parametrize(
+    ("select", "message"),
+    [
+        ({"kind": "component", "index": 1}, "component: index = 1, the mesh has 1"),
+        ({"kind": "nearest", "point": [0, 0, 0], "count": 31}, "count = 31 of 30 vertices"),
+        ({"kind": "union", "of": ["top", "middle"]}, "selection 'middle': allowed are left"),
+        ({"kind": "complement", "of": list(range(30))}, "selects no vertex"),
+        ([], "selects no vertex"),
+        ([30], "selection holds 30: allowed are 0 to 29"),
+    ],
+)
+def test_what_the_mesh_does_not_have_is_named(select, message):
+    with pytest.raises(SceneError, match=f"scene 'test', effect 'pins': .*{message}"):
+        make_scene(SPRING, {"effect": "pins", "select": select})
