@@ -41,8 +41,8 @@ class Space(ABC):
         """1/(2 h^2) |M^1/2 difference|^2 in joule."""
 
     @abstractmethod
-    def correct(self, y: np.ndarray) -> None:
-        """Contacts at the end of a frame, in place."""
+    def correct(self, y: np.ndarray, before: np.ndarray) -> None:
+        """Contacts at the end of a frame, in place; ``before`` are its first coordinates."""
 
 
 class VertexSpace(Space):
@@ -86,6 +86,6 @@ class VertexSpace(Space):
         squares = np.einsum("ij,ij->i", difference, difference)
         return 0.5 * float(self.system.inertia @ squares)
 
-    def correct(self, y: np.ndarray) -> None:
+    def correct(self, y: np.ndarray, before: np.ndarray) -> None:
         for contact in self._contacts:
-            contact.correct(y)
+            contact.correct(y, before)

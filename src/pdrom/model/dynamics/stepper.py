@@ -148,5 +148,5 @@ class Stepper:
 
     def _finish(self, state: State, y: np.ndarray) -> State:
         """State after the frame: contacts, then the velocities."""
-        self.space.correct(y)
+        self.space.correct(y, state.positions)
         return State(y, (y - state.positions) / self.time_step)

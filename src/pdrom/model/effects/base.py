@@ -10,7 +10,7 @@ role           question of the step loop                            examples
 `Start`        initial velocity                                     kick
 `Force`        acceleration of the frame                            gravity, wind
 `Boundary`     which vertices are held, and where                   pins, translate, poke
-`Contact`      correction of the end-of-frame positions             floor
+`Contact`      correction of the end-of-frame positions             floor, sphere
 constraint     local projection and its operator                    spring, strain (in
 group                                                               `pdrom.model.constraints`)
 =============  ===================================================  =========================
@@ -143,5 +143,8 @@ class Contact(Effect):
     """Corrects positions at the end of a frame."""
 
     @abstractmethod
-    def correct(self, positions: np.ndarray) -> None:
-        """Change positions (N, 3) m in place."""
+    def correct(self, positions: np.ndarray, before: np.ndarray) -> None:
+        """Change positions (N, 3) m in place; ``before`` (N, 3) are those at the frame's beginning.
+
+        What a scene lists later has the last word.
+        """

@@ -25,5 +25,5 @@ class Floor(Contact):
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
 
-    def correct(self, positions: np.ndarray) -> None:
+    def correct(self, positions: np.ndarray, before: np.ndarray) -> None:
         np.maximum(positions[:, 1], self.config.height, out=positions[:, 1])

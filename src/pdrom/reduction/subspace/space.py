@@ -1,7 +1,7 @@
 """The step loop in the coordinates of a position subspace, q = B z.
 
 Everything that has the length of the mesh is used here once, before the run. During a run the
-arrays have the length of the subspace, of the held vertices, or (for a scene with a floor) of its
+arrays have the length of the subspace, of the held vertices, or (for a scene with contacts) of its
 probe vertices.
 """
 
@@ -18,7 +18,7 @@ from pdrom.model.effects.base import Boundary, Contact, Effect
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.columns import Columns
 
-# Vertices that are asked whether the floor was reached, at most.
+# Vertices that are asked whether something was hit, at most.
 PROBES = 200
 
 
@@ -109,9 +109,9 @@ class ReducedSpace(Space):
     def inertia_energy(self, difference: np.ndarray) -> float:
         return 0.5 * float(np.sum(difference * (self._inertia @ difference)))
 
-    def correct(self, y: np.ndarray) -> None:
+    def correct(self, y: np.ndarray, before: np.ndarray) -> None:
         for contact in self._contacts:
-            contact.correct(y)
+            contact.correct(y, before)
 
 
 def _require_reducible(effects: Sequence[Effect]) -> None:
@@ -209,12 +209,12 @@ class _ReducedContact:
         weighted = columns.B * scene.masses[:, None]
         self._project = _mass_solve(columns, scene.masses, weighted.T)
 
-    def correct(self, y: np.ndarray) -> None:
+    def correct(self, y: np.ndarray, before: np.ndarray) -> None:
         probed = self._probes @ y
         corrected = probed.copy()
-        self._contact.correct(corrected)
+        self._contact.correct(corrected, self._probes @ before)
         if np.array_equal(probed, corrected):
             return
         full = self._columns.B @ y
-        self._contact.correct(full)
+        self._contact.correct(full, self._columns.B @ before)
         y[...] = self._project @ full

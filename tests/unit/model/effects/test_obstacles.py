@@ -1,0 +1,162 @@
+"""Obstacles: nothing ends inside or passes through, friction is Coulomb's, the floor is a plane."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from conftest import make_scene
+from pdrom.model.runs.full_order import trajectory
+from strategies import SEEDS
+
+SPRING = {"effect": "spring", "weight": 1.0}
+OBSTACLES = {
+    "plane": {"point": [0.1, 0.2, 0.3], "normal": [1, 2, -2]},
+    "sphere": {"centre": [0.1, 0.2, 0.3], "radius": 0.7},
+    "box": {"lower": [-0.4, -0.5, -0.6], "upper": [0.7, 0.6, 0.5]},
+}
+H = 0.016
+
+
+def obstacle(name, friction=0.0, **changes):
+    effect = {"effect": name, "friction": friction, **OBSTACLES[name], **changes}
+    (made,) = make_scene(SPRING, effect).contacts
+    return made
+
+
+def distance(name, points):
+    """Signed distance to the surface, negative inside, written down independently."""
+    if name == "plane":
+        return (points - [0.1, 0.2, 0.3]) @ (np.array([1.0, 2.0, -2.0]) / 3.0)
+    if name == "sphere":
+        return np.linalg.norm(points - [0.1, 0.2, 0.3], axis=1) - 0.7
+    beyond = np.abs(points - [0.15, 0.05, -0.05]) - [0.55, 0.55, 0.55]
+    return beyond.max(axis=1)
+
+
+@pytest.mark.parametrize("name", OBSTACLES)
+@given(seed=SEEDS, size=st.floats(-3, 4), friction=st.sampled_from([0.0, 0.3, np.inf]))
+def test_nothing_ends_inside(name, seed, size, friction):
+    """From anywhere, outside or inside, with paths of any length."""
+    rng = np.random.default_rng(seed)
+    before = rng.uniform(-1.5, 1.5, (200, 3))
+    after = before + 10.0**size * rng.standard_normal((200, 3))
+    ended = after.copy()
+    obstacle(name, friction).correct(ended, before)
+    assert (distance(name, ended) >= -1e-9 * (1.0 + np.abs(after).max())).all()
+
+
+@pytest.mark.parametrize("name", OBSTACLES)
+@given(seed=SEEDS, size=st.floats(-3, 4))
+def test_paths_that_miss_are_left_alone(name, seed, size):
+    rng = np.random.default_rng(seed)
+    before = rng.uniform(-3.0, 3.0, (100, 3))
+    after = before + 10.0**size * rng.standard_normal((100, 3))
+    steps = np.linspace(0.0, 1.0, 400)[:, None, None]
+    path = (before + steps * (after - before)).reshape(-1, 3)
+    nearest = distance(name, path).reshape(400, 100).min(axis=0)
+    misses = nearest > np.linalg.norm(after - before, axis=1) / 399.0
+    ended = after.copy()
+    obstacle(name).correct(ended, before)
+    assert np.array_equal(ended[misses], after[misses])
+
+
+@pytest.mark.parametrize("name", OBSTACLES)
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_no_path_passes_through(name, friction, rng):
+    """Aimed at the middle from outside, ten thousand metres a frame: it stays on its side."""
+    middle = np.array([0.1, 0.2, 0.3])
+    direction = rng.standard_normal((300, 3))
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    before = middle + 3.0 * direction
+    before = before[distance(name, before) > 0.0]
+    ended = middle - 1e4 * (before - middle)
+    obstacle(name, friction).correct(ended, before)
+    assert (distance(name, ended) >= -1e-8).all()
+    # the body is convex: a plane parts it from where the path begins and ends
+    assert (distance(name, 0.5 * (ended + before)) >= -1e-8).all()
+
+
+def test_a_plate_without_thickness_holds_what_falls_on_it():
+    plate = obstacle("box", lower=[-2, 1, -2], upper=[2, 1, 2], friction=0.5)
+    q, v = np.array([[0.1, 1.2, 0.0]]), np.array([[1.0, -3.0, 0.0]])
+    for _ in range(100):
+        v[:, 1] -= 9.81 * H
+        ended = q + H * v
+        plate.correct(ended, q)
+        q, v = ended, (ended - q) / H
+    assert q[0, 1] == 1.0
+    assert np.abs(v).max() == 0.0
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.1, 0.4])
+def test_friction_on_a_slope_is_coulombs(mu):
+    """A point glides down a plane of 30 degrees with g (sin - mu cos), from rest."""
+    tilt = np.radians(30.0)
+    slope = obstacle("plane", mu, point=[0, 0, 0], normal=[np.sin(tilt), np.cos(tilt), 0])
+    down = np.array([np.cos(tilt), -np.sin(tilt), 0.0])
+    q, v, frames = np.zeros((1, 3)), np.zeros((1, 3)), 50
+    for _ in range(frames):
+        v[:, 1] -= 9.81 * H
+        ended = q + H * v
+        slope.correct(ended, q)
+        q, v = ended, (ended - q) / H
+    expected = 9.81 * (np.sin(tilt) - mu * np.cos(tilt)) * frames * H
+    assert v[0] == pytest.approx(expected * down)
+
+
+@pytest.mark.parametrize("mu", [0.6, 10.0, np.inf])
+def test_friction_beyond_the_slope_holds(mu):
+    """tan 30 degrees is 0.577."""
+    tilt = np.radians(30.0)
+    slope = obstacle("plane", mu, point=[0, 0, 0], normal=[np.sin(tilt), np.cos(tilt), 0])
+    q, v = np.zeros((1, 3)), np.zeros((1, 3))
+    for _ in range(50):
+        v[:, 1] -= 9.81 * H
+        ended = q + H * v
+        slope.correct(ended, q)
+        q, v = ended, (ended - q) / H
+    assert np.abs(q).max() < 1e-15
+
+
+def test_a_plane_is_a_floor():
+    """Same run up to rounding, with any friction that never gets a chance to act sideways."""
+    effects = [{"effect": "gravity"}, {"effect": "spring", "weight": 1e4}]
+    start = {"mesh": {"kind": "cloth", "rows": 5, "columns": 5, "plane": "xz", "lift": 0.3}}
+    floor = trajectory(make_scene(*effects, {"effect": "floor"}, frames=40, **start))
+    plane = trajectory(make_scene(*effects, {"effect": "plane"}, frames=40, **start))
+    assert np.abs(floor[-1, :, 1]).max() < 1e-12
+    assert np.abs(plane - floor).max() < 1e-9
+
+
+def test_a_cloth_lies_on_a_ball_and_does_not_glide_off_with_friction():
+    """Pushed sideways it glides off a smooth ball; where it sticks, it stays."""
+    effects = [
+        {"effect": "gravity", "acceleration": [3, -9.81, 0]},
+        {"effect": "spring", "weight": 1e4},
+    ]
+    mesh = {"kind": "cloth", "rows": 9, "columns": 9, "plane": "xz", "lift": 1.05}
+    moved = {}
+    for friction in (0.0, np.inf):
+        ball = {"effect": "sphere", "centre": [0, 0.5, 0], "radius": 0.5, "friction": friction}
+        last = trajectory(make_scene(*effects, ball, mesh=mesh, frames=60))[-1]
+        assert (np.linalg.norm(last - [0, 0.5, 0], axis=1) >= 0.5 - 1e-9).all()
+        moved[friction] = last[40, 0]
+    assert moved[0.0] > 0.5
+    assert abs(moved[np.inf]) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("effect", "message"),
+    [
+        ({"effect": "plane", "normal": [0, 0, 0]}, "normal = .* has no direction"),
+        ({"effect": "box", "lower": [0, 1, 0], "upper": [1, 0, 1]}, "lower = 1 exceeds upper = 0"),
+        ({"effect": "sphere", "centre": [0, 0, 0], "radius": 0}, "radius"),
+        ({"effect": "plane", "friction": -0.1}, "friction = -0.1"),
+        ({"effect": "plane", "friction": float("nan")}, "friction"),
+    ],
+)
+def test_faults_name_key_and_value(effect, message):
+    with pytest.raises(ValidationError, match=message):
+        make_scene(SPRING, effect)
