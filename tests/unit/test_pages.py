@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from pdrom.model.effects import EFFECTS
+from pdrom.model.mesh.selection import KINDS
 from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.front import completed
 from pdrom.reduction.method import MethodSpec
@@ -69,3 +71,22 @@ def test_the_readmes_scene_and_method_are_valid() -> None:
     scene, methods = map(yaml.safe_load, blocks)
     assert SceneConfig.model_validate(scene).groups == ["spring"]
     assert [MethodSpec.model_validate(method).rows for method in methods.values()] == ["scalar"]
+
+
+def test_the_effects_of_the_registry_are_listed_with_their_keys_and_what_a_subspace_takes() -> None:
+    page = (ROOT / "config" / "README.md").read_text("utf-8")
+    rows = re.findall(r"^\| `(\w+)` \| (.*) \| (yes|no)[,:]?.* \|$", page, re.MULTILINE)
+    assert sorted(name for name, _, _ in rows) == sorted(EFFECTS)
+    for name, keys, taken in rows:
+        effect = EFFECTS.load(name)
+        assert (taken == "yes") == effect.in_subspace, name
+        assert set(effect.Config.model_fields) - {"effect"} <= set(re.findall(r"`(\w+)`", keys)), (
+            name
+        )
+
+
+def test_every_kind_of_selection_is_listed() -> None:
+    page = (ROOT / "config" / "README.md").read_text("utf-8")
+    assert sorted(
+        re.findall(r"`\{kind: (\w+), (?:of|\w+)", page.split("### Selections")[1])
+    ) == sorted(KINDS)

@@ -1,0 +1,96 @@
+"""A handle along positions and rotations over time."""
+
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+from scipy.interpolate import PchipInterpolator
+from scipy.spatial.transform import Rotation
+
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.model.effects.base import Vector
+from pdrom.model.effects.hold import Hold, HoldConfig
+from pdrom.model.mesh.types import Mesh
+
+Degrees = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+
+class Key(ConfigModel):
+    """Pose ``at`` so many frames after ``start``.
+
+    offset : metres from where the handle took hold
+    turn : degrees about x, y and z as a rotation vector (its direction is the axis, its length the
+        angle), right-handed about the middle of the handle's bounding box where it took hold
+    """
+
+    at: Annotated[int, Field(ge=1, le=1_000_000)]
+    offset: Vector = (0.0, 0.0, 0.0)
+    turn: tuple[Degrees, Degrees, Degrees] = (0.0, 0.0, 0.0)
+
+
+class Keyframes(Hold):
+    """Vertices that move as a rigid body from key to key, and hold still after the last one.
+
+    Offsets and rotation vectors are interpolated: ``linear``, with a kink at each key, or
+    ``smooth``, by monotone cubics without overshoot (Fritsch and Butland 1984). Angles beyond half
+    a turn are kept, since rotation vectors are interpolated, not rotations.
+    """
+
+    class Config(HoldConfig):
+        """``keys`` in the order of time; before them, at ``start``, the handle is where it was."""
+
+        effect: Literal["keyframes"] = "keyframes"
+        keys: Annotated[tuple[Key, ...], Field(min_length=1, max_length=10_000)]
+        interpolation: Literal["linear", "smooth"] = "linear"
+
+        @model_validator(mode="after")
+        def _in_time_order(self) -> Self:
+            for before, key in zip(self.keys, self.keys[1:], strict=False):
+                if key.at <= before.at:
+                    raise ValueError(f"keys: at = {key.at} must be greater than {before.at}")
+            return self
+
+        def with_frames_scaled(self, factor: float) -> Self:
+            """Keys stay apart by one frame at least."""
+            keys: list[Key] = []
+            for key in self.keys:
+                first = keys[-1].at + 1 if keys else 1
+                keys.append(key.model_copy(update={"at": max(first, round(key.at * factor))}))
+            scaled = super().with_frames_scaled(factor)
+            return scaled.model_copy(update={"keys": tuple(keys)})
+
+        def reversed(self) -> Self:
+            keys = [
+                key.model_copy(
+                    update={name: tuple(-x for x in getattr(key, name)) for name in POSE}
+                )
+                for key in self.keys
+            ]
+            return self.model_copy(update={"keys": tuple(keys)})
+
+    moves = True
+
+    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
+        super().__init__(config, mesh, masses)
+        poses = [np.concatenate([key.offset, key.turn]) for key in config.keys]
+        self._times = np.array([0, *(key.at for key in config.keys)], dtype=float)
+        self._poses = np.stack([np.zeros(6), *poses])
+        self._smooth = config.interpolation == "smooth"
+
+    def _pose(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Offset (3,) m and rotation vector (3,) degrees at a ``time`` in frames."""
+        time = min(time, self._times[-1])
+        if self._smooth:
+            pose = PchipInterpolator(self._times, self._poses)(time)
+        else:
+            pose = np.array([np.interp(time, self._times, line) for line in self._poses.T])
+        return pose[:3], pose[3:]
+
+    def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
+        offset, turn = self._pose(frame + 1 - self.config.start)
+        middle = 0.5 * (anchor.min(axis=0) + anchor.max(axis=0))
+        rotation = Rotation.from_rotvec(turn, degrees=True)
+        return middle + rotation.apply(anchor - middle) + offset
+
+
+POSE = ("offset", "turn")

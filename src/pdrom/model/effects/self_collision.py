@@ -1,0 +1,112 @@
+"""Vertices of one body keep apart."""
+
+import logging
+from typing import Annotated, Literal
+
+import numpy as np
+from numba import njit
+from pydantic import Field
+from scipy.spatial import cKDTree
+
+from pdrom.core.yamlfile import MAX_LENGTH, MIN_LENGTH
+from pdrom.model.effects.base import Contact, EffectConfig
+from pdrom.model.mesh.types import Mesh
+
+log = logging.getLogger(__name__)
+
+# Searches for close pairs in a frame, and sweeps over the pairs of each search, at most.
+SEARCHES, SWEEPS = 20, 100
+# Pairs are looked for within this multiple of the thickness, so that a sweep meets no others.
+REACH = 1.25
+# A sweep ends when no pair is closer than this part of the thickness.
+ENOUGH = 0.95
+# Vertices of a triangle with edges of length one are no farther than this from its points.
+COVER = 1.0 / np.sqrt(3.0)
+
+
+class SelfCollision(Contact):
+    """Pairs of vertices farther apart at rest than the thickness end no frame closer than it.
+
+    Close pairs (found by a k-d tree) are moved apart along the line between them, each vertex by
+    the share of its inverse mass: momentum is kept. The sweeps over the pairs, in the order of
+    their vertices, are repeated until every distance is at least `ENOUGH` of the thickness. Where
+    many vertices are crowded together that may take further frames.
+
+    A pair that changed sides during the frame is put back. Vertices stand for the surface:
+    nothing slips between them as long as the thickness is above 0.58 edge lengths and no pair moves
+    farther towards each other than the thickness in a frame.
+    """
+
+    class Config(EffectConfig):
+        """``thickness`` in metres."""
+
+        effect: Literal["self_collision"] = "self_collision"
+        thickness: Annotated[float, Field(ge=MIN_LENGTH, le=MAX_LENGTH)]
+
+    in_subspace = False
+
+    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
+        super().__init__(config, mesh, masses)
+        self._rest, self._inverse_masses = mesh.points, 1.0 / masses
+        self._thickness = config.thickness
+        edges = mesh.edges()
+        longest = np.linalg.norm(mesh.points[edges[:, 0]] - mesh.points[edges[:, 1]], axis=1).max()
+        if config.thickness < COVER * longest:
+            log.warning(
+                "self_collision: thickness = %g: vertices slip between others above %g "
+                "(edges of up to %g)", config.thickness, COVER * longest, longest,
+            )  # fmt: skip
+
+    def correct(self, positions: np.ndarray, before: np.ndarray) -> None:
+        for _ in range(SEARCHES):
+            pairs = self._pairs(positions)
+            closest = _separate(
+                positions, before, pairs, self._inverse_masses, self._thickness, ENOUGH, SWEEPS
+            )
+            if closest >= ENOUGH * self._thickness:
+                return
+
+    def _pairs(self, positions: np.ndarray) -> np.ndarray:
+        """Pairs (n, 2) that are close now and were not at rest, in lexicographic order."""
+        if not np.isfinite(positions).all():
+            return np.empty((0, 2), dtype=np.int64)
+        close = cKDTree(positions).query_pairs(REACH * self._thickness, output_type="ndarray")
+        apart = np.linalg.norm(self._rest[close[:, 0]] - self._rest[close[:, 1]], axis=1)
+        close = close[apart > self._thickness].astype(np.int64)
+        return close[np.lexsort((close[:, 1], close[:, 0]))]
+
+
+@njit(cache=True)
+def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
+    """Move close ``pairs`` of q apart in place; the closest distance that the first sweep met."""
+    first = thickness
+    for sweep in range(sweeps):
+        closest = thickness
+        for k in range(len(pairs)):
+            i, j = pairs[k, 0], pairs[k, 1]
+            dx, dy, dz = q[j, 0] - q[i, 0], q[j, 1] - q[i, 1], q[j, 2] - q[i, 2]
+            distance = np.sqrt(dx * dx + dy * dy + dz * dz)
+            if distance >= thickness:
+                continue
+            ex = before[j, 0] - before[i, 0]
+            ey = before[j, 1] - before[i, 1]
+            ez = before[j, 2] - before[i, 2]
+            length = np.sqrt(ex * ex + ey * ey + ez * ez)
+            gap = thickness - distance
+            if length > 0.0 and dx * ex + dy * ey + dz * ez <= 0.0:
+                # it passed, or lies where no side can be told: back to the side it came from
+                along = (dx * ex + dy * ey + dz * ez) / length
+                dx, dy, dz, distance, gap = ex, ey, ez, length, thickness - along
+            elif distance == 0.0:
+                dx, dy, dz, distance = 0.0, 1.0, 0.0, 1.0
+            if thickness - gap < closest:
+                closest = thickness - gap
+            step = gap / distance / (inverse_masses[i] + inverse_masses[j])
+            for axis, d in enumerate((dx, dy, dz)):
+                q[i, axis] -= inverse_masses[i] * step * d
+                q[j, axis] += inverse_masses[j] * step * d
+        if sweep == 0:
+            first = closest
+        if closest >= enough * thickness:
+            break
+    return first
