@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from hard_cases import EXPECTED, METHODS, parameters, training
+from pdrom.experiments.hard_cases.catalogue import CASES as CATALOGUE
 from pdrom.experiments.hard_cases.catalogue import reducible_cases
-from pdrom.experiments.hard_cases.expectations import FAILURES, surprise
+from pdrom.experiments.hard_cases.expectations import FAILURES, NOT_TAKEN, surprise
 from pdrom.experiments.hard_cases.outcomes import row
 from pdrom.experiments.hard_cases.reductions import names, reduced_run
+from pdrom.model.effects import EFFECTS
 
 CASES = [*reducible_cases(), *reducible_cases(slow=True)]
 
@@ -28,6 +30,19 @@ def test_outcome_is_as_expected(name, reduction):
 def test_two_runs_give_the_same_bits(name, reduction):
     first, again = (reduced_run(training(name), reduction, METHODS, 1e3).run for _ in range(2))
     assert np.array_equal(first.positions, again.positions)
+
+
+@pytest.mark.parametrize("name", reducible_cases())
+def test_a_subspace_takes_what_the_effects_say(name):
+    """One that does not take an effect says so by name; vertex positions take every effect."""
+    case = CATALOGUE[name]
+    listed = [EFFECTS.load(effect["effect"]) for effect in case.scene.effects]
+    taken = all(effect.in_subspace for effect in listed)
+    for reduction in ("pod-full", "pod"):
+        found = row(training(name), reduction, METHODS, EXPECTED)
+        assert (found["outcome"] == NOT_TAKEN) == (reduction == "pod-full" and not taken)
+        if found["outcome"] == NOT_TAKEN:
+            assert "effect '" in found["why"]
 
 
 def test_expectations_name_reductions_that_exist():

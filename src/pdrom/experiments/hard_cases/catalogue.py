@@ -271,11 +271,72 @@ def _boundaries() -> list[HardCase]:
     ]  # fmt: skip
 
 
-CASES: dict[str, HardCase] = {
-    case.name: case
-    for part in (_squashed, _states, _meshes, _settings, _boundaries)
-    for case in part()
-}
+def _air() -> list[HardCase]:
+    """Drag and wind."""
+    storm = {"effect": "wind", "velocity": [3e3, 9e3, 3e3]}
+    return [
+        HardCase("storm", _scene(sheet, SPRING, GRAVITY, LEFT, storm),
+                 "wind of ten thousand metres a second, held on one side", FORCED, bound=20.0),
+        HardCase("storm_light", _scene(partial(sheet, wave=0.05), STRAIN, storm, vertex_mass=1e-2,
+                                       frames=10),
+                 "the same wind takes a light sheet away in one frame", FORCED, bound=20.0),
+        HardCase("syrup", _scene(small_bar, TETRAHEDRON, GRAVITY,
+                                 {"effect": "drag", "coefficient": 1e12}),
+                 "drag that stops the surface in far less than a frame", FORCED, scales(1.2, 1, 1)),
+    ]  # fmt: skip
+
+
+def _obstacles() -> list[HardCase]:
+    """Edges, tunnelling, starts inside, friction of nothing and without end."""
+    ball = {"effect": "sphere", "centre": [0, 1, 0], "radius": 0.4}
+    edge = {"effect": "box", "lower": [-0.02, 1.0, -2], "upper": [0.03, 1.9, 2], "friction": 0.5}
+    plate = {"effect": "box", "lower": [-9, 1, -9], "upper": [9, 1, 9]}
+    around = {"effect": "box", "lower": [-2, 0, -2], "upper": [2, 4, 2]}
+    slope = {"effect": "plane", "point": [0, 1.8, 0], "normal": [0.6, 0.8, 0]}
+    fast, sticky = moving((0, -1e4, 0)), {"friction": float("inf")}
+    return [
+        HardCase("box_edge", _scene(sheet, SPRING, GRAVITY, edge),
+                 "a sheet falls on the edges of a box narrower than its cells", FORCED),
+        HardCase("sphere_at_speed", _scene(small_bar, TETRAHEDRON, GRAVITY, ball, time_step=0.1),
+                 "every vertex would pass the ball in one frame", FORCED, fast, bound=4e3),
+        HardCase("plate_at_speed", _scene(sheet, SPRING, GRAVITY, plate),
+                 "a plate without thickness is hit at ten kilometres a second", FORCED, fast,
+                 bound=20.0),
+        HardCase("inside_sphere", _scene(sheet, SPRING, _with(ball, centre=[0, 2, 0], radius=0.9)),
+                 "all vertices start inside the ball, some at its centre", FORCED, bound=4.0),
+        HardCase("inside_box", _scene(small_bar, TETRAHEDRON, around),
+                 "all vertices start inside the box", FORCED, bound=10.0),
+        HardCase("frictionless", _scene(sheet, SPRING, GRAVITY, slope),
+                 "a slope without friction", FORCED),
+        HardCase("sticky", _scene(sheet, SPRING, GRAVITY, {**slope, **sticky}),
+                 "a slope with infinite friction", FORCED),
+        HardCase("keys_at_speed", _scene(sheet, STRAIN, LEFT, {
+                     "effect": "keyframes", "select": "right", "until": 10, "keys": [
+                         {"at": 1, "offset": [0, 50, 0], "turn": [720, 0, 180]},
+                         {"at": 2, "offset": [0, -50, 0]}]}),
+                 "a handle jumps a hundred extents to and fro, turns over, and lets go", FORCED),
+    ]  # fmt: skip
+
+
+def _collisions() -> list[HardCase]:
+    """Bodies that meet themselves."""
+    apart = {"effect": "self_collision", "thickness": 0.18}
+    return [
+        HardCase("collision_folded", _scene(sheet, SPRING, GRAVITY, FLOOR, apart),
+                 "vertices of different layers coincide, and fall as a heap", FORCED, folded),
+        HardCase("collision_point", _scene(small_bar, TETRAHEDRON, _with(apart, thickness=0.3)),
+                 "all vertices in one point, none of which may stay there", FORCED, scales(0, 0, 0),
+                 bound=4.0),
+        HardCase("collision_thick", _scene(sheet, SPRING, _with(apart, thickness=0.9)),
+                 "a thickness as large as the sheet, crumpled", FORCED, scrambled(0.1),
+                 bound=4.0),
+        HardCase("collision_zero", _scene(sheet, SPRING, _with(apart, thickness=0.0)),
+                 "a thickness of zero", ("refused",)),
+    ]  # fmt: skip
+
+
+PARTS = (_squashed, _states, _meshes, _settings, _boundaries, _air, _obstacles, _collisions)
+CASES: dict[str, HardCase] = {case.name: case for part in PARTS for case in part()}
 
 
 def reducible_cases(slow: bool = False) -> list[str]:

@@ -9,7 +9,7 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
 from pdrom.experiments.hard_cases.catalogue import CASES
 
-HOLDS, NOTHING = "holds", "nothing to reduce"
+HOLDS, NOTHING, NOT_TAKEN = "holds", "nothing to reduce", "not taken"
 FAILURES = ("refused", "singular", "blow-up", "distorted", "objective rises", "momentum changes")
 
 

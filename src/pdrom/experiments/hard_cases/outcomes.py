@@ -5,10 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from pdrom.core.errors import PdromError
+from pdrom.core.errors import NotReducibleError, PdromError
 from pdrom.experiments.hard_cases.case import HardCase
 from pdrom.experiments.hard_cases.checks import momentum, reach
-from pdrom.experiments.hard_cases.expectations import FAILURES, HOLDS, NOTHING, Expectation
+from pdrom.experiments.hard_cases.expectations import (
+    FAILURES,
+    HOLDS,
+    NOT_TAKEN,
+    NOTHING,
+    Expectation,
+)
 from pdrom.experiments.hard_cases.reductions import ReducedRun, Training, names, reduced_run
 from pdrom.reduction.method import MethodSpec
 
@@ -62,6 +68,8 @@ def row(
     extent = scale_of(training)
     try:
         reduced = reduced_run(training, name, methods, BLOWUP * extent)
+    except NotReducibleError as error:
+        return {"frames": 0, "outcome": NOT_TAKEN, "why": str(error)}
     except PdromError as error:
         return {"frames": 0, "finite": False, "outcome": "refused", "why": str(error)}
     outcome = outcome_of(training.case, training, reduced)

@@ -45,22 +45,23 @@ class Box(Obstacle):
         self, start: np.ndarray, end: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """A path enters where it has crossed the nearer faces of all three axes."""
-        path = end - start
-        moves = path != 0.0
+        path, rows = end - start, np.arange(len(start))
         near_face = np.where(path > 0.0, self._lower, self._upper)
         far_face = np.where(path > 0.0, self._upper, self._lower)
-        within = (start >= self._lower) & (start <= self._upper)
-        divisor = np.where(moves, path, 1.0)
-        near = np.where(moves, (near_face - start) / divisor, np.where(within, -np.inf, np.inf))
-        far = np.where(moves, (far_face - start) / divisor, np.inf)
-        axis, rows = near.argmax(axis=1), np.arange(len(start))
-        fraction = near[rows, axis]
-        # a little inside the face still is on it
-        on_face = fraction * np.abs(path[rows, axis]) >= -self._slack
-        hits = moves[rows, axis] & on_face & (fraction <= 1.0) & (far.min(axis=1) >= fraction)
+        # a path that hardly moves along an axis, or not at all: between the faces from -inf to inf
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            near, far = (near_face - start) / path, (far_face - start) / path
+            within = (start >= self._lower) & (start <= self._upper)
+            near = np.where(path != 0.0, near, np.where(within, -np.inf, np.inf))
+            far = np.where(path != 0.0, far, np.inf)
+            axis = near.argmax(axis=1)
+            fraction, moved = near[rows, axis], path[rows, axis]
+            # a little inside the face still is on it
+            on_face = fraction * np.abs(moved) >= -self._slack
+        hits = (moved != 0.0) & on_face & (fraction <= 1.0) & (far.min(axis=1) >= fraction)
         points = start + np.clip(np.where(hits, fraction, 0.0), 0.0, None)[:, None] * path
         points[rows, axis] = near_face[rows, axis]
-        return hits, points, _axis_vectors(axis, -np.sign(path[rows, axis]))
+        return hits, points, _axis_vectors(axis, -np.sign(moved))
 
 
 def _axis_vectors(axes: np.ndarray, signs: np.ndarray) -> np.ndarray:

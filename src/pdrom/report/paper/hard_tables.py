@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from pdrom.experiments.hard_cases.catalogue import CASES
-from pdrom.experiments.hard_cases.expectations import FAILURES
+from pdrom.experiments.hard_cases.expectations import FAILURES, HOLDS, NOT_TAKEN, NOTHING
 from pdrom.report.paper.macros import format_number
 from pdrom.report.paper.tabular import longtable, name, tabular
 from pdrom.report.words.text import escape
@@ -49,13 +49,17 @@ def hard_reductions(tables: Tables) -> str:
         count = part.outcome.value_counts()
         failed = part[part.outcome.isin(FAILURES)]
         why = failed.why.dropna()
-        cells = [count.get(o, 0) for o in ("holds", "nothing to reduce", "singular", "blow-up")]
+        outcomes = (HOLDS, NOTHING, NOT_TAKEN, "singular", "blow-up")
+        cells = [count.get(outcome, 0) for outcome in outcomes]
         other = len(part) - sum(cells)
         shown = escape(why.iloc[0]) if len(why) else "--"
         rows.append([name(method), *(str(c) for c in (*cells, other)), shown])
-    header = ["reduction", "holds", "nothing", "singular", "blow-up", "distorted", "why it fails"]
+    header = [
+        "reduction", "holds", "nothing", "not taken", "singular", "blow-up", "distorted",
+        "why it fails",
+    ]  # fmt: skip
     left = r">{\raggedright\arraybackslash}"
-    return tabular(header, rows, rf"lrrrrr{left}p{{6cm}}")
+    return tabular(header, rows, rf"lrrrrrr{left}p{{5.2cm}}")
 
 
 def kernel_accuracy(tables: Tables) -> str:

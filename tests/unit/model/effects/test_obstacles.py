@@ -63,6 +63,19 @@ def test_paths_that_miss_are_left_alone(name, seed, size):
 
 
 @pytest.mark.parametrize("name", OBSTACLES)
+@pytest.mark.parametrize("path", [0.0, 5e-324, 1e-300])
+def test_a_path_of_nothing_is_no_special_case(name, path):
+    """Inside, outside and on the surface of the box."""
+    before = np.array([[0.0, 0.0, 0.0], [5.0, 5.0, 5.0], [0.7, 0.0, 0.0], [0.7, 0.6, 0.5]])
+    after = before + path
+    ended = after.copy()
+    obstacle(name, 0.5).correct(ended, before)
+    assert (distance(name, ended) >= -1e-12).all()
+    outside = distance(name, before) > 1e-9
+    assert np.array_equal(ended[outside], after[outside])
+
+
+@pytest.mark.parametrize("name", OBSTACLES)
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_no_path_passes_through(name, friction, rng):
     """Aimed at the middle from outside, ten thousand metres a frame: it stays on its side."""
