@@ -55,6 +55,7 @@ class SceneArtifacts:
             settings={
                 "sensitivity.reference": section.reference,
                 "sensitivity.threshold": section.threshold,
+                "time_step": self._study.scene(scene).time_step,
             },
         )
         return order.model_dump(mode="json")

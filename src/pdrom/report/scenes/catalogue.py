@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pdrom.core.paths import (
+    ANIMATION,
+    ANIMATION_GIF,
     MESH,
     RECONSTRUCTION,
     RERUNS,
@@ -13,6 +15,7 @@ from pdrom.core.paths import (
     SCENE_RUNS,
     SENSITIVITY,
     TRAIN,
+    VTK,
     Place,
 )
 
@@ -62,6 +65,15 @@ ARTIFACTS: dict[str, SceneArtifact] = {
         "Table of the reduced runs",
         {"table": SCENE_RUNS},
         (SENSITIVITY, RECONSTRUCTION, RERUNS, RERUNS_TRAIN),
+    ),
+    "animation": SceneArtifact(
+        "Animation", {"film": ANIMATION}, (MESH, TRAIN, RERUNS), by_default=False
+    ),
+    "gif": SceneArtifact(
+        "Animation (GIF)", {"film": ANIMATION_GIF}, (MESH, TRAIN, RERUNS), by_default=False
+    ),
+    "vtk": SceneArtifact(
+        "Files for ParaView", {"collection": VTK}, (MESH, TRAIN, RERUNS), by_default=False
     ),
 }
 

@@ -16,9 +16,9 @@ from pdrom.report.figures.kit.read import RerunInfo, positions_at, rerun_errors,
 from pdrom.report.figures.kit.run_rows import Row, draw_rows, run_panel
 from pdrom.report.scenes.picture import write_picture
 from pdrom.report.scenes.results import SceneResults
+from pdrom.report.scenes.sizes import shown
 
 INSTANTS = (0.25, 0.5, 0.75, 1.0)  # of the run
-SHOWN = 20  # modes; of a reduced run the largest size up to it is drawn
 CAMERA = Camera(30.0, 20.0)
 NO_LIMIT = 100.0  # inches: the picture need not fit on a page
 
@@ -58,13 +58,6 @@ def draw(results: SceneResults) -> Figure:
     rows = [Row(f"{style.words(scene)}\nfull order", mesh, reference, windows, full)]
     rows += [Row(label, mesh, panels, windows, full) for label, panels in reduced.items()]
     return draw_rows(rows, CAMERA, NO_LIMIT)
-
-
-def shown(infos: Sequence[RerunInfo]) -> RerunInfo | None:
-    """The run of the largest size up to `SHOWN`, or of the smallest; None if none ran."""
-    ran = [info for info in infos if not info.marked]
-    small = [info for info in ran if info.r <= SHOWN]
-    return small[-1] if small else next(iter(ran), None)
 
 
 def _panels(

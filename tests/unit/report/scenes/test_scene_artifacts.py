@@ -2,19 +2,25 @@
 
 from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
+import h5py
+import imageio_ffmpeg
+import meshio
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from PIL import Image
 
 from pdrom.core.errors import ConfigurationError
+from pdrom.core.paths import FULL_ORDER, VTK
 from pdrom.core.store import check_file, read_table
 from pdrom.pipeline.scene_command import scene_arguments
 from pdrom.pipeline.study import Study
 from pdrom.report.figures.kit.read import RerunInfo
 from pdrom.report.scenes.catalogue import ARTIFACTS, default_files
-from pdrom.report.scenes.frames import SHOWN, shown
 from pdrom.report.scenes.job import make
+from pdrom.report.scenes.sizes import SHOWN, shown
 from small_scene import SCENE, order, run_jobs, small_study
 
 
@@ -102,3 +108,39 @@ def test_the_command_names_the_files(project):
 def test_what_is_misspelt_is_named(project, words, message):
     with pytest.raises(ConfigurationError, match=message):
         scene_arguments(words, project)
+
+
+def test_a_film_has_a_picture_for_each_frame_that_is_shown(finished):
+    path = Path(made(finished, "animation")["film"])
+    assert check_file(path) == "intact"
+    frames = imageio_ffmpeg.read_frames(str(path))
+    about = next(frames)
+    shots = [np.frombuffer(shot, np.uint8) for shot in frames]
+    assert about["codec"] == "h264"
+    assert len(shots) == 5  # 8 frames of 0.016 s in steps of 2, and the start
+    assert len({len(shot) for shot in shots}) == 1
+    assert np.abs(shots[0].astype(int) - shots[-1]).max() > 50
+
+
+def test_a_gif_moves_at_the_same_speed_for_ever(finished):
+    with Image.open(made(finished, "gif")["film"]) as film:
+        assert film.n_frames == 5
+        assert film.info["loop"] == 0
+        assert film.info["duration"] == pytest.approx(1000 * 2 * 0.016, abs=10)
+
+
+def test_paraview_gets_every_frame_with_its_time(finished):
+    study, results = finished
+    stray = Path(VTK.at(results, scene=SCENE)).with_name("frame_00099.vtu")
+    stray.parent.mkdir(parents=True, exist_ok=True)
+    stray.write_text("of a longer run")
+    path = Path(made(finished, "vtk")["collection"])
+    listed = ElementTree.parse(path).findall("Collection/DataSet")
+    assert [float(d.get("timestep")) for d in listed] == pytest.approx(0.016 * np.arange(9))
+    assert {d.get("file") for d in listed} == {p.name for p in path.parent.glob("*.vtu")}
+    with h5py.File(FULL_ORDER.at(results, scene=SCENE, run="train")) as run:
+        last, velocity = run["positions"][8], run["velocities"][8]
+    frame = meshio.read(path.with_name(listed[8].get("file")))
+    assert np.array_equal(frame.points, last)
+    assert frame.point_data["velocity"] == pytest.approx(velocity, rel=1e-6)
+    assert {name.split()[1] for name in frame.point_data if " " in name} == set(study.methods)
