@@ -201,6 +201,23 @@ def test_a_scene_reruns_alone(finished: Checkout) -> None:
     assert {_below(p)[1].removesuffix(".csv") for p in per_scene} == {"strain_oop"}
 
 
+def test_a_removed_effect_reruns_the_scene_that_listed_it(finished: Checkout) -> None:
+    """And an edited one that no scene of this study lists, none."""
+    finished.edit("config/scenes/strain_oop.yaml", "  - {effect: floor}\n", "")
+    finished.edit("src/pdrom/model/effects/poke.py", "phase == 0", "phase <= 0")
+    planned = finished.planned(*MICRO_ARGUMENTS)
+    per_scene = {p for p in planned if _stage(p) not in SHARED}
+    assert {_below(p)[1].removesuffix(".csv") for p in per_scene} == {"strain_oop"}
+
+
+def test_one_figure_plans_its_own_scenes_only(clean: Checkout) -> None:
+    planned = clean.planned("results/figures/spring_runs.pdf")
+    assert {_below(p)[1] for p in planned if _stage(p) == "fom"} == {
+        "spring_stretch",
+        "spring_twist",
+    }
+
+
 SCENE = "config/scenes/spring_oop.yaml"
 SELECTION = '''"""The first blocks."""
 
