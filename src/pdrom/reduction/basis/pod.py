@@ -3,6 +3,8 @@
 import numpy as np
 from scipy import linalg
 
+from pdrom.reduction.basis.thin_qr import thin_qr
+
 
 def pod(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Left singular vectors (n, m) and singular values (m,) of ``matrix`` (n, m), n >= m or not.
@@ -12,9 +14,9 @@ def pod(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     singular values below sqrt(eps) sigma_1. Each vector's entry of largest magnitude is positive.
     """
     if matrix.shape[0] > matrix.shape[1]:
-        q, r = linalg.qr(matrix, mode="economic", check_finite=False)
+        q, second, r = thin_qr(matrix)
         u, sigma, _ = linalg.svd(r, full_matrices=False, check_finite=False)
-        u = q @ u
+        u = (linalg.solve_triangular(second, u, check_finite=False).T @ q.T).T
     else:
         u, sigma, _ = linalg.svd(matrix, full_matrices=False, check_finite=False)
     return fix_signs(u), sigma
@@ -28,6 +30,6 @@ def fix_signs(u: np.ndarray) -> np.ndarray:
     """
     if u.shape[1] == 0:
         return u
-    largest = np.argmax(np.abs(u).astype(np.float32), axis=0)
+    largest = [np.argmax(np.abs(mode).astype(np.float32)) for mode in u.T]
     signs = np.sign(u[largest, np.arange(u.shape[1])])
     return u * np.where(signs == 0.0, 1.0, signs)

@@ -1,4 +1,4 @@
-"""DEIM against pyMOR and the definition; Q-DEIM against its defining factorisation."""
+"""DEIM against pyMOR and the greedy loop; Q-DEIM against its defining factorisation."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from pymor.algorithms.ei import deim as pymor_deim
 from pymor.vectorarrays.numpy import NumpyVectorSpace
 from scipy import linalg
 
-from pdrom.reduction.sampling.deim import deim_entries
+from pdrom.reduction.sampling.deim import TIE, deim_entries, tie_weights
 from pdrom.reduction.sampling.qdeim import qdeim_entries
 
 SIZES = st.tuples(st.integers(1, 60), st.integers(1, 15), st.integers(0, 2**32 - 1))
@@ -42,6 +42,61 @@ def test_picks_the_entries_of_pymor(size):
 def test_picks_the_entries_of_pymor_for_a_decaying_basis():
     v = decaying()
     np.testing.assert_array_equal(deim_entries(v), pymor_entries(v))
+
+
+def greedy_loop(v: np.ndarray) -> list[int]:
+    """The algorithm as it is published, mode by mode, with the factors that decide ties."""
+    weights = tie_weights(len(v))
+    entries: list[int] = []
+    for k in range(v.shape[1]):
+        residual = v[:, k].copy()
+        if entries:
+            residual -= v[:, :k] @ np.linalg.solve(v[entries, :k], v[entries, k])
+        residual[entries] = 0.0
+        entries.append(int(np.argmax(weights * np.abs(residual))))
+    return entries
+
+
+@settings(deadline=None)
+@given(SIZES)
+def test_picks_the_entries_of_the_greedy_loop(size):
+    v = orthonormal(size)
+    assert deim_entries(v).tolist() == greedy_loop(v)
+
+
+@settings(deadline=None)
+@given(SIZES, st.integers(0, 2**32 - 1), st.floats(0.0, 1e-13))
+def test_of_mirrored_entries_the_first_is_taken_whatever_round_off_says(size, seed, noise):
+    """Both halves hold the same numbers, up to signs and a noise, as a symmetric motion's do."""
+    rng = np.random.default_rng(seed)
+    half = orthonormal(size)
+    mirrored = half[::-1] * rng.choice([-1.0, 1.0], len(half))[:, None]
+    v = np.vstack([half, mirrored * (1.0 + noise * rng.standard_normal(half.shape))])
+    entries = deim_entries(v)
+    assert entries.tolist() == greedy_loop(v)
+    assert (entries < len(half)).all()
+
+
+def test_equal_magnitudes_go_to_the_first_entry():
+    v = np.array([[1.0, 1.0, -1.0, 1.0], [1.0, -1.0, 1.0, 1.0]]).T
+    np.testing.assert_array_equal(deim_entries(v), [0, 1])
+    # a larger one that is no tie is taken wherever it stands
+    v = np.ones((50, 1))
+    v[49] = 1.0 + 2.0 * TIE
+    assert deim_entries(v).tolist() == [49]
+
+
+@settings(deadline=None)
+@given(SIZES, st.integers(1, 4), st.integers(0, 2**32 - 1))
+def test_dependent_modes_get_distinct_entries_and_change_none_before(size, copies, seed):
+    """Zero modes and combinations of earlier ones, exact and rounded."""
+    v = orthonormal(size)
+    rng = np.random.default_rng(seed)
+    extra = v @ rng.standard_normal((v.shape[1], copies)) * rng.integers(0, 2, copies)
+    entries = deim_entries(np.hstack([v, v[:, :1], extra]))
+    np.testing.assert_array_equal(entries[: v.shape[1]], deim_entries(v))
+    assert len(set(entries.tolist())) == min(len(v), v.shape[1] + 1 + copies)
+    assert deim_entries(np.zeros((3, 2))).tolist() == [0, 1]
 
 
 @settings(deadline=None)
