@@ -18,7 +18,7 @@ from pdrom.experiments.settings import Tolerance
 from pdrom.model.effects.base import Seed
 from pdrom.reduction.basis.pod import pod
 from pdrom.reduction.sampling.deim import deim_entries
-from pdrom.reduction.sampling.qdeim import qdeim_entries
+from pdrom.reduction.sampling.qdeim import qdeim_elements
 from pdrom.reduction.subspace.nnls import nnls_early_stop
 
 log = logging.getLogger(__name__)
@@ -111,7 +111,7 @@ def _tasks(sizes: Offline) -> Iterator[tuple[dict[str, Any], Task, Task | None]]
     basis = pod(matrix)[0][:, : sizes.r]
     size = {"rows": n, "columns": basis.shape[1]}
     yield {"task": "deim", **size}, lambda: deim_entries(basis), lambda: _pymor_deim(basis)
-    yield {"task": "q-deim", **size}, lambda: qdeim_entries(basis), None
+    yield {"task": "q-deim", **size}, lambda: qdeim_elements(basis, 1), None
     columns = decaying(generator, sizes.elements, sizes.equations).T
     target = columns.sum(axis=1)
     size = {"rows": sizes.equations, "columns": sizes.elements}

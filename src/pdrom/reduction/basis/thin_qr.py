@@ -11,13 +11,15 @@ DEPARTURE = 1e-12
 def thin_qr(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Q_1 (n, m), R_2 (m, m) and R (m, m) of A = ``matrix`` (n, m), n > m: A = (Q_1 R_2^-1) R.
 
-    Q_1 R_2^-1 has orthonormal columns up to round-off, also where A has no full rank; who multiplies
-    by something else next does that with R_2^-1 first. Householder's reflections go through A once a
-    column and wait for memory. Here (Terao, Ozaki and Ogita 2020) LU with partial pivoting,
-    A = P L U, leaves a well-conditioned L, and two Cholesky factorisations of Gram matrices make it
-    orthonormal: L = Q_1 R_1, Q_1 = Q R_2, R = R_2 R_1 U. That L is well-conditioned is no theorem:
-    where Q_1 is not orthonormal up to `DEPARTURE`, reflections do it. Where it is, the error of R
-    is that of the LU factorisation, some eps cond(L) of each column of A.
+    Q_1 R_2^-1 has orthonormal columns up to round-off, also where A has no full rank. It is not
+    formed: what comes next multiplies it by something, and that is better done to R_2^-1 first.
+
+    Householder's reflections go through A once a column and wait for memory. Here (Terao, Ozaki and
+    Ogita 2020) LU with partial pivoting, A = P L U, leaves a well-conditioned L, and two Cholesky
+    factorisations of Gram matrices make it orthonormal: L = Q_1 R_1, Q_1 = Q R_2, R = R_2 R_1 U.
+    That L is well-conditioned is no theorem: where Q_1 is not orthonormal up to `DEPARTURE`,
+    reflections do it. Where it is, the error of R is that of the LU factorisation, some eps cond(L)
+    of each column of A.
     """
     lower, swaps, _ = linalg.lapack.dgetrf(np.array(matrix, order="F"), overwrite_a=True)
     m = matrix.shape[1]

@@ -2,27 +2,26 @@
 
 import numpy as np
 
+from pdrom.reduction.sampling.deim import tie_weights
+from pdrom.reduction.sampling.growing_fit import GrowingFit
+
 
 def block_elements(v: np.ndarray, size: int) -> np.ndarray:
-    """Element indices (r,) of the basis ``v`` (size e, r), one per mode, nested in r.
+    """Element indices of the basis ``v`` (size e, r), one per mode (all e if e < r), nested in r.
 
     Mode k is fitted by the earlier modes on the entries of the elements taken so far (least
-    squares, more equations than unknowns); the element with the largest residual norm follows.
+    squares, more equations than unknowns); the element with the largest residual norm (times
+    `tie_weights`) follows.
     """
-    blocks = v.reshape(-1, size, v.shape[1])
-    taken = np.zeros(len(blocks), dtype=bool)
-    elements: list[int] = []
-    for k in range(v.shape[1]):
-        residual = blocks[:, :, k]
+    modes, total = np.asfortranarray(v), len(v) // size
+    fit, weights = GrowingFit(v.shape[1]), tie_weights(total) ** 2
+    elements = np.empty(min(v.shape[1], total), dtype=np.int64)
+    for k in range(len(elements)):
+        residual = modes[:, k]
         if k:
-            small = blocks[elements].reshape(-1, v.shape[1])
-            fit = np.linalg.lstsq(small[:, :k], small[:, k], rcond=None)[0]
-            residual = residual - blocks[:, :, :k] @ fit
-        norm = np.einsum("ei,ei->e", residual, residual)
-        norm[taken] = -1.0
-        element = int(np.argmax(norm))
-        taken[element] = True
-        elements.append(element)
-        if taken.all():
-            break
-    return np.array(elements, dtype=np.int64)
+            residual = residual - modes[:, :k] @ fit.coefficients(k)
+        norm = weights * np.square(residual).reshape(total, size).sum(axis=1)
+        norm[elements[:k]] = -1.0
+        elements[k] = element = int(np.argmax(norm))
+        fit.add(v[size * element : size * (element + 1)])
+    return elements

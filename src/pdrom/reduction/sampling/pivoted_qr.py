@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pdrom.reduction.sampling.block_qdeim import block_qdeim_elements
-from pdrom.reduction.sampling.qdeim import qdeim_entries
+from pdrom.reduction.sampling.qdeim import qdeim_elements
 from pdrom.reduction.sampling.selection import Selection
 
 
@@ -13,5 +12,4 @@ class PivotedQR(Selection):
     """Q-DEIM, not nested in r."""
 
     def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
-        pivots = qdeim_entries if size == 1 else (lambda modes: block_qdeim_elements(modes, size))
-        return {r: pivots(v[:, :r]) for r in ranks}
+        return {r: qdeim_elements(v[:, :r], size) for r in ranks}

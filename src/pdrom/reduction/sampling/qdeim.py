@@ -1,10 +1,101 @@
-"""Q-DEIM: entries by a column-pivoted QR factorisation (Drmac and Gugercin 2016)."""
+"""Q-DEIM: blocks of rows by a pivoted QR factorisation (Drmac and Gugercin 2016)."""
 
 import numpy as np
-from scipy import linalg
+
+from pdrom.reduction.sampling.deim import tie_weights
+
+EPS = np.finfo(float).eps
+# Rows of candidates for each mode, and how few pivots among them ask for twice as many.
+ROWS_A_MODE, FEW = 4, 8
 
 
-def qdeim_entries(v: np.ndarray) -> np.ndarray:
-    """The first r pivots of the pivoted QR factorisation of ``v``^T, v of shape (n, r)."""
-    pivots = linalg.qr(v.T, mode="r", pivoting=True, check_finite=False)[1]
-    return pivots[: v.shape[1]].astype(np.int64)
+def qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
+    """Element indices of the basis ``v`` (size e, r), one per mode (all e if e < r).
+
+    The columns of V^T are pivots, in groups of ``size`` that belong to one element. The group with
+    the largest Frobenius norm (times `tie_weights`) is taken, and the direction in R^r that
+    dominates it is removed from all groups. For ``size`` 1 this is the method of the paper. For
+    larger ones, to remove the whole group would exhaust R^r after about r / size elements; one
+    direction an element gives as many elements as modes, to be compared with the greedy at equal
+    cost. The removed directions are orthonormal and lie in the span of the taken groups, so the
+    sampled rows of V have full column rank.
+
+    Not nested in r. Cost O(n r^2), n = size e.
+    """
+    left = _Left(v, size)
+    candidates = min(left.total, ROWS_A_MODE * v.shape[1] // size + 1)
+    count = min(v.shape[1], left.total)
+    while len(left.picked) < count:
+        if left.pick_among(candidates, count) < FEW:
+            candidates = min(left.total, 2 * candidates)
+    return np.array(left.picked, dtype=np.int64)
+
+
+class _Left:
+    """What is left of all groups, known by bounds on their norms.
+
+    Norms only fall. So a pivot among the groups with the largest bounds is the pivot of all while
+    its norm exceeds the bounds of the others, and the others need not be touched until it does not:
+    LAPACK goes through the whole matrix once a pivot, this a few times in all.
+    """
+
+    def __init__(self, v: np.ndarray, size: int) -> None:
+        self._rows, self._size = np.ascontiguousarray(v), size
+        self.total = len(v) // size
+        self.picked: list[int] = []
+        self._weights = tie_weights(self.total) ** 2
+        self._directions = np.empty((0, v.shape[1]))
+        self._squares = self._norms(self._rows)
+        self._error = self._rounding(self._squares)
+
+    def pick_among(self, count: int, most: int) -> int:
+        """Pick among ``count`` candidates, up to ``most`` in all; how many were found."""
+        candidates, rest = self._highest(count)
+        left = self._rows.reshape(self.total, self._size, -1)[candidates]
+        left = left.reshape(len(candidates) * self._size, -1)
+        left = left - (left @ self._directions.T) @ self._directions
+        weights, before = self._weights[candidates], len(self.picked)
+        weights[np.isin(candidates, self.picked)] = -1.0
+        while True:
+            squares = self._norms(left)
+            best = int(np.argmax(weights * squares - (weights < 0.0)))
+            if len(self.picked) == most or weights[best] * squares[best] <= rest:
+                break
+            weights[best] = -1.0
+            self.picked.append(int(candidates[best]))
+            direction = self._take(left[self._size * best : self._size * (best + 1)])
+            left -= np.outer(left @ direction, direction)
+        new = self._directions[before:]
+        self._squares -= self._norms(self._rows @ new.T)
+        self._squares[candidates] = squares
+        self._error[candidates] = self._rounding(squares)
+        return len(new)
+
+    def _highest(self, count: int) -> tuple[np.ndarray, float]:
+        """Elements with the largest bounds, in order, and the largest of the others (-1: none)."""
+        bounds = self._weights * (self._squares + self._error)
+        bounds[self.picked] = -1.0
+        if count == self.total:
+            return np.arange(self.total), -1.0
+        split = np.argpartition(bounds, self.total - count)
+        rest = bounds[split[: self.total - count]].max()
+        return np.sort(split[self.total - count :]), float(rest)
+
+    def _take(self, group: np.ndarray) -> np.ndarray:
+        """The unit direction that dominates what is left of a group, from now on removed.
+
+        Zero where nothing is left: then the modes depend on each other.
+        """
+        direction = np.linalg.svd(group, full_matrices=False)[2][0] if group.any() else group[0]
+        direction = direction - self._directions.T @ (self._directions @ direction)
+        direction /= np.linalg.norm(direction) or 1.0
+        self._directions = np.vstack([self._directions, direction])
+        return direction
+
+    def _norms(self, rows: np.ndarray) -> np.ndarray:
+        """Squared Frobenius norms of groups."""
+        return np.einsum("nk,nk->n", rows, rows).reshape(-1, self._size).sum(axis=1)
+
+    def _rounding(self, squares: np.ndarray) -> np.ndarray:
+        """Bound on the errors of differences of ``squares`` and of those of their directions."""
+        return 4.0 * self._rows.shape[1] * EPS * squares

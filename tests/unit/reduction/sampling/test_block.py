@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from scipy import linalg
 
 from pdrom.reduction.sampling.block import block_elements
-from pdrom.reduction.sampling.block_qdeim import block_qdeim_elements
-from pdrom.reduction.sampling.deim import deim_entries
-from pdrom.reduction.sampling.qdeim import qdeim_entries
+from pdrom.reduction.sampling.deim import deim_entries, tie_weights
+from pdrom.reduction.sampling.qdeim import qdeim_elements
 
 Select = Callable[[np.ndarray, int], np.ndarray]
 SIZES = st.tuples(
     st.integers(1, 25), st.sampled_from([3, 6, 9]), st.integers(1, 14), st.integers(0, 2**32 - 1)
 )
-both = pytest.mark.parametrize("algorithm", [block_elements, block_qdeim_elements])
+both = pytest.mark.parametrize("algorithm", [block_elements, qdeim_elements])
 
 
 def modes(size: tuple[int, int, int, int]) -> np.ndarray:
@@ -70,11 +70,68 @@ def test_greedy_is_nested(size):
 
 @settings(deadline=None)
 @given(SIZES)
-def test_single_entries_as_elements_are_the_scalar_methods(size):
+def test_single_entries_as_elements_are_classical_deim(size):
     v = modes((size[0], 1, size[2], size[3]))
     assume(v.shape[0] > v.shape[1])
     np.testing.assert_array_equal(block_elements(v, 1), deim_entries(v))
-    np.testing.assert_array_equal(block_qdeim_elements(v, 1), qdeim_entries(v))
+
+
+def qdeim_loop(v: np.ndarray, size: int) -> list[int]:
+    """Q-DEIM as its docstring says, all groups touched at every step."""
+    left, weights = v.copy(), tie_weights(len(v) // size)
+    picked: list[int] = []
+    for _ in range(min(v.shape[1], len(weights))):
+        norms = weights * np.linalg.norm(left.reshape(len(weights), -1), axis=1)
+        norms[picked] = -1.0
+        picked.append(int(np.argmax(norms)))
+        group = left[size * picked[-1] : size * (picked[-1] + 1)]
+        direction = np.linalg.svd(group)[2][0]
+        left -= np.outer(left @ direction, direction)
+    return picked
+
+
+@settings(deadline=None)
+@given(SIZES)
+def test_qdeim_follows_its_definition(size):
+    v = modes(size)
+    assert qdeim_elements(v, size[1]).tolist() == qdeim_loop(v, size[1])
+
+
+def spread(kind: str, n: int = 1800, r: int = 24) -> np.ndarray:
+    """Modes (n, r) of many rows of which few matter, all, or mirrored pairs."""
+    rng = np.random.default_rng(5)
+    v = rng.standard_normal((n, r))
+    if kind == "few":
+        v *= np.exp(-0.02 * rng.permutation(n))[:, None]
+    if kind == "twelve decades":
+        v[: n // 2] *= 1e12
+    if kind == "mirrored":
+        v[n // 2 :] = v[n // 2 - 1 :: -1]
+    return v if kind == "twelve decades" else np.linalg.qr(v)[0]
+
+
+@pytest.mark.parametrize("size", [1, 3, 9])
+@pytest.mark.parametrize("kind", ["even", "few", "twelve decades", "mirrored"])
+def test_qdeim_among_candidates_is_qdeim_of_all(kind, size):
+    """There are far more elements than the candidates that are looked at."""
+    v = spread(kind)
+    assert qdeim_elements(v, size).tolist() == qdeim_loop(v, size)
+
+
+@pytest.mark.parametrize("kind", ["even", "few"])
+def test_qdeim_of_entries_takes_the_pivots_of_lapack(kind):
+    v = spread(kind)
+    pivots = linalg.qr(v.T, mode="r", pivoting=True)[1]
+    np.testing.assert_array_equal(qdeim_elements(v, 1), pivots[: v.shape[1]])
+
+
+@pytest.mark.parametrize("size", [1, 3])
+def test_qdeim_of_dependent_modes_takes_distinct_elements(size):
+    v = spread("even")
+    elements = qdeim_elements(np.hstack([v, v[:, :2], np.zeros((len(v), 1))]), size)
+    assert len(set(elements.tolist())) == v.shape[1] + 3
+    assert np.linalg.matrix_rank(sampled(v, elements, size)) == v.shape[1]
+    assert qdeim_elements(np.zeros((12, 3)), size).tolist() == [0, 1, 2]
 
 
 @both

@@ -9,7 +9,7 @@ from pymor.vectorarrays.numpy import NumpyVectorSpace
 from scipy import linalg
 
 from pdrom.reduction.sampling.deim import TIE, deim_entries, tie_weights
-from pdrom.reduction.sampling.qdeim import qdeim_entries
+from pdrom.reduction.sampling.qdeim import qdeim_elements
 
 SIZES = st.tuples(st.integers(1, 60), st.integers(1, 15), st.integers(0, 2**32 - 1))
 
@@ -150,7 +150,7 @@ def test_qdeim_takes_the_pivots_of_a_permuted_triangular_factorisation(size):
     """The pivots are distinct and give V^T P = Q R with |R_kk| >= the norm of what is left."""
     v = orthonormal(size)
     r = v.shape[1]
-    entries = qdeim_entries(v)
+    entries = qdeim_elements(v, 1)
     assert len(set(entries.tolist())) == r
     q, factor = linalg.qr(v[entries].T)
     rest = q.T @ v.T
@@ -169,14 +169,14 @@ def test_qdeim_does_not_depend_on_the_basis_of_the_space(size):
     v = orthonormal(size)
     assume(v.shape[0] > v.shape[1])
     q = np.linalg.qr(np.random.default_rng(size[2] + 1).standard_normal((v.shape[1],) * 2))[0]
-    np.testing.assert_array_equal(qdeim_entries(v @ q), qdeim_entries(v))
+    np.testing.assert_array_equal(qdeim_elements(v @ q, 1), qdeim_elements(v, 1))
 
 
 def test_qdeim_gain_is_below_that_of_the_greedy_on_average():
     gains = []
     for seed in range(30):
         v = orthonormal((200, 20, seed))
-        picks = deim_entries(v), qdeim_entries(v)
+        picks = deim_entries(v), qdeim_elements(v, 1)
         gains.append([np.linalg.norm(np.linalg.inv(v[entries]), 2) for entries in picks])
     greedy, pivoted = np.mean(gains, axis=0)
     assert pivoted < greedy
