@@ -13,7 +13,10 @@ from pydantic import Field
 from scipy import sparse
 
 from pdrom.core.errors import SceneError
+from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.effects.base import Effect, EffectConfig
+from pdrom.model.mesh.select import select_vertices
+from pdrom.model.mesh.selection import Selection
 from pdrom.model.mesh.types import Mesh
 
 # What an element may lie on, and all of its kind on a mesh, as vertices.
@@ -26,10 +29,21 @@ CELLS: dict[str, Callable[[Mesh], np.ndarray]] = {
 Weight = Annotated[float, Field(gt=0.0, le=1e16, allow_inf_nan=False)]
 
 
+class WeightFactor(ConfigModel):
+    """What the weight of the elements inside a selection (all their vertices) is multiplied by."""
+
+    select: Selection
+    factor: Weight
+
+
 class GroupConfig(EffectConfig):
-    """``weight`` w of the group; the element weights are w times the rest measure where stated."""
+    """``weight`` w of the group; the element weights are w times the rest measure where stated.
+
+    ``factors`` change the weight of some elements, one after the other.
+    """
 
     weight: Weight
+    factors: tuple[WeightFactor, ...] = ()
 
 
 class ConstraintGroup(Effect):
@@ -69,6 +83,27 @@ class ConstraintGroup(Effect):
     def element_vertices(cls, mesh: Mesh) -> np.ndarray:
         """Vertices (e, m) of each element on a mesh, in the order of the elements."""
         return CELLS[cls.cells](mesh)
+
+    def element_weights(self, mesh: Mesh) -> float | np.ndarray:
+        """w of each element before its rest measure, (e,), or one number for all of them.
+
+        Raises
+        ------
+        SceneError
+            A selection that holds no element of the group.
+        """
+        if not self.config.factors:
+            return self.config.weight
+        vertices = self.element_vertices(mesh)
+        weights = np.full(len(vertices), self.config.weight)
+        for number, entry in enumerate(self.config.factors):
+            inside = np.isin(vertices, select_vertices(mesh, entry.select)).all(axis=1)
+            if not inside.any():
+                raise SceneError(
+                    f"factors[{number}]: selects no element, which lies on a {self.cells}"
+                )
+            weights[inside] *= entry.factor
+        return weights
 
     @property
     def elements(self) -> int:

@@ -68,7 +68,7 @@ class VertexBending(ConstraintGroup):
         if len(self.vertices) == 0:
             raise SceneError(f"effect '{self.name}' needs interior vertices, this mesh has none")
         area = barycentric_areas(mesh.points, self._triangles)[self.vertices]
-        self.weights = config.weight * area
+        self.weights = self.element_weights(mesh) * area
         laplacian = cotangent_laplacian(mesh.points, self._triangles)[self.vertices]
         self.S = sparse.csr_array(laplacian.multiply(0.5 / area[:, None]))
         self.S.sort_indices()

@@ -122,7 +122,7 @@ class EdgeSpring(SimplexGroup):
         super().__init__(config, mesh, masses)
         self.stencil = mesh.edges()
         self.rest = mesh.points[self.stencil[:, 1]] - mesh.points[self.stencil[:, 0]]
-        self.weights = np.full(len(self.stencil), config.weight)
+        self.weights = np.full(len(self.stencil), self.element_weights(mesh))
         self.operator = np.tile(np.array([[[-1.0, 1.0]]]), (len(self.stencil), 1, 1))
         self._assemble(mesh.vertices)
 

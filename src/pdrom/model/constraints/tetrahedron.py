@@ -140,7 +140,7 @@ class TetrahedronGroup(SimplexGroup):
         self.stencil = require_cells(mesh, "tetrahedra", self.name)
         corner = mesh.points[self.stencil]
         edges = (corner[:, 1:] - corner[:, :1]).transpose(0, 2, 1)
-        self.weights = self.config.weight * np.abs(np.linalg.det(edges)) / 6.0
+        self.weights = self.element_weights(mesh) * np.abs(np.linalg.det(edges)) / 6.0
         # F = [q1 - q0, q2 - q0, q3 - q0] D^-1, hence F^T = D^-T [q1 - q0; q2 - q0; q3 - q0]
         transposed = np.linalg.inv(edges).transpose(0, 2, 1)
         self.operator = np.concatenate([-transposed.sum(axis=2, keepdims=True), transposed], axis=2)

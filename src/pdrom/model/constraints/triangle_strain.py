@@ -184,7 +184,7 @@ class TriangleStrain(SimplexGroup):
         super().__init__(config, mesh, masses)
         self.stencil = require_cells(mesh, "triangles", self.name)
         rest_inverse, area = rest_frames(mesh.points, self.stencil)
-        self.weights = config.weight * area
+        self.weights = self.element_weights(mesh) * area
         # F = [q1 - q0, q2 - q0] D^-1, hence F^T = D^-T [q1 - q0; q2 - q0]
         transposed = rest_inverse.transpose(0, 2, 1)
         self.operator = np.concatenate([-transposed.sum(axis=2, keepdims=True), transposed], axis=2)

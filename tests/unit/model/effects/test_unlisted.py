@@ -12,6 +12,7 @@ from conftest import ROOT, make_scene
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
 from pdrom.model.runs.full_order import trajectory
+from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.fingerprint import closure
 from pdrom.pipeline.scenes import load_scene
 
@@ -139,6 +140,21 @@ def test_a_scene_depends_on_the_code_of_its_own_effects_only(scene):
     every = {EFFECTS.module(effect) for effect in EFFECTS}
     assert listed <= covered
     assert covered & every <= needed
+
+
+@pytest.mark.parametrize("effect", IDLE)
+def test_a_configuration_survives_the_way_to_a_job(effect):
+    """As plain JSON, with a shape as selection and friction without end where there are any."""
+    entry: dict = {"effect": effect, **(IDLE[effect] or {})}
+    ball = {"kind": "sphere", "centre": [0, 2, 0], "radius": 0.5}
+    if "select" in entry:
+        entry["select"] = {"kind": "union", "of": ["top", {"kind": "complement", "of": ball}]}
+    if "friction" in entry:
+        entry["friction"] = float("inf")
+    masses = [{"select": ball, "density": 2.0}]
+    config = make_scene({"effect": "spring", "weight": 1.0}, entry, masses=masses).config
+    plain = json.loads(json.dumps(config.model_dump(mode="json")))
+    assert SceneConfig.model_validate(plain) == config
 
 
 def test_every_effect_says_how_it_does_nothing():
