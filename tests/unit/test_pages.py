@@ -85,6 +85,12 @@ def test_the_effects_of_the_registry_are_listed_with_their_keys_and_what_a_subsp
         )
 
 
+def test_the_readme_lists_the_effects_of_the_registry() -> None:
+    text = (ROOT / "README.md").read_text("utf-8")
+    (sentence,) = re.findall(r"^Effects: (.*?)\.\n", text, re.MULTILINE | re.DOTALL)
+    assert sorted(re.findall(r"`(\w+)`", sentence)) == sorted(EFFECTS)
+
+
 def test_every_kind_of_selection_is_listed() -> None:
     page = (ROOT / "config" / "README.md").read_text("utf-8")
     assert sorted(
