@@ -124,6 +124,7 @@ HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.SUBSPACES: _subspaces,
     paths.SUBSPACES_TRAIN: _subspaces,
     paths.SUBSPACES_HELDOUT: _subspaces,
+    paths.BOUNDS: _scenes,
     paths.LADDER: _ladders,
     paths.STABILITY: _among(lambda study: study.settings.stability.scenes),
     paths.SUBSPACE_ABLATION: _among(lambda study: study.ablation.scenes),

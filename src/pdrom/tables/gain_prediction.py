@@ -103,7 +103,7 @@ def _judge(value: pd.Series, runs: pd.DataFrame) -> dict:
         "rank_correlation": _ranks(x, runs.error.to_numpy(float)) if varies else None,
         "threshold": threshold,
         "misclassified_share": mistakes / len(runs),
-        "failures_ordered": _ordered(x, failed),
+        "failures_ordered": failures_ordered(x, failed),
     }
 
 
@@ -124,7 +124,7 @@ def best_threshold(x: np.ndarray, failed: np.ndarray) -> tuple[float, int]:
     return float(candidates[best]), mistakes[best]
 
 
-def _ordered(x: np.ndarray, failed: np.ndarray) -> float | None:
+def failures_ordered(x: np.ndarray, failed: np.ndarray) -> float | None:
     """Mann-Whitney statistic over the number of pairs; None without both kinds of runs."""
     many, others = int(failed.sum()), int((~failed).sum())
     if not many or not others:

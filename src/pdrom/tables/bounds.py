@@ -1,0 +1,53 @@
+"""Table bounds: what is known of a reduced run beforehand, beside what became of it."""
+
+import numpy as np
+import pandas as pd
+
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every, TableOf
+from pdrom.tables.declaration import number, table
+from pdrom.tables.parts import joined
+from pdrom.tables.vocabulary import ERROR_WITHIN, FINITE, GROUP, MAX_EXTENT, METHOD, SCENE, R
+
+_KEYS = ["scene", "group", "method", "r"]
+
+
+@table(
+    title="A-priori bounds of reduced runs, and how an iteration treats a small error",
+    columns=(
+        SCENE,
+        GROUP,
+        METHOD,
+        R,
+        number("reach", "bound of the static displacement by the projections, in rest extents"),
+        number("growth", "bound of the dynamic displacement over it, over the frames of the run"),
+        number("lasting_growth", "the same for ever, with the vertices that are held last"),
+        number("bound", "bound of the extent of the run, in rest extents; inf if there is none"),
+        MAX_EXTENT,
+        number("slack", "bound over largest extent"),
+        number("contraction", "how much an iteration may enlarge an error, in the norm of A"),
+        number("spectral_radius", "of the derivative of an iteration"),
+        number("small_gain", "growth times contraction; a small-gain argument needs less than one"),
+        FINITE,
+        ERROR_WITHIN,
+    ),
+    reads={"parts": Every(paths.BOUNDS), "reruns": TableOf("reduced_reruns")},
+)
+def bounds(parts: list[File], reruns: pd.DataFrame) -> pd.DataFrame:
+    """One row per scene, group, method and r with positions unreduced.
+
+    contraction and spectral_radius are the largest of two states of the full-order run; empty where
+    several groups act, and for scenes too large for dense matrices. The bounds need that no
+    contact acts and are empty where a group has no bounded projections.
+    """
+    known = joined(parts)
+    if known.empty:
+        return known
+    runs = reruns[reruns.position_basis == "full"]
+    runs = runs[[*_KEYS, "max_extent", "finite", "relative_error_within_horizon"]]
+    table = known.astype({"r": "int64"}).merge(runs.astype({"r": "int64"}), on=_KEYS, how="left")
+    extent = table.max_extent.astype(float)
+    table["slack"] = table.bound.astype(float) / extent.where(extent > 0.0, np.nan)
+    table["small_gain"] = table.growth.astype(float) * table.contraction.astype(float)
+    return table

@@ -1,0 +1,182 @@
+"""The manuscript's propositions on sampling and interpolation, each tried on numbers."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from conftest import make_scene
+from pdrom.model.dynamics.stepper import State
+from pdrom.model.runs.full_order import trajectory
+from pdrom.reduction.basis.types import Basis
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.sampling import Reduction, Sampling
+from pdrom.reduction.sampling.gappy_pod_e import eigenvalue_growth
+from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+# Descent of the (sampled) objective, and what it does not imply across frames.
+
+
+def test_an_objective_that_falls_lets_the_energy_rise():
+    """A sheet of springs thrown through its own centre: all springs turn over within one frame.
+
+    One spring with a = h^2 w / m gains the factor (1 + a/(1+a))^2 + a/(1+a)^2, between 1 and 4.
+    """
+    scene = make_scene({"effect": "spring", "weight": 1e7}, iterations=30, frames=1)
+    points = scene.mesh.points - scene.mesh.points.mean(axis=0)
+    velocities = -1.001 * points / scene.config.time_step
+    start = State(points, velocities)
+    after, report = scene.stepper().step(start, 0)
+    assert (np.diff(report.objective) <= 1e-9 * report.objective[0]).all()
+    before, later = _energy(scene, start), _energy(scene, after)
+    assert 1.5 < later / before < 4.0
+
+
+def _energy(scene, state):
+    (group,) = scene.groups
+    potential = group.accumulate(state.positions, np.zeros_like(state.positions))
+    return potential + 0.5 * float(np.sum(scene.masses[:, None] * state.velocities**2))
+
+
+def test_what_is_not_sampled_moves_on_uniformly():
+    """Coordinates in the kernel of the sampled stiffness are held by mass only: nothing bends them.
+
+    The objective falls in every frame all the same, at a stiffness of 1e8 as well.
+    """
+    mesh = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
+    kick = {"effect": "kick", "speed": 1.0, "seed": 3}
+    scene = make_scene(kick, {"effect": "spring", "weight": 1e8}, mesh=mesh, frames=30)
+    columns = make_columns(scene, trajectory(scene)[1:], "pod", 8)
+    samples = {"spring": Samples(np.array([0, 7]), np.array([20.0, 20.0]))}
+    loop, state = SubspaceModel("pod", columns, samples).loop(scene)
+    group = scene.group("spring")
+    strain = (group.S @ columns.B)[[0, 7]]
+    mass = columns.B.T @ (scene.masses[:, None] * columns.B)
+    kernel = np.linalg.svd(strain)[2][2:]
+    moved, h = kernel @ mass, scene.config.time_step
+    first, speed = moved @ state.positions, moved @ state.velocities
+    for frame in range(scene.config.frames):
+        state, _ = loop.step(state, frame)
+    expected = first + scene.config.frames * h * speed
+    assert moved @ state.positions == pytest.approx(expected, abs=1e-7 * np.abs(first).max())
+    assert len(kernel) > 1
+
+
+# What the gain bounds, in each variant.
+
+
+def _reduction(
+    v: np.ndarray, elements: np.ndarray, method: MethodSpec, separate: bool = False
+) -> Reduction:
+    """Reduction of a basis with one row an element (three entries)."""
+    count, r = len(v) // 3, v.shape[1]
+    trained = np.zeros((3 if separate else 1, 2, r))
+    basis = Basis(v, np.zeros(len(v)), np.ones(r), r, 1e-15, 1, separate, (True,) * 3, trained)
+    return Reduction(basis, Sampling.of_elements(elements, 1, count), method, r)
+
+
+def _orthonormal(rng: np.random.Generator, n: int, r: int) -> np.ndarray:
+    return np.linalg.qr(rng.standard_normal((n, r)))[0]
+
+
+@given(SEEDS, st.integers(1, 6), st.integers(0, 4))
+def test_gain_bounds_the_error_of_shared_coefficients(seed, r, more):
+    """Orthonormal V, least squares: |p - p^| <= gain |(I - V V^T) p|."""
+    rng = np.random.default_rng(seed)
+    v, p = _orthonormal(rng, 45, r), rng.standard_normal(45)
+    elements = rng.permutation(15)[: r + more]
+    made = _reduction(v, elements, MethodSpec(title="x", rows="element"))
+    error = np.linalg.norm(p - made.reconstruct(p.reshape(1, 15, 3)).ravel())
+    best = np.linalg.norm(p - v @ (v.T @ p))
+    assert error <= made.gain * best * (1 + 1e-9)
+
+
+@given(SEEDS, st.integers(1, 5), st.integers(0, 4))
+def test_gain_bounds_the_error_of_separate_coefficients(seed, r, more):
+    """Coefficients of each axis from its own rows: the largest gain of an axis, the same best."""
+    rng = np.random.default_rng(seed)
+    v, p = _orthonormal(rng, 45, r), rng.standard_normal(45)
+    elements = rng.permutation(15)[: r + more]
+    method = MethodSpec(title="x", rows="element", coefficients="per-axis")
+    made = _reduction(v, elements, method)
+    error = np.linalg.norm(p - made.reconstruct(p.reshape(1, 15, 3)).ravel())
+    assert error <= made.gain * np.linalg.norm(p - v @ (v.T @ p)) * (1 + 1e-9)
+
+
+@given(SEEDS, st.integers(1, 6), st.floats(1e-8, 1.0))
+def test_gain_bounds_the_error_of_a_regularised_solve(seed, r, t):
+    """sqrt(1 + gain^2) of the best error, and t / (sigma^2 + t) of the part in the basis."""
+    rng = np.random.default_rng(seed)
+    v, p = _orthonormal(rng, 45, r), rng.standard_normal(45)
+    method = MethodSpec(title="x", rows="element", solve="tikhonov", tikhonov=t)
+    made = _reduction(v, rng.permutation(15)[: r + 2], method)
+    error = np.linalg.norm(p - made.reconstruct(p.reshape(1, 15, 3)).ravel())
+    inside = v.T @ p
+    (block,) = made.blocks
+    sigma = np.linalg.svd(block.matrix, compute_uv=False)[-1]
+    bias = t / (sigma**2 + t) * np.linalg.norm(inside)
+    best = np.linalg.norm(p - v @ inside)
+    assert error <= (np.sqrt(1.0 + made.gain**2) * best + bias) * (1 + 1e-9)
+
+
+# The growth of the smallest eigenvalue by a block of rows.
+
+
+@given(SEEDS, st.integers(2, 6), st.integers(1, 4))
+def test_growth_is_a_lower_bound(seed, r, size):
+    rng = np.random.default_rng(seed)
+    rows, block = rng.standard_normal((r + 2, r)), rng.standard_normal((size, r))
+    gram = rows.T @ rows
+    values, vectors = np.linalg.eigh(gram)
+    product = block @ vectors[:, 0]
+    gap = values[1] - values[0]
+    (growth,) = eigenvalue_growth(block[None], product[None], vectors[:, 0], gap)
+    true = np.linalg.eigvalsh(gram + block.T @ block)[0] - values[0]
+    assert growth <= true + 1e-9 * values[-1]
+    if size == 1 and r == 2:  # then nothing was lowered: the bound is the root itself
+        assert growth == pytest.approx(true, rel=1e-6, abs=1e-9 * values[-1])
+
+
+@given(SEEDS, st.integers(2, 4), st.integers(1, 4))
+def test_equal_eigenvalues_rise_only_together(seed, multiplicity, size):
+    """With gap zero the bound is zero; the truth is, too, as long as a block has too few rows."""
+    rng = np.random.default_rng(seed)
+    r = multiplicity + 2
+    q = _orthonormal(rng, r, r)
+    values = np.concatenate([np.full(multiplicity, 0.5), [2.0, 3.0]])
+    gram, block = (q * values) @ q.T, rng.standard_normal((size, r))
+    (growth,) = eigenvalue_growth(block[None], (block @ q[:, 0])[None], q[:, 0], 0.0)
+    true = np.linalg.eigvalsh(gram + block.T @ block)[0] - 0.5
+    assert growth == 0.0
+    if size < multiplicity:
+        assert true == pytest.approx(0.0, abs=1e-12)
+    else:
+        assert true > 0.0
+
+
+# A bounded gain costs a share of the mesh.
+
+
+@given(SEEDS, st.integers(1, 8), st.integers(1, 20))
+def test_a_bounded_gain_needs_its_share_of_the_elements(seed, r, count):
+    """m >= e / (mu gain^2), mu the largest share of the modes in an element over the mean one."""
+    rng = np.random.default_rng(seed)
+    v = _orthonormal(rng, 60, r)
+    elements = rng.permutation(20)[: max(count, -(-r // 3))]
+    gain = _reduction(v, elements, MethodSpec(title="x", rows="element")).gain
+    leverage = np.sum(v.reshape(20, -1) ** 2, axis=1)
+    mu = leverage.max() / (r / 20)
+    assert len(elements) * mu * gain**2 >= 20 * (1 - 1e-9)
+
+
+@pytest.mark.parametrize("count", [1, 5, 20])
+def test_the_share_is_needed_exactly_where_modes_are_spread_evenly(count, rng):
+    """e blocks with orthonormal columns over sqrt(e): m of them have the gain sqrt(e / m)."""
+    blocks = [_orthonormal(rng, 3, 3) / np.sqrt(20) for _ in range(20)]
+    v = np.concatenate(blocks)
+    elements = rng.permutation(20)[:count]
+    made = _reduction(v, elements, MethodSpec(title="x", rows="element"))
+    assert made.gain == pytest.approx(np.sqrt(20 / count))
