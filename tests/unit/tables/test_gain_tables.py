@@ -6,7 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pdrom.tables.gain_prediction import best_threshold, gain_prediction, judged_runs
+from pdrom.tables.gain_prediction import (
+    best_threshold,
+    failures_ordered,
+    gain_prediction,
+    judged_runs,
+)
 from pdrom.tables.targets import targets
 
 # scene, method, r, error within the horizon (None: ended before), gain, elements, frames
@@ -125,9 +130,7 @@ def test_no_threshold_makes_fewer_mistakes(runs):
 
 @given(st.lists(st.tuples(st.integers(0, 5), st.booleans()), min_size=2, max_size=12))
 def test_order_is_the_share_of_pairs(runs):
-    from pdrom.tables.gain_prediction import _ordered
-
     x, failed = np.array([a for a, _ in runs], float), np.array([b for _, b in runs])
     pairs = [(a > b) + 0.5 * (a == b) for a in x[failed] for b in x[~failed]]
-    value = _ordered(x, failed)
+    value = failures_ordered(x, failed)
     assert value is None if not pairs else value == pytest.approx(np.mean(pairs))

@@ -47,7 +47,7 @@ TABLES = (
     "reconstruction_error", "singular_values", "local_share", "sensitivity", "accuracy_cost",
     "ladder", "scaling", "scaling_fit", "stability", "budget", "breakeven", "effects_cost",
     "effects_left_out", "reduced_reruns", "gain_prediction",
-    "subspace_ablation",
+    "subspace_ablation", "bounds",
 )  # fmt: skip
 
 
@@ -296,6 +296,10 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for method in methods
         for r in (8, 14)
     ]
+    bounds = [
+        (scene, group, method, r, 20.0 * r, extent, 20.0 * r, r, np.isnan(end))
+        for scene, group, method, r, _, extent, end, *_ in reruns
+    ]
     predictions = [
         ("gain", "10", "100", 40, 0.25, np.nan),
         ("gain", "10000", "inf", 2, 1.0, np.nan),
@@ -328,10 +332,11 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "gain_prediction": "predictor lower upper runs failed_share threshold",
         "subspace_ablation": "scene position_basis k r variant gain relative_error_within_horizon"
         " relative_error_full_projections",
+        "bounds": "scene group method r bound max_extent slack contraction finite",
     }
     made = (
         values, errors, times, floors, costs, ladder, runs, bought, ratios, shares, removed, reruns,
-        predictions, ablation,
+        predictions, ablation, bounds,
     )  # fmt: skip
     rows = dict(zip(columns, made, strict=True))
     for name, header in columns.items():

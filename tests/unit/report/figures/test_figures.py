@@ -173,6 +173,17 @@ def test_a_run_that_ended_early_lies_on_the_rim(study):
     assert [bar.get_height() for bar in right.patches] == [25.0, 100.0]
 
 
+def test_a_run_that_blew_up_is_ringed_below_its_bound(study):
+    scene, method, _ = BLOWN_UP
+    figure = draw(study, "bounds", scenes=(scene,), methods=(method,))
+    left, _ = figure.axes
+    (ring,) = (line for line in left.lines if line.get_marker() == "o")
+    assert (ring.get_ydata() <= ring.get_xdata()).all()
+    assert len(ring.get_xdata()) == 2
+    kept = draw(study, "bounds", scenes=(scene,), methods=("pod",))
+    assert not [line for line in kept.axes[0].lines if line.get_markerfacecolor() == "none"]
+
+
 def test_a_failure_later_than_the_drawn_instant_is_no_failure(study):
     figure = draw(study, "spring_runs", scenes=(BLOWN_UP[0],), frames=(0.1,))
     assert not any("blew up" in text for text in texts(figure))

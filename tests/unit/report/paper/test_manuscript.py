@@ -22,6 +22,8 @@ SOURCE = (ROOT / "paper" / "main.tex").read_text(encoding="utf-8")
 _NOT_PROSE = [
     r"(?<!\\)%.*",
     r"\\begin\{(equation|align)\*?\}.*?\\end\{\1\*?\}",
+    r"(?s:\\begin\{(theorem|proposition)\}.*?\\end\{\1\})",
+    r"(?s:\\emph\{Proof\.\}.*?\\hfill\$\\square\$)",
     r"\\(val|cite|label|ref|eqref|input|includegraphics|scene|method|figureof|fontsize)"
     r"(\[[^\]]*\])?\{[^{}]*\}",
     r"\\(setlength|vspace|hspace)\{[^{}]*\}(\{[^{}]*\})?",
@@ -43,7 +45,7 @@ def notation_removed(formula: re.Match) -> str:
 
 
 def prose(source: str) -> str:
-    """Body text without displayed mathematics, notation, keys, lengths and the names of claims."""
+    """Body text without mathematics, propositions, proofs, keys, lengths and the names of claims."""
     text = source.split(r"\begin{document}", 1)[1]
     for pattern in _NOT_PROSE:
         text = re.sub(pattern, " ", text, flags=re.S if "begin" in pattern else 0)
