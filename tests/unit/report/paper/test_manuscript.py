@@ -45,7 +45,7 @@ def notation_removed(formula: re.Match) -> str:
 
 
 def prose(source: str) -> str:
-    """Body text without mathematics, propositions, proofs, keys, lengths and the names of claims."""
+    """Body text without mathematics, propositions, proofs, keys, lengths and names of claims."""
     text = source.split(r"\begin{document}", 1)[1]
     for pattern in _NOT_PROSE:
         text = re.sub(pattern, " ", text, flags=re.S if "begin" in pattern else 0)
