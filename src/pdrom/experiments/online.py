@@ -27,6 +27,7 @@ from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import displacement_norms
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
 from pdrom.reduction.subspace.rerun import rerun_model
+from pdrom.reduction.subspace.training import Norm
 
 log = logging.getLogger(__name__)
 
@@ -38,11 +39,12 @@ COLUMNS = [
 
 
 class OnlineModels(ConfigModel):
-    """Models of a large scene: kinds of basis, numbers of modes, tolerances of the sampling."""
+    """Models of a large scene: bases, numbers of modes, tolerances and norm of the sampling."""
 
     bases: tuple[PositionBasis, ...] = ("pod",)
     sizes: tuple[Modes, ...] = (20,)
     tolerances: tuple[Tolerance, ...] = (1e-2,)
+    norm: Norm = "energy"
 
 
 class Online(OnlineModels):
@@ -86,7 +88,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     for kind in asked.bases:
         for k in asked.sizes:
             columns = make_columns(train, references[0][1:][frames], kind, k)
-            found = sample_elements(train, columns, frames, asked.tolerances)
+            found = sample_elements(train, columns, frames, asked.tolerances, norm=asked.norm)
             for tolerance, samples in zip(asked.tolerances, found, strict=True):
                 model = SubspaceModel(kind, columns, samples)
                 errors = [

@@ -36,6 +36,7 @@ from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
 from pdrom.reduction.subspace.specs import HrpdSpec, InterpolationSpec
 from pdrom.reduction.subspace.store import store_columns, store_model
+from pdrom.reduction.subspace.training import Norm
 
 log = logging.getLogger(__name__)
 
@@ -48,7 +49,7 @@ Sampled = Mapping[str, Samples | Interpolation]
 
 
 class SubspaceModels(ConfigModel):
-    """Position subspaces: kinds of basis, numbers of modes, tolerances of the sampling.
+    """Position subspaces: kinds of basis, numbers of modes, tolerances of the sampling, its norm.
 
     At the ``interpolated_sizes`` the projections are interpolated, too: by ``hrpd`` (None leaves it
     out), and on the snapshot basis by every method of ``interpolations``.
@@ -57,6 +58,7 @@ class SubspaceModels(ConfigModel):
     bases: tuple[PositionBasis, ...] = ("pod", "skinning")
     sizes: tuple[Modes, ...] = (10, 20, 40)
     tolerances: tuple[Tolerance, ...] = (3e-2, 1e-2, 1e-3)
+    norm: Norm = "energy"
     interpolated_sizes: tuple[Modes, ...] = ()
     hrpd: HrpdSpec | None = None
     interpolations: dict[str, InterpolationSpec] = Field(default_factory=dict)
@@ -150,7 +152,8 @@ def _samplings(
     yield "full", {}
     if kind == "pod":
         tolerances = settings.tolerances
-        found = sample_elements(scene, columns, training_indices(scene), tolerances)
+        frames = training_indices(scene)
+        found = sample_elements(scene, columns, frames, tolerances, norm=settings.norm)
         for tolerance, samples in zip(tolerances, found, strict=True):
             yield f"ecsw-{tolerance:.0e}", samples
 

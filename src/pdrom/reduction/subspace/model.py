@@ -16,7 +16,7 @@ from pdrom.reduction.subspace.interpolation import InterpolatedLocalStep, Interp
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
 from pdrom.reduction.subspace.skinning import skinning_modes
 from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
-from pdrom.reduction.subspace.training import training_run
+from pdrom.reduction.subspace.training import Norm, training_run
 
 # Training frames that the element sampling looks at, at most.
 FRAMES = 70
@@ -86,14 +86,16 @@ def sample_elements(
     frames: np.ndarray,
     tolerances: Sequence[float],
     start: State | None = None,
+    norm: Norm = "energy",
 ) -> list[dict[str, Samples]]:
     """Energy-conserving samples of every group for each tolerance.
 
     They are trained on iterates of the subspace with all projections, in some of the training
-    ``frames`` of a run that begins at ``start`` (coordinates) or where the scene does.
+    ``frames`` of a run that begins at ``start`` (coordinates) or where the scene does, and meet the
+    tolerances in ``norm`` (see module `training`).
     """
     chosen = frames[np.unique(np.linspace(0, len(frames) - 1, FRAMES).round().astype(int))]
-    training = training_run(scene, columns, chosen, start)
+    training = training_run(scene, columns, chosen, start, norm)
     found = {
         group.name: ecsw_elements(group, columns, training, tolerances) for group in scene.groups
     }

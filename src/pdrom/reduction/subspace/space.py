@@ -66,6 +66,7 @@ class ReducedSpace(Space):
     Attributes
     ----------
     matrix : (K, K) system matrix A: inertia and stiffness
+    inertia_matrix : (K, K) B^T M B / h^2
     """
 
     def __init__(self, scene: Scene, columns: Columns, matrices: Sequence[np.ndarray]) -> None:
@@ -74,7 +75,7 @@ class ReducedSpace(Space):
         self.columns = columns
         mass = columns.B.T @ (scene.masses[:, None] * columns.B)
         self.matrix = mass / h**2 + sum(matrices, np.zeros_like(mass))
-        self._inertia = mass / h**2
+        self.inertia_matrix = mass / h**2
         self._forces = [_reduce_force(f, columns, mass, scene) for f in scene.forces]
         self._boundaries = [_ReducedBoundary(b, columns) for b in scene.boundaries]
         self._contacts = [_ReducedContact(c, columns, scene) for c in scene.contacts]
@@ -104,10 +105,10 @@ class ReducedSpace(Space):
         return elimination
 
     def inertia(self, s: np.ndarray) -> np.ndarray:
-        return self._inertia @ s
+        return self.inertia_matrix @ s
 
     def inertia_energy(self, difference: np.ndarray) -> float:
-        return 0.5 * float(np.sum(difference * (self._inertia @ difference)))
+        return 0.5 * float(np.sum(difference * (self.inertia_matrix @ difference)))
 
     def correct(self, y: np.ndarray, before: np.ndarray) -> None:
         for contact in self._contacts:
