@@ -23,7 +23,7 @@ _NOT_PROSE = [
     r"(?<!\\)%.*",
     r"\\begin\{(equation|align)\*?\}.*?\\end\{\1\*?\}",
     r"(?s:\\begin\{(theorem|proposition)\}.*?\\end\{\1\})",
-    r"(?s:\\emph\{Proof\.\}.*?\\hfill\$\\square\$)",
+    r"(?s:\\emph\{Proof\.\}.*?\\proven)",
     r"\\(val|cite|label|ref|eqref|input|includegraphics|scene|method|figureof|fontsize)"
     r"(\[[^\]]*\])?\{[^{}]*\}",
     r"\\(setlength|vspace|hspace)\{[^{}]*\}(\{[^{}]*\})?",
