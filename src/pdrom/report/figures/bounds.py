@@ -12,7 +12,7 @@ class Options(Experiments, Methods):
 FIGURE = Declaration(
     title="Bounds known before a run",
     caption=(
-        "Left: the largest extent of every run against its a-priori bound (theorem~1), both in "
+        "Left: the largest extent of every run against its a-priori bound (theorem 1), both in "
         "rest extents. On the line they are equal; no dot may lie above it. Ringed: what the study "
         "calls a blow-up. Right: the error of every run whose basis suffices "
         "against the contraction number of its iteration, over all scenes with a single group. "
