@@ -126,6 +126,13 @@ def test_no_projection_is_larger_than_its_bound(group, rng):
         assert (norms <= largest * (1 + 1e-12)).all()
 
 
+def test_a_group_that_names_no_manifold_has_no_bound():
+    scene = make_scene({"effect": "spring", "weight": 1.0})
+    group = scene.group("spring")
+    group.manifold = None
+    assert largest_projections(group, scene.mesh.points) is None
+
+
 def test_where_nothing_connects_nothing_bounds():
     """Bending leaves the affine motions of a sheet free: a run with changing holds may drift."""
     released = make_scene(*RELEASED, {"effect": "bending", "weight": 1.0}, frames=40)

@@ -1,4 +1,4 @@
-"""Experiments stability and guard on a small study, made by the experiments before them."""
+"""Experiments stability, guard and bounds on a small study, made by the experiments before."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,10 +8,11 @@ import pytest
 
 from conftest import ROOT, make_scene
 from pdrom.core.paths import File
-from pdrom.core.store import read_table
-from pdrom.experiments import fom, guard, mesh, pod, reruns, snapshots, stability, subspaces
+from pdrom.core.store import read_table, write_table
+from pdrom.experiments import bounds, fom, guard, mesh, pod, reruns, snapshots, stability, subspaces
 from pdrom.experiments.guard import Trial, TriedGuard
 from pdrom.experiments.sampling import Sweep
+from pdrom.experiments.settings import Horizon
 from pdrom.experiments.stability import ShortRuns
 from pdrom.experiments.subspaces import SubspaceModels
 from pdrom.model.scene import SceneConfig
@@ -175,3 +176,31 @@ def test_guard_without_cases_is_an_empty_table(tmp_path):
     table = try_guard(tmp_path, (), guard.Inputs([], [], [], []))
     assert table.columns.tolist() == guard.COLUMNS
     assert len(table) == 0
+
+
+def bound_rows(study: Made) -> pd.DataFrame:
+    output = File(str(study.folder / "bounds.csv"), {"scene": "test"})
+    perturbed = File(str(study.folder / "sensitivity.csv"), {"scene": "test"})
+    floor = {"scene": "test", "perturbation": "1e-10", "frame": range(16)}
+    write_table(pd.DataFrame(floor).assign(relative_difference=1e-9), perturbed.path)
+    horizon = Horizon(perturbation=1e-10, threshold=1e-3)
+    asked = bounds.Settings(scene=study.scene, methods=METHODS, ranks=(2, 4, 30), horizon=horizon)
+    inputs = bounds.Inputs(study.mesh, study.runs["train"], perturbed, study.bases, study.samplings)
+    bounds.run(asked, inputs, bounds.Outputs(output))
+    return read_table(output.path)
+
+
+def test_every_reduction_that_exists_has_its_bounds(study):
+    """Sizes 2 and 4 of two methods; 30 exceeds the rank. The runs of size 4 stay below theirs."""
+    rows = bound_rows(study)
+    assert rows.groupby("method").r.apply(list).to_dict() == {m: [2, 4] for m in METHODS}
+    assert (rows.bound >= 1.0 + rows.growth * rows.reach * 0.99).all()
+    assert (rows.spectral_radius <= rows.contraction * (1.0 + 1e-6)).all()
+    for method in METHODS:
+        extents = read_table(str(study.folder / method / "train.csv")).max_extent
+        assert extents.max() <= rows[(rows.method == method) & (rows.r == 4)].bound.iloc[0]
+
+
+def test_a_scene_too_large_for_dense_matrices_has_no_bounds(study, monkeypatch):
+    monkeypatch.setattr(bounds, "MOST_VERTICES", 10)
+    assert len(bound_rows(study)) == 0
