@@ -17,3 +17,22 @@ for name, artifact in PLAN.scene_artifacts.items():
             f"{artifact.title}: {{wildcards.scene}}"
         script:
             "../scripts/scene.py"
+
+
+# The viewer of the scenes that the configuration names (key viewer), on request:
+#   ./reproduce viewer
+rule viewer:
+    input:
+        PLAN.of_scene.viewer.inputs,
+    output:
+        page=PLAN.of_scene.viewer.page,
+    log:
+        PLAN.of_scene.viewer.log,
+    params:
+        orders=PLAN.of_scene.viewer.orders,
+        content=PLAN.of_scene.viewer.content,
+        code=PLAN.of_scene.viewer.code,
+    message:
+        "Viewer of runs"
+    script:
+        "../scripts/viewer.py"

@@ -4,7 +4,7 @@ docs/python.md has a worked example.
 """
 
 from pdrom.api.files import load, save
-from pdrom.api.pictures import plot
+from pdrom.api.pictures import plot, view
 from pdrom.api.runs import FullRun, ReducedRun, basis, methods, reduce, run
 from pdrom.api.scenes import build_scene, load_scene
 
@@ -20,4 +20,5 @@ __all__ = [
     "reduce",
     "run",
     "save",
+    "view",
 ]

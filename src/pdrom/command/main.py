@@ -15,7 +15,7 @@ from pdrom.core.errors import PdromError
 from pdrom.core.logs import INTERRUPTED
 from pdrom.pipeline.environment import settle
 
-COMMANDS = ("new", "run", "reduce", "show")
+COMMANDS = ("new", "run", "reduce", "show", "view")
 CODES = """exit codes: 0 done; 1 faulty input, or a file that cannot be read or written;
 2 the command was not understood; 3 a reduced run blew up (its file is written all the
 same); 130 interrupted"""

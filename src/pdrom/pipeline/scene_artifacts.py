@@ -1,17 +1,34 @@
 """What the rules of a single scene's artifacts need from a study."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+from pdrom.core.paths import TIMINGS, VIEWER
 from pdrom.pipeline.figures import holdings_of
 from pdrom.pipeline.fingerprint import fingerprint
 from pdrom.pipeline.holdings import paths_of
+from pdrom.pipeline.jobs import digest
+from pdrom.pipeline.scenes import require_scenes
 from pdrom.pipeline.study import Study
-from pdrom.report.scenes.catalogue import SceneArtifact, module
+from pdrom.report.scenes.catalogue import ARTIFACTS, PAGE, SceneArtifact, module
 from pdrom.report.scenes.job import SceneOrder
 
+VIEWED = 4  # scenes of the viewer where the configuration names none
 MAKER = "pdrom.report.scenes.job"
+
+
+@dataclass(frozen=True)
+class ViewerJob:
+    """What the rule of the viewer reads, is told, writes and depends on."""
+
+    inputs: list[str]
+    orders: list[dict[str, Any]]
+    page: str
+    log: str
+    content: str
+    code: str
 
 
 class SceneArtifacts:
@@ -42,8 +59,25 @@ class SceneArtifacts:
         """What an artifact depends on, beside the dates of its files."""
         return {
             "order": lambda wildcards: self._order(name, wildcards.scene),
+            "content": digest(self._study.root, *ARTIFACTS[name].sources),
             "code": fingerprint(MAKER, module(name)),
         }
+
+    @property
+    def viewer(self) -> "ViewerJob":
+        """The viewer of several scenes, with the times of their runs."""
+        chosen = self._study.settings.viewer.scenes or tuple(self._study.scenes)[:VIEWED]
+        require_scenes(self._study.root, chosen, "viewer.scenes")
+        reads = (*ARTIFACTS["viewer"].reads, TIMINGS)
+        studies = [self._study.only(scene) for scene in chosen]
+        return ViewerJob(
+            inputs=[f for s in studies for p in reads for f in paths_of(s, p, self._results)],
+            orders=[self._order("viewer", scene) for scene in chosen],
+            page=VIEWER.at(self._results),
+            log=f"{self._results}/logs/viewer.log",
+            content=digest(self._study.root, *PAGE),
+            code=fingerprint(MAKER, module("viewer")),
+        )
 
     def _made_order(self, name: str, scene: str) -> dict[str, Any]:
         section = self._study.settings.sensitivity
@@ -52,6 +86,7 @@ class SceneArtifacts:
             scene=scene,
             folder=self._results,
             holdings=holdings_of(self._study.only(scene)),
+            ranks=self._study.settings.viewer.ranks,
             settings={
                 "sensitivity.reference": section.reference,
                 "sensitivity.threshold": section.threshold,

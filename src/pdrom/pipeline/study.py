@@ -37,6 +37,7 @@ from pdrom.pipeline.scenes import (
 )
 from pdrom.reduction.local.ranks import Rank
 from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
+from pdrom.report.viewer.settings import Viewer
 
 
 class StudySettings(ConfigModel):
@@ -67,6 +68,7 @@ class StudySettings(ConfigModel):
     guard: GuardSection = GuardSection()
     hard_cases: HardCases = HardCases()
     online: Online = Online()
+    viewer: Viewer = Viewer()
     study: str | None = None
 
     @model_validator(mode="after")

@@ -53,6 +53,17 @@ def test_a_scene_is_run_reduced_and_shown(folder, capsys):
         assert words in shown
 
 
+def test_runs_are_put_on_a_page(folder, capsys):
+    asked = ["reduce", "small.yaml", "--group", "spring", "--r"]
+    assert [run([*asked, r]) for r in ("1", "2")] == [Status.DONE] * 2
+    files = [f"small_spring_gappy_{r}.h5" for r in "12"]
+    assert run(["view", *files, "--out", "both.html"]) == Status.DONE
+    page = (folder / "both.html").read_text("utf-8")
+    assert '"r":1' in page
+    assert '"r":2' in page
+    assert run(["view", "small.yaml"]) == Status.FAULTY
+
+
 def test_the_whole_configuration_is_shown_as_yaml(folder, capsys):
     run(["run", "small.yaml", "--out", "x.h5"])
     capsys.readouterr()

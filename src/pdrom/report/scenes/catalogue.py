@@ -13,6 +13,7 @@ from pdrom.core.paths import (
     SCENE_PICTURE,
     SCENE_PICTURE_PNG,
     SCENE_RUNS,
+    SCENE_VIEWER,
     SENSITIVITY,
     TRAIN,
     VTK,
@@ -28,16 +29,21 @@ class SceneArtifact:
     outputs : files written, which the scene's name labels
     reads : kinds of files of the scene, one for each of its groups and methods where they say so
     by_default : made by ``./reproduce scene NAME``; the others are asked for by name
+    sources : files of the project that are parts of it and no Python
     """
 
     title: str
     outputs: Mapping[str, Place]
     reads: tuple[Place, ...]
     by_default: bool = True
+    sources: tuple[str, ...] = ()
 
     def files(self, results: str, scene: str) -> list[str]:
         """Paths of what is written for a scene below the folder ``results``."""
         return [place.at(results, scene=scene) for place in self.outputs.values()]
+
+
+PAGE = tuple(f"src/pdrom/report/viewer/viewer.{kind}" for kind in ("html", "css", "js"))
 
 
 def _picture(name: str) -> dict[str, Place]:
@@ -74,6 +80,13 @@ ARTIFACTS: dict[str, SceneArtifact] = {
     ),
     "vtk": SceneArtifact(
         "Files for ParaView", {"collection": VTK}, (MESH, TRAIN, RERUNS), by_default=False
+    ),
+    "viewer": SceneArtifact(
+        "Viewer",
+        {"page": SCENE_VIEWER},
+        (MESH, TRAIN, SENSITIVITY, RERUNS),
+        by_default=False,
+        sources=PAGE,
     ),
 }
 

@@ -6,6 +6,7 @@ from importlib import import_module
 from pydantic import BaseModel, ConfigDict
 
 from pdrom.report.figures.kit.holdings import Holdings
+from pdrom.report.figures.kit.options import Rank
 from pdrom.report.scenes.catalogue import module
 from pdrom.report.scenes.results import SceneResults
 
@@ -14,6 +15,7 @@ class SceneOrder(BaseModel):
     """What a job is told to make, for which scene, and what the configuration holds of it.
 
     folder : where the results lie
+    ranks : basis sizes, where not every one is shown
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -22,10 +24,15 @@ class SceneOrder(BaseModel):
     scene: str
     folder: str
     holdings: Holdings
+    ranks: tuple[Rank, ...]
     settings: dict[str, float]
+
+    @property
+    def results(self) -> SceneResults:
+        """What the artifact reads."""
+        return SceneResults(self.scene, self.folder, self.holdings, self.settings, self.ranks)
 
 
 def make(order: SceneOrder, outputs: Mapping[str, str]) -> None:
     """Make an artifact; ``outputs`` are its files by the names of `SceneArtifact.outputs`."""
-    results = SceneResults(order.scene, order.folder, order.holdings, order.settings)
-    import_module(module(order.name)).make(results, outputs)
+    import_module(module(order.name)).make(order.results, outputs)

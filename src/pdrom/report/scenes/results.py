@@ -8,6 +8,7 @@ from pdrom.core.errors import StorageError
 from pdrom.core.paths import RECONSTRUCTION, RERUNS, RERUNS_TRAIN, SENSITIVITY, File, Place
 from pdrom.core.store import read_table
 from pdrom.report.figures.kit.holdings import Holdings
+from pdrom.report.figures.kit.options import Rank
 from pdrom.report.figures.kit.results import Results
 from pdrom.tables.reconstruction_error import reconstruction_error
 from pdrom.tables.reruns import COLUMNS, TRAIN, judged_reruns
@@ -17,10 +18,16 @@ class SceneResults(Results):
     """Results of ``scene``; what drawings call tables of the study are made of its own files."""
 
     def __init__(
-        self, scene: str, folder: str, holdings: Holdings, settings: Mapping[str, float]
+        self,
+        scene: str,
+        folder: str,
+        holdings: Holdings,
+        settings: Mapping[str, float],
+        ranks: tuple[Rank, ...] = (),
     ) -> None:
         super().__init__(folder, holdings, settings)
         self.scene = scene
+        self.ranks = ranks
 
     @property
     def groups(self) -> tuple[str, ...]:

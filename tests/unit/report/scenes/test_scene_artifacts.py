@@ -1,5 +1,6 @@
 """What is made of one scene: files that show its runs, from its own results alone."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -8,19 +9,21 @@ import h5py
 import imageio_ffmpeg
 import meshio
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.image import imread
 from PIL import Image
 
 from pdrom.core.errors import ConfigurationError
-from pdrom.core.paths import FULL_ORDER, VTK
-from pdrom.core.store import check_file, read_table
+from pdrom.core.paths import FULL_ORDER, TIMINGS, VTK
+from pdrom.core.store import check_file, read_table, write_table
 from pdrom.pipeline.scene_command import scene_arguments
 from pdrom.pipeline.study import Study
 from pdrom.report.figures.kit.read import RerunInfo
 from pdrom.report.scenes.catalogue import ARTIFACTS, default_files
 from pdrom.report.scenes.job import make
 from pdrom.report.scenes.sizes import SHOWN, shown
+from pdrom.report.scenes.viewer import make_index
 from small_scene import SCENE, order, run_jobs, small_study
 
 
@@ -144,3 +147,32 @@ def test_paraview_gets_every_frame_with_its_time(finished):
     assert np.array_equal(frame.points, last)
     assert frame.point_data["velocity"] == pytest.approx(velocity, rel=1e-6)
     assert {name.split()[1] for name in frame.point_data if " " in name} == set(study.methods)
+
+
+def test_the_viewer_shows_every_method_with_its_times(finished):
+    study, results = finished
+    page = Path(made(finished, "viewer")["page"])
+    (packed,) = _scenes(page)
+    assert {run["method"] for run in packed["runs"]} == {m.title for m in study.methods.values()}
+    assert {run["ms"] for run in packed["runs"]} == {None}
+    rows = pd.DataFrame(
+        {
+            "group": [None, "spring"],
+            "method": [None, "pod"],
+            "position_basis": None,
+            "r": [None, 2],
+            "implementation": ["compiled", "compiled"],
+            "ms_per_frame": [2.0, 1.0],
+        }
+    )
+    write_table(rows, TIMINGS.at(results, scene=SCENE))
+    make_index([order(study, results, "viewer").results] * 2, str(page))
+    first, second = _scenes(page)
+    assert first == second
+    assert first["ms"] == 2.0
+    assert {run["ms"] for run in first["runs"] if run["r"] == 2} >= {1.0}
+
+
+def _scenes(page: Path) -> list[dict]:
+    data = page.read_text("utf-8").split('<script id="scenes" type="application/json">')[1]
+    return json.loads(data.split("</script>")[0])

@@ -1,0 +1,38 @@
+"""``pdrom view RESULT ...``: a page to look at runs."""
+
+import argparse
+import sys
+import webbrowser
+from pathlib import Path
+
+from pdrom.command.base import Command, Status
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """The runs, and the page to write."""
+    parser.add_argument(
+        "results", metavar="RESULT", nargs="+", help="files of pdrom run and pdrom reduce"
+    )
+    parser.add_argument("--out", metavar="FILE", help="page to write; the first RESULT as .html")
+    parser.add_argument("--open", action="store_true", help="open it in the browser")
+
+
+def perform(arguments: argparse.Namespace) -> Status:
+    """Write the page and say where it is."""
+    from pdrom.api import load, view
+
+    out = Path(arguments.out or Path(arguments.results[0]).with_suffix(".html"))
+    view(out, *map(load, arguments.results))
+    size = out.stat().st_size / 1e6
+    sys.stdout.write(f"{out}: {size:.1f} MB; a browser opens it without a network\n")
+    if arguments.open and not webbrowser.open(out.resolve().as_uri()):
+        sys.stderr.write("pdrom: no browser was found; open the file by hand\n")
+    return Status.DONE
+
+
+COMMAND = Command(
+    "Write a page on which runs are looked at",
+    "pdrom view sheet_spring_gappy_20.h5 --open",
+    declare,
+    perform,
+)

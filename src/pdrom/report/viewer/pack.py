@@ -1,0 +1,79 @@
+"""Runs as plain data for the page: the surface alone, some frames, positions of 16 bits."""
+
+import base64
+import zlib
+from math import ceil
+from typing import Any
+
+import numpy as np
+
+from pdrom.report.viewer.runs import ViewedRun, ViewedScene
+
+FRAMES = 75  # stored of a run, at most
+LEVELS = 65535  # of a quantised coordinate, over the run's bounding box
+
+
+def pack_scene(scene: ViewedScene) -> dict[str, Any]:
+    """A scene for the page; vertices that no triangle has are left out."""
+    used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
+    stride = max(1, ceil((len(scene.positions) - 1) / FRAMES))
+    return {
+        "name": scene.name,
+        "title": scene.title,
+        "triangles": _text(triangles.reshape(-1, 3).astype("<u4")),
+        "timeStep": scene.time_step,
+        "stride": stride,
+        "full": pack_positions(scene.positions[::stride, used]),
+        "ms": scene.ms,
+        "floor": _numbers(scene.floor),
+        "horizon": scene.horizon,
+        "runs": [_pack_run(run, stride, used) for run in scene.runs],
+    }
+
+
+def _pack_run(run: ViewedRun, stride: int, used: np.ndarray) -> dict[str, Any]:
+    return {
+        "group": run.group,
+        "method": run.method,
+        "r": run.r,
+        "positions": pack_positions(run.positions[::stride, used]),
+        "error": _numbers(run.error),
+        "blowup": run.blowup_frame,
+        "ms": run.ms,
+    }
+
+
+def pack_positions(positions: np.ndarray) -> dict[str, Any]:
+    """Positions (F, N, 3) as steps of a 65535th of their bounding box, and only their changes.
+
+    A coordinate is wrong by half a step at most; changes from frame to frame, modulo 2^16, compress
+    better than the positions.
+    """
+    low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
+    step = np.where(high > low, (high - low) / LEVELS, 1.0)
+    levels = np.round((positions - low) / step).astype(np.int64)
+    changes = np.diff(levels, axis=0, prepend=0) % (LEVELS + 1)
+    return {
+        "frames": len(positions),
+        "vertices": positions.shape[1],
+        "low": low.tolist(),
+        "step": step.tolist(),
+        "changes": _text(changes.astype("<u2")),
+    }
+
+
+def unpack_positions(packed: dict[str, Any]) -> np.ndarray:
+    """The positions (F, N, 3) that the page draws."""
+    data = zlib.decompress(base64.b64decode(packed["changes"]))
+    changes = np.frombuffer(data, "<u2").reshape(packed["frames"], packed["vertices"], 3)
+    levels = np.cumsum(changes, axis=0, dtype=np.int64) % (LEVELS + 1)
+    return np.array(packed["low"]) + np.array(packed["step"]) * levels
+
+
+def _text(values: np.ndarray) -> str:
+    return base64.b64encode(zlib.compress(np.ascontiguousarray(values).tobytes(), 9)).decode()
+
+
+def _numbers(values: np.ndarray) -> list[float | None]:
+    """Four digits of each number; null where there is none."""
+    return [float(f"{v:.4g}") if np.isfinite(v) else None for v in values]

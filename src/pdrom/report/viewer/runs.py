@@ -1,0 +1,48 @@
+"""What a viewer's page shows: scenes with their full-order and reduced runs."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pdrom.model.mesh.types import Mesh
+
+
+@dataclass(frozen=True)
+class ViewedRun:
+    """A reduced run.
+
+    positions : (F' + 1, N, 3) m, finite, the initial ones first
+    error : (F',) relative error of each frame
+    blowup_frame : None for a run that lived
+    ms : milliseconds a frame, None where nobody measured
+    """
+
+    group: str
+    method: str
+    r: int
+    positions: np.ndarray
+    error: np.ndarray
+    blowup_frame: int | None
+    ms: float | None
+
+
+@dataclass(frozen=True)
+class ViewedScene:
+    """A scene with its full-order run and the reduced ones.
+
+    time_step : of a frame, s
+    positions : (F + 1, N, 3) m of the full order
+    ms : milliseconds a frame of the full order, None where nobody measured
+    floor : (F,) sensitivity floor, empty where it is not known
+    horizon : frame from which on no run can be judged, None if there is none or it is not known
+    """
+
+    name: str
+    title: str
+    mesh: Mesh
+    time_step: float
+    positions: np.ndarray
+    ms: float | None
+    floor: np.ndarray = field(default_factory=lambda: np.empty(0))
+    horizon: int | None = None
+    runs: tuple[ViewedRun, ...] = ()

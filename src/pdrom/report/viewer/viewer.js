@@ -1,0 +1,233 @@
+"use strict";
+// The page's own script: choices, frames, playing. Plotly draws; its licence stands above its code.
+(async () => {
+  const GREY = "#b9b4a7", BLUE = "#0072b2", RED = "#b3261e";
+  const FLOOR = 1e-7; // smaller errors are drawn on the axis
+  const at = (id) => document.getElementById(id);
+  const scenes = JSON.parse(at("scenes").textContent);
+  const unpacked = new WeakMap();
+  let shown = null; // {scene, run, full, reduced, faces}
+  let timer = null, syncing = false;
+  let wanted = null, drawing = null; // what is still to be drawn: null, "frame" or "all"; who draws
+
+  async function bytes(text) {
+    const raw = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+    const stream = new Blob([raw]).stream().pipeThrough(new DecompressionStream("deflate"));
+    return new Response(stream).arrayBuffer();
+  }
+
+  // Frames of packed positions: three arrays of coordinates each.
+  async function positions(packed) {
+    if (unpacked.has(packed)) return unpacked.get(packed);
+    const changes = new Uint16Array(await bytes(packed.changes));
+    const n = packed.vertices, level = new Uint16Array(3 * n), frames = [];
+    for (let f = 0; f < packed.frames; f++) {
+      const xyz = [new Float32Array(n), new Float32Array(n), new Float32Array(n)];
+      for (let i = 0; i < 3 * n; i++) {
+        level[i] += changes[3 * n * f + i];
+        xyz[i % 3][(i / 3) | 0] = packed.low[i % 3] + packed.step[i % 3] * level[i];
+      }
+      frames.push(xyz);
+    }
+    unpacked.set(packed, frames);
+    return frames;
+  }
+
+  function fill(select, values, words = String) {
+    const before = select.value;
+    select.replaceChildren(...values.map((value) => new Option(words(value), value)));
+    if (values.map(String).includes(before)) select.value = before;
+    select.disabled = values.length < 2;
+  }
+
+  const distinct = (values) => [...new Set(values)];
+
+  function chosenRun() {
+    const scene = scenes[at("scene").value];
+    fill(at("group"), distinct(scene.runs.map((run) => run.group)), (g) => g.replaceAll("_", " "));
+    const ofGroup = scene.runs.filter((run) => run.group === at("group").value);
+    fill(at("method"), distinct(ofGroup.map((run) => run.method)));
+    const ofMethod = ofGroup.filter((run) => run.method === at("method").value);
+    fill(at("r"), ofMethod.map((run) => run.r));
+    return [scene, ofMethod.find((run) => String(run.r) === at("r").value) || null];
+  }
+
+  // Box of the full-order run, with room around it: runs that leave it are cut off.
+  function box(frames) {
+    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+    for (const xyz of frames) xyz.forEach((values, axis) => values.forEach((v) => {
+      low[axis] = Math.min(low[axis], v);
+      high[axis] = Math.max(high[axis], v);
+    }));
+    const size = Math.max(...high.map((v, axis) => v - low[axis]));
+    return low.map((v, axis) => [v - 0.2 * size, high[axis] + 0.2 * size]);
+  }
+
+  function space(ranges, domain, camera) {
+    const axis = (range) => ({ range, visible: false });
+    const [x, y, z] = ranges.map(axis);
+    return { xaxis: x, yaxis: y, zaxis: z, domain, camera, aspectmode: "data", uirevision: "camera" };
+  }
+
+  const CAMERA = { up: { x: 0, y: 1, z: 0 }, eye: { x: 0.7, y: 0.45, z: 1.15 } };
+
+  function surface(name, xyz, faces, scene, look) {
+    const [x, y, z] = xyz;
+    return { type: "mesh3d", name, x, y, z, ...faces, scene, flatshading: true, hoverinfo: "skip",
+      lighting: { ambient: 0.55, diffuse: 0.7, specular: 0.05 }, ...look };
+  }
+
+  function distance(a, b) {
+    return Float32Array.from(a[0], (v, i) => Math.hypot(v - b[0][i], a[1][i] - b[1][i], a[2][i] - b[2][i]));
+  }
+
+  // Frame of the page -> what is stored; a run that ended early keeps its last frame.
+  const full = (k) => shown.full[k];
+  const reduced = (k) => shown.reduced && shown.reduced[Math.min(k, shown.reduced.length - 1)];
+
+  // One thing is drawn at a time; what is asked for meanwhile is drawn afterwards, once.
+  function update(what) {
+    if (wanted !== "all") wanted = what;
+    drawing = drawing || drawWanted().finally(() => { drawing = null; });
+    return drawing;
+  }
+
+  async function drawWanted() {
+    while (wanted) {
+      const now = wanted;
+      wanted = null;
+      if (now === "all") await choose();
+      else await showFrame();
+    }
+  }
+
+  async function choose() {
+    const [scene, run] = chosenRun();
+    const faces = new Uint32Array(await bytes(scene.triangles));
+    const pick = (corner) => faces.filter((_, i) => i % 3 === corner);
+    shown = { scene, run, faces: { i: pick(0), j: pick(1), k: pick(2) },
+      full: await positions(scene.full), reduced: run && await positions(run.positions) };
+    shown.ranges = box(shown.full);
+    at("frame").max = shown.full.length - 1;
+    at("frame").value = Math.min(at("frame").value, shown.full.length - 1);
+    await drawShapes();
+    await drawErrors();
+    await showFrame();
+  }
+
+  async function drawShapes() {
+    const k = Number(at("frame").value), beside = at("view").value === "beside" && shown.reduced;
+    const old = at("shapes").layout, camera = (old && old.scene && old.scene.camera) || CAMERA;
+    const traces = [surface("full order", full(k), shown.faces, "scene",
+      { color: GREY, opacity: beside || !shown.reduced ? 1 : 0.4 })];
+    if (shown.reduced) {
+      const size = Math.max(...shown.ranges.map((range) => range[1] - range[0])) / 1.4;
+      const colour = at("colour").checked
+        ? { intensity: distance(reduced(k), full(k)), cmin: 0, cmax: 0.1 * size, colorscale: "Viridis",
+          colorbar: { title: { text: "distance, m" }, thickness: 12, len: 0.6 } }
+        : { color: BLUE };
+      traces.push(surface("reduced", reduced(k), shown.faces, beside ? "scene2" : "scene", colour));
+    }
+    const note = (text, x) => ({ text, x, y: 1, xref: "paper", yref: "paper", showarrow: false, font: { size: 14 } });
+    const layout = { margin: { l: 0, r: 0, t: 24, b: 0 }, uirevision: "camera",
+      scene: space(shown.ranges, { x: [0, beside ? 0.48 : 0.95], y: [0, 1] }, camera),
+      annotations: beside ? [note("full order", 0.2), note("reduced", 0.7)]
+        : [note(shown.reduced ? "full order (transparent) and reduced" : "full order", 0.45)] };
+    if (beside) layout.scene2 = space(shown.ranges, { x: [0.48, 0.95], y: [0, 1] }, camera);
+    await Plotly.react(at("shapes"), traces, layout, { displaylogo: false, responsive: true });
+  }
+
+  const time = (frame) => frame * shown.scene.timeStep;
+  const clipped = (error) => (error === null ? null : Math.max(error, FLOOR));
+
+  async function drawErrors() {
+    const { scene, run } = shown;
+    const series = (values) => ({ x: values.map((_, f) => time(f + 1)), y: values.map(clipped) });
+    const traces = [];
+    if (scene.floor.length) traces.push({ ...series(scene.floor), name: "sensitivity floor", fill: "tozeroy",
+      mode: "lines", line: { color: "#c9c4b8" } });
+    if (run) traces.push({ ...series(run.error), name: "relative error", mode: "lines", line: { color: BLUE } });
+    traces.push({ x: [0, 0], y: [FLOOR, 1e3], name: "now", mode: "lines", line: { color: "#222", width: 1 } });
+    const shapes = scene.horizon === null ? [] : [{ type: "line", x0: time(scene.horizon), x1: time(scene.horizon),
+      yref: "paper", y0: 0, y1: 1, line: { dash: "dot", color: RED } }];
+    await Plotly.react(at("errors"), traces, { margin: { l: 60, r: 10, t: 24, b: 40 }, shapes,
+      legend: { orientation: "h", y: -0.18 }, xaxis: { title: { text: "time, s" }, range: [0, time((shown.full.length - 1) * scene.stride)] },
+      yaxis: { type: "log", range: [-7, 3], title: { text: "relative error" }, exponentformat: "power" } },
+      { displaylogo: false, responsive: true });
+    const ms = (value) => (value === null ? "not timed" : `${value.toPrecision(3)} ms a frame`);
+    const parts = [`${scene.title}.`, `Full order: ${ms(scene.ms)}.`];
+    if (run) parts.push(`Reduced: ${ms(run.ms)}.`);
+    if (run && run.blowup !== null) parts.push(`The reduced run blew up at frame ${run.blowup}.`);
+    parts.push(!scene.floor.length ? "Sensitivity floor and horizon are not known here."
+      : scene.horizon === null ? "The floor stays below the threshold: the whole run can be judged."
+        : `Beyond frame ${scene.horizon} (dotted line) errors cannot be told from chaos.`);
+    at("about").textContent = parts.join(" ");
+  }
+
+  async function showFrame() {
+    const k = Number(at("frame").value), frame = k * shown.scene.stride;
+    const runs = shown.reduced ? [full(k), reduced(k)] : [full(k)];
+    const change = { x: runs.map((r) => r[0]), y: runs.map((r) => r[1]), z: runs.map((r) => r[2]) };
+    if (shown.reduced && at("colour").checked) change.intensity = [undefined, distance(reduced(k), full(k))];
+    await Plotly.restyle(at("shapes"), change);
+    const line = at("errors").data.length - 1;
+    await Plotly.restyle(at("errors"), { x: [[time(frame), time(frame)]] }, [line]);
+    at("status").textContent = words(k, frame);
+    at("frame").setAttribute("aria-valuetext", `frame ${frame}`);
+    await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+    document.body.dataset.frame = k;
+  }
+
+  function words(k, frame) {
+    const told = [`frame ${frame}, ${time(frame).toFixed(2)} s`];
+    const { run } = shown;
+    if (run && shown.reduced.length <= k) told.push("the reduced run had ended");
+    else if (run && frame > 0 && run.error[frame - 1] != null) told.push(`relative error ${run.error[frame - 1].toPrecision(2)}`);
+    if (shown.scene.horizon !== null && frame > shown.scene.horizon) told.push("past the horizon");
+    return told.join(", ");
+  }
+
+  function stop() {
+    clearInterval(timer);
+    timer = null;
+    at("play").textContent = "Play";
+    at("play").setAttribute("aria-pressed", "false");
+  }
+
+  function play() {
+    if (timer !== null) return stop();
+    at("play").textContent = "Pause";
+    at("play").setAttribute("aria-pressed", "true");
+    const beat = Math.max(40, 1000 * shown.scene.timeStep * shown.scene.stride);
+    timer = setInterval(() => {
+      if (drawing) return;
+      const input = at("frame");
+      input.value = input.value === input.max ? 0 : Number(input.value) + 1;
+      update("frame");
+    }, beat);
+  }
+
+  // One camera for both pictures.
+  function follow(change) {
+    const moved = ["scene", "scene2"].find((name) => change[`${name}.camera`]);
+    if (!moved || syncing || !at("shapes").layout.scene2) return;
+    syncing = true;
+    const other = moved === "scene" ? "scene2" : "scene";
+    Plotly.relayout(at("shapes"), { [`${other}.camera`]: change[`${moved}.camera`] }).then(() => { syncing = false; });
+  }
+
+  async function changed() {
+    stop();
+    document.body.dataset.ready = "no";
+    await update("all");
+    document.body.dataset.ready = "yes";
+  }
+
+  fill(at("scene"), scenes.map((_, i) => i), (i) => scenes[i].name.replaceAll("_", " "));
+  at("choice").addEventListener("change", changed);
+  at("choice").addEventListener("submit", (event) => event.preventDefault());
+  at("frame").addEventListener("input", () => update("frame"));
+  at("play").addEventListener("click", play);
+  await changed();
+  at("shapes").on("plotly_relayout", follow);
+})();

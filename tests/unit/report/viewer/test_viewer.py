@@ -1,0 +1,184 @@
+"""The viewer: positions survive packing, the page is one file, and it works in a real browser."""
+
+import io
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+from playwright.sync_api import Locator, Page, sync_playwright
+
+from pdrom.core.errors import StorageError
+from pdrom.model.mesh.generators import bar, cloth
+from pdrom.report.viewer import page as writer
+from pdrom.report.viewer.pack import FRAMES, LEVELS, pack_positions, pack_scene, unpack_positions
+from pdrom.report.viewer.page import write_page
+from pdrom.report.viewer.runs import ViewedRun, ViewedScene
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+# software rendering, so that a machine without a graphics card draws, too
+OPTIONS = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]
+LIMIT = 120_000  # ms after which a page that does not answer has failed
+
+
+@given(st.integers(1, 4), st.integers(1, 5), st.floats(1e-6, 1e6), st.integers(0, 2**32 - 1))
+def test_positions_survive_packing_to_half_a_step(frames, vertices, size, seed):
+    positions = size * np.random.default_rng(seed).normal(size=(frames, vertices, 3))
+    positions[..., 2] = 0.5 * size  # a sheet without thickness
+    found = unpack_positions(pack_positions(positions))
+    box = np.ptp(positions, axis=(0, 1))
+    assert np.all(np.abs(found - positions) <= 0.5001 * box / LEVELS + 1e-15 * size)
+
+
+def viewed(name: str = "sheet", frames: int = 12, runs: int = 2) -> ViewedScene:
+    """A sheet that sinks; one reduced run is near it, the other one bends up and ends early."""
+    mesh = cloth(6, 6, "xz", 1.0, 2.0, 0.0)
+    t = np.linspace(0.0, 1.0, frames + 1)[:, None]
+    full = np.repeat(mesh.points[None], frames + 1, axis=0)
+    full[..., 1] -= t * mesh.points[:, 0] ** 2
+    bent = full.copy()
+    bent[..., 1] += 1.5 * t * np.abs(mesh.points[:, 0])
+    error = np.linspace(1e-3, 1.0, frames)
+    half = frames // 2
+    near = ViewedRun("spring", "near", 6, full + 0.01, error, None, 0.5)
+    far = ViewedRun("spring", "far", 6, bent[: half + 1], error[:half], half, None)
+    floor = np.geomspace(1e-9, 1e-2, frames)
+    return ViewedScene(
+        name, "A <sheet> </script>", mesh, 0.02, full, 1.0, floor, 9, (near, far)[:runs]
+    )
+
+
+def test_the_surface_alone_is_packed_and_few_frames():
+    mesh = bar(6, 4, 4)
+    positions = np.repeat(mesh.points[None], 3 * FRAMES, axis=0)
+    packed = pack_scene(ViewedScene("bar", "Bar", mesh, 0.01, positions, None))
+    assert packed["full"]["vertices"] == len(np.unique(mesh.triangles)) < mesh.vertices
+    assert FRAMES / 2 < packed["full"]["frames"] <= FRAMES + 1
+    assert unpack_positions(packed["full"])[0].max() == pytest.approx(mesh.points.max(), rel=1e-4)
+    assert json.dumps(packed, allow_nan=False)
+
+
+def test_a_page_that_is_too_large_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(writer, "LARGEST", 1000)
+    with pytest.raises(StorageError, match=r"viewer\.scenes"):
+        write_page([viewed()], tmp_path / "x.html")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_page_keeps_the_licence_and_no_title_ends_its_script(tmp_path):
+    write_page([viewed()], tmp_path / "x.html")
+    text = (tmp_path / "x.html").read_text("utf-8")
+    assert "Licensed under the MIT license" in text
+    assert text.count("</script>") == 3
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    """The page of two scenes in a headless browser; what it said and asked for is noted."""
+    program = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if program is None:
+        pytest.skip(f"no browser on this machine ({', '.join(BROWSERS)})")
+    path = tmp_path_factory.mktemp("viewer") / "index.html"
+    write_page([viewed(), viewed("other", runs=0)], path)
+    with sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=program, args=OPTIONS)
+        page = browser.new_page(viewport={"width": 1000, "height": 700})
+        page.set_default_timeout(LIMIT)
+        page.said, page.asked = [], []
+        page.on("console", lambda m: page.said.append(m.text) if m.type == "error" else None)
+        page.on("pageerror", lambda error: page.said.append(str(error)))
+        page.on("request", lambda request: page.asked.append(request.url))
+        page.goto(path.as_uri())
+        ready(page)
+        yield page
+        browser.close()
+
+
+def ready(page: Page) -> None:
+    """Wait until the page shows what was chosen."""
+    page.wait_for_selector('body[data-ready="yes"]')
+
+
+def choose(page: Page, **chosen: str) -> None:
+    """Choose from lists by the words shown."""
+    for name, label in chosen.items():
+        page.select_option(f"#{name}", label=label)
+        ready(page)
+
+
+def go_to(page: Page, frame: int) -> None:
+    """Move the slider as the keyboard does."""
+    page.focus("#frame")
+    page.keyboard.press("Home")
+    for _ in range(frame):
+        page.keyboard.press("ArrowRight")
+    page.wait_for_selector(f'body[data-frame="{frame}"]')
+
+
+def picture(element: Locator) -> np.ndarray:
+    """What is seen, (height, width, 3)."""
+    with Image.open(io.BytesIO(element.screenshot())) as image:
+        return np.asarray(image.convert("RGB"), dtype=int)
+
+
+def differ(first: np.ndarray, second: np.ndarray) -> bool:
+    """Whether more than a thousandth of the pixels changed clearly."""
+    return np.mean(np.abs(first - second).max(axis=2) > 30) > 1e-3
+
+
+def test_two_methods_and_two_frames_differ(opened: Page) -> None:
+    shapes = opened.locator("#shapes")
+    choose(opened, scene="sheet", method="near")
+    go_to(opened, 0)
+    start = picture(shapes)
+    assert np.mean(start.min(axis=2) < 200) > 0.01  # something is drawn
+    go_to(opened, 6)
+    near = picture(shapes)
+    assert differ(start, near)
+    assert "frame 6, 0.12 s" in opened.inner_text("#status")
+    choose(opened, method="far")
+    assert differ(near, picture(shapes))
+    assert "blew up at frame 6" in opened.inner_text("#about")
+    assert "Beyond frame 9" in opened.inner_text("#about")
+
+
+def test_views_and_scenes_are_chosen(opened: Page) -> None:
+    shapes = opened.locator("#shapes")
+    choose(opened, scene="sheet", method="near")
+    beside = picture(shapes)
+    choose(opened, view="on top of each other")
+    assert differ(beside, picture(shapes))
+    choose(opened, scene="other", view="side by side")
+    assert opened.locator("#method").is_disabled()
+    assert "A <sheet> </script>" in opened.inner_text("#about")
+
+
+def test_playing_goes_through_the_frames_and_stops(opened: Page) -> None:
+    choose(opened, scene="sheet", method="near")
+    go_to(opened, 0)
+    opened.focus("#play")
+    opened.keyboard.press("Enter")
+    opened.wait_for_selector('body[data-frame="3"]')
+    opened.keyboard.press("Enter")
+    assert opened.inner_text("#play") == "Play"
+    assert opened.get_attribute("#play", "aria-pressed") == "false"
+
+
+def test_nothing_is_asked_of_a_network_and_nothing_fails(opened: Page) -> None:
+    assert [url for url in opened.asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    assert opened.said == []
+
+
+def test_the_small_page_is_far_below_the_limit(tmp_path: Path) -> None:
+    write_page([viewed()], tmp_path / "x.html")
+    assert (tmp_path / "x.html").stat().st_size < 6_000_000

@@ -1,0 +1,7 @@
+from pdrom.core.logs import job_log
+from pdrom.report.scenes.job import SceneOrder
+from pdrom.report.scenes.viewer import make_index
+
+with job_log(snakemake.log[0]):
+    orders = map(SceneOrder.model_validate, snakemake.params.orders)
+    make_index([order.results for order in orders], snakemake.output.page)
