@@ -82,6 +82,13 @@ def _ladders(study: Study) -> Iterator[Labels]:
             yield {"scene": scene, "group": group}
 
 
+def _noise(study: Study) -> Iterator[Labels]:
+    cases = study.settings.noise.cases
+    for scene, group in study.experiments:
+        if cases.get(scene) == group:
+            yield {"scene": scene, "group": group}
+
+
 def _sizes(study: Study) -> Iterator[Labels]:
     for scene, factors in study.settings.scaling.scenes.items():
         if scene in study.scenes:
@@ -126,6 +133,7 @@ HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.SUBSPACES_HELDOUT: _subspaces,
     paths.BOUNDS: _scenes,
     paths.LADDER: _ladders,
+    paths.NOISE: _noise,
     paths.STABILITY: _among(lambda study: study.settings.stability.scenes),
     paths.SUBSPACE_ABLATION: _among(lambda study: study.ablation.scenes),
     paths.TIMINGS: _scenes,

@@ -81,6 +81,7 @@ def _study(study: Study) -> Row:
         "threshold": settings.sensitivity.threshold,
         "perturbation": settings.sensitivity.reference,
         "seeds": len(settings.sensitivity.seeds),
+        "noise_repetitions": settings.noise.repetitions,
         "repeats": settings.timing.repeats,
         "timed_frames": settings.timing.frames,
         "blowup_extent": settings.blowup_extent,

@@ -82,6 +82,11 @@ def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
     return found | study.named_methods(section.breakeven.methods, "scaling.breakeven.methods")
 
 
+def _noise_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
+    """The methods of the noise runs; they need not be among the study's."""
+    return study.named_methods(study.settings.noise.methods, "noise.methods")
+
+
 PROVIDERS: dict[str, Callable[[Study, Labels], Any]] = {
     "scene": _scene,
     "mesh": _mesh,
@@ -89,6 +94,7 @@ PROVIDERS: dict[str, Callable[[Study, Labels], Any]] = {
     "methods": lambda study, labels: study.methods,
     "every_method": lambda study, labels: study.every_method,
     "scaled_methods": scaled_methods,
+    "noise_methods": _noise_methods,
     "basis": _basis,
     "horizon": _horizon,
     "stability": _stability,

@@ -15,6 +15,7 @@ from pdrom.experiments.guard import GuardSection
 from pdrom.experiments.hard_cases.experiment import HardCases
 from pdrom.experiments.iterations import IterationSweep
 from pdrom.experiments.ladder import LadderFile
+from pdrom.experiments.noise import Noise
 from pdrom.experiments.offline import Offline
 from pdrom.experiments.online import Online
 from pdrom.experiments.sampling import Sweep
@@ -65,6 +66,7 @@ class StudySettings(ConfigModel):
     scaling: Scaling = Scaling()
     offline: Offline = Offline()
     stability: Stability = Stability()
+    noise: Noise = Noise()
     guard: GuardSection = GuardSection()
     hard_cases: HardCases = HardCases()
     online: Online = Online()

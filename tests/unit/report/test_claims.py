@@ -76,6 +76,14 @@ def tables() -> dict[str, pd.DataFrame]:
                 "ratio": [0.5, 1.5, 0.25],
             }
         ),
+        "noise": pd.DataFrame(
+            {
+                "scene": "a",
+                "r": [6, 10, 20],
+                "rank": [12, 12, 12],
+                "relative_error": [1e-9, None, None],
+            }
+        ),
         "local_share": pd.DataFrame(
             {
                 "scene": ["a", "a", "b"],
@@ -143,6 +151,8 @@ def measured(metric: str, accuracy: float = 0.1, **where) -> list[float]:
         # x and y of two sizes, the second one singular; z is round-off at every size
         ("axis_reconstruction_error", {}, [0.2, np.inf, 0.4, np.inf]),
         ("axis_reconstruction_error", {"axis": "y", "scene": "a"}, [0.4, np.inf]),
+        # a size beyond the rank does not run, a run that ends early has failed
+        ("noise_error", {}, [1e-9, np.inf]),
         ("elements_per_entry", {}, [1.0, 0.9]),
         # a run that is wrong buys nothing; the largest over the sizes of a scene
         ("useful_speedup", {"scene": "a", "method": "deim"}, [0.5, 0.0]),

@@ -13,8 +13,8 @@ Tables = Mapping[str, pd.DataFrame]
 Value = str | int | float
 VALUE = "value"
 LABELS = (
-    "scene", "group", "method", "position_basis", "k", "r", "split", "axis", "component",
-    "implementation", "factor", "threads",
+    "scene", "group", "method", "position_basis", "k", "r", "split", "axis", "noisy_axes", "seed",
+    "component", "implementation", "factor", "threads",
 )  # fmt: skip
 AXES = ("x", "y", "z")
 _PLACE = ("scene", "group", "method", "position_basis")
@@ -135,6 +135,13 @@ def _axis_reconstruction(tables: Tables, where: dict, accuracy: float) -> pd.Dat
     return pd.concat(parts, ignore_index=True)
 
 
+def _noise_error(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
+    """Error of runs on bases of round-off; infinite where a run ends early or cannot start."""
+    rows = filtered(tables["noise"], where)
+    rows = rows[rows.r <= rows["rank"]]
+    return _labelled(rows, rows.relative_error.fillna(np.inf))
+
+
 def _elements_per_entry(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
     rows = filtered(tables["reconstruction_error"], where)
     rows = rows[rows.elements_sampled.notna()]
@@ -201,6 +208,7 @@ METRICS = {
         ("scene", "group", "method", "split", "gain", *(f"relative_error_{a}" for a in AXES)),
         ("axis",),
     ),
+    "noise_error": Metric(_noise_error, "noise", ("r", "rank", "relative_error")),
     "elements_per_entry": Metric(
         _elements_per_entry, "reconstruction_error", ("elements_sampled", "r")
     ),

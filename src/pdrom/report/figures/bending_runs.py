@@ -11,8 +11,8 @@ FIGURE = Declaration(
     caption=(
         "Sheets with bending constraints only, near the end of the run: full order against "
         "reduced projections. The projections of a flat sheet are round-off, so that there is "
-        "nothing to reduce in the paper's two scenes; the curved sheet has projections that "
-        "matter."
+        "nothing to reduce in the paper's two scenes (what bases of that noise do is counted in "
+        "`noise_runs`); the curved sheet has projections that matter."
     ),
     reads=(
         Chosen(MESH),

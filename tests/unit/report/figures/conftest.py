@@ -47,7 +47,7 @@ TABLES = (
     "reconstruction_error", "singular_values", "local_share", "sensitivity", "accuracy_cost",
     "ladder", "scaling", "scaling_fit", "stability", "budget", "breakeven", "effects_cost",
     "effects_left_out", "reduced_reruns", "gain_prediction",
-    "subspace_ablation", "bounds",
+    "subspace_ablation", "noise", "bounds",
 )  # fmt: skip
 
 
@@ -312,6 +312,13 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for r in (20, 50)
         for variant, gain, error in variants
     ]
+    noise = [
+        (scene, "bending", axes, method, r, 9, None if axes == "plane" else 1e-12)
+        for scene in FLAT
+        for axes in ("all", "plane")
+        for method in ("deim-joint", "published")
+        for r in (6, 10)
+    ]
     columns = {
         "singular_values": "scene group component singular_value relative above_roundoff",
         "reconstruction_error": "scene group method r split relative_error gain elements_sampled",
@@ -330,13 +337,14 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "reduced_reruns": "scene group method r position_basis max_extent blowup_frame"
         " relative_error relative_error_within_horizon",
         "gain_prediction": "predictor lower upper runs failed_share threshold",
+        "noise": "scene group noisy_axes method r rank relative_error",
         "subspace_ablation": "scene position_basis k r variant gain relative_error_within_horizon"
         " relative_error_full_projections",
         "bounds": "scene group method r bound max_extent slack contraction finite",
     }
     made = (
         values, errors, times, floors, costs, ladder, runs, bought, ratios, shares, removed, reruns,
-        predictions, ablation, bounds,
+        predictions, noise, ablation, bounds,
     )  # fmt: skip
     rows = dict(zip(columns, made, strict=True))
     for name, header in columns.items():

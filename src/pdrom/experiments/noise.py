@@ -1,0 +1,170 @@
+"""Reductions of a group whose projections are round-off, on bases of that noise."""
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+from pydantic import Field
+
+from pdrom.core.paths import MESH, NOISE, SENSITIVITY, File
+from pdrom.core.store import write_table
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.scenes import scene_of
+from pdrom.experiments.settings import BlowupExtent, Horizon, Modes
+from pdrom.model.runs.sensitivity import perturbation_field
+from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.basis import Basis, compute_basis
+from pdrom.reduction.local.local_step import ReducedLocalStep
+from pdrom.reduction.local.rerun import replace_group, rerun
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.rerun import displacement_norms
+from pdrom.reduction.sampling import Reduction, select_path
+from pdrom.reduction.snapshots import row_masses, training_frames
+
+log = logging.getLogger(__name__)
+
+COLUMNS = [
+    "scene", "group", "noisy_axes", "seed", "method", "r", "rank", "gain", "frames", "finite",
+    "blowup_frame", "relative_error",
+]  # fmt: skip
+ALL, PLANE = "all", "plane"
+
+
+class NoiseRuns(ConfigModel):
+    """Runs on bases of round-off.
+
+    sizes : numbers of modes
+    repetitions : starts, each with another round-off
+    perturbation : length by which they move a vertex, over the extent: a few units of round-off
+    """
+
+    sizes: Annotated[tuple[Modes, ...], Field(min_length=1)] = (6, 10, 20)
+    repetitions: Annotated[int, Field(ge=1, le=1000)] = 20
+    perturbation: Annotated[float, Field(gt=0.0, le=1e-12)] = 1e-15
+
+
+class Noise(NoiseRuns):
+    """Section ``noise``: ``cases`` are scenes with a group each, as far as the study holds them."""
+
+    cases: dict[str, str] = Field(default_factory=dict)
+    methods: tuple[str, ...] = ("deim-joint", "published")
+
+
+class Settings(JobSettings):
+    """What the runs of a scene depend on."""
+
+    scene: SceneConfig
+    noise: NoiseRuns
+    noise_methods: dict[str, MethodSpec]
+    horizon: Horizon
+    blowup_extent: BlowupExtent
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read."""
+
+    mesh: Annotated[File, MESH]
+    sensitivity: Annotated[File, SENSITIVITY]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written: a row for every start, method and size."""
+
+    table: Annotated[File, NOISE]
+
+
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+    """Perturb, run, make bases without a cutoff, rerun; up to the scene's horizon."""
+    labels, asked = outputs.table.labels, settings.noise
+    whole = scene_of(settings.scene, inputs.mesh)
+    frames = min(whole.config.frames, max(2, settings.horizon.frames(inputs.sensitivity)))
+    scene = Scene.build(whole.config.model_copy(update={"frames": frames}), whole.mesh)
+    rows = []
+    for axes in kinds(scene):
+        for seed in range(1, asked.repetitions + 1):
+            found = _runs(scene, labels["group"], axes, seed, settings)
+            rows += [{**labels, "noisy_axes": axes, "seed": seed, **row} for row in found]
+        log.info("%s: %d starts", axes, asked.repetitions)
+    whole_numbers = dict.fromkeys(("frames", "blowup_frame"), "Int64")
+    write_table(pd.DataFrame(rows, columns=COLUMNS).astype(whole_numbers), outputs.table.path)
+
+
+def kinds(scene: Scene) -> tuple[str, ...]:
+    """Which axes round-off may reach: all, and those of the plane of a mesh that is flat."""
+    return (ALL, PLANE) if np.ptp(scene.mesh.points, axis=0).min() == 0.0 else (ALL,)
+
+
+def roundoff_field(scene: Scene, axes: str, size: float, seed: int) -> np.ndarray:
+    """Displacement (N, 3) m of a start; zero across the plane of a flat mesh for `PLANE`."""
+    field = perturbation_field(scene, size, seed)
+    if axes == PLANE:
+        field[:, np.ptp(scene.mesh.points, axis=0) == 0.0] = 0.0
+    return field
+
+
+def noise_basis(
+    projections: np.ndarray, row_mass: np.ndarray, rows_per_element: int, method: MethodSpec
+) -> Basis:
+    """Basis of all that is stored, be it round-off: no cutoff, and no axis is left out.
+
+    A method with separate systems then has one for an axis in which nothing moves, as its text
+    says; elsewhere in this study such an axis has none.
+    """
+    basis = compute_basis(projections, row_mass, 0.0, rows_per_element, method)
+    return replace(basis, active_axes=(True, True, True))
+
+
+def _runs(
+    scene: Scene, name: str, axes: str, seed: int, settings: Settings
+) -> Iterator[dict[str, Any]]:
+    """Rows of one start: its full-order run, then the reductions trained on it."""
+    group, plan = scene.group(name), scene.config.reduce[name]
+    start = roundoff_field(scene, axes, settings.noise.perturbation, seed)
+    reference, projections = _full_order(scene, name, start)
+    even = training_frames(scene.config.frames, min(plan.train, (scene.config.frames + 1) // 2))
+    masses = row_masses(group, scene.masses)
+    displacement = displacement_norms(reference)
+    for method, spec in settings.noise_methods.items():
+        basis = noise_basis(projections[even], masses, group.rows_per_element, spec)
+        sizes = [r for r in settings.noise.sizes if r <= basis.rank]
+        path = select_path(basis, spec, sizes) if sizes else {}
+        for r in settings.noise.sizes:
+            row = {"method": method, "r": r, "rank": basis.rank, "frames": 0}
+            if r in path:
+                reduction = Reduction(basis, path[r], spec, r)
+                steps = replace_group(scene, name, ReducedLocalStep(group, reduction))
+                outcome = rerun(scene, scene.system, steps, reference, settings.blowup_extent)
+                row |= {
+                    "gain": reduction.gain,
+                    "frames": outcome.frames,
+                    "finite": outcome.finite,
+                    "blowup_frame": outcome.blowup_frame,
+                    "relative_error": outcome.error(displacement),
+                }
+            yield row
+
+
+def _full_order(scene: Scene, name: str, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (F + 1, N, 3) of a run, and projections (F, e p, 3) of its last iterates."""
+    group, loop = scene.group(name), scene.stepper()
+    state = scene.initial_state(start)
+    positions, projections = [state.positions], []
+    for frame in range(scene.config.frames):
+        seen: list[np.ndarray] = []
+
+        def watch(y: np.ndarray, seen: list[np.ndarray] = seen) -> None:
+            seen[:] = [group.project(y)]
+
+        state, _ = loop.step(state, frame, watch)
+        positions.append(state.positions)
+        projections += seen
+    return np.stack(positions), np.stack(projections)
+
+
+EXPERIMENT = Experiment("noise", "Bases of the round-off of {group} in {scene}", run)

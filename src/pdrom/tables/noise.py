@@ -1,0 +1,38 @@
+"""Table noise: reductions on bases of round-off, one row per start, method and size."""
+
+import pandas as pd
+
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every
+from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.parts import joined
+from pdrom.tables.vocabulary import BLOWUP_FRAME, FINITE, FRAMES, GAIN, GROUP, METHOD, SCENE, R
+
+
+@table(
+    title="Runs on bases of round-off",
+    columns=(
+        SCENE,
+        GROUP,
+        text(
+            "noisy_axes",
+            "which axes the start's round-off reaches: all, or the plane of a flat mesh",
+        ),
+        integer("seed", "of the start's round-off"),
+        METHOD,
+        R,
+        integer("rank", "modes that the snapshots have without a cutoff"),
+        GAIN,
+        FRAMES,
+        FINITE,
+        BLOWUP_FRAME,
+        number(
+            "relative_error", "error of the positions over all frames, which end at the horizon"
+        ),
+    ),
+    reads={"parts": Every(paths.NOISE)},
+)
+def noise(parts: list[File]) -> pd.DataFrame:
+    """Rows of all scenes, in order."""
+    return joined(parts)

@@ -1,0 +1,80 @@
+"""Bases of round-off: what a start's round-off reaches, and what becomes of the runs."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from conftest import ROOT
+from pdrom.core.paths import File
+from pdrom.core.store import read_table, write_table
+from pdrom.experiments.noise import (
+    ALL,
+    PLANE,
+    Inputs,
+    NoiseRuns,
+    Outputs,
+    Settings,
+    kinds,
+    noise_basis,
+    roundoff_field,
+    run,
+)
+from pdrom.experiments.settings import Horizon
+from pdrom.model.mesh.types import save_mesh
+from pdrom.pipeline.scenes import Coarsen, load_bound_scene
+from pdrom.reduction.method import load_methods
+
+METHODS = load_methods(ROOT / "config" / "methods.yaml")
+
+
+@pytest.fixture(scope="module")
+def fall():
+    """The falling sheet, coarse and short."""
+    return load_bound_scene(ROOT, "bend_fall", Coarsen(resolution=0.4, frames=0.4))
+
+
+def test_a_flat_mesh_may_keep_its_plane(fall):
+    assert kinds(fall) == (ALL, PLANE)
+    curved = load_bound_scene(ROOT, "bend_curved", Coarsen(resolution=0.4))
+    assert kinds(curved) == (ALL,)
+    every, plane = (roundoff_field(fall, axes, 1e-15, 1) for axes in (ALL, PLANE))
+    np.testing.assert_array_equal(plane[:, :2], every[:, :2])
+    assert not plane[:, 2].any()
+    assert every[:, 2].all()
+
+
+def test_a_basis_of_noise_keeps_every_axis(rng):
+    p = 1e-13 * rng.standard_normal((6, 10, 3)) * [1.0, 1.0, 0.0]
+    basis = noise_basis(p, np.ones(10), 1, METHODS["deim-joint"])
+    assert basis.rank == 6
+    assert basis.active_axes == (True, True, True)
+
+
+def test_the_joint_selection_fails_where_an_axis_carries_nothing(fall, tmp_path):
+    """Its separate system is exactly singular; noise in that axis is harmless."""
+    labels = {"scene": "bend_fall", "group": "bending"}
+    floor = {"scene": "bend_fall", "perturbation": "1e-10", "frame": range(22)}
+    sensitivity = tmp_path / "sensitivity.csv"
+    write_table(pd.DataFrame({**floor, "relative_difference": 0.0}), sensitivity)
+    save_mesh(fall.mesh, tmp_path / "mesh.h5", {})
+    settings = Settings(
+        scene=fall.config,
+        noise=NoiseRuns(sizes=(2, 5, 99), repetitions=2),
+        noise_methods={name: METHODS[name] for name in ("deim-joint", "published")},
+        horizon=Horizon(perturbation=1e-10, threshold=1e-3),
+        blowup_extent=100.0,
+    )
+    mesh = File(str(tmp_path / "mesh.h5"), {"mesh": "m"})
+    output = File(str(tmp_path / "noise.csv"), labels)
+    run(settings, Inputs(mesh, File(str(sensitivity), labels)), Outputs(output))
+    table = read_table(Path(output.path))
+    assert len(table) == 2 * 2 * 2 * 3
+    beyond = table.r == 99
+    assert (table.frames[beyond] == 0).all()
+    assert (table["rank"] < 99).all()
+    singular = (table.noisy_axes == PLANE) & (table.method == "deim-joint") & ~beyond
+    assert np.isinf(table.gain[singular]).all()
+    assert (table.blowup_frame[singular] == 0).all()
+    assert (table.relative_error[~singular & ~beyond] < 1e-10).all()
