@@ -47,7 +47,7 @@ TABLES = (
     "reconstruction_error", "singular_values", "local_share", "sensitivity", "accuracy_cost",
     "ladder", "scaling", "scaling_fit", "stability", "budget", "breakeven", "effects_cost",
     "effects_left_out", "reduced_reruns", "gain_prediction",
-    "subspace_ablation", "noise", "bounds",
+    "subspace_ablation", "noise", "claims_sensitivity", "bounds",
 )  # fmt: skip
 
 
@@ -319,6 +319,13 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for method in ("deim-joint", "published")
         for r in (6, 10)
     ]
+    variations = [
+        (claim, part, varied, f"v{n}", "holds", n == 0)
+        for claim in ("C1", "C2")
+        for part in ("published", "beyond")
+        for varied in ("threshold", "scenes")
+        for n in range(3)
+    ]
     columns = {
         "singular_values": "scene group component singular_value relative above_roundoff",
         "reconstruction_error": "scene group method r split relative_error gain elements_sampled",
@@ -338,13 +345,14 @@ def _write_tables(results, scenes, methods, rng) -> None:
         " relative_error relative_error_within_horizon",
         "gain_prediction": "predictor lower upper runs failed_share threshold",
         "noise": "scene group noisy_axes method r rank relative_error",
+        "claims_sensitivity": "claim part varied variation verdict_of_rules same",
         "subspace_ablation": "scene position_basis k r variant gain relative_error_within_horizon"
         " relative_error_full_projections",
         "bounds": "scene group method r bound max_extent slack contraction finite",
     }
     made = (
         values, errors, times, floors, costs, ladder, runs, bought, ratios, shares, removed, reruns,
-        predictions, noise, ablation, bounds,
+        predictions, noise, variations, ablation, bounds,
     )  # fmt: skip
     rows = dict(zip(columns, made, strict=True))
     for name, header in columns.items():

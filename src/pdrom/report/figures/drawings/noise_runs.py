@@ -1,16 +1,14 @@
 """Reductions on bases of round-off: how many starts fail, by scene, method and size."""
 
-import numpy as np
-from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.counts import draw_counts
 from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 
 COLUMNS = ["scene", "group", "noisy_axes", "method", "r", "rank", "relative_error"]
 WRONG = 0.1  # of the motion
-_MAP = LinearSegmentedColormap.from_list("failed", ["#FFFFFF", style.VERMILLION])
 _AXES = {"all": "all axes", "plane": "in the plane"}
 
 
@@ -27,25 +25,21 @@ def draw(results: Results, options: Scenes) -> Figure:
     counts = failed.groupby(keys, sort=False).agg(["sum", "count"])
     rows = list(dict.fromkeys(zip(table.scene, table.noisy_axes, strict=True)))
     columns = sorted(dict.fromkeys(zip(table.method, table.r, strict=True)))
-    figure = Figure(figsize=(style.WIDTH, 0.32 * len(rows) + 1.0), layout="constrained")
+    cells = {
+        (y, x): tuple(counts.loc[(*row, *column)])
+        for y, row in enumerate(rows)
+        for x, column in enumerate(columns)
+        if (*row, *column) in counts.index
+    }
+    figure = Figure(figsize=(style.WIDTH, 0.25 * len(rows) + 1.0), layout="constrained")
     ax = figure.subplots()
-    share = np.full((len(rows), len(columns)), np.nan)
-    for y, row in enumerate(rows):
-        for x, column in enumerate(columns):
-            if (*row, *column) in counts.index:
-                bad, total = counts.loc[(*row, *column)]
-                share[y, x] = bad / total
-                ax.text(x, y, f"{bad} of {total}", ha="center", va="center", fontsize=7.5)
-    ax.imshow(share, cmap=_MAP, vmin=0.0, vmax=1.0, aspect="auto")
-    ax.set_xticks(
-        range(len(columns)), [f"{results.method_title(m)}\n$r$ = {r}" for m, r in columns]
-    )
-    ax.set_yticks(range(len(rows)), [f"{style.words(s)}, {_AXES.get(a, a)}" for s, a in rows])
-    ax.set_xlabel("method and number of modes")
+    labels = [f"{style.words(scene)}, {_AXES.get(axes, axes)}" for scene, axes in rows]
+    draw_counts(ax, labels, [f"$r$ = {r}" for _, r in columns], cells)
+    methods = [method for method, _ in columns]
+    for method in dict.fromkeys(methods):
+        places = [x for x, other in enumerate(methods) if other == method]
+        x, title = sum(places) / len(places), results.method_title(method)
+        ax.text(x, -0.7, title, ha="center", va="bottom", fontsize=8)
+    ax.set_xlabel("number of modes")
     ax.set_ylabel("scene, round-off")
-    ax.tick_params(length=0)
-    ax.set_xticks(np.arange(len(columns) + 1) - 0.5, minor=True)
-    ax.set_yticks(np.arange(len(rows) + 1) - 0.5, minor=True)
-    ax.grid(True, which="minor", color=style.GREY, linewidth=0.5)
-    ax.tick_params(which="minor", length=0)
     return figure
