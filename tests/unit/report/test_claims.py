@@ -142,6 +142,8 @@ def measured(metric: str, accuracy: float = 0.1, **where) -> list[float]:
         ("error_trend", {"scene": "a", "method": "deim"}, []),
         ("error_trend", {"scene": "d", "method": "deim"}, [0.4]),
         ("error_trend", {"scene": "d", "method": "qdeim"}, [0.0]),
+        # blocks of different lengths, and one block alone, have no joint trend
+        ("trend_p_value", {"scene": "d", "method": "deim"}, []),
         # full rank blew up at once: the smaller size must not stand in for it
         ("rerun_error", {"scene": "c", "method": "deim-joint", "r": "full"}, [np.inf]),
         ("rerun_error", {"scene": "c", "method": "qdeim"}, []),
@@ -168,6 +170,18 @@ def measured(metric: str, accuracy: float = 0.1, **where) -> list[float]:
 )
 def test_metrics_by_hand(metric, where, expected):
     assert measured(metric, **where) == pytest.approx(expected)
+
+
+def test_the_trend_of_all_experiments_together(monkeypatch):
+    """Three blocks of three sizes, all ascending: one of 3!^3 orders, SciPy's smallest p-value."""
+    columns = [(s, r, 10, None, float(r)) for s in "efg" for r in (6, 10, 20)]
+    rising = [(s, "spring", "deim", "full", None, r, f, b, e, 1.0) for s, r, f, b, e in columns]
+    monkeypatch.setitem(globals(), "RERUNS", rising)
+    where = {"method": "deim"}
+    assert measured("trend_p_value", **where) == pytest.approx([1.0 / 216.0])
+    falling = [(*row[:8], 1.0 / row[8], 1.0) for row in rising]
+    monkeypatch.setitem(globals(), "RERUNS", falling)
+    assert measured("trend_p_value", **where) == pytest.approx([1.0])
 
 
 @pytest.mark.parametrize("metric", ["rerun_error", "error_trend"])

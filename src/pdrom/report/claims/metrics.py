@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from scipy.stats import page_trend_test
 
 from pdrom.core.errors import ConfigurationError
 from pdrom.tables.break_even import CURVE
@@ -104,6 +105,26 @@ def _error_trend(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
     return pd.DataFrame(trends, columns=["scene", "group", "method", VALUE])
 
 
+def _trend_p_value(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
+    """P-value of Page's test (1963) that errors rise with the sizes, over all experiments together.
+
+    An experiment (scene, group, method) is a block, the places of its sizes in ascending order are
+    the treatments; blow-ups share the highest rank. Blocks with the most common number of sizes
+    count; one value, or none with fewer than two blocks of three sizes.
+    """
+    rows = _tried(filtered(_reruns(tables, where), where)).sort_values("r")
+    blocks = [
+        run.relative_error_within_horizon.rank(na_option="bottom").to_numpy(float)
+        for _, run in rows.groupby(["scene", "group", "method"], sort=False)
+    ]
+    lengths = [len(block) for block in blocks]
+    common = max(set(lengths), key=lambda n: (lengths.count(n), n), default=0)
+    ranks = [block for block in blocks if len(block) == common]
+    if len(ranks) < 2 or common < 3:
+        return pd.DataFrame(columns=[VALUE])
+    return pd.DataFrame({VALUE: [float(page_trend_test(ranks, ranked=True).pvalue)]})
+
+
 def _decay(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
     rows = filtered(tables["singular_values"], where)
     rows = rows[rows.groupby(["scene", "group"]).above_roundoff.transform("any")]
@@ -196,6 +217,7 @@ METRICS = {
     "useful_speedup": Metric(_useful_speedup, "reduced_reruns", (*_RERUN, "speedup")),
     "best_useful_speedup": Metric(_best_useful_speedup, "reduced_reruns", (*_RERUN, "speedup")),
     "error_trend": Metric(_error_trend, "reduced_reruns", _RERUN),
+    "trend_p_value": Metric(_trend_p_value, "reduced_reruns", _RERUN),
     "singular_value_decay": Metric(
         _decay, "singular_values", ("scene", "group", "above_roundoff", "relative")
     ),
