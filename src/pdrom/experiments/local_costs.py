@@ -12,6 +12,7 @@ from pdrom.reduction.local.local_step import ReducedLocalStep
 
 COLUMNS = [
     "scene", "group", "method", "vertices", "elements", "threads", "r", "local_ms", "full_ms",
+    "solve_ms", "lift_ms",
 ]  # fmt: skip
 THREADS = (1, 2)
 
@@ -24,6 +25,8 @@ def local_costs(
     repeats: int,
 ) -> pd.DataFrame:
     """Milliseconds of one local step, mean over some states, with one thread and with two.
+
+    Of a reduced one also the dense product that solves for its coefficients, and its lift, alone.
 
     The steps of a number of threads are interleaved; a second thread that waits for work would
     disturb those that have one.
@@ -40,6 +43,8 @@ def local_costs(
     for key, step in reduced.items():
         steps[key] = step
     calls = {key: _all_states(step, states) for key, step in steps.items()}
+    for key, own in reduced.items():
+        calls["solve", key], calls["lift", key] = _solve_and_lift(own, states)
     before = {name: group.threads for name, group in groups.items()}
     rows = []
     for threads in THREADS:
@@ -49,11 +54,33 @@ def local_costs(
             times = measure_calls(calls, warmup, repeats)
         for name, method, r in reduced:
             labels = (name, method, scene.mesh.vertices, groups[name].elements, threads, r)
-            both = (times[name, method, r] / len(states), times[name] / len(states))
-            rows.append((scene.config.name, *labels, *both))
+            key = (name, method, r)
+            measured = (times[key], times[name], times["solve", key], times["lift", key])
+            means = (time / len(states) for time in measured)
+            rows.append((scene.config.name, *labels, *means))
     for name, group in groups.items():
         group.threads = before[name]
     return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _solve_and_lift(
+    step: ReducedLocalStep, states: np.ndarray
+) -> tuple[Callable[[], None], Callable[[], None]]:
+    """The two dense parts of a reduced local step over all states."""
+    rhs = np.zeros_like(states[0])
+    step.begin_frame(states[0])
+    sampled = [step.sample(y) for y in states]
+    coefficients = [step.solve(values) for values in sampled]
+
+    def solve() -> None:
+        for values in sampled:
+            step.solve(values)
+
+    def lift() -> None:
+        for values in coefficients:
+            step.lift(values, rhs)
+
+    return solve, lift
 
 
 def _all_states(step: LocalStep, states: np.ndarray) -> Callable[[], None]:

@@ -30,6 +30,10 @@ OWN_MESH = "1"  # factor of a scene's own mesh, whose curve is measured with its
         timed(number("full_ms", "time of the full local step of the group", "ms")),
         timed(number("ratio", "the first over the second")),
         timed(integer("breakeven_r", "size from which the reduction costs more, of the curve")),
+        timed(number("solve_ms", "of it, the solve of size r for the coefficients", "ms")),
+        timed(number("lift_ms", "of it, the lift from the coefficients to the mesh", "ms")),
+        timed(number("solve_ratio", "the solve alone over the full local step")),
+        timed(number("lift_ratio", "the lift alone over the full local step")),
     ),
     reads={"own": Every(paths.BREAK_EVEN), "sized": Every(paths.BREAK_EVEN_SIZED)},
 )
@@ -42,7 +46,8 @@ def breakeven(own: list[File], sized: list[File]) -> pd.DataFrame:
     rows = joined([*own, *(file for file in sized if file["factor"] != OWN_MESH)])
     if rows.empty:
         return rows
-    rows["ratio"] = rows.local_ms / rows.full_ms
+    for part, name in (("local", "ratio"), ("solve", "solve_ratio"), ("lift", "lift_ratio")):
+        rows[name] = rows[f"{part}_ms"] / rows.full_ms
     sizes = [
         pd.Series(break_even(*curve.sort_values("r")[["r", "ratio"]].to_numpy().T), curve.index)
         for _, curve in rows.groupby(CURVE, sort=False)

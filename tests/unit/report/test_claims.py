@@ -74,6 +74,8 @@ def tables() -> dict[str, pd.DataFrame]:
                 "threads": 1,
                 "r": [6, 20, 6],
                 "ratio": [0.5, 1.5, 0.25],
+                "solve_ratio": [0.1, 0.2, 0.05],
+                "lift_ratio": [0.3, 1.1, 0.15],
             }
         ),
         "noise": pd.DataFrame(
@@ -163,6 +165,8 @@ def measured(metric: str, accuracy: float = 0.1, **where) -> list[float]:
         # the largest size of each curve
         ("local_time_ratio", {"group": "spring"}, [1.5, 0.25]),
         ("local_time_ratio", {"scene": "b"}, [0.25]),
+        ("solve_time_ratio", {"scene": "a"}, [0.2]),
+        ("lift_time_ratio", {}, [1.1, 0.15]),
         ("position_basis_ratio", {"scene": "b"}, [0.1]),
         # neither basis is accurate
         ("position_basis_ratio", {"scene": "b", "accuracy": 0.01}, []),

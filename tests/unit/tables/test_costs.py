@@ -66,14 +66,11 @@ def test_a_budget_that_buys_nothing_is_a_row():
 def curve(folder, scene: str, offset: float, slope: float, full: float, sizes, shuffle=0) -> File:
     """A local step that costs offset + slope r, as a file."""
     r = np.array(sizes)
-    table = pd.DataFrame({"r": r, "local_ms": offset + slope * r}).sample(
-        frac=1.0, random_state=shuffle
-    )
-    table = table.assign(
+    table = pd.DataFrame({"r": r, "local_ms": offset + slope * r}).assign(
         scene=scene, group="spring", method="block-deim", factor=1.0, vertices=9, elements=20,
-        threads=1, full_ms=full,
+        threads=1, full_ms=full, solve_ms=0.5 * offset, lift_ms=slope * r,
     )  # fmt: skip
-    write_table(table, folder / f"{scene}.csv")
+    write_table(table.sample(frac=1.0, random_state=shuffle), folder / f"{scene}.csv")
     return File(str(folder / f"{scene}.csv"), {})
 
 
@@ -91,6 +88,9 @@ def test_break_even_of_a_line(tmp_path, offset, slope, full, expected):
     path = curve(tmp_path, "a", offset, slope, full, [5, 10, 20, 40, 100])
     table = breakeven([path], [])
     np.testing.assert_allclose(table.ratio, (offset + slope * table.r) / full)
+    np.testing.assert_allclose(
+        table.solve_ratio + table.lift_ratio, table.ratio - 0.5 * offset / full
+    )
     if expected is None:
         assert table.breakeven_r.isna().all()
     else:

@@ -55,7 +55,14 @@ class ReducedLocalStep:
 
     def coefficients(self, y: np.ndarray) -> list[np.ndarray]:
         """Coefficients (r,) of each block, from the projections of the sampled elements."""
-        sampled = self._group.project_elements(y, self._elements).ravel()
+        return self.solve(self.sample(y))
+
+    def sample(self, y: np.ndarray) -> np.ndarray:
+        """Projections of the sampled elements, as one vector."""
+        return self._group.project_elements(y, self._elements).ravel()
+
+    def solve(self, sampled: np.ndarray) -> list[np.ndarray]:
+        """Coefficients (r,) of each block, from what `sample` gives; the systems are inverted."""
         return [
             self._limited(operator @ sampled[positions] - shift)
             for _, positions, operator, shift, _ in self._blocks

@@ -5,7 +5,8 @@ the tables, compared with a threshold. Tests marked ``decides`` give the verdict
 beside it in the reason.
 """
 
-from pdrom.report.claims.metrics import METRICS, Metric, Tables
+from pdrom.report.claims.metrics import METRICS, Metric
+from pdrom.report.claims.rows import Tables
 from pdrom.report.claims.rules import ClaimRule, TestRule, load_claims
 from pdrom.report.claims.verdicts import (
     DEPENDS,

@@ -11,7 +11,8 @@ from pydantic import Field, FiniteFloat, model_validator
 
 from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
-from pdrom.report.claims.metrics import METRICS, Value
+from pdrom.report.claims.metrics import METRICS
+from pdrom.report.claims.rows import Value
 from pdrom.tables import declared
 
 SETS = "sets"

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import pandas as pd
 
-from pdrom.report.claims.metrics import VALUE, Tables
+from pdrom.report.claims.rows import VALUE, Tables
 from pdrom.report.claims.rules import ClaimRule, TestRule
 from pdrom.report.claims.verdicts import answer, combined, satisfied, values_of
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pdrom.report.claims.metrics import METRICS, VALUE, Tables, filtered
+from pdrom.report.claims.metrics import METRICS
+from pdrom.report.claims.rows import VALUE, Tables, filtered
 from pdrom.report.claims.rules import Change, ClaimRule, TestRule
 from pdrom.tables import declared
 

@@ -1,0 +1,31 @@
+"""Rows of tables that tests of claims compare: filtered, with their labels and a value each."""
+
+from collections.abc import Mapping
+
+import pandas as pd
+
+from pdrom.core.errors import ConfigurationError
+
+Tables = Mapping[str, pd.DataFrame]
+Value = str | int | float
+VALUE = "value"
+LABELS = (
+    "scene", "group", "method", "position_basis", "k", "r", "split", "axis", "noisy_axes", "seed",
+    "component", "implementation", "factor", "threads",
+)  # fmt: skip
+AXES = ("x", "y", "z")
+
+
+def filtered(table: pd.DataFrame, where: Mapping[str, tuple[Value, ...]]) -> pd.DataFrame:
+    for column, allowed in where.items():
+        if column not in table.columns:
+            raise ConfigurationError(
+                f"claims: no column '{column}' (allowed: {', '.join(table.columns)})"
+            )
+        table = table[table[column].isin(allowed)]
+    return table
+
+
+def labelled(rows: pd.DataFrame, values: pd.Series) -> pd.DataFrame:
+    """Labels of ``rows``, as far as they have them, and a value for each."""
+    return rows[[label for label in LABELS if label in rows]].assign(**{VALUE: values})
