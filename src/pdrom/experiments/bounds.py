@@ -111,7 +111,8 @@ class _Case:
         return {**bounds, "contraction": contraction, "spectral_radius": radius}
 
     def _bounds(self, group: str, reduction: Reduction) -> dict[str, float]:
-        if len(self._largest) < len(self._scene.groups):
+        # clipped coefficients are no linear image of the projections
+        if len(self._largest) < len(self._scene.groups) or reduction.spec.bounds != "none":
             return {}
         compliance, own = self._compliance, self._largest[group]
         energy = reach(self._scene.group(group), reduction, own, compliance.inverse)

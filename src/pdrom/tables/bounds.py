@@ -39,7 +39,8 @@ def bounds(parts: list[File], reruns: pd.DataFrame) -> pd.DataFrame:
 
     contraction and spectral_radius are the largest of two states of the full-order run; empty where
     several groups act, and for scenes too large for dense matrices. The bounds need that no
-    contact acts and are empty where a group has no bounded projections.
+    contact acts and are empty where a group has no bounded projections, or the method clips its
+    coefficients.
     """
     known = joined(parts)
     if known.empty:

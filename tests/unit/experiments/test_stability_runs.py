@@ -17,7 +17,7 @@ from pdrom.experiments.stability import ShortRuns
 from pdrom.experiments.subspaces import SubspaceModels
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.local.guard_settings import GuardSettings
-from pdrom.reduction.method import load_methods
+from pdrom.reduction.method import MethodSpec, load_methods
 
 METHODS = {
     name: spec
@@ -178,13 +178,13 @@ def test_guard_without_cases_is_an_empty_table(tmp_path):
     assert len(table) == 0
 
 
-def bound_rows(study: Made) -> pd.DataFrame:
+def bound_rows(study: Made, methods: dict[str, MethodSpec] = METHODS) -> pd.DataFrame:
     output = File(str(study.folder / "bounds.csv"), {"scene": "test"})
     perturbed = File(str(study.folder / "sensitivity.csv"), {"scene": "test"})
     floor = {"scene": "test", "perturbation": "1e-10", "frame": range(16)}
     write_table(pd.DataFrame(floor).assign(relative_difference=1e-9), perturbed.path)
     horizon = Horizon(perturbation=1e-10, threshold=1e-3)
-    asked = bounds.Settings(scene=study.scene, methods=METHODS, ranks=(2, 4, 30), horizon=horizon)
+    asked = bounds.Settings(scene=study.scene, methods=methods, ranks=(2, 4, 30), horizon=horizon)
     inputs = bounds.Inputs(study.mesh, study.runs["train"], perturbed, study.bases, study.samplings)
     bounds.run(asked, inputs, bounds.Outputs(output))
     return read_table(output.path)
@@ -199,6 +199,14 @@ def test_every_reduction_that_exists_has_its_bounds(study):
     for method in METHODS:
         extents = read_table(str(study.folder / method / "train.csv")).max_extent
         assert extents.max() <= rows[(rows.method == method) & (rows.r == 4)].bound.iloc[0]
+
+
+def test_clipped_coefficients_have_no_bound_but_a_contraction(study):
+    spec = MethodSpec(title="x", centring="affine", rows="all", bounds="training")
+    rows = bound_rows(study, METHODS | {"pod": spec})
+    clipped = rows[rows.method == "pod"]
+    assert clipped[["reach", "bound"]].isna().all(axis=None)
+    assert clipped.contraction.notna().all()
 
 
 def test_a_scene_too_large_for_dense_matrices_has_no_bounds(study, monkeypatch):

@@ -12,6 +12,8 @@ def reach(
 ) -> float:
     """Bound of | S^T W (p^ - mean) |_{K^+} over all states, J^1/2; inf if p^ does not exist.
 
+    Coefficients are taken as not clipped.
+
     The sampled projections p_e lie in balls of radius ``largest``, so that those of the m sampled
     elements minus the mean, divided by sqrt(m) times their radii, lie in the unit ball together:
     what remains is the 2-norm of K^{+1/2} S^T W V (P^T V)^+ with its columns scaled so.
