@@ -78,7 +78,7 @@ def _viewed(full: FullRun, reduced: list[ReducedRun]) -> ViewedScene:
                 positions=run.outcome.positions,
                 error=run.error,
                 blowup_frame=run.outcome.blowup_frame,
-                ms=run.ms,
+                ms=run.ms if np.isfinite(run.ms) else None,
             )
             for run in reduced
         ),

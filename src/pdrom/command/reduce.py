@@ -81,7 +81,7 @@ def _told(reduced: "ReducedRun") -> str:
     told = "no error: nothing moves" if error is None else f"relative error {error:.2g}"
     return (
         f"{reduced.title}: {told}, gain {reduced.gain:.3g}, {reduced.ms:.2f} ms a frame "
-        f"on average (full order {np.median(full.ms):.2f}, median)"
+        f"(full order {np.median(full.ms):.2f})"
     )
 
 

@@ -52,7 +52,7 @@
     return [scene, ofMethod.find((run) => String(run.r) === at("r").value) || null];
   }
 
-  // Box of the full-order run, with room around it: runs that leave it are cut off.
+  // Cube about the full-order run, with room around it: runs that leave it are cut off.
   function box(frames) {
     const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
     for (const xyz of frames) xyz.forEach((values, axis) => values.forEach((v) => {
@@ -60,16 +60,16 @@
       high[axis] = Math.max(high[axis], v);
     }));
     const size = Math.max(...high.map((v, axis) => v - low[axis]));
-    return low.map((v, axis) => [v - 0.2 * size, high[axis] + 0.2 * size]);
+    return low.map((v, axis) => (v + high[axis]) / 2).map((middle) => [middle - 0.7 * size, middle + 0.7 * size]);
   }
 
   function space(ranges, domain, camera) {
     const axis = (range) => ({ range, visible: false });
     const [x, y, z] = ranges.map(axis);
-    return { xaxis: x, yaxis: y, zaxis: z, domain, camera, aspectmode: "data", uirevision: "camera" };
+    return { xaxis: x, yaxis: y, zaxis: z, domain, camera, aspectmode: "cube", uirevision: "camera" };
   }
 
-  const CAMERA = { up: { x: 0, y: 1, z: 0 }, eye: { x: 0.7, y: 0.45, z: 1.15 } };
+  const CAMERA = { up: { x: 0, y: 1, z: 0 }, eye: { x: 0.7, y: 0.45, z: 1.2 } };
 
   function surface(name, xyz, faces, scene, look) {
     const [x, y, z] = xyz;
