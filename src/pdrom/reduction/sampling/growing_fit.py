@@ -23,9 +23,13 @@ class GrowingFit:
         block = min(BLOCK, len(self._factor))
         self._factor = linalg.lapack.dtpqrt(0, block, self._factor, rows, overwrite_a=True)[0]
 
+    def triangle(self, k: int) -> np.ndarray:
+        """R (k, k) of the first k modes: R^T R is the Gram matrix of their sampled rows."""
+        return self._factor[:k, :k]
+
     def coefficients(self, k: int) -> np.ndarray:
         """c (k,) of mode k; of several solutions, as far as can be told, the shortest."""
-        factor, target = self._factor[:k, :k], self._factor[:k, k]
+        factor, target = self.triangle(k), self._factor[:k, k]
         if linalg.lapack.dtrcon(factor)[0] > k * np.finfo(float).eps:
             return linalg.solve_triangular(factor, target, check_finite=False)
         return np.linalg.lstsq(factor, target, rcond=None)[0]

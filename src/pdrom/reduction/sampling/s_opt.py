@@ -11,6 +11,7 @@ import numpy as np
 from scipy import linalg
 
 from pdrom.core.errors import SamplingError
+from pdrom.reduction.sampling.growing_fit import GrowingFit
 from pdrom.reduction.sampling.selection import Selection
 
 # Columns of length one depend on each other when what the others leave of one of them is below
@@ -108,8 +109,9 @@ class _Sampled:
         self._squares = np.einsum("esk,esk->ek", self._blocks, self._blocks)
         self._picked = [] if elements is None else [int(e) for e in elements]
         self._products = np.zeros((self.total, size, size))
-        self._modes = 0
+        self._modes, self._fit = 0, GrowingFit(v.shape[1])
         if self._picked:
+            self._fit.add(self._blocks[self._picked].reshape(-1, v.shape[1]))
             self._modes = v.shape[1]
             self._products = self._from_scratch()
 
@@ -127,7 +129,7 @@ class _Sampled:
         """The same when ``mode`` joins the columns."""
         if not self._picked:
             return int(np.argmax(self._squares[:, mode]))
-        z, q = self._residual(mode)
+        z, q = self._residual()
         solved = np.linalg.solve(self._shifted(), z[:, :, None])[:, :, 0]
         residual = q + np.maximum(np.einsum("es,es->e", z, solved), 0.0)
         possible = residual > DEPENDENT**2
@@ -143,10 +145,12 @@ class _Sampled:
         rows = columns[element]
         small = np.eye(len(rows)) + rows @ inverse @ rows.T
         cross = columns @ (inverse @ rows.T)
-        self._products -= cross @ np.linalg.solve(small, cross.transpose(0, 2, 1))
+        solved = np.linalg.solve(small, cross.reshape(-1, len(rows)).T).T.reshape(cross.shape)
+        self._products -= cross @ solved.transpose(0, 2, 1)
         self._picked.append(element)
+        self._fit.add(self._blocks[element])
         if mode is not None:
-            z, q = self._residual(mode)
+            z, q = self._residual()
             if q <= DEPENDENT**2:
                 raise SamplingError(
                     f"S-OPT: mode {mode + 1} depends on the modes before it at all elements"
@@ -154,26 +158,17 @@ class _Sampled:
             self._products += z[:, :, None] * z[:, None, :] / q
             self._modes = mode + 1
 
-    def _residual(self, mode: int) -> tuple[np.ndarray, float]:
-        """Residual (e, s) of a mode fitted at the sampled rows, and its squared norm there."""
-        known, new = self._blocks[:, :, : self._modes], self._blocks[:, :, mode]
-        fit = np.linalg.lstsq(self._sampled_rows(), new[self._picked].ravel(), rcond=None)[0]
-        z = new - known @ fit
+    def _residual(self) -> tuple[np.ndarray, float]:
+        """Residual (e, s) of the next mode fitted at the sampled rows, its squared norm there."""
+        known, new = self._blocks[:, :, : self._modes], self._blocks[:, :, self._modes]
+        z = new - known @ self._fit.coefficients(self._modes)
         return z, float(np.sum(z[self._picked] ** 2))
-
-    def _sampled_rows(self) -> np.ndarray:
-        """(s m, k) sampled rows of the modes that are in."""
-        rows = self._blocks[self._picked, :, : self._modes]
-        return rows.reshape(rows.shape[0] * rows.shape[1], self._modes)
 
     def _inverse(self) -> np.ndarray:
         """G^-1 (k, k) of the sampled rows."""
-        rows = self._sampled_rows()
-        factor = linalg.qr(rows, mode="r", check_finite=False)[0][: self._modes]
-        diagonal = np.abs(np.diag(factor))
-        if len(rows) < self._modes or diagonal.min(initial=1.0) <= DEPENDENT * diagonal.max(
-            initial=0.0
-        ):
+        factor = self._fit.triangle(self._modes)
+        diagonal, rows = np.abs(np.diag(factor)), len(self._picked) * self._blocks.shape[1]
+        if rows < self._modes or diagonal.min(initial=1.0) <= DEPENDENT * diagonal.max(initial=0.0):
             raise SamplingError(
                 f"S-OPT: the first {self._modes} modes depend on each other at the "
                 f"{len(self._picked)} sampled elements"
