@@ -1,4 +1,4 @@
-"""Offline algorithms, each beside what it replaced: reflections, the greedy loop, LAPACK's pivots."""
+"""Offline algorithms, each beside what it replaced: reflections, the loop, LAPACK's pivots."""
 
 import numpy as np
 import pytest

@@ -6,7 +6,7 @@ from pdrom.reduction.sampling.deim import tie_weights
 
 EPS = np.finfo(float).eps
 # Rows of candidates for each mode, and how few pivots among them ask for twice as many.
-ROWS_A_MODE, FEW = 4, 8
+ROWS_A_MODE, FEW = 2, 8
 
 
 def qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
