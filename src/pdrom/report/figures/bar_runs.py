@@ -1,7 +1,7 @@
 """Runs of the bars, reduced."""
 
-from pdrom.core.paths import FULL_ORDER, MESH, RERUNS
-from pdrom.core.reads import Chosen, Setting, TableOf
+from pdrom.core.paths import FULL_ORDER, MESH, RERUNS, SENSITIVITY
+from pdrom.core.reads import Chosen, Setting
 from pdrom.report.figures.kit.declaration import Declaration
 from pdrom.report.figures.kit.options import ReducedRuns
 
@@ -16,7 +16,7 @@ FIGURE = Declaration(
         Chosen(MESH),
         Chosen(FULL_ORDER),
         Chosen(RERUNS),
-        TableOf("sensitivity"),
+        Chosen(SENSITIVITY),
         Setting("sensitivity.reference"),
         Setting("sensitivity.threshold"),
     ),

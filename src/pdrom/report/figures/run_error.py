@@ -1,7 +1,7 @@
 """Error of reduced runs against time, with the sensitivity floor behind it."""
 
-from pdrom.core.paths import RERUNS
-from pdrom.core.reads import Chosen, Setting, TableOf
+from pdrom.core.paths import RERUNS, SENSITIVITY
+from pdrom.core.reads import Chosen, Setting
 from pdrom.report.figures.kit.declaration import Declaration
 from pdrom.report.figures.kit.options import Columns, Experiments, Methods, Ranks
 
@@ -19,7 +19,7 @@ FIGURE = Declaration(
     ),
     reads=(
         Chosen(RERUNS),
-        TableOf("sensitivity"),
+        Chosen(SENSITIVITY),
         Setting("sensitivity.reference"),
         Setting("sensitivity.threshold"),
     ),

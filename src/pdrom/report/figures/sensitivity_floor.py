@@ -1,6 +1,7 @@
 """How far runs drift apart that start almost alike, and the horizon that follows."""
 
-from pdrom.core.reads import Setting, TableOf
+from pdrom.core.paths import SENSITIVITY
+from pdrom.core.reads import Chosen, Setting
 from pdrom.report.figures.kit.declaration import Declaration
 from pdrom.report.figures.kit.options import Columns, Scenes
 
@@ -18,7 +19,7 @@ FIGURE = Declaration(
         "judged by its error. Dashed lines are twins, scenes that end before."
     ),
     reads=(
-        TableOf("sensitivity"),
+        Chosen(SENSITIVITY),
         Setting("sensitivity.reference"),
         Setting("sensitivity.threshold"),
     ),

@@ -24,7 +24,7 @@ def draw(results: Results, options: Options) -> Figure:
     Raises
     ------
     StorageError
-        The table is missing or lacks a column.
+        The file of a scene is missing or lacks a column.
     """
     floors = Floors(results)
     kinds: dict[str, list[str]] = {}

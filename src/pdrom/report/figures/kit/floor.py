@@ -1,36 +1,42 @@
-"""Sensitivity floors and horizons of the scenes, as the table sensitivity has them."""
+"""Sensitivity floors and horizons of the scenes that a figure draws."""
 
 import numpy as np
 
-from pdrom.model.runs.horizon import floor_of, horizons
+from pdrom.core.paths import SENSITIVITY
+from pdrom.core.store import read_table
+from pdrom.model.runs.horizon import floor_of, horizon
 from pdrom.report.figures.kit.results import Results
 
 COLUMNS = ["scene", "perturbation", "frame", "relative_difference"]
 
 
 class Floors:
-    """Floor and horizon of every scene at the study's reference perturbation.
+    """Floor and horizon of a scene at the study's reference perturbation.
 
     Raises
     ------
     StorageError
-        The table is missing or lacks a column.
+        The file of a scene that is asked for is missing or lacks a column.
     """
 
     def __init__(self, results: Results) -> None:
         self.perturbation = results.settings["sensitivity.reference"]
         self.threshold = results.settings["sensitivity.threshold"]
-        self._table = results.table("sensitivity", COLUMNS)
-        self._horizons = horizons(self._table, self.perturbation, self.threshold)
+        self._results = results
+        self._floors: dict[str, np.ndarray] = {}
 
     def of(self, scene: str) -> np.ndarray:
         """Largest relative difference of all seeds by frame (F,); empty without perturbed runs."""
-        return floor_of(self._table, scene, self.perturbation)
+        if scene not in self._floors:
+            table = read_table(self._results.path(SENSITIVITY, scene), COLUMNS)
+            self._floors[scene] = floor_of(table, scene, self.perturbation)
+        return self._floors[scene]
 
     def horizon(self, scene: str) -> int | None:
         """First frame at which the floor exceeds the threshold; None if it never does."""
-        end = self._horizons.get(scene, 0)
-        return end if end < len(self.of(scene)) else None
+        floor = self.of(scene)
+        end = horizon(floor, self.threshold)
+        return end if end < len(floor) else None
 
     def instant(self, scene: str, frame: int) -> str:
         """Label of a frame; one past the scene's horizon says so: there no run can be judged."""
