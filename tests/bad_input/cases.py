@@ -112,7 +112,7 @@ STUDY_CASES = [
     more("misspelt key", "sovler: splu\n", "unknown key 'sovler'", "did you mean 'solver'?"),
     more("misspelt key of a section", "sweep: {dens_to: 4}\n", "'sweep.dens_to'", "'dense_to'"),
     more("key that is a number", "3: 4\n", "3: the key is not a text"),
-    more("unknown solver", "solver: lu\n", "solver = 'lu'", "cholespy, splu"),
+    more("unknown solver", "solver: lu\n", "solver = 'lu'", "supernodal, splu, splu-columns"),
     more("section as a number", "coarsen: 0.5\n", "coarsen = 0.5", "valid dictionary"),
     more("factor above one", "coarsen: {resolution: 2}\n", "coarsen.resolution = 2", "equal to 1"),
     more("factor NaN", "coarsen: {frames: .nan}\n", "coarsen.frames = nan"),

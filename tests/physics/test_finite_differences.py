@@ -89,7 +89,7 @@ def test_deformation_gradient_is_the_derivative_of_a_smooth_map(group, mesh, edg
 def test_global_step_minimises_the_objective(group_scene, rng):
     """The solution of the global step is stationary: no direction lowers the quadratic."""
     scene = group_scene
-    system = scene.system_with("cholespy")
+    system = scene.system_with("supernodal")
     points = scene.mesh.points
     s = points + 0.05 * rng.standard_normal(points.shape)
     p = [group.project(s) for group in scene.groups]

@@ -194,7 +194,7 @@ def test_one_factorisation_per_pin_set():
         {"effect": "spring", "weight": 1e5},
         frames=12,
     )
-    system = scene.system_with("cholespy")
+    system = scene.system_with("supernodal")
     for _ in simulate(scene, system=system):
         pass
     assert system.factorisations == 3

@@ -31,7 +31,6 @@ case "$*" in
 *fcntl*) exec "{real}" "$@" ;;
 *platforms.py*)
     [ ! -e unsupported ] || {{ echo "no wheel for it" >&2; exit 1; }}
-    cp "$2" "$3"
     ;;
 *"-m venv"*)
     mkdir -p "$3/bin" "$3/packages"

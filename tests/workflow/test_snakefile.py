@@ -289,7 +289,7 @@ def test_a_selection_reruns_the_methods_that_use_it(finished: Checkout) -> None:
 
 FAULTS = {
     "unknown key of the study": (
-        "config/default.yaml", "methods: [pod,", "sovler: cholespy\nmethods: [pod,",
+        "config/default.yaml", "methods: [pod,", "sovler: splu\nmethods: [pod,",
         ("config/default.yaml", "unknown key 'sovler'", "allowed: scenes, methods"),
     ),
     "unknown key of a scene": (

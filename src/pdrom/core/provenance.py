@@ -9,7 +9,7 @@ from typing import Any
 
 from pdrom import __version__
 
-LIBRARIES = ("numpy", "scipy", "numba", "cholespy", "h5py", "pandas", "matplotlib", "snakemake")
+LIBRARIES = ("numpy", "scipy", "numba", "h5py", "pandas", "matplotlib", "snakemake")
 
 
 def configuration_hash(configuration: Any) -> str:

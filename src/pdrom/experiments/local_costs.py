@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.experiments.measurement import measure_calls
+from pdrom.model.compiled.rows import as_vertices, vertices
 from pdrom.model.dynamics.stepper import LocalStep
 from pdrom.model.scene import Scene
 from pdrom.reduction.local.local_step import ReducedLocalStep
@@ -67,28 +68,27 @@ def _solve_and_lift(
     step: ReducedLocalStep, states: np.ndarray
 ) -> tuple[Callable[[], None], Callable[[], None]]:
     """The two dense parts of a reduced local step over all states."""
-    rhs = np.zeros_like(states[0])
+    rhs = vertices(len(states[0]))
     step.begin_frame(states[0])
     sampled = [step.sample(y) for y in states]
-    coefficients = [step.solve(values) for values in sampled]
 
     def solve() -> None:
         for values in sampled:
             step.solve(values)
 
     def lift() -> None:
-        for values in coefficients:
-            step.lift(values, rhs)
+        for _ in states:
+            step.lift(rhs)
 
     return solve, lift
 
 
 def _all_states(step: LocalStep, states: np.ndarray) -> Callable[[], None]:
-    rhs = np.zeros_like(states[0])
+    rhs, iterates = vertices(len(states[0])), [as_vertices(y) for y in states]
     step.begin_frame(states[0])
 
     def call() -> None:
-        for y in states:
+        for y in iterates:
             step.accumulate(y, rhs)
 
     return call

@@ -16,7 +16,6 @@ from pydantic import Field
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.settings import Count, Repeats
 from pdrom.model.dynamics.stepper import State, Stepper
-from pdrom.reduction.local.local_step import ReducedLocalStep
 
 Progress = Callable[[int, int], None]
 
@@ -65,27 +64,6 @@ class Measurement:
     solve: float
     spread: float
     repeats: int
-
-
-class LiftTimed:
-    """A reduced local step whose lift is timed apart; used in timings only."""
-
-    def __init__(self, step: ReducedLocalStep) -> None:
-        self.name = step.name
-        self.lift_seconds = 0.0
-        self._step = step
-
-    def begin_frame(self, q: np.ndarray) -> None:
-        """See `LocalStep`."""
-        self._step.begin_frame(q)
-
-    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """See `LocalStep`."""
-        coefficients = self._step.coefficients(y)
-        before = perf_counter()
-        self._step.lift(coefficients, rhs)
-        self.lift_seconds += perf_counter() - before
-        return float("nan")
 
 
 def measure(

@@ -28,7 +28,7 @@ from pdrom.experiments.declaration import Experiment, JobSettings
 from pdrom.experiments.effect_costs import effect_costs, left_out
 from pdrom.experiments.iterations import IterationCounts, accelerated, stepper_of
 from pdrom.experiments.local_costs import local_costs
-from pdrom.experiments.measurement import LiftTimed, Measurement, Protocol, Variant, measure
+from pdrom.experiments.measurement import Measurement, Protocol, Variant, measure
 from pdrom.experiments.names import ANDERSON, FOM
 from pdrom.experiments.scenes import scene_of
 from pdrom.experiments.settings import Count, Solver, Threads
@@ -143,7 +143,7 @@ def _variants(
         source = _Source(scene.group(group), sampling, settings.methods[method], inputs.bases)
         for r in source.sizes(settings.ranks):
             step, labels = source.step(r), {"group": group, "method": method, "r": r}
-            steps = replace_group(scene, group, LiftTimed(step))
+            steps = replace_group(scene, group, step)
             variants.append(make({**labels, "implementation": "compiled"}, steps))
         if source.spec.rows != "all":
             for r in source.sizes(settings.timing.breakeven):

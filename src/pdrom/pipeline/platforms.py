@@ -4,16 +4,11 @@
 there: only the standard library may be imported.
 """
 
-import os
 import platform
-import re
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 OLDEST, NEWEST = (3, 11), (3, 13)
-# Packages without a wheel for Linux on ARM, where the project does without them.
-LEFT_OUT_ON_ARM = ("cholespy",)
 
 
 @dataclass(frozen=True)
@@ -58,32 +53,12 @@ class Machine:
             )
         return None
 
-    def left_out(self) -> tuple[str, ...]:
-        """Packages that the project does without on this machine."""
-        return LEFT_OUT_ON_ARM if (self.system, self.processor) == ("Linux", "aarch64") else ()
 
-
-def without(lock: str, packages: tuple[str, ...]) -> str:
-    """Text of a lock file without some packages; each entry is a line and its indented hashes."""
-    entries = re.split(r"^(?=[^\s#])", lock, flags=re.MULTILINE)
-    return "".join(entry for entry in entries if entry.partition("==")[0] not in packages)
-
-
-def main(lock: str, target: str) -> None:
-    """Write the packages that this machine gets from ``lock`` to ``target``, or say why not."""
-    machine = Machine.here()
-    obstacle = machine.obstacle()
+def main() -> None:
+    """Say why this machine gets no packages, if it gets none."""
+    obstacle = Machine.here().obstacle()
     if obstacle:
         sys.exit(obstacle)
-    text = Path(lock).read_text(encoding="utf-8")
-    temporary = Path(f"{target}.{os.getpid()}")
-    temporary.write_text(without(text, machine.left_out()), encoding="utf-8")
-    temporary.replace(target)
-    if machine.left_out():
-        sys.stderr.write(
-            f"reproduce: {', '.join(machine.left_out())} has no wheel for this machine and is left "
-            "out; SciPy solves the global step instead\n"
-        )
 
 
 def _text(version: tuple[int, int]) -> str:
@@ -91,4 +66,4 @@ def _text(version: tuple[int, int]) -> str:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main()

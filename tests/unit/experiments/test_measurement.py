@@ -1,11 +1,9 @@
 """Timings: interleaved, warm, started afresh, and the phases of one repeat."""
 
-import time
-
 import numpy as np
 import pytest
 
-from pdrom.experiments.measurement import LiftTimed, Variant, measure, measure_calls
+from pdrom.experiments.measurement import Variant, measure, measure_calls
 from pdrom.model.dynamics.stepper import FrameReport, State
 
 
@@ -112,35 +110,6 @@ def test_a_part_of_the_iterations_stands_for_all():
     assert result.local == pytest.approx(2000.0)
     assert result.solve == pytest.approx(1200.0)
     assert result.frame == pytest.approx(3400.0)
-
-
-class Halves:
-    """A reduced local step in two halves, the second of which takes its time."""
-
-    name = "spring"
-
-    def __init__(self) -> None:
-        self.begun: list[float] = []
-
-    def begin_frame(self, q: np.ndarray) -> None:
-        self.begun.append(float(q.sum()))
-
-    def coefficients(self, y: np.ndarray) -> list[np.ndarray]:
-        return [2.0 * y]
-
-    def lift(self, coefficients: list[np.ndarray], rhs: np.ndarray) -> None:
-        time.sleep(0.01)
-        rhs += coefficients[0]
-
-
-def test_the_lift_is_timed_apart_and_changes_nothing():
-    inner, rhs = Halves(), np.ones((2, 3))
-    step = LiftTimed(inner)
-    step.begin_frame(np.ones((2, 3)))
-    assert np.isnan(step.accumulate(np.full((2, 3), 4.0), rhs))
-    assert (rhs == 9.0).all()
-    assert inner.begun == [6.0]
-    assert step.lift_seconds >= 0.01
 
 
 def test_calls_take_turns():

@@ -28,7 +28,7 @@ SHORT = ShortRuns(
     time_steps=(0.1,), stiffness_ratios=(0.01,), ranks=(4, 30), duration=0.16, min_frames=8,
     max_frames=12,
 )  # fmt: skip
-LIMITS = {"blowup_extent": 100.0, "solver": "cholespy"}
+LIMITS = {"blowup_extent": 100.0, "solver": "supernodal"}
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def study(tmp_path_factory) -> Made:
     mesh.run(mesh.Settings(mesh=scene.mesh), mesh.Inputs([]), mesh.Outputs(grid))
     runs = {run: file(f"{run}.h5", run=run) for run in ("train", "heldout")}
     for run in runs.values():
-        settings = fom.Settings(scene=scene, solver="cholespy", threads=1)
+        settings = fom.Settings(scene=scene, solver="supernodal", threads=1)
         fom.run(settings, fom.Inputs(grid), fom.Outputs(run))
     stored = file("snapshots.h5", group="strain")
     inputs = snapshots.Inputs(grid, runs["train"], runs["heldout"])

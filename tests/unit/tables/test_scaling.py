@@ -52,7 +52,7 @@ def test_every_size_is_measured(tmp_path, name):
         scene=scene,
         scaled_methods={"block-deim": SPEC, "deim-joint": JOINT},
         scaling=Sized(r=4, k=5, training_frames=8, frames=1, repeats=2, breakeven=alone),
-        solver="cholespy",
+        solver="supernodal",
     )
     outputs = {}
     for factor in (0.3, 0.5):

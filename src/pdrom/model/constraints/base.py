@@ -14,6 +14,7 @@ from scipy import sparse
 
 from pdrom.core.errors import SceneError
 from pdrom.core.yamlfile import ConfigModel
+from pdrom.model.constraints.local_kernel import LocalKernel, LocalPass, projections
 from pdrom.model.effects.base import Effect, EffectConfig
 from pdrom.model.mesh.select import select_vertices
 from pdrom.model.mesh.selection import Selection
@@ -68,6 +69,9 @@ class ConstraintGroup(Effect):
     """Threads of `accumulate`, 1 or 2; the result is the same bit for bit."""
     gradient_kernel: Any = None
     """Compiled projection from S q (module `gradient_kernel` beside), if there is one."""
+    local_kernel: LocalKernel | None = None
+    """Compiled `accumulate`, for loops in compiled code; a group without one writes its own."""
+    _pass: LocalPass | None = None
     manifold: ClassVar[str | None] = None
     """What it projects on, if that is one of "clamped" (signed singular values in a range, which
     are the `kernel_parameters`), "length" or "half sphere": kernels are then compared with its
@@ -129,13 +133,25 @@ class ConstraintGroup(Effect):
         """Projections p(y) of all elements, (e p, 3)."""
         return self.project_elements(y, np.arange(self.elements))
 
-    @abstractmethod
+    def sampler(self, elements: np.ndarray) -> LocalKernel:
+        """Local kernel that writes the projections of some elements (int64), flat, in their order.
+
+        It is called with the place of the projections in place of that of the right-hand side.
+        """
+        raise NotImplementedError(f"{self.name} has no sampler")
+
     def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:
         """Projections of some elements, (len(elements) p, 3), in the order given."""
+        elements = np.ascontiguousarray(elements, dtype=np.int64)
+        return projections(self.sampler(elements), y, self.rows_per_element * len(elements))
 
-    @abstractmethod
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         """Add S^T W p(y) to ``rhs`` (N, 3) in place and return the energy W(y)."""
+        if self.local_kernel is None:
+            raise NotImplementedError(f"{self.name} has neither a local kernel nor its own")
+        if self._pass is None or self._pass.kernels != (self.local_kernel,):
+            self._pass = LocalPass([self.local_kernel])
+        return self._pass.accumulate(y, rhs, self.threads)
 
     @abstractmethod
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:

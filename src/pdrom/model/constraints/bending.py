@@ -14,15 +14,17 @@ from pdrom.model.constraints.base import (
     require_cells,
 )
 from pdrom.model.constraints.half_spheres import (
+    MANIFOLD,
     NEAR_POLE,
+    POLE,
     RIM,
     SIZE,
     accumulate_vertices,
     project_gradients,
     project_vertices,
 )
-from pdrom.model.constraints.lanes import workspace
-from pdrom.model.constraints.parts import Parts
+from pdrom.model.constraints.lanes import LANES, blocks, pack, put, workspace
+from pdrom.model.constraints.local_kernel import LocalKernel
 from pdrom.model.constraints.surface import (
     cotangent_laplacian,
     fan_normals,
@@ -73,7 +75,7 @@ class VertexBending(ConstraintGroup):
         self.S = sparse.csr_array(laplacian.multiply(0.5 / area[:, None]))
         self.S.sort_indices()
         self._set_rest(mesh.points)
-        self._set_buffers()
+        self._set_kernel()
 
     @classmethod
     def element_vertices(cls, mesh: Mesh) -> np.ndarray:
@@ -103,19 +105,20 @@ class VertexBending(ConstraintGroup):
         normals = np.zeros((len(curved), 3))
         fan_normals(q, self.vertices[curved], self._fan_start, self._fan, self._triangles, normals)
         self.normals[curved] = normals
+        put(self._manifold, MANIFOLD, POLE, curved, self.side[curved, None] * normals)
 
-    def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:
-        p = np.empty((len(elements), 3))
-        project_vertices(y, elements, self._operator(), self._manifold(), self._work[0], p)
-        return p
+    def sampler(self, elements: np.ndarray) -> LocalKernel:
+        return LocalKernel.of(
+            project_vertices,
+            self.S.shape[1],
+            blocks(self.elements),
+            False,
+            self._arrays(elements),
+            (self.elements, len(elements)),
+        )
 
-    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        operator, manifold = self._operator(), self._manifold()
-
-        def part(first: int, last: int, part: int, target: np.ndarray) -> float:
-            return accumulate_vertices(y, operator, manifold, first, last, self._work[part], target)
-
-        return self._parts.accumulate(part, rhs, self.threads)
+    def _arrays(self, elements: np.ndarray) -> tuple[np.ndarray, ...]:
+        return (*self._operator(), self._manifold, self._work, elements, self._taken)
 
     def restricted(
         self, elements: np.ndarray, factors: np.ndarray
@@ -136,22 +139,27 @@ class VertexBending(ConstraintGroup):
         part.side = self.side[elements]
         part.normals = self.normals[elements].copy()
         part._curved = np.flatnonzero(part.side)
-        part._set_buffers()
+        part._set_kernel()
         return part, vertices
 
     def _operator(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return self.S.indptr, self.S.indices, self.S.data
 
-    def _manifold(self) -> tuple[np.ndarray, ...]:
-        return self.rest, self.magnitude, self.side, self.normals, self.weights
-
-    def _set_buffers(self) -> None:
-        self._work = [workspace(SIZE) for _ in range(2)]
-        self._parts = Parts(
-            self.elements,
-            self.elements >= self.split_from,
+    def _set_kernel(self) -> None:
+        self.S.indptr = self.S.indptr.astype(np.int32)
+        self.S.indices = self.S.indices.astype(np.int32)
+        numbers = (self.weights, self.magnitude, self.rest, self.side[:, None] * self.normals)
+        self._manifold = pack(np.column_stack(numbers))
+        self._work = np.stack([workspace(SIZE) for _ in range(2)])
+        self._taken = workspace(MANIFOLD)
+        self.local_kernel = LocalKernel.of(
+            accumulate_vertices,
             self.S.shape[1],
-            lambda element: self.S.indices[self.S.indptr[element] :],
+            blocks(self.elements),
+            self.elements >= self.split_from,
+            self._arrays(np.empty(0, np.int64)),
+            (self.elements, 0),
+            lambda block: self.S.indices[self.S.indptr[block * LANES] :],
         )
 
     @property
@@ -159,7 +167,7 @@ class VertexBending(ConstraintGroup):
         return project_gradients
 
     def kernel_parameters(self) -> np.ndarray:
-        return np.column_stack([self.side[:, None] * self.normals, self.magnitude, self.rest])
+        return self._manifold
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         h, n = d[:, 0], self.normals[elements] * self.side[elements, None]

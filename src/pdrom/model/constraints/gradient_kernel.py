@@ -6,8 +6,10 @@ subspace call it through its address, so that one compiled loop serves every mix
 """
 
 from llvmlite import ir
-from numba import carray, cfunc, types
+from numba import carray, types
 from numba.extending import intrinsic
+
+from pdrom.model.compiled.functions import compiled_callback
 
 _SIGNATURE = types.void(
     types.CPointer(types.float64),
@@ -24,7 +26,7 @@ def gradient_kernel(function):
     parameters : pointer to the numbers of `ConstraintGroup.kernel_parameters`
     p : pointer to (m, rows, 3), where the projections go
     """
-    return cfunc(_SIGNATURE, cache=True, error_model="numpy")(function)
+    return compiled_callback(function, _SIGNATURE)
 
 
 @intrinsic

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from pdrom.model.compiled import arithmetic, rows
+from pdrom.model.compiled.rows import WIDTH, at
 from pdrom.model.constraints.gradient_kernel import carray, gradient_kernel
 from pdrom.model.constraints.lanes import (
     LANES,
@@ -9,7 +11,6 @@ from pdrom.model.constraints.lanes import (
     absolute_sum,
     choose,
     dot,
-    kernel,
     lane_function,
     load,
     mix,
@@ -17,7 +18,9 @@ from pdrom.model.constraints.lanes import (
     save,
     scaled,
     square_distance,
+    take,
 )
+from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, local_kernel
 
 # A rim direction below this has been lost to round-off.
 RIM = 1e-15
@@ -25,27 +28,32 @@ RIM = 1e-15
 # that it comes from has cancelled so far that it is made orthogonal once more.
 NEAR_POLE = 1e-4
 
-# numbers of a lane in the working array: curvature, side times normal, magnitude, p, weight,
-# energy, rest curvature
-H, NORMAL, MAGNITUDE, P, WEIGHT, ENERGY, REST, SIZE = 0, 3, 6, 7, 10, 11, 12, 15
+# numbers of a lane in the packed manifold: weight, magnitude, rest curvature, side times normal
+WEIGHT, MAGNITUDE, REST, POLE, MANIFOLD = 0, 1, 2, 5, 8
+# and in the working array: curvature, p
+H, P, SIZE = 0, 3, 6
+# Entries of the record: the numbers of elements and of those to project; then the places of the
+# operator in CSR, the manifold, the working arrays, the elements to project and their manifold.
+ELEMENTS, COUNT, START, INDICES, DATA, SPHERES, WORK, SAMPLED, TAKEN, ARRAYS = range(OWN, OWN + 10)
 
 
 @lane_function
-def _gather(y, e, lane, operator, manifold, work):
-    """Curvature vector and manifold of element e."""
-    indptr, indices, data = operator
-    rest, magnitude, side, normals, weights = manifold
-    hx, hy, hz = 0.0, 0.0, 0.0
-    for k in range(indptr[e], indptr[e + 1]):
-        v = indices[k]
-        hx += data[k] * y[v, 0]
-        hy += data[k] * y[v, 1]
-        hz += data[k] * y[v, 2]
-    save(work, H, lane, (hx, hy, hz))
-    save(work, NORMAL, lane, scaled(side[e], (normals[e, 0], normals[e, 1], normals[e, 2])))
-    save(work, REST, lane, (rest[e, 0], rest[e, 1], rest[e, 2]))
-    work[MAGNITUDE * LANES + lane] = magnitude[e]
-    work[WEIGHT * LANES + lane] = weights[e]
+def _curvature(y, e, start, indices, data):
+    """Mean-curvature vector of element e."""
+    h = arithmetic.constant(0.0)
+    for k in range(at(start, e), at(start, e + 1)):
+        h = arithmetic.add_scaled(h, at(data, k), rows.load(y, WIDTH * at(indices, k)))
+    return h
+
+
+@lane_function
+def _save_columns(work, first, lane, a, b, c, d):
+    """Save the vectors of four lanes."""
+    x, y, z, _ = arithmetic.transposed(a, b, c, d)
+    place = first * LANES + lane
+    rows.store(work, place, x)
+    rows.store(work, place + LANES, y)
+    rows.store(work, place + 2 * LANES, z)
 
 
 @lane_function
@@ -57,10 +65,11 @@ def _without(a, part, n):
 
 
 @lane_function
-def _half_spheres(work):
+def _half_spheres(work, manifold, block):
     """Nearest points of the half spheres to the curvature vectors of a block."""
+    first = block * MANIFOLD
     for lane in range(LANES):
-        h, n = load(work, H, lane), load(work, NORMAL, lane)
+        h, n = load(work, H, lane), load(manifold, first + POLE, lane)
         # scaled: neither overflow nor underflow of the squares
         scale = absolute_sum(h)
         unit = scaled(1.0 / (scale + SMALLEST), h)
@@ -72,60 +81,97 @@ def _half_spheres(work):
         again = choose(length > RIM and left > 0.5, again, perpendicular(n))
         rim = choose(length > NEAR_POLE, rim, again)
         unit = choose(height < 0.0, rim, unit)
-        magnitude = work[MAGNITUDE * LANES + lane]
-        pole = choose(dot(n, n) == 0.0, load(work, REST, lane), scaled(magnitude, n))
-        p = choose(scale == 0.0, pole, scaled(magnitude, unit))
-        save(work, P, lane, p)
-        work[ENERGY * LANES + lane] = work[WEIGHT * LANES + lane] * square_distance(h, p)
+        magnitude = manifold[(first + MAGNITUDE) * LANES + lane]
+        pole = choose(dot(n, n) == 0.0, load(manifold, first + REST, lane), scaled(magnitude, n))
+        save(work, P, lane, choose(scale == 0.0, pole, scaled(magnitude, unit)))
 
 
-@kernel
-def project_vertices(y, elements, operator, manifold, work, p):
-    """Projections p (m, 3) of some elements."""
-    count = elements.shape[0]
-    for start in range(0, count, LANES):
+@lane_function
+def _operator(y_place, record):
+    """(y, operator in CSR) of a kernel."""
+    entries = rows.indices(record, ARRAYS)
+    y = rows.doubles(y_place, WIDTH * entries[VERTICES])
+    start = rows.integers(entries[START], entries[ELEMENTS] + 1)
+    count = at(start, entries[ELEMENTS])
+    return y, start, rows.integers(entries[INDICES], count), rows.doubles(entries[DATA], count)
+
+
+@lane_function
+def _spheres(record, part):
+    """(manifold, working array) of a kernel."""
+    entries = rows.indices(record, ARRAYS)
+    return (
+        rows.doubles(entries[SPHERES], entries[FIRST + 2] * MANIFOLD * LANES),
+        rows.doubles(entries[WORK] + 8 * SIZE * LANES * part, SIZE * LANES),
+    )
+
+
+@local_kernel
+def project_vertices(y_place, p_place, record, part):
+    """Projections (m, 3) of some elements."""
+    y, start, indices, data = _operator(y_place, record)
+    manifold, work = _spheres(record, part)
+    entries = rows.indices(record, ARRAYS)
+    count = entries[COUNT]
+    elements = rows.indices(entries[SAMPLED], count)
+    taken = rows.doubles(entries[TAKEN], MANIFOLD * LANES)
+    p = rows.doubles(p_place, 3 * count)
+    for begin in range(0, count, LANES):
         for lane in range(LANES):
-            _gather(y, elements[min(start + lane, count - 1)], lane, operator, manifold, work)
-        _half_spheres(work)
-        for lane in range(min(LANES, count - start)):
-            i = start + lane
-            p[i, 0], p[i, 1], p[i, 2] = load(work, P, lane)
+            e = elements[min(begin + lane, count - 1)]
+            save(work, H, lane, arithmetic.first_three(_curvature(y, e, start, indices, data)))
+        take(manifold, MANIFOLD, elements, begin, taken)
+        _half_spheres(work, taken, 0)
+        for lane in range(min(LANES, count - begin)):
+            i = 3 * (begin + lane)
+            p[i], p[i + 1], p[i + 2] = load(work, P, lane)
+    return 0.0
 
 
-@kernel
-def accumulate_vertices(y, operator, manifold, first, last, work, rhs):
-    """Add S^T W p of the elements first .. last - 1 to rhs; their energy."""
-    indptr, indices, data = operator
+@local_kernel
+def accumulate_vertices(y_place, rhs_place, record, part):
+    """Add S^T W p of a part's blocks to the right-hand side; their energy."""
+    entries = rows.indices(record, ARRAYS)
+    y, start, indices, data = _operator(y_place, record)
+    manifold, work = _spheres(record, part)
+    rhs, elements = rows.doubles(rhs_place, WIDTH * entries[VERTICES]), entries[ELEMENTS]
     energy = 0.0
-    for start in range(first, last, LANES):
-        for lane in range(LANES):
-            _gather(y, min(start + lane, last - 1), lane, operator, manifold, work)
-        _half_spheres(work)
-        for lane in range(min(LANES, last - start)):
-            px, py, pz = scaled(work[WEIGHT * LANES + lane], load(work, P, lane))
-            for k in range(indptr[start + lane], indptr[start + lane + 1]):
-                v = indices[k]
-                rhs[v, 0] += data[k] * px
-                rhs[v, 1] += data[k] * py
-                rhs[v, 2] += data[k] * pz
-            energy += work[ENERGY * LANES + lane]
+    for block in range(entries[FIRST + part], entries[FIRST + part + 1]):
+        begin = block * LANES
+        used = min(LANES, elements - begin)
+        for lane in range(0, used, WIDTH):
+            e, last = begin + lane, elements - 1
+            _save_columns(
+                work, H, lane,
+                _curvature(y, e, start, indices, data),
+                _curvature(y, min(e + 1, last), start, indices, data),
+                _curvature(y, min(e + 2, last), start, indices, data),
+                _curvature(y, min(e + 3, last), start, indices, data),
+            )  # fmt: skip
+        _half_spheres(work, manifold, block)
+        for lane in range(used):
+            w = manifold[(block * MANIFOLD + WEIGHT) * LANES + lane]
+            h, p = load(work, H, lane), load(work, P, lane)
+            energy += w * square_distance(h, p)
+            force = arithmetic.of_three(w * p[0], w * p[1], w * p[2])
+            for k in range(at(start, begin + lane), at(start, begin + lane + 1)):
+                v = WIDTH * at(indices, k)
+                rows.store(rhs, v, arithmetic.add_scaled(rows.load(rhs, v), at(data, k), force))
     return 0.5 * energy
 
 
 @gradient_kernel
 def project_gradients(d_pointer, manifold_pointer, p_pointer, m):
-    """Projections from S q; the manifold has side times normal, magnitude and rest curvature."""
+    """Projections from S q and the packed manifold."""
     d, p = carray(d_pointer, (m, 3)), carray(p_pointer, (m, 3))
-    manifold = carray(manifold_pointer, (m, 7))
+    blocks = (m + LANES - 1) // LANES
+    manifold = carray(manifold_pointer, (blocks * MANIFOLD * LANES,))
     work = np.zeros(SIZE * LANES)
-    for start in range(0, m, LANES):
+    for block in range(blocks):
         for lane in range(LANES):
-            e = min(start + lane, m - 1)
+            e = min(block * LANES + lane, m - 1)
             save(work, H, lane, (d[e, 0], d[e, 1], d[e, 2]))
-            save(work, NORMAL, lane, (manifold[e, 0], manifold[e, 1], manifold[e, 2]))
-            work[MAGNITUDE * LANES + lane] = manifold[e, 3]
-            save(work, REST, lane, (manifold[e, 4], manifold[e, 5], manifold[e, 6]))
-        _half_spheres(work)
-        for lane in range(min(LANES, m - start)):
-            i = start + lane
+        _half_spheres(work, manifold, block)
+        for lane in range(min(LANES, m - block * LANES)):
+            i = block * LANES + lane
             p[i, 0], p[i, 1], p[i, 2] = load(work, P, lane)

@@ -7,11 +7,9 @@ its number i begins. Functions of one lane are inlined into the loop over the la
 branches, only selections. No fast-math: an element gives the same bits in every lane and company.
 """
 
-from pathlib import Path
-from zlib import crc32
-
 import numpy as np
-from numba import njit
+
+from pdrom.model.compiled.functions import compiled
 
 LANES = 32
 
@@ -19,30 +17,14 @@ LANES = 32
 SMALLEST = 1e-300
 
 
-def _checksum() -> str:
-    """Of the sources of all kernels."""
-    sources = sorted(Path(__file__).parent.glob("*.py"))
-    return f"{crc32(b''.join(path.read_bytes() for path in sources)):08x}"
-
-
-_SOURCES = _checksum()
-
-
-def _compiled(function, **options):
-    # numba's cache looks at the file of a function only, not at those of what it inlines: without
-    # the checksum an edit of this file would leave kernels of other files as they were
-    function.__qualname__ += f"_{_SOURCES}"
-    return njit(cache=True, error_model="numpy", **options)(function)
-
-
 def lane_function(function):
     """Compile a function of one lane: inlined, without division checks."""
-    return _compiled(function, forceinline=True)
+    return compiled(function, forceinline=True)
 
 
 def kernel(function):
     """Compile a kernel that releases the interpreter lock."""
-    return _compiled(function, nogil=True)
+    return compiled(function, nogil=True)
 
 
 def blocks(elements: int) -> int:
@@ -56,6 +38,15 @@ def pack(numbers: np.ndarray) -> np.ndarray:
     padding = np.repeat(numbers[-1:], blocks(e) * LANES - e, axis=0)
     padded = np.concatenate([numbers, padding]).reshape(blocks(e), LANES, k)
     return np.ascontiguousarray(padded.transpose(0, 2, 1)).ravel()
+
+
+def put(
+    packed: np.ndarray, numbers: int, first: int, elements: np.ndarray, values: np.ndarray
+) -> None:
+    """Write values (m, k) as the numbers ``first``, ... of some elements."""
+    by_lane = packed.reshape(-1, numbers, LANES)
+    for i in range(values.shape[1]):
+        by_lane[elements // LANES, first + i, elements % LANES] = values[:, i]
 
 
 def workspace(numbers: int) -> np.ndarray:

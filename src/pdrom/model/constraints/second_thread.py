@@ -14,13 +14,17 @@ from functools import cache
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
+
+from pdrom.model.compiled.functions import compiled
 
 TURNS = 1 << 24  # looks before the thread sleeps, some milliseconds
 SETTLE = 1 << 15  # looks after it has seen work: some microseconds, see `_await`
 YIELD = 1 << 16  # looks of the caller at the end before it lets others run, where cores are few
-_LINE = 8  # int64 numbers of a cache line, so that the two counters do not share one
+LINE = 8  # int64 numbers of a cache line, so that the two counters do not share one
+
+_sched_yield = types.ExternalFunction("sched_yield", types.int32())
 
 Work = Callable[[], float]
 
@@ -55,9 +59,9 @@ class _SecondThread:
 
     def __init__(self) -> None:
         # numbers of the last piece of work: given to the thread, and done by it
-        self._counters = np.zeros(3 * _LINE, np.int64)
+        self._counters = np.zeros(3 * LINE, np.int64)
         address = self._counters.ctypes.data
-        self._given, self._done = address, address + _LINE * self._counters.itemsize
+        self._given, self._done = address, address + LINE * self._counters.itemsize
         self._count = 0
         self._work: Work = _nothing
         self._result: float | BaseException = 0.0
@@ -71,7 +75,7 @@ class _SecondThread:
         with self._one_caller:
             self._count += 1
             self._work = second
-            _write(self._given, self._count)
+            publish(self._given, self._count)
             if self._asleep:
                 self._wake.set()
             try:
@@ -94,7 +98,7 @@ class _SecondThread:
                 self._result = self._work()
             except BaseException as error:  # raised in the thread that asked
                 self._result = error
-            _write(self._done, count)
+            publish(self._done, count)
 
     def _await(self, count: int) -> None:
         """Return when there is work number ``count``.
@@ -137,7 +141,7 @@ def _store(_context, _address, _value):
     return types.void(types.intp, types.int64), generate
 
 
-@njit(nogil=True, cache=True)
+@compiled(nogil=True)
 def _reaches(address, value, turns, more):
     """Whether the number at ``address`` is at least ``value`` within so many looks.
 
@@ -151,6 +155,17 @@ def _reaches(address, value, turns, more):
     return looks < turns
 
 
-@njit(cache=True)
-def _write(address, value):
+@compiled(nogil=True)
+def publish(address, value):
+    """Write the number at ``address``, after everything that was written before."""
     _store(address, value)
+
+
+@compiled(nogil=True)
+def wait_for(address, value):
+    """Return when the number at ``address`` is at least ``value``."""
+    looks = 0
+    while _load(address) < value:
+        looks += 1
+        if looks > YIELD:
+            _sched_yield()

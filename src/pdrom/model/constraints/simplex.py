@@ -5,26 +5,25 @@ matrix D of the rest shape (1 for springs). What differs from group to group is 
 block; gather and scatter are here, for blocks of elements (see `pdrom.model.constraints.lanes`).
 """
 
-from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
+from pdrom.model.compiled import rows
+from pdrom.model.compiled.arithmetic import add, constant, subtract, transposed
+from pdrom.model.compiled.rows import WIDTH, at
 from pdrom.model.constraints.base import StencilGroup
-from pdrom.model.constraints.lanes import (
-    LANES,
-    blocks,
-    lane_function,
-    load,
-    pack,
-    save,
-    workspace,
-)
-from pdrom.model.constraints.parts import Parts
+from pdrom.model.constraints.lanes import LANES, blocks, lane_function, load, pack, save, workspace
+from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, LocalKernel
 
 # numbers of a lane in the working array: edges, S q, p, forces on the corners but 0, energy
-EDGE, F, P, FORCE, ENERGY, OWN = 0, 9, 18, 27, 36, 37
+EDGE, F, P, FORCE, ENERGY, SIZE = 0, 9, 18, 27, 36, 37
 # number of a lane in the packed geometry, before the operator and what else a group has
 WEIGHT, OPERATOR = 0, 1
+# Entries of the record: the size of a working array and the number of elements to project; then the
+# places of corners, geometry, constants, working arrays, the elements to project and their data.
+WORK_SIZE, COUNT, CORNERS, GEOMETRY, CONSTANTS, WORK, ELEMENTS = range(OWN, OWN + 7)
+TAKEN, TAKEN_GEOMETRY, ARRAYS = range(OWN + 7, OWN + 10)
 
 
 class SimplexGroup(StencilGroup):
@@ -32,16 +31,14 @@ class SimplexGroup(StencilGroup):
 
     A subclass gives two kernels and, if it has other numbers of an element, `_extra`:
 
-    accumulate_kernel : ``(y, corners, geometry, *constants, first, last, elements, work, rhs)``
-        adds the blocks first .. last - 1 to rhs and returns their energy
-    project_kernel : ``(y, corners, geometry, *constants, elements, taken_corners, taken_geometry,
-        work, p)`` writes the projections of some elements
+    accumulate_kernel : a `pdrom.model.constraints.local_kernel.local_kernel` whose units are blocks
+    project_kernel : the same form; writes the projections of some elements, see `samples`
     """
 
-    accumulate_kernel: Callable[..., float]
-    project_kernel: Callable[..., None]
+    accumulate_kernel: Any
+    project_kernel: Any
 
-    work_size = OWN
+    work_size = SIZE
     """Numbers of a lane in the working array."""
 
     def _assemble(self, vertices: int) -> None:
@@ -50,14 +47,31 @@ class SimplexGroup(StencilGroup):
         self._corners = pack(np.asarray(self.stencil, dtype=np.int32))
         numbers = np.column_stack([self.weights, *self._extra()])
         self._geometry = pack(numbers)
-        # the copies that fill up the last block have no energy
+        # the copies that fill up the last block have no force and no energy
         by_lane = self._geometry.reshape(blocks(e), numbers.shape[1], LANES)
         by_lane[-1:, WEIGHT, e - LANES * (blocks(e) - 1) :] = 0.0
-        self._work = [workspace(self.work_size) for _ in range(2)]
+        self._work = np.stack([workspace(self.work_size) for _ in range(2)])
         self._taken = (np.empty(m * LANES, np.int32), workspace(numbers.shape[1]))
-        self._parts = Parts(
-            blocks(e), e >= self.split_from, vertices, lambda block: self.stencil[block * LANES :]
+        self.local_kernel = LocalKernel.of(
+            self.accumulate_kernel,
+            vertices,
+            blocks(e),
+            e >= self.split_from,
+            self._arrays(np.empty(0, np.int64)),
+            (self._work.shape[1], 0),
+            lambda block: self.stencil[block * LANES :],
         )
+
+    def sampler(self, elements: np.ndarray) -> LocalKernel:
+        vertices, arrays = self.S.shape[1], self._arrays(elements)
+        numbers = (self._work.shape[1], len(elements))
+        return LocalKernel.of(
+            self.project_kernel, vertices, blocks(self.elements), False, arrays, numbers
+        )
+
+    def _arrays(self, elements: np.ndarray) -> tuple[np.ndarray, ...]:
+        data = (self._corners, self._geometry, np.array(self._constants()), self._work)
+        return (*data, elements, *self._taken, *self._own_arrays())
 
     def _extra(self) -> list[np.ndarray]:
         """Numbers of an element after its weight: the operator without the corner 0."""
@@ -67,64 +81,128 @@ class SimplexGroup(StencilGroup):
         """Further arguments of the kernels."""
         return ()
 
-    def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:
-        p = np.empty((self.rows_per_element * len(elements), 3))
-        data = (self._corners, self._geometry, *self._constants())
-        self.project_kernel(y, *data, elements, *self._taken, self._work[0], p)
-        return p
-
-    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        data = (self._corners, self._geometry, *self._constants())
-
-        def kernel(first: int, last: int, part: int, target: np.ndarray) -> float:
-            work = self._work[part]
-            return self.accumulate_kernel(y, *data, first, last, self.elements, work, target)
-
-        return self._parts.accumulate(kernel, rhs, self.threads)
+    def _own_arrays(self) -> tuple[np.ndarray, ...]:
+        """Further arrays of the kernel."""
+        return ()
 
 
 @lane_function
-def gather_edges(y, corners, block, rows, work):
+def arguments(y, rhs, record, part, corners, numbers):
+    """What a kernel on simplices with so many corners and numbers an element works with.
+
+    (y, rhs, corners, geometry, constants, work, first block, last block)
+    """
+    entries = rows.indices(record, ARRAYS)
+    count = WIDTH * entries[VERTICES]
+    packed = entries[FIRST + 2] * LANES
+    size = entries[WORK_SIZE]
+    return (
+        rows.doubles(y, count),
+        rows.doubles(rhs, count),
+        rows.integers(entries[CORNERS], packed * corners),
+        rows.doubles(entries[GEOMETRY], packed * numbers),
+        rows.doubles(entries[CONSTANTS], 2),
+        rows.doubles(entries[WORK] + 8 * size * part, size),
+        entries[FIRST + part],
+        entries[FIRST + part + 1],
+    )
+
+
+@lane_function
+def samples(record, corners, numbers):
+    """What a kernel that projects some elements works with besides.
+
+    (elements, corners and geometry of a block of them), see `pdrom.model.constraints.lanes.take`
+    """
+    entries = rows.indices(record, ARRAYS)
+    return (
+        rows.indices(entries[ELEMENTS], entries[COUNT]),
+        rows.integers(entries[TAKEN], corners * LANES),
+        rows.doubles(entries[TAKEN_GEOMETRY], numbers * LANES),
+    )
+
+
+@lane_function
+def corner_rows(y, corners, place):
+    """Positions of four vertices."""
+    return (
+        rows.load(y, WIDTH * at(corners, place)),
+        rows.load(y, WIDTH * at(corners, place + 1)),
+        rows.load(y, WIDTH * at(corners, place + 2)),
+        rows.load(y, WIDTH * at(corners, place + 3)),
+    )
+
+
+@lane_function
+def edge_columns(start, end):
+    """x, y and z of four edges, from four vertices each."""
+    return transposed(
+        subtract(end[0], start[0]),
+        subtract(end[1], start[1]),
+        subtract(end[2], start[2]),
+        subtract(end[3], start[3]),
+    )
+
+
+@lane_function
+def gather_edges(y, corners, block, edges, work):
     """Edges from corner 0 to the others."""
-    for lane in range(LANES):
-        base = block * (rows + 1) * LANES + lane
-        v0 = corners[base]
-        for i in range(rows):
-            v = corners[base + (i + 1) * LANES]
-            edge = (y[v, 0] - y[v0, 0], y[v, 1] - y[v0, 1], y[v, 2] - y[v0, 2])
-            save(work, EDGE + 3 * i, lane, edge)
+    for lane in range(0, LANES, WIDTH):
+        base = block * (edges + 1) * LANES + lane
+        start = corner_rows(y, corners, base)
+        for i in range(edges):
+            end = corner_rows(y, corners, base + (i + 1) * LANES)
+            ex, ey, ez, _ = edge_columns(start, end)
+            place = (EDGE + 3 * i) * LANES + lane
+            rows.store(work, place, ex)
+            rows.store(work, place + LANES, ey)
+            rows.store(work, place + 2 * LANES, ez)
 
 
 @lane_function
-def copy_rows(d, rows, start, work, first):
-    """Copy S q (m rows, 3) of the elements ``start``, ... of m, the last one repeated."""
-    count = d.shape[0] // rows
+def copy_rows(d, count, start, work, first):
+    """Copy S q (m count, 3) of the elements ``start``, ... of m, the last one repeated."""
+    last = d.shape[0] // count - 1
     for lane in range(LANES):
-        base = rows * min(start + lane, count - 1)
-        for i in range(rows):
+        base = count * min(start + lane, last)
+        for i in range(count):
             save(work, first + 3 * i, lane, (d[base + i, 0], d[base + i, 1], d[base + i, 2]))
 
 
 @lane_function
-def scatter(work, corners, block, rows, elements, rhs):
-    """Add the forces of a block, of ``elements`` in all, to the vertices.
+def add_to(rhs, corners, place, forces):
+    """Add four forces to four vertices, one after the other: two may be the same."""
+    for lane in range(WIDTH):
+        v = WIDTH * at(corners, place + lane)
+        rows.store(rhs, v, add(rows.load(rhs, v), forces[lane]))
+
+
+@lane_function
+def take_from(rhs, corners, place, forces):
+    """Opposite of `add_to`."""
+    for lane in range(WIDTH):
+        v = WIDTH * at(corners, place + lane)
+        rows.store(rhs, v, subtract(rows.load(rhs, v), forces[lane]))
+
+
+@lane_function
+def scatter(work, corners, block, edges, rhs):
+    """Add the forces of a block to the vertices.
 
     Forces on the corners 1, 2, ... are given; corner 0 gets what makes their sum zero.
     """
-    for lane in range(min(LANES, elements - block * LANES)):
-        base = block * (rows + 1) * LANES + lane
-        x, y, z = 0.0, 0.0, 0.0
-        for i in range(rows):
-            v = corners[base + (i + 1) * LANES]
-            fx, fy, fz = load(work, FORCE + 3 * i, lane)
-            rhs[v, 0] += fx
-            rhs[v, 1] += fy
-            rhs[v, 2] += fz
-            x, y, z = x + fx, y + fy, z + fz
-        v = corners[base]
-        rhs[v, 0] -= x
-        rhs[v, 1] -= y
-        rhs[v, 2] -= z
+    none = constant(0.0)
+    for lane in range(0, LANES, WIDTH):
+        base = block * (edges + 1) * LANES + lane
+        x, y, z = none, none, none
+        for i in range(edges):
+            place = (FORCE + 3 * i) * LANES + lane
+            fx = rows.load(work, place)
+            fy = rows.load(work, place + LANES)
+            fz = rows.load(work, place + 2 * LANES)
+            add_to(rhs, corners, base + (i + 1) * LANES, transposed(fx, fy, fz, none))
+            x, y, z = add(x, fx), add(y, fy), add(z, fz)
+        take_from(rhs, corners, base, transposed(x, y, z, none))
 
 
 @lane_function
@@ -144,9 +222,12 @@ def energy(work):
 
 
 @lane_function
-def store_projections(work, rows, start, p):
-    """Copy the projections of a block to those of the elements ``start``, ``start + 1``, ..."""
-    for lane in range(min(LANES, p.shape[0] // rows - start)):
-        for i in range(rows):
-            row = rows * (start + lane) + i
-            p[row, 0], p[row, 1], p[row, 2] = load(work, P + 3 * i, lane)
+def store_projections(work, count, start, p):
+    """Copy the projections of a block to those of the elements ``start``, ``start + 1``, ...
+
+    p : flat, three numbers a row, ``count`` rows an element
+    """
+    for lane in range(min(LANES, len(p) // (3 * count) - start)):
+        for i in range(count):
+            at_p = 3 * (count * (start + lane) + i)
+            p[at_p], p[at_p + 1], p[at_p + 2] = load(work, P + 3 * i, lane)

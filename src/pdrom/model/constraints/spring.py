@@ -4,96 +4,155 @@ from typing import Literal
 
 import numpy as np
 
+from pdrom.model.compiled import arithmetic, rows
+from pdrom.model.compiled.arithmetic import (
+    add,
+    add_product,
+    all_within,
+    choose_within,
+    constant,
+    divide,
+    magnitude,
+    multiply,
+    square_root,
+    subtract,
+    transposed,
+)
+from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.constraints.base import GroupConfig, directions
 from pdrom.model.constraints.gradient_kernel import carray, gradient_kernel
-from pdrom.model.constraints.lanes import (
-    LANES,
-    SMALLEST,
-    absolute_sum,
-    choose,
-    dot,
-    kernel,
-    lane_function,
-    load,
-    save,
-    scaled,
-    square_distance,
-    take,
-)
+from pdrom.model.constraints.lanes import LANES, SMALLEST, lane_function, pack, take
+from pdrom.model.constraints.local_kernel import local_kernel
 from pdrom.model.constraints.simplex import (
+    ARRAYS,
     EDGE,
-    ENERGY,
-    FORCE,
-    OWN,
+    SIZE,
     WEIGHT,
     P,
     SimplexGroup,
+    add_to,
+    arguments,
     copy_rows,
-    energy,
+    corner_rows,
+    edge_columns,
     gather_edges,
-    scatter,
-    start_energy,
+    samples,
     store_projections,
+    take_from,
 )
 from pdrom.model.mesh.types import Mesh
 
-# numbers of a lane in the packed geometry: weight, rest edge, rest length
-REST, LENGTH, GEOMETRY = 1, 4, 5
+# numbers of a lane in the packed geometry: weight, rest length; and in that of the rest edges
+LENGTH, GEOMETRY = 1, 2
+REST = 3
+# entries of the record: rest edges, those of a block of elements to project
+REST_EDGES, TAKEN_REST = ARRAYS, ARRAYS + 1
+# squares of lengths that neither overflow nor lose digits
+LOW, HIGH = 1e-280, 1e280
 
 
 @lane_function
-def _rest_lengths(work, geometry, block):
-    """Edges of a block with their rest length."""
-    first = block * GEOMETRY
-    for lane in range(LANES):
-        d, rest = load(work, EDGE, lane), load(geometry, first + REST, lane)
-        length = geometry[(first + LENGTH) * LANES + lane]
-        # scaled: neither overflow nor underflow of the squares
-        scale = absolute_sum(d)
-        unit = scaled(1.0 / (scale + SMALLEST), d)
-        unit = scaled(length / np.sqrt(dot(unit, unit)), unit)
-        save(work, P, lane, choose(scale == 0.0, rest, unit))
+def _squares(x, y, z):
+    return add_product(add_product(multiply(x, x), y, y), z, z)
 
 
 @lane_function
-def _forces(work, geometry, block):
-    """Weighted forces S^T W p on the end, and w |S q - p|^2."""
-    weight = (block * GEOMETRY + WEIGHT) * LANES
-    for lane in range(LANES):
-        p, w = load(work, P, lane), geometry[weight + lane]
-        save(work, FORCE, lane, scaled(w, p))
-        work[ENERGY * LANES + lane] += w * square_distance(load(work, EDGE, lane), p)
+def _rest_lengths(x, y, z, length, rest, place):
+    """Four edges with their rest lengths; ``place`` is where their rest edges begin in ``rest``."""
+    square = _squares(x, y, z)
+    factor = divide(length, square_root(square))
+    px, py, pz = multiply(factor, x), multiply(factor, y), multiply(factor, z)
+    if all_within(square, LOW, HIGH):
+        return px, py, pz
+    # scaled: neither overflow nor underflow of the squares; not finite where the edge is not
+    scale = add(add(magnitude(x), magnitude(y)), magnitude(z))
+    inverse = divide(constant(1.0), add(scale, constant(SMALLEST)))
+    ux, uy, uz = multiply(inverse, x), multiply(inverse, y), multiply(inverse, z)
+    factor = divide(length, square_root(_squares(ux, uy, uz)))
+    sx = choose_within(scale, 0.0, 0.0, rows.load(rest, place), multiply(factor, ux))
+    sy = choose_within(scale, 0.0, 0.0, rows.load(rest, place + LANES), multiply(factor, uy))
+    sz = choose_within(scale, 0.0, 0.0, rows.load(rest, place + 2 * LANES), multiply(factor, uz))
+    return (
+        choose_within(square, LOW, HIGH, px, sx),
+        choose_within(square, LOW, HIGH, py, sy),
+        choose_within(square, LOW, HIGH, pz, sz),
+    )
 
 
-@kernel
-def _project(y, corners, geometry, elements, taken, taken_geometry, work, p):
-    for start in range(0, elements.shape[0], LANES):
+@lane_function
+def _project_block(work, geometry, geometry_block, rest, rest_block):
+    """Projections of the edges in the working array."""
+    for lane in range(0, LANES, WIDTH):
+        edge, p = EDGE * LANES + lane, P * LANES + lane
+        px, py, pz = _rest_lengths(
+            rows.load(work, edge),
+            rows.load(work, edge + LANES),
+            rows.load(work, edge + 2 * LANES),
+            rows.load(geometry, (geometry_block * GEOMETRY + LENGTH) * LANES + lane),
+            rest,
+            rest_block * REST * LANES + lane,
+        )
+        rows.store(work, p, px)
+        rows.store(work, p + LANES, py)
+        rows.store(work, p + 2 * LANES, pz)
+
+
+@local_kernel
+def _project(y_place, p_place, record, part):
+    y, _, corners, geometry, _, work, _, last = arguments(
+        y_place, p_place, record, part, 2, GEOMETRY
+    )
+    elements, taken, taken_geometry = samples(record, 2, GEOMETRY)
+    entries = rows.indices(record, TAKEN_REST + 1)
+    rest = rows.doubles(entries[REST_EDGES], last * REST * LANES)
+    taken_rest = rows.doubles(entries[TAKEN_REST], REST * LANES)
+    p = rows.doubles(p_place, 3 * len(elements))
+    for start in range(0, len(elements), LANES):
         take(corners, 2, elements, start, taken)
         take(geometry, GEOMETRY, elements, start, taken_geometry)
+        take(rest, REST, elements, start, taken_rest)
         gather_edges(y, taken, 0, 1, work)
-        _rest_lengths(work, taken_geometry, 0)
+        _project_block(work, taken_geometry, 0, taken_rest, 0)
         store_projections(work, 1, start, p)
+    return 0.0
 
 
-@kernel
-def _accumulate(y, corners, geometry, first, last, elements, work, rhs):
-    start_energy(work)
+@local_kernel
+def _accumulate(y_place, rhs_place, record, part):
+    y, rhs, corners, geometry, _, _, first, last = arguments(
+        y_place, rhs_place, record, part, 2, GEOMETRY
+    )
+    rest = rows.doubles(rows.indices(record, REST_EDGES + 1)[REST_EDGES], last * REST * LANES)
+    none = constant(0.0)
+    energies = none
     for block in range(first, last):
-        gather_edges(y, corners, block, 1, work)
-        _rest_lengths(work, geometry, block)
-        _forces(work, geometry, block)
-        scatter(work, corners, block, 1, elements, rhs)
-    return energy(work)
+        numbers = block * GEOMETRY * LANES
+        for lane in range(0, LANES, WIDTH):
+            a = block * 2 * LANES + lane
+            b = a + LANES
+            dx, dy, dz, _ = edge_columns(corner_rows(y, corners, a), corner_rows(y, corners, b))
+            length = rows.load(geometry, numbers + LENGTH * LANES + lane)
+            place = block * REST * LANES + lane
+            px, py, pz = _rest_lengths(dx, dy, dz, length, rest, place)
+            w = rows.load(geometry, numbers + WEIGHT * LANES + lane)
+            square = _squares(subtract(dx, px), subtract(dy, py), subtract(dz, pz))
+            energies = add_product(energies, w, square)
+            forces = transposed(multiply(w, px), multiply(w, py), multiply(w, pz), none)
+            add_to(rhs, corners, b, forces)
+            take_from(rhs, corners, a, forces)
+    return 0.5 * arithmetic.total(energies)
 
 
 @gradient_kernel
-def _project_gradients(d_pointer, geometry_pointer, p_pointer, m):
-    d, p = carray(d_pointer, (m, 3)), carray(p_pointer, (m, 3))
-    geometry = carray(geometry_pointer, ((m + LANES - 1) // LANES * GEOMETRY * LANES,))
-    work = np.zeros(OWN * LANES)
+def _project_gradients(d_pointer, parameters, p_pointer, m):
+    d, p = carray(d_pointer, (m, 3)), carray(p_pointer, (3 * m,))
+    packed = (m + LANES - 1) // LANES * LANES
+    numbers = carray(parameters, (packed * (GEOMETRY + REST),))
+    geometry, rest = numbers[: packed * GEOMETRY], numbers[packed * GEOMETRY :]
+    work = np.zeros(SIZE * LANES)
     for start in range(0, m, LANES):
         copy_rows(d, 1, start, work, EDGE)
-        _rest_lengths(work, geometry, start // LANES)
+        _project_block(work, geometry, start // LANES, rest, start // LANES)
         store_projections(work, 1, start, p)
 
 
@@ -114,8 +173,8 @@ class EdgeSpring(SimplexGroup):
     rows_per_element = 1
     per_element = ("rest",)
     split_from = 8192
-    project_kernel = staticmethod(_project)
-    accumulate_kernel = staticmethod(_accumulate)
+    project_kernel = _project
+    accumulate_kernel = _accumulate
     manifold = "length"
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
@@ -126,15 +185,24 @@ class EdgeSpring(SimplexGroup):
         self.operator = np.tile(np.array([[[-1.0, 1.0]]]), (len(self.stencil), 1, 1))
         self._assemble(mesh.vertices)
 
+    def _assemble(self, vertices: int) -> None:
+        # apart from the geometry: only an edge of length zero looks its rest edge up
+        self._rest = pack(self.rest)
+        self._taken_rest = np.empty(REST * LANES)
+        super()._assemble(vertices)
+
     def _extra(self) -> list[np.ndarray]:
-        return [self.rest, np.linalg.norm(self.rest, axis=1)]
+        return [np.linalg.norm(self.rest, axis=1)]
+
+    def _own_arrays(self) -> tuple[np.ndarray, ...]:
+        return self._rest, self._taken_rest
 
     @property
     def gradient_kernel(self):
         return _project_gradients
 
     def kernel_parameters(self) -> np.ndarray:
-        return self._geometry
+        return np.concatenate([self._geometry, self._rest])
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         rest = self.rest[elements, None, :]

@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from pdrom.model.compiled.rows import doubles
 from pdrom.model.constraints import svd3
 from pdrom.model.constraints.base import require_cells
 from pdrom.model.constraints.gradient_kernel import carray, gradient_kernel
 from pdrom.model.constraints.lanes import (
     LANES,
-    kernel,
     lane_function,
     load,
     mix3,
@@ -16,20 +16,23 @@ from pdrom.model.constraints.lanes import (
     square_distance,
     take,
 )
+from pdrom.model.constraints.local_kernel import local_kernel
 from pdrom.model.constraints.polar3 import rotation_block, within_range_block
 from pdrom.model.constraints.simplex import (
     EDGE,
     ENERGY,
     FORCE,
     OPERATOR,
-    OWN,
+    SIZE,
     WEIGHT,
     F,
     P,
     SimplexGroup,
+    arguments,
     copy_rows,
     energy,
     gather_edges,
+    samples,
     scatter,
     start_energy,
     store_projections,
@@ -39,7 +42,7 @@ from pdrom.model.mesh.types import Mesh
 # numbers of a lane in the packed geometry
 GEOMETRY = 10
 # where the working array of svd3 and the marks of finished lanes begin
-SVD, FOUND = OWN, OWN + svd3.SIZE
+SVD, FOUND = SIZE, SIZE + svd3.SIZE
 
 
 @lane_function
@@ -89,32 +92,43 @@ def _forces(work, geometry, block):
         )
 
 
-@kernel
-def _project(y, corners, geometry, low, high, elements, taken, taken_geometry, work, p):
-    for start in range(0, elements.shape[0], LANES):
+@local_kernel
+def _project(y_place, p_place, record, part):
+    y, _, corners, geometry, allowed, work, _, _ = arguments(
+        y_place, p_place, record, part, 4, GEOMETRY
+    )
+    elements, taken, taken_geometry = samples(record, 4, GEOMETRY)
+    p = doubles(p_place, 3 * 3 * len(elements))
+    low, high = allowed[0], allowed[1]
+    for start in range(0, len(elements), LANES):
         take(corners, 4, elements, start, taken)
         take(geometry, GEOMETRY, elements, start, taken_geometry)
         gather_edges(y, taken, 0, 3, work)
         _gradients(work, taken_geometry, 0)
         _nearest(work, low, high)
         store_projections(work, 3, start, p)
+    return 0.0
 
 
-@kernel
-def _accumulate(y, corners, geometry, low, high, first, last, elements, work, rhs):
+@local_kernel
+def _accumulate(y_place, rhs_place, record, part):
+    y, rhs, corners, geometry, allowed, work, first, last = arguments(
+        y_place, rhs_place, record, part, 4, GEOMETRY
+    )
+    low, high = allowed[0], allowed[1]
     start_energy(work)
     for block in range(first, last):
         gather_edges(y, corners, block, 3, work)
         _gradients(work, geometry, block)
         _nearest(work, low, high)
         _forces(work, geometry, block)
-        scatter(work, corners, block, 3, elements, rhs)
+        scatter(work, corners, block, 3, rhs)
     return energy(work)
 
 
 @gradient_kernel
 def _project_gradients(d_pointer, range_pointer, p_pointer, m):
-    d, p = carray(d_pointer, (3 * m, 3)), carray(p_pointer, (3 * m, 3))
+    d, p = carray(d_pointer, (3 * m, 3)), carray(p_pointer, (9 * m,))
     allowed = carray(range_pointer, (2,))
     work = np.zeros((FOUND + 1) * LANES)
     for start in range(0, m, LANES):
@@ -130,8 +144,8 @@ class TetrahedronGroup(SimplexGroup):
     rows_per_element = 3
     work_size = FOUND + 1
     split_from = 1024
-    project_kernel = staticmethod(_project)
-    accumulate_kernel = staticmethod(_accumulate)
+    project_kernel = _project
+    accumulate_kernel = _accumulate
     manifold = "clamped"
     minimum: float
     maximum: float

@@ -9,6 +9,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from pdrom.model.compiled.rows import doubles
 from pdrom.model.constraints.base import GroupConfig, require_cells
 from pdrom.model.constraints.gradient_kernel import carray, gradient_kernel
 from pdrom.model.constraints.lanes import (
@@ -18,7 +19,6 @@ from pdrom.model.constraints.lanes import (
     choose,
     clamp,
     dot,
-    kernel,
     lane_function,
     load,
     mix,
@@ -27,19 +27,22 @@ from pdrom.model.constraints.lanes import (
     square_distance,
     take,
 )
+from pdrom.model.constraints.local_kernel import local_kernel
 from pdrom.model.constraints.simplex import (
     EDGE,
     ENERGY,
     FORCE,
     OPERATOR,
-    OWN,
+    SIZE,
     WEIGHT,
     F,
     P,
     SimplexGroup,
+    arguments,
     copy_rows,
     energy,
     gather_edges,
+    samples,
     scatter,
     start_energy,
     store_projections,
@@ -116,26 +119,37 @@ def _forces(work, geometry, block):
         )
 
 
-@kernel
-def _project(y, corners, geometry, low, high, elements, taken, taken_geometry, work, p):
-    for start in range(0, elements.shape[0], LANES):
+@local_kernel
+def _project(y_place, p_place, record, part):
+    y, _, corners, geometry, allowed, work, _, _ = arguments(
+        y_place, p_place, record, part, 3, GEOMETRY
+    )
+    elements, taken, taken_geometry = samples(record, 3, GEOMETRY)
+    p = doubles(p_place, 3 * 2 * len(elements))
+    low, high = allowed[0], allowed[1]
+    for start in range(0, len(elements), LANES):
         take(corners, 3, elements, start, taken)
         take(geometry, GEOMETRY, elements, start, taken_geometry)
         gather_edges(y, taken, 0, 2, work)
         _gradients(work, taken_geometry, 0)
         _clamp_columns(work, low, high)
         store_projections(work, 2, start, p)
+    return 0.0
 
 
-@kernel
-def _accumulate(y, corners, geometry, low, high, first, last, elements, work, rhs):
+@local_kernel
+def _accumulate(y_place, rhs_place, record, part):
+    y, rhs, corners, geometry, allowed, work, first, last = arguments(
+        y_place, rhs_place, record, part, 3, GEOMETRY
+    )
+    low, high = allowed[0], allowed[1]
     start_energy(work)
     for block in range(first, last):
         gather_edges(y, corners, block, 2, work)
         _gradients(work, geometry, block)
         _clamp_columns(work, low, high)
         _forces(work, geometry, block)
-        scatter(work, corners, block, 2, elements, rhs)
+        scatter(work, corners, block, 2, rhs)
     return energy(work)
 
 
@@ -156,9 +170,9 @@ def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, 
 
 @gradient_kernel
 def _project_gradients(d_pointer, range_pointer, p_pointer, m):
-    d, p = carray(d_pointer, (2 * m, 3)), carray(p_pointer, (2 * m, 3))
+    d, p = carray(d_pointer, (2 * m, 3)), carray(p_pointer, (6 * m,))
     allowed = carray(range_pointer, (2,))
-    work = np.zeros(OWN * LANES)
+    work = np.zeros(SIZE * LANES)
     for start in range(0, m, LANES):
         copy_rows(d, 2, start, work, F)
         _clamp_columns(work, allowed[0], allowed[1])
@@ -176,8 +190,8 @@ class TriangleStrain(SimplexGroup):
     cells = "triangle"
     rows_per_element = 2
     split_from = 4096
-    project_kernel = staticmethod(_project)
-    accumulate_kernel = staticmethod(_accumulate)
+    project_kernel = _project
+    accumulate_kernel = _accumulate
     manifold = "clamped"
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:

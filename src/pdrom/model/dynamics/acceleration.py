@@ -10,6 +10,8 @@ same.
 import numpy as np
 from numba import njit
 
+from pdrom.model.compiled.rows import flat
+
 # Relative Tikhonov term of the small least-squares problem: nearly parallel residual differences
 # (close to convergence) must not blow up the weights.
 REGULARISATION = 1e-14
@@ -79,6 +81,11 @@ def _mix(start, image, residual, last_image, residuals, images, gram, slot, coun
             image[i] -= weights[j] * images[j, i]
 
 
+def _numbers(y: np.ndarray) -> np.ndarray:
+    """All numbers of y, not copied: of a view of rows of four with their zeros."""
+    return y.reshape(-1) if y.flags.c_contiguous else flat(y)
+
+
 class Anderson:
     """Accelerates the iterations of one step loop.
 
@@ -89,19 +96,18 @@ class Anderson:
 
     def __init__(self, window: int) -> None:
         self._window = window
-        self._shape: tuple[int, ...] = ()
+        self._start = np.empty(0)
         self.refused = 0
 
     def begin_frame(self, y: np.ndarray) -> None:
         """Forget the last frame; ``y`` (n, 3) is the first iterate of this one."""
-        if y.shape != self._shape:
-            self._allocate(y.shape)
+        n = len(_numbers(y))
+        if n != len(self._start):
+            self._allocate(n)
         self._differences = -1
         self._last = np.inf
 
-    def _allocate(self, shape: tuple[int, ...]) -> None:
-        n = int(np.prod(shape))
-        self._shape = shape
+    def _allocate(self, n: int) -> None:
         self._start, self._residual, self._image = (np.empty(n) for _ in range(3))
         self._residuals, self._images = (np.empty((self._window, n)) for _ in range(2))
         self._gram = np.empty((self._window, self._window))
@@ -111,12 +117,12 @@ class Anderson:
         image of the last one and the history is dropped. An unknown objective (nan) never does.
         """
         if self._differences >= 1 and objective > self._last:
-            y.ravel()[...] = self._image
+            _numbers(y)[...] = self._image
             self._differences = -1
             self.refused += 1
             return True
         self._last = objective
-        np.copyto(self._start, y.ravel())
+        np.copyto(self._start, _numbers(y))
         return False
 
     def combine(self, image: np.ndarray) -> None:
@@ -126,6 +132,6 @@ class Anderson:
         slot = (self._differences - 1) % self._window
         count = min(self._differences, self._window)
         _mix(
-            self._start, image.reshape(-1), self._residual, self._image, self._residuals,
+            self._start, _numbers(image), self._residual, self._image, self._residuals,
             self._images, self._gram, slot, count, first,
         )  # fmt: skip

@@ -1,93 +1,162 @@
-"""Sparse Cholesky backends for the global step, factor once and solve often."""
+"""Factorisations of the global system: factor once, solve often."""
 
-import logging
 from abc import ABC, abstractmethod
-from importlib.util import find_spec
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.linalg import SuperLU, splu
 
 from pdrom.core.errors import SolverError
 from pdrom.core.registry import Registry
+from pdrom.model.compiled import rows
+from pdrom.model.dynamics.panels import Panels
+from pdrom.model.dynamics.sweeps import load, sweep
 
 SOLVERS = Registry(
     "solver",
     {
-        "cholespy": "pdrom.model.dynamics.solvers:CholespySolver",
+        "supernodal": "pdrom.model.dynamics.solvers:SupernodalSolver",
         "splu": "pdrom.model.dynamics.solvers:SuperLUSolver",
         "splu-columns": "pdrom.model.dynamics.solvers:ColumnOrderedSolver",
     },
 )
 
-
-log = logging.getLogger(__name__)
-
-
-def solver_class(name: str) -> "type[SparseSolver]":
-    """Class of a registered solver.
-
-    Where cholespy is not installed (it has no wheel for Linux on ARM), SciPy's solver takes its
-    place, and every log says so.
-    """
-    if name == "cholespy" and find_spec("cholespy") is None:
-        log.warning("cholespy is not installed: SciPy's SuperLU solves the global system instead")
-        return SuperLUSolver
-    return SOLVERS.load(name)
+# First arguments of `pdrom.model.dynamics.sweeps.sweep`: panels, vertices, loads, working array.
+Factor = tuple[tuple[np.ndarray, ...], np.ndarray, np.ndarray, np.ndarray]
+NOTHING_FREE: Factor = (
+    (np.zeros(1, np.int32), *(np.zeros(1, np.int64),) * 2, np.zeros(0, np.int32), np.zeros(0)),
+    np.zeros(0, np.int32),
+    np.zeros(0),
+    np.zeros(0),
+)
 
 
 class SparseSolver(ABC):
-    """Factorisation of a symmetric positive definite matrix (n, n)."""
+    """A factored symmetric positive definite matrix.
+
+    Parameters
+    ----------
+    matrix : (n, n)
+    vertices : (n,) rows of the arrays (N, 3) that its unknowns are
+    coupling : (n, m) to m held vertices, whose part is taken from the right-hand side; None: m = 0
+    """
+
+    factor: Factor | None = None
+    """For a compiled loop; None if the solver is not compiled."""
 
     @abstractmethod
-    def __init__(self, matrix: sparse.csr_array) -> None: ...
+    def __init__(
+        self,
+        matrix: sparse.csr_array,
+        vertices: np.ndarray,
+        coupling: sparse.csr_array | None = None,
+    ) -> None: ...
 
     @abstractmethod
-    def solve(self, rhs: np.ndarray, out: np.ndarray) -> None:
-        """Solve for the columns of ``rhs`` (n, 3), C order, into ``out`` (n, 3)."""
+    def set_targets(self, targets: np.ndarray) -> None:
+        """Positions (m, 3) of the held vertices for the solves that follow."""
 
-
-class CholespySolver(SparseSolver):
-    """CHOLMOD through cholespy: three right-hand sides in one pass."""
-
-    def __init__(self, matrix: sparse.csr_array) -> None:
-        from cholespy import CholeskySolverD, MatrixType
-
-        coo = matrix.tocoo()
-        rows, columns = (np.ascontiguousarray(i, dtype=np.int32) for i in (coo.row, coo.col))
-        try:
-            self._solver = CholeskySolverD(
-                matrix.shape[0], rows, columns, np.ascontiguousarray(coo.data), MatrixType.COO
-            )
-        except (ValueError, RuntimeError) as error:
-            raise SolverError(f"global system of size {matrix.shape[0]}: {error}") from error
-
-    def solve(self, rhs: np.ndarray, out: np.ndarray) -> None:
-        self._solver.solve(rhs, out)
+    @abstractmethod
+    def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
+        """Overwrite the rows ``vertices`` of ``y`` (N, 3) by the solution for ``rhs`` (N, 3)."""
 
 
 class SuperLUSolver(SparseSolver):
-    """SciPy's SuperLU with a symmetric ordering; needs no further package."""
+    """SciPy's SuperLU with a symmetric ordering and its own substitution."""
 
     ordering = "MMD_AT_PLUS_A"
 
-    def __init__(self, matrix: sparse.csr_array) -> None:
-        from scipy.sparse.linalg import splu
+    def __init__(
+        self,
+        matrix: sparse.csr_array,
+        vertices: np.ndarray,
+        coupling: sparse.csr_array | None = None,
+    ) -> None:
+        self._factor = factored(matrix, self.ordering)
+        self._vertices, self._coupling = vertices, coupling
+        self._load = np.zeros((len(vertices), 3))
 
-        try:
-            self._factor = splu(
-                matrix.tocsc(),
-                permc_spec=self.ordering,
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True},
-            )
-        except RuntimeError as error:
-            raise SolverError(f"global system of size {matrix.shape[0]}: {error}") from error
+    def set_targets(self, targets: np.ndarray) -> None:
+        if self._coupling is not None:
+            self._load = self._coupling @ targets
 
-    def solve(self, rhs: np.ndarray, out: np.ndarray) -> None:
-        out[...] = self._factor.solve(rhs)
+    def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
+        y[self._vertices] = self._factor.solve(rhs[self._vertices] - self._load)
 
 
 class ColumnOrderedSolver(SuperLUSolver):
     """The same with another order of summation, to see what the order changes."""
 
     ordering = "COLAMD"
+
+
+class SupernodalSolver(SparseSolver):
+    """SuperLU's factor in panels, swept by compiled code with x, y and z in one pass.
+
+    Attributes
+    ----------
+    panels : the factor
+    factor : the first arguments of `sweep`
+    """
+
+    def __init__(
+        self,
+        matrix: sparse.csr_array,
+        vertices: np.ndarray,
+        coupling: sparse.csr_array | None = None,
+    ) -> None:
+        n = matrix.shape[0]
+        factor = factored(matrix, "MMD_AT_PLUS_A")
+        lower = sparse.csc_array(factor.L)
+        lower.sort_indices()
+        self.panels = Panels.of(lower, factor.U.diagonal())
+        unknowns = np.argsort(factor.perm_c)
+        order = vertices[unknowns].astype(np.int32)
+        self._loads = np.zeros(4 * n)
+        self._sweep = (self.panels.arrays, order, self._loads, np.empty(4 * n))
+        self.factor = self._sweep
+        self._coupling = None
+        if coupling is not None:
+            own = sparse.csr_array(coupling[unknowns])
+            # few unknowns have a held neighbour
+            beside = np.flatnonzero(np.diff(own.indptr))
+            self._coupling = beside, own.indptr, own.indices, own.data
+
+    def set_targets(self, targets: np.ndarray) -> None:
+        if self._coupling is not None:
+            load(*self._coupling, np.ascontiguousarray(targets), self._loads)
+
+    def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
+        right, solution = rows.flat(rhs), rows.flat(y)
+        sweep(*self._sweep, right, solution)
+        if not rows.shares(y, solution):
+            y[...] = solution.reshape(-1, 4)[:, :3]
+
+
+def factored(matrix: sparse.csr_array, ordering: str) -> SuperLU:
+    """SuperLU of a matrix (n, n) without pivoting.
+
+    Raises
+    ------
+    SolverError
+        The matrix is singular or not positive definite.
+    """
+    size = matrix.shape[0]
+    try:
+        factor = splu(
+            matrix.tocsc(),
+            permc_spec=ordering,
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError as error:
+        raise SolverError(f"global system of size {size}: {error}") from error
+    symmetric = ordering == "COLAMD" or np.array_equal(factor.perm_r, factor.perm_c)
+    if not (symmetric and (factor.U.diagonal() > 0.0).all()):
+        raise SolverError(f"global system of size {size}: not positive definite")
+    return factor
+
+
+def solver_class(name: str) -> type[SparseSolver]:
+    """Class of a registered solver."""
+    return SOLVERS.load(name)

@@ -2,10 +2,13 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
+from pdrom.model.compiled.rows import WIDTH, flat
+from pdrom.model.dynamics.frames import end, predict, weighted
+from pdrom.model.dynamics.iterations import CompiledIterations
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.effects.base import Boundary, Contact, Force
 
@@ -17,8 +20,43 @@ class Solve(Protocol):
         """Overwrite the free coordinates of ``y`` by the solution for ``rhs``."""
 
 
+class Iterations(Protocol):
+    """All iterations of a frame at once, see `pdrom.model.dynamics.iterations`."""
+
+    def takes(self, elimination: "Solve") -> bool:
+        """Whether the system is solved by compiled code, too."""
+
+    def run(
+        self,
+        count: int,
+        objective: np.ndarray,
+        y: np.ndarray,
+        s: np.ndarray,
+        base: np.ndarray,
+        elimination: Any,
+        seconds: np.ndarray,
+    ) -> None:
+        """Do ``count`` iterations in place."""
+
+
 class Space(ABC):
     """What the step loop asks of its coordinates. Arrays are (n, 3) with n coordinates."""
+
+    def predict(self, positions: np.ndarray, velocities: np.ndarray, h: float) -> np.ndarray:
+        """Inertial prediction s = q + h v + h^2 a."""
+        return positions + h * velocities + h**2 * self.acceleration(positions, velocities)
+
+    def copy(self, s: np.ndarray) -> np.ndarray:
+        """A copy of what `predict` or `inertia` returned, to iterate on."""
+        return s.copy()
+
+    def end(self, y: np.ndarray, before: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates and velocities at the end of a frame that began at ``before``."""
+        return y, (y - before) / h
+
+    def compiled(self, local_steps: Sequence[Any]) -> Iterations | None:
+        """Compiled iterations with these local steps, None if there are none."""
+        return None
 
     @abstractmethod
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
@@ -56,7 +94,6 @@ class VertexSpace(Space):
         contacts: Sequence[Contact] = (),
     ) -> None:
         self.system = system
-        self._inertia = system.inertia[:, None]
         self._forces, self._boundaries, self._contacts = forces, boundaries, contacts
 
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
@@ -71,6 +108,8 @@ class VertexSpace(Space):
             return np.empty(0, dtype=np.int64), np.empty((0, 3))
         held = [b.held(frame) for b in active]
         targets = [b.targets(frame, positions[v]) for b, v in zip(active, held, strict=True)]
+        if len(active) == 1 and (np.diff(held[0]) > 0).all():
+            return held[0], targets[0]
         vertices, first = np.unique(np.concatenate(held), return_index=True)
         return vertices, np.concatenate(targets)[first]
 
@@ -79,8 +118,25 @@ class VertexSpace(Space):
         elimination.set_targets(targets)
         return elimination
 
+    def predict(self, positions: np.ndarray, velocities: np.ndarray, h: float) -> np.ndarray:
+        acceleration = np.atleast_2d(self.acceleration(positions, velocities))
+        s = np.empty((len(positions), WIDTH))
+        predict(positions, velocities, acceleration, h, s)
+        return s[:, :3]
+
+    def copy(self, s: np.ndarray) -> np.ndarray:
+        return flat(s).copy().reshape(-1, WIDTH)[:, :3]
+
+    def end(self, y: np.ndarray, before: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
+        return end(flat(y), before, h)
+
+    def compiled(self, local_steps: Sequence[Any]) -> Iterations | None:
+        if any(getattr(step, "local_kernel", None) is None for step in local_steps):
+            return None
+        return CompiledIterations(local_steps, self.system.inertia)
+
     def inertia(self, s: np.ndarray) -> np.ndarray:
-        return self._inertia * s
+        return weighted(self.system.inertia, flat(s)).reshape(-1, WIDTH)[:, :3]
 
     def inertia_energy(self, difference: np.ndarray) -> float:
         squares = np.einsum("ij,ij->i", difference, difference)

@@ -73,6 +73,7 @@ class Stepper:
         self.local_steps = list(local_steps)
         self._acceleration = acceleration
         self._track = track_objective
+        self._compiled = None if acceleration is not None else space.compiled(self.local_steps)
 
     def step(
         self,
@@ -94,8 +95,7 @@ class Stepper:
     def _begin(self, state: State, frame: int) -> tuple[np.ndarray, Solve, np.ndarray]:
         """Inertial prediction s with held coordinates at their targets, the system, (M/h^2) s."""
         space, h = self.space, self.time_step
-        s = state.positions + h * state.velocities
-        s += h**2 * space.acceleration(state.positions, state.velocities)
+        s = space.predict(state.positions, state.velocities, h)
         fixed, targets = space.fixed(frame, state.positions)
         s[fixed] = targets
         elimination = space.eliminate(fixed, targets)
@@ -116,11 +116,34 @@ class Stepper:
 
         Their times are added to ``seconds``.
         """
+        y = self.space.copy(s)
+        objective = np.full(self.iterations if self._track else 0, np.nan)
+        if self._compiled is None or not self._compiled.takes(elimination):
+            self._one_by_one(s, base, elimination, y, objective, seconds, on_last_iterate)
+            return y, objective
+        unseen = self.iterations - (on_last_iterate is not None)
+        rest = (y, s, base, elimination, seconds)
+        self._compiled.run(unseen, objective[:unseen], *rest)
+        if on_last_iterate is not None:
+            on_last_iterate(y)
+            self._compiled.run(1, objective[unseen:], *rest)
+        return y, objective
+
+    def _one_by_one(
+        self,
+        s: np.ndarray,
+        base: np.ndarray,
+        elimination: Solve,
+        y: np.ndarray,
+        objective: np.ndarray,
+        seconds: np.ndarray,
+        on_last_iterate: Callable[[np.ndarray], None] | None,
+    ) -> None:
+        """All iterations with local steps of any kind, in place."""
         space, acceleration = self.space, self._acceleration
-        y, rhs = s.copy(), np.empty_like(s)
+        rhs = space.copy(base)
         if acceleration is not None:
             acceleration.begin_frame(y)
-        objective = np.full(self.iterations if self._track else 0, np.nan)
         for k in range(self.iterations):
             if on_last_iterate is not None and k == self.iterations - 1:
                 on_last_iterate(y)
@@ -144,9 +167,8 @@ class Stepper:
                 if k < self.iterations - 1:
                     acceleration.combine(y)
             seconds[2] += perf_counter() - before
-        return y, objective
 
     def _finish(self, state: State, y: np.ndarray) -> State:
         """State after the frame: contacts, then the velocities."""
         self.space.correct(y, state.positions)
-        return State(y, (y - state.positions) / self.time_step)
+        return State(*self.space.end(y, state.positions, self.time_step))

@@ -3,65 +3,54 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numba import njit
 from scipy import sparse
 
 from pdrom.core.errors import SolverError
 from pdrom.core.store import require_finite
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.dynamics.solvers import SparseSolver, solver_class
+from pdrom.model.dynamics.solvers import NOTHING_FREE, Factor, SparseSolver, solver_class
 
-DEFAULT_SOLVER = "cholespy"
+DEFAULT_SOLVER = "supernodal"
 
 # A solve that keeps fewer digits than this would move a body that nothing pushes.
 ACCURACY = 1e-6
 
 
 class Elimination:
-    """The system with a fixed set of vertices taken out; one factorisation serves x, y and z."""
+    """The system with a fixed set of vertices taken out; one factorisation serves x, y and z.
+
+    Attributes
+    ----------
+    factor : arguments of `pdrom.model.dynamics.sweeps.sweep`; None if another solver is in use
+    """
 
     def __init__(self, matrix: sparse.csr_array, fixed: np.ndarray, solver: str) -> None:
         self.fixed = fixed
         self.free = np.setdiff1d(np.arange(matrix.shape[0]), fixed)
-        self._coupling = matrix[self.free][:, fixed] if len(fixed) else None
-        self._rhs = np.empty((len(self.free), 3))
-        self._solution = np.empty((len(self.free), 3))
-        self._load = np.zeros((len(self.free), 3))
+        coupling = sparse.csr_array(matrix[self.free][:, fixed]) if len(fixed) else None
         self._solver: SparseSolver | None = None
+        self.factor: Factor | None = NOTHING_FREE
         if len(self.free):
             block = matrix if not len(fixed) else matrix[self.free][:, self.free]
-            self._solver = solver_class(solver)(sparse.csr_array(block))
-            require_accurate(block, self._solver.solve)
+            self._solver = solver_class(solver)(sparse.csr_array(block), self.free, coupling)
+            self.factor = self._solver.factor
+            require_accurate(block, self._solve_free)
+
+    def _solve_free(self, rhs: np.ndarray, out: np.ndarray) -> None:
+        all_rhs, y = np.zeros((2, len(self.fixed) + len(self.free), 3))
+        all_rhs[self.free] = rhs
+        self.solve(all_rhs, y)
+        out[...] = y[self.free]
 
     def set_targets(self, targets: np.ndarray) -> None:
         """Positions (n_fixed, 3) of the fixed vertices for the solves that follow."""
-        if self._coupling is not None:
-            self._load = self._coupling @ targets
+        if self._solver is not None:
+            self._solver.set_targets(targets)
 
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
         """Overwrite the free rows of ``y`` (N, 3) with the solution for ``rhs`` (N, 3)."""
-        if self._solver is None:
-            return
-        if self._coupling is None:
+        if self._solver is not None:
             self._solver.solve(rhs, y)
-            return
-        _take_less(rhs, self.free, self._load, self._rhs)
-        self._solver.solve(self._rhs, self._solution)
-        _put(self._solution, self.free, y)
-
-
-@njit(cache=True)
-def _take_less(values, rows, less, out):
-    for i in range(len(rows)):
-        for axis in range(3):
-            out[i, axis] = values[rows[i], axis] - less[i, axis]
-
-
-@njit(cache=True)
-def _put(values, rows, out):
-    for i in range(len(rows)):
-        for axis in range(3):
-            out[rows[i], axis] = values[i, axis]
 
 
 def require_accurate(matrix, solve: Callable[[np.ndarray, np.ndarray], object]) -> None:

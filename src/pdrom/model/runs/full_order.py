@@ -10,6 +10,7 @@ import numpy as np
 
 from pdrom.core.store import write_hdf5
 from pdrom.model.dynamics.stepper import PHASES, FrameReport, State
+from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.mesh.types import store_mesh
 from pdrom.model.scene import Scene
 
@@ -39,7 +40,7 @@ def run(
     path: str | os.PathLike[str],
     snapshot_frames: Mapping[str, np.ndarray],
     attributes: Mapping[str, Any],
-    solver: str = "cholespy",
+    solver: str = DEFAULT_SOLVER,
     with_mesh: bool = False,
     on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
 ) -> None:

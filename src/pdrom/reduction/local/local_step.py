@@ -4,11 +4,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pdrom.model.compiled.rows import as_vertices, flat, shares
 from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.constraints.local_kernel import LocalKernel, LocalPass
 from pdrom.model.constraints.second_thread import both
-from pdrom.reduction.sampling.reduction import Reduction
-
-SPLIT_FROM = 1 << 17  # entries of a lift (N, r) from which its rows are in two parts
+from pdrom.reduction.local.lift import Lift, coefficients, lift
+from pdrom.reduction.sampling.reduction import Block, Reduction
 
 
 class ReducedLocalStep:
@@ -17,26 +18,29 @@ class ReducedLocalStep:
     Precomputed: the offset S^T W mean (N, 3), the lift S^T W V for each coefficient block, and the
     solution operators. Online: the projections of the sampled elements, a small dense product for
     c, and the dense lift, shared by the group's threads.
+
+    Attributes
+    ----------
+    local_kernel : all of this as compiled code; None for a group without a sampler
     """
 
     def __init__(self, group: ConstraintGroup, reduction: Reduction) -> None:
         self.name = group.name
         self._group = group
-        self._elements = np.ascontiguousarray(reduction.elements)
+        self._elements = np.ascontiguousarray(reduction.elements, dtype=np.int64)
         self._everything = len(self._elements) == group.elements
-        mean = reduction.basis.mean.reshape(-1, 3)
-        lift = group.S.T.multiply(group.row_weights[None, :]).tocsr()
-        self._offset = lift @ mean
-        self._limited = reduction.limited
-        self._parts = _parts(len(self._offset), reduction.r)
-        place = _local_positions(reduction)
-        self._blocks = []
-        for block in reduction.blocks:
-            modes = reduction.v[block.output]
-            columns = modes.reshape(len(mean), -1)
-            lifted = np.ascontiguousarray((lift @ columns).reshape(-1, reduction.r))
-            shift = block.operator @ reduction.basis.mean[block.entries]
-            self._blocks.append((block.axis, place(block.entries), block.operator, shift, lifted))
+        self._lift = _lift(group, reduction)
+        self.local_kernel: LocalKernel | None = None
+        self._pass: LocalPass | None = None
+        if getattr(group, "local_kernel", None) is not None:
+            sampled = 3 * group.rows_per_element * len(self._elements)
+            self.local_kernel = self._lift.kernel(group.sampler(self._elements), sampled)
+            self._pass = LocalPass([self.local_kernel])
+
+    @property
+    def threads(self) -> int:
+        """Threads of the group."""
+        return self._group.threads
 
     def begin_frame(self, q: np.ndarray) -> None:
         """Freeze frame-lagged data of the sampled elements only."""
@@ -44,54 +48,91 @@ class ReducedLocalStep:
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         """Add the reduced S^T W p(y) to ``rhs`` (N, 3); the energy is unknown: nan."""
-        coefficients = self.coefficients(y)
-        for block, values in enumerate(coefficients):
-            self._observe(block, values)
-        self.lift(coefficients, rhs)
+        if self._pass is not None:
+            return self._pass.accumulate(y, rhs, self.threads)
+        self.solve(self.sample(y))
+        self.lift(rhs)
         return float("nan")
-
-    def _observe(self, block: int, coefficients: np.ndarray) -> None:
-        """Called with the coefficients of every block; a watched step looks at them."""
-
-    def coefficients(self, y: np.ndarray) -> list[np.ndarray]:
-        """Coefficients (r,) of each block, from the projections of the sampled elements."""
-        return self.solve(self.sample(y))
 
     def sample(self, y: np.ndarray) -> np.ndarray:
         """Projections of the sampled elements, as one vector."""
         return self._group.project_elements(y, self._elements).ravel()
 
-    def solve(self, sampled: np.ndarray) -> list[np.ndarray]:
-        """Coefficients (r,) of each block, from what `sample` gives; the systems are inverted."""
-        return [
-            self._limited(operator @ sampled[positions] - shift)
-            for _, positions, operator, shift, _ in self._blocks
-        ]
+    def solve(self, sampled: np.ndarray) -> None:
+        """Set the coefficients from what `sample` gives; the systems are inverted."""
+        data = self._lift
+        coefficients(
+            sampled, data.starts, data.positions, data.operators, data.shifts, data.limits,
+            data.coefficients,
+        )  # fmt: skip
 
-    def lift(self, coefficients: list[np.ndarray], rhs: np.ndarray) -> None:
-        """Add S^T W (mean + V c) to ``rhs`` (N, 3)."""
+    def lift(self, rhs: np.ndarray) -> None:
+        """Add S^T W (mean + V c) with the coefficients of the last `solve` to ``rhs`` (N, 3)."""
+        data, right = self._lift, flat(rhs)
+        added = right if shares(rhs, right) else np.zeros_like(right)
 
-        def add(rows: slice) -> float:
-            own = rhs[rows]
-            own += self._offset[rows]
-            for (axis, *_, lifted), c in zip(self._blocks, coefficients, strict=True):
-                if axis is None:
-                    own += (lifted[3 * rows.start : 3 * rows.stop] @ c).reshape(own.shape)
-                else:
-                    own[:, axis] += lifted[rows] @ c
+        def rows(first: int, last: int) -> float:
+            lift(
+                data.coefficients, data.axes, data.own_sets, data.lifted, data.offset, first, last,
+                added,
+            )  # fmt: skip
             return 0.0
 
-        first, *others = self._parts
-        if others:
-            both(lambda: add(first), lambda: add(others[0]), self._group.threads)
-        else:
-            add(first)
+        vertices = data.lifted.shape[1]
+        middle = vertices // 2 if data.split else vertices
+        both(lambda: rows(0, middle), lambda: rows(middle, vertices), self.threads)
+        if added is not right:
+            rhs += added.reshape(-1, 4)[:, :3]
+
+    @property
+    def lift_seconds(self) -> float:
+        """Time of the lift so far; two threads do its parts at once."""
+        seconds = self._lift.seconds
+        return float(seconds.max() if self.threads == 2 else seconds.sum())
+
+    @lift_seconds.setter
+    def lift_seconds(self, seconds: float) -> None:
+        self._lift.seconds[:] = seconds
+
+    @property
+    def coefficients(self) -> np.ndarray:
+        """Coefficients (sets, r) of the last evaluation, a set for each block of the reduction."""
+        return self._lift.coefficients
 
 
-def _parts(vertices: int, r: int) -> list[slice]:
-    """One or two ranges of vertices, whatever the number of threads, which thus changes no bits."""
-    middle = vertices // 2 if vertices * r >= SPLIT_FROM else vertices
-    return [slice(0, middle), slice(middle, vertices)][: 1 + (middle < vertices)]
+def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
+    mean, blocks, r = reduction.basis.mean, reduction.blocks, reduction.r
+    operator = group.S.T.multiply(group.row_weights[None, :]).tocsr()
+    vertices = operator.shape[0]
+    place = _local_positions(reduction)
+    limits = np.full((2, r), np.inf) * [[-1.0], [1.0]]
+    if reduction.limits is not None:
+        limits = reduction.limits
+    columns = [(axis, k) for k, block in enumerate(blocks) for axis in _axes(block)]
+    lifted = np.zeros((len(columns), vertices, r))
+    for own, (axis, _) in zip(lifted, columns, strict=True):
+        own[...] = operator @ reduction.v[axis::3]
+    return Lift(
+        starts=np.cumsum([0, *(len(block.entries) for block in blocks)], dtype=np.int64),
+        positions=_joined([place(block.entries) for block in blocks], np.int64),
+        operators=_joined([block.operator.ravel() for block in blocks], np.float64),
+        shifts=np.array([b.operator @ mean[b.entries] for b in blocks]).reshape(-1, r),
+        limits=np.ascontiguousarray(limits),
+        coefficients=np.zeros((len(blocks), r)),
+        axes=np.array([axis for axis, _ in columns], dtype=np.int64),
+        own_sets=np.array([k for _, k in columns], dtype=np.int64),
+        lifted=lifted,
+        offset=flat(as_vertices(operator @ mean.reshape(-1, 3))),
+        seconds=np.zeros(2),
+    )
+
+
+def _axes(block: Block) -> tuple[int, ...]:
+    return (0, 1, 2) if block.axis is None else (block.axis,)
+
+
+def _joined(parts: list[np.ndarray], kind: type) -> np.ndarray:
+    return np.concatenate([np.empty(0, kind), *parts]).astype(kind)
 
 
 def _local_positions(reduction: Reduction) -> Callable[[np.ndarray], np.ndarray]:

@@ -25,6 +25,8 @@ class WatchedLocalStep(ReducedLocalStep):
 
     def __init__(self, group: ConstraintGroup, reduction: Reduction, iterations: int) -> None:
         super().__init__(group, reduction)
+        # compiled iterations look at nothing
+        self.local_kernel = None
         self.full = False
         self._look_at = (iterations // 2, iterations - 1)
         self._call = 0
@@ -38,7 +40,6 @@ class WatchedLocalStep(ReducedLocalStep):
             modes, own = reduction.v[block.output], weights[block.output]
             linear = modes.T @ (own * mean[block.output])
             self._squares.append((linear, 0.5 * modes.T @ (own[:, None] * modes)))
-        self._last = [np.zeros(reduction.r) for _ in reduction.blocks]
         self.projection_energy = 0.0
         """1/2 |W^1/2 p^|^2 at the last iterate looked at: the size of the terms that cancel."""
 
@@ -60,8 +61,8 @@ class WatchedLocalStep(ReducedLocalStep):
             return super().accumulate(y, rhs)
         before = rhs.copy()
         super().accumulate(y, rhs)
-        for box, coefficients in zip(self._boxes, self._last, strict=True):
-            box.include(coefficients)
+        for box, own in zip(self._boxes, self.coefficients, strict=True):
+            box.include(own)
         return self._energy(y, rhs - before)
 
     def distance(self) -> float:
@@ -71,12 +72,9 @@ class WatchedLocalStep(ReducedLocalStep):
         """
         return max((box.distance() for box in self._boxes), default=0.0)
 
-    def _observe(self, block: int, coefficients: np.ndarray) -> None:
-        self._last[block] = coefficients
-
     def _energy(self, y: np.ndarray, added: np.ndarray) -> float:
         """1/2 |W^1/2 (S y - p^)|^2 from S^T W p^ (``added``) and the coefficients of p^."""
-        squares = zip(self._last, self._squares, strict=True)
+        squares = zip(self.coefficients, self._squares, strict=True)
         own = self._constant + sum(float(c @ (linear + gram @ c)) for c, (linear, gram) in squares)
         self.projection_energy = own
         return float(np.vdot(y, 0.5 * (self._stiffness @ y) - added)) + own

@@ -38,6 +38,12 @@ class Reduction:
     it does not count for the gain. That is kinder to methods with separate systems per axis than
     their text, which would divide noise by noise. An axis that does carry something but whose
     system is singular is a failure of the method: gain inf, reconstruction nan.
+
+    Attributes
+    ----------
+    v : (3 e p, r) modes
+    blocks : sets of coefficients
+    limits : (2, r) least and largest coefficients; None if they are free, see `limited`
     """
 
     def __init__(self, basis: Basis, sampling: Sampling, spec: MethodSpec, r: int) -> None:
@@ -45,7 +51,7 @@ class Reduction:
         self.v = basis.truncated(r)
         axes = [int(a) for a in np.flatnonzero(basis.active_axes)] if spec.per_axis else [None]
         self.blocks = [self._block(axis) for axis in axes]
-        self._limits = _limits(basis, spec, r)
+        self.limits = _limits(basis, spec, r)
 
     @property
     def elements(self) -> np.ndarray:
@@ -60,9 +66,9 @@ class Reduction:
         where a run rightly leaves the range, it does.
         Bounded least squares would fit the samples better, but needs an iteration per evaluation.
         """
-        if self._limits is None:
+        if self.limits is None:
             return coefficients
-        return np.clip(coefficients, *self._limits)
+        return np.clip(coefficients, *self.limits)
 
     def _block(self, axis: int | None) -> Block:
         if self.spec.rows == "all":

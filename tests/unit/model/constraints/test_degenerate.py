@@ -15,7 +15,7 @@ from conftest import random_rotation
 from pdrom.model.constraints.bending import VertexBending
 from pdrom.model.constraints.deformation_gradient import DeformationGradient
 from pdrom.model.constraints.gradient_kernel import call
-from pdrom.model.constraints.lanes import LANES
+from pdrom.model.constraints.lanes import LANES, pack
 from pdrom.model.constraints.spring import EdgeSpring
 from pdrom.model.constraints.tetrahedron_strain import TetrahedronStrain
 from pdrom.model.constraints.triangle_strain import TriangleStrain
@@ -256,7 +256,8 @@ def half_spheres(h: np.ndarray, n: np.ndarray, magnitude: float, compiled: bool)
     """Projections (m, 3) of the vectors h on the half spheres about the poles n."""
     if compiled:
         p, rest = np.full_like(h, np.nan), np.zeros_like(h)
-        parameters = np.column_stack([n, np.full(len(h), magnitude), rest])
+        columns = (np.ones(len(h)), np.full(len(h), magnitude), rest, n)
+        parameters = pack(np.column_stack(columns))
         _call_kernel(_CURVED.gradient_kernel.address, h, parameters, p, len(h))
         return p
     group = copy(_CURVED)

@@ -70,9 +70,9 @@ def test_an_edit_of_an_inlined_function_reaches_every_kernel(tmp_path):
     lanes = tmp_path / "src" / "pdrom" / "model" / "constraints" / "lanes.py"
     before = _spring_in(tmp_path)
     text = lanes.read_text()
-    scaled = "return (s * a[0], s * a[1], s * a[2])"
-    assert scaled in text
-    lanes.write_text(text.replace(scaled, "return (2.0 * s * a[0], s * a[1], s * a[2])"))
+    loaded = "        work[first * LANES + lane],"
+    assert loaded in text
+    lanes.write_text(text.replace(loaded, "        2.0 * work[first * LANES + lane],"))
     assert before == pytest.approx([1.0, 0.0, 0.0])
     assert _spring_in(tmp_path) == pytest.approx([2.0, 0.0, 0.0])
 

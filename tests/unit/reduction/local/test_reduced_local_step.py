@@ -22,6 +22,9 @@ class InventedGroup:
 
     name = "invented"
     elements = ELEMENTS
+    rows_per_element = P
+    threads = 1
+    local_kernel = None
 
     def __init__(self, projections: np.ndarray) -> None:
         rng = np.random.default_rng(8)
@@ -119,17 +122,45 @@ def test_evaluates_sampled_elements_only(spec):
         np.testing.assert_array_equal(added(step), rhs)
 
 
-def test_two_threads_share_the_lift_with_the_bits_of_one(spec, monkeypatch):
-    _, reduction = reduction_of(spec)
-    group = InventedGroup(np.random.default_rng(7).standard_normal((ROWS, 3)))
-    whole = added(ReducedLocalStep(group, reduction))
-    monkeypatch.setattr("pdrom.reduction.local.local_step.SPLIT_FROM", 1)
-    step = ReducedLocalStep(group, reduction)
-    shared = []
-    for group.threads in (1, 2):
-        shared.append(added(step))
-    np.testing.assert_array_equal(*shared)
-    np.testing.assert_allclose(shared[0], whole, atol=1e-13 * np.abs(whole).max())
+@pytest.mark.parametrize("preset", ["pod", "deim", "block-deim"])
+def test_two_threads_share_the_lift_with_the_bits_of_one(preset, group_scene, rng, monkeypatch):
+    """And the compiled loop's local kernel adds what the parts of Python code add."""
+    group, q = group_scene.groups[0], group_scene.mesh.points
+    group.begin_frame(q)
+    p = np.stack([group.project(q + 0.05 * rng.standard_normal(q.shape)) for _ in range(5)])
+    spec = PRESETS[preset]
+    basis = compute_basis(p, np.ones(p.shape[1]), 0.0, group.rows_per_element, spec)
+    reduction = Reduction(basis, select(basis, spec, basis.rank), spec, basis.rank)
+    y, sums = q + 0.05 * rng.standard_normal(q.shape), []
+    for split in (1, 1 << 17):
+        monkeypatch.setattr("pdrom.reduction.local.lift.SPLIT_FROM", split)
+        step = ReducedLocalStep(group, reduction)
+        step.begin_frame(q)
+        assert len(step.local_kernel.touched) == (len(q) - len(q) // 2 if split == 1 else 0)
+        for group.threads in (1, 2):
+            sums.append(np.zeros_like(q))
+            assert np.isnan(step.accumulate(y, sums[-1]))
+        assert np.array_equal(sums[-2], sums[-1])
+    group.threads, group.local_kernel = 1, None
+    plain, rhs = ReducedLocalStep(group, reduction), np.zeros_like(q)
+    assert plain.local_kernel is None
+    plain.accumulate(y, rhs)
+    for other in sums:
+        assert np.abs(other - rhs).max() <= 1e-12 * np.abs(rhs).max()
+
+
+def test_the_lift_is_timed_apart(group_scene, rng):
+    group, q = group_scene.groups[0], group_scene.mesh.points
+    p = np.stack([group.project(q + 0.05 * rng.standard_normal(q.shape)) for _ in range(5)])
+    spec = PRESETS["block-deim"]
+    basis = compute_basis(p, np.ones(p.shape[1]), 0.0, group.rows_per_element, spec)
+    step = ReducedLocalStep(group, Reduction(basis, select(basis, spec, 2), spec, 2))
+    assert step.lift_seconds == 0.0
+    for _ in range(1000):
+        step.accumulate(q, np.zeros_like(q))
+    assert step.lift_seconds > 0.0
+    step.lift_seconds = 0.0
+    assert step.lift_seconds == 0.0
 
 
 def test_adds_to_what_is_there_and_knows_no_energy(spec):

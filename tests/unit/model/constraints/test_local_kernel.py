@@ -1,12 +1,19 @@
 """Two threads give the bits of one, and the split of large groups is only a matter of order."""
 
-import threading
-
 import numpy as np
 import pytest
 
 from conftest import GROUPS, make_scene
-from pdrom.model.constraints.parts import Parts
+from pdrom.model.compiled import rows
+from pdrom.model.constraints.local_kernel import (
+    FIRST,
+    OWN,
+    PREPARE,
+    VERTICES,
+    LocalKernel,
+    LocalPass,
+    local_kernel,
+)
 from pdrom.model.effects import EFFECTS
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
@@ -17,7 +24,8 @@ SPLIT = [name for name in sorted(GROUPS) if hasattr(EFFECTS.load(name), "split_f
 
 def group_of(name: str, split: bool, monkeypatch: pytest.MonkeyPatch):
     """A group that counts as large or not, on a mesh of several blocks."""
-    scene = make_scene({"effect": name, "weight": 1e4}, mesh=GROUPS[name])
+    mesh = {**GROUPS[name], "rows": 9, "columns": 8} if "rows" in GROUPS[name] else GROUPS[name]
+    scene = make_scene({"effect": name, "weight": 1e4}, mesh=mesh)
     monkeypatch.setattr(type(scene.groups[0]), "split_from", 2 if split else 10**9)
     return Scene.build(scene.config, scene.mesh)
 
@@ -26,7 +34,7 @@ def group_of(name: str, split: bool, monkeypatch: pytest.MonkeyPatch):
 def test_two_threads_give_the_bits_of_one(name, rng, monkeypatch):
     scene = group_of(name, True, monkeypatch)
     group, points = scene.groups[0], scene.mesh.points
-    assert group._parts.count == 2
+    assert group.local_kernel.touched
     for size in (0.0, 1e-3, 1.0):
         y = points + size * rng.standard_normal(points.shape)
         group.begin_frame(y)
@@ -67,44 +75,54 @@ def test_a_run_with_two_threads_is_the_run_with_one(monkeypatch):
     assert np.array_equal(trajectory(one), trajectory(two))
 
 
-def recording(calls: list):
-    """A kernel that notes its arguments and thread, and adds 1 to row ``first``."""
+@local_kernel
+def _recording(y_place, rhs_place, record, part):
+    """Adds 1 to the first number of each of its units; counts them, and the calls of each part."""
+    entries = rows.indices(record, OWN + 1)
+    rhs = rows.doubles(rhs_place, 4 * entries[VERTICES])
+    notes = rows.doubles(entries[OWN], 3)
+    notes[part] += 1.0
+    if part == PREPARE:
+        return 0.0
+    for unit in range(entries[FIRST + part], entries[FIRST + part + 1]):
+        rhs[4 * unit] += 1.0
+    return float(entries[FIRST + part + 1] - entries[FIRST + part])
 
-    def kernel(first, last, part, rhs):
-        calls.append((first, last, part, threading.current_thread()))
-        rhs[first] += 1.0
-        return float(last - first)
 
-    return kernel
+def recording(split: bool, prepares: bool) -> tuple[LocalKernel, np.ndarray]:
+    """A kernel of five units that touch six vertices, and how often each part was called."""
+    notes = np.zeros(3)
+    kernel = LocalKernel.of(
+        _recording, 6, 5, split, [notes], [], lambda unit: np.arange(unit, 6), prepares
+    )
+    return kernel, notes
+
+
+@pytest.mark.parametrize("prepares", [True, False])
+@pytest.mark.parametrize("split", [True, False])
+@pytest.mark.parametrize("threads", [1, 2])
+def test_parts_cover_all_units_once(threads, split, prepares):
+    kernel, notes = recording(split, prepares)
+    local, rhs = LocalPass([kernel]), np.full((6, 3), 5.0)
+    assert local.parts == 1 + split
+    for _ in range(3):
+        assert local.accumulate(np.zeros((6, 3)), rhs, threads) == 5.0
+    expected = np.full((6, 3), 5.0)
+    expected[:5, 0] += 3.0
+    assert np.array_equal(rhs, expected)
+    assert notes.tolist() == [3.0, 3.0 * split, 3.0 * prepares]
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_parts_cover_all_units_once(threads):
-    calls, rhs = [], np.full((6, 3), 5.0)
-    parts = Parts(5, True, 6, lambda unit: np.arange(unit, 6))
-    for _ in range(3):
-        assert parts.accumulate(recording(calls), rhs, threads) == 5.0
-    assert sorted({c[:3] for c in calls}) == [(0, 2, 0), (2, 5, 1)]
-    expected = np.full((6, 3), 5.0)
-    expected[[0, 2]] += 3.0
-    assert np.array_equal(rhs, expected)
-    assert len({c[3] for c in calls}) == threads
+def test_a_pass_adds_all_its_kernels(threads):
+    kernels = [recording(split, False)[0] for split in (True, False, True)]
+    rhs = np.zeros((6, 3))
+    assert LocalPass(kernels).accumulate(np.zeros((6, 3)), rhs, threads) == 15.0
+    assert rhs[:, 0].tolist() == [3.0] * 5 + [0.0]
 
 
-def test_a_small_group_is_one_part():
-    calls, rhs = [], np.zeros((6, 3))
-    parts = Parts(5, False, 6, lambda unit: np.arange(unit, 6))
-    assert parts.accumulate(recording(calls), rhs, 2) == 5.0
-    assert [c[:3] for c in calls] == [(0, 5, 0)]
-    assert calls[0][3] is threading.main_thread()
-
-
-def test_a_fault_of_the_second_thread_is_raised():
-    def kernel(first, last, part, rhs):
-        if part:
-            raise FloatingPointError("second part")
-        return 0.0
-
-    parts = Parts(4, True, 2, lambda unit: np.arange(2))
-    with pytest.raises(FloatingPointError, match="second part"):
-        parts.accumulate(kernel, np.zeros((2, 3)), 2)
+def test_a_group_without_a_kernel_writes_its_own_local_step():
+    group = make_scene({"effect": "spring", "weight": 1.0}).groups[0]
+    group.local_kernel = None
+    with pytest.raises(NotImplementedError, match="spring"):
+        group.accumulate(np.zeros((2, 3)), np.zeros((2, 3)))

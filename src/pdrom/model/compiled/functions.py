@@ -1,0 +1,33 @@
+"""How the compiled functions of the model are compiled and kept."""
+
+from pathlib import Path
+from zlib import crc32
+
+from numba import cfunc, njit
+
+
+def _checksum() -> str:
+    """Of the sources of all compiled functions."""
+    model = Path(__file__).parents[1]
+    folders = ("compiled", "constraints", "dynamics")
+    sources = sorted(path for folder in folders for path in model.glob(f"{folder}/*.py"))
+    return f"{crc32(b''.join(path.read_bytes() for path in sources)):08x}"
+
+
+# numba's cache looks at the file of a function only, not at those of what it inlines: without the
+# checksum in its name a function would stay as it was when another file is edited
+_SOURCES = _checksum()
+
+
+def compiled(function=None, **options):
+    """Compile and keep a function: without division checks, without fast-math unless asked for."""
+    if function is None:
+        return lambda wrapped: compiled(wrapped, **options)
+    function.__qualname__ += f"_{_SOURCES}"
+    return njit(cache=True, error_model="numpy", **options)(function)
+
+
+def compiled_callback(function, signature):
+    """The same for a function that other compiled code calls by its address."""
+    function.__qualname__ += f"_{_SOURCES}"
+    return cfunc(signature, cache=True, error_model="numpy")(function)

@@ -1,0 +1,138 @@
+"""Vertices as rows of four numbers, so that compiled code moves one with a single instruction.
+
+The step loop keeps positions and right-hand sides as (N, 4) with a last column of zeros; outside
+they are (N, 3) views of these. Compiled code sees the flat array and holds a row in a register of
+four lanes. A row may also hold one number of four elements
+(`pdrom.model.compiled.arithmetic.transposed` goes from one to the other).
+
+Loads and stores check nothing: indices are neither negative nor too large.
+"""
+
+import numpy as np
+from llvmlite import ir
+from numba import carray, types
+from numba.extending import intrinsic, models, register_model
+
+from pdrom.model.compiled.functions import compiled
+
+WIDTH = 4
+
+NUMBERS = ir.VectorType(ir.DoubleType(), WIDTH)
+INDICES = ir.VectorType(ir.IntType(32), WIDTH)
+
+
+class _RowType(types.Type):  # type: ignore[misc]
+    def __init__(self) -> None:
+        super().__init__(name="RowOfFour")
+
+
+ROW = _RowType()
+
+
+@register_model(_RowType)
+class _RowModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager, kind) -> None:
+        super().__init__(manager, kind, NUMBERS)
+
+
+def vertices(count: int) -> np.ndarray:
+    """Zeros (count, 3), a view of rows of four."""
+    return np.zeros((count, WIDTH))[:, :3]
+
+
+def as_vertices(values: np.ndarray) -> np.ndarray:
+    """A copy of the values (N, 3) as a view of rows of four."""
+    copy = vertices(len(values))
+    copy[...] = values
+    return copy
+
+
+def flat(values: np.ndarray) -> np.ndarray:
+    """Rows of four behind ``values`` (N, 3), as (4 N,): shared if it is a view of them."""
+    rows = values.base
+    if (
+        isinstance(rows, np.ndarray)
+        and rows.size == WIDTH * len(values)
+        and rows.flags.c_contiguous
+        and rows.dtype == np.float64
+        and values.strides == (8 * WIDTH, 8)
+        and values.ctypes.data == rows.ctypes.data
+    ):
+        return rows.reshape(-1)
+    rows = np.zeros((len(values), WIDTH))
+    rows[:, :3] = values
+    return rows.reshape(-1)
+
+
+def shares(values: np.ndarray, rows: np.ndarray) -> bool:
+    """Whether ``rows`` = `flat` (values) is no copy."""
+    return values.ctypes.data == rows.ctypes.data and len(values) > 0
+
+
+def _element(context, builder, kind, array, index):
+    return builder.gep(context.make_array(kind)(context, builder, array).data, [index])
+
+
+def _place(context, builder, kind, array, index):
+    pointer = _element(context, builder, kind, array, index)
+    return builder.bitcast(pointer, NUMBERS.as_pointer())
+
+
+@intrinsic
+def at(_context, array, index):
+    """array[index], an integer widened to the size of an index."""
+    result = types.intp if isinstance(array.dtype, types.Integer) else array.dtype
+
+    def generate(context, builder, signature, arguments):
+        value = builder.load(_element(context, builder, signature.args[0], *arguments))
+        return context.cast(builder, value, signature.args[0].dtype, signature.return_type)
+
+    return result(array, types.intp), generate
+
+
+@intrinsic
+def load(_context, array, index):
+    """The row that begins at ``index``."""
+
+    def generate(context, builder, signature, arguments):
+        return builder.load(_place(context, builder, signature.args[0], *arguments), align=8)
+
+    return ROW(array, types.intp), generate
+
+
+@intrinsic
+def store(_context, array, index, _row):
+    """Write a row to where ``index`` points."""
+
+    def generate(context, builder, signature, arguments):
+        array, index, row = arguments
+        builder.store(row, _place(context, builder, signature.args[0], array, index), align=8)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, ROW), generate
+
+
+@intrinsic
+def _pointer(_context, _address):
+    def generate(_target, builder, _signature, arguments):
+        return builder.inttoptr(arguments[0], ir.IntType(8).as_pointer())
+
+    return types.voidptr(types.intp), generate
+
+
+@compiled(inline="always")
+def doubles(address, count):
+    """Array (count,) of the doubles at an address."""
+    return carray(_pointer(address), (count,), np.float64)
+
+
+@compiled(inline="always")
+def integers(address, count):
+    """Array (count,) of the int32 at an address."""
+    return carray(_pointer(address), (count,), np.int32)
+
+
+@compiled(inline="always")
+def indices(address, count):
+    """Array (count,) of the int64 at an address."""
+    return carray(_pointer(address), (count,), np.int64)

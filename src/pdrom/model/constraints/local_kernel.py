@@ -1,0 +1,172 @@
+"""Local steps as compiled functions that the compiled step loop calls by address.
+
+A local kernel reads what it needs from a record of addresses and numbers, so that one loop serves
+every mix of groups and reduced local steps. The units (blocks of elements, rows) of a large step
+are done in two parts, always the same ones: the first adds to the right-hand side itself, the
+second to an array of its own that is added afterwards. Two threads therefore change no bits.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from pdrom.model.compiled import rows
+from pdrom.model.compiled.functions import compiled, compiled_callback
+from pdrom.model.constraints.second_thread import both
+
+# Entries of every record: number of vertices, and the units of part k are those from FIRST + k to
+# FIRST + k + 1. What a kernel has of its own begins at OWN.
+VERTICES, FIRST, OWN = 0, 1, 4
+# What a kernel is asked for: one of the two parts, or what both need beforehand.
+PARTS, PREPARE = (0, 1), 2
+
+_SIGNATURE = types.float64(types.intp, types.intp, types.intp, types.intp)
+
+
+def local_kernel(function):
+    """Compile ``function(y, rhs, record, part) -> energy``; all but the part are addresses.
+
+    y, rhs : rows of four (N, 4); S^T W p(y) of the part's units is added to rhs
+    record : int64 numbers, see `VERTICES`
+    part : one of `PARTS`, or `PREPARE`
+    """
+    return compiled_callback(function, _SIGNATURE)
+
+
+@intrinsic
+def call(_context, _address, _y, _rhs, _record, _part):
+    """Call a local kernel by its address."""
+
+    def generate(_target, builder, _signature, arguments):
+        integer = ir.IntType(types.intp.bitwidth)
+        kind = ir.FunctionType(ir.DoubleType(), [integer] * 4)
+        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
+
+    return types.float64(*(types.intp,) * 5), generate
+
+
+@compiled(nogil=True)
+def add_part(addresses, records, part, y, rhs):
+    """Add a part of all kernels to ``rhs``; its energy. ``y`` and ``rhs`` are addresses."""
+    energy = 0.0
+    for k in range(len(addresses)):
+        energy += call(addresses[k], y, rhs, records[k], part)
+    return energy
+
+
+@dataclass(frozen=True, eq=False)
+class LocalKernel:
+    """A compiled local step with its data.
+
+    address : of a function made by `local_kernel`
+    record : its numbers; the ``arrays`` that they point to live as long as the kernel
+    prepares : whether it wants to be called with `PREPARE`
+    touched : range of vertices that the second part adds to; empty if there is one part
+    """
+
+    address: int
+    record: np.ndarray
+    arrays: tuple[np.ndarray, ...]
+    prepares: bool
+    touched: range
+
+    @classmethod
+    def of(
+        cls,
+        kernel: Any,
+        vertices: int,
+        units: int,
+        split: bool,
+        arrays: Sequence[np.ndarray],
+        numbers: Sequence[int],
+        touched: Callable[[int], np.ndarray] | None = None,
+        prepares: bool = False,
+    ) -> "LocalKernel":
+        """Kernel for ``units`` units, in two parts if ``split``.
+
+        Parameters
+        ----------
+        arrays, numbers : entries of the record from `OWN` on: the numbers, then the addresses
+        touched : function of a first unit: vertices of this and all later units; without it
+            there is one part
+        """
+        middle, second = units, range(0)
+        if split and units > 1 and touched is not None:
+            middle = units // 2
+            later = touched(middle)
+            second = range(int(later.min()), int(later.max()) + 1)
+        places = [array.ctypes.data for array in arrays]
+        record = np.array([vertices, 0, middle, units, *numbers, *places], dtype=np.int64)
+        return cls(kernel.address, record, tuple(arrays), prepares, second)
+
+
+@compiled(nogil=True)
+def _call(address, y, out, record):
+    return call(address, y, out, record, PARTS[0])
+
+
+def projections(sampler: LocalKernel, y: np.ndarray, count: int) -> np.ndarray:
+    """What a sampler writes for the positions y (N, 3): (count, 3)."""
+    p, places = np.empty((count, 3)), rows.flat(y)
+    _call(sampler.address, places.ctypes.data, p.ctypes.data, sampler.record.ctypes.data)
+    return p
+
+
+class LocalPass:
+    """All local kernels of a step loop, one after the other."""
+
+    def __init__(self, kernels: Sequence[LocalKernel]) -> None:
+        self.kernels = tuple(kernels)
+        self.addresses, self.records = _tables(kernels)
+        self.preparing = _tables([kernel for kernel in kernels if kernel.prepares])
+        self.second = _tables([kernel for kernel in kernels if kernel.touched])
+        touched = [kernel.touched for kernel in kernels if kernel.touched]
+        self.touched = range(0)
+        self.other = np.zeros(0)
+        if touched:
+            self.touched = range(min(r.start for r in touched), max(r.stop for r in touched))
+            self.other = np.zeros(4 * max(int(kernel.record[VERTICES]) for kernel in kernels))
+
+    @property
+    def parts(self) -> int:
+        """1 or 2."""
+        return 2 if self.touched else 1
+
+    def add(self, y: np.ndarray, rhs: np.ndarray, threads: int) -> float:
+        """Add S^T W p(y) to ``rhs``, both flat rows of four; the energy."""
+        places = y.ctypes.data, rhs.ctypes.data
+        add_part(*self.preparing, PREPARE, *places)
+        if not self.touched:
+            return add_part(self.addresses, self.records, PARTS[0], *places)
+        own = slice(4 * self.touched.start, 4 * self.touched.stop)
+
+        def second() -> float:
+            self.other[own] = 0.0
+            return add_part(*self.second, PARTS[1], y.ctypes.data, self.other.ctypes.data)
+
+        def first() -> float:
+            return add_part(self.addresses, self.records, PARTS[0], *places)
+
+        energies = both(first, second, threads)
+        rhs[own] += self.other[own]
+        return sum(energies)
+
+    def accumulate(self, y: np.ndarray, rhs: np.ndarray, threads: int) -> float:
+        """The same for arrays (N, 3), which need not be views of rows of four."""
+        right = rows.flat(rhs)
+        if rows.shares(rhs, right):
+            return self.add(rows.flat(y), right, threads)
+        added = np.zeros_like(right)
+        energy = self.add(rows.flat(y), added, threads)
+        rhs += added.reshape(-1, 4)[:, :3]
+        return energy
+
+
+def _tables(kernels: Sequence[LocalKernel]) -> tuple[np.ndarray, np.ndarray]:
+    addresses = np.array([kernel.address for kernel in kernels], dtype=np.int64)
+    return addresses, np.array([kernel.record.ctypes.data for kernel in kernels], dtype=np.int64)

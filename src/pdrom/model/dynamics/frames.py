@@ -1,0 +1,39 @@
+"""Beginning and end of a frame for all vertices, each in one pass over them."""
+
+import numpy as np
+
+from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.rows import WIDTH
+
+
+@compiled(nogil=True)
+def predict(positions, velocities, acceleration, time_step, s):
+    """Write q + h v + h^2 a to ``s`` (N, 4); ``acceleration`` is (N, 3), or (1, 3) for all."""
+    square = time_step**2
+    for i in range(len(positions)):
+        own = i if len(acceleration) > 1 else 0
+        for axis in range(3):
+            moved = positions[i, axis] + time_step * velocities[i, axis]
+            s[i, axis] = moved + square * acceleration[own, axis]
+        s[i, 3] = 0.0
+
+
+@compiled(nogil=True)
+def weighted(inertia, s):
+    """(M/h^2) s as rows of four, flat as s is."""
+    result = np.empty(len(s))
+    for i in range(len(inertia)):
+        for lane in range(WIDTH):
+            result[WIDTH * i + lane] = inertia[i] * s[WIDTH * i + lane]
+    return result
+
+
+@compiled(nogil=True)
+def end(y, before, time_step):
+    """Positions and velocities (N, 3) at the end of a frame, from rows of four, flat."""
+    positions, velocities = np.empty_like(before), np.empty_like(before)
+    for i in range(len(before)):
+        for axis in range(3):
+            positions[i, axis] = y[WIDTH * i + axis]
+            velocities[i, axis] = (positions[i, axis] - before[i, axis]) / time_step
+    return positions, velocities

@@ -1,0 +1,152 @@
+"""All iterations of a frame in one compiled loop, for local steps and solvers that are compiled.
+
+With two threads the second one does the second parts of the local steps while the first does the
+first parts; they hand over through counters in memory, without leaving compiled code.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pdrom.model.compiled import rows
+from pdrom.model.compiled.clock import clock, now
+from pdrom.model.compiled.functions import compiled
+from pdrom.model.constraints.local_kernel import PARTS, PREPARE, LocalPass, add_part
+from pdrom.model.constraints.second_thread import LINE, both, publish, wait_for
+from pdrom.model.dynamics.sweeps import sweep
+from pdrom.model.dynamics.system import Elimination
+
+
+class CompiledIterations:
+    """The iterations of a step loop whose local steps all have a local kernel.
+
+    Parameters
+    ----------
+    local_steps : objects with ``local_kernel`` and ``threads``
+    inertia : (N,) M / h^2
+    """
+
+    def __init__(self, local_steps: Sequence[Any], inertia: np.ndarray) -> None:
+        self._steps = list(local_steps)
+        self._pass = LocalPass([step.local_kernel for step in local_steps])
+        self._inertia = inertia
+        self._counters = np.zeros(3 * LINE, np.int64)
+        self._energy = np.zeros(1)
+        self._clock = clock()
+
+    def takes(self, elimination: Any) -> bool:
+        """Whether the system is solved by compiled code, too."""
+        return isinstance(elimination, Elimination) and elimination.factor is not None
+
+    def run(
+        self,
+        count: int,
+        objective: np.ndarray,
+        y: np.ndarray,
+        s: np.ndarray,
+        base: np.ndarray,
+        elimination: Elimination,
+        seconds: np.ndarray,
+    ) -> None:
+        """Do ``count`` iterations in place.
+
+        Parameters
+        ----------
+        objective : (count,) receives the objective at the iterates; empty if nobody asks
+        y, base : (N, 3) views of rows of four: iterate, (M/h^2) s
+        s : (N, 3) prediction
+        seconds : (4,) times of the local and of the global steps are added to entries 1 and 2
+        """
+        local = self._pass
+        right = np.empty(4 * len(y))
+        iterate, start = rows.flat(y), rows.flat(base)
+        prediction = rows.flat(s) if len(objective) else start
+        factor = elimination.factor
+        threads = max((step.threads for step in self._steps), default=1) if local.parts == 2 else 1
+        touched = local.touched
+        tables = (local.addresses, local.records, local.preparing, local.second)
+        shared = (self._counters, self._energy, local.other, touched.start, touched.stop)
+        places = (self._counters.ctypes.data, self._counters[LINE:].ctypes.data)
+        self._counters[:] = 0
+
+        def first() -> float:
+            return _iterate(
+                count, iterate, prediction, start, right, self._inertia, tables, shared, places,
+                threads == 2, factor, objective, seconds, self._clock,
+            )  # fmt: skip
+
+        def second() -> float:
+            return _assist(count, iterate, tables, shared, places)
+
+        if threads == 2:
+            both(first, second, threads)
+        else:
+            first()
+
+
+@compiled(nogil=True)
+def _second_part(second, y, other, start, stop):
+    """The second parts of all local steps into an array of their own; their energy."""
+    other[4 * start : 4 * stop] = 0.0
+    return add_part(second[0], second[1], PARTS[1], y.ctypes.data, other.ctypes.data)
+
+
+@compiled(nogil=True)
+def _assist(count, y, tables, shared, places):
+    """The second thread's share of all iterations."""
+    _, energy, other, start, stop = shared
+    given, done = places
+    for k in range(count):
+        wait_for(given, k + 1)
+        energy[0] = _second_part(tables[3], y, other, start, stop)
+        publish(done, k + 1)
+    return 0.0
+
+
+@compiled(nogil=True)
+def _iterate(
+    count, y, s, base, rhs, inertia, tables, shared, places, assisted, factor, objective, seconds,
+    watch,
+):  # fmt: skip
+    addresses, records, preparing, second = tables
+    _, shared_energy, other, start, stop = shared
+    given, done = places
+    panels, vertices, loads, work = factor
+    for k in range(count):
+        before = now(watch)
+        rhs[:] = base
+        add_part(preparing[0], preparing[1], PREPARE, y.ctypes.data, rhs.ctypes.data)
+        if assisted:
+            publish(given, k + 1)
+        energy = add_part(addresses, records, PARTS[0], y.ctypes.data, rhs.ctypes.data)
+        if stop > start:
+            if assisted:
+                wait_for(done, k + 1)
+            else:
+                shared_energy[0] = _second_part(second, y, other, start, stop)
+            energy += shared_energy[0]
+            for i in range(4 * start, 4 * stop):
+                rhs[i] += other[i]
+        between = now(watch)
+        if len(objective):
+            objective[k] = energy + _inertia_energy(y, s, inertia)
+            between_energy = now(watch)
+        else:
+            between_energy = between
+        sweep(panels, vertices, loads, work, rhs, y)
+        seconds[1] += between - before
+        seconds[2] += now(watch) - between_energy
+    return 0.0
+
+
+@compiled(nogil=True)
+def _inertia_energy(y, s, inertia):
+    """1/(2 h^2) |M^1/2 (y - s)|^2."""
+    energy = 0.0
+    for v in range(len(inertia)):
+        square = 0.0
+        for axis in range(3):
+            square += (y[4 * v + axis] - s[4 * v + axis]) ** 2
+        energy += inertia[v] * square
+    return 0.5 * energy

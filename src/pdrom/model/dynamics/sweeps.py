@@ -1,0 +1,202 @@
+"""Forward and backward substitution with panels, three right-hand sides at once.
+
+A row of the right-hand side is a register of four lanes (`pdrom.model.compiled.rows`), so that an
+entry of the factor is read once for x, y and z. The instructions of a panel are written out for its
+width: its columns stay in registers while the rows below go by.
+"""
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils, errors
+from numba.extending import intrinsic
+
+from pdrom.model.compiled.arithmetic import multiply_add, spread, subtract
+from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.rows import at, store
+from pdrom.model.compiled.rows import load as load_row
+
+_INDEX = ir.IntType(64)
+_ROW = ir.VectorType(ir.DoubleType(), 4)
+
+
+class _Panel:
+    """Writes the instructions of a panel of ``width`` columns.
+
+    values : of the panel, see `pdrom.model.dynamics.panels.Panels`
+    """
+
+    def __init__(self, context, builder, signature, arguments, width):
+        _, x, first, rows, start, stop, values, value_start = arguments
+        self.builder, self.width = builder, width
+        self._x = context.make_array(signature.args[1])(context, builder, x).data
+        self._first = first
+        self._rows = context.make_array(signature.args[3])(context, builder, rows).data
+        self._start, self._stop = start, stop
+        numbers = context.make_array(signature.args[6])(context, builder, values).data
+        self._own = builder.gep(numbers, [value_start])
+        self._below = builder.gep(self._own, [self._index(width + width * (width - 1) // 2)])
+
+    def _index(self, number):
+        return ir.Constant(_INDEX, number)
+
+    def _spread(self, pointer, offset):
+        return spread(self.builder, self.builder.load(self.builder.gep(pointer, [offset])))
+
+    def inverse(self, column):
+        """1 / D of a column."""
+        return self._spread(self._own, self._index(column))
+
+    def triangle(self, row, column):
+        """Entry of L inside the panel."""
+        return self._spread(self._own, self._index(self.width + row * (row - 1) // 2 + column))
+
+    def pointer(self, offset):
+        """Where a row of the right-hand side lies."""
+        return self.builder.bitcast(self.builder.gep(self._x, [offset]), _ROW.as_pointer())
+
+    def column(self, k):
+        """Where the row of the panel's own column lies."""
+        return self.pointer(self.builder.add(self._first, self._index(4 * k)))
+
+    def load(self, pointer):
+        return self.builder.load(pointer, align=8)
+
+    def store(self, row, pointer):
+        self.builder.store(row, pointer, align=8)
+
+    def less(self, a, entry, b):
+        """a - entry b."""
+        return multiply_add(self.builder, self.builder.fneg(entry), b, a)
+
+    def rows_below(self):
+        """Loop over the rows below: (pointer to the row, function of a column: entry of L)."""
+        builder = self.builder
+        with cgutils.for_range_slice(builder, self._start, self._stop, self._index(1)) as (k, _):
+            row = builder.sext(builder.load(builder.gep(self._rows, [k])), _INDEX)
+            begin = builder.mul(builder.sub(k, self._start), self._index(self.width))
+            entries = builder.gep(self._below, [begin])
+            yield self.pointer(row), lambda column: self._spread(entries, self._index(column))
+
+
+def _panel_intrinsic(write):
+    """An intrinsic ``(width, x, first, rows, start, stop, values, value_start)``."""
+
+    def typed(_context, width, x, first, rows, start, stop, values, value_start):
+        if not isinstance(width, types.IntegerLiteral):
+            raise errors.RequireLiteralValue("the width of a panel")
+
+        def generate(context, builder, signature, arguments):
+            write(_Panel(context, builder, signature, arguments, width.literal_value))
+            return context.get_dummy_value()
+
+        index = types.intp
+        return types.void(width, x, index, rows, index, index, values, index), generate
+
+    typed.__name__ = typed.__qualname__ = write.__name__
+    return intrinsic(typed)
+
+
+def _write_forward(panel):
+    """x <- L^-1 x: the panel's columns, then what they take from the rows below."""
+    columns: list[ir.Value] = []
+    for row in range(panel.width):
+        value = panel.load(panel.column(row))
+        for column in range(row):
+            value = panel.less(value, panel.triangle(row, column), columns[column])
+        if row:
+            panel.store(value, panel.column(row))
+        columns.append(value)
+    for pointer, entry in panel.rows_below():
+        # two sums: half the wait for the next panel
+        sums = [panel.load(pointer), None]
+        for k, column in enumerate(columns):
+            if sums[k % 2] is None:
+                sums[1] = panel.builder.fmul(panel.builder.fneg(entry(k)), column)
+            else:
+                sums[k % 2] = panel.less(sums[k % 2], entry(k), column)
+        total = sums[0] if sums[1] is None else panel.builder.fadd(sums[0], sums[1])
+        panel.store(total, pointer)
+
+
+def _write_backward(panel):
+    """x <- L^-T D^-1 x: what the rows below take from the panel's columns, then these."""
+    builder = panel.builder
+    slots = []
+    for k in range(panel.width):
+        slots.append(cgutils.alloca_once(builder, _ROW))
+        scaled = builder.fmul(panel.inverse(k), panel.load(panel.column(k)))
+        builder.store(scaled, slots[k])
+    for pointer, entry in panel.rows_below():
+        row = panel.load(pointer)
+        for k, slot in enumerate(slots):
+            builder.store(panel.less(builder.load(slot), entry(k), row), slot)
+    columns = [builder.load(slot) for slot in slots]
+    for column in reversed(range(panel.width)):
+        for row in reversed(range(column + 1, panel.width)):
+            entry = panel.triangle(row, column)
+            columns[column] = panel.less(columns[column], entry, columns[row])
+        panel.store(columns[column], panel.column(column))
+
+
+_forward = _panel_intrinsic(_write_forward)
+_backward = _panel_intrinsic(_write_backward)
+
+
+@compiled(nogil=True)
+def load(beside, indptr, indices, data, targets, loads):
+    """Write coupling times targets to the rows ``beside`` of ``loads``; the others stay zero."""
+    for i in beside:
+        for axis in range(3):
+            total = 0.0
+            for k in range(indptr[i], indptr[i + 1]):
+                total += data[k] * targets[indices[k], axis]
+            loads[4 * i + axis] = total
+
+
+@compiled(nogil=True)
+def sweep(panels, vertices, loads, x, rhs, y):
+    """Overwrite some rows of ``y`` by A^-1 (rhs - load).
+
+    Parameters
+    ----------
+    panels : arrays of `pdrom.model.dynamics.panels.Panels`
+    vertices : (n,) row of ``rhs`` and ``y`` of each unknown, in the order of the factor
+    loads : (4 n,) rows that are taken from the right-hand side, in that order
+    x : (4 n,) working array
+    rhs, y : rows of four, flat
+    """
+    first, row_start, value_start, rows, values = panels
+    for i in range(len(vertices)):
+        store(x, 4 * i, subtract(load_row(rhs, 4 * at(vertices, i)), load_row(loads, 4 * i)))
+    for p in range(len(first) - 1):
+        a, width = 4 * at(first, p), at(first, p + 1) - at(first, p)
+        start, stop, v = at(row_start, p), at(row_start, p + 1), at(value_start, p)
+        if width == 8:
+            _forward(8, x, a, rows, start, stop, values, v)
+        elif width == 6:
+            _forward(6, x, a, rows, start, stop, values, v)
+        elif width == 4:
+            _forward(4, x, a, rows, start, stop, values, v)
+        elif width == 3:
+            _forward(3, x, a, rows, start, stop, values, v)
+        elif width == 2:
+            _forward(2, x, a, rows, start, stop, values, v)
+        else:
+            _forward(1, x, a, rows, start, stop, values, v)
+    for p in range(len(first) - 2, -1, -1):
+        a, width = 4 * at(first, p), at(first, p + 1) - at(first, p)
+        start, stop, v = at(row_start, p), at(row_start, p + 1), at(value_start, p)
+        if width == 8:
+            _backward(8, x, a, rows, start, stop, values, v)
+        elif width == 6:
+            _backward(6, x, a, rows, start, stop, values, v)
+        elif width == 4:
+            _backward(4, x, a, rows, start, stop, values, v)
+        elif width == 3:
+            _backward(3, x, a, rows, start, stop, values, v)
+        elif width == 2:
+            _backward(2, x, a, rows, start, stop, values, v)
+        else:
+            _backward(1, x, a, rows, start, stop, values, v)
+    for i in range(len(vertices)):
+        store(y, 4 * at(vertices, i), load_row(x, 4 * i))

@@ -1,0 +1,169 @@
+"""Compiled part of the reduced local step: coefficients from sampled entries, and their lift.
+
+Coefficients come in sets: one that all axes share, or one an axis. A column of the lift adds the
+coefficients of its set to one axis of the right-hand side.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdrom.model.compiled import rows
+from pdrom.model.compiled.clock import clock, now
+from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.rows import WIDTH, at
+from pdrom.model.constraints.local_kernel import (
+    FIRST,
+    OWN,
+    PARTS,
+    PREPARE,
+    VERTICES,
+    LocalKernel,
+    call,
+    local_kernel,
+)
+
+# Sums may be reordered, which vectorises the dot products; nan and inf keep their meaning.
+REORDERED = {"reassoc", "contract", "nsz"}
+SPLIT_FROM = 1 << 17  # entries of a lift (N, r) from which its rows are in two parts
+
+# Entries of the record: the numbers of modes, sets, columns and sampled numbers, address and record
+# of the sampler; then the places of the arrays of `Lift` in their order, and that of a clock.
+MODES, SETS, COLUMNS, SAMPLED, SAMPLER, SAMPLER_RECORD = range(OWN, OWN + 6)
+STARTS, POSITIONS, OPERATORS, SHIFTS, LIMITS, COEFFICIENTS = range(OWN + 6, OWN + 12)
+AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 12, OWN + 20)
+
+
+@dataclass(frozen=True)
+class Lift:
+    """What a reduced local step holds, for r modes, N vertices and c columns.
+
+    starts : (sets + 1,) where the sampled entries of each set begin
+    positions : sampled entries of each set among the numbers of the sampled elements
+    operators : (r, m) of each set, flat, one after the other
+    shifts : (sets, r) what is taken from operator times entries: the part of the mean
+    limits : (2, r) least and largest coefficients
+    coefficients : (sets, r) those of the last evaluation
+    axes, own_sets : (c,) axis that a column adds to, set whose coefficients it takes
+    lifted : (c, N, r) S^T W V
+    offset : (4 N,) S^T W mean, rows of four
+    seconds : (2,) time of the two parts of the lift so far
+    """
+
+    starts: np.ndarray
+    positions: np.ndarray
+    operators: np.ndarray
+    shifts: np.ndarray
+    limits: np.ndarray
+    coefficients: np.ndarray
+    axes: np.ndarray
+    own_sets: np.ndarray
+    lifted: np.ndarray
+    offset: np.ndarray
+    seconds: np.ndarray
+
+    @property
+    def arrays(self) -> Sequence[np.ndarray]:
+        """All of them, in the order of the kernel's record."""
+        return tuple(getattr(self, name) for name in self.__dataclass_fields__)
+
+    @property
+    def split(self) -> bool:
+        """Whether its rows are in two parts."""
+        _, vertices, modes = self.lifted.shape
+        return bool(vertices * modes >= SPLIT_FROM)
+
+    def kernel(self, sampler: LocalKernel, sampled: int) -> LocalKernel:
+        """Local kernel that adds the lift; ``sampler`` writes so many ``sampled`` numbers."""
+        columns, vertices, modes = self.lifted.shape
+        numbers = (
+            modes, len(self.shifts), columns, sampled, sampler.address, sampler.record.ctypes.data
+        )  # fmt: skip
+        clocks = np.stack([clock(), clock()])
+        arrays = (*self.arrays, np.empty(sampled), clocks, sampler.record, *sampler.arrays)
+        return LocalKernel.of(
+            _accumulate,
+            vertices,
+            vertices,
+            self.split,
+            arrays,
+            numbers,
+            lambda first: np.arange(first, vertices),
+            prepares=True,
+        )
+
+
+@compiled(nogil=True, fastmath=REORDERED)
+def coefficients(sampled, starts, positions, operators, shifts, limits, result):
+    """Write the coefficients of all sets that belong to the numbers of the sampled elements."""
+    sets, modes = shifts.shape
+    for k in range(sets):
+        first, last = starts[k], starts[k + 1]
+        for i in range(modes):
+            begin = first * modes + i * (last - first)
+            total = -shifts[k, i]
+            for j in range(last - first):
+                total += at(operators, begin + j) * at(sampled, at(positions, first + j))
+            # not a number stays one
+            if total < limits[0, i]:
+                total = limits[0, i]
+            elif total > limits[1, i]:
+                total = limits[1, i]
+            result[k, i] = total
+
+
+@compiled(nogil=True, fastmath=REORDERED)
+def lift(values, axes, own_sets, lifted, offset, first, last, rhs):
+    """Add S^T W (mean + V c) to the rows ``first`` to ``last`` - 1 of the right-hand side."""
+    for i in range(WIDTH * first, WIDTH * last):
+        rhs[i] += offset[i]
+    columns, vertices, modes = lifted.shape
+    flat = lifted.reshape(columns * vertices * modes)
+    for column in range(columns):
+        own = values[own_sets[column]]
+        for vertex in range(first, last):
+            begin = (column * vertices + vertex) * modes
+            total = 0.0
+            for i in range(modes):
+                total += at(flat, begin + i) * at(own, i)
+            rhs[WIDTH * vertex + axes[column]] += total
+
+
+@local_kernel
+def _accumulate(y, rhs_place, record, part):
+    entries = rows.indices(record, SIZE)
+    modes, sets, columns = entries[MODES], entries[SETS], entries[COLUMNS]
+    values = rows.doubles(entries[COEFFICIENTS], sets * modes).reshape((sets, modes))
+    if part == PREPARE:
+        starts = rows.indices(entries[STARTS], sets + 1)
+        count = starts[sets]
+        projections = entries[PROJECTIONS]
+        call(entries[SAMPLER], y, projections, entries[SAMPLER_RECORD], PARTS[0])
+        coefficients(
+            rows.doubles(projections, entries[SAMPLED]),
+            starts,
+            rows.indices(entries[POSITIONS], count),
+            rows.doubles(entries[OPERATORS], count * modes),
+            rows.doubles(entries[SHIFTS], sets * modes).reshape((sets, modes)),
+            rows.doubles(entries[LIMITS], 2 * modes).reshape((2, modes)),
+            values,
+        )
+        return 0.0
+    vertices = entries[VERTICES]
+    watch = rows.indices(entries[CLOCK] + 16 * part, 2)
+    before = now(watch)
+    lift(
+        values,
+        rows.indices(entries[AXES], columns),
+        rows.indices(entries[OWN_SETS], columns),
+        rows.doubles(entries[LIFTED], columns * vertices * modes).reshape(
+            (columns, vertices, modes)
+        ),
+        rows.doubles(entries[OFFSET], WIDTH * vertices),
+        entries[FIRST + part],
+        entries[FIRST + part + 1],
+        rows.doubles(rhs_place, WIDTH * vertices),
+    )
+    rows.doubles(entries[SECONDS], 2)[part] += now(watch) - before
+    return np.nan
