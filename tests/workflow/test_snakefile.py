@@ -169,7 +169,7 @@ def test_comments_and_docstrings_rerun_nothing(finished: Checkout) -> None:
 
 def test_a_kernel_reruns_the_scenes_that_use_it_and_what_follows(finished: Checkout) -> None:
     finished.edit(
-        "src/pdrom/model/constraints/spring.py", "choose(scale == 0.0", "choose(scale <= 0.0"
+        "src/pdrom/model/constraints/spring.py", "LOW, HIGH = 1e-280", "LOW, HIGH = 1e-281"
     )
     planned = finished.planned(*MICRO_ARGUMENTS)
     per_scene = {p for p in planned if _stage(p) not in SHARED}
@@ -184,7 +184,9 @@ def test_a_threshold_of_a_claim_reruns_verdicts_and_manuscript_only(finished: Ch
     planned = finished.planned(*MICRO_ARGUMENTS)
     assert MICRO_MANUSCRIPT in planned
     others = {p for p in planned if _stage(p) != "paper"}
-    assert others == {f"{MICRO_RESULTS}/tables/claims.csv"}
+    figure = {f"{MICRO_RESULTS}/figures/claims_sensitivity.{kind}" for kind in ("pdf", "png")}
+    tables = {f"{MICRO_RESULTS}/tables/{name}.csv" for name in ("claims", "claims_sensitivity")}
+    assert others == tables | figure
 
 
 def test_a_caption_rerenders_its_figure_and_the_manuscript_only(finished: Checkout) -> None:
