@@ -136,6 +136,7 @@ def differ(first: np.ndarray, second: np.ndarray) -> bool:
     return np.mean(np.abs(first - second).max(axis=2) > 30) > 1e-3
 
 
+@pytest.mark.slow
 def test_two_methods_and_two_frames_differ(opened: Page) -> None:
     shapes = opened.locator("#shapes")
     choose(opened, scene="sheet", method="near")
@@ -152,6 +153,7 @@ def test_two_methods_and_two_frames_differ(opened: Page) -> None:
     assert "Beyond frame 9" in opened.inner_text("#about")
 
 
+@pytest.mark.slow
 def test_views_and_scenes_are_chosen(opened: Page) -> None:
     shapes = opened.locator("#shapes")
     choose(opened, scene="sheet", method="near")
@@ -163,6 +165,7 @@ def test_views_and_scenes_are_chosen(opened: Page) -> None:
     assert "A <sheet> </script>" in opened.inner_text("#about")
 
 
+@pytest.mark.slow
 def test_playing_goes_through_the_frames_and_stops(opened: Page) -> None:
     choose(opened, scene="sheet", method="near")
     go_to(opened, 0)
@@ -174,6 +177,7 @@ def test_playing_goes_through_the_frames_and_stops(opened: Page) -> None:
     assert opened.get_attribute("#play", "aria-pressed") == "false"
 
 
+@pytest.mark.slow
 def test_nothing_is_asked_of_a_network_and_nothing_fails(opened: Page) -> None:
     assert [url for url in opened.asked if not url.startswith(("file:", "data:", "blob:"))] == []
     assert opened.said == []
