@@ -49,9 +49,9 @@ def growing(m: int) -> np.ndarray:
     return np.vstack([np.eye(m) - np.tril(np.ones((m, m)), -1), np.zeros((3, m))])
 
 
-@pytest.mark.parametrize("m", [12, 30, 70])
+@pytest.mark.parametrize("m", [30, 70])
 def test_an_ill_conditioned_factor_is_noticed(m, monkeypatch):
-    """For m = 70 the first Cholesky factorisation fails, for 12 and 30 the departure tells."""
+    """For m = 70 the first Cholesky factorisation fails, for 30 the departure tells."""
     calls = []
     reflect = module._by_reflections
 
