@@ -77,8 +77,9 @@ def _read(path: str, formats: list[str], max_vertices: int, max_cells: int) -> t
             f"holds cells {kinds or 'of no kind'}, allowed: only one of {', '.join(ALLOWED_CELLS)}"
         )
     blocks = [block.data for block in raw.cells if block.type == kinds[0]]
-    _check_size("vertices", len(raw.points), max_vertices)
-    _check_size("cells", sum(map(len, blocks)), max_cells)
+    # of a damaged file they may be no arrays, which the conversion refuses
+    _check_size("vertices", len(np.atleast_1d(raw.points)), max_vertices)
+    _check_size("cells", sum(len(np.atleast_1d(block)) for block in blocks), max_cells)
     try:
         points = np.ascontiguousarray(raw.points, dtype=np.float64)
         cells = np.concatenate(blocks).astype(np.int64, casting="same_kind")
