@@ -13,6 +13,8 @@ import pandas as pd
 
 from pdrom.experiments.measurement import Measurement, Variant, measure, median_frames
 from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.constraints.local_kernel import LocalKernel
+from pdrom.model.constraints.timed_kernel import timed
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.dynamics.system import GlobalSystem
@@ -33,19 +35,39 @@ _QUESTIONS: dict[type[Effect], tuple[str, ...]] = {
 
 
 class Timed:
-    """Stands for an effect and adds up the time of the questions that the step loop asks it."""
+    """Stands for an effect and adds up the time of the questions that the step loop asks it.
+
+    Attributes
+    ----------
+    local_kernel, threads : of a group, whose kernel is timed inside the compiled loop
+    """
 
     def __init__(self, effect: Effect, questions: Sequence[str]) -> None:
         self.name = effect.name
-        self.seconds = 0.0
+        self._asked, self._kernel = 0.0, np.zeros(1)
+        self.local_kernel: LocalKernel | None = None
+        if isinstance(effect, ConstraintGroup):
+            self.threads = effect.threads
+            if effect.local_kernel is not None:
+                self.local_kernel, self._kernel = timed(effect.local_kernel)
         for question in questions:
             setattr(self, question, self._timed(getattr(effect, question)))
+
+    @property
+    def seconds(self) -> float:
+        """Time since `reset`."""
+        return self._asked + float(self._kernel.sum())
+
+    def reset(self) -> None:
+        """Begin anew."""
+        self._asked = 0.0
+        self._kernel[:] = 0.0
 
     def _timed(self, ask: Callable[..., Any]) -> Callable[..., Any]:
         def answer(*arguments: Any) -> Any:
             before = perf_counter()
             result = ask(*arguments)
-            self.seconds += perf_counter() - before
+            self._asked += perf_counter() - before
             return result
 
         return answer
@@ -62,12 +84,12 @@ def effect_costs(
     roles: list[Sequence[Effect]] = []
     roles += [scene.groups, scene.forces, scene.boundaries, scene.contacts]
     questions = zip(roles, _QUESTIONS.values(), strict=True)
-    timed: Any = [[Timed(effect, asked) for effect in role] for role, asked in questions]
-    groups, *others = timed
+    by_role: Any = [[Timed(effect, asked) for effect in role] for role, asked in questions]
+    groups, *others = by_role
     space = VertexSpace(system, *others)
     config = scene.config
     loop = Stepper(space, config.time_step, config.iterations, groups, track_objective=False)
-    stands = [stand for role in timed for stand in role]
+    stands = [stand for role in by_role for stand in role]
     names = list(dict.fromkeys(stand.name for stand in stands))
     samples = [_profile(loop, scene, frames, stands, names) for _ in range(warmup + repeats)]
     total, *parts = median_frames(np.array(samples[warmup:]))
@@ -83,7 +105,7 @@ def _profile(
     state, rows = scene.initial_state(), []
     for frame in range(frames):
         for stand in stands:
-            stand.seconds = 0.0
+            stand.reset()
         state, report = loop.step(state, frame)
         own = [sum(stand.seconds for stand in stands if stand.name == name) for name in names]
         total, solve = float(report.seconds.sum()), float(report.seconds[2])

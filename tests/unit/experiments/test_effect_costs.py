@@ -14,6 +14,7 @@ from pdrom.experiments.effect_costs import (
     left_out,
     left_out_sets,
 )
+from pdrom.model.constraints.local_kernel import LocalPass
 
 EFFECTS = (
     {"effect": "gravity"},
@@ -48,6 +49,26 @@ def test_a_stand_in_answers_as_the_effect_does(rng):
     assert stand.accumulate(y, timed) == group.accumulate(y, own)
     assert (own == timed).all()
     assert stand.seconds > 0.0
+    stand.reset()
+    assert stand.seconds == 0.0
+
+
+def test_a_timed_kernel_does_what_the_kernel_does(rng):
+    """In the compiled loop, which the stand-ins must not leave: they time what a run does."""
+    scene = make_scene(*EFFECTS)
+    group = scene.group("strain")
+    y = scene.mesh.points + 0.01 * rng.standard_normal(scene.mesh.points.shape)
+    own, other = np.zeros_like(y), np.zeros_like(y)
+    stand = Timed(group, ("begin_frame",))
+    kernel = LocalPass([stand.local_kernel])
+    for _ in range(1000):
+        other[...] = 0.0
+        energy = kernel.accumulate(y, other, 1)
+    assert energy == group.accumulate(y, own)
+    assert (own == other).all()
+    assert stand.seconds > 0.0
+    space = scene.space(scene.system)
+    assert space.compiled([Timed(g, ("begin_frame",)) for g in scene.groups]) is not None
 
 
 def test_effects_are_left_out_alone_and_groups_together():

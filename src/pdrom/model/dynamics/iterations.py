@@ -5,7 +5,7 @@ first parts; they hand over through counters in memory, without leaving compiled
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -35,7 +35,7 @@ class CompiledIterations:
         self._energy = np.zeros(1)
         self._clock = clock()
 
-    def takes(self, elimination: Any) -> bool:
+    def takes(self, elimination: object) -> TypeGuard[Elimination]:
         """Whether the system is solved by compiled code, too."""
         return isinstance(elimination, Elimination) and elimination.factor is not None
 

@@ -12,6 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.rows import WIDTH
 
 WIDTHS = np.array([1, 2, 3, 4, 6, 8])
 # Cycles of a panel (a branch that is guessed wrong, the chain of its own columns) and of each row
@@ -141,4 +142,4 @@ def _fill(indptr, indices, data, inverse, first, row_start, value_start, rows, v
                     values[triangle + (row - a) * (row - a - 1) // 2 + j - a] = data[k]
         for k in range(count):
             place[own[k]] = -1
-            own[k] *= 4
+            own[k] *= WIDTH

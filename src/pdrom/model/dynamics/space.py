@@ -20,25 +20,6 @@ class Solve(Protocol):
         """Overwrite the free coordinates of ``y`` by the solution for ``rhs``."""
 
 
-class Iterations(Protocol):
-    """All iterations of a frame at once, see `pdrom.model.dynamics.iterations`."""
-
-    def takes(self, elimination: "Solve") -> bool:
-        """Whether the system is solved by compiled code, too."""
-
-    def run(
-        self,
-        count: int,
-        objective: np.ndarray,
-        y: np.ndarray,
-        s: np.ndarray,
-        base: np.ndarray,
-        elimination: Any,
-        seconds: np.ndarray,
-    ) -> None:
-        """Do ``count`` iterations in place."""
-
-
 class Space(ABC):
     """What the step loop asks of its coordinates. Arrays are (n, 3) with n coordinates."""
 
@@ -54,7 +35,7 @@ class Space(ABC):
         """Coordinates and velocities at the end of a frame that began at ``before``."""
         return y, (y - before) / h
 
-    def compiled(self, local_steps: Sequence[Any]) -> Iterations | None:
+    def compiled(self, local_steps: Sequence[Any]) -> CompiledIterations | None:
         """Compiled iterations with these local steps, None if there are none."""
         return None
 
@@ -130,7 +111,7 @@ class VertexSpace(Space):
     def end(self, y: np.ndarray, before: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
         return end(flat(y), before, h)
 
-    def compiled(self, local_steps: Sequence[Any]) -> Iterations | None:
+    def compiled(self, local_steps: Sequence[Any]) -> CompiledIterations | None:
         if any(getattr(step, "local_kernel", None) is None for step in local_steps):
             return None
         return CompiledIterations(local_steps, self.system.inertia)
