@@ -9,7 +9,8 @@ from pathlib import Path
 
 from places import ROOT
 
-PARTS = ("Snakefile", "config", "paper/main.tex", "paper/references.bib", "src", "workflow")
+PAPER = ("paper/main.tex", "paper/sections", "paper/references.bib")
+PARTS = ("Snakefile", "config", *PAPER, "src", "workflow")
 
 
 @dataclass(frozen=True)

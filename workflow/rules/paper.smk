@@ -1,7 +1,7 @@
-# tables and figures -> manuscript; no number is typed in main.tex
+# tables and figures -> manuscript; no number is typed in its source
 rule paper_inputs:
     input:
-        source="paper/main.tex",
+        source=PLAN.paper.sources,
         references="paper/references.bib",
         tables=PLAN.tables.paths,
         machine=PLAN.paper.machine,
@@ -11,7 +11,7 @@ rule paper_inputs:
         f"{PLAN.results}/logs/paper/inputs.log",
     params:
         facts=PLAN.paper.facts.model_dump(mode="json"),
-        content=PLAN.digest("paper/main.tex", "paper/references.bib"),
+        content=PLAN.digest(*PLAN.paper.sources, "paper/references.bib"),
         code=PLAN.code("pdrom.report.paper.build"),
     message:
         "Numbers, tables and references of the manuscript"
@@ -21,7 +21,7 @@ rule paper_inputs:
 
 rule paper:
     input:
-        source="paper/main.tex",
+        source=PLAN.paper.sources,
         inputs=rules.paper_inputs.output,
         figures=PLAN.figures,
     output:
@@ -29,7 +29,7 @@ rule paper:
     log:
         f"{PLAN.results}/logs/paper/main.log",
     params:
-        content=PLAN.digest("paper/main.tex"),
+        content=PLAN.digest(*PLAN.paper.sources),
         code=PLAN.code("pdrom.report.paper.build"),
     message:
         f"Manuscript {FOLDERS.manuscript}"

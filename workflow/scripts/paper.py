@@ -3,7 +3,7 @@ from pdrom.report.paper.build import build
 
 with job_log(snakemake.log[0]):
     build(
-        snakemake.input.source,
+        snakemake.input.source[0],
         list(snakemake.input.figures),
         list(snakemake.input.inputs),
         snakemake.output[0],

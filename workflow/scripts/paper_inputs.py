@@ -5,7 +5,7 @@ from pdrom.report.paper.build import Facts, write_inputs
 
 with job_log(snakemake.log[0]):
     write_inputs(
-        snakemake.input.source,
+        snakemake.input.source[0],
         snakemake.input.references,
         list(snakemake.input.tables),
         snakemake.input.machine,

@@ -9,6 +9,7 @@ from pdrom.pipeline.full import FULL_STUDY, is_full
 from pdrom.pipeline.study import Study
 from pdrom.report.claims import load_claims
 from pdrom.report.paper.build import Facts
+from pdrom.report.paper.source import source_files
 from pdrom.report.paper.textables import TEX_TABLES
 from pdrom.report.words.text import require_typeset
 
@@ -17,8 +18,13 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class PaperJob:
-    """The manuscript: generated files that main.tex reads, and what they state beside results."""
+    """The manuscript: its source, the generated files that this reads, and what they state.
 
+    sources : main.tex, then its sections
+    facts : what is stated beside results
+    """
+
+    sources: list[str]
     machine: str
     inputs: list[str]
     facts: Facts
@@ -49,7 +55,7 @@ def paper_job(study: Study, captions: dict[str, str], configuration: str, result
     tables = [f"{name}.tex" for name in TEX_TABLES]
     names = ["macros.tex", "figures.tex", "main.bbl", *tables]
     inputs = [PAPER_INPUT.at(results, name=name) for name in names]
-    return PaperJob(MACHINE.at(results), inputs, facts)
+    return PaperJob(source_files(study.root), MACHINE.at(results), inputs, facts)
 
 
 def check_texts(study: Study) -> None:

@@ -14,6 +14,7 @@ from pdrom.report.paper.bibliography import bibliography
 from pdrom.report.paper.figuretex import captions
 from pdrom.report.paper.known import decisions, provenance
 from pdrom.report.paper.macros import macros
+from pdrom.report.paper.source import whole_source
 from pdrom.report.paper.tex import build_pdf
 from pdrom.report.paper.textables import TEX_TABLES
 from pdrom.report.words.text import replaced
@@ -40,7 +41,7 @@ def write_inputs(
     source: str, references: str, tables: list[str], machine: str, facts: Facts, folder: str
 ) -> None:
     """Write macros.tex, figures.tex, the TeX tables and main.bbl into ``folder``."""
-    text = Path(source).read_text(encoding="utf-8")
+    text = whole_source(Path(source))
     data = {Path(path).stem: read_table(path) for path in tables}
     data |= {name: pd.DataFrame(rows) for name, rows in facts.tables.items()}
     data["machine"] = _machine_table(Path(machine))

@@ -14,9 +14,10 @@ from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.paper.bibliography import bibliography, cited_keys
 from pdrom.report.paper.known import sentences
 from pdrom.report.paper.macros import keys_of
+from pdrom.report.paper.source import whole_source
 from pdrom.report.paper.tex import build_pdf, packages_of
 
-SOURCE = (ROOT / "paper" / "main.tex").read_text(encoding="utf-8")
+SOURCE = whole_source(ROOT / "paper" / "main.tex")
 
 # What may hold digits without stating a result: mathematics, keys, lengths, names of claims.
 _NOT_PROSE = [
