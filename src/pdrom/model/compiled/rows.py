@@ -64,6 +64,11 @@ def flat(values: np.ndarray) -> np.ndarray:
     return rows.reshape(-1)
 
 
+def unflat(rows: np.ndarray) -> np.ndarray:
+    """Flat rows of four as a view (N, 3), the opposite of `flat`."""
+    return rows.reshape(-1, WIDTH)[:, :3]
+
+
 def shares(values: np.ndarray, rows: np.ndarray) -> bool:
     """Whether ``rows`` = `flat` (values) is no copy."""
     return values.ctypes.data == rows.ctypes.data and len(values) > 0

@@ -30,8 +30,8 @@ NEAR_POLE = 1e-4
 
 # numbers of a lane in the packed manifold: weight, magnitude, rest curvature, side times normal
 WEIGHT, MAGNITUDE, REST, POLE, MANIFOLD = 0, 1, 2, 5, 8
-# and in the working array: curvature, p
-H, P, SIZE = 0, 3, 6
+# and in the working array: curvature, p, height of its direction above the equator
+H, P, HEIGHT, SIZE = 0, 3, 6, 7
 # Entries of the record: the numbers of elements and of those to project; then the places of the
 # operator in CSR, the manifold, the working arrays, the elements to project and their manifold.
 ELEMENTS, COUNT, START, INDICES, DATA, SPHERES, WORK, SAMPLED, TAKEN, ARRAYS = range(OWN, OWN + 10)
@@ -67,23 +67,39 @@ def _without(a, part, n):
 @lane_function
 def _half_spheres(work, manifold, block):
     """Nearest points of the half spheres to the curvature vectors of a block."""
-    first = block * MANIFOLD
+    first, wrong = block * MANIFOLD, 0.0
     for lane in range(LANES):
         h, n = load(work, H, lane), load(manifold, first + POLE, lane)
         # scaled: neither overflow nor underflow of the squares
         scale = absolute_sum(h)
         unit = scaled(1.0 / (scale + SMALLEST), h)
         unit = scaled(1.0 / np.sqrt(dot(unit, unit)), unit)
-        height = dot(unit, n)
+        save(work, P, lane, unit)
+        work[HEIGHT * LANES + lane] = dot(unit, n)
+    for lane in range(LANES):
+        wrong += 1.0 if work[HEIGHT * LANES + lane] < 0.0 else 0.0
+    if wrong > 0.0:
+        _to_rims(work, manifold, first)
+    for lane in range(LANES):
+        n, unit = load(manifold, first + POLE, lane), load(work, P, lane)
+        magnitude = manifold[(first + MAGNITUDE) * LANES + lane]
+        pole = choose(dot(n, n) == 0.0, load(manifold, first + REST, lane), scaled(magnitude, n))
+        vanishes = absolute_sum(load(work, H, lane)) == 0.0
+        save(work, P, lane, choose(vanishes, pole, scaled(magnitude, unit)))
+
+
+@lane_function
+def _to_rims(work, manifold, first):
+    """Replace the directions on the wrong side by those of the rim."""
+    for lane in range(LANES):
+        n, unit = load(manifold, first + POLE, lane), load(work, P, lane)
+        height = work[HEIGHT * LANES + lane]
         rim, length = _without(unit, height, n)
         again, left = _without(rim, dot(rim, n), n)
         # what is mostly normal after a difference of unit vectors was round-off from the start
         again = choose(length > RIM and left > 0.5, again, perpendicular(n))
         rim = choose(length > NEAR_POLE, rim, again)
-        unit = choose(height < 0.0, rim, unit)
-        magnitude = manifold[(first + MAGNITUDE) * LANES + lane]
-        pole = choose(dot(n, n) == 0.0, load(manifold, first + REST, lane), scaled(magnitude, n))
-        save(work, P, lane, choose(scale == 0.0, pole, scaled(magnitude, unit)))
+        save(work, P, lane, choose(height < 0.0, rim, unit))
 
 
 @lane_function

@@ -130,7 +130,9 @@ class LocalPass:
         self.other = np.zeros(0)
         if touched:
             self.touched = range(min(r.start for r in touched), max(r.stop for r in touched))
-            self.other = np.zeros(4 * max(int(kernel.record[VERTICES]) for kernel in kernels))
+            self.other = np.zeros(
+                rows.WIDTH * max(int(kernel.record[VERTICES]) for kernel in kernels)
+            )
 
     @property
     def parts(self) -> int:
@@ -143,7 +145,7 @@ class LocalPass:
         add_part(*self.preparing, PREPARE, *places)
         if not self.touched:
             return add_part(self.addresses, self.records, PARTS[0], *places)
-        own = slice(4 * self.touched.start, 4 * self.touched.stop)
+        own = slice(rows.WIDTH * self.touched.start, rows.WIDTH * self.touched.stop)
 
         def second() -> float:
             self.other[own] = 0.0
@@ -163,7 +165,7 @@ class LocalPass:
             return self.add(rows.flat(y), right, threads)
         added = np.zeros_like(right)
         energy = self.add(rows.flat(y), added, threads)
-        rhs += added.reshape(-1, 4)[:, :3]
+        rhs += rows.unflat(added)
         return energy
 
 

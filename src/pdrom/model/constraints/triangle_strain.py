@@ -11,14 +11,10 @@ from pydantic import Field, model_validator
 
 from pdrom.model.compiled.rows import doubles
 from pdrom.model.constraints.base import GroupConfig, require_cells
+from pdrom.model.constraints.clamp2 import clamp_block
 from pdrom.model.constraints.gradient_kernel import carray, gradient_kernel
 from pdrom.model.constraints.lanes import (
     LANES,
-    SMALLEST,
-    absolute_sum,
-    choose,
-    clamp,
-    dot,
     lane_function,
     load,
     mix,
@@ -47,11 +43,12 @@ from pdrom.model.constraints.simplex import (
     start_energy,
     store_projections,
 )
-from pdrom.model.constraints.svd3 import jacobi_rotation, orthonormal_pair
 from pdrom.model.mesh.types import Mesh
 
 # numbers of a lane in the packed geometry
 GEOMETRY = 5
+# where the marks of `clamp_block` begin in the working array
+FOUND = SIZE
 
 
 class StrainConfig(GroupConfig):
@@ -77,29 +74,6 @@ def _gradients(work, geometry, block):
         save(work, F, lane, mix(geometry[at], e0, geometry[at + LANES], e1))
         at += 2 * LANES
         save(work, F + 3, lane, mix(geometry[at], e0, geometry[at + LANES], e1))
-
-
-@lane_function
-def _clamp_columns(work, low, high):
-    """Clamp the singular values of the 3 x 2 matrices F of a block.
-
-    One-sided Jacobi: a single rotation makes two columns orthogonal, their norms are the singular
-    values. Working on F, not on F^T F, keeps small singular values accurate.
-    """
-    for lane in range(LANES):
-        f0, f1 = load(work, F, lane), load(work, F + 3, lane)
-        scale = absolute_sum(f0) + absolute_sum(f1) + SMALLEST
-        f0, f1 = scaled(1.0 / scale, f0), scaled(1.0 / scale, f1)
-        c, s, _ = jacobi_rotation(f0, f1, False)
-        a, b = mix(c, f0, -s, f1), mix(s, f0, c, f1)
-        swapped = dot(a, a) < dot(b, b)
-        u0, u1, s0, s1 = orthonormal_pair(choose(swapped, b, a), choose(swapped, a, b))
-        # not finite where F is not
-        u0 = scaled(clamp(scale * s0, low, high) + 0.0 * scale, u0)
-        u1 = scaled(clamp(scale * s1, low, high), u1)
-        a, b = choose(swapped, u1, u0), choose(swapped, u0, u1)
-        save(work, P, lane, mix(c, a, s, b))
-        save(work, P + 3, lane, mix(c, b, -s, a))
 
 
 @lane_function
@@ -132,7 +106,7 @@ def _project(y_place, p_place, record, part):
         take(geometry, GEOMETRY, elements, start, taken_geometry)
         gather_edges(y, taken, 0, 2, work)
         _gradients(work, taken_geometry, 0)
-        _clamp_columns(work, low, high)
+        clamp_block(work, F, P, FOUND, low, high)
         store_projections(work, 2, start, p)
     return 0.0
 
@@ -147,7 +121,7 @@ def _accumulate(y_place, rhs_place, record, part):
     for block in range(first, last):
         gather_edges(y, corners, block, 2, work)
         _gradients(work, geometry, block)
-        _clamp_columns(work, low, high)
+        clamp_block(work, F, P, FOUND, low, high)
         _forces(work, geometry, block)
         scatter(work, corners, block, 2, rhs)
     return energy(work)
@@ -172,10 +146,10 @@ def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, 
 def _project_gradients(d_pointer, range_pointer, p_pointer, m):
     d, p = carray(d_pointer, (2 * m, 3)), carray(p_pointer, (6 * m,))
     allowed = carray(range_pointer, (2,))
-    work = np.zeros(SIZE * LANES)
+    work = np.zeros((FOUND + 1) * LANES)
     for start in range(0, m, LANES):
         copy_rows(d, 2, start, work, F)
-        _clamp_columns(work, allowed[0], allowed[1])
+        clamp_block(work, F, P, FOUND, allowed[0], allowed[1])
         store_projections(work, 2, start, p)
 
 
@@ -189,6 +163,7 @@ class TriangleStrain(SimplexGroup):
 
     cells = "triangle"
     rows_per_element = 2
+    work_size = FOUND + 1
     split_from = 4096
     project_kernel = _project
     accumulate_kernel = _accumulate

@@ -12,6 +12,7 @@ import numpy as np
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.clock import clock, now
 from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.constraints.local_kernel import PARTS, PREPARE, LocalPass, add_part
 from pdrom.model.constraints.second_thread import LINE, both, publish, wait_for
 from pdrom.model.dynamics.sweeps import sweep
@@ -59,7 +60,7 @@ class CompiledIterations:
         seconds : (4,) times of the local and of the global steps are added to entries 1 and 2
         """
         local = self._pass
-        right = np.empty(4 * len(y))
+        right = np.empty(WIDTH * len(y))
         iterate, start = rows.flat(y), rows.flat(base)
         prediction = rows.flat(s) if len(objective) else start
         factor = elimination.factor
@@ -88,7 +89,7 @@ class CompiledIterations:
 @compiled(nogil=True)
 def _second_part(second, y, other, start, stop):
     """The second parts of all local steps into an array of their own; their energy."""
-    other[4 * start : 4 * stop] = 0.0
+    other[WIDTH * start : WIDTH * stop] = 0.0
     return add_part(second[0], second[1], PARTS[1], y.ctypes.data, other.ctypes.data)
 
 
@@ -126,7 +127,7 @@ def _iterate(
             else:
                 shared_energy[0] = _second_part(second, y, other, start, stop)
             energy += shared_energy[0]
-            for i in range(4 * start, 4 * stop):
+            for i in range(WIDTH * start, WIDTH * stop):
                 rhs[i] += other[i]
         between = now(watch)
         if len(objective):
@@ -147,6 +148,6 @@ def _inertia_energy(y, s, inertia):
     for v in range(len(inertia)):
         square = 0.0
         for axis in range(3):
-            square += (y[4 * v + axis] - s[4 * v + axis]) ** 2
+            square += (y[WIDTH * v + axis] - s[WIDTH * v + axis]) ** 2
         energy += inertia[v] * square
     return 0.5 * energy

@@ -112,8 +112,8 @@ class SupernodalSolver(SparseSolver):
         self.panels = Panels.of(lower, factor.U.diagonal())
         unknowns = np.argsort(factor.perm_c)
         order = vertices[unknowns].astype(np.int32)
-        self._loads = np.zeros(4 * n)
-        self._sweep = (self.panels.arrays, order, self._loads, np.empty(4 * n))
+        self._loads = np.zeros(rows.WIDTH * n)
+        self._sweep = (self.panels.arrays, order, self._loads, np.empty(rows.WIDTH * n))
         self.factor = self._sweep
         self._coupling = None
         if coupling is not None:
@@ -130,7 +130,7 @@ class SupernodalSolver(SparseSolver):
         right, solution = rows.flat(rhs), rows.flat(y)
         sweep(*self._sweep, right, solution)
         if not rows.shares(y, solution):
-            y[...] = solution.reshape(-1, 4)[:, :3]
+            y[...] = rows.unflat(solution)
 
 
 def factored(matrix: sparse.csr_array, ordering: str) -> SuperLU:

@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pdrom.model.compiled.rows import WIDTH, flat
+from pdrom.model.compiled.rows import WIDTH, flat, unflat
 from pdrom.model.dynamics.frames import end, predict, weighted
 from pdrom.model.dynamics.iterations import CompiledIterations
 from pdrom.model.dynamics.system import GlobalSystem
@@ -106,7 +106,7 @@ class VertexSpace(Space):
         return s[:, :3]
 
     def copy(self, s: np.ndarray) -> np.ndarray:
-        return flat(s).copy().reshape(-1, WIDTH)[:, :3]
+        return unflat(flat(s).copy())
 
     def end(self, y: np.ndarray, before: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
         return end(flat(y), before, h)
@@ -117,7 +117,7 @@ class VertexSpace(Space):
         return CompiledIterations(local_steps, self.system.inertia)
 
     def inertia(self, s: np.ndarray) -> np.ndarray:
-        return weighted(self.system.inertia, flat(s)).reshape(-1, WIDTH)[:, :3]
+        return unflat(weighted(self.system.inertia, flat(s)))
 
     def inertia_energy(self, difference: np.ndarray) -> float:
         squares = np.einsum("ij,ij->i", difference, difference)

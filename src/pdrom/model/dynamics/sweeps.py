@@ -12,11 +12,10 @@ from numba.extending import intrinsic
 
 from pdrom.model.compiled.arithmetic import multiply_add, spread, subtract
 from pdrom.model.compiled.functions import compiled
-from pdrom.model.compiled.rows import at, store
+from pdrom.model.compiled.rows import NUMBERS, WIDTH, at, store
 from pdrom.model.compiled.rows import load as load_row
 
 _INDEX = ir.IntType(64)
-_ROW = ir.VectorType(ir.DoubleType(), 4)
 
 
 class _Panel:
@@ -52,11 +51,11 @@ class _Panel:
 
     def pointer(self, offset):
         """Where a row of the right-hand side lies."""
-        return self.builder.bitcast(self.builder.gep(self._x, [offset]), _ROW.as_pointer())
+        return self.builder.bitcast(self.builder.gep(self._x, [offset]), NUMBERS.as_pointer())
 
     def column(self, k):
         """Where the row of the panel's own column lies."""
-        return self.pointer(self.builder.add(self._first, self._index(4 * k)))
+        return self.pointer(self.builder.add(self._first, self._index(WIDTH * k)))
 
     def load(self, pointer):
         return self.builder.load(pointer, align=8)
@@ -123,7 +122,7 @@ def _write_backward(panel):
     builder = panel.builder
     slots = []
     for k in range(panel.width):
-        slots.append(cgutils.alloca_once(builder, _ROW))
+        slots.append(cgutils.alloca_once(builder, NUMBERS))
         scaled = builder.fmul(panel.inverse(k), panel.load(panel.column(k)))
         builder.store(scaled, slots[k])
     for pointer, entry in panel.rows_below():
@@ -150,7 +149,7 @@ def load(beside, indptr, indices, data, targets, loads):
             total = 0.0
             for k in range(indptr[i], indptr[i + 1]):
                 total += data[k] * targets[indices[k], axis]
-            loads[4 * i + axis] = total
+            loads[WIDTH * i + axis] = total
 
 
 @compiled(nogil=True)
@@ -167,9 +166,13 @@ def sweep(panels, vertices, loads, x, rhs, y):
     """
     first, row_start, value_start, rows, values = panels
     for i in range(len(vertices)):
-        store(x, 4 * i, subtract(load_row(rhs, 4 * at(vertices, i)), load_row(loads, 4 * i)))
+        store(
+            x,
+            WIDTH * i,
+            subtract(load_row(rhs, WIDTH * at(vertices, i)), load_row(loads, WIDTH * i)),
+        )
     for p in range(len(first) - 1):
-        a, width = 4 * at(first, p), at(first, p + 1) - at(first, p)
+        a, width = WIDTH * at(first, p), at(first, p + 1) - at(first, p)
         start, stop, v = at(row_start, p), at(row_start, p + 1), at(value_start, p)
         if width == 8:
             _forward(8, x, a, rows, start, stop, values, v)
@@ -184,7 +187,7 @@ def sweep(panels, vertices, loads, x, rhs, y):
         else:
             _forward(1, x, a, rows, start, stop, values, v)
     for p in range(len(first) - 2, -1, -1):
-        a, width = 4 * at(first, p), at(first, p + 1) - at(first, p)
+        a, width = WIDTH * at(first, p), at(first, p + 1) - at(first, p)
         start, stop, v = at(row_start, p), at(row_start, p + 1), at(value_start, p)
         if width == 8:
             _backward(8, x, a, rows, start, stop, values, v)
@@ -199,4 +202,4 @@ def sweep(panels, vertices, loads, x, rhs, y):
         else:
             _backward(1, x, a, rows, start, stop, values, v)
     for i in range(len(vertices)):
-        store(y, 4 * at(vertices, i), load_row(x, 4 * i))
+        store(y, WIDTH * at(vertices, i), load_row(x, WIDTH * i))

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pdrom.model.compiled.rows import as_vertices, flat, shares
+from pdrom.model.compiled.rows import as_vertices, flat, shares, unflat
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.constraints.local_kernel import LocalKernel, LocalPass
 from pdrom.model.constraints.second_thread import both
@@ -82,7 +82,7 @@ class ReducedLocalStep:
         middle = vertices // 2 if data.split else vertices
         both(lambda: rows(0, middle), lambda: rows(middle, vertices), self.threads)
         if added is not right:
-            rhs += added.reshape(-1, 4)[:, :3]
+            rhs += unflat(added)
 
     @property
     def lift_seconds(self) -> float:
