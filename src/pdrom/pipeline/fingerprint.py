@@ -6,6 +6,7 @@ rule therefore carries the fingerprint of the modules it uses as a parameter.
 
 import ast
 import hashlib
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import cast
@@ -40,7 +41,7 @@ def fingerprint(*places: str) -> str:
     for place in sorted({place for place in places if ":" in place}):
         digest.update(f"{place}\n".encode())
     for name in closure(*places):
-        digest.update(f"{name} {_digest(_source(name), name)}\n".encode())
+        digest.update(f"{name} {_read(name).digest}\n".encode())
     return digest.hexdigest()
 
 
@@ -57,7 +58,7 @@ def _closure(modules: tuple[str, ...]) -> set[str]:
         if name in reached:
             continue
         reached.add(name)
-        waiting += _imports(_source(name), name)
+        waiting += _read(name).imports
     return reached
 
 
@@ -83,11 +84,25 @@ def _locate(module: str) -> Path | None:
     return None
 
 
+@dataclass(frozen=True)
+class _Module:
+    """What a file says: modules of the package that it imports, and the hash of its code."""
+
+    imports: tuple[str, ...]
+    digest: str
+
+
 @cache
-def _imports(path: Path, module: str) -> tuple[str, ...]:
+def _read(module: str) -> _Module:
+    tree = ast.parse(_source(module).read_text(encoding="utf-8"))
+    nodes = list(ast.walk(tree))
+    return _Module(_imports(nodes, module), _digest(tree, nodes, module))
+
+
+def _imports(nodes: list[ast.AST], module: str) -> tuple[str, ...]:
     """Modules of the package that a file imports, with the packages above them."""
     found: set[str] = set()
-    for node in ast.walk(_tree(path)):
+    for node in nodes:
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
@@ -104,24 +119,18 @@ def _packages_above(name: str) -> list[str]:
     return [".".join(parts[:i]) for i in range(1, len(parts))]
 
 
-@cache
-def _tree(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
-
-
-@cache
-def _digest(path: Path, module: str) -> str:
-    """Hash of a file's syntax tree without docstrings; layout and comments do not count."""
-    return digest_of_source(path.read_text(encoding="utf-8"), module)
-
-
 def digest_of_source(source: str, module: str = "") -> str:
     """Hash of source text without comments, layout, docstrings and names of other modules' code.
 
     The latter are the entries of a registry that lie outside of ``module``.
     """
     tree = ast.parse(source)
-    for node in ast.walk(tree):
+    return _digest(tree, list(ast.walk(tree)), module)
+
+
+def _digest(tree: ast.Module, nodes: list[ast.AST], module: str) -> str:
+    """See `digest_of_source`; what does not count is taken out of the tree."""
+    for node in nodes:
         if isinstance(node, ast.Call) and _is_registry(node):
             _drop_others(cast(ast.Dict, node.args[1]), module)
         body = getattr(node, "body", None)

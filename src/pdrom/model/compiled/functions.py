@@ -1,5 +1,6 @@
 """How the compiled functions of the model are compiled and kept."""
 
+from functools import cached_property
 from pathlib import Path
 from zlib import crc32
 
@@ -27,7 +28,18 @@ def compiled(function=None, **options):
     return njit(cache=True, error_model="numpy", **options)(function)
 
 
-def compiled_callback(function, signature):
-    """The same for a function that other compiled code calls by its address."""
-    function.__qualname__ += f"_{_SOURCES}"
-    return cfunc(signature, cache=True, error_model="numpy")(function)
+class Callback:
+    """A function that other compiled code calls by its address; compiled at the first question."""
+
+    def __init__(self, function, signature):
+        function.__qualname__ += f"_{_SOURCES}"
+        self._function, self._signature = function, signature
+
+    @cached_property
+    def _compiled(self):
+        return cfunc(self._signature, cache=True, error_model="numpy")(self._function)
+
+    @property
+    def address(self):
+        """Where the compiled function begins."""
+        return self._compiled.address

@@ -9,7 +9,7 @@ from llvmlite import ir
 from numba import carray, types
 from numba.extending import intrinsic
 
-from pdrom.model.compiled.functions import compiled_callback
+from pdrom.model.compiled.functions import Callback
 
 _SIGNATURE = types.void(
     types.CPointer(types.float64),
@@ -26,7 +26,7 @@ def gradient_kernel(function):
     parameters : pointer to the numbers of `ConstraintGroup.kernel_parameters`
     p : pointer to (m, rows, 3), where the projections go
     """
-    return compiled_callback(function, _SIGNATURE)
+    return Callback(function, _SIGNATURE)
 
 
 @intrinsic

@@ -8,7 +8,6 @@ second to an array of its own that is added afterwards. Two threads therefore ch
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from llvmlite import ir
@@ -16,7 +15,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from pdrom.model.compiled import rows
-from pdrom.model.compiled.functions import compiled, compiled_callback
+from pdrom.model.compiled.functions import Callback, compiled
 from pdrom.model.constraints.second_thread import both
 
 # Entries of every record: number of vertices, and the units of part k are those from FIRST + k to
@@ -35,7 +34,7 @@ def local_kernel(function):
     record : int64 numbers, see `VERTICES`
     part : one of `PARTS`, or `PREPARE`
     """
-    return compiled_callback(function, _SIGNATURE)
+    return Callback(function, _SIGNATURE)
 
 
 @intrinsic
@@ -63,22 +62,27 @@ def add_part(addresses, records, part, y, rhs):
 class LocalKernel:
     """A compiled local step with its data.
 
-    address : of a function made by `local_kernel`
+    function : made by `local_kernel`; it is compiled when its address is first asked for
     record : its numbers; the ``arrays`` that they point to live as long as the kernel
     prepares : whether it wants to be called with `PREPARE`
     touched : range of vertices that the second part adds to; empty if there is one part
     """
 
-    address: int
+    function: Callback
     record: np.ndarray
     arrays: tuple[np.ndarray, ...]
     prepares: bool
     touched: range
 
+    @property
+    def address(self) -> int:
+        """Where the compiled function begins."""
+        return self.function.address
+
     @classmethod
     def of(
         cls,
-        kernel: Any,
+        function: Callback,
         vertices: int,
         units: int,
         split: bool,
@@ -102,7 +106,7 @@ class LocalKernel:
             second = range(int(later.min()), int(later.max()) + 1)
         places = [array.ctypes.data for array in arrays]
         record = np.array([vertices, 0, middle, units, *numbers, *places], dtype=np.int64)
-        return cls(kernel.address, record, tuple(arrays), prepares, second)
+        return cls(function, record, tuple(arrays), prepares, second)
 
 
 @compiled(nogil=True)

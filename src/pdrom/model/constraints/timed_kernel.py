@@ -28,4 +28,4 @@ def timed(kernel: LocalKernel) -> tuple[LocalKernel, np.ndarray]:
     places = [kernel.address, kernel.record.ctypes.data, *(array.ctypes.data for array in arrays)]
     record = np.concatenate([kernel.record[:OWN], np.array(places, dtype=np.int64)])
     kept = (*arrays, kernel.record, *kernel.arrays)
-    return LocalKernel(_timed.address, record, kept, kernel.prepares, kernel.touched), seconds
+    return LocalKernel(_timed, record, kept, kernel.prepares, kernel.touched), seconds
