@@ -316,7 +316,7 @@ def test_every_verdict(tmp_path, tests, expected):
     assert row.verdict == expected
     assert row.verdict_beyond == HOLDS
     assert row["why"].count("rows:") == len(tests)
-    assert row.answer.startswith(f"as published, it {expected}")
+    assert row.answer.startswith(f"as published it {expected},")
     assert row.measured.count(";") == sum(t.get("decides", True) for t in tests) - 1
 
 

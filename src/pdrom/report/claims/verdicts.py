@@ -151,7 +151,7 @@ def _row(name: str, rule: ClaimRule, tables: Tables) -> dict[str, Any]:
         "text": rule.text,
         "qualifiers": rule.qualifiers,
         **{f"{key}_beyond": value for key, value in beyond.items()},
-        "answer": f"as published, it {_said(published)}; beyond, it {_said(beyond)}",
+        "answer": f"as published it {published['verdict']}, beyond it {beyond['verdict']}",
         "history": " ".join(_told(change) for change in rule.changes),
     }
 
@@ -165,12 +165,6 @@ def _decided(tests: Sequence[TestRule], tables: Tables) -> dict[str, str]:
         "condition": "; ".join(o.condition for o in deciding if o.condition),
         "why": "; ".join(o.sentence for _, o in outcomes) + ".",
     }
-
-
-def _said(decided: Mapping[str, str]) -> str:
-    """A verdict, with the condition that it depends on."""
-    condition = decided["condition"]
-    return f"{decided['verdict']} ({condition})" if condition else decided["verdict"]
 
 
 def _told(change: Change) -> str:

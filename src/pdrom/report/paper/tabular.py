@@ -13,9 +13,10 @@ def tabular(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) 
 
 
 def longtable(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
-    """A table that may break across pages."""
-    head = " & ".join(header) + r" \\"
-    lines = [rf"\begin{{longtable}}{{{columns}}}", r"\hline", head, r"\hline", r"\endhead"]
+    r"""A table that may break across pages, below ``\captionrow``, which the text defines."""
+    head = [r"\hline", " & ".join(header) + r" \\", r"\hline"]
+    lines = [rf"\begin{{longtable}}{{{columns}}}", r"\captionrow", *head, r"\endfirsthead"]
+    lines += [*head, r"\endhead"]
     lines += [" & ".join(row) + r" \\" for row in rows]
     return "\n".join([*lines, r"\hline", r"\end{longtable}"]) + "\n"
 

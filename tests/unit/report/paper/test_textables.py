@@ -146,9 +146,9 @@ TABLES = {
 
 
 def rows(text: str) -> list[str]:
-    """Rows of the body, the head left out."""
+    """Rows of the body, the head (on every page) left out."""
     lines = [line for line in text.splitlines() if line.endswith(r" \\")]
-    return lines[1:]
+    return [line for line in lines if line != lines[0]]
 
 
 def test_rows_and_columns_of_a_table():
