@@ -13,6 +13,7 @@ from pdrom.model.compiled import rows
 from pdrom.model.compiled.arithmetic import add, constant, subtract, transposed
 from pdrom.model.compiled.rows import WIDTH, at
 from pdrom.model.constraints.base import StencilGroup
+from pdrom.model.constraints.element_order import visiting_order
 from pdrom.model.constraints.lanes import LANES, blocks, lane_function, load, pack, save, workspace
 from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, LocalKernel
 
@@ -44,8 +45,10 @@ class SimplexGroup(StencilGroup):
     def _assemble(self, vertices: int) -> None:
         super()._assemble(vertices)
         e, m = self.stencil.shape
-        self._corners = pack(np.asarray(self.stencil, dtype=np.int32))
-        numbers = np.column_stack([self.weights, *self._extra()])
+        self._order = visiting_order(self.stencil, vertices)
+        visited = self._visited(np.asarray(self.stencil, dtype=np.int32))
+        self._corners = pack(visited)
+        numbers = self._visited(np.column_stack([self.weights, *self._extra()]))
         self._geometry = pack(numbers)
         # the copies that fill up the last block have no force and no energy
         by_lane = self._geometry.reshape(blocks(e), numbers.shape[1], LANES)
@@ -59,11 +62,16 @@ class SimplexGroup(StencilGroup):
             e >= self.split_from,
             self._arrays(np.empty(0, np.int64)),
             (self._work.shape[1], 0),
-            lambda block: self.stencil[block * LANES :],
+            lambda block: visited[block * LANES :],
         )
 
+    def _visited(self, values: np.ndarray) -> np.ndarray:
+        """Values (e, ...) of the elements in the order in which the kernel visits them."""
+        return values if self._order is None else values[self._order]
+
     def sampler(self, elements: np.ndarray) -> LocalKernel:
-        vertices, arrays = self.S.shape[1], self._arrays(elements)
+        places = elements if self._order is None else np.argsort(self._order)[elements]
+        vertices, arrays = self.S.shape[1], self._arrays(places)
         numbers = (self._work.shape[1], len(elements))
         return LocalKernel.of(
             self.project_kernel, vertices, blocks(self.elements), False, arrays, numbers

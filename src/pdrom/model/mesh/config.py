@@ -1,21 +1,26 @@
 """Typed configuration of a mesh: a generator with its parameters, or a file."""
 
-import hashlib
-import json
+import logging
 import re
 from math import prod
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
+import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from pdrom.core.errors import MeshError
-from pdrom.core.yamlfile import ConfigModel, Length, PositiveLength
+from pdrom.core.yamlfile import Length, PositiveLength
 from pdrom.model.mesh.checks import check_mesh, check_range
 from pdrom.model.mesh.files import read_mesh_file
-from pdrom.model.mesh.generators import bar, cloth
+from pdrom.model.mesh.generators import Plane, bar, cloth
 from pdrom.model.mesh.limits import MAX_VERTICES
+from pdrom.model.mesh.mesh_model import MeshModel
+from pdrom.model.mesh.orientation import turned_alike
+from pdrom.model.mesh.shape_config import DiscMesh, ShellMesh, SolidMesh
 from pdrom.model.mesh.types import Mesh
+
+log = logging.getLogger(__name__)
 
 Count = Annotated[int, Field(ge=2, le=2000)]
 
@@ -27,33 +32,13 @@ def _check_size(**counts: int) -> None:
         raise ValueError(f"{product} are {total} vertices, allowed: at most {MAX_VERTICES}")
 
 
-class _Model(ConfigModel):
-    """Base of the kinds of meshes."""
-
-    @property
-    def label(self) -> str:
-        """What messages call the mesh."""
-        raise NotImplementedError(f"{type(self).__name__} has no label")
-
-    @property
-    def identifier(self) -> str:
-        """File name of the mesh: readable, and different for different parameters."""
-        canonical = json.dumps(self.model_dump(mode="json"), sort_keys=True)
-        return f"{self.label}_{hashlib.sha256(canonical.encode()).hexdigest()[:8]}"
-
-    @property
-    def sources(self) -> list[str]:
-        """Files of the project that the mesh is read from; none for one that is generated."""
-        return []
-
-
-class ClothMesh(_Model):
+class ClothMesh(MeshModel):
     """Sheet of the generator `pdrom.model.mesh.generators.cloth`; lengths in metres."""
 
     kind: Literal["cloth"]
     rows: Count = 20
     columns: Count = 20
-    plane: Literal["xy", "xz"] = "xy"
+    plane: Plane = "xy"
     extent: PositiveLength = 1.0
     lift: Length = 2.0
     wave: Length = 0.0
@@ -78,7 +63,7 @@ class ClothMesh(_Model):
         return f"cloth_{self.rows}x{self.columns}_{self.plane}"
 
 
-class BarMesh(_Model):
+class BarMesh(MeshModel):
     """Bar of the generator `pdrom.model.mesh.generators.bar`; lengths in metres."""
 
     kind: Literal["bar"]
@@ -108,7 +93,7 @@ class BarMesh(_Model):
         return f"bar_{self.nx}x{self.ny}x{self.nz}"
 
 
-class MeshFile(_Model):
+class MeshFile(MeshModel):
     """A mesh file below the project's folder, of a format that keeps it in one file."""
 
     kind: Literal["file"]
@@ -129,11 +114,31 @@ class MeshFile(_Model):
         return self
 
     def build(self, root: Path) -> Mesh:
-        """Read the mesh."""
+        """Read the mesh; triangles listed the other way round than their neighbours are turned over.
+
+        Raises
+        ------
+        MeshError, DegenerateElementError
+            An unreadable or faulty file, see `read_mesh_file` and `check_mesh`, or a surface with
+            one side only.
+        """
         mesh = read_mesh_file(self.file(root))
         check_range(mesh.points, self.scale, self.path)
         scaled = Mesh(mesh.points * self.scale, mesh.triangles, mesh.tetrahedra)
-        return check_mesh(scaled, self.path)
+        check_mesh(scaled, self.path)
+        return scaled if len(scaled.tetrahedra) else self._turned(scaled)
+
+    def _turned(self, mesh: Mesh) -> Mesh:
+        turned = turned_alike(mesh.triangles, self.path)
+        if not turned.any():
+            return mesh
+        log.warning(
+            "%s: %d of %d triangles are listed the other way round than their neighbours, the "
+            "first is %d: they are turned over",
+            self.path, turned.sum(), len(turned), np.argmax(turned),
+        )  # fmt: skip
+        triangles = np.where(turned[:, None], mesh.triangles[:, ::-1], mesh.triangles)
+        return Mesh(mesh.points, triangles)
 
     @property
     def sources(self) -> list[str]:
@@ -157,4 +162,4 @@ class MeshFile(_Model):
         return re.sub(r"[^A-Za-z0-9_-]", "_", Path(self.path).stem)[:40]
 
 
-MeshConfig = Annotated[ClothMesh | BarMesh | MeshFile, Field(discriminator="kind")]
+MeshConfig = Annotated[ClothMesh | BarMesh | DiscMesh | ShellMesh | SolidMesh | MeshFile, Field(discriminator="kind")]
