@@ -1,19 +1,20 @@
-"""The order in which a local step visits its elements, so that vertices are still in the cache.
+"""The order in which a local step visits its elements.
 
-Meshers list elements in the order in which they were made, neighbours far apart. What a group shows
-to others (S, weights, projections) keeps the order of the mesh; only its kernel's own arrays do not.
+A kernel projects a block of elements in lanes, and a block takes the expensive path as soon as one
+of its elements needs it. Neighbours are in like states, so that blocks of neighbours are cheap
+where little happens; their vertices are also in the cache still. Meshers list elements in the order
+in which they were made, neighbours far apart. What a group shows to others (S, weights,
+projections) keeps the order of the mesh; only the arrays of its kernels do not.
 """
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-# Fewer elements have their vertices in the cache anyhow.
-FROM = 10_000
-# Elements whose vertices are in the innermost cache together.
-WINDOW = 512
-# The order of the mesh is kept if it loads at most so many times the vertices that the other does.
-# It is what grids have, whose results shall not depend on what is here.
+from pdrom.model.constraints.lanes import LANES
+
+# The order of the mesh is kept if its blocks have at most so many times the vertices that others
+# would have. Grids keep theirs.
 KEPT = 1.5
 
 
@@ -28,12 +29,10 @@ def visiting_order(stencil: np.ndarray, vertices: int) -> np.ndarray | None:
     stencil : (e, m) vertices of each element
     vertices : number of all vertices
     """
-    if len(stencil) < FROM:
-        return None
     rank = np.empty(vertices, dtype=np.int64)
     rank[csgraph.reverse_cuthill_mckee(_neighbours(stencil, vertices), True)] = np.arange(vertices)
     order = np.lexsort(np.sort(rank[stencil], axis=1).T[::-1])
-    return order if _loads(stencil) > KEPT * _loads(stencil[order]) else None
+    return order if _corners(stencil) > KEPT * _corners(stencil[order]) else None
 
 
 def _neighbours(stencil: np.ndarray, vertices: int) -> sparse.csr_array:
@@ -44,7 +43,8 @@ def _neighbours(stencil: np.ndarray, vertices: int) -> sparse.csr_array:
     return sparse.csr_array(incidence.T @ incidence)
 
 
-def _loads(stencil: np.ndarray) -> int:
-    """How often a vertex is loaded if each window of elements begins with an empty cache."""
-    windows = np.array_split(stencil, -(-len(stencil) // WINDOW))
-    return sum(len(np.unique(window)) for window in windows)
+def _corners(stencil: np.ndarray) -> int:
+    """How many vertices the blocks have, added up."""
+    blocks = np.arange(len(stencil)) // LANES
+    pairs = blocks[:, None] * (int(stencil.max()) + 1) + stencil
+    return len(np.unique(pairs))

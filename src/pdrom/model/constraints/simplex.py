@@ -5,7 +5,7 @@ matrix D of the rest shape (1 for springs). What differs from group to group is 
 block; gather and scatter are here, for blocks of elements (see `pdrom.model.constraints.lanes`).
 """
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -41,11 +41,13 @@ class SimplexGroup(StencilGroup):
 
     work_size = SIZE
     """Numbers of a lane in the working array."""
+    reordered: ClassVar[bool] = True
+    """Whether the kernel may visit the elements in another order than that of the mesh."""
 
     def _assemble(self, vertices: int) -> None:
         super()._assemble(vertices)
         e, m = self.stencil.shape
-        self._order = visiting_order(self.stencil, vertices)
+        self._order = visiting_order(self.stencil, vertices) if self.reordered else None
         visited = self._visited(np.asarray(self.stencil, dtype=np.int32))
         self._corners = pack(visited)
         numbers = self._visited(np.column_stack([self.weights, *self._extra()]))

@@ -114,7 +114,7 @@ class MeshFile(MeshModel):
         return self
 
     def build(self, root: Path) -> Mesh:
-        """Read the mesh; triangles listed the other way round than their neighbours are turned over.
+        """Read the mesh; triangles that face the other way than their neighbours are turned over.
 
         Raises
         ------
@@ -162,4 +162,6 @@ class MeshFile(MeshModel):
         return re.sub(r"[^A-Za-z0-9_-]", "_", Path(self.path).stem)[:40]
 
 
-MeshConfig = Annotated[ClothMesh | BarMesh | DiscMesh | ShellMesh | SolidMesh | MeshFile, Field(discriminator="kind")]
+MeshConfig = Annotated[
+    ClothMesh | BarMesh | DiscMesh | ShellMesh | SolidMesh | MeshFile, Field(discriminator="kind")
+]

@@ -1,9 +1,9 @@
 """The meshers behind unstructured shapes: Triangle in the plane, TetGen in space.
 
-J. R. Shewchuk, "Triangle: engineering a 2D quality mesh generator and Delaunay triangulator", 1996;
-H. Si, "TetGen, a Delaunay-based quality tetrahedral mesh generator", ACM TOMS 41(2), 2015. Both come
-with the package meshpy, which is imported when a scene has such a shape and not before. Equal input
-gives equal bytes.
+J. R. Shewchuk, "Triangle: engineering a 2D quality mesh generator and Delaunay triangulator",
+1996; H. Si, "TetGen, a Delaunay-based quality tetrahedral mesh generator", ACM TOMS 41(2), 2015.
+Both come with the package meshpy, which is imported when a scene has such a shape and not before.
+Equal input gives equal bytes.
 """
 
 from collections.abc import Callable
@@ -55,9 +55,7 @@ def triangulate(
     return np.array(made.points), np.array(made.elements, dtype=np.int32)
 
 
-def fill(
-    points: np.ndarray, triangles: np.ndarray, edge: float
-) -> tuple[np.ndarray, np.ndarray]:
+def fill(points: np.ndarray, triangles: np.ndarray, edge: float) -> tuple[np.ndarray, np.ndarray]:
     """Points (N, 3), those of the surface first, and tetrahedra (E, 4) inside a closed surface.
 
     The surface stays as it is. ``edge`` is the length about which edges inside have.
