@@ -12,8 +12,10 @@ import numpy as np
 
 # degrees; Triangle is proven to end up to 20.7 and ends up to 33 in practice
 SMALLEST_ANGLE = 30.0
-# edges of a triangle are at most so much longer than asked for
+# edges of a triangle are at most so much longer than asked for, where their images count
 LONGEST = 1.25
+# largest area of a triangle over that of the equilateral one, where they do not
+LARGEST = 1.2
 # Volume of a regular tetrahedron over its edge cubed. TetGen stays below the largest volume that it
 # is given, by about a third on average.
 REGULAR, MARGIN = np.sqrt(2.0) / 12.0, 1.3
@@ -23,8 +25,8 @@ def triangulate(
     points: np.ndarray,
     segments: np.ndarray,
     hole: np.ndarray | None,
-    image: Callable[[np.ndarray], np.ndarray],
     edge: float,
+    image: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points (N, 2) and triangles (T, 3), anticlockwise, of a region of the plane.
 
@@ -32,12 +34,13 @@ def triangulate(
     ----------
     points, segments : (n, 2), (n, 2) its boundary, which stays as it is and comes first
     hole : (2,) a point in a hole of the region, None if it has none
-    image : maps points (m, 2) to where their edges are measured, (m, 2 or 3)
-    edge : length about which edges have there
+    edge : length about which edges have
+    image : maps points (m, 2) to where their edges are measured, (m, 3); None: in the plane
     """
     from meshpy import triangle
 
     def too_large(corners: list[tuple[float, float]], _area: float) -> bool:
+        assert image is not None
         there = image(np.array([(corner[0], corner[1]) for corner in corners]))
         longest = np.linalg.norm(there - np.roll(there, 1, axis=0), axis=1).max()
         return bool(longest > LONGEST * edge)
@@ -48,7 +51,8 @@ def triangulate(
     region.set_holes([] if hole is None else [hole.tolist()])
     made = triangle.build(
         region,
-        refinement_func=too_large,
+        refinement_func=too_large if image else None,
+        max_volume=None if image else LARGEST * np.sqrt(3.0) / 4.0 * edge**2,
         min_angle=SMALLEST_ANGLE,
         allow_boundary_steiner=False,
     )

@@ -37,7 +37,7 @@ def disc(edge: float, hole: float, plane: Plane, extent: float, lift: float) -> 
     segments = [_loop(len(rims[0])), *(_loop(len(rim), len(rims[0])) for rim in rims[1:])]
     middle = np.zeros(2) if hole > 0.0 else None
     uv, triangles = triangulate(
-        np.concatenate(rims), np.concatenate(segments), middle, lambda points: points, edge / extent
+        np.concatenate(rims), np.concatenate(segments), middle, edge / extent
     )
     u, v = extent * uv.T
     points = np.column_stack((u, v, 0.0 * u) if plane == "xy" else (u, 0.0 * u, v))
@@ -85,9 +85,9 @@ def _deformed(shape: Map, edge: float) -> Surface:
     upper, lower = half(1), half(-1)
     rim = _on_circle(_spaced(lambda t: upper(_on_circle(t)), edge))
     n, segments = len(rim), _loop(len(rim))
-    top, above = triangulate(rim, segments, None, upper, edge)
+    top, above = triangulate(rim, segments, None, edge, upper)
     turned = np.roll(rim, -TURNED, axis=0)
-    bottom, below = triangulate(turned, segments, None, lower, edge)
+    bottom, below = triangulate(turned, segments, None, edge, lower)
     shared = (np.arange(n) + TURNED) % n
     number = np.concatenate([shared, len(top) + np.arange(len(bottom) - n)]).astype(np.int32)
     points = np.concatenate([upper(top), lower(bottom[n:])])
@@ -127,7 +127,7 @@ def _torus(edge: float) -> Surface:
         np.column_stack([0.0 * v, np.append(height, v[:0:-1])]),
     ]
     rim = np.round(np.concatenate(sides), 12)
-    uv, triangles = triangulate(rim, _loop(len(rim)), None, image, edge)
+    uv, triangles = triangulate(rim, _loop(len(rim)), None, edge, image)
     # vertices of the right and the upper side are those opposite, all corners are the first one
     n, m = len(u), len(v)
     same = np.arange(len(uv))
