@@ -8,16 +8,18 @@ same.
 """
 
 import numpy as np
-from numba import njit
 
+from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import flat
 
 # Relative Tikhonov term of the small least-squares problem: nearly parallel residual differences
 # (close to convergence) must not blow up the weights.
 REGULARISATION = 1e-14
+# Entries of the history's counts: differences so far (-1: no iterate yet), refused iterates.
+DIFFERENCES, REFUSED = 0, 1
 
 
-@njit(cache=True)
+@compiled
 def _dot(a, b):
     total = 0.0
     for i in range(len(a)):
@@ -25,7 +27,7 @@ def _dot(a, b):
     return total
 
 
-@njit(cache=True)
+@compiled
 def _weights(gram, projection, count):
     """Solve the regularised normal equations (count, count) by Cholesky; zero weights if they
     are not positive definite, so that the plain image is taken."""
@@ -55,21 +57,36 @@ def _weights(gram, projection, count):
     return weights
 
 
-@njit(cache=True)
-def _mix(start, image, residual, last_image, residuals, images, gram, slot, count, first):
-    """Put the new differences into ``slot`` and overwrite ``image`` by the combination.
+@compiled
+def refuse(history, y, objective):
+    """See `Anderson.refuse`; ``y`` (n,) are all numbers of the iterate."""
+    start, _, image, _, _, _, numbers, last = history
+    if numbers[DIFFERENCES] >= 1 and objective > last[0]:
+        y[:] = image
+        numbers[DIFFERENCES] = -1
+        numbers[REFUSED] += 1
+        return True
+    last[0] = objective
+    start[:] = y
+    return False
 
-    ``residual`` and ``last_image`` hold those of the previous iterate and receive the new ones.
-    """
+
+@compiled
+def combine(history, image):
+    """See `Anderson.combine`; ``image`` (n,) are all numbers of G(y)."""
+    start, residual, last_image, residuals, images, gram, numbers, _ = history
+    numbers[DIFFERENCES] += 1
+    differences, window = numbers[DIFFERENCES], len(gram)
+    count, slot = min(differences, window), (differences - 1) % window
     n = len(image)
     for i in range(n):
         new = image[i] - start[i]
-        if not first:
+        if differences:
             residuals[slot, i] = new - residual[i]
             images[slot, i] = image[i] - last_image[i]
         residual[i] = new
         last_image[i] = image[i]
-    if first:
+    if not differences:
         return
     projection = np.empty(count)
     for j in range(count):
@@ -81,9 +98,20 @@ def _mix(start, image, residual, last_image, residuals, images, gram, slot, coun
             image[i] -= weights[j] * images[j, i]
 
 
-def _numbers(y: np.ndarray) -> np.ndarray:
-    """All numbers of y, not copied: of a view of rows of four with their zeros."""
-    return y.reshape(-1) if y.flags.c_contiguous else flat(y)
+def _history(window: int, n: int) -> tuple[np.ndarray, ...]:
+    """What is kept of a frame's iterates of n numbers.
+
+    The accepted iterate, and the residual and image of the one before (n,); ``window`` differences
+    of residuals and of images (window, n), the Gram matrix of the former; `DIFFERENCES` so far and
+    iterates `REFUSED`; the objective of the accepted iterate (1,).
+    """
+    vectors = [np.empty(n) for _ in range(3)]
+    differences = [np.empty((window, n)) for _ in range(2)]
+    return (*vectors, *differences, np.empty((window, window)), np.zeros(2, np.int64), np.empty(1))
+
+
+# Of iterations without acceleration.
+NO_HISTORY = _history(0, 0)
 
 
 class Anderson:
@@ -92,46 +120,40 @@ class Anderson:
     Parameters
     ----------
     window : how many differences of earlier iterates are combined
+
+    Attributes
+    ----------
+    history : what `refuse` and `combine` of compiled loops take
     """
 
     def __init__(self, window: int) -> None:
         self._window = window
-        self._start = np.empty(0)
-        self.refused = 0
+        self.history = _history(window, 0)
+
+    @property
+    def refused(self) -> int:
+        """How many iterates were refused so far."""
+        return int(self.history[6][REFUSED])
 
     def begin_frame(self, y: np.ndarray) -> None:
         """Forget the last frame; ``y`` (n, 3) is the first iterate of this one."""
-        n = len(_numbers(y))
-        if n != len(self._start):
-            self._allocate(n)
-        self._differences = -1
-        self._last = np.inf
-
-    def _allocate(self, n: int) -> None:
-        self._start, self._residual, self._image = (np.empty(n) for _ in range(3))
-        self._residuals, self._images = (np.empty((self._window, n)) for _ in range(2))
-        self._gram = np.empty((self._window, self._window))
+        n, refused = _numbers(y).size, self.refused
+        if n != len(self.history[0]):
+            self.history = _history(self._window, n)
+        self.history[6][:] = -1, refused
+        self.history[7][:] = np.inf
 
     def refuse(self, y: np.ndarray, objective: float) -> bool:
         """Whether the iterate ``y`` raises the objective (J); it is then replaced by the plain
         image of the last one and the history is dropped. An unknown objective (nan) never does.
         """
-        if self._differences >= 1 and objective > self._last:
-            _numbers(y)[...] = self._image
-            self._differences = -1
-            self.refused += 1
-            return True
-        self._last = objective
-        np.copyto(self._start, _numbers(y))
-        return False
+        return refuse(self.history, _numbers(y), objective)
 
     def combine(self, image: np.ndarray) -> None:
         """Overwrite ``image`` = G(y) of the accepted y by the next iterate."""
-        self._differences += 1
-        first = self._differences == 0
-        slot = (self._differences - 1) % self._window
-        count = min(self._differences, self._window)
-        _mix(
-            self._start, _numbers(image), self._residual, self._image, self._residuals,
-            self._images, self._gram, slot, count, first,
-        )  # fmt: skip
+        combine(self.history, _numbers(image))
+
+
+def _numbers(y: np.ndarray) -> np.ndarray:
+    """All numbers of y, not copied: of a view of rows of four with their zeros."""
+    return y.reshape(-1) if y.flags.c_contiguous else flat(y)

@@ -15,6 +15,7 @@ from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.constraints.local_kernel import PARTS, PREPARE, LocalPass, add_part
 from pdrom.model.constraints.second_thread import LINE, both, publish, wait_for
+from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, combine, refuse
 from pdrom.model.dynamics.sweeps import sweep
 from pdrom.model.dynamics.system import Elimination
 
@@ -26,12 +27,19 @@ class CompiledIterations:
     ----------
     local_steps : objects with ``local_kernel`` and ``threads``
     inertia : (N,) M / h^2
+    acceleration : begun with each frame by the step loop
     """
 
-    def __init__(self, local_steps: Sequence[Any], inertia: np.ndarray) -> None:
+    def __init__(
+        self,
+        local_steps: Sequence[Any],
+        inertia: np.ndarray,
+        acceleration: Anderson | None = None,
+    ) -> None:
         self._steps = list(local_steps)
         self._pass = LocalPass([step.local_kernel for step in local_steps])
         self._inertia = inertia
+        self._acceleration = acceleration
         self._counters = np.zeros(3 * LINE, np.int64)
         self._energy = np.zeros(1)
         self._clock = clock()
@@ -42,7 +50,8 @@ class CompiledIterations:
 
     def run(
         self,
-        count: int,
+        which: range,
+        iterations: int,
         objective: np.ndarray,
         y: np.ndarray,
         s: np.ndarray,
@@ -50,19 +59,21 @@ class CompiledIterations:
         elimination: Elimination,
         seconds: np.ndarray,
     ) -> None:
-        """Do ``count`` iterations in place.
+        """Do the iterations ``which`` of a frame's ``iterations`` K in place.
 
         Parameters
         ----------
-        objective : (count,) receives the objective at the iterates; empty if nobody asks
+        objective : (K,) receives the objective at the iterates; empty if nobody asks
         y, base : (N, 3) views of rows of four: iterate, (M/h^2) s
         s : (N, 3) prediction
         seconds : (4,) times of the local and of the global steps are added to entries 1 and 2
         """
-        local = self._pass
+        local, count = self._pass, len(which)
+        history = NO_HISTORY if self._acceleration is None else self._acceleration.history
+        asked = len(objective) > 0 or self._acceleration is not None
         right = np.empty(WIDTH * len(y))
         iterate, start = rows.flat(y), rows.flat(base)
-        prediction = rows.flat(s) if len(objective) else start
+        prediction = rows.flat(s) if asked else start
         factor = elimination.factor
         threads = max((step.threads for step in self._steps), default=1) if local.parts == 2 else 1
         touched = local.touched
@@ -73,8 +84,9 @@ class CompiledIterations:
 
         def first() -> float:
             return _iterate(
-                count, iterate, prediction, start, right, self._inertia, tables, shared, places,
-                threads == 2, factor, objective, seconds, self._clock,
+                which.start, which.stop, iterations, iterate, prediction, start, right,
+                self._inertia, tables, shared, places, threads == 2, factor, history, objective,
+                seconds, self._clock,
             )  # fmt: skip
 
         def second() -> float:
@@ -107,37 +119,46 @@ def _assist(count, y, tables, shared, places):
 
 @compiled(nogil=True)
 def _iterate(
-    count, y, s, base, rhs, inertia, tables, shared, places, assisted, factor, objective, seconds,
-    watch,
+    first, end, iterations, y, s, base, rhs, inertia, tables, shared, places, assisted, factor,
+    history, objective, seconds, watch,
 ):  # fmt: skip
     addresses, records, preparing, second = tables
     _, shared_energy, other, start, stop = shared
     given, done = places
     panels, vertices, loads, work = factor
-    for k in range(count):
+    window = len(history[5])
+    for k in range(first, end):
         before = now(watch)
         rhs[:] = base
         add_part(preparing[0], preparing[1], PREPARE, y.ctypes.data, rhs.ctypes.data)
         if assisted:
-            publish(given, k + 1)
+            publish(given, k - first + 1)
         energy = add_part(addresses, records, PARTS[0], y.ctypes.data, rhs.ctypes.data)
         if stop > start:
             if assisted:
-                wait_for(done, k + 1)
+                wait_for(done, k - first + 1)
             else:
                 shared_energy[0] = _second_part(second, y, other, start, stop)
             energy += shared_energy[0]
             for i in range(WIDTH * start, WIDTH * stop):
                 rhs[i] += other[i]
         between = now(watch)
-        if len(objective):
-            objective[k] = energy + _inertia_energy(y, s, inertia)
-            between_energy = now(watch)
-        else:
-            between_energy = between
-        sweep(panels, vertices, loads, work, rhs, y)
         seconds[1] += between - before
-        seconds[2] += now(watch) - between_energy
+        value = np.nan
+        if len(objective) or window:
+            value = energy + _inertia_energy(y, s, inertia)
+        if len(objective):
+            objective[k] = value
+            between = now(watch)
+        if window and refuse(history, y, value):
+            if len(objective):
+                objective[k] = objective[k - 1]
+        else:
+            sweep(panels, vertices, loads, work, rhs, y)
+            # the last image stays as it is: its objective is known not to rise
+            if window and k < iterations - 1:
+                combine(history, y)
+        seconds[2] += now(watch) - between
     return 0.0
 
 

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from pdrom.model.compiled.rows import WIDTH, flat, unflat
+from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.frames import end, predict, weighted
 from pdrom.model.dynamics.iterations import CompiledIterations
 from pdrom.model.dynamics.system import GlobalSystem
@@ -35,7 +36,9 @@ class Space(ABC):
         """Coordinates and velocities at the end of a frame that began at ``before``."""
         return y, (y - before) / h
 
-    def compiled(self, local_steps: Sequence[Any]) -> CompiledIterations | None:
+    def compiled(
+        self, local_steps: Sequence[Any], acceleration: Anderson | None = None
+    ) -> CompiledIterations | None:
         """Compiled iterations with these local steps, None if there are none."""
         return None
 
@@ -111,10 +114,12 @@ class VertexSpace(Space):
     def end(self, y: np.ndarray, before: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
         return end(flat(y), before, h)
 
-    def compiled(self, local_steps: Sequence[Any]) -> CompiledIterations | None:
+    def compiled(
+        self, local_steps: Sequence[Any], acceleration: Anderson | None = None
+    ) -> CompiledIterations | None:
         if any(getattr(step, "local_kernel", None) is None for step in local_steps):
             return None
-        return CompiledIterations(local_steps, self.system.inertia)
+        return CompiledIterations(local_steps, self.system.inertia, acceleration)
 
     def inertia(self, s: np.ndarray) -> np.ndarray:
         return unflat(weighted(self.system.inertia, flat(s)))

@@ -73,7 +73,7 @@ class Stepper:
         self.local_steps = list(local_steps)
         self._acceleration = acceleration
         self._track = track_objective
-        self._compiled = None if acceleration is not None else space.compiled(self.local_steps)
+        self._compiled = space.compiled(self.local_steps, acceleration)
 
     def step(
         self,
@@ -118,15 +118,18 @@ class Stepper:
         """
         y = self.space.copy(s)
         objective = np.full(self.iterations if self._track else 0, np.nan)
+        if self._acceleration is not None:
+            self._acceleration.begin_frame(y)
         if self._compiled is None or not self._compiled.takes(elimination):
             self._one_by_one(s, base, elimination, y, objective, seconds, on_last_iterate)
             return y, objective
-        unseen = self.iterations - (on_last_iterate is not None)
-        rest = (y, s, base, elimination, seconds)
-        self._compiled.run(unseen, objective[:unseen], *rest)
+        rest = (objective, y, s, base, elimination, seconds)
+        iterations = range(self.iterations)
         if on_last_iterate is not None:
+            self._compiled.run(iterations[:-1], self.iterations, *rest)
             on_last_iterate(y)
-            self._compiled.run(1, objective[unseen:], *rest)
+            iterations = iterations[-1:]
+        self._compiled.run(iterations, self.iterations, *rest)
         return y, objective
 
     def _one_by_one(
@@ -142,8 +145,6 @@ class Stepper:
         """All iterations with local steps of any kind, in place."""
         space, acceleration = self.space, self._acceleration
         rhs = space.copy(base)
-        if acceleration is not None:
-            acceleration.begin_frame(y)
         for k in range(self.iterations):
             if on_last_iterate is not None and k == self.iterations - 1:
                 on_last_iterate(y)
