@@ -8,6 +8,7 @@ from pdrom.tables.declaration import integer, number, table, text, timed
 from pdrom.tables.vocabulary import METHOD, SCENE, THREADS
 
 QUANTITIES = ("ms_per_iteration", "local_ms", "global_ms", "factorisation_ms", "memory_mb")
+FEWEST = 3  # sizes
 
 
 @table(
@@ -25,14 +26,14 @@ QUANTITIES = ("ms_per_iteration", "local_ms", "global_ms", "factorisation_ms", "
 def scaling_fit(scaling: pd.DataFrame) -> pd.DataFrame:
     """Exponents of power laws in the number of vertices, by least squares on the logarithms.
 
-    A quantity with fewer than two sizes has no row.
+    Any two points lie on a power law: a quantity with fewer than three sizes has no row.
     """
     rows = []
     for labels, part in scaling.groupby(["scene", "method", "threads"], sort=False):
         for quantity in QUANTITIES:
             points = part[["vertices", quantity]].dropna()
             points = points[points[quantity] > 0.0].astype(float)
-            if points.vertices.nunique() < 2:
+            if points.vertices.nunique() < FEWEST:
                 continue
             exponent, _ = np.polyfit(np.log(points.vertices), np.log(points[quantity]), 1)
             row = dict(zip(("scene", "method", "threads"), labels, strict=True))

@@ -30,9 +30,12 @@ def test_exponents_of_exact_power_laws():
     assert fitted.points.tolist() == [3] * 5
 
 
-def test_one_size_or_nothing_measured_has_no_exponent():
-    table = power_laws([1.0] * 5, sizes=(100,))
-    assert scaling_fit(table).empty
+@pytest.mark.parametrize("sizes", [(100,), (100, 1000)])
+def test_fewer_than_three_sizes_have_no_exponent(sizes):
+    assert scaling_fit(power_laws([1.0] * 5, sizes)).empty
+
+
+def test_what_was_not_measured_has_no_exponent():
     table = power_laws([1.0] * 5)
     table["memory_mb"] = [0.0, 0.0, 4.0]
     assert "memory_mb" not in set(scaling_fit(table).quantity)

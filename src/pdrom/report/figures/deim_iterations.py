@@ -15,8 +15,10 @@ FIGURE = Declaration(
     title="The first iterations of DEIM",
     caption=(
         "In step $k$ the residual of mode $k$ is taken against the modes before it, interpolated "
-        "at the entries picked so far, and the entry where it is largest is picked next (ringed). "
-        "Dark elements have a large residual; it vanishes at every entry that was picked before."
+        "at the entries picked so far, and the entry where it is largest in absolute value is "
+        "picked next. An element has the colour of its largest entry, so that the ringed one, "
+        "which holds the picked entry, is the darkest; white dots are elements picked before. Each "
+        "step asks for one number, whose whole element has to be projected for it."
     ),
     reads=(
         Chosen(MESH, first=True),

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.paths import RERUNS
 from pdrom.model.mesh.generators import bar, cloth
+from pdrom.reduction.sampling.block import block_elements
 from pdrom.reduction.sampling.deim import deim_entries
 from pdrom.report.figures.drawings.snapshots_and_modes import MAGNITUDE
 from pdrom.report.figures.kit import style
@@ -205,7 +206,7 @@ def test_residuals_are_those_of_deim():
             coefficients = np.linalg.solve(V[picked, : step.k - 1], V[picked, step.k - 1])
         residual = V[:, step.k - 1] - V[:, : step.k - 1] @ coefficients
         assert step.entry == np.argmax(np.abs(residual))
-        assert np.allclose(step.magnitude, np.linalg.norm(residual.reshape(-1, 6), axis=1))
+        assert np.allclose(step.magnitude, np.abs(residual.reshape(-1, 6)).max(axis=1))
         assert step.newest == step.entry // 6
         assert list(step.earlier) == [e // 6 for e in picked]
 
@@ -222,6 +223,15 @@ def test_residuals_of_blocks_and_joint_rows():
     other = V.reshape(-1, 3, 5)[5]
     coefficient = V.reshape(-1, 3, 5)[4, :, 1] / V.reshape(-1, 3, 5)[4, :, 0]
     assert second == pytest.approx(np.linalg.norm(other[:, 1] - coefficient * other[:, 0]))
+
+
+@pytest.mark.parametrize("rows", ["scalar", "element"])
+def test_the_picked_element_is_the_darkest(rows):
+    V = np.linalg.qr(np.random.default_rng(5).standard_normal((60, 6)))[0]
+    blocks = (6 * block_elements(V, 6)[:, None] + np.arange(6)).ravel()
+    entries = deim_entries(V) if rows == "scalar" else blocks
+    for step in iterations(V, entries, 2, rows, 6):
+        assert step.newest == np.argmax(step.magnitude)
 
 
 def test_entries_outside_the_basis_are_refused():

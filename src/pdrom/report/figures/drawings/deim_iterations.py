@@ -20,7 +20,14 @@ from pdrom.report.figures.kit.read import read_basis, read_samplings
 from pdrom.report.figures.kit.residual import Iteration, iterations
 from pdrom.report.figures.kit.results import NothingToDraw, Results, asked
 
-NEWEST, EARLIER = style.SKY, "#FFFFFF"
+EARLIER = {
+    "markerfacecolor": "#FFFFFF", "markeredgecolor": style.BLACK, "markeredgewidth": 0.8,
+    "markersize": 3.0,
+}  # fmt: skip
+NEWEST = {
+    "markerfacecolor": "none", "markeredgecolor": style.SKY, "markeredgewidth": 1.6,
+    "markersize": 8.5,
+}  # fmt: skip
 
 
 def draw(results: Results, options: Options) -> Figure:
@@ -75,7 +82,7 @@ def _draw_steps(
         ScalarMappable(norm, MAGNITUDE), ax=list(axes[: len(steps)]), aspect=25, pad=0.01,
         fraction=0.03,
     )  # fmt: skip
-    bar.set_label("residual / largest")
+    bar.set_label("residual of the element / largest")
     _legend(figure)
     return figure
 
@@ -83,20 +90,13 @@ def _draw_steps(
 def _mark(ax: Axes, step: Iteration, elements: ElementMap, camera: Camera) -> None:
     centres = camera.project(elements.centres(elements.mesh.points))
     if len(step.earlier):
-        ax.scatter(*centres[step.earlier].T, s=16, zorder=5, **_dot(EARLIER))
-    newest = centres[step.newest]
-    ax.scatter(*newest, s=110, zorder=6, facecolors="none", edgecolors=style.BLACK, linewidths=1.2)
-    ax.scatter(*newest, s=20, zorder=7, **_dot(NEWEST))
-
-
-def _dot(colour: str) -> dict:
-    return {"facecolors": colour, "edgecolors": style.BLACK, "linewidths": 0.8}
+        ax.plot(*centres[step.earlier].T, "o", zorder=5, **EARLIER)
+    ax.plot(*centres[step.newest], "o", zorder=6, **NEWEST)
 
 
 def _legend(figure: Figure) -> None:
-    common = {"linestyle": "none", "marker": "o", "markeredgecolor": style.BLACK}
     handles = [
-        Line2D([], [], markerfacecolor=EARLIER, markersize=4.5, label="picked before", **common),
-        Line2D([], [], markerfacecolor=NEWEST, markersize=5, label="picked in this step", **common),
+        Line2D([], [], linestyle="none", marker="o", label="picked before", **EARLIER),
+        Line2D([], [], linestyle="none", marker="o", label="picked in this step", **NEWEST),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=2)

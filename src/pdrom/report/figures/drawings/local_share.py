@@ -11,9 +11,10 @@ from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 
+# the local step, whose share is printed, is what has a shade of orange
 PHASES = {
-    "local_ms": ("local projections", style.ORANGE),
-    "assembly_ms": ("right-hand side", style.SKY),
+    "local_ms": ("local step: projections", style.ORANGE),
+    "assembly_ms": ("local step: right-hand side", "#F7D08A"),
     "global_ms": ("global solve", style.BLUE),
 }
 COLUMNS = ["scene", "implementation", *PHASES, "local_share"]

@@ -26,8 +26,8 @@ OFFLINE = {
 TWO = "two threads"  # a method of its own here: the full-order run with two threads
 NAMES = {"fom": "full order", TWO: "full order, two threads", "ecsw": "POD subspace, ecsw"}
 COLOURS = {"fom": style.BLACK, TWO: "#8C8C8C", "ecsw": "#1B6E6E"}
-# whose exponent is printed, and how many points above the end of the line
-BESIDE = {"fom": 6, "ecsw": 5}
+FITTED = ("fom", "ecsw")  # whose exponent is printed
+ROOM = 2.6  # factor by which the axis goes on beyond the last mesh, for the exponents
 MARKERS = {"fom": "o", TWO: "s", "ecsw": ">"}
 
 
@@ -55,6 +55,8 @@ def draw(results: Results, options: Scenes) -> Figure:
         _draw_offline(lower, rows[rows.method == "fom"])
         ax.set_title(style.words(scene))
         lower.set_xlabel("vertices")
+    sizes = table[table.scene.isin(scenes)].vertices
+    times[0].set_xlim(0.75 * sizes.min(), ROOM * sizes.max())
     times[0].set_ylabel("time of an iteration (ms)")
     offline[0].set_ylabel("before the first frame")
     _legend(figure, results, list(dict.fromkeys(table.method)))
@@ -79,12 +81,12 @@ def _draw_times(ax: Axes, rows: pd.DataFrame, fits: pd.DataFrame) -> None:
                 marker=marker if line == "-" else None, linewidth=1.3 if line == "-" else 0.9,
             )  # fmt: skip
         own = (fits.method == method) & (fits.quantity == "ms_per_iteration")
-        if own.any() and method in BESIDE:
+        if own.any() and method in FITTED:
             end = part.iloc[-1]
             ax.annotate(
                 rf"$N^{{{fits[own].exponent.iloc[0]:.2f}}}$",
-                (end.vertices, end.ms_per_iteration), xytext=(-3, BESIDE[str(method)]),
-                textcoords="offset points", ha="right", color=colour, fontsize=7.5,
+                (end.vertices, end.ms_per_iteration), xytext=(5, 0),
+                textcoords="offset points", va="center", color=colour, fontsize=7.5,
             )  # fmt: skip
 
 

@@ -11,7 +11,9 @@ from pdrom.core.errors import StorageError
 class Iteration:
     """Step k of a greedy selection.
 
-    magnitude : (e,) norm of the residual of mode k on each element
+    magnitude : (e,) on each element the residual of mode k in the measure that the selection
+        takes the largest of: its largest entry (``rows`` "scalar"), the largest norm of one of its
+        rows over x, y, z ("joint"), or the norm of all its entries ("element")
     earlier, newest : elements picked before, and in this step
     entry : vector index of the (first) entry picked in this step
     """
@@ -53,13 +55,20 @@ def iterations(
         steps.append(
             Iteration(
                 k=k + 1,
-                magnitude=np.linalg.norm(residual.reshape(-1, 3 * rows_per_element), axis=1),
+                magnitude=_measured(residual, rows_per_element, rows),
                 earlier=picked[:-1],
                 newest=int(picked[-1]),
                 entry=int(entries[k * per_step]),
             )
         )
     return steps
+
+
+def _measured(residual: np.ndarray, rows_per_element: int, rows: str) -> np.ndarray:
+    """What is compared between elements (e,), of a residual (3 e p,)."""
+    length = {"scalar": 1, "joint": 3, "element": 3 * rows_per_element}[rows]
+    norms = np.linalg.norm(residual.reshape(-1, length), axis=1)
+    return norms.reshape(-1, 3 * rows_per_element // length).max(axis=1)
 
 
 def _shared_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
