@@ -6,6 +6,7 @@ from typing import Any
 import pandas as pd
 
 from pdrom.report.paper.claim_tables import claims, claims_in_full
+from pdrom.report.paper.cost_tables import break_even, exponents, iterations, positions
 from pdrom.report.paper.hard_tables import hard_cases, hard_reductions, kernel_accuracy
 from pdrom.report.paper.macros import format_number
 from pdrom.report.paper.tabular import longtable, name, tabular
@@ -169,6 +170,10 @@ TEX_TABLES = {
     "tab_local_share": local_share,
     "tab_stability": stability,
     "tab_guard": guard,
+    "tab_iterations": iterations,
+    "tab_positions": positions,
+    "tab_break_even": break_even,
+    "tab_exponents": exponents,
     "tab_hard_cases": hard_cases,
     "tab_hard_reductions": hard_reductions,
     "tab_kernel_accuracy": kernel_accuracy,

@@ -3,6 +3,7 @@
 import pandas as pd
 import pytest
 
+from pdrom.report.paper.cost_tables import break_even, exponents, iterations, positions
 from pdrom.report.paper.textables import (
     TEX_TABLES,
     claims,
@@ -16,9 +17,10 @@ from pdrom.report.paper.textables import (
 )
 from pdrom.report.paper.textables import scenes as scene_table
 
+ERROR = "relative_error_within_horizon"
 COLUMNS = [
     "scene", "group", "method", "position_basis", "r", "frames", "blowup_frame", "horizon_frame",
-    "relative_error_within_horizon",
+    ERROR, "k", "speedup",
 ]  # fmt: skip
 TABLES = {
     "methods": pd.DataFrame(
@@ -44,15 +46,54 @@ TABLES = {
     ),
     "reduced_reruns": pd.DataFrame(
         [
-            ("bar_a", "edge_spring", "pod", "full", 6, 10, None, 10, 0.5),
-            ("bar_a", "edge_spring", "pod", "full", 20, 10, None, 10, 0.25),
-            ("bar_a", "edge_spring", "pod", "full", 30, 0, None, 10, None),
-            ("bar_a", "edge_spring", "deim_x", "full", 6, 10, None, 10, 0.75),
-            ("bar_a", "edge_spring", "deim_x", "full", 20, 5, 4, 10, None),
-            ("b", "bending", "pod", "full", 6, 0, None, 7, None),
-            ("b", "all", "pod", "pod", 6, 10, None, 7, 0.125),
+            ("bar_a", "edge_spring", "pod", "full", 6, 10, None, 10, 0.5, None, None),
+            ("bar_a", "edge_spring", "pod", "full", 20, 10, None, 10, 0.25, None, None),
+            ("bar_a", "edge_spring", "pod", "full", 30, 0, None, 10, None, None, None),
+            ("bar_a", "edge_spring", "deim_x", "full", 6, 10, None, 10, 0.75, None, None),
+            ("bar_a", "edge_spring", "deim_x", "full", 20, 5, 4, 10, None, None, None),
+            ("b", "bending", "pod", "full", 6, 0, None, 7, None, None, None),
+            ("b", "all", "full", "pod", 6, 10, None, 7, 0.125, 6, 2.5),
+            ("b", "all", "ecsw-1e-02", "pod", 90, 10, None, 7, 0.375, 6, 4.0),
         ],
         columns=COLUMNS,
+    ),
+    "heldout_reruns": pd.DataFrame(
+        [("b", "all", "full", "pod", 6, 0.5)],
+        columns=["scene", "group", "method", "position_basis", "k", ERROR],
+    ),
+    "accuracy_cost": pd.DataFrame(
+        [
+            ("bar_a", "fom", 1, 0.5, 0.25),
+            ("bar_a", "fom", 10, 0.125, 2.0),
+            ("bar_a", "fom-anderson", 10, 0.0625, 3.0),
+            ("bar_a", "pod", None, 0.03, 1.0),
+        ],
+        columns=["scene", "method", "iterations", ERROR, "ms_per_frame"],
+    ),
+    "breakeven": pd.DataFrame(
+        [
+            ("bar_a", "edge_spring", "deim-joint", 1, 400, 1, 6, 20.0),
+            ("bar_a", "edge_spring", "deim-joint", 1, 400, 1, 20, 20.0),
+            ("bar_a", "edge_spring", "deim-joint", 1, 400, 2, 6, None),
+        ],
+        columns=[
+            "scene",
+            "group",
+            "method",
+            "factor",
+            "vertices",
+            "threads",
+            "r",
+            "breakeven_r",
+        ],
+    ),
+    "scaling_fit": pd.DataFrame(
+        [
+            ("bar_a", "fom", 1, "ms_per_iteration", 1.25, 3),
+            ("bar_a", "fom", 2, "ms_per_iteration", 1.5, 3),
+            ("bar_a", "ecsw", 1, "ms_per_iteration", 0.125, 3),
+        ],
+        columns=["scene", "method", "threads", "quantity", "exponent", "points"],
     ),
     "singular_values": pd.DataFrame(
         {
@@ -170,6 +211,28 @@ def test_every_row_has_a_cell_for_every_column(name):
         assert row.replace(r"\&", "").count("&") == head.count("&")
         assert "nan" not in row
     assert TEX_TABLES[name](TABLES) == text
+
+
+def test_iterations_have_error_and_time():
+    assert rows(iterations(TABLES)) == [
+        r"\texttt{bar\_a} & 0.50 (0.25) & -- & 0.12 (2) & -- & 0.062 (3) \\"
+    ]
+
+
+def test_positions_show_the_subspace_and_its_sample():
+    assert rows(positions(TABLES)) == [
+        r"\texttt{b} & 0.12 & 0.50 & 0.38 & -- & 90 & 4 & -- & -- & -- \\"
+    ]
+
+
+def test_a_reduction_that_always_pays_has_no_break_even():
+    assert rows(break_even(TABLES)) == [
+        r"\texttt{bar\_a} & edge spring & 400 & 20 & pays & -- & -- & -- & -- \\"
+    ]
+
+
+def test_exponents_of_one_thread():
+    assert rows(exponents(TABLES)) == [r"\texttt{bar\_a} & 3 & 1.2 & -- & -- & -- & 0.12 \\"]
 
 
 def test_reruns_show_the_largest_size_that_ran():
