@@ -92,8 +92,8 @@ def break_even(tables: Tables) -> str:
             for threads in (1, 2)
         ]
         rows.append([name(scene), escape(group.replace("_", " ")), str(int(vertices)), *cells])
-    titles = [f"{name(method)}, {n}" for method in _METHODS for n in (1, 2)]
-    narrow = r">{\raggedleft\arraybackslash}p{1.5cm}"
+    titles = [f"{escape(method)}, {n}" for method in _METHODS for n in (1, 2)]
+    narrow = r">{\raggedleft\arraybackslash}p{1.2cm}"
     return longtable(["scene", "group", "vertices", *titles], rows, "llr" + narrow * len(titles))
 
 
