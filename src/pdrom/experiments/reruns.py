@@ -153,8 +153,7 @@ class _Case:
             )  # fmt: skip
             energy = scale.ratio(outcome.positions)
             _store(store, outcome, displacement, seen)
-            if self.motion == "train":
-                store["positions"] = outcome.positions.astype(np.float32)
+            store["positions"] = outcome.positions.astype(np.float32)
             measured = {"energy_ratio": energy, "gain": reduction.gain, **seen.columns()}
             rows.append({**self.labels, "r": r, **_row(outcome, displacement), **measured})
             log.info("r = %d: %d frames, blow-up %s", r, outcome.frames, outcome.blowup_frame)

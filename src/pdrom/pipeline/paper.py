@@ -98,6 +98,9 @@ def _study(study: Study) -> Row:
         "guard_margin": settings.guard.margin,
         "guard_extent": settings.guard.extent,
         "guard_rise": settings.guard.rise,
+        "companion_modes": settings.companion.modes,
+        "companion_tolerance": settings.companion.tolerance,
+        "companion_alarm": settings.companion.alarm,
         "tolerance": settings.iterations.tolerance,
     }
 

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.names import SceneName
 from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
+from pdrom.experiments.companion import Companion
 from pdrom.experiments.guard import GuardSection
 from pdrom.experiments.hard_cases.experiment import HardCases
 from pdrom.experiments.iterations import IterationSweep
@@ -68,6 +69,7 @@ class StudySettings(ConfigModel):
     stability: Stability = Stability()
     noise: Noise = Noise()
     guard: GuardSection = GuardSection()
+    companion: Companion = Companion()
     hard_cases: HardCases = HardCases()
     online: Online = Online()
     viewer: Viewer = Viewer()

@@ -32,7 +32,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class SubspaceModel:
-    """Position basis ("pod" or "skinning"), its columns, and what is sampled of each group."""
+    """Kind of position basis, see `make_columns`, its columns, and what each group samples."""
 
     position_basis: str
     columns: Columns
@@ -71,12 +71,15 @@ def make_columns(scene: Scene, training: np.ndarray, kind: str, k: int) -> Colum
     Parameters
     ----------
     training : (n, N, 3) positions of the training frames
+    kind : "pod", "skinning", or "pod+skinning" with k modes of each
     """
     points, masses = scene.mesh.points, scene.masses
-    if kind == "pod":
-        modes = displacement_modes(training, points, masses, k)
-    else:
-        modes = skinning_modes(points, masses, k)
+    parts = []
+    if "pod" in kind:
+        parts.append(displacement_modes(training, points, masses, k))
+    if "skinning" in kind:
+        parts.append(skinning_modes(points, masses, k))
+    modes = np.hstack(parts)
     return build_columns(modes, points, masses, atoms(scene.boundaries, len(points)), training)
 
 

@@ -33,7 +33,7 @@ from places import ROOT
 
 FRAMES = 20
 SETTINGS = {"sensitivity.reference": 1e-10, "sensitivity.threshold": 1e-3,
-            "stability.wrong": 0.1, "stability.left": 2.0}  # fmt: skip
+            "stability.wrong": 0.1, "stability.left": 2.0, "companion.alarm": 0.15}  # fmt: skip
 ROWS = {"bending": 1, "spring": 1, "strain": 2, "deformation_gradient": 3, "tetrahedron_strain": 3}
 METHOD_ROWS = {"pod": "all", "deim": "scalar", "qdeim": "scalar", "deim-joint": "joint",
                "published": "joint", "block-deim": "element"}  # fmt: skip
@@ -57,6 +57,7 @@ TABLES = (
     "ladder", "scaling", "scaling_fit", "stability", "budget", "breakeven", "effects_cost",
     "effects_left_out", "reduced_reruns", "gain_prediction",
     "subspace_ablation", "noise", "claims_sensitivity", "bounds",
+    "estimates",
 )  # fmt: skip
 
 
@@ -303,6 +304,13 @@ def _write_tables(results, scenes, methods, rng) -> None:
         (scene, group, method, r, 20.0 * r, extent, 20.0 * r, r, np.isnan(end))
         for scene, group, method, r, _, extent, end, *_ in reruns
     ]
+    estimates = [
+        (scene, basis, split, error, 1.2 * error, 1.2, True, error > 1e-3)
+        for scene in scenes
+        for basis in ("full", "pod", "skinning")
+        for split in ("train", "heldout")
+        for error in (1e-5, 1e-2)
+    ]
     predictions = [
         ("gain", "10", "100", 40, 0.25, np.nan),
         ("gain", "10000", "inf", 2, 1.0, np.nan),
@@ -351,10 +359,12 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "subspace_ablation": "scene position_basis k r variant gain relative_error_within_horizon"
         " relative_error_full_projections",
         "bounds": "scene group method r bound max_extent slack contraction finite",
+        "estimates": "scene position_basis split relative_error_within_horizon estimate ratio"
+        " within resolved",
     }
     made = (
         values, errors, times, costs, ladder, runs, bought, ratios, shares, removed, reruns,
-        predictions, noise, variations, ablation, bounds,
+        predictions, noise, variations, ablation, bounds, estimates,
     )  # fmt: skip
     rows = dict(zip(columns, made, strict=True))
     for name, header in columns.items():

@@ -1,0 +1,70 @@
+"""A companion: a finer model that runs beside reduced runs and estimates their errors.
+
+The distance of a run to the companion stands for its distance to the full order (a hierarchical
+estimate, Bank and Weiser 1985). If the companion's own error is at most theta < 1 times that of the
+run, saturation, then by the triangle inequality the estimate lies between 1 - theta and 1 + theta
+times the error. The companion has the run's own scene and its forces, contacts and handles, the
+snapshot modes and as many skinning modes, which a motion that the training did not hold needs, and
+sampled elements of its own. It does not depend on the run: one companion serves all runs of a
+motion, and none of them needs the full order.
+"""
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.model.runs.bounded import BoundedRun
+from pdrom.model.scene import Scene
+from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
+
+
+class CompanionSpec(ConfigModel):
+    """A companion: modes of each kind, tolerance tau of its sampling, frames that train it."""
+
+    modes: Annotated[int, Field(ge=1, le=1000)] = 20
+    tolerance: Annotated[float, Field(gt=0.0, lt=1.0)] = 1e-2
+    frames: Annotated[int, Field(ge=1, le=10_000)] = 35
+
+
+def companion_model(
+    scene: Scene, training: np.ndarray, frames: np.ndarray, spec: CompanionSpec
+) -> SubspaceModel:
+    """Companion of all runs of a scene.
+
+    Parameters
+    ----------
+    training : (n, N, 3) m, full-order positions after the training ``frames`` (n,), ascending
+    """
+    kind = "pod+skinning"
+    columns = make_columns(scene, training, kind, spec.modes)
+    chosen = np.linspace(0, len(frames) - 1, min(spec.frames, len(frames))).round().astype(int)
+    (samples,) = sample_elements(scene, columns, frames[chosen], [spec.tolerance])
+    return SubspaceModel(kind, columns, samples)
+
+
+def companion_run(scene: Scene, model: SubspaceModel) -> np.ndarray:
+    """Positions (F' + 1, N, 3) m of the companion, the initial ones first; finite frames only."""
+    loop, start = model.loop(scene)
+    frames, unit = scene.config.frames, scene.mesh.extent
+    run = BoundedRun(loop.step, start, frames, np.inf, unit, model.positions)
+    first = model.positions(start.positions)
+    return np.stack([first, *(frame.positions for frame in run)])
+
+
+def estimate(positions: np.ndarray, companion: np.ndarray, end: int) -> float | None:
+    """Estimated relative error of a run over its frames before ``end``.
+
+    || Q - Q' ||_F / || Q' - Q'_0 ||_F with the companion Q'; None where it does not move, or
+    neither has a frame.
+
+    Parameters
+    ----------
+    positions, companion : (F + 1, N, 3) m, the initial ones first
+    """
+    last = min(len(positions), len(companion), end + 1)
+    moved = float(np.linalg.norm(companion[1:last] - companion[0]))
+    if moved == 0.0:
+        return None
+    return float(np.linalg.norm(positions[1:last] - companion[1:last])) / moved

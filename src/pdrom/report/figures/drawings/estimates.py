@@ -1,0 +1,68 @@
+"""Does the distance to a finer model tell the error of a run, without the full order?"""
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.multiples import clipped, log_axis
+from pdrom.report.figures.kit.options import Scenes
+from pdrom.report.figures.kit.results import NothingToDraw, Results
+from pdrom.tables.estimates import BAND
+
+LIMITS = (1e-4, 1e1)
+FAMILIES = {
+    "projections alone": (lambda basis: basis == "full", style.BLUE),
+    "snapshot subspace": (lambda basis: basis == "pod", style.VERMILLION),
+    "skinning subspace": (lambda basis: basis == "skinning", style.GREEN),
+}
+SPLITS = {"train": "training motions", "heldout": "held-out motions"}
+
+
+def draw(results: Results, options: Scenes) -> Figure:
+    """A panel for each motion."""
+    table = results.table("estimates")
+    table = table[table.scene.isin(results.scenes(options))]
+    table = table[table.ratio.notna()]
+    if table.empty:
+        raise NothingToDraw("no run with an estimate and an error")
+    alarm = float(results.settings["companion.alarm"])
+    figure = Figure(figsize=(style.WIDTH, 3.6), layout="constrained")
+    axes = figure.subplots(1, 2, sharey=True)
+    for ax, (split, title) in zip(axes, SPLITS.items(), strict=True):
+        _draw(ax, table[table.split == split], title, alarm)
+    axes[0].set_ylabel("estimate")
+    handles = [
+        Line2D([], [], linestyle="none", color=colour, marker="o", markersize=4, label=name)
+        for name, (_, colour) in FAMILIES.items()
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
+
+
+def _draw(ax: Axes, runs: pd.DataFrame, title: str, alarm: float) -> None:
+    log_axis(ax, *LIMITS)
+    ax.set_xscale("log")
+    ax.set_xlim(*LIMITS)
+    ends = np.array(LIMITS)
+    ax.plot(ends, ends, color="#333333", linewidth=0.8, zorder=0)
+    for factor in BAND:
+        ax.plot(ends, factor * ends, color="#333333", linewidth=0.7, linestyle="--", zorder=0)
+    ax.axhline(alarm, color="#333333", linewidth=0.7, linestyle=":", zorder=0)
+    resolved = runs.resolved.astype(bool)
+    for chosen, colour in FAMILIES.values():
+        for kept, face in ((resolved, colour), (~resolved, "none")):
+            part = runs[chosen(runs.position_basis) & kept]
+            if part.empty:
+                continue
+            ax.plot(
+                clipped(part.relative_error_within_horizon.to_numpy(float), *LIMITS),
+                clipped(part.estimate.to_numpy(float), *LIMITS),
+                "o", markersize=3.0, color=colour, markerfacecolor=face, markeredgewidth=0.5,
+                alpha=0.7, clip_on=False,
+            )  # fmt: skip
+    share = runs.within.astype(bool).mean() if len(runs) else float("nan")
+    ax.set_title(f"{title}: {100 * share:.0f} % of {len(runs)} within the band")
+    ax.set_xlabel("error within the horizon (relative)")

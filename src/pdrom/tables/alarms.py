@@ -1,0 +1,85 @@
+"""Table alarms: what tells failing runs from good ones while they run, without the full order."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pandas as pd
+
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every, Setting, TableOf
+from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.gain_prediction import FAILED
+from pdrom.tables.parts import joined
+
+_KEYS = ["scene", "group", "method", "r"]
+
+
+@table(
+    title="Alarms at run time: failures noticed, and false alarms",
+    columns=(
+        text("split", "motion of the runs: train, heldout"),
+        text("alarm", "of the guard, or of the estimate"),
+        number("threshold", "of the estimate"),
+        integer("runs", "runs with projections alone reduced"),
+        integer("failed", f"runs among them that blow up or have an error above {FAILED:g}"),
+        number("detected_share", "failed runs with an alarm before the horizon"),
+        number("false_share", "other runs with an alarm before the horizon"),
+    ),
+    reads={
+        "estimates": TableOf("estimates"),
+        "reruns": TableOf("reduced_reruns"),
+        "heldout": TableOf("heldout_reruns"),
+        "guarded": Every(paths.RERUNS_TRAIN),
+        "guarded_heldout": Every(paths.RERUNS_HELDOUT),
+        "threshold": Setting("companion.alarm"),
+    },
+)
+def alarms(
+    estimates: pd.DataFrame,
+    reruns: pd.DataFrame,
+    heldout: pd.DataFrame,
+    guarded: list[File],
+    guarded_heldout: list[File],
+    threshold: float,
+) -> pd.DataFrame:
+    """For each motion a row for the guard and one for the estimate, over the same runs.
+
+    The guard gives an alarm in a frame, the estimate at the end of the frames before the horizon.
+    """
+    rows: list[dict[str, Any]] = []
+    for split, runs, files in (
+        ("train", reruns, guarded),
+        ("heldout", heldout, guarded_heldout),
+    ):
+        rows += _rows(split, runs, joined(files), estimates, threshold)
+    return pd.DataFrame(rows)
+
+
+def _rows(
+    split: str, runs: pd.DataFrame, guarded: pd.DataFrame, estimates: pd.DataFrame, threshold: float
+) -> Iterator[dict[str, Any]]:
+    own = estimates[(estimates.split == split) & (estimates.position_basis == "full")]
+    own = own[[*_KEYS, "estimate"]].astype({"r": "int64"})
+    if own.empty or guarded.empty:
+        return
+    ends = runs.drop_duplicates("scene").set_index("scene").horizon_frame
+    table = guarded[[*_KEYS, "relative_error", "guard_frame"]].astype({"r": "int64"})
+    judged = runs[[*_KEYS, "position_basis", "relative_error_within_horizon"]]
+    judged = judged[judged.position_basis == "full"].astype({"r": "int64"})
+    table = table.merge(judged, on=_KEYS).merge(own, on=_KEYS)
+    table = table[table.scene.map(ends) > 0]
+    failed = ~(table.relative_error_within_horizon <= FAILED)
+    noticed = table.guard_frame.astype(float) < table.scene.map(ends)
+    # an estimate that is not finite is larger than any threshold
+    estimated = ~(table.estimate <= threshold)
+    for name, alarm, value in (("guard", noticed, None), ("estimate", estimated, threshold)):
+        yield {
+            "split": split,
+            "alarm": name,
+            "threshold": value,
+            "runs": len(table),
+            "failed": int(failed.sum()),
+            "detected_share": alarm[failed].mean(),
+            "false_share": alarm[~failed].mean(),
+        }

@@ -1,0 +1,70 @@
+"""Table estimates: the error of every run as its companion estimates it, beside the true one."""
+
+import pandas as pd
+
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every, TableOf
+from pdrom.tables.declaration import flag, number, table, text, timed
+from pdrom.tables.parts import joined
+from pdrom.tables.reruns import KEYS
+from pdrom.tables.vocabulary import ERROR_WITHIN, GROUP, METHOD, POSITION_BASIS, SCENE, K, R
+
+BAND = (0.3, 3.0)  # estimates between these multiples of the error count as good
+MARGIN = 1.5  # an estimate above this multiple of the companion's own error is resolved
+
+
+@table(
+    title="Estimated and true errors of runs",
+    columns=(
+        SCENE,
+        GROUP,
+        METHOD,
+        POSITION_BASIS,
+        K,
+        R,
+        text("split", "motion of the run: train, heldout"),
+        ERROR_WITHIN,
+        number("estimate", "distance to the companion, relative to its motion, before the horizon"),
+        number("ratio", "effectivity: estimate over error"),
+        flag("within", f"the ratio lies between {BAND[0]:g} and {BAND[1]:g}"),
+        number("companion_error", "of the companion's own run of the motion before the horizon"),
+        number("floor", "the same of the training motion, which is known offline"),
+        flag("resolved", f"the estimate exceeds {MARGIN:g} times the floor"),
+        timed(number("overhead", "time of the companion's frame over that of the run")),
+        timed(number("full_order_share", "the same over that of the full-order run")),
+    ),
+    reads={
+        "parts": Every(paths.ESTIMATES),
+        "times": Every(paths.COMPANION_TIMES),
+        "reruns": TableOf("reduced_reruns"),
+    },
+)
+def estimates(parts: list[File], times: list[File], reruns: pd.DataFrame) -> pd.DataFrame:
+    """One row per run of both motions; without an error where the run ended before the horizon.
+
+    A resolved estimate differs from the error by at most the companion's own error over the motion:
+    if that is no larger than ``floor``, the ratio lies between 0.6 and 3.
+    """
+    rows = joined(parts)
+    if rows.empty:
+        return rows
+    error = rows.relative_error_within_horizon.astype(float)
+    rows["ratio"] = rows.estimate / error.where(error > 0.0)
+    rows["within"] = rows.ratio.between(*BAND).where(rows.ratio.notna())
+    train = rows[rows.split == "train"].groupby("scene").companion_error.first()
+    rows["floor"] = rows.scene.map(train)
+    rows["resolved"] = rows.estimate > MARGIN * rows.floor
+    own = joined(times).set_index("scene")
+    companion = rows.scene.map(own.companion_ms)
+    rows["overhead"] = companion / _times_of(rows, reruns)
+    rows["full_order_share"] = companion / rows.scene.map(own.full_ms)
+    return rows
+
+
+def _times_of(rows: pd.DataFrame, reruns: pd.DataFrame) -> pd.Series:
+    """Time of a frame of each run: that of the training motion with the same model."""
+    whole = {"k": "Int64", "r": "Int64"}
+    known = reruns[[*KEYS, "ms_per_frame"]].astype(whole).drop_duplicates(KEYS)
+    found = rows[KEYS].astype(whole).merge(known, on=KEYS, how="left").ms_per_frame
+    return found.astype(float).set_axis(rows.index)

@@ -1,0 +1,73 @@
+"""Table model_choice: the model that the estimate chooses for a tolerance of the user."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import pandas as pd
+
+from pdrom.core.reads import Setting, TableOf
+from pdrom.tables.declaration import flag, number, table
+from pdrom.tables.reruns import KEYS
+from pdrom.tables.vocabulary import (
+    ERROR_WITHIN,
+    GROUP,
+    METHOD,
+    MS_PER_FRAME,
+    POSITION_BASIS,
+    SCENE,
+    K,
+    R,
+)
+
+_WHOLE = {"k": "Int64", "r": "Int64"}
+_CHOSEN = [
+    "group", "method", "position_basis", "k", "r", "estimate", "relative_error_within_horizon",
+    "ms_per_frame",
+]  # fmt: skip
+
+
+@table(
+    title="Models chosen for a tolerance by their estimates",
+    columns=(
+        SCENE,
+        number("tolerance", "error that the user allows"),
+        flag("found", "a model has an estimate within the tolerance"),
+        GROUP,
+        METHOD,
+        POSITION_BASIS,
+        K,
+        R,
+        number("estimate", "of the chosen model on the held-out motion"),
+        ERROR_WITHIN,
+        flag("met", "its true error is within the tolerance"),
+        MS_PER_FRAME,
+    ),
+    reads={
+        "estimates": TableOf("estimates"),
+        "reruns": TableOf("reduced_reruns"),
+        "tolerances": Setting("companion.tolerances"),
+    },
+)
+def model_choice(
+    estimates: pd.DataFrame, reruns: pd.DataFrame, tolerances: Sequence[float]
+) -> pd.DataFrame:
+    """The cheapest model of each scene whose estimate on the held-out motion meets a tolerance.
+
+    Nothing of that motion's full order goes into the choice. Cheapest is the one that evaluates
+    the fewest elements, then has the fewest modes: times differ from run to run.
+    """
+    heldout = estimates[(estimates.split == "heldout") & (estimates.position_basis != "full")]
+    times = reruns[[*KEYS, "ms_per_frame"]].astype(_WHOLE).drop_duplicates(KEYS)
+    runs = heldout.astype(_WHOLE).merge(times, on=KEYS, how="left")
+    rows: list[dict[str, Any]] = []
+    for scene, models in runs.groupby("scene", sort=False):
+        for tolerance in tolerances:
+            good = models[models.estimate <= tolerance].sort_values(["r", "k"], kind="stable")
+            row: dict[str, Any] = {"scene": scene, "tolerance": tolerance, "found": len(good) > 0}
+            if len(good):
+                chosen = good.iloc[0]
+                error = chosen.relative_error_within_horizon
+                row |= chosen[_CHOSEN].to_dict()
+                row["met"] = bool(error <= tolerance)
+            rows.append(row)
+    return pd.DataFrame(rows)
