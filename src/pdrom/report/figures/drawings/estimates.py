@@ -14,9 +14,9 @@ from pdrom.tables.estimates import BAND
 
 LIMITS = (1e-4, 1e1)
 FAMILIES = {
-    "projections alone": (lambda basis: basis == "full", style.BLUE),
-    "snapshot subspace": (lambda basis: basis == "pod", style.VERMILLION),
-    "skinning subspace": (lambda basis: basis == "skinning", style.GREEN),
+    "projections alone": ("full", style.BLUE),
+    "snapshot subspace": ("pod", style.VERMILLION),
+    "skinning subspace": ("skinning", style.GREEN),
 }
 SPLITS = {"train": "training motions", "heldout": "held-out motions"}
 
@@ -52,9 +52,9 @@ def _draw(ax: Axes, runs: pd.DataFrame, title: str, alarm: float) -> None:
         ax.plot(ends, factor * ends, color="#333333", linewidth=0.7, linestyle="--", zorder=0)
     ax.axhline(alarm, color="#333333", linewidth=0.7, linestyle=":", zorder=0)
     resolved = runs.resolved.astype(bool)
-    for chosen, colour in FAMILIES.values():
+    for basis, colour in FAMILIES.values():
         for kept, face in ((resolved, colour), (~resolved, "none")):
-            part = runs[chosen(runs.position_basis) & kept]
+            part = runs[(runs.position_basis == basis) & kept]
             if part.empty:
                 continue
             ax.plot(
