@@ -86,6 +86,7 @@ class SceneArtifacts:
             scene=scene,
             folder=self._results,
             holdings=holdings_of(self._study.only(scene)),
+            title=self._study.scene(scene).title,
             ranks=self._study.settings.viewer.ranks,
             settings={
                 "sensitivity.reference": section.reference,

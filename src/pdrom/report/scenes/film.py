@@ -25,13 +25,13 @@ COLUMNS, WIDTH = 4, 2.4  # panels side by side, inches of each
 
 @dataclass(frozen=True)
 class Film:
-    """Runs to be shown with their mesh; ``time_step`` of a frame in s."""
+    """Runs to be shown with their titles and mesh; ``time_step`` of a frame in s."""
 
     title: str
     mesh: Mesh
     time_step: float
     full: np.ndarray
-    runs: list[LoadedRun]
+    runs: list[tuple[str, LoadedRun]]
     colours: dict[str, tuple[float, float, float]]
 
     @property
@@ -70,18 +70,18 @@ class Film:
     def _draw(self, axes: list[Axes], frame: int, window: Window) -> None:
         ghost = self.full[frame]
         panels = [RunPanel("full order", style.FULL_ORDER, ghost, reference=True)]
-        panels += [self._panel(run, frame) for run in self.runs]
+        panels += [self._panel(name, run, frame) for name, run in self.runs]
         for ax, panel in zip(axes, panels, strict=False):
             ax.clear()
             outline = None if panel.reference else ghost
             draw_run(ax, self.mesh, panel.seen_by(CAMERA), CAMERA, window, outline)
 
-    def _panel(self, run: LoadedRun, frame: int) -> RunPanel:
+    def _panel(self, name: str, run: LoadedRun, frame: int) -> RunPanel:
         colour, last = self.colours[run.group], len(run.positions) - 1
         blew_up = 0 <= run.info.blowup_frame < frame
         failure = f"blew up at frame {run.info.blowup_frame}" if blew_up or frame > last else None
         at = min(frame, last)
-        return RunPanel(run.name, colour, run.positions[at].astype(float), failure)
+        return RunPanel(name, colour, run.positions[at].astype(float), failure)
 
 
 def film_of(results: SceneResults) -> Film:
@@ -92,6 +92,12 @@ def film_of(results: SceneResults) -> Film:
         load_mesh(results.path(MESH, results.scene)),
         results.settings["time_step"],
         full_order(results),
-        reduced(results),
+        [(_title(results, run), run) for run in reduced(results)],
         {group: style.surface_colour(look[0]) for group, look in looks.items()},
     )
+
+
+def _title(results: SceneResults, run: LoadedRun) -> str:
+    """Method and size, below the group where the scene reduces several."""
+    group = f"{style.words(run.group)}\n" if len(results.groups) > 1 else ""
+    return f"{group}{results.method_title(run.method)}, r = {run.info.r}"

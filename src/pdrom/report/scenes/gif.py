@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+import numpy as np
 from PIL import Image
 
 from pdrom.core.store import atomic_path
@@ -19,5 +20,16 @@ def make(results: SceneResults, outputs: Mapping[str, str]) -> None:
     palette = pictures[-1].quantize(COLOURS)
     flat = [p.quantize(palette=palette, dither=Image.Dither.NONE) for p in pictures]
     with atomic_path(outputs["film"]) as path:
-        duration = round(1000.0 / film.rate)
-        flat[0].save(path, save_all=True, append_images=flat[1:], duration=duration, loop=0)
+        flat[0].save(
+            path,
+            save_all=True,
+            append_images=flat[1:],
+            duration=durations(len(flat), film.rate),
+            loop=0,
+        )
+
+
+def durations(pictures: int, rate: float) -> list[int]:
+    """Milliseconds of each picture: whole hundredths of a second, which together keep the rate."""
+    ends = np.round(100.0 / rate * np.arange(pictures + 1))
+    return (10 * np.diff(ends)).astype(int).tolist()

@@ -16,6 +16,7 @@ class SceneOrder(BaseModel):
 
     folder : where the results lie
     ranks : basis sizes, where not every one is shown
+    title : of the scene
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -26,11 +27,14 @@ class SceneOrder(BaseModel):
     holdings: Holdings
     ranks: tuple[Rank, ...]
     settings: dict[str, float]
+    title: str
 
     @property
     def results(self) -> SceneResults:
         """What the artifact reads."""
-        return SceneResults(self.scene, self.folder, self.holdings, self.settings, self.ranks)
+        return SceneResults(
+            self.scene, self.folder, self.holdings, self.settings, self.ranks, self.title
+        )
 
 
 def make(order: SceneOrder, outputs: Mapping[str, str]) -> None:

@@ -24,10 +24,12 @@ class SceneResults(Results):
         holdings: Holdings,
         settings: Mapping[str, float],
         ranks: tuple[Rank, ...] = (),
+        title: str = "",
     ) -> None:
         super().__init__(folder, holdings, settings)
         self.scene = scene
         self.ranks = ranks
+        self.title = title
 
     @property
     def groups(self) -> tuple[str, ...]:

@@ -43,7 +43,7 @@ def viewed(results: SceneResults, times: pd.DataFrame) -> ViewedScene:
     compiled = times[times.method.isna() & (times.implementation == "compiled")]
     return ViewedScene(
         name=scene,
-        title=scene.replace("_", " "),
+        title=results.title or scene.replace("_", " "),
         mesh=load_mesh(results.path(MESH, scene)),
         time_step=results.settings["time_step"],
         positions=positions,

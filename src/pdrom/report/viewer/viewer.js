@@ -1,7 +1,7 @@
 "use strict";
 // The page's own script: choices, frames, playing. Plotly draws; its licence stands above its code.
 (async () => {
-  const GREY = "#b9b4a7", BLUE = "#0072b2", RED = "#b3261e";
+  const GREY = "#b9b4a7", WIRE = "#55524a", BLUE = "#0072b2", RED = "#b3261e";
   const FLOOR = 1e-7; // smaller errors are drawn on the axis
   const at = (id) => document.getElementById(id);
   const scenes = JSON.parse(at("scenes").textContent);
@@ -77,9 +77,38 @@
       lighting: { ambient: 0.55, diffuse: 0.7, specular: 0.05 }, ...look };
   }
 
+  // Edges (a, b, a, b, ...) of a surface, each once.
+  function edgesOf({ i, j, k }) {
+    const seen = new Set(), edges = [];
+    const add = (a, b) => {
+      const key = Math.min(a, b) * 2 ** 26 + Math.max(a, b);
+      if (!seen.has(key)) edges.push(a, b);
+      seen.add(key);
+    };
+    i.forEach((a, f) => { add(a, j[f]); add(j[f], k[f]); add(k[f], a); });
+    return edges;
+  }
+
+  // Coordinates of all edges one after the other, with a gap behind each.
+  function lines(xyz, edges) {
+    return xyz.map((values) => {
+      const out = [];
+      for (let e = 0; e < edges.length; e += 2) out.push(values[edges[e]], values[edges[e + 1]], null);
+      return out;
+    });
+  }
+
+  function wires(name, [x, y, z]) {
+    return { type: "scatter3d", mode: "lines", name, x, y, z, scene: "scene", hoverinfo: "skip", showlegend: false,
+      line: { color: WIRE, width: 1 } };
+  }
+
   function distance(a, b) {
     return Float32Array.from(a[0], (v, i) => Math.hypot(v - b[0][i], a[1][i] - b[1][i], a[2][i] - b[2][i]));
   }
+
+  // Whether both runs are in one picture, the full order as wires: two surfaces in one place would flicker.
+  const above = () => at("view").value === "above" && shown.reduced;
 
   // Frame of the page -> what is stored; a run that ended early keeps its last frame.
   const full = (k) => shown.full[k];
@@ -108,6 +137,7 @@
     shown = { scene, run, faces: { i: pick(0), j: pick(1), k: pick(2) },
       full: await positions(scene.full), reduced: run && await positions(run.positions) };
     shown.ranges = box(shown.full);
+    shown.edges = edgesOf(shown.faces);
     at("frame").max = shown.full.length - 1;
     at("frame").value = Math.min(at("frame").value, shown.full.length - 1);
     await drawShapes();
@@ -116,10 +146,10 @@
   }
 
   async function drawShapes() {
-    const k = Number(at("frame").value), beside = at("view").value === "beside" && shown.reduced;
+    const k = Number(at("frame").value), beside = shown.reduced && !above();
     const old = at("shapes").layout, camera = (old && old.scene && old.scene.camera) || CAMERA;
-    const traces = [surface("full order", full(k), shown.faces, "scene",
-      { color: GREY, opacity: beside || !shown.reduced ? 1 : 0.4 })];
+    const traces = [above() ? wires("full order", lines(full(k), shown.edges))
+      : surface("full order", full(k), shown.faces, "scene", { color: GREY })];
     if (shown.reduced) {
       const size = Math.max(...shown.ranges.map((range) => range[1] - range[0])) / 1.4;
       const colour = at("colour").checked
@@ -132,7 +162,7 @@
     const layout = { margin: { l: 0, r: 0, t: 24, b: 0 }, uirevision: "camera",
       scene: space(shown.ranges, { x: [0, beside ? 0.48 : 0.95], y: [0, 1] }, camera),
       annotations: beside ? [note("full order", 0.2), note("reduced", 0.7)]
-        : [note(shown.reduced ? "full order (transparent) and reduced" : "full order", 0.45)] };
+        : [note(shown.reduced ? "full order (wires) and reduced" : "full order", 0.45)] };
     if (beside) layout.scene2 = space(shown.ranges, { x: [0.48, 0.95], y: [0, 1] }, camera);
     await Plotly.react(at("shapes"), traces, layout, { displaylogo: false, responsive: true });
   }
@@ -166,7 +196,8 @@
 
   async function showFrame() {
     const k = Number(at("frame").value), frame = k * shown.scene.stride;
-    const runs = shown.reduced ? [full(k), reduced(k)] : [full(k)];
+    const first = above() ? lines(full(k), shown.edges) : full(k);
+    const runs = shown.reduced ? [first, reduced(k)] : [first];
     const change = { x: runs.map((r) => r[0]), y: runs.map((r) => r[1]), z: runs.map((r) => r[2]) };
     if (shown.reduced && at("colour").checked) change.intensity = [undefined, distance(reduced(k), full(k))];
     await Plotly.restyle(at("shapes"), change);

@@ -11,6 +11,8 @@ import meshio
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from matplotlib.image import imread
 from PIL import Image
 
@@ -21,6 +23,7 @@ from pdrom.pipeline.scene_command import scene_arguments
 from pdrom.pipeline.study import Study
 from pdrom.report.figures.kit.read import RerunInfo
 from pdrom.report.scenes.catalogue import ARTIFACTS, default_files
+from pdrom.report.scenes.gif import durations
 from pdrom.report.scenes.job import make
 from pdrom.report.scenes.sizes import SHOWN, shown
 from pdrom.report.scenes.viewer import make_index
@@ -130,6 +133,13 @@ def test_a_gif_moves_at_the_same_speed_for_ever(finished):
         assert film.n_frames == 5
         assert film.info["loop"] == 0
         assert film.info["duration"] == pytest.approx(1000 * 2 * 0.016, abs=10)
+
+
+@given(pictures=st.integers(1, 400), rate=st.floats(1.0, 30.0))
+def test_pictures_of_a_gif_keep_the_rate_together(pictures, rate):
+    each = durations(pictures, rate)
+    assert sum(each) == pytest.approx(1000.0 * pictures / rate, abs=5.0)
+    assert all(one % 10 == 0 and abs(one - 1000.0 / rate) <= 10.0 for one in each)
 
 
 def test_paraview_gets_every_frame_with_its_time(finished):
