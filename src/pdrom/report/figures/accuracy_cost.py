@@ -1,23 +1,25 @@
-"""Accuracy of reduced models against their time per frame."""
+"""Accuracy of reduced models against their time per frame, by family and constraint group."""
 
 from pdrom.core.reads import TableOf
 from pdrom.report.figures.kit.declaration import Declaration
-from pdrom.report.figures.kit.options import Columns, Methods, Scenes
+from pdrom.report.figures.kit.options import Methods, Scenes
 
 
-class Options(Scenes, Methods, Columns):
-    """What may be chosen."""
+class Options(Scenes, Methods):
+    """What may be chosen; the first scene is drawn large."""
 
 
 FIGURE = Declaration(
-    title="Accuracy against time per frame",
+    title="What accuracy costs in time",
     caption=(
         "Error within the horizon against the time per frame of every reduced model, and of the "
-        "full-order run with fewer iterations, all against the scene's own full-order run "
-        "(vertical line: its time). The horizontal line is that run's own error, against the "
-        "converged one: errors below it cannot be seen. Ringed points are those that no other "
-        "beats in both; dashed lines mark 60 and 30 frames per second."
+        "full-order run with fewer iterations $K$; both against the scene's own full-order run, "
+        "whose time is the vertical line. A colour is a family of models, a marker one of its "
+        "members, a line the best trade-offs within the family: further down and further left is "
+        "better. The horizontal line is the full-order run's own error, against the converged one: "
+        "errors below it cannot be seen. Arrows on the rim are errors outside the axis, crosses "
+        "runs that blew up. Below, a scene for each other constraint group."
     ),
-    reads=(TableOf("accuracy_cost"),),
+    reads=(TableOf("accuracy_cost"), TableOf("reduced_reruns")),
     options=Options,
 )

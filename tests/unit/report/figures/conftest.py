@@ -294,7 +294,7 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for h, ratio in ((0.016, 1.0), (0.2, 1.0), (0.016, 100.0))
     ]  # fmt: skip
     reruns = [
-        (scene, group, method, r, "full", 1.0, *_outcome(scene, method, r))
+        (scene, group, method, r, "full", 1.0, *_outcome(scene, method, r), 0.2 * r)
         for scene, group in pairs
         if scene not in FLAT
         for method in methods
@@ -352,7 +352,7 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "effects_cost": "scene effect ms_per_frame share",
         "effects_left_out": "scene left_out groups ms_per_frame own_ms",
         "reduced_reruns": "scene group method r position_basis max_extent blowup_frame"
-        " relative_error relative_error_within_horizon",
+        " relative_error relative_error_within_horizon ms_per_frame",
         "gain_prediction": "predictor lower upper runs failed_share threshold",
         "noise": "scene group noisy_axes method r rank relative_error",
         "claims_sensitivity": "claim part varied variation verdict_of_rules same",

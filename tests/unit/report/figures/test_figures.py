@@ -294,7 +294,7 @@ def test_points_with_another_reference_are_no_dots(study):
     assert [line.get_ydata()[0] for line in lines] == [0.01]  # fom, K = 10
     times = {float(x) for line in ax.lines if line.get_marker() == "o" for x in line.get_xdata()}
     assert 16.0 not in times  # fom, K = 40
-    (fewer,) = [line for line in ax.lines if line.get_marker() == "x"]
+    (fewer,) = [line for line in ax.lines if line.get_marker() == "X"]
     assert list(fewer.get_xdata()) == [1.0, 2.0]
 
 

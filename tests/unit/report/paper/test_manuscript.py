@@ -109,6 +109,11 @@ def test_every_figure_of_the_study_is_shown():
     assert set(shown) <= set(declarations())
 
 
+def test_the_text_speaks_of_every_figure():
+    shown = re.findall(r"\\figureof\{([a-z_]+)\}", SOURCE)
+    assert set(shown) - set(re.findall(r"\\ref\{fig:([a-z_]+)\}", SOURCE)) == set()
+
+
 def test_numbers_that_a_configuration_may_lack_stand_in_sentences_that_can_be_left_out():
     """Outside of them only what every configuration holds."""
     blocks = [sentence.text for sentence in sentences(SOURCE)]

@@ -1,172 +1,78 @@
-"""Accuracy of reduced models against their time per frame."""
-
-from typing import Any
+"""Accuracy of reduced models against their time per frame: one scene large, others by group."""
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from pdrom.experiments.names import ANDERSON, FOM
 from pdrom.report.figures.accuracy_cost import Options
 from pdrom.report.figures.kit import style
-from pdrom.report.figures.kit.multiples import clipped, label_outer, log_axis, small_multiples
-from pdrom.report.figures.kit.results import NothingToDraw, Results
-from pdrom.tables.accuracy_cost import FEWER
+from pdrom.report.figures.kit.legends import draw_legend, legend_height
+from pdrom.report.figures.kit.results import Results
+from pdrom.report.figures.kit.trade_offs import (
+    TradeOffs,
+    draw_panel,
+    group_title,
+    handles,
+    label_iterations,
+    trade_offs,
+)
 
-COLUMNS = [
-    "scene", "method", "position_basis", "iterations", "relative_error_within_horizon",
-    "ms_per_frame", "pareto",
-]  # fmt: skip
-LOW, HIGH = 1e-6, 1e2  # errors outside are drawn on the limit
 RATES = (60, 30)  # frames per second
-ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
-_FEWER = {"color": style.BLACK, "marker": "x", "linewidth": 0.8, "linestyle": (0, (1, 1))}
-_BLIND = {"color": style.FAILED, "linewidth": 0.9, "linestyle": "-."}
-_RATE = {"color": "#8A857A", "linewidth": 0.8, "linestyle": "--"}
+LARGE, SMALL = 3.3, 1.75  # inches, heights of panels
+LOWEST = 1e-3  # of the axes: what matters here lies above
+COLUMNS = 4  # of the legend
 
 
 def draw(results: Results, options: Options) -> Figure:
-    """A panel per scene, a dot per reduced model; the best trade-offs are joined and ringed.
-
-    All errors of dots are against the scene's own full-order run, whose time is a vertical line.
-    That run's own error, against the converged one, is a horizontal line: what lies below it
-    cannot be seen. Errors outside the axis lie on its rim.
+    """The first scene large; below it the next ones that reduce other groups, one for each group.
 
     Raises
     ------
     StorageError
-        The table is missing or lacks a column.
+        A table is missing or lacks a column.
     """
-    table = results.table("accuracy_cost", COLUMNS).dropna(subset=[ERROR, TIME])
-    own = (table.method == "full") & (table.position_basis == "full")
-    full_order = table[own].set_index("scene")
-    fom = table[table.method == FOM].set_index(["scene", "iterations"])[ERROR]
-    blind = {
-        scene: fom[scene, k] for scene, k in full_order.iterations.items() if (scene, k) in fom
-    }
-    table = table[
-        (table[ERROR] > 0.0) & (table[TIME] > 0.0) & ~own & ~table.method.isin([FOM, ANDERSON])
-    ]
-    table["method"] = [model_name(row) for row in table.itertuples()]
-    if options.methods:
-        table = table[table.method.isin([*options.methods, FEWER])]
-    held = results.scenes(options)
-    scenes = [scene for scene in held if (table.scene == scene).any()]
-    if not scenes:
-        raise NothingToDraw("no reduced model with both an error and a time")
-    figure, axes = small_multiples(len(scenes), options.columns, legend_rows=5, height=1.8)
-    table = table[table.scene.isin(scenes)]
-    methods = [m for m in dict.fromkeys(table.method) if m != FEWER]
-    styles = style.method_styles(methods)
-    for ax, scene in zip(axes, scenes, strict=True):
-        own_time = full_order[TIME].get(scene)
-        _draw_scene(ax, table[table.scene == scene], styles, own_time, blind.get(scene))
-        ax.set_title(style.words(scene))
-    label_outer(axes, options.columns, "time per frame (ms)", "relative error")
-    _legend(figure, results, styles)
+    found, scenes = trade_offs(results, options)
+    first, *rest = scenes
+    small = list({group_title(results, scene): scene for scene in reversed(rest)}.values())[::-1]
+    blocks = handles(found, results)
+    heights = [LARGE, *([SMALL] if small else []), legend_height(blocks, COLUMNS)]
+    figure = Figure(figsize=(style.WIDTH, sum(heights)), layout="constrained")
+    parts = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
+    ax = parts[0].subplots()
+    draw_panel(ax, found, first, results, LOWEST, size=4.2)
+    label_iterations(ax, found, first)
+    _draw_rates(ax)
+    ax.set_title(f"{group_title(results, first)}: {style.words(first)}")
+    ax.set(xlabel="time per frame (ms)", ylabel="relative error")
+    if small:
+        _draw_small(parts[1].subplots(1, len(small), sharey=True, squeeze=False)[0], found, small,
+                    results)  # fmt: skip
+    draw_legend(parts[-1], blocks, COLUMNS)
     return figure
 
 
-def model_name(row: Any) -> str:
-    """Method of a row; in a position subspace its kind comes first."""
-    if row.position_basis == "full":
-        return str(row.method)
-    subspace = f"{row.position_basis} subspace"
-    return subspace if row.method == "full" else f"{subspace}, {row.method}"
-
-
-def _draw_scene(
-    ax: Axes,
-    rows: pd.DataFrame,
-    styles: dict[str, tuple[str, str]],
-    full_order: float | None,
-    blind: float | None,
-) -> None:
-    ax.set_xscale("log")
-    log_axis(ax, LOW, HIGH)
-    rows = rows.assign(**{ERROR: clipped(rows[ERROR].to_numpy(float), LOW, HIGH)})
-    time = rows[TIME].to_numpy(float)
-    for method, part in rows[rows.method != FEWER].groupby("method", sort=False):
-        colour, marker = styles[str(method)]
-        ax.plot(
-            part[TIME], part[ERROR], linestyle="none",
-            color=colour, marker=marker, markersize=3.8, alpha=0.85,
-        )  # fmt: skip
-    fewer = rows[rows.method == FEWER].sort_values("iterations")
-    ax.plot(fewer[TIME], fewer[ERROR], markersize=4.5, zorder=1.5, **_FEWER)
-    for row in fewer.itertuples():
-        _label_iterations(ax, row.ms_per_frame, row.relative_error_within_horizon, row.iterations)
-    best = rows[rows.pareto.astype(bool)].sort_values(TIME)
-    ax.plot(
-        best[TIME], best[ERROR], color="#333333", linewidth=0.8,
-        marker="o", markersize=7.5, markerfacecolor="none", markeredgewidth=0.8,
-        drawstyle="steps-post", zorder=1,
-    )  # fmt: skip
-    if blind is not None:
-        ax.axhline(np.clip(blind, LOW, HIGH), zorder=0, **_BLIND)
-    if full_order is not None:
-        ax.axvline(full_order, color=style.GREY, linewidth=1.2, zorder=0)
-        time = np.append(time, full_order)
-    low, high = np.log10(time.min()), np.log10(time.max())
-    pad = max(0.1, 0.08 * (high - low))
-    ax.set_xlim(10 ** (low - pad), 10 ** (high + pad))
-    _draw_rates(ax)
-    _label_times(ax, high - low)
-
-
-def _label_iterations(ax: Axes, time: float, error: float, iterations: float) -> None:
-    ax.annotate(
-        f"{iterations:.0f}", (time, error), (0.0, 5.5), textcoords="offset points", fontsize=6.5,
-        ha="center",
-    )  # fmt: skip
+def _draw_small(axes: np.ndarray, found: TradeOffs, scenes: list[str], results: Results) -> None:
+    for ax, scene in zip(axes, scenes, strict=True):
+        draw_panel(ax, found, scene, results, LOWEST, size=2.4)
+        ax.set_title(f"{group_title(results, scene)}:\n{style.words(scene)}")
+        ax.set_xlabel("time per frame (ms)")
+    axes[0].set_ylabel("relative error")
 
 
 def _draw_rates(ax: Axes) -> None:
-    """Lines of real time; a rate that the axis does not reach is named at the side it lies on."""
-    low, high = ax.get_xlim()
-    limits = {rate: 1e3 / rate for rate in RATES}
-    inside = [rate for rate in RATES if low < limits[rate] < high]
-    heights = (0.98, 0.89, 0.8)
-    for height, rate in zip(heights, inside, strict=False):
-        ax.axvline(limits[rate], zorder=0, **_RATE)
-        _label_rate(ax, limits[rate], height, f"{rate} fps ")
-    beyond = [str(rate) for rate in RATES if limits[rate] >= high]
+    """Lines of real time, where the axis reaches them; otherwise they are named at its side."""
+    high = ax.get_xlim()[1]
+    beyond = [rate for rate in RATES if 1e3 / rate >= high]
+    for rate in set(RATES) - set(beyond):
+        ax.axvline(1e3 / rate, color="#8A857A", linewidth=0.8, linestyle="--", zorder=0)
+        _label(ax, 1e3 / rate, f"{rate} fps ")
     if beyond:
-        _label_rate(ax, high, heights[len(inside)], f"{', '.join(beyond)} fps \N{RIGHTWARDS ARROW}")
+        names = ", ".join(str(rate) for rate in beyond)
+        _label(ax, high, f"{names} fps \N{RIGHTWARDS ARROW}")
 
 
-def _label_rate(ax: Axes, x: float, height: float, text: str) -> None:
+def _label(ax: Axes, x: float, text: str) -> None:
     ax.text(
-        x, height, text, transform=ax.get_xaxis_transform(), fontsize=6.5, va="top", ha="right",
+        x, 0.99, text, transform=ax.get_xaxis_transform(), fontsize=6.5, va="top", ha="right",
         color="#6B675F",
     )  # fmt: skip
-
-
-def _label_times(ax: Axes, decades: float) -> None:
-    """Plain numbers on the logarithmic axis, as many as there is room for."""
-    steps = [(0.4, (1, 1.5, 2, 3, 5, 7)), (0.7, (1, 2, 3, 5)), (1.3, (1, 2, 5)), (2.0, (1, 3))]
-    subs = next((s for limit, s in steps if decades < limit), (1,))
-    ax.xaxis.set_major_locator(LogLocator(subs=subs))
-    ax.xaxis.set_minor_locator(NullLocator())
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-
-
-def _legend(figure: Figure, results: Results, styles: dict[str, tuple[str, str]]) -> None:
-    handles = [
-        Line2D(
-            [], [], linestyle="none", color=colour, marker=marker,
-            label=results.method_title(method),
-        )
-        for method, (colour, marker) in styles.items()
-    ]  # fmt: skip
-    ring = {"marker": "o", "markersize": 7, "markerfacecolor": "none"}
-    handles.append(Line2D([], [], label="fewer iterations (number K)", markersize=4.5, **_FEWER))
-    handles.append(Line2D([], [], color="#333333", label="best trade-offs", **ring))
-    handles.append(Line2D([], [], color=style.GREY, linewidth=1.2, label="full order: time"))
-    handles.append(Line2D([], [], label="full order: its own error", **_BLIND))
-    times = ", ".join(f"{1e3 / rate:.1f} ms" for rate in RATES)
-    handles.append(Line2D([], [], label=f"real time ({times})", **_RATE))
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)

@@ -1,12 +1,13 @@
 """What a frame's time buys: the smallest error for a few budgets."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from pdrom.report.figures.drawings.accuracy_cost import model_name
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.multiples import clipped
 from pdrom.report.figures.kit.options import Scenes
@@ -55,6 +56,14 @@ def draw(results: Results, options: Scenes) -> Figure:
     axes[0].set_ylabel("scene")
     _legend(figure, results, styles)
     return figure
+
+
+def model_name(row: Any) -> str:
+    """Method of a row; in a position subspace its kind comes first."""
+    if row.position_basis == "full":
+        return str(row.method)
+    subspace = f"{row.position_basis} subspace"
+    return subspace if row.method == "full" else f"{subspace}, {row.method}"
 
 
 def _models(table: pd.DataFrame) -> list[str]:

@@ -1,0 +1,63 @@
+"""Families of reduced models: what belongs together has one colour, and a marker each within it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.results import Results
+from pdrom.tables.accuracy_cost import FEWER
+
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
+
+
+@dataclass(frozen=True)
+class Family:
+    """Models of one kind, told apart from the others by their colour."""
+
+    title: str
+    colour: str
+
+
+ITERATIONS = Family("full order, fewer iterations", style.BLACK)
+PROJECTION = Family("orthogonal projection", style.PURPLE)
+ENTRIES = Family("single entries, joint rows", style.VERMILLION)
+ELEMENTS = Family("whole elements", style.BLUE)
+WEIGHTED = Family("subspace, weighted or full", style.GREEN)
+INTERPOLATED = Family("subspace, interpolated", style.ORANGE)
+FAMILIES = (ITERATIONS, PROJECTION, ENTRIES, ELEMENTS, WEIGHTED, INTERPOLATED)
+_BY_ROWS = {"all": PROJECTION, "scalar": ENTRIES, "joint": ENTRIES, "element": ELEMENTS}
+
+
+@dataclass(frozen=True)
+class Model:
+    """A method with the kind of position basis that it is used in (``full`` for none)."""
+
+    method: str
+    position_basis: str
+
+    def title(self, results: Results) -> str:
+        """Its name within its family."""
+        if self.position_basis == "full":
+            return results.method_title(self.method)
+        projections = "all projections" if self.method == "full" else self.method
+        return f"{self.position_basis}, {projections}"
+
+    def family(self, results: Results) -> Family | None:
+        """Its family; None for a method that is not drawn."""
+        if self.method == FEWER:
+            return ITERATIONS
+        if self.position_basis != "full":
+            weighted = self.method == "full" or self.method.startswith("ecsw")
+            return WEIGHTED if weighted else INTERPOLATED
+        held = results.holdings.methods.get(self.method)
+        return _BY_ROWS[held.rows] if held else None
+
+
+def markers(models: Sequence[Model], results: Results) -> dict[Model, str]:
+    """A marker for each model, in the order in which its family's models come."""
+    found: dict[Model, str] = {}
+    for family in FAMILIES[1:]:
+        members = [model for model in models if model.family(results) == family]
+        for place, model in enumerate(members):
+            found[model] = MARKERS[place % len(MARKERS)]
+    return found

@@ -1,0 +1,35 @@
+"""Legends of several blocks, each with a title, below a figure."""
+
+from collections.abc import Sequence
+
+from matplotlib.artist import Artist
+from matplotlib.figure import SubFigure
+
+LINE = 0.145  # inches, of a line of text
+_GAP = 0.06  # inches, between rows of blocks
+
+Block = tuple[str, Sequence[Artist]]
+
+
+def _rows(blocks: Sequence[Block], columns: int) -> list[Sequence[Block]]:
+    return [blocks[i : i + columns] for i in range(0, len(blocks), columns)]
+
+
+def legend_height(blocks: Sequence[Block], columns: int) -> float:
+    """Height of the legend, inches."""
+    rows = _rows(blocks, columns)
+    return sum(LINE * (1.3 + max(len(entries) for _, entries in row)) + _GAP for row in rows)
+
+
+def draw_legend(figure: SubFigure, blocks: Sequence[Block], columns: int) -> None:
+    """Draw titled blocks of entries in ``columns``, from left to right and from the top."""
+    height = legend_height(blocks, columns)
+    top = 1.0
+    for row in _rows(blocks, columns):
+        for place, (title, entries) in enumerate(row):
+            figure.legend(
+                handles=list(entries), title=title, loc="upper left", alignment="left",
+                bbox_to_anchor=(0.01 + place / columns, top), fontsize=7, title_fontsize=7.5,
+                borderpad=0.0, borderaxespad=0.1, labelspacing=0.3, handlelength=1.8,
+            )  # fmt: skip
+        top -= (LINE * (1.3 + max(len(entries) for _, entries in row)) + _GAP) / height

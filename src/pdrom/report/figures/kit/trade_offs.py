@@ -1,0 +1,213 @@
+"""Panels of error against time per frame: models by family, and the best trade-offs of each."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+from pdrom.experiments.names import ANDERSON, FOM
+from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.families import FAMILIES, ITERATIONS, Family, Model, markers
+from pdrom.report.figures.kit.multiples import clipped, log_axis
+from pdrom.report.figures.kit.options import Options
+from pdrom.report.figures.kit.results import NothingToDraw, Results
+from pdrom.tables.accuracy_cost import FEWER, pareto
+
+COLUMNS = [
+    "scene", "method", "position_basis", "iterations", "relative_error_within_horizon",
+    "ms_per_frame",
+]  # fmt: skip
+RERUN_COLUMNS = ["scene", "method", "position_basis", "blowup_frame", *COLUMNS[-2:]]
+ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
+LOW, HIGH = 1e-4, 1e2  # errors outside are arrows on the rim
+ABOVE, BELOW, BLOWN_UP = 6, 7, "x"  # markers: carets, and a cross
+OWN = {"color": style.GREY, "linewidth": 1.2}
+BLIND = {"color": style.FAILED, "linewidth": 0.9, "linestyle": "-."}
+_NEAR = 0.05  # of the axis: markers closer than this share a label
+
+
+@dataclass(frozen=True)
+class TradeOffs:
+    """Points of every scene.
+
+    points : rows of the table accuracy_cost whose errors are against the scene's own run
+    blown_up : reduced runs that ended before they had an error
+    own_ms : scene -> time per frame of its own full-order run
+    own_error : scene -> that run's own error, against the converged one
+    """
+
+    points: pd.DataFrame
+    blown_up: pd.DataFrame
+    own_ms: dict[str, float]
+    own_error: dict[str, float]
+    marker: dict[Model, str]
+
+    def models(self, family: Family, results: Results) -> list[Model]:
+        """Models of a family, in the order of the table."""
+        return [model for model in self.marker if model.family(results) == family]
+
+
+def trade_offs(results: Results, options: Options) -> tuple[TradeOffs, list[str]]:
+    """The points of the scenes that are drawn, and these scenes.
+
+    Raises
+    ------
+    NothingToDraw
+        No reduced model has both an error and a time.
+    StorageError
+        A table is missing or lacks a column.
+    """
+    table = results.table("accuracy_cost", COLUMNS).dropna(subset=[ERROR, TIME])
+    runs = results.table("reduced_reruns", RERUN_COLUMNS)
+    own = (table.method == "full") & (table.position_basis == "full")
+    full = table[own].set_index("scene")
+    fom = table[table.method == FOM].set_index(["scene", "iterations"])[ERROR]
+    errors = {s: float(fom[s, k]) for s, k in full.iterations.items() if (s, k) in fom}
+    shown = (table[TIME] > 0.0) & ~own & ~table.method.isin([FOM, ANDERSON])
+    points = _drawn(table[shown], results)
+    blown_up = runs[(runs.blowup_frame >= 0) & runs[ERROR].isna() & (runs[TIME] > 0.0)]
+    scenes = [scene for scene in results.scenes(options) if (points.scene == scene).any()]
+    if not scenes:
+        raise NothingToDraw("no reduced model with both an error and a time")
+    points = points[points.scene.isin(scenes)]
+    names = dict.fromkeys(zip(points.method, points.position_basis, strict=True))
+    marker = markers([Model(*name) for name in names if name[0] != FEWER], results)
+    found = TradeOffs(points, _drawn(blown_up, results), dict(full[TIME]), errors, marker)
+    return found, scenes
+
+
+def _drawn(table: pd.DataFrame, results: Results) -> pd.DataFrame:
+    """Rows of models that are drawn, with their family."""
+    names = zip(table.method, table.position_basis, strict=True)
+    families = [Model(*name).family(results) for name in names]
+    kept = np.array([family is not None for family in families], dtype=bool)
+    return table[kept].assign(family=[family.title for family in families if family])
+
+
+def draw_panel(
+    ax: Axes, found: TradeOffs, scene: str, results: Results, low: float = LOW, size: float = 3.0
+) -> None:
+    """A scene's points with the front of each family, and the full-order run that they replace.
+
+    An error below ``low`` or above `HIGH` is an arrow on the rim; a run that blew up, a cross on
+    the upper one.
+    """
+    ax.set_xscale("log")
+    log_axis(ax, low, HIGH)
+    rows = found.points[found.points.scene == scene]
+    lost = found.blown_up[found.blown_up.scene == scene]
+    for family in FAMILIES:
+        part = rows[rows.family == family.title]
+        for model in found.models(family, results):
+            own = (part.method == model.method) & (part.position_basis == model.position_basis)
+            _points(ax, part[own], family.colour, found.marker[model], low, size)
+        if family == ITERATIONS:
+            _points(ax, part, family.colour, "X", low, size)
+        _front(ax, part, family.colour, low)
+        ended = lost[lost.family == family.title]
+        ax.plot(
+            ended[TIME], np.full(len(ended), 0.6 * HIGH), BLOWN_UP, color=family.colour,
+            markersize=6.0, markeredgewidth=1.8,
+        )  # fmt: skip
+    times = [*rows[TIME], *lost[TIME], found.own_ms.get(scene, np.nan)]
+    _time_axis(ax, np.asarray(times, dtype=float))
+    if scene in found.own_ms:
+        ax.axvline(found.own_ms[scene], zorder=0, **OWN)
+    if scene in found.own_error:
+        ax.axhline(np.clip(found.own_error[scene], low, HIGH), zorder=0, **BLIND)
+
+
+def _points(
+    ax: Axes, rows: pd.DataFrame, colour: str, marker: str, low: float, size: float
+) -> None:
+    error, time = rows[ERROR].to_numpy(float), rows[TIME].to_numpy(float)
+    looks = ((error < low, BELOW), (error > HIGH, ABOVE))
+    inside = (error >= low) & (error <= HIGH)
+    common = {"linestyle": "none", "color": colour, "alpha": 0.75, "markeredgewidth": 0.9}
+    ax.plot(time[inside], error[inside], marker=marker, markersize=size, **common)
+    for outside, arrow in looks:
+        if outside.any():
+            rim = clipped(error[outside], low, HIGH)
+            ax.plot(time[outside], rim, marker=arrow, markersize=size + 2.5, **common)
+
+
+def _front(ax: Axes, rows: pd.DataFrame, colour: str, low: float) -> None:
+    unbeaten = np.array(pareto(rows[ERROR].to_list(), rows[TIME].to_list()), dtype=bool)
+    best = rows[unbeaten].sort_values(TIME)
+    heights = clipped(best[ERROR].to_numpy(float), low, HIGH)
+    ax.plot(best[TIME], heights, color=colour, linewidth=1.3, drawstyle="steps-post", zorder=1.5)
+
+
+def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
+    """Number of iterations beside each run that stops earlier; near ones share a label."""
+    rows = found.points[(found.points.scene == scene) & (found.points.method == FEWER)]
+    rows = rows.sort_values(TIME)
+    low, high = np.log10(ax.get_xlim())
+    places = (np.log10(rows[TIME].to_numpy(float)) - low) / (high - low)
+    start = 0
+    for end in range(1, len(rows) + 1):
+        if end < len(rows) and places[end] - places[end - 1] < _NEAR:
+            continue
+        together = rows.iloc[start:end]
+        numbers = ", ".join(f"{k:.0f}" for k in together.iterations)
+        ax.annotate(
+            f"K = {numbers}", (together[TIME].iloc[0], together[ERROR].min()), (-3.0, -4.5),
+            textcoords="offset points", fontsize=7, ha="right", va="top",
+        )  # fmt: skip
+        start = end
+
+
+def _time_axis(ax: Axes, times: np.ndarray) -> None:
+    """Plain numbers on the logarithmic axis, as many as there is room for."""
+    low, high = np.log10(np.nanmin(times)), np.log10(np.nanmax(times))
+    pad = max(0.1, 0.08 * (high - low))
+    ax.set_xlim(10 ** (low - pad), 10 ** (high + pad))
+    steps = [(0.4, (1, 1.5, 2, 3, 5, 7)), (0.7, (1, 2, 3, 5)), (1.3, (1, 2, 5)), (2.0, (1, 3))]
+    subs = next((s for limit, s in steps if high - low < limit), (1,))
+    ax.xaxis.set_major_locator(LogLocator(subs=subs))
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+
+def group_title(results: Results, scene: str) -> str:
+    """The constraint group that a scene reduces, in words."""
+    groups = results.holdings.scenes[scene].groups
+    return style.words(groups[0]) if len(groups) == 1 else "several groups"
+
+
+def handles(found: TradeOffs, results: Results) -> list[tuple[str, list[Line2D]]]:
+    """Legend entries by family, and what is no family last."""
+    entries: list[tuple[str, list[Line2D]]] = []
+    for family in FAMILIES[1:]:
+        members = [
+            Line2D(
+                [], [], color=family.colour, marker=found.marker[model], linewidth=1.0,
+                markersize=4.0, label=model.title(results),
+            )
+            for model in found.models(family, results)
+        ]  # fmt: skip
+        if members:
+            entries.append((family.title, members))
+    rest = [
+        Line2D(
+            [],
+            [],
+            color=ITERATIONS.colour,
+            marker="X",
+            linewidth=1.0,
+            markersize=4.0,
+            label="K iterations",
+        ),
+        Line2D([], [], label="its time", **OWN),
+        Line2D([], [], label="its own error", **BLIND),
+    ]
+    rim = {"color": "#555555", "linestyle": "none"}
+    outside = [
+        Line2D([], [], marker=BELOW, markersize=5.5, label="error below the axis", **rim),
+        Line2D([], [], marker=ABOVE, markersize=5.5, label="error above the axis", **rim),
+        Line2D([], [], marker=BLOWN_UP, markersize=6, markeredgewidth=1.8, label="blow-up", **rim),
+    ]
+    return [("full order", rest), *entries, ("on the rim", outside)]
