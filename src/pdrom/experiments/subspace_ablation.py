@@ -1,6 +1,7 @@
 """Why does block DEIM fail in a position subspace, and what mends it? Variants on one scene."""
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -20,6 +21,7 @@ from pdrom.model.scene import SceneConfig
 from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.interpolated import Training, interpolate
+from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns
 from pdrom.reduction.subspace.specs import InterpolationSpec, InterpolationVariant
 
@@ -27,7 +29,8 @@ log = logging.getLogger(__name__)
 
 POSITION_BASIS = "pod"
 COLUMNS = [
-    "scene", "group", "position_basis", "k", "r", "variant", "elements_sampled", "gain", "finite",
+    "scene", "group", "position_basis", "k", "r", "variant", "elements_sampled", "control_elements",
+    "fallback_share", "heldout_fallback_share", "gain", "finite",
     "max_extent", "relative_error_within_horizon", "relative_error_full_projections",
     "heldout_error_within_horizon", "heldout_error_full_projections",
 ]  # fmt: skip
@@ -109,7 +112,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
             log.info("k = %d, r = %d, %s: %s", k, spec.modes, variant, rows[-1])
     table = pd.DataFrame(rows, columns=COLUMNS)
     table["finite"] = table["finite"].astype("boolean")
-    table["elements_sampled"] = table["elements_sampled"].astype("Int64")
+    table = table.astype({"elements_sampled": "Int64", "control_elements": "Int64"})
     write_table(table, outputs.table.path)
 
 
@@ -144,13 +147,15 @@ class _Trials:
             return {}
         model = SubspaceModel(POSITION_BASIS, columns, found)
         outcome, within = self._run("train", model)
+        heldout, heldout_within = self._run("heldout", model)
         return {
             "elements_sampled": model.elements_evaluated(self.motions["train"].scene),
+            **_safeguard(found, outcome, heldout),
             "gain": max(chosen.gain for chosen in found.values()),
             "finite": outcome.finite,
             "max_extent": outcome.max_extent,
             "relative_error_within_horizon": within,
-            "heldout_error_within_horizon": self._run("heldout", model)[1],
+            "heldout_error_within_horizon": heldout_within,
         }
 
     def _run(self, motion: str, model: SubspaceModel) -> tuple[Rerun, float | None]:
@@ -158,6 +163,18 @@ class _Trials:
         case, end = self.motions[motion], self._ends[motion]
         outcome = case.run(model, self._limit)
         return outcome, error_within(outcome.difference, case.displacement, end)
+
+
+def _safeguard(found: Mapping[str, Interpolation], train: Rerun, heldout: Rerun) -> dict[str, Any]:
+    """Cells of a safeguard; empty without one."""
+    control = [len(chosen.control) for chosen in found.values() if chosen.control is not None]
+    if not control:
+        return {}
+    return {
+        "control_elements": sum(control),
+        "fallback_share": train.fallbacks / max(train.frames, 1),
+        "heldout_fallback_share": heldout.fallbacks / max(heldout.frames, 1),
+    }
 
 
 EXPERIMENT = Experiment(

@@ -131,6 +131,7 @@ HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.SUBSPACES: _subspaces,
     paths.SUBSPACES_TRAIN: _subspaces,
     paths.SUBSPACES_HELDOUT: _subspaces,
+    paths.POSITION_BASES: _subspaces,
     paths.COMPANION: _scenes,
     paths.ESTIMATES: _scenes,
     paths.COMPANION_TIMES: _scenes,

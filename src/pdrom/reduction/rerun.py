@@ -19,6 +19,7 @@ class Rerun:
     extent : (F',) longest side of the bounding box over the rest extent
     blowup_frame : first frame whose extent exceeds the limit or is not finite, else None
     coordinates : (F' + 1, K, 3) of the step loop; the positions themselves outside a subspace
+    fallbacks : frames that a safeguard repeated
     """
 
     positions: np.ndarray
@@ -27,6 +28,7 @@ class Rerun:
     extent: np.ndarray
     blowup_frame: int | None
     coordinates: np.ndarray
+    fallbacks: int = 0
 
     @property
     def frames(self) -> int:

@@ -24,6 +24,7 @@ from pdrom.reduction.subspace.interpolated import Training as States
 from pdrom.reduction.subspace.interpolated import interpolate
 from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
+from pdrom.reduction.subspace.safeguard import SafeguardedStepper
 from pdrom.reduction.subspace.space import coordinates
 from pdrom.reduction.subspace.specs import HrpdSpec, InterpolationSpec
 
@@ -32,6 +33,9 @@ R, K, TOLERANCE = 10, 6, 1e-2
 HRPD = HrpdSpec(dimension=20, samples=60)
 INTERPOLATIONS = {
     "gappy": InterpolationSpec(modes=R, states="projected", oversampling=3, margin=0.1),
+    "safeguarded": InterpolationSpec(
+        modes=R, states="projected", oversampling=3, margin=0.1, safeguard=0.1
+    ),
 }
 BASES = {"pod": ("full", "ecsw", "hrpd", *INTERPOLATIONS), "skinning": ("full", "hrpd")}
 
@@ -48,7 +52,8 @@ def _samples(
     if sampling == "hrpd":
         points = scene.mesh.points
         return {g.name: hrpd(g, columns, sampled_space(g, points, HRPD)) for g in scene.groups}
-    return interpolate(scene, columns, States(scene, columns, positions), INTERPOLATIONS[sampling])
+    states = States(scene, columns, positions, start)
+    return interpolate(scene, columns, states, INTERPOLATIONS[sampling])
 
 
 class Training:
@@ -143,7 +148,9 @@ def _subspace(training: Training, kind: str, sampling: str, limit: float) -> Red
     model = SubspaceModel(kind, columns, samples)
     untracked, _ = model.loop(scene)
     steps = untracked.local_steps
-    loop = Stepper(untracked.space, untracked.time_step, untracked.iterations, steps)
+    loop: Stepper = untracked
+    if not isinstance(untracked, SafeguardedStepper):
+        loop = Stepper(untracked.space, untracked.time_step, untracked.iterations, steps)
     roundoff = Roundoff(scene, loop, columns)
     run = record(scene, loop, state, roundoff, model.positions, limit)
     return ReducedRun(run, model.elements_evaluated(scene), columns.B.shape[1], None)

@@ -1,16 +1,19 @@
 """States and bases that train the interpolations in a position subspace, and the result."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from pdrom.core.errors import SceneError
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.dynamics.stepper import Stepper
+from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.scene import Scene
 from pdrom.reduction.snapshots import training_frames
 from pdrom.reduction.subspace.block_deim import States, TrainedBasis, block_deim, train_basis
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
+from pdrom.reduction.subspace.model import Samples, sample_elements
 from pdrom.reduction.subspace.space import ReducedSpace, coordinates, reduced_state
 from pdrom.reduction.subspace.specs import InterpolationSpec
 
@@ -19,7 +22,14 @@ def interpolate(
     scene: Scene, columns: Columns, training: "Training", spec: InterpolationSpec
 ) -> dict[str, Interpolation]:
     """Interpolation of every group of the scene; errors as `block_deim`."""
-    return {g.name: block_deim(g, columns, training.basis(g, spec), spec) for g in scene.groups}
+    made = {g.name: block_deim(g, columns, training.basis(g, spec), spec) for g in scene.groups}
+    if spec.safeguard is None:
+        return made
+    control = training.control(spec.safeguard)
+    return {
+        name: replace(chosen, control=control[name].elements, control_factors=control[name].factors)
+        for name, chosen in made.items()
+    }
 
 
 class Training:
@@ -28,10 +38,14 @@ class Training:
     Parameters
     ----------
     training : (n, N, 3) full-order positions of the training frames
+    start : coordinates at which the training motion begins; where the scene does if None
     """
 
-    def __init__(self, scene: Scene, columns: Columns, training: np.ndarray) -> None:
+    def __init__(
+        self, scene: Scene, columns: Columns, training: np.ndarray, start: State | None = None
+    ) -> None:
         self._scene, self._columns, self._training = scene, columns, training
+        self._start = start
         self._made: dict[str, States] = {}
         self._bases: dict[tuple[str, ...], TrainedBasis] = {}
         self._makers = {
@@ -46,6 +60,11 @@ class Training:
         if key not in self._bases:
             self._bases[key] = train_basis(group, self.states(spec.states), spec)
         return self._bases[key]
+
+    def control(self, tolerance: float) -> dict[str, Samples]:
+        """Energy-conserving samples of every group for the safeguard."""
+        frames = training_frames(self._scene.config.frames, len(self._training))
+        return sample_elements(self._scene, self._columns, frames, [tolerance], self._start)[0]
 
     def states(self, kind: str) -> States:
         """States of a kind, as pairs (beginning of the frame, place of the projections)."""
@@ -65,7 +84,7 @@ class Training:
         """Last local iterates of a run with full projections, in as many (even) frames."""
         wanted = set(training_frames(self._scene.config.frames, len(self._training)).tolist())
         loop = _full_projections(self._scene, self._columns)
-        state = reduced_state(self._scene, self._columns)
+        state = self._start or reduced_state(self._scene, self._columns)
         b, visited, last = self._columns.B, [], []
         for frame in range(self._scene.config.frames):
             start = state.positions

@@ -12,7 +12,10 @@ import numpy as np
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.reduction.subspace.columns import Columns
 
-_ARRAYS = ("elements", "operator", "modes", "offset", "stiffness", "lower", "upper")
+_ARRAYS = (
+    "elements", "operator", "modes", "offset", "stiffness", "lower", "upper",
+    "control", "control_factors",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,7 @@ class Interpolation:
     gain : || operator ||_2
     residual : whether p - S y is interpolated, instead of p
     lower, upper : (r, 1) bounds of the coefficients, or None
+    control, control_factors : (m',) sampled elements of the safeguard and their factors, or None
     """
 
     elements: np.ndarray
@@ -39,6 +43,8 @@ class Interpolation:
     residual: bool = False
     lower: np.ndarray | None = None
     upper: np.ndarray | None = None
+    control: np.ndarray | None = None
+    control_factors: np.ndarray | None = None
 
     @classmethod
     def of_constant(cls, stiffness: np.ndarray, offset: np.ndarray) -> "Interpolation":

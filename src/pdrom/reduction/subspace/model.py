@@ -14,6 +14,7 @@ from pdrom.reduction.subspace.ecsw import ecsw_elements
 from pdrom.reduction.subspace.fused import FusedStepper
 from pdrom.reduction.subspace.interpolation import InterpolatedLocalStep, Interpolation
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
+from pdrom.reduction.subspace.safeguard import ControlStepper, SafeguardedStepper
 from pdrom.reduction.subspace.skinning import skinning_modes
 from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
 from pdrom.reduction.subspace.training import Norm, training_run
@@ -39,7 +40,7 @@ class SubspaceModel:
     samples: Mapping[str, Samples | Interpolation] = field(default_factory=dict)
 
     def elements_evaluated(self, scene: Scene) -> int:
-        """Elements of all groups that a local step evaluates."""
+        """Elements of all groups that a local step evaluates; those of a safeguard do not count."""
         return sum(self._evaluated(group) for group in scene.groups)
 
     def _evaluated(self, group: ConstraintGroup) -> int:
@@ -56,9 +57,26 @@ class SubspaceModel:
                 continue
             steps.append(SubspaceLocalStep(group, self.columns, chosen.elements, chosen.factors))
         space = ReducedSpace(scene, self.columns, [step.matrix for step in steps])
-        config = scene.config
-        loop = FusedStepper(space, config.time_step, config.iterations, steps, scene.acceleration())
-        return loop, reduced_state(scene, self.columns)
+        h, iterations = scene.config.time_step, scene.config.iterations
+        start = reduced_state(scene, self.columns)
+        control = self._control(scene)
+        if control is not None:
+            return SafeguardedStepper(space, h, iterations, steps, control), start
+        return FusedStepper(space, h, iterations, steps, scene.acceleration()), start
+
+    def _control(self, scene: Scene) -> ControlStepper | None:
+        """Iterations of the sampled elements that control an interpolation; None without any."""
+        chosen = [(group, self.samples.get(group.name)) for group in scene.groups]
+        steps = [
+            SubspaceLocalStep(group, self.columns, own.control, own.control_factors)
+            for group, own in chosen
+            if isinstance(own, Interpolation) and own.control is not None
+        ]
+        if len(steps) < len(chosen):
+            return None
+        space = ReducedSpace(scene, self.columns, [step.matrix for step in steps])
+        h, iterations = scene.config.time_step, scene.config.iterations
+        return ControlStepper(space, h, iterations, steps, track_objective=False)
 
     def positions(self, z: np.ndarray) -> np.ndarray:
         """Vertex positions (N, 3) m of coordinates (K, 3)."""

@@ -35,6 +35,8 @@ class InterpolationVariant(ConfigModel):
         "interpolated" strains (Galerkin; symmetric together with "both")
     margin : online coefficients stay in the range seen in training, widened on both sides by this
         fraction of it; None for no bounds
+    safeguard : tolerance tau of the energy-conserving sampling whose objective no frame may raise;
+        None for no safeguard
     """
 
     states: Literal["full-order", "projected", "visited"] = "full-order"
@@ -45,6 +47,7 @@ class InterpolationVariant(ConfigModel):
     refuse_above: Gain | None = None
     test: Literal["subspace", "interpolated"] = "subspace"
     margin: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
+    safeguard: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
 
     @model_validator(mode="after")
     def _combination_exists(self) -> Self:
