@@ -5,7 +5,8 @@ p_j = p_j(y) and a global step (M/h^2 + sum S^T W S) y = (M/h^2) s + sum S^T W p
 v = (y - q) / h and q = y. What replaces the projections of a group is a `LocalStep`.
 """
 
-from collections.abc import Callable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Protocol
@@ -22,6 +23,7 @@ class LocalStep(Protocol):
     """Contribution of one group to the right-hand side. A constraint group is one itself.
 
     With a position subspace y and rhs are coordinates (k, 3) in place of vertex positions (N, 3).
+    A step with a ``local_kernel`` is part of compiled iterations.
     """
 
     name: str
@@ -31,6 +33,19 @@ class LocalStep(Protocol):
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         """Add S^T W p(y) to ``rhs`` (N, 3); return the energy W(y), nan where it is not known."""
+
+
+class WatchedStep(ABC):
+    """A `LocalStep` that takes a look at some iterations, which are then not compiled ones."""
+
+    @property
+    @abstractmethod
+    def watched(self) -> Collection[int]:
+        """Iterations of the coming frame at which it looks."""
+
+    @abstractmethod
+    def look(self, y: np.ndarray, rhs: np.ndarray) -> float:
+        """`accumulate` in these iterations."""
 
 
 @dataclass(frozen=True)
@@ -120,54 +135,59 @@ class Stepper:
         objective = np.full(self.iterations if self._track else 0, np.nan)
         if self._acceleration is not None:
             self._acceleration.begin_frame(y)
-        if self._compiled is None or not self._compiled.takes(elimination):
-            self._one_by_one(s, base, elimination, y, objective, seconds, on_last_iterate)
-            return y, objective
-        rest = (objective, y, s, base, elimination, seconds)
-        iterations = range(self.iterations)
-        if on_last_iterate is not None:
-            self._compiled.run(iterations[:-1], self.iterations, *rest)
-            on_last_iterate(y)
-            iterations = iterations[-1:]
-        self._compiled.run(iterations, self.iterations, *rest)
+        watching = (local for local in self.local_steps if isinstance(local, WatchedStep))
+        watched = {k for local in watching for k in local.watched}
+        compiled = self._compiled
+        k, last = 0, self.iterations - 1
+        while k <= last:
+            if on_last_iterate is not None and k == last:
+                on_last_iterate(y)
+            if k in watched or compiled is None or not compiled.takes(elimination):
+                self._in_python(k, s, base, elimination, y, objective, seconds)
+                k += 1
+                continue
+            unseen = last if on_last_iterate is not None and k < last else self.iterations
+            end = min((j for j in watched if k < j < unseen), default=unseen)
+            which = range(k, end)
+            compiled.run(which, self.iterations, objective, y, s, base, elimination, seconds)
+            k = end
         return y, objective
 
-    def _one_by_one(
+    def _in_python(
         self,
+        k: int,
         s: np.ndarray,
         base: np.ndarray,
         elimination: Solve,
         y: np.ndarray,
         objective: np.ndarray,
         seconds: np.ndarray,
-        on_last_iterate: Callable[[np.ndarray], None] | None,
     ) -> None:
-        """All iterations with local steps of any kind, in place."""
+        """Iteration k with local steps of any kind, in place."""
         space, acceleration = self.space, self._acceleration
+        before = perf_counter()
         rhs = space.copy(base)
-        for k in range(self.iterations):
-            if on_last_iterate is not None and k == self.iterations - 1:
-                on_last_iterate(y)
-            before = perf_counter()
-            np.copyto(rhs, base)
-            energy = 0.0
-            for local in self.local_steps:
-                energy += local.accumulate(y, rhs)
-            between = perf_counter()
-            seconds[1] += between - before
-            if self._track and energy == energy:
-                objective[k] = energy + space.inertia_energy(y - s)
-            before = perf_counter()
-            if acceleration is None:
-                elimination.solve(rhs, y)
-            elif acceleration.refuse(y, energy + space.inertia_energy(y - s)):
-                objective[k : k + 1] = objective[k - 1 : k]
+        energy = 0.0
+        for local in self.local_steps:
+            if isinstance(local, WatchedStep) and k in local.watched:
+                energy += local.look(y, rhs)
             else:
-                elimination.solve(rhs, y)
-                # the last image stays as it is: its objective is known not to rise
-                if k < self.iterations - 1:
-                    acceleration.combine(y)
-            seconds[2] += perf_counter() - before
+                energy += local.accumulate(y, rhs)
+        between = perf_counter()
+        seconds[1] += between - before
+        if self._track and energy == energy:
+            objective[k] = energy + space.inertia_energy(y - s)
+        before = perf_counter()
+        if acceleration is None:
+            elimination.solve(rhs, y)
+        elif acceleration.refuse(y, energy + space.inertia_energy(y - s)):
+            objective[k : k + 1] = objective[k - 1 : k]
+        else:
+            elimination.solve(rhs, y)
+            # the last image stays as it is: its objective is known not to rise
+            if k < self.iterations - 1:
+                acceleration.combine(y)
+        seconds[2] += perf_counter() - before
 
     def _finish(self, state: State, y: np.ndarray) -> State:
         """State after the frame: contacts, then the velocities."""

@@ -1,13 +1,16 @@
 """A reduced local step that keeps an eye on itself: coefficients, energy, and full projections."""
 
+from collections.abc import Collection
+
 import numpy as np
 
 from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.dynamics.stepper import WatchedStep
 from pdrom.reduction.local.local_step import ReducedLocalStep
 from pdrom.reduction.sampling.reduction import Reduction
 
 
-class WatchedLocalStep(ReducedLocalStep):
+class WatchedLocalStep(ReducedLocalStep, WatchedStep):
     """`ReducedLocalStep` that adds the same bits to the right-hand side and looks at them.
 
     It looks at the middle and at the last of the K iterations only, to be cheap: at the
@@ -25,11 +28,8 @@ class WatchedLocalStep(ReducedLocalStep):
 
     def __init__(self, group: ConstraintGroup, reduction: Reduction, iterations: int) -> None:
         super().__init__(group, reduction)
-        # compiled iterations look at nothing
-        self.local_kernel = None
         self.full = False
-        self._look_at = (iterations // 2, iterations - 1)
-        self._call = 0
+        self._iterations = iterations
         self._boxes = [_Box(*_trained(reduction, b.axis)) for b in reduction.blocks]
         self._stiffness = group.system_matrix()
         weights = np.repeat(group.row_weights, 3)
@@ -43,8 +43,14 @@ class WatchedLocalStep(ReducedLocalStep):
         self.projection_energy = 0.0
         """1/2 |W^1/2 p^|^2 at the last iterate looked at: the size of the terms that cancel."""
 
+    @property
+    def watched(self) -> Collection[int]:
+        """Iterations that compiled code leaves out."""
+        if self.full:
+            return range(self._iterations)
+        return (self._iterations // 2, self._iterations - 1)
+
     def begin_frame(self, q: np.ndarray) -> None:
-        self._call = 0
         for box in self._boxes:
             box.reset()
         if self.full:
@@ -52,15 +58,12 @@ class WatchedLocalStep(ReducedLocalStep):
         else:
             super().begin_frame(q)
 
-    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
+    def look(self, y: np.ndarray, rhs: np.ndarray) -> float:
+        """`accumulate` in a watched iteration; the energy is that of the reduced projections."""
         if self.full:
             return self._group.accumulate(y, rhs)
-        looks = self._call in self._look_at
-        self._call += 1
-        if not looks:
-            return super().accumulate(y, rhs)
         before = rhs.copy()
-        super().accumulate(y, rhs)
+        self.accumulate(y, rhs)
         for box, own in zip(self._boxes, self.coefficients, strict=True):
             box.include(own)
         return self._energy(y, rhs - before)
