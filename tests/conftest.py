@@ -26,6 +26,8 @@ GROUPS = {
     "strain": {"kind": "cloth", "rows": 6, "columns": 5},
     "tetrahedron_strain": {"kind": "bar", "nx": 5, "ny": 3, "nz": 3},
     "deformation_gradient": {"kind": "bar", "nx": 5, "ny": 3, "nz": 3},
+    "volume": {"kind": "bar", "nx": 5, "ny": 3, "nz": 3},
+    "area": {"kind": "cloth", "rows": 6, "columns": 5},
 }
 
 

@@ -42,7 +42,7 @@ SUMMED = 20_000
 
 
 def largest_projections(group: ConstraintGroup, points: np.ndarray) -> np.ndarray | None:
-    """Bound (e,) of | p_e |_F over all states; None for a group that names no manifold.
+    """Bound (e,) of | p_e |_F over all states; None for a group that names no bounded manifold.
 
     Parameters
     ----------

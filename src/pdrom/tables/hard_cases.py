@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.tables.declaration import number, table, text
+from pdrom.tables.declaration import flag, number, table, text
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import BLOWUP_FRAME, FINITE, FRAMES, GAIN, METHOD, K, R
 
@@ -15,6 +15,7 @@ from pdrom.tables.vocabulary import BLOWUP_FRAME, FINITE, FRAMES, GAIN, METHOD, 
     columns=(
         text("case", "name of the hard case"),
         METHOD,
+        flag("bounded_projections", "no state makes projections of the reduced group large"),
         K,
         R,
         GAIN,

@@ -100,7 +100,7 @@ def test_stored_snapshot_is_the_projection_of_the_last_iterate(tmp_path):
     ("effects", "message"),
     [
         ([{"effect": "gravity"}], "no constraint group"),
-        ([SPRING, {"effect": "sprnig", "weight": 1.0}], "allowed: bending"),
+        ([SPRING, {"effect": "sprnig", "weight": 1.0}], "allowed: area, bending"),
         ([{"effect": "spring", "weight": -1.0}], "weight = -1.0"),
         ([{"effect": "spring", "weight": float("nan")}], "weight"),
         ([{"effect": "spring", "weigth": 1.0}], "weigth"),

@@ -12,6 +12,7 @@ from pdrom.experiments.hard_cases.shapes import (
     folded,
     lowered,
     mapped,
+    meeting,
     moving,
     noisy,
     one_tetrahedron,
@@ -35,6 +36,8 @@ SPRING = {"effect": "spring", "weight": 1e6}
 STRAIN = {"effect": "strain", "weight": 1e7}
 TETRAHEDRON = {"effect": "tetrahedron_strain", "weight": 1e6}
 ROTATION = {"effect": "deformation_gradient", "weight": 1e8}
+VOLUME = {"effect": "volume", "weight": 1e6}
+AREA = {"effect": "area", "weight": 1e6}
 
 # Nothing pushes, nothing is held: everything that theory promises.
 FREE = ("finite", "bounded", "objective", "momentum", "determinism")
@@ -68,6 +71,10 @@ def _all_but(*free: int) -> dict:
 
 def _two_sheets() -> Mesh:
     return both(sheet(), shifted(sheet(), 3.0, 0.5, 0.0))
+
+
+def _two_layers() -> Mesh:
+    return both(sheet(), shifted(sheet(), 0.0, 0.5, 0.0))
 
 
 def _one_bad_element() -> Mesh:
@@ -161,6 +168,45 @@ def _states() -> list[HardCase]:
                      (*CALM, "still"), turn),
         ]  # fmt: skip
     return cases
+
+
+def _sizes() -> list[HardCase]:
+    """Volumes and areas that are to be kept: states that say nothing about the shape."""
+    lying = mapped((1, 0, 5), (0, 1, 0), (0, 0, 1))
+    # what only keeps its size may be drawn out as long as its momentum carries it
+    loose, cases = 40.0, []
+    for label, mesh, group, flat in (
+        ("volume", small_bar, VOLUME, scales(1, 1, 0)),
+        ("area", sheet, AREA, scales(1, 1, 0)),
+    ):
+        cases += [
+            HardCase(f"{label}_flat", _scene(mesh, group),
+                     "every element has lost its size along one axis", CALM, flat, bound=loose),
+            HardCase(f"{label}_point", _scene(mesh, group),
+                     "all vertices in one point: no direction to grow in", CALM, scales(0, 0, 0),
+                     bound=loose),
+            HardCase(f"{label}_scrambled", _scene(mesh, group),
+                     "vertices at random in a box: needles of the right size are near", CALM,
+                     scrambled(), bound=loose),
+            HardCase(f"{label}_swollen", _scene(mesh, group),
+                     "three times as large along each axis: several shapes are near", CALM,
+                     scales(3, 3, 3), bound=loose),
+            HardCase(f"{label}_sheared", _scene(mesh, group),
+                     "sheared five times over: nothing may move", (*CALM, "still"), lying),
+        ]  # fmt: skip
+    return [
+        *cases,
+        HardCase("volume_inverted", _scene(small_bar, VOLUME, frames=60),
+                 "all tetrahedra are inverted: any axis may turn back", CALM, scales(1, 1, -1),
+                 bound=loose),
+        HardCase("volume_large_step", _scene(small_bar, VOLUME, _with(TETRAHEDRON, weight=1e5),
+                                             GRAVITY, LEFT, time_step=0.1),
+                 "a soft bar that keeps its volume, h = 0.1 s", FORCED, bound=4.0),
+        HardCase("area_falling", _scene(sheet, AREA, _with(SPRING, weight=1e2), GRAVITY, FLOOR,
+                                        LEFT),
+                 "a soft sheet that keeps its area hangs and touches the floor", FORCED,
+                 bound=4.0),
+    ]  # fmt: skip
 
 
 def _meshes() -> list[HardCase]:
@@ -293,6 +339,7 @@ def _obstacles() -> list[HardCase]:
     plate = {"effect": "box", "lower": [-9, 1, -9], "upper": [9, 1, 9]}
     around = {"effect": "box", "lower": [-2, 0, -2], "upper": [2, 4, 2]}
     slope = {"effect": "plane", "point": [0, 1.8, 0], "normal": [0.6, 0.8, 0]}
+    wire = {"effect": "box", "lower": [-9, 1.9, 0.03], "upper": [9, 1.9, 0.03], "friction": 1.0}
     fast, sticky = moving((0, -1e4, 0)), {"friction": float("inf")}
     return [
         HardCase("box_edge", _scene(sheet, SPRING, GRAVITY, edge),
@@ -315,6 +362,16 @@ def _obstacles() -> list[HardCase]:
                          {"at": 1, "offset": [0, 50, 0], "turn": [720, 0, 180]},
                          {"at": 2, "offset": [0, -50, 0]}]}),
                  "a handle jumps a hundred extents to and fro, turns over, and lets go", FORCED),
+        HardCase("wire", _scene(sheet, SPRING, GRAVITY, wire),
+                 "a box without width and height, thinner than any cell", FORCED),
+        HardCase("ball_large_step", _scene(sheet, SPRING, GRAVITY, {
+                     "effect": "sphere", "centre": [0, 0, 0], "radius": 0.1, **sticky},
+                     time_step=1.0),
+                 "h = 1 s: the sheet falls past a small sticky ball in one frame", FORCED,
+                 bound=20.0),
+        HardCase("below_slope", _scene(small_bar, TETRAHEDRON, GRAVITY, {
+                     **slope, **sticky, "point": [0, 9, 0]}),
+                 "all vertices start far behind a sticky slope", FORCED, bound=4.0),
     ]  # fmt: skip
 
 
@@ -330,12 +387,17 @@ def _collisions() -> list[HardCase]:
         HardCase("collision_thick", _scene(sheet, SPRING, _with(apart, thickness=0.9)),
                  "a thickness as large as the sheet, crumpled", FORCED, scrambled(0.1),
                  bound=4.0),
+        HardCase("collision_at_speed", _scene(_two_layers, SPRING, apart),
+                 "two layers pass through each other in a tenth of a frame", FORCED, meeting(1e4),
+                 bound=1e4),
         HardCase("collision_zero", _scene(sheet, SPRING, _with(apart, thickness=0.0)),
                  "a thickness of zero", ("refused",)),
     ]  # fmt: skip
 
 
-PARTS = (_squashed, _states, _meshes, _settings, _boundaries, _air, _obstacles, _collisions)
+PARTS = (
+    _squashed, _states, _sizes, _meshes, _settings, _boundaries, _air, _obstacles, _collisions,
+)  # fmt: skip
 CASES: dict[str, HardCase] = {case.name: case for part in PARTS for case in part()}
 
 

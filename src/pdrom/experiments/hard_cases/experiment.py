@@ -23,8 +23,8 @@ from pdrom.reduction.method import MethodSpec
 log = logging.getLogger(__name__)
 
 COLUMNS = [
-    "case", "method", "k", "r", "gain", "frames", "finite", "blowup_frame", "max_extent",
-    "objective_rise", "outcome", "why",
+    "case", "method", "bounded_projections", "k", "r", "gain", "frames", "finite", "blowup_frame",
+    "max_extent", "objective_rise", "outcome", "why",
 ]  # fmt: skip
 
 

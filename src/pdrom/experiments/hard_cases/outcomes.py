@@ -16,6 +16,7 @@ from pdrom.experiments.hard_cases.expectations import (
     Expectation,
 )
 from pdrom.experiments.hard_cases.reductions import ReducedRun, Training, names, reduced_run
+from pdrom.model.boundedness import largest_projections
 from pdrom.reduction.method import MethodSpec
 
 # Multiples of the full-order run's scale: a larger extent is a blow-up, or a distorted shape.
@@ -53,8 +54,10 @@ def rows(
 ) -> Iterator[dict[str, Any]]:
     """Rows of the table hard_cases: every reduction in ``case``."""
     training = Training(case)
+    bounded = largest_projections(training.group, training.scene.mesh.points) is not None
     for name in names(methods):
-        yield {"case": case.name, "method": name, **row(training, name, methods, expected)}
+        named = {"case": case.name, "method": name, "bounded_projections": bounded}
+        yield {**named, **row(training, name, methods, expected)}
 
 
 def row(

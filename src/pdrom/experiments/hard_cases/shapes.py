@@ -126,6 +126,18 @@ def moving(velocity: tuple[float, float, float]) -> Start:
     return start
 
 
+def meeting(speed: float) -> Start:
+    """The upper half of the vertices moves down and the lower half up at ``speed``, m/s."""
+
+    def start(scene: Scene) -> State:
+        points = scene.mesh.points.copy()
+        velocities = np.zeros_like(points)
+        velocities[:, 1] = np.where(points[:, 1] > points[:, 1].mean(), -speed, speed)
+        return State(points, velocities)
+
+    return start
+
+
 def lowered(offset: float) -> Start:
     """The rest shape moved by ``offset`` along y."""
     return lambda scene: still(scene.mesh.points + np.array([0.0, offset, 0.0]))

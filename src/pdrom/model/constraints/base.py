@@ -75,7 +75,7 @@ class ConstraintGroup(Effect):
     manifold: ClassVar[str | None] = None
     """What it projects on, if that is one of "clamped" (signed singular values in a range, which
     are the `kernel_parameters`), "length" or "half sphere": kernels are then compared with its
-    projection in high precision."""
+    projection in high precision; or "size" (a volume or an area in a range), without a bound."""
     frame_lagged: bool = False
     """Whether ``begin_frame`` freezes anything."""
     cells: ClassVar[str]

@@ -34,9 +34,11 @@ LAST_TANGENT = 1e-8
 RANK = 1e-15
 
 
-# numbers of a lane in the working array of `clamp_block`
+# numbers of a lane in the working array of `clamp_block`, and with the singular values that
+# `factor_block` leaves there
 B, V, SCALE, DONE = 0, 9, 18, 19
 SIZE = 20
+SIGMA, FACTORS = 20, 23
 
 
 @lane_function
@@ -113,17 +115,8 @@ def orthonormal_pair(b0, b1):
 
 
 @lane_function
-def clamp_block(f, at_f, p, at_p, keep, low, high, work):
-    """Write the matrix nearest to F with signed singular values in [low, high] to P.
-
-    Parameters
-    ----------
-    f, at_f, p, at_p : blocks of matrices and the number at which F and P begin in them
-    keep : (LANES,) lanes with a non-zero entry keep their P
-    work : `SIZE` numbers a lane
-
-    A matrix with an entry that is not finite gives nan.
-    """
+def _diagonalise(f, at_f, keep, work):
+    """Leave B = F V / scale with orthogonal columns, V and scale; lanes to ``keep`` are left."""
     for lane in range(LANES):
         f0, f1, f2 = load(f, at_f, lane), load(f, at_f + 3, lane), load(f, at_f + 6, lane)
         scale = absolute_sum(f0) + absolute_sum(f1) + absolute_sum(f2) + SMALLEST
@@ -138,23 +131,71 @@ def clamp_block(f, at_f, p, at_p, keep, low, high, work):
     for _ in range(SWEEPS):
         if _sweep(work) == 0.0:
             break
+
+
+@lane_function
+def _factors(work, lane):
+    """Columns of U and V and the singular values over the scale, the largest first."""
+    b0, b1, b2 = load(work, B, lane), load(work, B + 3, lane), load(work, B + 6, lane)
+    v0, v1, v2 = load(work, V, lane), load(work, V + 3, lane), load(work, V + 6, lane)
+    b0, v0, b1, v1 = _larger_first(b0, v0, b1, v1)
+    b1, v1, b2, v2 = _larger_first(b1, v1, b2, v2)
+    b0, v0, b1, v1 = _larger_first(b0, v0, b1, v1)
+    u0, u1, s0, s1 = orthonormal_pair(b0, b1)
+    # U has det +1, so that the last singular value takes the sign of det F (Irving et al. 2004)
+    u2 = cross(u0, u1)
+    return (u0, u1, u2), (v0, v1, v2), (s0, s1, dot(u2, b2))
+
+
+@lane_function
+def _compose(u, v, sigma, p, at_p, lane, kept):
+    """Write U diag(sigma) V^T to P unless it is kept."""
+    u0, u1, u2 = scaled(sigma[0], u[0]), scaled(sigma[1], u[1]), scaled(sigma[2], u[2])
+    for i in range(3):
+        column = mix3(v[0][i], u0, v[1][i], u1, v[2][i], u2)
+        save(p, at_p + 3 * i, lane, choose(kept, load(p, at_p + 3 * i, lane), column))
+
+
+@lane_function
+def clamp_block(f, at_f, p, at_p, keep, low, high, work):
+    """Write the matrix nearest to F with signed singular values in [low, high] to P.
+
+    Parameters
+    ----------
+    f, at_f, p, at_p : blocks of matrices and the number at which F and P begin in them
+    keep : (LANES,) lanes with a non-zero entry keep their P
+    work : `SIZE` numbers a lane
+
+    A matrix with an entry that is not finite gives nan.
+    """
+    _diagonalise(f, at_f, keep, work)
     for lane in range(LANES):
-        b0, b1, b2 = load(work, B, lane), load(work, B + 3, lane), load(work, B + 6, lane)
-        v0, v1, v2 = load(work, V, lane), load(work, V + 3, lane), load(work, V + 6, lane)
-        b0, v0, b1, v1 = _larger_first(b0, v0, b1, v1)
-        b1, v1, b2, v2 = _larger_first(b1, v1, b2, v2)
-        b0, v0, b1, v1 = _larger_first(b0, v0, b1, v1)
-        u0, u1, s0, s1 = orthonormal_pair(b0, b1)
-        # U has det +1, so that the last singular value takes the sign of det F (Irving et al. 2004)
-        u2 = cross(u0, u1)
-        s2 = dot(u2, b2)
+        u, v, s = _factors(work, lane)
         scale = work[SCALE * LANES + lane]
-        s0, s1, s2 = (
-            clamp(scale * s0, low, high), clamp(scale * s1, low, high), clamp(scale * s2, low, high)
-        )  # fmt: skip
-        u0 = scaled(s0 + 0.0 * scale, u0)
-        u1, u2 = scaled(s1, u1), scaled(s2, u2)
-        kept = keep[lane] != 0.0
+        first, second = clamp(scale * s[0], low, high), clamp(scale * s[1], low, high)
+        sigma = first + 0.0 * scale, second, clamp(scale * s[2], low, high)
+        _compose(u, v, sigma, p, at_p, lane, keep[lane] != 0.0)
+
+
+@lane_function
+def factor_block(f, at_f, keep, work):
+    """Leave U in `B`, V in `V` and the signed singular values, largest first, in `SIGMA`.
+
+    The arguments are those of `clamp_block`, with `FACTORS` numbers a lane.
+    """
+    _diagonalise(f, at_f, keep, work)
+    for lane in range(LANES):
+        u, v, s = _factors(work, lane)
         for i in range(3):
-            column = mix3(v0[i], u0, v1[i], u1, v2[i], u2)
-            save(p, at_p + 3 * i, lane, choose(kept, load(p, at_p + 3 * i, lane), column))
+            save(work, B + 3 * i, lane, u[i])
+            save(work, V + 3 * i, lane, v[i])
+        save(work, SIGMA, lane, scaled(work[SCALE * LANES + lane], s))
+
+
+@lane_function
+def compose_block(sigma, at_sigma, p, at_p, keep, work):
+    """Write U diag(sigma) V^T to P, with the U and V that `factor_block` left."""
+    for lane in range(LANES):
+        u = load(work, B, lane), load(work, B + 3, lane), load(work, B + 6, lane)
+        v = load(work, V, lane), load(work, V + 3, lane), load(work, V + 6, lane)
+        _compose(u, v, load(sigma, at_sigma, lane), p, at_p, lane, keep[lane] != 0.0)

@@ -46,7 +46,7 @@ SVD, FOUND = SIZE, SIZE + svd3.SIZE
 
 
 @lane_function
-def _gradients(work, geometry, block):
+def gradients(work, geometry, block):
     """S q = F^T of a block from its edges."""
     start = block * GEOMETRY + OPERATOR
     for lane in range(LANES):
@@ -72,7 +72,7 @@ def _nearest(work, low, high):
 
 
 @lane_function
-def _forces(work, geometry, block):
+def forces(work, geometry, block):
     """Weighted forces S^T W p on the corners, and w |S q - p|^2."""
     weight, start = block * GEOMETRY + WEIGHT, block * GEOMETRY + OPERATOR
     for lane in range(LANES):
@@ -104,7 +104,7 @@ def _project(y_place, p_place, record, part):
         take(corners, 4, elements, start, taken)
         take(geometry, GEOMETRY, elements, start, taken_geometry)
         gather_edges(y, taken, 0, 3, work)
-        _gradients(work, taken_geometry, 0)
+        gradients(work, taken_geometry, 0)
         _nearest(work, low, high)
         store_projections(work, 3, start, p)
     return 0.0
@@ -119,9 +119,9 @@ def _accumulate(y_place, rhs_place, record, part):
     start_energy(work)
     for block in range(first, last):
         gather_edges(y, corners, block, 3, work)
-        _gradients(work, geometry, block)
+        gradients(work, geometry, block)
         _nearest(work, low, high)
-        _forces(work, geometry, block)
+        forces(work, geometry, block)
         scatter(work, corners, block, 3, rhs)
     return energy(work)
 

@@ -65,7 +65,7 @@ class StrainConfig(GroupConfig):
 
 
 @lane_function
-def _gradients(work, geometry, block):
+def gradients(work, geometry, block):
     """S q = F^T of a block from its edges."""
     first = (block * GEOMETRY + OPERATOR) * LANES
     for lane in range(LANES):
@@ -77,7 +77,7 @@ def _gradients(work, geometry, block):
 
 
 @lane_function
-def _forces(work, geometry, block):
+def forces(work, geometry, block):
     """Weighted forces S^T W p on the corners, and w |S q - p|^2."""
     weight = (block * GEOMETRY + WEIGHT) * LANES
     first = (block * GEOMETRY + OPERATOR) * LANES
@@ -105,7 +105,7 @@ def _project(y_place, p_place, record, part):
         take(corners, 3, elements, start, taken)
         take(geometry, GEOMETRY, elements, start, taken_geometry)
         gather_edges(y, taken, 0, 2, work)
-        _gradients(work, taken_geometry, 0)
+        gradients(work, taken_geometry, 0)
         clamp_block(work, F, P, FOUND, low, high)
         store_projections(work, 2, start, p)
     return 0.0
@@ -120,9 +120,9 @@ def _accumulate(y_place, rhs_place, record, part):
     start_energy(work)
     for block in range(first, last):
         gather_edges(y, corners, block, 2, work)
-        _gradients(work, geometry, block)
+        gradients(work, geometry, block)
         clamp_block(work, F, P, FOUND, low, high)
-        _forces(work, geometry, block)
+        forces(work, geometry, block)
         scatter(work, corners, block, 2, rhs)
     return energy(work)
 

@@ -25,5 +25,7 @@ EFFECTS = Registry(
         "strain": "pdrom.model.constraints.triangle_strain:TriangleStrain",
         "tetrahedron_strain": "pdrom.model.constraints.tetrahedron_strain:TetrahedronStrain",
         "deformation_gradient": "pdrom.model.constraints.deformation_gradient:DeformationGradient",
+        "volume": "pdrom.model.constraints.volume:TetrahedronVolume",
+        "area": "pdrom.model.constraints.area:TriangleArea",
     },
 )

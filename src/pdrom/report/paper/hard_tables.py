@@ -26,7 +26,10 @@ def hard_cases(tables: Tables) -> str:
         rows.append([name(case), escape(CASES[case].why), *cells])
     header = ["case", "why it is hard", *map(name, reductions)]
     left = r">{\raggedright\arraybackslash}"
-    return longtable(header, rows, rf"l{left}p{{5.2cm}}" + f"{left}p{{2.6cm}}" * len(reductions))
+    why, other = (5.2, 2.6) if len(reductions) < 4 else (3.4, 8.6 / len(reductions))
+    return longtable(
+        header, rows, rf"l{left}p{{{why}cm}}" + f"{left}p{{{other:.2f}cm}}" * len(reductions)
+    )
 
 
 def _failure(row: Any) -> str:

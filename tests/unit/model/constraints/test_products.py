@@ -1,0 +1,170 @@
+"""Volumes and areas: the compiled projections against bisection, and against their definition."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from conftest import make_scene, random_rotation
+from pdrom.model.constraints.area import TriangleArea
+from pdrom.model.constraints.products import reference_nearest
+from pdrom.model.constraints.volume import TetrahedronVolume
+from pdrom.model.mesh.types import Mesh
+
+LOW, HIGH = 0.99, 1.01
+KINDS = {"volume": (TetrahedronVolume, 3), "area": (TriangleArea, 2)}
+COUNT = 40  # more than a block of lanes
+
+# round-off, flat, repeated, in range, far too large, and any size
+SIZES = st.one_of(
+    st.sampled_from([0.0, 1e-300, 1e-17, 1e-8, 0.1, 0.99, 1.0, 1.01, 1.9, 2.0, 3.0]),
+    st.floats(0.0, 4.0),
+    st.floats(-6.0, 6.0).map(lambda x: 10.0**x),
+)
+
+
+def unit_group(kind: str, count: int):
+    """A group of separate unit simplices, so that S q = F^T is chosen freely."""
+    group_type, rows = KINDS[kind]
+    corners = np.eye(4, 3, k=-1)[: rows + 1]
+    cells = np.arange(count * (rows + 1), dtype=np.int32).reshape(count, rows + 1)
+    points = np.tile(corners, (count, 1))
+    empty = np.empty((0, 3), dtype=np.int32)
+    mesh = Mesh(points, empty, cells) if rows == 3 else Mesh(points, cells)
+    config = group_type.Config(weight=1.0, minimum=LOW, maximum=HIGH)
+    return group_type(config, mesh, np.ones(mesh.vertices))
+
+
+GROUPS = {kind: unit_group(kind, COUNT) for kind in KINDS}
+
+
+def projected(kind: str, f: np.ndarray) -> np.ndarray:
+    """Projections of F^T = f (`COUNT`, rows, 3)."""
+    y = np.concatenate([np.zeros((COUNT, 1, 3)), f], axis=1).reshape(-1, 3)
+    return GROUPS[kind].project(y).reshape(f.shape)
+
+
+def signed(f: np.ndarray) -> np.ndarray:
+    """Singular values (e, rows), the last with the sign of det F for three rows."""
+    sigma = np.linalg.svd(f, compute_uv=False)
+    if f.shape[1] == 3:
+        sigma[:, 2] *= np.sign(np.linalg.det(f / sigma[:, :1, None]))
+    return sigma
+
+
+@st.composite
+def matrices(draw, kind: str) -> np.ndarray:
+    """F^T of `COUNT` elements: one set of singular values, maybe mirrored, in many frames."""
+    rows = KINDS[kind][1]
+    sigma = np.array([draw(SIZES) for _ in range(rows)])
+    if draw(st.booleans()):
+        sigma[-1] = -sigma[-1]
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    turns = [(random_rotation(rng)[:rows], random_rotation(rng)[:rows, :rows]) for _ in range(3)]
+    if draw(st.booleans()):
+        turns.append((np.eye(rows, 3), np.eye(rows)))
+    chosen = [turns[i % len(turns)] for i in range(COUNT)]
+    right = [np.linalg.qr(r)[0] for _, r in chosen]
+    return np.stack(
+        [r.T @ (sigma[:, None] * left) for (left, _), r in zip(chosen, right, strict=True)]
+    )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=60)
+@given(data=st.data())
+def test_the_projection_is_in_range_and_as_near_as_bisection_finds(kind, data):
+    f = data.draw(matrices(kind))
+    p = projected(kind, f)
+    reference = GROUPS[kind].reference_project(f, np.arange(COUNT))
+    scale = max(np.abs(f).max(), 1.0)
+    distance, nearest = (np.linalg.norm((f - x) / scale, axis=(1, 2)) for x in (p, reference))
+    assert np.isfinite(p).all()
+    assert (np.abs(distance - nearest) <= 1e-11).all()
+    # what a matrix of this size can hold of its smallest singular values
+    size = signed(p).prod(axis=1)
+    rounding = 1e-13 * scale ** KINDS[kind][1]
+    assert ((size >= LOW - rounding) & (size <= HIGH + rounding)).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=40)
+@given(data=st.data())
+def test_projecting_twice_changes_nothing(kind, data):
+    f = data.draw(matrices(kind))
+    assume(np.abs(f).max() < 100.0)
+    once = projected(kind, f)
+    assert np.abs(projected(kind, once) - once).max() <= 1e-9 * max(1.0, np.abs(once).max())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=40)
+@given(seed=st.integers(0, 2**32 - 1), size=st.floats(-1.0, 1.0))
+def test_no_other_member_is_nearer_and_turns_commute(kind, seed, size):
+    """Members: random frames with the product in range; Q F projects to Q p."""
+    rng = np.random.default_rng(seed)
+    rows = KINDS[kind][1]
+    f = 10.0**size * rng.standard_normal((COUNT, rows, 3))
+    p = projected(kind, f)
+    distance = np.linalg.norm(f - p, axis=(1, 2))
+    for _ in range(10):
+        sigma = 10.0 ** rng.uniform(-1, 1, rows)
+        sigma *= (rng.uniform(LOW, HIGH) / sigma.prod()) ** (1.0 / rows)
+        turn = np.linalg.qr(rng.standard_normal((rows, rows)))[0]
+        turn[0] *= np.sign(np.linalg.det(turn))
+        member = (turn * sigma) @ random_rotation(rng)[:rows]
+        assert (distance <= np.linalg.norm(f - member, axis=(1, 2)) * (1 + 1e-12)).all()
+        # the same singular vectors, other values
+        u, s, vt = np.linalg.svd(p, full_matrices=False)
+        other = s * 10.0 ** rng.uniform(-0.1, 0.1, s.shape)
+        other *= (s.prod(axis=1) / other.prod(axis=1))[:, None] ** (1.0 / rows)
+        member = (u * other[:, None, :]) @ vt
+        assert (distance <= np.linalg.norm(f - member, axis=(1, 2)) * (1 + 1e-9)).all()
+    turn = random_rotation(rng)
+    assert np.abs(projected(kind, f @ turn.T) - p @ turn.T).max() <= 1e-9 * np.abs(p).max()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_keeps_its_size_stays_however_it_is_sheared(kind):
+    """A shear and a stretch along one axis that another gives back change no volume and no area."""
+    rows = KINDS[kind][1]
+    members = [np.eye(3), np.diag([1.25, 0.8, 1.0]), np.eye(3) + 3.0 * np.eye(3, k=1)]
+    f = np.stack([members[i % 3][:rows] for i in range(COUNT)])
+    if rows == 2:
+        f[:, :, 2] = 0.0
+    assert np.abs(projected(kind, f) - f).max() < 1e-12
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_rest_shape_is_a_fixed_point(kind):
+    mesh = {"volume": {"kind": "bar", "nx": 5, "ny": 3, "nz": 3}, "area": None}[kind]
+    scene = make_scene({"effect": kind, "weight": 1e4}, mesh=mesh)
+    group, points = scene.groups[0], scene.mesh.points
+    assert np.abs(group.project(points) - group.S @ points).max() < 1e-12
+
+
+def test_an_element_blown_up_far_enough_gives_way_along_one_axis():
+    """The nearest triple of product 1: all alike below a factor of about 1.94 a side, one above."""
+    alike = reference_nearest(np.full((1, 3), 1.9), 1.0, 1.0)[0]
+    flat = reference_nearest(np.full((1, 3), 2.1), 1.0, 1.0)[0]
+    assert alike == pytest.approx(np.ones(3), abs=1e-12)
+    assert flat[0] == pytest.approx(flat[1], abs=1e-12)
+    assert flat[2] < 0.5 * flat[0]
+    assert flat.prod() == pytest.approx(1.0, abs=1e-12)
+
+
+def test_values_that_are_not_finite_give_no_number():
+    f = np.tile(np.eye(3), (COUNT, 1, 1))
+    f[7, 0, 0], f[9, 1, 1] = np.nan, np.inf
+    for kind, (_, rows) in KINDS.items():
+        p = projected(kind, f[:, :rows])
+        assert np.isnan(p[[7, 9]]).all()
+        assert np.isfinite(np.delete(p, [7, 9], axis=0)).all()
+
+
+def test_the_reference_projects_onto_the_hyperbola():
+    """Two values with a product of 1: (3, 0) goes where the normal of the hyperbola meets it."""
+    t = reference_nearest(np.array([[3.0, 0.0]]), 1.0, 1.0)[0]
+    assert t.prod() == pytest.approx(1.0, abs=1e-12)
+    # s - t is parallel to the gradient (t_2, t_1)
+    assert (3.0 - t[0]) * t[0] == pytest.approx((0.0 - t[1]) * t[1], abs=1e-12)
