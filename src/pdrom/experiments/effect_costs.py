@@ -154,8 +154,8 @@ def left_out(
 
 
 def _without(scene: Scene, names: tuple[str, ...], frames: int, solver: str) -> Variant:
-    kept = tuple(e for e in scene.config.effects if e.effect not in names)
-    part = Scene.build(scene.config.model_copy(update={"effects": kept}), scene.mesh)
+    kept = {"effects": scene.config.effects_without(*names)}
+    part = Scene.build(scene.config.model_copy(update=kept), scene.mesh)
     loop = part.stepper(part.system_with(solver), track_objective=False)
     return Variant({"groups": len(part.groups)}, loop, part.initial_state(), frames)
 

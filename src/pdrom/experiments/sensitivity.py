@@ -1,4 +1,4 @@
-"""How far runs of one scene drift apart that should be the same."""
+"""How far runs of a scene drift apart that should be the same, and what its effects do in it."""
 
 from dataclasses import dataclass
 from typing import Annotated, Self
@@ -6,12 +6,13 @@ from typing import Annotated, Self
 import pandas as pd
 from pydantic import Field, model_validator
 
-from pdrom.core.paths import MESH, SENSITIVITY, File
+from pdrom.core.paths import CONTRIBUTIONS, MESH, SENSITIVITY, File
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.declaration import Experiment, JobSettings
 from pdrom.experiments.scenes import scene_of
 from pdrom.model.effects.base import Seed
+from pdrom.model.runs.contributions import contributions
 from pdrom.model.runs.sensitivity import heldout_floor, sensitivity
 from pdrom.model.scene import SceneConfig
 
@@ -57,18 +58,20 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
-    """Files written: differences of all seeds, frame by frame."""
+    """Files written: differences of all seeds, and forces of all effects, frame by frame."""
 
     table: Annotated[File, SENSITIVITY]
+    contributions: Annotated[File, CONTRIBUTIONS]
 
 
 def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     """Write the differences of a scene's perturbed runs, and of its held-out motion."""
-    chosen = settings.sensitivity
-    table = sensitivity(scene_of(settings.scene, inputs.mesh), chosen.perturbations, chosen.seeds)
+    chosen, scene = settings.sensitivity, scene_of(settings.scene, inputs.mesh)
+    table = sensitivity(scene, chosen.perturbations, chosen.seeds)
     motion = scene_of(settings.scene, inputs.mesh, "heldout")
     heldout = heldout_floor(motion, chosen.reference, chosen.seeds)
     write_table(pd.concat([table, heldout], ignore_index=True), outputs.table.path)
+    write_table(contributions(scene), outputs.contributions.path)
 
 
 EXPERIMENT = Experiment("sensitivity", "Perturbed full-order runs of {scene}", run)

@@ -92,6 +92,10 @@ class SceneConfig(_Model):
         """Names of the constraint groups, in the order of the effects."""
         return [e.effect for e in self.effects if isinstance(e, GroupConfig)]
 
+    def effects_without(self, *names: str) -> tuple[EffectConfig, ...]:
+        """The effects that are not called so, in their order."""
+        return tuple(e for e in self.effects if e.effect not in names)
+
     @property
     def modules(self) -> list[str]:
         """Places of the listed effects (for the code fingerprint), "module:attribute"."""

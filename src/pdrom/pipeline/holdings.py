@@ -120,6 +120,7 @@ HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.TRAIN: _scenes,
     paths.HELDOUT: _scenes,
     paths.SENSITIVITY: _scenes,
+    paths.CONTRIBUTIONS: _scenes,
     paths.ITERATIONS: _scenes,
     paths.SNAPSHOTS: _experiments,
     paths.BASIS: _bases,

@@ -10,6 +10,7 @@ from pdrom.core.paths import File
 from pdrom.core.store import write_table
 from pdrom.tables.break_even import breakeven
 from pdrom.tables.budget import budget
+from pdrom.tables.effects_contribution import effects_contribution
 from pdrom.tables.effects_cost import effects_cost
 from pdrom.tables.effects_left_out import effects_left_out
 
@@ -120,3 +121,48 @@ def test_effects_are_joined_and_scenes_without_rows_left_out(tmp_path):
     table = effects_left_out([File(str(tmp_path / "none.csv"), {})])
     assert tuple(table.columns) == effects_left_out.column_names
     assert len(table) == 0
+
+
+def test_contributions_are_judged_before_the_horizon_and_bring_their_times(tmp_path):
+    """Two frames count; bending moves less than the floor, the only group of b cannot go."""
+    rows = [
+        (scene, effect, role, frame, force, energy)
+        for scene, effects in (
+            ("a", [("spring", "constraint group", 3.0), ("bending", "constraint group", 1.0)]),
+            ("b", [("strain", "constraint group", 4.0)]),
+        )
+        for effect, role, force in effects
+        for frame, energy in enumerate([1.0, 5.0, 2.0])
+    ]
+    rows.append(("b", "kick", "start", 0, 4.0 * np.sqrt(3.0), 7.0))
+    header = ["scene", "effect", "role", "frame", "force", "energy"]
+    write_table(pd.DataFrame(rows, columns=header), tmp_path / "all.csv")
+    drifts = {
+        ("a", "1e-10"): [1e-6, 1e-5, 1.0], ("a", "without bending"): [1e-7, 1e-7, 9.0],
+        ("a", "without spring"): [1e-2, 1e-1, 1.0], ("b", "1e-10"): [1e-6, 1e-6, 1e-6],
+        ("b", "without kick"): [0.5, 0.6, 0.7],
+    }  # fmt: skip
+    sensitivity = pd.DataFrame(
+        [
+            (*key, frame, value)
+            for key, drift in drifts.items()
+            for frame, value in enumerate(drift)
+        ],
+        columns=["scene", "perturbation", "frame", "relative_difference"],
+    )
+    costs = pd.DataFrame({"scene": ["a"], "effect": ["bending"], "ms_per_frame": [0.25]})
+    removed = pd.DataFrame({"scene": ["a"], "left_out": ["bending"], "saved_ms": [0.2]})
+    file = File(str(tmp_path / "all.csv"), {})
+    made = effects_contribution([file], sensitivity, 1e-10, 1e-3, costs, removed)
+    by = made.set_index(["scene", "effect"])
+    assert by.moved[("a", "bending")] == 1e-7
+    assert by.moved[("a", "spring")] == 1e-1
+    assert by.moved[("b", "kick")] == 0.7
+    assert pd.isna(by.moved[("b", "strain")])
+    assert by.above_floor.tolist() == [True, False, pd.NA, True]
+    assert by.sensitivity_floor[("a", "bending")] == 1e-5
+    assert by.force_share.to_numpy() == pytest.approx([0.75, 0.25, 0.5, 0.5])
+    assert by.energy.tolist() == [4.0, 4.0, 4.0, 7.0]
+    assert by.acting_frames.tolist() == [3, 3, 3, 1]
+    assert by.loc[("a", "bending"), ["own_ms", "saved_ms"]].tolist() == [0.25, 0.2]
+    assert pd.isna(by.own_ms[("b", "kick")])

@@ -2,7 +2,7 @@
 
 What a run does when its start moves by 1e-10 of the extent bounds what any reduced model can be
 blamed for. Beside the start, the solver (another order of summation), the number of iterations and
-the time step are changed.
+the time step are changed, and each effect is left out.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from pdrom.model.dynamics.solvers import solver_class
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.runs.horizon import HELDOUT
-from pdrom.model.scene import Scene
+from pdrom.model.scene import Scene, SceneConfig
 
 COLUMNS = ["scene", "perturbation", "seed", "frame", "relative_difference"]
 # The first that is not the one that the run uses.
@@ -50,7 +50,11 @@ def heldout_floor(heldout: Scene, size: float, seeds: tuple[int, ...]) -> pd.Dat
 def sensitivity(
     scene: Scene, perturbations: tuple[float, ...], seeds: tuple[int, ...]
 ) -> pd.DataFrame:
-    """Table of `COLUMNS`: perturbed starts, another solver, 4 K iterations, half the time step."""
+    """Table of `COLUMNS`: perturbed starts, and the scene with something else changed.
+
+    That is another solver, 4 K iterations, half the time step, and no effect of one name (label
+    `without`); the only constraint group cannot be left out.
+    """
     base = trajectory(scene)
     parts = []
     for size in perturbations:
@@ -60,7 +64,21 @@ def sensitivity(
     variants = {"solver": _other_solver, "iterations x4": _more_iterations, "h/2": _half_step}
     for label, variant in variants.items():
         parts.append(_rows(scene, label, 0, relative_difference(variant(scene), base)))
+    for effect in removable(scene.config):
+        other = trajectory(_fresh(scene, effects=scene.config.effects_without(effect)))
+        parts.append(_rows(scene, without(effect), 0, relative_difference(other, base)))
     return pd.concat(parts, ignore_index=True)
+
+
+def without(effect: str) -> str:
+    """Label of the runs without an effect."""
+    return f"without {effect}"
+
+
+def removable(config: SceneConfig) -> list[str]:
+    """Names of the effects without which the scene still is one, each once."""
+    names = dict.fromkeys(e.effect for e in config.effects)
+    return [name for name in names if config.groups != [name]]
 
 
 def _fresh(scene: Scene, **changes: object) -> Scene:

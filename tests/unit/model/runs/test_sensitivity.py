@@ -75,6 +75,7 @@ def test_table_has_every_perturbation_seed_variant_and_frame():
     assert list(labels.index) == [
         ("1e-10", 1), ("1e-10", 2), ("1e-06", 1), ("1e-06", 2),
         ("solver", 0), ("iterations x4", 0), ("h/2", 0),
+        ("without gravity", 0), ("without pins", 0),
     ]  # fmt: skip
     assert all(frames == [0, 1, 2, 3] for frames in labels)
     largest = table.groupby("perturbation").relative_difference.max()

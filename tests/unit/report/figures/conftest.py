@@ -10,6 +10,7 @@ import pytest
 
 from pdrom.core.paths import (
     BASIS,
+    CONTRIBUTIONS,
     FULL_ORDER,
     MESH,
     RERUNS,
@@ -57,7 +58,7 @@ TABLES = (
     "ladder", "scaling", "scaling_fit", "stability", "budget", "breakeven", "effects_cost",
     "effects_left_out", "reduced_reruns", "gain_prediction",
     "subspace_ablation", "noise", "claims_sensitivity", "bounds",
-    "estimates",
+    "estimates", "effects_contribution",
 )  # fmt: skip
 
 
@@ -337,6 +338,16 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for varied in ("threshold", "scenes")
         for n in range(3)
     ]
+    moved = [
+        (scene, effect, role, drift, 1e-6, None if drift is None else drift > 1e-6)
+        for scene, groups in scenes.items()
+        for effect, role, drift in (
+            *((group, "constraint group", None) for group in groups[:1]),
+            *((group, "constraint group", 1e-9) for group in groups[1:]),
+            ("gravity", "force", 0.5),
+            ("kick", "start", 1e-15),
+        )
+    ]
     columns = {
         "singular_values": "scene group component singular_value relative above_roundoff",
         "reconstruction_error": "scene group method r split relative_error gain elements_sampled",
@@ -361,10 +372,11 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "bounds": "scene group method r bound max_extent slack contraction finite",
         "estimates": "scene position_basis split relative_error_within_horizon estimate ratio"
         " within resolved",
+        "effects_contribution": "scene effect role moved sensitivity_floor above_floor",
     }
     made = (
         values, errors, times, costs, ladder, runs, bought, ratios, shares, removed, reruns,
-        predictions, noise, variations, ablation, bounds, estimates,
+        predictions, noise, variations, ablation, bounds, estimates, moved,
     )  # fmt: skip
     rows = dict(zip(columns, made, strict=True))
     for name, header in columns.items():
@@ -374,6 +386,20 @@ def _write_tables(results, scenes, methods, rng) -> None:
     _write_scaling(results, scenes)
     for scene in scenes:
         _write_sensitivity(results, scene)
+        _write_contributions(results, scene)
+
+
+def _write_contributions(results, scene) -> None:
+    """Gravity always pulls, the groups ever more; a kick acts once."""
+    names = [*results.holdings.scenes[scene].groups, "gravity"]
+    rows = [
+        (scene, effect, "force", frame, 1.0 if effect == "gravity" else float(frame), None)
+        for effect in names
+        for frame in range(FRAMES)
+    ]
+    rows.append((scene, "kick", "start", 0, 5.0, 1.0))
+    columns = ["scene", "effect", "role", "frame", "force", "energy"]
+    write_table(pd.DataFrame(rows, columns=columns), results.path(CONTRIBUTIONS, scene))
 
 
 def _write_sensitivity(results, scene) -> None:

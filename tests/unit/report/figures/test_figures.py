@@ -335,6 +335,18 @@ def test_break_even_over_mesh_sizes(study):
     assert (marks[40], marks[6]) == ("^", "v")
 
 
+def test_what_an_effect_moves_stands_beside_the_floor(study):
+    """Below the floor the marker is open; a group that cannot be left out has none."""
+    figure = draw(study, "effects_contribution", scenes=("strain_oop", "cloth_all"))
+    *forces, moved = figure.axes
+    assert [ax.get_title() for ax in forces] == ["cloth all", "strain oop"]
+    assert [t.get_text() for t in moved.get_yticklabels()] == ["strain oop", "cloth all"]
+    found = [(line.get_xdata()[0], line.get_markerfacecolor() == "white") for line in moved.lines]
+    of_strain = [(0.5, False), (1e-12, True)]
+    assert found == [*of_strain, (1e-9, True), (1e-9, True), *of_strain]
+    assert {bar.get_x() + bar.get_width() for bar in moved.patches} == {1e-6}
+
+
 def test_a_scene_without_effects_ends_at_the_tick(study):
     figure = draw(study, "effects_cost", scenes=("strain_oop", "cloth_all"))
     shares, without = figure.axes
