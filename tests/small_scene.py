@@ -13,8 +13,25 @@ from pdrom.pipeline.study import Study
 from pdrom.report.scenes.job import SceneOrder
 
 SCENE = "own"
-NEEDED = ("mesh", "fom", "sensitivity", "snapshots", "pod", "reruns")
-CHANGES = {"ranks": [2, "full"], "sensitivity": {"perturbations": [1e-10], "seeds": [1]}}
+NEEDED = (
+    "mesh",
+    "fom",
+    "sensitivity",
+    "iterations",
+    "snapshots",
+    "pod",
+    "sampling",
+    "reruns",
+    "hyper",
+    "timing",
+)
+CHANGES = {
+    "ranks": [2, "full"],
+    "sensitivity": {"perturbations": [1e-10], "seeds": [1]},
+    "iterations": {"counts": [1, 2]},
+    "subspace": {"bases": ["pod"], "sizes": [2], "tolerances": [1e-2]},
+    "timing": {"frames": 2, "repeats": 1, "breakeven": [2], "breakeven_repeats": 5},
+}
 
 
 def small_study(root: Path) -> Study:
@@ -48,7 +65,7 @@ def _labels(study: Study, name: str) -> Iterator[dict[str, str]]:
             yield {"mesh": study.mesh_of(SCENE)}
         case "fom":
             yield from ({"scene": SCENE, "run": run} for run in ("train", "heldout"))
-        case "sensitivity":
+        case "sensitivity" | "iterations" | "hyper" | "timing":
             yield {"scene": SCENE}
         case "snapshots":
             yield from ({"scene": s, "group": g} for s, g in only.experiments)

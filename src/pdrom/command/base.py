@@ -12,6 +12,7 @@ class Status(IntEnum):
     DONE = 0
     FAULTY = 1
     BLEW_UP = 3
+    NOTHING_FITS = 4
 
 
 @dataclass(frozen=True)

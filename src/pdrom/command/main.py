@@ -15,10 +15,10 @@ from pdrom.core.errors import PdromError
 from pdrom.core.logs import INTERRUPTED
 from pdrom.pipeline.environment import settle
 
-COMMANDS = ("new", "run", "reduce", "show", "view")
+COMMANDS = ("new", "run", "reduce", "show", "view", "advise")
 CODES = """exit codes: 0 done; 1 faulty input, or a file that cannot be read or written;
 2 the command was not understood; 3 a reduced run blew up (its file is written all the
-same); 130 interrupted"""
+same); 4 nothing measured fits the wishes (advise); 130 interrupted"""
 CACHE = Path(__file__).resolve().parents[3] / ".cache"
 
 

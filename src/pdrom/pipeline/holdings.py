@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator
 from pdrom.core import paths
 from pdrom.core.paths import Place
 from pdrom.core.reads import Preferred
+from pdrom.model.effects import EFFECTS
+from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.study import Study
 
 Labels = dict[str, str]
@@ -107,11 +109,15 @@ def _one(study: Study) -> Iterator[Labels]:
 
 
 def _subspaces(study: Study) -> Iterator[Labels]:
-    """The listed scenes, or all; none where no model is asked for."""
+    """The listed scenes, or all; none where no model is asked for, or none takes an effect."""
     section = study.settings.subspace
-    for scene in study.scenes if section.bases and section.sizes else ():
-        if scene in section.scenes or not section.scenes:
+    for scene, config in study.scenes.items() if section.bases and section.sizes else ():
+        if scene in section.scenes or (not section.scenes and _in_subspace(config)):
             yield {"scene": scene}
+
+
+def _in_subspace(config: SceneConfig) -> bool:
+    return all(EFFECTS.load(entry.effect).in_subspace for entry in config.effects)
 
 
 HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {

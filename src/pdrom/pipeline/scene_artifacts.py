@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from pdrom.core.paths import TIMINGS, VIEWER
+from pdrom.core.paths import SUBSPACES, TIMINGS, VIEWER
 from pdrom.pipeline.figures import holdings_of
 from pdrom.pipeline.fingerprint import fingerprint
 from pdrom.pipeline.holdings import paths_of
@@ -92,6 +92,8 @@ class SceneArtifacts:
                 "sensitivity.reference": section.reference,
                 "sensitivity.threshold": section.threshold,
                 "time_step": self._study.scene(scene).time_step,
+                "iterations": self._study.scene(scene).iterations,
             },
+            subspaces=bool(paths_of(self._study.only(scene), SUBSPACES, self._results)),
         )
         return order.model_dump(mode="json")

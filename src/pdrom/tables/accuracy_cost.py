@@ -25,7 +25,16 @@ from pdrom.core.reads import Every, PerScene, TableOf
 from pdrom.experiments.names import ANDERSON, FOM
 from pdrom.tables.declaration import flag, integer, table, timed
 from pdrom.tables.parts import joined
-from pdrom.tables.vocabulary import ERROR_WITHIN, METHOD, MS_PER_FRAME, POSITION_BASIS, SCENE, K, R
+from pdrom.tables.vocabulary import (
+    ERROR_WITHIN,
+    GROUP,
+    METHOD,
+    MS_PER_FRAME,
+    POSITION_BASIS,
+    SCENE,
+    K,
+    R,
+)
 
 FEWER = "fewer-iterations"
 CONVERGED, OWN = "converged", "own iterations"
@@ -35,6 +44,7 @@ CONVERGED, OWN = "converged", "own iterations"
     title="Every method and size as a point of accuracy and cost",
     columns=(
         SCENE,
+        GROUP,
         METHOD,
         POSITION_BASIS,
         K,

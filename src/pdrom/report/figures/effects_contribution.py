@@ -12,7 +12,8 @@ FIGURE = Declaration(
         "(of a hold: on the vertices that it holds). Right: how far the run moves "
         "when an effect is left out, before the horizon; the grey bar ends at the "
         "sensitivity floor, below which nothing can be told from round-off. Open markers "
-        "lie below the floor. The only group of a scene cannot be left out."
+        "lie below the floor, at the left edge where nothing changes at all. The only group of a "
+        "scene cannot be left out."
     ),
     reads=(TableOf("effects_contribution"), Chosen(CONTRIBUTIONS)),
     options=Scenes,

@@ -6,6 +6,10 @@ from dataclasses import dataclass
 from pdrom.core.paths import (
     ANIMATION,
     ANIMATION_GIF,
+    CONTRIBUTIONS,
+    EFFECTS,
+    ITERATIONS,
+    LEFT_OUT,
     MESH,
     RECONSTRUCTION,
     RERUNS,
@@ -13,8 +17,12 @@ from pdrom.core.paths import (
     SCENE_PICTURE,
     SCENE_PICTURE_PNG,
     SCENE_RUNS,
+    SCENE_TABLE,
     SCENE_VIEWER,
     SENSITIVITY,
+    SUBSPACES,
+    SUBSPACES_TRAIN,
+    TIMINGS,
     TRAIN,
     VTK,
     Place,
@@ -53,6 +61,9 @@ def _picture(name: str) -> dict[str, Place]:
     }
 
 
+# what the rows of reduced runs are made of
+MEASURED = (SENSITIVITY, RERUNS, RERUNS_TRAIN, SUBSPACES, SUBSPACES_TRAIN, TIMINGS)
+
 ARTIFACTS: dict[str, SceneArtifact] = {
     "frames": SceneArtifact(
         "Frames of the full-order run and of reduced ones",
@@ -70,7 +81,16 @@ ARTIFACTS: dict[str, SceneArtifact] = {
     "runs": SceneArtifact(
         "Table of the reduced runs",
         {"table": SCENE_RUNS},
-        (SENSITIVITY, RECONSTRUCTION, RERUNS, RERUNS_TRAIN),
+        (RECONSTRUCTION, *MEASURED),
+    ),
+    "advice": SceneArtifact(
+        "Tables for pdrom advise: what each effect does, and errors and times of all settings",
+        {
+            "effects": SCENE_TABLE.where(name="effects_contribution"),
+            "costs": SCENE_TABLE.where(name="accuracy_cost"),
+        },
+        (CONTRIBUTIONS, EFFECTS, LEFT_OUT, ITERATIONS, *MEASURED),
+        by_default=False,
     ),
     "animation": SceneArtifact(
         "Animation", {"film": ANIMATION}, (MESH, TRAIN, RERUNS), by_default=False

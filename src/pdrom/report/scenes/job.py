@@ -17,6 +17,7 @@ class SceneOrder(BaseModel):
     folder : where the results lie
     ranks : basis sizes, where not every one is shown
     title : of the scene
+    subspaces : whether it holds position subspaces
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -28,12 +29,19 @@ class SceneOrder(BaseModel):
     ranks: tuple[Rank, ...]
     settings: dict[str, float]
     title: str
+    subspaces: bool = False
 
     @property
     def results(self) -> SceneResults:
         """What the artifact reads."""
         return SceneResults(
-            self.scene, self.folder, self.holdings, self.settings, self.ranks, self.title
+            self.scene,
+            self.folder,
+            self.holdings,
+            self.settings,
+            self.ranks,
+            self.title,
+            self.subspaces,
         )
 
 

@@ -5,13 +5,23 @@ from collections.abc import Iterable, Mapping, Sequence
 import pandas as pd
 
 from pdrom.core.errors import StorageError
-from pdrom.core.paths import RECONSTRUCTION, RERUNS, RERUNS_TRAIN, SENSITIVITY, File, Place
+from pdrom.core.paths import (
+    RECONSTRUCTION,
+    RERUNS,
+    RERUNS_TRAIN,
+    SENSITIVITY,
+    SUBSPACES,
+    SUBSPACES_TRAIN,
+    TIMINGS,
+    File,
+    Place,
+)
 from pdrom.core.store import read_table
 from pdrom.report.figures.kit.holdings import Holdings
 from pdrom.report.figures.kit.options import Rank
 from pdrom.report.figures.kit.results import Results
 from pdrom.tables.reconstruction_error import reconstruction_error
-from pdrom.tables.reruns import COLUMNS, TRAIN, judged_reruns
+from pdrom.tables.reduced_reruns import reduced_reruns
 
 
 class SceneResults(Results):
@@ -25,11 +35,13 @@ class SceneResults(Results):
         settings: Mapping[str, float],
         ranks: tuple[Rank, ...] = (),
         title: str = "",
+        subspaces: bool = False,
     ) -> None:
         super().__init__(folder, holdings, settings)
         self.scene = scene
         self.ranks = ranks
         self.title = title
+        self._subspaces = subspaces
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -47,21 +59,37 @@ class SceneResults(Results):
             return read_table(self.path(SENSITIVITY, self.scene), columns)
         if name == "reconstruction_error":
             return reconstruction_error(self._files(RECONSTRUCTION))
+        if name == "reduced_reruns":
+            return self._reduced_reruns()
         raise StorageError(f"scene {self.scene}: the table {name} is made of whole studies only")
 
     def runs(self) -> pd.DataFrame:
-        """Reduced runs of the training motion with what was sampled, a row per group, method, r."""
-        names = [column.name for column in COLUMNS]
+        """Reduced runs of the training motion with times and what was sampled.
+
+        A row per group, method and r, then those in position subspaces.
+        """
+        runs = self.table("reduced_reruns")
         if not self.reductions:
-            return pd.DataFrame(columns=[*names, *_SAMPLED])
-        runs = judged_reruns(
-            self._files(RERUNS), self._files(RERUNS_TRAIN), [], [], self.table("sensitivity"),
-            self.settings["sensitivity.reference"], self.settings["sensitivity.threshold"], TRAIN,
-        )  # fmt: skip
+            return runs.reindex(columns=[*runs.columns, *_SAMPLED])
         errors = self.table("reconstruction_error")
-        sampled = errors[errors.split == "train"]
-        keys = ["scene", "group", "method", "r"]
-        return runs[names].merge(sampled[[*keys, *_SAMPLED]], on=keys, how="left")
+        sampled = errors[errors.split == "train"].assign(position_basis="full")
+        keys = ["scene", "group", "method", "position_basis", "r"]
+        return runs.merge(sampled[[*keys, *_SAMPLED]], on=keys, how="left")
+
+    def file(self, place: Place) -> File:
+        """The scene's only file of a kind."""
+        return place.file(self.path(place, self.scene))
+
+    def _reduced_reruns(self) -> pd.DataFrame:
+        inside = [SUBSPACES, SUBSPACES_TRAIN] if self._subspaces else []
+        subspaces, rows = ([self.file(place)] for place in inside) if inside else ([], [])
+        if not self.reductions and not inside:
+            return reduced_reruns.checked(pd.DataFrame())
+        return reduced_reruns(
+            self._files(RERUNS), self._files(RERUNS_TRAIN), subspaces, rows, [self.file(TIMINGS)],
+            self.table("sensitivity"), self.settings["sensitivity.reference"],
+            self.settings["sensitivity.threshold"],
+        )  # fmt: skip
 
     def _files(self, place: Place) -> list[File]:
         return place.files(self._paths(place))

@@ -17,8 +17,10 @@ from matplotlib.image import imread
 from PIL import Image
 
 from pdrom.core.errors import ConfigurationError
-from pdrom.core.paths import FULL_ORDER, TIMINGS, VTK
+from pdrom.core.paths import FULL_ORDER, SUBSPACES, TIMINGS, VTK
 from pdrom.core.store import check_file, read_table, write_table
+from pdrom.model.scene import SceneConfig
+from pdrom.pipeline.holdings import labels_of
 from pdrom.pipeline.scene_command import scene_arguments
 from pdrom.pipeline.study import Study
 from pdrom.report.figures.kit.read import RerunInfo
@@ -27,6 +29,9 @@ from pdrom.report.scenes.gif import durations
 from pdrom.report.scenes.job import make
 from pdrom.report.scenes.sizes import SHOWN, shown
 from pdrom.report.scenes.viewer import make_index
+from pdrom.tables.accuracy_cost import accuracy_cost
+from pdrom.tables.effects_contribution import effects_contribution
+from pdrom.tables.reduced_reruns import reduced_reruns
 from small_scene import SCENE, order, run_jobs, small_study
 
 
@@ -71,6 +76,35 @@ def test_the_table_has_a_row_for_each_run_with_its_error_and_gain(finished):
     assert (ran.relative_error_within_horizon < 1.0).all()
     # an orthogonal projection amplifies nothing
     assert table.gain[table.method == "pod"].to_numpy() == pytest.approx(1.0)
+    inside = table.position_basis == "pod"
+    assert set(table.method[inside]) == {"full", "ecsw-1e-02"}
+    assert table.gain[inside].isna().all()
+    # the columns of the study's table, times and lengths among them
+    assert set(reduced_reruns.column_names) <= set(table.columns)
+    assert (table[["ms_per_frame", "speedup", "error_over_extent", "shape_error"]] >= 0.0).all(None)
+
+
+def test_what_the_command_advises_from_has_the_columns_of_the_study(finished):
+    files = made(finished, "advice")
+    effects, costs = read_table(files["effects"]), read_table(files["costs"])
+    assert list(effects.columns) == list(effects_contribution.column_names)
+    assert effects.effect.tolist() == ["spring", "gravity", "pins"]
+    assert effects.above_floor.tolist()[1:] == [True, True]
+    assert list(costs.columns) == list(accuracy_cost.column_names)
+    assert {"fom", "full", "pod", "ecsw-1e-02"} <= set(costs.method)
+    assert (costs.ms_per_frame > 0.0).all()
+
+
+def test_a_scene_that_no_subspace_takes_has_none(tmp_path):
+    study = small_study(tmp_path)
+    scene = study.scene(SCENE)
+    wind = {"effect": "wind", "velocity": [0.0, 0.0, 1.0]}
+    plain = scene.model_dump(mode="json")
+    windy = SceneConfig.model_validate({**plain, "effects": [*plain["effects"], wind]})
+    only = study.only(SCENE)
+    assert labels_of(only, SUBSPACES) == [{"scene": SCENE}]
+    only.scenes = {SCENE: windy}
+    assert labels_of(only, SUBSPACES) == []
 
 
 def test_the_study_does_not_hold_the_scene(finished):

@@ -16,6 +16,7 @@ TABLE = ["scene", "effect", "role", "moved", "sensitivity_floor", "above_floor"]
 FRAMES = ["effect", "frame", "force"]
 SHOWN = 3  # scenes whose forces are drawn
 LOW, HIGH = 1e-12, 1e2
+ROUNDOFF = 1e-14  # of the largest force of a scene: what is smaller is not drawn
 OTHERS = ("#8C6D31", "#5A5A5A", "#B03A6B", "#2B2B80", "#3E8E7E", "#A0522D", "#7F7F00")
 
 
@@ -32,8 +33,8 @@ def draw(results: Results, options: Scenes) -> Figure:
     if not scenes:
         raise NothingToDraw("no contributions of effects")
     rows = table[table.scene.isin(scenes)]
-    colours = _colours(results, rows)
     drawn = sorted(scenes, key=lambda scene: -len(results.holdings.scenes[scene].groups))[:SHOWN]
+    colours = _colours(results, rows[rows.moved.notna() | rows.scene.isin(drawn)])
     figure = Figure(figsize=(style.WIDTH, 0.24 * len(scenes) + 2.0), layout="constrained")
     left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.15))
     axes = left.subplots(len(drawn), 1, squeeze=False)[:, 0]
@@ -61,8 +62,9 @@ def _colours(results: Results, rows: pd.DataFrame) -> dict[str, str]:
 
 
 def _draw_forces(ax: Axes, frames: pd.DataFrame, colours: dict[str, str]) -> None:
+    least = ROUNDOFF * frames.force.max()
     for effect, rows in frames.groupby("effect", sort=False):
-        force = rows.force.where(rows.force > 0.0)
+        force = rows.force.where(rows.force > least)
         if len(rows) > 1:
             ax.plot(rows.frame, force, color=colours[str(effect)], linewidth=1.1)
         else:
@@ -81,6 +83,7 @@ def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], colours: dict[s
             ax.plot(
                 [np.clip(row.moved, LOW, HIGH)], [y], marker="o", markersize=4.5, zorder=3,
                 color=colour, markerfacecolor=colour if row.above_floor else "white",
+                clip_on=False,
             )  # fmt: skip
     ax.set_yticks(range(len(scenes)), [style.words(scene) for scene in scenes])
     ax.set_ylim(len(scenes) - 0.4, -0.6)

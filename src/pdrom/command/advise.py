@@ -1,0 +1,103 @@
+"""``pdrom advise SCENE``: what a scene does not need, and what fits an error and a time."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pdrom.command.base import Command, Status
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+RESULTS = Path(__file__).resolve().parents[3] / "results"
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text}: a number above zero is required")
+    return value
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """The scene, the wishes, and where results lie."""
+    parser.add_argument("scene", metavar="SCENE", help="name of a scene, or its file")
+    parser.add_argument(
+        "--error", metavar="E", type=_positive, help="largest relative error allowed"
+    )
+    parser.add_argument(
+        "--ms", metavar="T", type=_positive, help="longest time of a frame allowed, ms"
+    )
+    parser.add_argument(
+        "--results", metavar="FOLDER", default=str(RESULTS),
+        help="folder of measured results (those of the project)",
+    )  # fmt: skip
+
+
+def perform(arguments: argparse.Namespace) -> Status:
+    """Read the tables that hold the scene and say what follows from them."""
+    from pdrom.report.advice import on_choices, on_effects, on_resolution
+
+    scene, folder = Path(arguments.scene).stem, arguments.results
+    effects = _rows(folder, "effects_contribution", scene)
+    lines = [f"{scene}: effects", *on_effects(effects)]
+    fits = True
+    if arguments.error is not None or arguments.ms is not None:
+        points = _rows(folder, "accuracy_cost", scene)
+        lines.append(f"{scene}: {_wish(arguments.error, arguments.ms)}")
+        found, fits = on_choices(points, arguments.error, arguments.ms)
+        lines += found
+        if arguments.ms is not None:
+            scaling = _rows(folder, "scaling", scene, required=False)
+            own = points[(points.method == "full") & (points.position_basis == "full")]
+            lines += on_resolution(scaling, int(own.iterations.iloc[0]), arguments.ms)
+    sys.stdout.write("\n".join(lines) + "\n")
+    return Status.DONE if fits else Status.NOTHING_FITS
+
+
+def _wish(error: float | None, ms: float | None) -> str:
+    parts = [] if error is None else [f"an error of at most {error:g}"]
+    parts += [] if ms is None else [f"at most {ms:g} ms a frame"]
+    return f"for {' and '.join(parts)}"
+
+
+def _rows(folder: str, name: str, scene: str, required: bool = True) -> "pd.DataFrame":
+    """The scene's rows of a table of the study, else of the scene's own.
+
+    Raises
+    ------
+    StorageError
+        Neither is there, or holds the scene.
+    """
+    from pdrom.core.errors import StorageError
+    from pdrom.core.paths import SCENE_TABLE, TABLE
+    from pdrom.core.store import read_table
+
+    empty = None
+    for place in (
+        TABLE.at(folder, name=name),
+        SCENE_TABLE.at(folder, scene=scene, name=name),
+    ):
+        if Path(place).exists():
+            table = read_table(place)
+            empty = table[:0]
+            rows = table[table.scene == scene] if len(table) else table
+            if len(rows):
+                return rows
+    if not required:
+        import pandas as pd
+
+        return pd.DataFrame() if empty is None else empty
+    raise StorageError(
+        f"{scene}: {folder} holds no measurements of it (table {name}); "
+        f"./reproduce scene {scene} advice makes them, for a scene in config/scenes"
+    )
+
+
+COMMAND = Command(
+    "Say which effects of a scene do nothing, and what fits an error and a time per frame",
+    "pdrom advise cloth_all_oop --error 1e-2 --ms 1",
+    declare,
+    perform,
+)
