@@ -27,12 +27,19 @@ effects:
   - {{effect: gravity}} # along -y
   - {{effect: floor}} # at y = 0
   - {{effect: pins, select: left}} # held: a side (left, right, top ...) or a list of vertices
-  # a handle: held vertices, moved by `offset` (m) over 50 frames
+  # a handle: held vertices, moved by `offset` (m) over 50 frames; any `select` may be a place
   # - {{effect: translate, select: right, offset: [0.3, 0.0, 0.0], over: 50}}
-  # constraint groups: edges that keep their length, triangles that keep their shape, bending
+  # - {{effect: pins, select: {{kind: sphere, centre: [0.5, 2.0, 0.0], radius: 0.1}}}}
+  # an obstacle; also plane, box
+  # - {{effect: sphere, centre: [0.0, 1.0, 0.0], radius: 0.4, friction: 0.3}}
+  # constraint groups of surfaces: edges keep their length, triangles their shape or area, bending
   - {{effect: spring, weight: 1.0e+5}}
   # - {{effect: strain, weight: 1.0e+5}}
+  # - {{effect: area, weight: 1.0e+5}}
   # - {{effect: bending, weight: 0.1}}
+  # and of volumes: tetrahedra keep their shape, or their volume
+  # - {{effect: tetrahedron_strain, weight: 1.0e+6}}
+  # - {{effect: volume, weight: 1.0e+6}}
 
 # Groups whose projections are reduced, and the number of snapshots (even frames of the run) that
 # train a basis.

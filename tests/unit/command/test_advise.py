@@ -17,7 +17,8 @@ EFFECTS = pd.DataFrame(
 )  # fmt: skip
 COSTS = pd.DataFrame(
     {
-        "scene": "sheet", "group": [None, "spring"], "method": ["full", "pod"], "position_basis": "full", "k": None,
+        "scene": "sheet", "group": [None, "spring"], "method": ["full", "pod"],
+        "position_basis": "full", "k": None,
         "r": [None, 10], "iterations": 10, "relative_error_within_horizon": [0.0, 0.005],
         "ms_per_frame": [0.5, 0.7],
     }
