@@ -26,7 +26,8 @@ def hard_cases(tables: Tables) -> str:
         rows.append([name(case), escape(CASES[case].why), *cells])
     header = ["case", "why it is hard", *map(name, reductions)]
     left = r">{\raggedright\arraybackslash}"
-    why, other = (5.2, 2.6) if len(reductions) < 4 else (3.4, 8.6 / len(reductions))
+    # all of it fits the width of the text
+    why, other = (5.2, 2.6) if len(reductions) < 3 else (2.8, 7.0 / len(reductions))
     return longtable(
         header, rows, rf"l{left}p{{{why}cm}}" + f"{left}p{{{other:.2f}cm}}" * len(reductions)
     )
