@@ -29,6 +29,8 @@ def visiting_order(stencil: np.ndarray, vertices: int) -> np.ndarray | None:
     stencil : (e, m) vertices of each element
     vertices : number of all vertices
     """
+    if len(stencil) == 0:
+        return None
     rank = np.empty(vertices, dtype=np.int64)
     rank[csgraph.reverse_cuthill_mckee(_neighbours(stencil, vertices), True)] = np.arange(vertices)
     order = np.lexsort(np.sort(rank[stencil], axis=1).T[::-1])
