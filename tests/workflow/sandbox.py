@@ -27,10 +27,14 @@ MICRO = {
     "coarsen": {"resolution": 0.25, "frames": 0.05},
     "sensitivity": {"perturbations": [1e-10], "seeds": [1]},
     "timing": {"frames": 1, "warmup": 0, "repeats": 1, "numpy_frames": 1},
+    "frame_times": {"processes": 1, "frames": 1, "warmup": 0, "repeats": 1},
     "subspace": {"scenes": ["spring_oop"], "sizes": [4], "tolerances": [1e-2]},
 }
 MICRO_FILE = "micro.yaml"
-TIMED_FOLDERS = ("timings", "breakeven", "effects", "left_out", "guard", "offline", "logs")
+TIMED_FOLDERS = (
+    "timings", "frame_times", "seconds", "breakeven", "effects", "left_out", "guard", "offline",
+    "logs",
+)  # fmt: skip
 TIMED_FIGURES = ("local_share", "accuracy_cost")
 SHIM = '#!/bin/sh\nPYTHONPATH="{hooks}" exec "{python}" {module} "$@"\n'
 

@@ -25,7 +25,7 @@ MICRO = {
     "subspace": {"scenes": ["strain_oop"], "sizes": [4], "tolerances": [1e-2]},
 }
 # Folders of results that belong to no single scene.
-SHARED = ("tables", "figures", "paper", "hard_cases", "guard", "offline")
+SHARED = ("tables", "figures", "paper", "hard_cases", "guard", "offline", "frame_times")
 MICRO_FILE = "micro.yaml"
 MICRO_ARGUMENTS = ("--configfile", MICRO_FILE)
 

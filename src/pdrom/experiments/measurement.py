@@ -5,10 +5,10 @@ so that drifts of the machine's clock hit all variants alike. Of each frame the 
 median time counts: an interruption hits one frame of one repeat, and is left out.
 """
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from time import perf_counter
-from typing import Annotated
+from time import perf_counter, process_time
+from typing import Annotated, TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -17,6 +17,7 @@ from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.settings import Count, Repeats
 from pdrom.model.dynamics.stepper import State, Stepper
 
+T = TypeVar("T")
 Progress = Callable[[int, int], None]
 
 
@@ -96,6 +97,18 @@ def measure_calls(
             if repeat >= 0:
                 samples[key].append(1e3 * seconds)
     return {key: float(np.median(values)) for key, values in samples.items()}
+
+
+def clocked(made: Iterable[T]) -> Iterator[tuple[float, T]]:
+    """Every item with the processor time that it took to make, s."""
+    items = iter(made)
+    while True:
+        before = process_time()
+        try:
+            item = next(items)
+        except StopIteration:
+            return
+        yield process_time() - before, item
 
 
 _INNER = ("assembly_seconds", "lift_seconds")

@@ -1,11 +1,12 @@
 """One large scene in position subspaces, against its own full-order run in the same job.
 
-Everything is made here and nothing is kept but the rows of the table: full-order runs of both
-motions, columns from training frames, element sampling, reduced runs, and times. Full-order and
-reduced steps are timed in turn by the protocol of `pdrom.experiments.measurement`.
+Everything is made here: full-order runs of both motions, columns from training frames, element
+sampling, reduced runs. Kept are the models, which `pdrom.experiments.frame_times` times, and a row
+for each.
 """
 
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,28 +14,34 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 
-from pdrom.core.paths import ONLINE, File
+from pdrom.core.paths import ONLINE, ONLINE_MODELS, File
 from pdrom.core.reads import SourcesOf
-from pdrom.core.store import write_table
+from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.measurement import Protocol, Variant, measure
+from pdrom.experiments.measurement import clocked
 from pdrom.experiments.motion import training_indices
 from pdrom.experiments.settings import Modes, PositionBasis, Tolerance
-from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import displacement_norms
-from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
+from pdrom.reduction.subspace.columns import Columns
+from pdrom.reduction.subspace.model import (
+    Samples,
+    SubspaceModel,
+    ecsw_name,
+    make_columns,
+    sample_elements,
+)
 from pdrom.reduction.subspace.rerun import rerun_model
+from pdrom.reduction.subspace.store import store_columns, store_model
 from pdrom.reduction.subspace.training import Norm
 
 log = logging.getLogger(__name__)
 
 COLUMNS = [
-    "scene", "vertices", "elements", "position_basis", "k", "tau", "elements_sampled",
-    "relative_error_train", "relative_error_heldout", "ms_per_frame", "ms_per_iteration",
-    "fom_ms_per_frame", "speedup",
+    "scene", "vertices", "elements", "iterations", "position_basis", "k", "tau", "method",
+    "elements_sampled", "relative_error_train", "relative_error_heldout", "reduction_s",
 ]  # fmt: skip
 
 
@@ -58,7 +65,6 @@ class Settings(JobSettings):
 
     scene: SceneConfig
     online: OnlineModels
-    timing: Protocol
 
 
 @dataclass(frozen=True)
@@ -70,62 +76,64 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
-    """Files written: a row for every basis, size and tolerance."""
+    """Files written: a row for every basis, size and tolerance, and the models."""
 
     table: Annotated[File, ONLINE]
+    models: Annotated[File, ONLINE_MODELS]
 
 
 def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
-    """Reduce a scene by every model and time each beside the full order."""
-    config, asked, timing = settings.scene, settings.online, settings.timing
+    """Reduce a scene by every model and run both motions with each."""
+    config, asked = settings.scene, settings.online
     mesh = config.mesh.build(Path())
     train = Scene.build(config, mesh)
     heldout = Scene.build(config.heldout_variant(), mesh)
     references = [trajectory(motion, track_objective=False) for motion in (train, heldout)]
     log.info("%s: full-order runs of %d vertices", config.name, mesh.vertices)
-    frames = training_indices(train)
-    rows, variants = [], []
-    for kind in asked.bases:
-        for k in asked.sizes:
-            columns = make_columns(train, references[0][1:][frames], kind, k)
-            found = sample_elements(train, columns, frames, asked.tolerances, norm=asked.norm)
+    rows = []
+    with write_hdf5(outputs.models.path) as file:
+        made = clocked(_models(train, references[0], asked))
+        for seconds, (base, k, columns, found) in made:
+            store_columns(file.create_group(f"columns/{base}"), columns)
             for tolerance, samples in zip(asked.tolerances, found, strict=True):
-                model = SubspaceModel(kind, columns, samples)
+                model = SubspaceModel(base.partition("_")[0], columns, samples)
+                row = _row(train, model, k, tolerance)
+                labels = {key: row[key] for key in ("method", "position_basis", "k")}
+                store = file.create_group(f"models/{base}_{row['method']}")
+                store_model(store, {**labels, "base": base}, samples)
                 errors = [
                     relative_error(motion, model, reference)
                     for motion, reference in zip((train, heldout), references, strict=True)
                 ]
-                rows.append(_row(train, model, k, tolerance, errors))
-                variants.append(_variant(*model.loop(train), timing, config))
-                log.info("%s k=%d tau=%g", kind, k, tolerance)
-    stepper = train.stepper(track_objective=False)
-    variants.append(_variant(stepper, train.initial_state(), timing, config))
-    *reduced, full = measure(variants, timing.warmup, timing.repeats)
-    for row, measurement in zip(rows, reduced, strict=True):
-        row["ms_per_frame"] = measurement.frame
-        row["ms_per_iteration"] = measurement.frame / config.iterations
-        row["fom_ms_per_frame"] = full.frame
-        row["speedup"] = full.frame / measurement.frame
+                keys = ("relative_error_train", "relative_error_heldout", "reduction_s")
+                rows.append({**row, **dict(zip(keys, (*errors, seconds), strict=True))})
+                log.info("%s k=%d tau=%g", base, k, tolerance)
     write_table(pd.DataFrame(rows, columns=COLUMNS), outputs.table.path)
 
 
-def _row(
-    scene: Scene,
-    model: SubspaceModel,
-    k: int,
-    tolerance: float,
-    errors: list[float | None],
-) -> dict[str, Any]:
+def _models(
+    scene: Scene, reference: np.ndarray, asked: OnlineModels
+) -> Iterator[tuple[str, int, Columns, list[dict[str, Samples]]]]:
+    """Name, size and columns of every subspace, with the samples for each tolerance."""
+    frames = training_indices(scene)
+    for kind in asked.bases:
+        for k in asked.sizes:
+            columns = make_columns(scene, reference[1:][frames], kind, k)
+            found = sample_elements(scene, columns, frames, asked.tolerances, norm=asked.norm)
+            yield f"{kind}_k{k:03d}", k, columns, found
+
+
+def _row(scene: Scene, model: SubspaceModel, k: int, tolerance: float) -> dict[str, Any]:
     return {
         "scene": scene.config.name,
         "vertices": scene.mesh.vertices,
         "elements": sum(group.elements for group in scene.groups),
+        "iterations": scene.config.iterations,
         "position_basis": model.position_basis,
         "k": k,
         "tau": tolerance,
+        "method": ecsw_name(tolerance),
         "elements_sampled": model.elements_evaluated(scene),
-        "relative_error_train": errors[0],
-        "relative_error_heldout": errors[1],
     }
 
 
@@ -135,8 +143,4 @@ def relative_error(scene: Scene, model: SubspaceModel, reference: np.ndarray) ->
     return error if error is not None and np.isfinite(error) else None
 
 
-def _variant(loop: Stepper, state: State, timing: Protocol, config: SceneConfig) -> Variant:
-    return Variant({}, loop, state, min(timing.frames, config.frames))
-
-
-EXPERIMENT = Experiment("online", "Online cost of {scene}", run, alone=True)
+EXPERIMENT = Experiment("online", "Reduction of {scene}", run)

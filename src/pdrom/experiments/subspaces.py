@@ -1,6 +1,7 @@
 """Position subspaces with full projections, with sampled elements and with interpolation."""
 
 import logging
+from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
@@ -16,6 +17,7 @@ from pdrom.core.paths import (
     MESH,
     SUBSPACES,
     SUBSPACES_HELDOUT,
+    SUBSPACES_SECONDS,
     SUBSPACES_TRAIN,
     TRAIN,
     File,
@@ -24,6 +26,7 @@ from pdrom.core.provenance import attributes
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.measurement import clocked
 from pdrom.experiments.motion import Motion, training_indices, training_positions
 from pdrom.experiments.scenes import RUNS, scene_of
 from pdrom.experiments.settings import BlowupExtent, Modes, PositionBasis, Tolerance
@@ -33,7 +36,14 @@ from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.hrpd import hrpd, sampled_space
 from pdrom.reduction.subspace.interpolated import Training, interpolate
 from pdrom.reduction.subspace.interpolation import Interpolation
-from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
+from pdrom.reduction.subspace.model import (
+    ECSW,
+    Samples,
+    SubspaceModel,
+    ecsw_name,
+    make_columns,
+    sample_elements,
+)
 from pdrom.reduction.subspace.specs import HrpdSpec, InterpolationSpec
 from pdrom.reduction.subspace.store import store_columns, store_model
 from pdrom.reduction.subspace.training import Norm
@@ -44,6 +54,9 @@ COLUMNS = [
     "scene", "group", "method", "position_basis", "k", "r", "frames", "finite", "blowup_frame",
     "max_extent", "relative_error", "energy_ratio",
 ]  # fmt: skip
+
+SECONDS_COLUMNS = ["scene", "position_basis", "k", "method", "reduction_s"]
+FULL = "full"
 
 Sampled = Mapping[str, Samples | Interpolation]
 
@@ -62,6 +75,17 @@ class SubspaceModels(ConfigModel):
     interpolated_sizes: tuple[Modes, ...] = ()
     hrpd: HrpdSpec | None = None
     interpolations: dict[str, InterpolationSpec] = Field(default_factory=dict)
+
+    def methods(self, kind: str, k: int) -> list[str]:
+        """Names of the models on a basis of ``kind`` with k modes."""
+        if kind not in self.bases or k not in self.sizes:
+            return []
+        trained = kind == "pod"
+        names = [FULL, *(ecsw_name(tolerance) for tolerance in self.tolerances if trained)]
+        if k in self.interpolated_sizes:
+            names += ["hrpd"] if self.hrpd is not None else []
+            names += list(self.interpolations) if trained else []
+        return names
 
 
 class Subspace(SubspaceModels):
@@ -89,11 +113,12 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
-    """Files written: models with their runs, and a table of each motion."""
+    """Files written: models with their runs, a table of each motion, and what the models took."""
 
     runs: Annotated[File, SUBSPACES]
     train: Annotated[File, SUBSPACES_TRAIN]
     heldout: Annotated[File, SUBSPACES_HELDOUT]
+    seconds: Annotated[File, SUBSPACES_SECONDS]
 
 
 def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
@@ -103,6 +128,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
         for name in RUNS
     }
     rows: dict[str, list[dict[str, Any]]] = {name: [] for name in RUNS}
+    seconds = []
     asked = settings.subspace.model_dump(mode="json")
     config = settings.scene.model_dump(mode="json")
     with write_hdf5(outputs.runs.path) as file:
@@ -111,9 +137,17 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
             file[f"displacement/{name}"] = motion.displacement
         start = motions["train"]
         file.attrs["extent_norm"] = extent_norm(start.reference, start.scene.mesh.extent)
-        for base, columns, kind, k, models in _subspaces(motions["train"], settings.subspace):
+        subspaces = clocked(_subspaces(motions["train"], settings.subspace))
+        for of_columns, (base, columns, kind, k, models) in subspaces:
             store_columns(file.create_group(f"columns/{base}"), columns)
-            for method, samples in models:
+            spent: dict[str, float] = defaultdict(float)
+            for of_model, (method, samples) in clocked(models):
+                # samplings of all tolerances are made together, for the first of them
+                family = ECSW if method.startswith(ECSW) else method
+                spent[family] += of_model
+                seconds.append(
+                    (start.scene.config.name, kind, k, method, of_columns + spent[family])
+                )
                 model = SubspaceModel(kind, columns, samples)
                 labels = {"method": method, "position_basis": kind, "k": k, "base": base}
                 store = file.create_group(f"models/{base}_{method}")
@@ -127,6 +161,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     for name in RUNS:
         table = pd.DataFrame(rows[name], columns=COLUMNS)
         write_table(table, getattr(outputs, name).path)
+    write_table(pd.DataFrame(seconds, columns=SECONDS_COLUMNS), outputs.seconds.path)
 
 
 def _subspaces(
@@ -149,13 +184,13 @@ def _samplings(
     scene: Scene, columns: Columns, kind: str, settings: SubspaceModels
 ) -> Iterator[tuple[str, Sampled]]:
     """(method, samples) pairs: full projections, and element sampling on the snapshot basis."""
-    yield "full", {}
+    yield FULL, {}
     if kind == "pod":
         tolerances = settings.tolerances
         frames = training_indices(scene)
         found = sample_elements(scene, columns, frames, tolerances, norm=settings.norm)
         for tolerance, samples in zip(tolerances, found, strict=True):
-            yield f"ecsw-{tolerance:.0e}", samples
+            yield ecsw_name(tolerance), samples
 
 
 def _sampled_spaces(scene: Scene, spec: HrpdSpec | None) -> dict[str, Any]:

@@ -90,6 +90,7 @@ def _study(study: Study) -> Row:
         "noise_repetitions": settings.noise.repetitions,
         "repeats": settings.timing.repeats,
         "timed_frames": settings.timing.frames,
+        "processes": settings.frame_times.processes,
         "blowup_extent": settings.blowup_extent,
         "ranks": ", ".join(str(r) for r in settings.ranks),
         "wrong": settings.stability.wrong,

@@ -7,11 +7,14 @@ base class gets the fields of that class only, so that a job depends on nothing 
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from pdrom.core import paths
+from pdrom.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
 from pdrom.experiments.guard import Trial
 from pdrom.experiments.settings import Horizon
 from pdrom.experiments.stability import Stability
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import SceneConfig
+from pdrom.pipeline.holdings import labels_of
 from pdrom.pipeline.study import Study
 from pdrom.reduction.method import BasisSpec, MethodSpec
 
@@ -75,6 +78,35 @@ def _trials(study: Study, labels: Labels) -> tuple[Trial, ...]:
     )
 
 
+def _timed_scenes(study: Study, labels: Labels) -> tuple[NamedScene, ...]:
+    return tuple(NamedScene(scene=scene) for scene in study.scenes.values())
+
+
+def _large_scenes(study: Study, labels: Labels) -> tuple[NamedScene, ...]:
+    return tuple(NamedScene(scene=scene) for scene in study.online.values())
+
+
+def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
+    """Those whose models the study holds."""
+    held = {labels["scene"] for labels in labels_of(study, paths.SUBSPACES)}
+    models = study.settings.subspace
+    return tuple(
+        case
+        for case in study.settings.frame_times.subspaces
+        if case.scene in held and case.method in models.methods(case.position_basis, case.k)
+    )
+
+
+def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...]:
+    """Those whose samplings the study holds."""
+    held = labels_of(study, paths.SAMPLING)
+    return tuple(
+        case
+        for case in study.settings.frame_times.projections
+        if case.labels in held and case.r in study.settings.ranks
+    )
+
+
 def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
     """The methods that are timed on growing meshes; they need not be among the study's."""
     section = study.settings.scaling
@@ -85,6 +117,10 @@ def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
 def _noise_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
     """The methods of the noise runs; they need not be among the study's."""
     return study.named_methods(study.settings.noise.methods, "noise.methods")
+
+
+def _projection_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
+    return {case.method: study.methods[case.method] for case in _projection_cases(study, labels)}
 
 
 PROVIDERS: dict[str, Callable[[Study, Labels], Any]] = {
@@ -99,6 +135,11 @@ PROVIDERS: dict[str, Callable[[Study, Labels], Any]] = {
     "horizon": _horizon,
     "stability": _stability,
     "trials": _trials,
+    "timed_scenes": _timed_scenes,
+    "large_scenes": _large_scenes,
+    "subspace_cases": _subspace_cases,
+    "projection_cases": _projection_cases,
+    "projection_methods": _projection_methods,
     "ladder": lambda study, labels: study.ladder,
     "ablation": lambda study, labels: study.ablation,
 }

@@ -12,6 +12,7 @@ from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.names import SceneName
 from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
 from pdrom.experiments.companion import Companion
+from pdrom.experiments.frame_times import FrameTimes
 from pdrom.experiments.guard import GuardSection
 from pdrom.experiments.hard_cases.experiment import HardCases
 from pdrom.experiments.iterations import IterationSweep
@@ -62,6 +63,7 @@ class StudySettings(ConfigModel):
     sensitivity: Sensitivity = Sensitivity()
     iterations: IterationSweep = IterationSweep()
     timing: Timing = Timing()
+    frame_times: FrameTimes = FrameTimes()
     budgets: tuple[Annotated[float, Field(gt=0.0)], ...] = (0.1, 1.0, 10.0)
     subspace: Subspace = Subspace()
     scaling: Scaling = Scaling()

@@ -24,6 +24,7 @@ from pdrom.core.paths import File
 from pdrom.core.reads import Every, PerScene, TableOf
 from pdrom.experiments.names import ANDERSON, FOM
 from pdrom.tables.declaration import flag, integer, table, timed
+from pdrom.tables.one_time import timings_in_one_time
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import (
     ERROR_WITHIN,
@@ -57,6 +58,7 @@ CONVERGED, OWN = "converged", "own iterations"
     reads={
         "reruns": TableOf("reduced_reruns"),
         "timings": Every(paths.TIMINGS),
+        "frame_times": TableOf("frame_times"),
         "sweeps": Every(paths.ITERATIONS),
         "iterations": PerScene("iterations"),
     },
@@ -64,6 +66,7 @@ CONVERGED, OWN = "converged", "own iterations"
 def accuracy_cost(
     reruns: pd.DataFrame,
     timings: list[File],
+    frame_times: pd.DataFrame,
     sweeps: list[File],
     iterations: Mapping[str, int],
 ) -> pd.DataFrame:
@@ -75,10 +78,11 @@ def accuracy_cost(
     ----------
     reruns : the table reduced_reruns
     timings : timing tables of the scenes
+    frame_times : the table of that name
     sweeps : tables of the scenes' full-order runs with other numbers of iterations
     iterations : scene -> its own local/global iterations K per frame
     """
-    times = joined(timings)
+    times = timings_in_one_time(timings, frame_times)
     times = times[times.implementation == "compiled"]
     full = times[times.method.isna()].copy()
     full = full.assign(method="full", position_basis="full", relative_error_within_horizon=0.0)

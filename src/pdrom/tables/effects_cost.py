@@ -4,10 +4,13 @@ import pandas as pd
 
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every
+from pdrom.core.reads import Every, TableOf
 from pdrom.tables.declaration import integer, number, table, text, timed
+from pdrom.tables.one_time import in_one_time
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import MS_PER_FRAME, SCENE
+
+TIMES = ("ms_per_frame",)
 
 
 @table(
@@ -19,8 +22,11 @@ from pdrom.tables.vocabulary import MS_PER_FRAME, SCENE
         MS_PER_FRAME,
         timed(number("share", "of the frame; those of a scene add up to one")),
     ),
-    reads={"parts": Every(paths.EFFECTS)},
+    reads={"parts": Every(paths.EFFECTS), "frame_times": TableOf("frame_times")},
 )
-def effects_cost(parts: list[File]) -> pd.DataFrame:
+def effects_cost(parts: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
     """The scenes' tables one after the other."""
-    return joined(parts)
+    rows = joined(parts)
+    if rows.empty:
+        return rows
+    return in_one_time(rows, rows.groupby("scene").ms_per_frame.sum(), frame_times, TIMES)

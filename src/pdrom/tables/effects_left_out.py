@@ -4,10 +4,14 @@ import pandas as pd
 
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every
+from pdrom.core.reads import Every, TableOf
 from pdrom.tables.declaration import integer, number, table, text, timed
+from pdrom.tables.one_time import in_one_time
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import MS_PER_FRAME, SCENE
+
+NOTHING = "nothing"
+TIMES = ("ms_per_frame", "saved_ms", "own_ms")
 
 
 @table(
@@ -21,8 +25,12 @@ from pdrom.tables.vocabulary import MS_PER_FRAME, SCENE
         timed(number("saved_ms", "time of the whole scene less that of the row", "ms")),
         timed(number("own_ms", "time of what is left out, inside the whole scene", "ms")),
     ),
-    reads={"parts": Every(paths.LEFT_OUT)},
+    reads={"parts": Every(paths.LEFT_OUT), "frame_times": TableOf("frame_times")},
 )
-def effects_left_out(parts: list[File]) -> pd.DataFrame:
+def effects_left_out(parts: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
     """Scenes with several groups, as they are and without some of their effects."""
-    return joined(parts)
+    rows = joined(parts)
+    if rows.empty:
+        return rows
+    own = rows[rows.left_out == NOTHING].set_index("scene").ms_per_frame
+    return in_one_time(rows, own, frame_times, TIMES)

@@ -43,19 +43,28 @@ def failure_predictors(
     of `pdrom.tables.gain_prediction` (the basis suffices) whose error exceeds its limit; "blown up"
     are those that ended early, among all runs of sampled methods.
     """
-    known = bounds[[*_KEYS, *PREDICTORS[1:]]].astype({"r": "int64"})
-    judged = judged_runs(reruns, reconstruction)
-    every = reruns_with_gain(reruns, reconstruction)
-    every = every[(every.method != ORTHOGONAL) & every.gain.notna()]
-    every = every.assign(failed=every.finite.map({True: False, False: True}))
     rows = []
-    for target, runs in zip(TARGETS, (judged, every), strict=True):
-        runs = runs.merge(known, on=_KEYS, how="inner").dropna(subset=list(PREDICTORS))
+    for target, runs in predicted_runs(bounds, reruns, reconstruction).items():
         for predictor in PREDICTORS if len(runs) else ():
             rows += [
                 {"target": target, "predictor": predictor, **row} for row in _rows(runs, predictor)
             ]
     return pd.DataFrame(rows)
+
+
+def predicted_runs(
+    bounds: pd.DataFrame, reruns: pd.DataFrame, reconstruction: pd.DataFrame
+) -> dict[str, pd.DataFrame]:
+    """Runs with all predictors and ``failed`` for each target, see `failure_predictors`."""
+    known = bounds[[*_KEYS, *PREDICTORS[1:]]].astype({"r": "int64"})
+    judged = judged_runs(reruns, reconstruction)
+    every = reruns_with_gain(reruns, reconstruction)
+    every = every[(every.method != ORTHOGONAL) & every.gain.notna()]
+    every = every.assign(failed=every.finite.map({True: False, False: True}))
+    return {
+        target: runs.merge(known, on=_KEYS, how="inner").dropna(subset=list(PREDICTORS))
+        for target, runs in zip(TARGETS, (judged, every), strict=True)
+    }
 
 
 def _rows(runs: pd.DataFrame, predictor: str) -> list[dict]:

@@ -4,7 +4,7 @@ import pandas as pd
 
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every
+from pdrom.core.reads import Every, TableOf
 from pdrom.tables.declaration import integer, number, table, text, timed
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import (
@@ -45,8 +45,13 @@ from pdrom.tables.vocabulary import (
         MS_PER_FRAME,
         timed(number("relative_cost", "time of a frame over that of the full-order run")),
     ),
-    reads={"parts": Every(paths.GUARD)},
+    reads={"parts": Every(paths.GUARD), "frame_times": TableOf("frame_times")},
 )
-def guard(parts: list[File]) -> pd.DataFrame:
+def guard(parts: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
     """Rows of all cases, each after its full-order run."""
-    return joined(parts)
+    rows = joined(parts)
+    if rows.empty:
+        return rows
+    scenes = frame_times.set_index("scene").ms_per_frame
+    one = rows.scene.map(scenes) * rows.relative_cost
+    return rows.assign(ms_per_frame=one.fillna(rows.ms_per_frame))

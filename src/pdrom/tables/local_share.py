@@ -4,9 +4,9 @@ import pandas as pd
 
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every
+from pdrom.core.reads import Every, TableOf
 from pdrom.tables.declaration import number, table, text, timed
-from pdrom.tables.parts import joined
+from pdrom.tables.one_time import timings_in_one_time
 from pdrom.tables.vocabulary import GLOBAL_MS, LOCAL_MS, LOCAL_SHARE, SCENE, VERTICES
 
 IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")
@@ -23,14 +23,14 @@ IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")
         GLOBAL_MS,
         LOCAL_SHARE,
     ),
-    reads={"timings": Every(paths.TIMINGS)},
+    reads={"timings": Every(paths.TIMINGS), "frame_times": TableOf("frame_times")},
 )
-def local_share(timings: list[File]) -> pd.DataFrame:
+def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
     """One row per scene and implementation; assembly counts as a part of the local step.
 
     Compiled kernels project and scatter in one pass: their assembly time is part of the local step.
     """
-    times = joined(timings)
+    times = timings_in_one_time(timings, frame_times)
     full = times[times.method.isna()].copy()
     full["local_share"] = (full.local_ms + full.assembly_ms) / (
         full.local_ms + full.assembly_ms + full.global_ms

@@ -4,18 +4,24 @@ import pandas as pd
 
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every
+from pdrom.core.reads import Every, TableOf
 from pdrom.tables.declaration import integer, number, table, timed
 from pdrom.tables.parts import joined
+from pdrom.tables.speedups import timed_reductions
 from pdrom.tables.vocabulary import (
     ELEMENTS_SAMPLED,
     MS_PER_FRAME,
     POSITION_BASIS,
     SCENE,
     SPEEDUP,
+    SPEEDUP_HIGH,
+    SPEEDUP_LOW,
     VERTICES,
     K,
 )
+
+_KEYS = ["scene", "position_basis", "k", "method"]
+_TIMES = ["ms_per_frame", "fom_ms_per_frame", "speedup", "speedup_low", "speedup_high"]
 
 
 @table(
@@ -34,9 +40,21 @@ from pdrom.tables.vocabulary import (
         timed(number("ms_per_iteration", "time of an iteration", "ms")),
         timed(number("fom_ms_per_frame", "time of a frame of the full-order run", "ms")),
         SPEEDUP,
+        SPEEDUP_LOW,
+        SPEEDUP_HIGH,
     ),
-    reads={"parts": Every(paths.ONLINE)},
+    reads={
+        "parts": Every(paths.ONLINE),
+        "measured": Every(paths.FRAME_TIMES),
+        "times": TableOf("frame_times"),
+    },
 )
-def online(parts: list[File]) -> pd.DataFrame:
-    """Rows of all scenes, in order."""
-    return joined(parts)
+def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.DataFrame:
+    """Rows of all scenes, in order, with their times."""
+    rows = joined(parts)
+    if rows.empty:
+        return rows
+    found = pd.DataFrame(list(timed_reductions(joined(measured), times)))
+    found = found.rename(columns={"full_ms": "fom_ms_per_frame"})
+    made = rows.merge(found[[*_KEYS, *_TIMES]], on=_KEYS, how="left")
+    return made.assign(ms_per_iteration=made.ms_per_frame / made.iterations)

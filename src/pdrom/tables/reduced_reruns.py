@@ -6,7 +6,7 @@ from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, Setting, TableOf
 from pdrom.tables.declaration import table
-from pdrom.tables.parts import joined
+from pdrom.tables.one_time import timings_in_one_time
 from pdrom.tables.reruns import COLUMNS, KEYS, LENGTHS, TRAIN, judged_reruns
 from pdrom.tables.vocabulary import GLOBAL_MS, LOCAL_MS, MS_PER_FRAME, SPEEDUP
 
@@ -20,6 +20,7 @@ from pdrom.tables.vocabulary import GLOBAL_MS, LOCAL_MS, MS_PER_FRAME, SPEEDUP
         "subspaces": Every(paths.SUBSPACES),
         "subspace_rows": Every(paths.SUBSPACES_TRAIN),
         "timings": Every(paths.TIMINGS),
+        "frame_times": TableOf("frame_times"),
         "sensitivity": TableOf("sensitivity"),
         "perturbation": Setting("sensitivity.reference"),
         "threshold": Setting("sensitivity.threshold"),
@@ -31,6 +32,7 @@ def reduced_reruns(
     subspaces: list[File],
     subspace_rows: list[File],
     timings: list[File],
+    frame_times: pd.DataFrame,
     sensitivity: pd.DataFrame,
     perturbation: float,
     threshold: float,
@@ -39,7 +41,7 @@ def reduced_reruns(
     judged = judged_reruns(
         runs, rows, subspaces, subspace_rows, sensitivity, perturbation, threshold, TRAIN
     )
-    return _with_times(judged, joined(timings))
+    return _with_times(judged, timings_in_one_time(timings, frame_times))
 
 
 def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:

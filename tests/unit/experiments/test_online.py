@@ -4,16 +4,19 @@ import numpy as np
 import pytest
 
 from conftest import make_scene
-from pdrom.core.errors import ConfigurationError
+from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.paths import File
 from pdrom.core.store import read_table
 from pdrom.core.yamlfile import validate
 from pdrom.experiments import online as experiment
+from pdrom.experiments.fresh_process import Request, Subspaces, TimedScene, in_fresh_process
 from pdrom.experiments.measurement import Protocol
 from pdrom.experiments.online import COLUMNS, Online, OnlineModels, relative_error
+from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns
+from pdrom.tables.frame_times import frame_times
 from pdrom.tables.online import online
 
 EFFECTS = (
@@ -32,15 +35,21 @@ def written(tmp_path_factory):
     settings = experiment.Settings(
         scene=config,
         online=OnlineModels(bases=("pod", "skinning"), sizes=(3,), tolerances=(0.3, 1e-2)),
-        timing=Protocol(frames=3, warmup=1, repeats=2),
     )
-    output = experiment.Outputs(File(str(path), {"scene": "test"}))
+    models = path.with_suffix(".h5")
+    output = experiment.Outputs(File(str(path), {"scene": "test"}), File(str(models), {}))
     experiment.run(settings, experiment.Inputs([]), output)
-    return scene, path
+    timed = TimedScene(scene=config, subspaces=Subspaces(path=str(models)))
+    request = Request(
+        scenes=(timed,), timing=Protocol(frames=3, warmup=1, repeats=1), solver=DEFAULT_SOLVER,
+        threads=1, seed=1, result=str(path.parent / "times.csv"),
+    )  # fmt: skip
+    in_fresh_process(request, path.parent)
+    return scene, path, File(request.result, {})
 
 
 def test_rows_of_a_scene(written):
-    scene, path = written
+    scene, path, _ = written
     table = read_table(path)
     assert table.columns.tolist() == COLUMNS
     assert table.position_basis.tolist() == ["pod", "pod", "skinning", "skinning"]
@@ -53,21 +62,42 @@ def test_rows_of_a_scene(written):
         assert table[column].between(1e-6, 1.0).all()
     # the held-out motion starts with a kick that the training has not seen
     assert (table.relative_error_heldout > table.relative_error_train).any()
-    np.testing.assert_allclose(table.speedup, table.fom_ms_per_frame / table.ms_per_frame)
+
+
+def test_a_fresh_process_times_every_model(written):
+    scene, path, times = written
+    rows = read_table(times.path)
+    assert rows.role.tolist() == ["full", "control", *4 * ["reduced"]]
+    assert (rows.ms_per_frame > 0.0).all()
+    assert (rows.vertices == scene.mesh.vertices).all()
+    table = online([File(str(path), {})], [times], frame_times([times]))
     np.testing.assert_allclose(table.ms_per_iteration, table.ms_per_frame / 10)
+    np.testing.assert_allclose(table.speedup, table.fom_ms_per_frame / table.ms_per_frame)
     assert table.fom_ms_per_frame.nunique() == 1
+    # the files hold the same models
+    assert table.ms_per_frame.tolist() == rows.ms_per_frame[2:].tolist()
 
 
-def test_table_is_the_rows_of_all_scenes(written):
-    _, path = written
-    assert len(online(2 * [File(str(path), {})])) == 8
-    empty = online([])
-    assert list(empty.columns) == COLUMNS
+def test_a_process_that_fails_is_told(written, tmp_path):
+    missing = TimedScene(
+        scene=written[0].config, subspaces=Subspaces(path=str(tmp_path / "none.h5"))
+    )
+    request = Request(
+        scenes=(missing,), timing=Protocol(), solver=DEFAULT_SOLVER, threads=1, seed=1,
+        result=str(tmp_path / "times.csv"),
+    )  # fmt: skip
+    with pytest.raises(PdromError, match=r"none\.h5"):
+        in_fresh_process(request, tmp_path)
+
+
+def test_no_scene_leaves_an_empty_table():
+    empty = online([], [], frame_times([]))
+    assert tuple(empty.columns) == online.column_names
     assert len(empty) == 0
 
 
 def test_error_is_that_of_the_trajectories(written):
-    scene, _ = written
+    scene, _, _ = written
     reference = trajectory(scene)
     model = SubspaceModel("pod", make_columns(scene, reference[1:], "pod", 3))
     loop, state = model.loop(scene)

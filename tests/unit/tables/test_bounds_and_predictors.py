@@ -9,6 +9,7 @@ from pdrom.core.store import write_table
 from pdrom.experiments.bounds import COLUMNS
 from pdrom.tables.bounds import bounds
 from pdrom.tables.failure_predictors import PREDICTORS, failure_predictors
+from pdrom.tables.failure_transfer import failure_transfer
 
 # method, r, gain, contraction, error within the horizon (None: blew up), extent
 RUNS = [
@@ -78,3 +79,24 @@ def test_no_runs_leave_empty_tables(tables, tmp_path):
     assert len(empty) == 0
     assert len(failure_predictors(empty, runs, reconstruction)) == 0
     assert np.isfinite(made.bound).all()
+
+
+def test_a_limit_is_learned_without_the_scene_that_it_judges(tables):
+    # a second scene, in which the same runs have ten times the contraction
+    other = [t.assign(scene="wild") for t in tables]
+    other[0]["contraction"] *= 10.0
+    both = [pd.concat(pair, ignore_index=True) for pair in zip(tables, other, strict=True)]
+    rows = failure_transfer(*both).set_index(["predictor", "method", "scene"])
+    calm, wild = (rows.loc[("contraction", "all", scene)] for scene in ("calm", "wild"))
+    # 8, 3 and 90 fail, 2 and 0.5 do not; of the other scene ten times
+    assert (calm.threshold, wild.threshold) == (20.0, 2.0)
+    assert calm.misclassified_share == pytest.approx(2 / 5)
+    assert wild.misclassified_share == pytest.approx(2 / 5)
+    assert calm.majority_share == pytest.approx(2 / 5)
+    assert calm.failures_ordered == wild.failures_ordered == 1.0
+    over_all = rows.loc[("contraction", "all", "all")]
+    assert (over_all.runs, over_all.failed) == (10, 6)
+    assert over_all.misclassified_share == pytest.approx(2 / 5)
+    assert over_all.failures_ordered == 1.0
+    one = failure_transfer(*tables)
+    assert len(one) == 0, "nothing can be learned from other scenes"

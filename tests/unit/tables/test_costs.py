@@ -114,11 +114,15 @@ def test_effects_are_joined_and_scenes_without_rows_left_out(tmp_path):
     cost = {"scene": "a", "effect": "spring", "elements": 3, "ms_per_frame": 1.0, "share": 1.0}
     write_table(pd.DataFrame([cost]), tmp_path / "a.csv")
     write_table(pd.DataFrame([cost | {"scene": "b"}]), tmp_path / "b.csv")
-    table = effects_cost([File(str(tmp_path / f"{name}.csv"), {}) for name in "ab"])
+    files = [File(str(tmp_path / f"{name}.csv"), {}) for name in "ab"]
+    times = pd.DataFrame({"scene": ["b"], "ms_per_frame": [3.0]})
+    table = effects_cost(files, times)
     assert table.scene.tolist() == ["a", "b"]
+    # the one time of scene b; a was not timed in several processes
+    assert table.ms_per_frame.tolist() == [1.0, 3.0]
     empty = pd.DataFrame(columns=effects_left_out.column_names)
     write_table(empty, tmp_path / "none.csv")
-    table = effects_left_out([File(str(tmp_path / "none.csv"), {})])
+    table = effects_left_out([File(str(tmp_path / "none.csv"), {})], times)
     assert tuple(table.columns) == effects_left_out.column_names
     assert len(table) == 0
 

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pdrom.tables.gain_interventions import gain_interventions
 from pdrom.tables.gain_prediction import (
     best_threshold,
     failures_ordered,
@@ -134,3 +135,38 @@ def test_order_is_the_share_of_pairs(runs):
     pairs = [(a > b) + 0.5 * (a == b) for a in x[failed] for b in x[~failed]]
     value = failures_ordered(x, failed)
     assert value is None if not pairs else value == pytest.approx(np.mean(pairs))
+
+
+def test_interventions_compare_runs_on_one_basis():
+    table = gain_interventions(*tables()).set_index("step")
+    # block-deim ran in one scene only, where its gain and its error are below those of deim
+    step = table.loc["whole elements for single entries"]
+    assert (step.pairs, step.scenes, step.scenes_fallen) == (1, 1, 1)
+    assert step.gain_ratio == pytest.approx(8.0 / 50.0)
+    assert step.error_ratio == step.error_ratio_low == pytest.approx(0.02)
+    assert step.p_value == 1.0
+    assert "a gain of at most two" not in table.index
+
+
+def test_scenes_count_once_however_many_sizes_they_have():
+    reruns, _ = tables()
+    parts = []
+    for scene, ratio, sizes in (("s", 0.5, 40), ("t", 2.0, 2), ("u", 0.25, 2), ("v", 0.1, 2)):
+        for r in range(1, sizes + 1):
+            for method, gain, error in (
+                ("pod", 1, 1e-3),
+                ("block-deim", 8, 1e-2),
+                ("gappy", 4, 1e-2 * ratio),
+            ):
+                row = reruns.iloc[0].to_dict() | {"scene": scene, "r": r, "method": method}
+                row |= {"relative_error_within_horizon": error}
+                gains = {"scene": scene, "group": "spring", "method": method, "r": r, "gain": gain}
+                gains |= {"split": "train", "relative_error": 0.1, "elements_sampled": 9}
+                parts.append((row, gains))
+    table = gain_interventions(*(pd.DataFrame(list(rows)) for rows in zip(*parts, strict=True)))
+    (step,) = table.itertuples()
+    assert (step.pairs, step.scenes, step.scenes_fallen) == (46, 4, 3)
+    assert step.error_ratio == 0.5
+    # sign test by hand: 2 (1 + 4) / 16
+    assert step.p_value == pytest.approx(0.625)
+    assert step.error_ratio_low < 0.5 <= step.error_ratio_high

@@ -127,6 +127,7 @@ def test_floor_is_the_largest_over_the_seeds(tmp_path):
 
 # Reruns -------------------------------------------------------------------------------------------
 
+NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # table frame_times without rows
 DISPLACEMENT = np.array([1.0, 2.0, 3.0, 4.0])
 
 
@@ -144,6 +145,7 @@ class Files:
         return reduced_reruns(
             **self._beside(paths.RERUNS_TRAIN, paths.SUBSPACES_TRAIN, ""),
             timings=self.timings,
+            frame_times=NOT_TIMED,
             sensitivity=self.sensitivity,
             perturbation=1e-10,
             threshold=1e-3,
@@ -342,7 +344,7 @@ def no_sweep(folder) -> File:
 
 def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
     runs, timings = files.reduced(), files.timings
-    table = accuracy_cost(runs, timings, [no_sweep(tmp_path)], {"a": 10, "b": 20})
+    table = accuracy_cost(runs, timings, NOT_TIMED, [no_sweep(tmp_path)], {"a": 10, "b": 20})
     points = list(zip(table.scene, table.method, table.ms_per_frame, strict=True))
     assert points == [
         ("a", "full", 8.0), ("a", "deim", 4.0),
@@ -353,7 +355,7 @@ def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
     assert table.relative_error_within_horizon[[0, 2]].tolist() == [0.0, 0.0]
     assert table.pareto.tolist() == [True] * 6
     slow = runs.assign(ms_per_frame=100.0)
-    table = accuracy_cost(slow, timings, [no_sweep(tmp_path)], {"a": 1, "b": 1})
+    table = accuracy_cost(slow, timings, NOT_TIMED, [no_sweep(tmp_path)], {"a": 1, "b": 1})
     assert table.pareto.tolist() == [True, False, True, False, False, False]
 
 
@@ -372,7 +374,7 @@ def sweep(folder, **changes) -> File:
 
 def test_runs_with_other_iterations_have_their_own_reference(files, tmp_path):
     runs, timings = files.reduced(), files.timings
-    table = accuracy_cost(runs, timings, [sweep(tmp_path)], {"a": 10, "b": 20})
+    table = accuracy_cost(runs, timings, NOT_TIMED, [sweep(tmp_path)], {"a": 10, "b": 20})
     fom = table[table.method == "fom"]
     assert fom.iterations.tolist() == [2, 10, 40]
     assert fom.relative_error_within_horizon.tolist() == [0.4, 0.1, 0.02]
@@ -399,7 +401,7 @@ def test_runs_with_other_iterations_have_their_own_reference(files, tmp_path):
 def test_without_a_converged_run_there_is_no_point_against_it(files, tmp_path):
     runs, timings = files.reduced(), files.timings
     sweeps = [sweep(tmp_path, error_converged=None)]
-    table = accuracy_cost(runs, timings, sweeps, {"a": 10, "b": 20})
+    table = accuracy_cost(runs, timings, NOT_TIMED, sweeps, {"a": 10, "b": 20})
     assert "fom" not in set(table.method)
     assert (table.method == "fewer-iterations").sum() == 1
 
@@ -408,11 +410,11 @@ def test_without_a_converged_run_there_is_no_point_against_it(files, tmp_path):
 
 
 def test_local_share_counts_assembly_with_the_local_step(tmp_path, files):
-    table = local_share(files.timings)
+    table = local_share(files.timings, NOT_TIMED)
     assert table.scene.tolist() == ["a", "a", "a", "b"]
     assert table.implementation.tolist() == ["interpreted", "numpy", "compiled", "compiled"]
     assert table.local_share.tolist() == pytest.approx([0.6] * 4)
     row = {"scene": "c", "implementation": "numpy", "vertices": 4, "local_ms": 2.0,
            "assembly_ms": 1.0, "global_ms": 1.0}  # fmt: skip
     path = written(tmp_path / "c.csv", TIMING, row)
-    assert local_share([path]).local_share.tolist() == [0.75]
+    assert local_share([path], NOT_TIMED).local_share.tolist() == [0.75]

@@ -21,6 +21,12 @@ from pdrom.reduction.subspace.training import Norm, training_run
 
 # Training frames that the element sampling looks at, at most.
 FRAMES = 70
+ECSW = "ecsw"
+
+
+def ecsw_name(tolerance: float) -> str:
+    """What tables call a model with energy-conserving samples."""
+    return f"{ECSW}-{tolerance:.0e}"
 
 
 @dataclass(frozen=True)

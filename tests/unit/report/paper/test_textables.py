@@ -163,6 +163,47 @@ TABLES = {
             "history": ["2026-01-31: first.", "h", "h"],
         }
     ),
+    "speedups": pd.DataFrame(
+        [
+            ("bar_a", "deim_x", "full", None, 6, 1.2, "0.50", True, 0.1, None, 2.0, 0.5, None),
+            ("b", "ecsw", "pod", 20, 97, 8.0, "66 to 73", False, 0.01, 0.02, 1.0, 3.0, 1234.5),
+        ],
+        columns=[
+            "scene",
+            "method",
+            "position_basis",
+            "k",
+            "r",
+            "full_ms",
+            "shown",
+            "loses",
+            "error_train",
+            "error_heldout",
+            "training_s",
+            "reduction_s",
+            "frames_to_break_even",
+        ],
+    ),
+    "payoff": pd.DataFrame(
+        [
+            ("full", "deim_x", 3, 0, 0, 0, *5 * [None], 0),
+            ("pod", "ecsw", 3, 2, 1, 1, *5 * [0.5], 2),
+        ],
+        columns=[
+            "position_basis",
+            "method",
+            "scenes",
+            "accurate",
+            "pays",
+            "loses",
+            "least_speedup",
+            "best_speedup",
+            "most_speedup",
+            "error_train",
+            "error_heldout",
+            "heldout",
+        ],
+    ),
     "hard_cases": pd.DataFrame(
         [
             ("torn", "pod", 1.0, None, 1.0, "holds", None),
@@ -233,6 +274,17 @@ def test_a_reduction_that_always_pays_has_no_break_even():
 
 def test_exponents_of_one_thread():
     assert rows(exponents(TABLES)) == [r"\texttt{bar\_a} & 3 & 1.2 & -- & -- & -- & 0.12 \\"]
+
+
+def test_speedups_that_lose_say_so():
+    deim, ecsw = rows(TEX_TABLES["tab_speedups"](TABLES))
+    assert "0.50 (loses)" in deim
+    assert "never" in deim
+    assert "deim\\_x, r = 6" in deim
+    assert "66 to 73 &" in ecsw
+    assert "ecsw, k = 20" in ecsw
+    # two digits of a count
+    assert ecsw.endswith(r"& 1200 \\")
 
 
 def test_reruns_show_the_largest_size_that_ran():

@@ -1,0 +1,218 @@
+"""Times of frames over several processes: one for every full-order run, and of quoted reductions.
+
+Every process times everything in another random order. The full-order run of each scene is timed
+twice, the second time as a control: what two identical runs differ by is no speed-up.
+"""
+
+import logging
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import process_time
+from typing import Annotated
+
+import pandas as pd
+
+from pdrom.core.names import SceneName
+from pdrom.core.paths import (
+    BASIS,
+    FRAME_TIMES,
+    MESH,
+    ONLINE_MODELS,
+    PROJECTION_SECONDS,
+    SAMPLING,
+    SNAPSHOTS,
+    SUBSPACES,
+    File,
+)
+from pdrom.core.reads import EachOf
+from pdrom.core.store import write_table
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.fresh_process import (
+    Projections,
+    Request,
+    Subspaces,
+    TimedScene,
+    in_fresh_process,
+)
+from pdrom.experiments.measurement import Protocol
+from pdrom.experiments.settings import Count, Modes, PositionBasis, Repeats, Solver, Threads
+from pdrom.model.scene import SceneConfig
+from pdrom.reduction.basis import compute_basis
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.sampling import select
+from pdrom.reduction.snapshots import load_snapshots
+
+log = logging.getLogger(__name__)
+
+SECONDS_COLUMNS = ["scene", "group", "method", "r", "reduction_s"]
+
+
+class SubspaceCase(ConfigModel):
+    """A model of a position subspace whose speed-up is quoted."""
+
+    scene: SceneName
+    method: str
+    position_basis: PositionBasis = "pod"
+    k: Modes
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Labels of the file that holds it."""
+        return {"scene": self.scene}
+
+
+class ProjectionCase(ConfigModel):
+    """Reduced projections, positions unreduced, whose speed-up is quoted."""
+
+    scene: SceneName
+    group: str
+    method: str
+    r: Modes
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Labels of its files."""
+        return {"scene": self.scene, "group": self.group, "method": self.method}
+
+
+class Processes(Protocol):
+    """``processes`` that each time every run: ``frames``, ``warmup`` and ``repeats`` of each."""
+
+    frames: Count = 6
+    repeats: Repeats = 3
+    processes: Count = 10
+
+
+class FrameTimes(Processes):
+    """Section ``frame_times``: the protocol, and the reductions whose speed-up is quoted.
+
+    Full-order runs of all scenes are timed, and every model of the large ones.
+    """
+
+    subspaces: tuple[SubspaceCase, ...] = ()
+    projections: tuple[ProjectionCase, ...] = ()
+
+
+class NamedScene(ConfigModel):
+    """A scene with the label of its files."""
+
+    scene: SceneConfig
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Labels of its files."""
+        return {"scene": self.scene.name}
+
+
+class Settings(JobSettings):
+    """What the times depend on, beside the machine."""
+
+    frame_times: Processes
+    timed_scenes: tuple[NamedScene, ...]
+    large_scenes: tuple[NamedScene, ...]
+    subspace_cases: tuple[SubspaceCase, ...]
+    projection_cases: tuple[ProjectionCase, ...]
+    projection_methods: dict[str, MethodSpec]
+    solver: Solver
+    threads: Threads
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read: of every scene, of every quoted reduction, of every large scene."""
+
+    meshes: Annotated[list[File], EachOf("timed_scenes", MESH)]
+    subspaces: Annotated[list[File], EachOf("subspace_cases", SUBSPACES)]
+    bases: Annotated[list[File], EachOf("projection_cases", BASIS)]
+    samplings: Annotated[list[File], EachOf("projection_cases", SAMPLING)]
+    snapshots: Annotated[list[File], EachOf("projection_cases", SNAPSHOTS)]
+    large: Annotated[list[File], EachOf("large_scenes", ONLINE_MODELS)]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written: a row per process and run; what the quoted reductions of projections took."""
+
+    times: Annotated[File, FRAME_TIMES]
+    seconds: Annotated[File, PROJECTION_SECONDS]
+
+
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+    """Start the processes one after the other, and join what they measured."""
+    asked = settings.frame_times
+    scenes = tuple(_scenes(settings, inputs))
+    parts = []
+    with TemporaryDirectory() as folder:
+        for process in range(1, asked.processes + 1):
+            request = Request(
+                scenes=scenes,
+                timing=Protocol(frames=asked.frames, warmup=asked.warmup, repeats=asked.repeats),
+                solver=settings.solver,
+                threads=settings.threads,
+                seed=process,
+                result=str(Path(folder) / f"{process}.csv"),
+            )
+            parts.append(in_fresh_process(request, Path(folder)))
+            log.info("process %d of %d", process, asked.processes)
+    write_table(pd.concat(parts, ignore_index=True), outputs.times.path)
+    rows = [
+        (case.scene, case.group, case.method, case.r, _seconds(case, file, settings))
+        for case, file in zip(settings.projection_cases, inputs.snapshots, strict=True)
+    ]
+    write_table(pd.DataFrame(rows, columns=SECONDS_COLUMNS), outputs.seconds.path)
+
+
+def _scenes(settings: Settings, inputs: Inputs) -> Iterator[TimedScene]:
+    """The study's scenes with their quoted reductions, then the large ones."""
+    projections = list(_projections(settings, inputs))
+    for named, mesh in zip(settings.timed_scenes, inputs.meshes, strict=True):
+        name = named.scene.name
+        yield TimedScene(
+            scene=named.scene,
+            mesh=mesh.path,
+            projections=tuple(own for scene, own in projections if scene == name),
+            subspaces=_subspaces(name, settings.subspace_cases, inputs.subspaces),
+        )
+    for named, models in zip(settings.large_scenes, inputs.large, strict=True):
+        yield TimedScene(scene=named.scene, subspaces=Subspaces(path=models.path))
+
+
+def _projections(settings: Settings, inputs: Inputs) -> Iterator[tuple[str, Projections]]:
+    files = zip(inputs.bases, inputs.samplings, strict=True)
+    for case, (basis, sampling) in zip(settings.projection_cases, files, strict=True):
+        yield (
+            case.scene,
+            Projections(
+                group=case.group,
+                method=case.method,
+                r=case.r,
+                spec=settings.projection_methods[case.method],
+                basis=basis.path,
+                sampling=sampling.path,
+            ),
+        )
+
+
+def _subspaces(
+    scene: str, cases: Sequence[SubspaceCase], files: Sequence[File]
+) -> Subspaces | None:
+    own = [(c, f) for c, f in zip(cases, files, strict=True) if c.scene == scene]
+    if not own:
+        return None
+    chosen = tuple((case.method, case.position_basis, case.k) for case, _ in own)
+    return Subspaces(path=own[0][1].path, chosen=chosen)
+
+
+def _seconds(case: ProjectionCase, snapshots: File, settings: Settings) -> float:
+    """Processor time of basis and sampling, s."""
+    data, spec = load_snapshots(snapshots.path), settings.projection_methods[case.method]
+    before = process_time()
+    basis = compute_basis(data.train, data.row_mass, data.roundoff, data.rows_per_element, spec)
+    select(basis, spec, case.r)
+    return process_time() - before
+
+
+EXPERIMENT = Experiment("frame_times", "Times of frames in several processes", run, alone=True)

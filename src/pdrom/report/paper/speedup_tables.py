@@ -1,0 +1,72 @@
+"""Tables of the manuscript about what reductions gain and cost, as TeX."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+
+from pdrom.report.paper.macros import format_number
+from pdrom.report.paper.tabular import name, tabular
+from pdrom.report.words.text import escape
+
+Tables = Mapping[str, pd.DataFrame]
+FULL = "full"  # position basis of unreduced positions
+
+
+def speedups(tables: Tables) -> str:
+    """Each quoted speed-up with its interval, its errors and what it costs."""
+    rows = [
+        [
+            name(row.scene),
+            name(_reduction(row)),
+            _number(row.full_ms),
+            escape(row.shown) + (" (loses)" if row.loses else ""),
+            _number(row.error_train),
+            _number(row.error_heldout),
+            _number(row.training_s),
+            _number(row.reduction_s),
+            "never" if pd.isna(row.frames_to_break_even) else _whole(row.frames_to_break_even),
+        ]
+        for row in tables["speedups"].itertuples()
+    ]
+    header = ["scene", "reduction", "full ms", "speed-up", "training", "held out", "run (s)",
+              "reduction (s)", "frames"]  # fmt: skip
+    return tabular(header, rows, "llrlrrrrr")
+
+
+def payoff(tables: Tables) -> str:
+    """In how many scenes each reduction is accurate, pays, and loses."""
+    rows = [
+        [
+            name(_model(row)),
+            str(row.scenes),
+            str(row.accurate),
+            str(row.pays),
+            str(row.loses),
+            *(_number(v) for v in (row.least_speedup, row.best_speedup, row.most_speedup)),
+            _number(row.error_train),
+            f"{_number(row.error_heldout)} ({row.heldout})",
+        ]
+        for row in tables["payoff"].itertuples()
+    ]
+    header = ["reduction", "runs in", "accurate in", "pays in", "loses in", "least", "median",
+              "most", "training", "held out (of)"]  # fmt: skip
+    return tabular(header, rows, "lrrrrrrrrr")
+
+
+def _model(row: Any) -> str:
+    return row.method if row.position_basis == FULL else f"{row.method}, {row.position_basis}"
+
+
+def _reduction(row: Any) -> str:
+    size = f"r = {int(row.r)}" if row.position_basis == FULL else f"k = {int(row.k)}"
+    return f"{row.method}, {size}"
+
+
+def _number(value: float) -> str:
+    return "--" if pd.isna(value) else format_number(value)
+
+
+def _whole(value: float) -> str:
+    """Two digits of a count, written out."""
+    return str(int(float(f"{value:.1e}")))
