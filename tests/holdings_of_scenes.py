@@ -11,6 +11,8 @@ from collections.abc import Mapping
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
+from pdrom.model.compiled.functions import Callback
+
 SHEET = {"kind": "cloth", "rows": 5, "columns": 4}
 FRAMES = 2
 
@@ -23,7 +25,8 @@ def arrays(thing: object, seen: set[int] | None = None) -> dict[int, int]:
     seen.add(id(thing))
     if isinstance(thing, np.ndarray):
         return {id(thing): thing.nbytes}
-    if isinstance(thing, (str, bytes, int, float, type)):
+    # code is counted by `compiled`, and what a compiler holds is not the scene's
+    if isinstance(thing, (str, bytes, int, float, type, Callback)):
         return {}
     parts = list(thing.values()) if isinstance(thing, Mapping) else []
     parts += list(thing) if isinstance(thing, (list, tuple, set)) else []
