@@ -9,11 +9,12 @@ FIGURE = Declaration(
     number=4,
     title="Three constraint groups, one of them reduced",
     caption=(
-        "The cloth with bending, springs and strain at three instants: the full-order run, then "
-        "runs in which the projections of one group only are reduced. The grey outline is the "
-        "full-order run. Springs carry nearly all of the force, so that the other rows say little "
-        "about the method; and what differs beyond the scene's horizon cannot be blamed on the "
-        "reduction. A framed picture is drawn to the smaller scale given below it."
+        "The cloth with bending, springs and strain at instants up to the scene's horizon, beyond "
+        "which no difference could be blamed on a reduction: the full-order run, then runs that "
+        "reduce the projections of one group only, by two methods. Triangles are coloured by "
+        "their distance to the full-order run, whose outline is grey; a framed picture is drawn to "
+        "the smaller scale given below it. Springs carry nearly all of the force, so that reducing "
+        "strain changes little whatever the method."
     ),
     reads=(
         Chosen(MESH),

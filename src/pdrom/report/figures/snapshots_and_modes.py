@@ -14,9 +14,11 @@ FIGURE = Declaration(
     number=1,
     title="Snapshots of the projections and their modes",
     caption=(
-        "Top: the training snapshots of one constraint group, one row each. Middle: snapshots on "
-        "the moving sheet, coloured by how far each projection has changed since the first frame. "
-        "Bottom: the first POD modes of these snapshots, coloured by their size on each element."
+        "The snapshots of one constraint group, a column each, less their mean, are the product of "
+        "modes, singular values (a diagonal, dark where large) and coefficients; red entries are "
+        "positive, blue ones negative. Below, columns of the first matrix on the moving mesh and "
+        "the first modes on the mesh at rest: an element has the colour of one of its entries, "
+        "whose axis and row are named, relative to the largest."
     ),
     reads=(
         Chosen(MESH, first=True),

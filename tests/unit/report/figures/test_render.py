@@ -8,14 +8,13 @@ from matplotlib.colors import Normalize, to_rgb
 from matplotlib.figure import Figure
 
 from pdrom.core.errors import ConfigurationError, StorageError
-from pdrom.core.paths import RERUNS
+from pdrom.core.paths import FULL_ORDER, RERUNS
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.reduction.sampling.block import block_elements
 from pdrom.reduction.sampling.deim import deim_entries
-from pdrom.report.figures.drawings.snapshots_and_modes import MAGNITUDE
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.camera import Camera, Window, bounds, window_of
-from pdrom.report.figures.kit.elements import element_map
+from pdrom.report.figures.kit.elements import MAGNITUDE, element_map, signed_entry
 from pdrom.report.figures.kit.mesh_render import (
     AMBIENT,
     RASTER_ABOVE,
@@ -28,7 +27,13 @@ from pdrom.report.figures.kit.mesh_render import (
     shade,
 )
 from pdrom.report.figures.kit.panels import RunPanel, fit_aspect
-from pdrom.report.figures.kit.read import choose_ranks, frame_numbers, rerun_infos, rerun_positions
+from pdrom.report.figures.kit.read import (
+    choose_ranks,
+    frame_numbers,
+    positions_at,
+    rerun_infos,
+    rerun_positions,
+)
 from pdrom.report.figures.kit.residual import iterations
 
 from .conftest import BLOWN_UP, BLOWUP_FRAME
@@ -196,6 +201,15 @@ def test_colours_and_markers_are_unique():
     assert named["mine"] == style.method_styles(["yours", "mine"])["mine"]
 
 
+def test_the_signed_entry_is_the_largest():
+    vector = np.zeros((4, 6))
+    vector[2, 4], vector[1, 0], vector[3, 4] = -3.0, 2.0, 1.0
+    values, words = signed_entry(vector.ravel(), 2)
+    assert values.tolist() == [0.0, 0.0, -3.0, 1.0]
+    assert words == "y, row 2"
+    assert signed_entry(vector.ravel(), 1)[1] == "y"
+
+
 def test_residuals_are_those_of_deim():
     V = np.linalg.qr(np.random.default_rng(3).standard_normal((60, 6)))[0]
     entries = deim_entries(V)
@@ -237,6 +251,16 @@ def test_the_picked_element_is_the_darkest(rows):
 def test_entries_outside_the_basis_are_refused():
     with pytest.raises(StorageError, match="do not fit"):
         iterations(np.eye(12)[:, :2], np.array([3, 12]), 2, "scalar", 2)
+
+
+def test_instants_may_be_shares_of_the_first_frames(study):
+    path = study.results.path(FULL_ORDER, "spring_twist")
+    frames, positions = positions_at(path, (0.5, 1.0), end=10)
+    assert frames == [5, 10]
+    whole, everything = positions_at(path, (0.25, 0.5, 1.0))
+    assert whole == [5, 10, 20]
+    assert (positions == everything[:2]).all()
+    assert positions_at(path, (1.0,), end=99)[0] == [20]
 
 
 def test_runs_are_read_only_where_finite(study):

@@ -1,68 +1,111 @@
 """A scene with several groups: the full-order run, then one group reduced at a time."""
 
+from dataclasses import replace
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from pdrom.core.paths import FULL_ORDER, MESH, RERUNS
-from pdrom.model.mesh.types import load_mesh
+from pdrom.model.mesh.types import Mesh, load_mesh
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.camera import Camera
+from pdrom.report.figures.kit.elements import MAGNITUDE
 from pdrom.report.figures.kit.floor import Floors
 from pdrom.report.figures.kit.options import ReducedRuns
-from pdrom.report.figures.kit.panels import (
-    RunPanel,
-    fit_aspect,
-    shared_window,
-)
-from pdrom.report.figures.kit.read import (
-    choose_ranks,
-    positions_at,
-    rerun_infos,
-)
+from pdrom.report.figures.kit.panels import RunPanel, fit_aspect, shared_window
+from pdrom.report.figures.kit.read import choose_ranks, positions_at, rerun_infos
 from pdrom.report.figures.kit.results import NothingToDraw, Results, asked
 from pdrom.report.figures.kit.run_rows import NOTHING_RAN, Row, draw_rows, run_panel
 
+DISTANCE = LogNorm(1e-4, 1.0, clip=True)  # in extents of the mesh
+FOOTER = 0.55  # inches, for the scale of colours
+
 
 def draw(results: Results, options: ReducedRuns) -> Figure:
-    """One row per reduced group and method (first the full-order run), one column per instant.
+    """One row per reduced group (first the full-order run), the methods side by side.
 
-    All pictures have the same camera and scale but for framed ones, whose scale is given. The size
-    is the first of ``options.ranks`` that ran. Raises StorageError if a file of the results is
-    missing or damaged.
+    A method has a column for each instant; instants are shares of the scene's horizon. All pictures
+    have the same camera and scale but for framed ones, whose scale is given. The size is the first
+    of ``options.ranks`` that ran. Raises StorageError if a file of the results is missing or
+    damaged.
     """
     camera = Camera(options.azimuth, options.elevation)
     found = results.holdings.first(options)
     if found is None:
         raise NothingToDraw(asked(options))
-    scene, floors = found[0], Floors(results)
+    scene, methods = found[0], results.methods(options)
     mesh = load_mesh(results.path(MESH, scene))
-    frames, full = positions_at(results.path(FULL_ORDER, scene), options.frames)
+    end = Floors(results).horizon(scene)
+    frames, full = positions_at(results.path(FULL_ORDER, scene), options.frames, end)
     first = [
-        RunPanel(floors.instant(scene, f), style.FULL_ORDER, q, reference=True)
+        RunPanel(f"frame {f}", style.FULL_ORDER, q, reference=True)
         for f, q in zip(frames, full, strict=True)
     ]
-    table = [("full order", first, None)]
+    rows: list[tuple[str, list[RunPanel], str | None]] = [
+        ("full order", first * len(methods), None)
+    ]
     for group in results.holdings.scenes[scene].groups:
-        for method in results.methods(options):
-            table.append(_grid_row(results, options, (scene, group, method), frames))
-    windows = [shared_window(camera, q, []) for q in full]
+        runs = [_run(results, options, (scene, group, m), frames, full, mesh) for m in methods]
+        label, ran = f"{style.words(group)} reduced", any(runs)
+        panels = [panel for run in runs for panel in run or _blank(len(frames))]
+        rows.append((label, panels, None if ran else NOTHING_RAN))
+    windows = [shared_window(camera, q, [], 0.04) for q in full]
     size = (max(w.width for w in windows), max(w.height for w in windows))
-    windows = [fit_aspect(w.resized(*size)) for w in windows]
-    panels = [([p.seen_by(camera) for p in row], label, note) for label, row, note in table]
-    return draw_rows(
-        [Row(label, mesh, row, windows, full, note) for row, label, note in panels], camera
-    )
+    windows = [fit_aspect(w.resized(*size)) for w in windows] * len(methods)
+    ghosts = np.concatenate([full] * len(methods))
+    made = [
+        Row(label, mesh, [panel.seen_by(camera) for panel in panels], windows, ghosts, note)
+        for label, panels, note in rows
+    ]
+    figure = draw_rows(made, camera, footer=FOOTER)
+    _draw_scale(figure)
+    return figure
 
 
-def _grid_row(
-    results: Results, options: ReducedRuns, experiment: tuple[str, str, str], frames: list[int]
-) -> tuple[str, list[RunPanel], str | None]:
-    _, group, method = experiment
+def _blank(count: int) -> list[RunPanel]:
+    return [RunPanel("", style.GREY, None, remark="not run")] * count
+
+
+def _run(
+    results: Results,
+    options: ReducedRuns,
+    experiment: tuple[str, str, str],
+    frames: list[int],
+    full: np.ndarray,
+    mesh: Mesh,
+) -> list[RunPanel] | None:
+    """A reduced run at every instant, coloured by its distance; None if no size ran."""
     path = results.path(RERUNS, *experiment)
     infos = choose_ranks(rerun_infos(path), options.ranks)
-    info = next((i for i in infos if not i.marked), infos[0]) if infos else None
-    label = f"{style.words(group)} reduced\n{results.method_title(method)}"
-    if info is None or info.marked:
-        blank = RunPanel("", style.GREY, None)
-        return label, [blank] * len(frames), NOTHING_RAN
-    colour = style.surface_colour(style.group_looks(results.holdings)[group][0])
-    return f"{label}\n{info.title}", [run_panel(path, info, f, colour, "") for f in frames], None
+    info = next((i for i in infos if not i.marked), None)
+    if info is None:
+        return None
+    plain = style.surface_colour(style.GREY)
+    panels = [
+        _coloured(run_panel(path, info, frame, plain, ""), q, mesh)
+        for frame, q in zip(frames, full, strict=True)
+    ]
+    middle = len(panels) // 2
+    title = f"{results.method_title(experiment[2])}, {info.title}"
+    panels[middle] = replace(panels[middle], title=title)
+    return panels
+
+
+def _coloured(panel: RunPanel, full: np.ndarray, mesh: Mesh) -> RunPanel:
+    """The panel with each triangle coloured by its distance to the full-order run."""
+    if panel.positions is None or panel.failure:
+        return panel
+    distance = np.linalg.norm(panel.positions - full, axis=1) / mesh.extent
+    return replace(panel, colour=MAGNITUDE(DISTANCE(distance[mesh.triangles].mean(axis=1)))[:, :3])
+
+
+def _draw_scale(figure: Figure) -> None:
+    inch = 1.0 / figure.get_figheight()
+    ax = figure.add_axes((0.3, 0.40 * inch, 0.5, 0.08 * inch))
+    bar = figure.colorbar(
+        ScalarMappable(DISTANCE, MAGNITUDE), cax=ax, orientation="horizontal", extend="both"
+    )
+    bar.set_label("distance to the full-order run (extents)", labelpad=1)
+    bar.outline.set_linewidth(0.4)

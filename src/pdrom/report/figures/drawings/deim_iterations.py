@@ -10,10 +10,9 @@ from matplotlib.lines import Line2D
 from pdrom.core.paths import BASIS, MESH, SAMPLING
 from pdrom.model.mesh.types import load_mesh
 from pdrom.report.figures.deim_iterations import Options
-from pdrom.report.figures.drawings.snapshots_and_modes import MAGNITUDE
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.camera import Camera, window_of
-from pdrom.report.figures.kit.elements import ElementMap, element_map
+from pdrom.report.figures.kit.elements import MAGNITUDE, ElementMap, element_map
 from pdrom.report.figures.kit.mesh_render import set_window
 from pdrom.report.figures.kit.panels import fit_aspect
 from pdrom.report.figures.kit.read import read_basis, read_samplings

@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import Colormap, Normalize
+from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
 
 from pdrom.core.errors import StorageError
 from pdrom.model.constraints.base import ConstraintGroup
@@ -14,6 +15,12 @@ from pdrom.report.figures.kit.camera import Camera
 from pdrom.report.figures.kit.mesh_render import Surface, draw_lines, draw_surface
 
 NEUTRAL = "#E4E1DA"
+# light to dark, so that zero is the paper's white
+MAGNITUDE = LinearSegmentedColormap.from_list(
+    "pdrom_magnitude", mpl.colormaps["magma_r"](np.linspace(0.02, 0.92, 256))
+)
+
+SIGNED = mpl.colormaps["RdBu_r"]  # of what has a sign
 
 
 @dataclass(frozen=True)
@@ -100,9 +107,15 @@ def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMa
     return ElementMap(effect.cells, cells, mesh)
 
 
-def magnitude(vector: np.ndarray, rows_per_element: int) -> np.ndarray:
-    """Norm of each element's 3 p entries of a vectorised quantity (3 e p,), (e,)."""
-    return np.linalg.norm(vector.reshape(-1, 3 * rows_per_element), axis=1)
+def signed_entry(vector: np.ndarray, rows_per_element: int) -> tuple[np.ndarray, str]:
+    """One of the 3 p entries of every element (e,), the one that is largest somewhere; its name.
+
+    vector : a vectorised quantity (3 e p,)
+    """
+    entries = vector.reshape(-1, 3 * rows_per_element)
+    slot = int(np.argmax(np.abs(vector))) % (3 * rows_per_element)
+    row = f", row {slot // 3 + 1}" if rows_per_element > 1 else ""
+    return entries[:, slot], f"{'xyz'[slot % 3]}{row}"
 
 
 def _tetrahedron_behind(mesh: Mesh) -> np.ndarray:

@@ -28,6 +28,7 @@ SHORTEST, TALLEST = 0.35, 1.5  # allowed heights of a panel over its width
 class RunPanel:
     """One run at one instant.
 
+    colour : one for all, or one for each triangle (T, 3), which then carries a number
     positions : (N, 3) m, finite; None if there is nothing to draw
     failure : what went wrong, drawn in red; None for a run that lived
     remark : one line below the picture
@@ -36,7 +37,7 @@ class RunPanel:
     """
 
     title: str
-    colour: Colour
+    colour: Colour | np.ndarray
     positions: np.ndarray | None
     failure: str | None = None
     remark: str | None = None
@@ -117,7 +118,8 @@ def draw_run(
         draw_floor(ax, panel.positions, surface, camera, shown)
     if ghost is not None:
         draw_outline(ax, ghost, outline_edges(mesh.points, mesh.triangles), camera)
-    draw_surface(ax, panel.positions, surface, camera, panel.colour)
+    contrast = 0.5 if isinstance(panel.colour, np.ndarray) else 1.0
+    draw_surface(ax, panel.positions, surface, camera, panel.colour, contrast=contrast)
     set_window(ax, shown)
     lines = [text for text in (panel.failure, panel.remark) if text]
     if zoom > SLACK:

@@ -14,8 +14,12 @@ def frame_numbers(fractions: tuple[float, ...], frames: int) -> list[int]:
     return list(dict.fromkeys(round(fraction * frames) for fraction in fractions))
 
 
-def positions_at(path: str, fractions: tuple[float, ...]) -> tuple[list[int], np.ndarray]:
-    """Frame numbers and positions (n, N, 3) m of a run at fractions of it.
+def positions_at(
+    path: str, fractions: tuple[float, ...], end: int | None = None
+) -> tuple[list[int], np.ndarray]:
+    """Frame numbers and positions (n, N, 3) m of a run at fractions of it, or of its first frames.
+
+    end : last of these frames; None for all
 
     Raises
     ------
@@ -24,7 +28,8 @@ def positions_at(path: str, fractions: tuple[float, ...]) -> tuple[list[int], np
     """
     with open_hdf5(path) as file:
         data = file["positions"]
-        frames = frame_numbers(fractions, len(data) - 1)
+        last = len(data) - 1
+        frames = frame_numbers(fractions, last if end is None else min(end, last))
         chosen = np.stack([data[frame] for frame in frames])
     if not np.isfinite(chosen).all():
         raise StorageError(f"{path}: positions of a full-order run are not finite")
@@ -111,9 +116,10 @@ def rerun_positions(path: str, info: RerunInfo, frame: int) -> tuple[int, np.nda
 
 @dataclass(frozen=True)
 class BasisView:
-    """Modes V (3 e p, rank) of a group and their singular values."""
+    """Modes V (3 e p, rank) of a group, their singular values, and the snapshots' mean (3 e p,)."""
 
     V: np.ndarray
+    mean: np.ndarray
     singular_values: np.ndarray
     rank: int
     rows_per_element: int
@@ -129,6 +135,7 @@ def read_basis(path: str) -> BasisView:
     with open_hdf5(path) as file:
         return BasisView(
             V=file["V"][...],
+            mean=file["mean"][...],
             singular_values=file["singular_values"][...],
             rank=int(file.attrs["rank"]),
             rows_per_element=int(file.attrs["rows_per_element"]),

@@ -83,18 +83,24 @@ def run_panel(
     return RunPanel(title, colour, positions, failure, remark)
 
 
-def draw_rows(rows: list[Row], camera: Camera, height_limit: float = HEIGHT_LIMIT) -> Figure:
-    """The figure of these rows, one below the other, no higher (inches) than a page."""
+def draw_rows(
+    rows: list[Row], camera: Camera, height_limit: float = HEIGHT_LIMIT, footer: float = 0.0
+) -> Figure:
+    """The figure of these rows, one below the other, no higher (inches) than a page.
+
+    ``footer`` inches at its lower end are left free.
+    """
     columns = max(len(row.panels) for row in rows)
     width = (style.WIDTH - LEFT) / columns
-    texts = sum(ABOVE + BELOW + LINE * row.lines for row in rows)
+    texts = footer + sum(ABOVE + BELOW + LINE * row.lines for row in rows)
     pictures = sum(0.96 * width * row.aspect for row in rows)
     shrink = min(1.0, (height_limit - texts) / pictures)
     heights = [
         shrink * 0.96 * width * row.aspect + ABOVE + BELOW + LINE * row.lines for row in rows
     ]
-    figure = Figure(figsize=(style.WIDTH, sum(heights)))
-    tops = 1.0 - np.concatenate([[0.0], np.cumsum(heights)]) / sum(heights)
+    height = sum(heights) + footer
+    figure = Figure(figsize=(style.WIDTH, height))
+    tops = 1.0 - np.concatenate([[0.0], np.cumsum(heights)]) / height
     for row, (top, bottom) in zip(rows, pairwise(tops), strict=True):
         _draw_row(figure, row, camera, columns, top, bottom)
     return figure
