@@ -115,7 +115,8 @@ def test_the_artifacts_of_a_scene_need_that_scene_alone(clean: Checkout) -> None
         "results/scenes/spring_oop/runs.csv", "results/scenes/bar140/frames.pdf"
     )
     assert {_stage(path) for path in planned} == {
-        "meshes", "fom", "sensitivity", "snapshots", "pod", "reruns", "sampling", "scenes",
+        "meshes", "fom", "sensitivity", "contributions", "snapshots", "pod", "reruns", "sampling",
+        "hyper", "timings", "breakeven", "effects", "left_out", "scenes",
     }  # fmt: skip
     others = {path for path in planned if _stage(path) != "meshes"}
     assert {path.split("/")[2].removesuffix(".csv") for path in others} == {"spring_oop", "bar140"}
