@@ -48,6 +48,7 @@ class Training:
         self._start = start
         self._made: dict[str, States] = {}
         self._bases: dict[tuple[str, ...], TrainedBasis] = {}
+        self._controls: dict[float, dict[str, Samples]] = {}
         self._makers = {
             "full-order": self._full_order,
             "projected": self._projected,
@@ -63,8 +64,11 @@ class Training:
 
     def control(self, tolerance: float) -> dict[str, Samples]:
         """Energy-conserving samples of every group for the safeguard."""
-        frames = training_frames(self._scene.config.frames, len(self._training))
-        return sample_elements(self._scene, self._columns, frames, [tolerance], self._start)[0]
+        if tolerance not in self._controls:
+            frames = training_frames(self._scene.config.frames, len(self._training))
+            found = sample_elements(self._scene, self._columns, frames, [tolerance], self._start)
+            self._controls[tolerance] = found[0]
+        return self._controls[tolerance]
 
     def states(self, kind: str) -> States:
         """States of a kind, as pairs (beginning of the frame, place of the projections)."""
