@@ -30,8 +30,7 @@ def arrays(thing: object, seen: set[int] | None = None) -> dict[int, int]:
         return {}
     parts = list(thing.values()) if isinstance(thing, Mapping) else []
     parts += list(thing) if isinstance(thing, (list, tuple, set)) else []
-    own = getattr(thing, "__dict__", None)  # which libraries of C answer with a function
-    parts += list(own.values()) if isinstance(own, dict) else []
+    parts += list(getattr(thing, "__dict__", {}).values())
     found: dict[int, int] = {}
     for part in parts:
         found |= arrays(part, seen)
