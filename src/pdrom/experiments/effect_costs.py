@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.experiments.measurement import Measurement, Variant, measure, median_frames
+from pdrom.experiments.names import GLOBAL, REST, RIGHT
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.constraints.local_kernel import LocalKernel
 from pdrom.model.constraints.timed_kernel import timed
@@ -21,8 +22,7 @@ from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.effects.base import Boundary, Contact, Effect, Force
 from pdrom.model.scene import Scene
 
-GLOBAL, REST = "global solve", "rest of the frame"
-COSTS = ["scene", "effect", "elements", "ms_per_frame", "share"]
+COSTS = ["scene", "effect", "elements", "ms_per_frame", "share", "us_per_iteration"]
 LEFT_OUT = ["scene", "left_out", "groups", "elements", "ms_per_frame", "saved_ms", "own_ms"]
 
 # Questions that the step loop asks an effect of each role.
@@ -56,7 +56,12 @@ class Timed:
     @property
     def seconds(self) -> float:
         """Time since `reset`."""
-        return self._asked + float(self._kernel.sum())
+        return self._asked + self.kernel_seconds
+
+    @property
+    def kernel_seconds(self) -> float:
+        """Of it, inside the compiled loop."""
+        return float(self._kernel.sum())
 
     def reset(self) -> None:
         """Begin anew."""
@@ -76,10 +81,12 @@ class Timed:
 def effect_costs(
     scene: Scene, system: GlobalSystem, frames: int, warmup: int, repeats: int
 ) -> pd.DataFrame:
-    """Table of `COSTS` of the full-order run: effects, the global solve, and the rest.
+    """Table of `COSTS` of the full-order run: effects, right-hand side, global solve, the rest.
 
     An effect that a scene lists several times has one row. Elements are those of a group, the
-    vertices that a hold may ever hold, else all vertices. The shares add up to one.
+    vertices that a hold may ever hold, else all vertices. The shares add up to one. What the
+    compiled loop does in each iteration has its time there, too; the right-hand side is what the
+    loop's local steps take beside the groups.
     """
     roles: list[Sequence[Effect]] = []
     roles += [scene.groups, scene.forces, scene.boundaries, scene.contacts]
@@ -93,23 +100,31 @@ def effect_costs(
     names = list(dict.fromkeys(stand.name for stand in stands))
     samples = [_profile(loop, scene, frames, stands, names) for _ in range(warmup + repeats)]
     total, *parts = median_frames(np.array(samples[warmup:]))
-    elements = [*(_elements(scene, name) for name in names), *(2 * [scene.mesh.vertices])]
-    rows = zip([*names, GLOBAL, REST], elements, parts, strict=True)
-    return pd.DataFrame([(config.name, *row, row[-1] / total) for row in rows], columns=COSTS)
+    phases = [*names, RIGHT, GLOBAL, REST]
+    costs = pd.DataFrame({"scene": config.name, "effect": phases})
+    costs["elements"] = [_elements(scene, phase) for phase in phases]
+    costs["ms_per_frame"], inside = np.reshape(parts, (2, -1))
+    costs["share"] = costs.ms_per_frame / total
+    costs["us_per_iteration"] = np.where(inside > 0.0, 1e3 * inside / config.iterations, np.nan)
+    return costs[COSTS]
 
 
 def _profile(
     loop: Stepper, scene: Scene, frames: int, stands: list[Timed], names: list[str]
 ) -> list[list[float]]:
-    """Milliseconds of each frame: total, each effect, global solve, rest."""
+    """Milliseconds of each frame: total, all phases, then of each what the compiled loop takes."""
     state, rows = scene.initial_state(), []
     for frame in range(frames):
         for stand in stands:
             stand.reset()
         state, report = loop.step(state, frame)
         own = [sum(stand.seconds for stand in stands if stand.name == name) for name in names]
-        total, solve = float(report.seconds.sum()), float(report.seconds[2])
-        rows.append([1e3 * part for part in (total, *own, solve, total - sum(own) - solve)])
+        inside = [sum(s.kernel_seconds for s in stands if s.name == name) for name in names]
+        total, (_, local, solve, _) = float(report.seconds.sum()), report.seconds.tolist()
+        # a loop outside compiled code asks the groups themselves
+        right = local - sum(inside) if sum(inside) > 0.0 else 0.0
+        parts = [*own, right, solve, total - sum(own) - right - solve]
+        rows.append([1e3 * part for part in (total, *parts, *inside, right, solve, 0.0)])
     return rows
 
 

@@ -15,11 +15,12 @@ import pandas as pd
 import psutil
 from pydantic import Field
 
-from pdrom.core.paths import BREAK_EVEN_SIZED, SCALING, File
+from pdrom.core.paths import BREAK_EVEN_SIZED, EFFECTS_SIZED, SCALING, File
 from pdrom.core.reads import SourcesOf
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.effect_costs import effect_costs
 from pdrom.experiments.local_costs import local_costs
 from pdrom.experiments.measurement import Measurement, Protocol, Variant, measure
 from pdrom.experiments.names import FOM
@@ -104,6 +105,7 @@ class Outputs:
 
     iterations: Annotated[File, SCALING]
     breakeven: Annotated[File, BREAK_EVEN_SIZED]
+    effects: Annotated[File, EFFECTS_SIZED]
 
 
 def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
@@ -131,6 +133,8 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     results = measure(variants, sized.warmup, sized.repeats)
     rows = [{"scene": config.name, "threads": 1, **m.labels, **_times(scene, m)} for m in results]
     write_table(pd.DataFrame(rows, columns=ITERATIONS), outputs.iterations.path)
+    costs = effect_costs(scene, system, sized.frames, sized.warmup, sized.repeats)
+    write_table(costs, outputs.effects.path)
     steps = _steps_alone(scene, training.first(alone.training_frames), specs, alone)
     states = training.positions[:: len(training.positions) // STATES][:STATES]
     times = local_costs(scene, steps, states, sized.warmup, alone.repeats)

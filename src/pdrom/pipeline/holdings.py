@@ -152,6 +152,7 @@ HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.BREAK_EVEN: _scenes,
     paths.BREAK_EVEN_SIZED: _sizes,
     paths.EFFECTS: _scenes,
+    paths.EFFECTS_SIZED: _sizes,
     paths.LEFT_OUT: _scenes,
     paths.SCALING: _sizes,
     paths.ONLINE: _online,
@@ -162,4 +163,6 @@ HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.KERNEL_ACCURACY: _one,
     paths.GUARD: _one,
     paths.OFFLINE: _one,
+    paths.RATES: _one,
+    paths.WORK: _one,
 }

@@ -114,6 +114,12 @@ def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
     return found | study.named_methods(section.breakeven.methods, "scaling.breakeven.methods")
 
 
+def _sizes_of_scenes(study: Study, labels: Labels) -> dict[str, tuple[float, ...]]:
+    """Factors of the meshes on which scenes of the study are timed."""
+    sizes = study.settings.scaling.scenes
+    return {name: factors for name, factors in sizes.items() if name in study.scenes}
+
+
 def _noise_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
     """The methods of the noise runs; they need not be among the study's."""
     return study.named_methods(study.settings.noise.methods, "noise.methods")
@@ -128,6 +134,8 @@ PROVIDERS: dict[str, Callable[[Study, Labels], Any]] = {
     "mesh": _mesh,
     "method": _method,
     "methods": lambda study, labels: study.methods,
+    "every_scene": lambda study, labels: study.scenes,
+    "sizes": _sizes_of_scenes,
     "every_method": lambda study, labels: study.every_method,
     "scaled_methods": scaled_methods,
     "noise_methods": _noise_methods,

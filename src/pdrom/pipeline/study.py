@@ -20,6 +20,7 @@ from pdrom.experiments.ladder import LadderFile
 from pdrom.experiments.noise import Noise
 from pdrom.experiments.offline import Offline
 from pdrom.experiments.online import Online
+from pdrom.experiments.roofline.experiment import Roofline
 from pdrom.experiments.sampling import Sweep
 from pdrom.experiments.scaling import Scaling
 from pdrom.experiments.sensitivity import Sensitivity
@@ -68,6 +69,7 @@ class StudySettings(ConfigModel):
     subspace: Subspace = Subspace()
     scaling: Scaling = Scaling()
     offline: Offline = Offline()
+    roofline: Roofline = Roofline()
     stability: Stability = Stability()
     noise: Noise = Noise()
     guard: GuardSection = GuardSection()

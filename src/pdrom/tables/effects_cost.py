@@ -17,7 +17,10 @@ TIMES = ("ms_per_frame",)
     title="Cost of each effect in a full-order frame",
     columns=(
         SCENE,
-        text("effect", "name of the effect; the global solve and the rest have rows, too"),
+        text(
+            "effect",
+            "name of the effect; right-hand side, global solve and the rest have rows, too",
+        ),
         integer("elements", "elements of a group, vertices of another effect"),
         MS_PER_FRAME,
         timed(number("share", "of the frame; those of a scene add up to one")),

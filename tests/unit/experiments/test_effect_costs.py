@@ -6,14 +6,13 @@ import pytest
 from conftest import make_scene
 from pdrom.experiments.effect_costs import (
     COSTS,
-    GLOBAL,
     LEFT_OUT,
-    REST,
     Timed,
     effect_costs,
     left_out,
     left_out_sets,
 )
+from pdrom.experiments.names import GLOBAL, REST, RIGHT
 from pdrom.model.constraints.local_kernel import LocalPass
 
 EFFECTS = (
@@ -32,11 +31,14 @@ def test_every_effect_has_a_row_and_the_shares_are_whole():
     assert list(table.columns) == COSTS
     expected = {
         "spring": scene.group("spring").elements, "strain": scene.group("strain").elements,
-        "gravity": 30, "pins": 2 * 5, "floor": 30, GLOBAL: 30, REST: 30,
+        "gravity": 30, "pins": 2 * 5, "floor": 30, RIGHT: 30, GLOBAL: 30, REST: 30,
     }  # fmt: skip
     assert dict(zip(table.effect, table.elements, strict=True)) == expected
     assert (table.ms_per_frame > 0.0).all()
     assert table.share.sum() == pytest.approx(1.0)
+    inside = table[table.us_per_iteration > 0.0]
+    assert inside.effect.tolist() == ["spring", "strain", RIGHT, GLOBAL]
+    assert (1e-3 * 10 * inside.us_per_iteration <= inside.ms_per_frame * (1.0 + 1e-12)).all()
 
 
 def test_a_stand_in_answers_as_the_effect_does(rng):

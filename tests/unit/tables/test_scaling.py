@@ -59,7 +59,7 @@ def test_every_size_is_measured(tmp_path, name):
     )
     outputs = {}
     for factor in (0.3, 0.5):
-        paths = {k: str(tmp_path / f"{k}{factor}") for k in ("iterations", "breakeven")}
+        paths = {k: str(tmp_path / f"{k}{factor}") for k in ("iterations", "breakeven", "effects")}
         files = {k: File(path, {"factor": f"{factor:g}"}) for k, path in paths.items()}
         run(settings, Inputs([]), Outputs(**files))
         outputs[factor] = paths

@@ -29,15 +29,20 @@ def compiled(function=None, **options):
 
 
 class Callback:
-    """A function that other compiled code calls by its address; compiled at the first question."""
+    """A function that other compiled code calls by its address; compiled at the first question.
+
+    Attributes
+    ----------
+    function, signature : what is compiled
+    """
 
     def __init__(self, function, signature):
         function.__qualname__ += f"_{_SOURCES}"
-        self._function, self._signature = function, signature
+        self.function, self.signature = function, signature
 
     @cached_property
     def _compiled(self):
-        return cfunc(self._signature, cache=True, error_model="numpy")(self._function)
+        return cfunc(self.signature, cache=True, error_model="numpy")(self.function)
 
     @property
     def address(self):

@@ -129,6 +129,11 @@ class ConstraintGroup(Effect):
         """
         raise NotImplementedError(f"{self.name} has no gradient kernel")
 
+    @property
+    def streamed(self) -> tuple[np.ndarray, ...]:
+        """Arrays that a pass of the local kernel reads once each, beside the positions."""
+        return ()
+
     def project(self, y: np.ndarray) -> np.ndarray:
         """Projections p(y) of all elements, (e p, 3)."""
         return self.project_elements(y, np.arange(self.elements))

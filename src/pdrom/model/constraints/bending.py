@@ -107,6 +107,10 @@ class VertexBending(ConstraintGroup):
         self.normals[curved] = normals
         put(self._manifold, MANIFOLD, POLE, curved, self.side[curved, None] * normals)
 
+    @property
+    def streamed(self) -> tuple[np.ndarray, ...]:
+        return *self._operator(), self._manifold
+
     def sampler(self, elements: np.ndarray) -> LocalKernel:
         return LocalKernel.of(
             project_vertices,

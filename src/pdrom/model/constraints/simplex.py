@@ -71,6 +71,10 @@ class SimplexGroup(StencilGroup):
         """Values (e, ...) of the elements in the order in which the kernel visits them."""
         return values if self._order is None else values[self._order]
 
+    @property
+    def streamed(self) -> tuple[np.ndarray, ...]:
+        return self._corners, self._geometry
+
     def sampler(self, elements: np.ndarray) -> LocalKernel:
         places = elements if self._order is None else np.argsort(self._order)[elements]
         vertices, arrays = self.S.shape[1], self._arrays(places)

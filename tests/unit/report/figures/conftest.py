@@ -20,6 +20,7 @@ from pdrom.core.paths import (
     TABLE,
 )
 from pdrom.core.store import write_hdf5, write_table
+from pdrom.experiments.names import GLOBAL, RIGHT
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh, save_mesh
@@ -29,6 +30,7 @@ from pdrom.report.figures.kit.catalogue import declarations, load_choices
 from pdrom.report.figures.kit.holdings import GroupHolding, Holdings, MethodHolding, SceneHolding
 from pdrom.report.figures.kit.options import Options
 from pdrom.report.figures.kit.results import Results
+from pdrom.tables.roofline import WHOLE
 from pdrom.tables.scaling_fit import scaling_fit
 from places import ROOT
 
@@ -56,7 +58,7 @@ BLOWUP_FRAME = 4
 TABLES = (
     "reconstruction_error", "singular_values", "local_share", "accuracy_cost",
     "ladder", "scaling", "scaling_fit", "stability", "budget", "breakeven", "effects_cost",
-    "effects_left_out", "reduced_reruns", "gain_prediction",
+    "effects_left_out", "machine_rates", "roofline", "reduced_reruns", "gain_prediction",
     "subspace_ablation", "noise", "claims_sensitivity", "bounds",
     "estimates", "effects_contribution",
 )  # fmt: skip
@@ -324,6 +326,12 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for r in (20, 50)
         for variant, gain, error in variants
     ]
+    rates = [("bytes read", 2.0**k, f"L{k // 20 + 1}", 90.0, 80.0, 95.0) for k in range(14, 26)]
+    phases = [
+        (scene, phase, 3e5, 1.0, np.nan if phase == "bending" else 3.0, limit)
+        for scene, phase in (*pairs, *((s, p) for s in scenes for p in (RIGHT, GLOBAL, WHOLE)))
+        for limit in ("bytes", "sums and products")
+    ]
     noise = [
         (scene, "bending", axes, method, r, 9, None if axes == "plane" else 1e-12)
         for scene in FLAT
@@ -362,6 +370,8 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "breakeven": "scene group method factor vertices threads r ratio breakeven_r",
         "effects_cost": "scene effect ms_per_frame share",
         "effects_left_out": "scene left_out groups ms_per_frame own_ms",
+        "machine_rates": "quantity working_set level rate low high",
+        "roofline": "scene phase working_set bound_us measured_us limit",
         "reduced_reruns": "scene group method r position_basis max_extent blowup_frame"
         " relative_error relative_error_within_horizon ms_per_frame",
         "gain_prediction": "predictor lower upper runs failed_share threshold",
@@ -375,8 +385,8 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "effects_contribution": "scene effect role moved sensitivity_floor above_floor",
     }
     made = (
-        values, errors, times, costs, ladder, runs, bought, ratios, shares, removed, reruns,
-        predictions, noise, variations, ablation, bounds, estimates, moved,
+        values, errors, times, costs, ladder, runs, bought, ratios, shares, removed, rates,
+        phases, reruns, predictions, noise, variations, ablation, bounds, estimates, moved,
     )  # fmt: skip
     rows = dict(zip(columns, made, strict=True))
     for name, header in columns.items():

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pdrom.experiments.effect_costs import GLOBAL, REST
+from pdrom.experiments.names import GLOBAL, REST, RIGHT
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import NothingToDraw, Results
@@ -14,7 +14,7 @@ from pdrom.report.figures.kit.results import NothingToDraw, Results
 COSTS = ["scene", "effect", "ms_per_frame", "share"]
 LEFT_OUT = ["scene", "left_out", "groups", "ms_per_frame", "own_ms"]
 OTHERS = "forces, holds, contacts"
-COLOURS = {OTHERS: style.VERMILLION, GLOBAL: "#3A5A78", REST: "#C9C4BA"}
+COLOURS = {OTHERS: style.VERMILLION, RIGHT: style.SKY, GLOBAL: "#3A5A78", REST: "#C9C4BA"}
 
 
 def draw(results: Results, options: Scenes) -> Figure:

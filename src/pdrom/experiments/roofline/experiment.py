@@ -1,0 +1,93 @@
+"""Rates of this machine, and the work of an iteration in every scene and mesh size."""
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import pandas as pd
+from pydantic import Field
+
+from pdrom.core.paths import MESH, RATES, WORK, File
+from pdrom.core.reads import Every
+from pdrom.core.store import write_table
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.roofline import rates, work
+from pdrom.experiments.scenes import scene_of
+from pdrom.experiments.settings import Count, Repeats, Solver
+from pdrom.model.scene import Scene, SceneConfig
+
+log = logging.getLogger(__name__)
+
+OWN_MESH = 1.0  # factor of a scene's own mesh
+
+
+class Roofline(ConfigModel):
+    """Section ``roofline``: how the machine's rates are measured, and the work counted.
+
+    Reads go through working sets of up to ``largest_mb`` (MiB); every one of the ``repeats`` takes
+    ``ms`` or more. Operations are counted in the first ``frames`` of each scene.
+    """
+
+    largest_mb: Annotated[int, Field(ge=1, le=65536)] = 256
+    ms: Annotated[float, Field(gt=0.0, le=1000.0)] = 3.0
+    repeats: Repeats = 15
+    frames: Count = 10
+
+
+class Settings(JobSettings):
+    """What rates and work depend on."""
+
+    every_scene: dict[str, SceneConfig]
+    sizes: dict[str, tuple[float, ...]]
+    roofline: Roofline
+    solver: Solver
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read."""
+
+    meshes: Annotated[list[File], Every(MESH)]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written."""
+
+    rates: Annotated[File, RATES]
+    work: Annotated[File, WORK]
+
+
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+    """Measure the machine, then count."""
+    section = settings.roofline
+    found = rates.rates(section.largest_mb * 2**20, 1e-3 * section.ms, section.repeats)
+    write_table(pd.DataFrame(found, columns=rates.COLUMNS), outputs.rates.path)
+    log.info("rates measured")
+    meshes = {file["mesh"]: file for file in inputs.meshes}
+    rows: list[dict[str, Any]] = []
+    for factor, scene in _scenes(settings, meshes):
+        system = scene.system_with(settings.solver)
+        counted = work.work(scene, system, min(section.frames, scene.config.frames))
+        rows += [{**row, "factor": factor} for row in counted]
+        log.info("%s: %d vertices counted", scene.config.name, scene.mesh.vertices)
+    write_table(pd.DataFrame(rows, columns=work.COLUMNS), outputs.work.path)
+
+
+def _scenes(settings: Settings, meshes: dict[str, File]) -> Iterator[tuple[float, Scene]]:
+    """Every scene on its own mesh, then on those with ``factor`` times the vertices a side."""
+    for config in settings.every_scene.values():
+        yield OWN_MESH, scene_of(config, meshes[config.mesh.identifier])
+    for name, factors in settings.sizes.items():
+        for factor in factors:
+            if factor != OWN_MESH:
+                config = settings.every_scene[name].coarsened(factor, 1.0)
+                yield factor, Scene.build(config, config.mesh.build(Path()))
+
+
+EXPERIMENT = Experiment(
+    "roofline", "Rates of the machine, and the work of an iteration", run, alone=True
+)

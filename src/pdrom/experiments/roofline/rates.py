@@ -1,0 +1,158 @@
+"""Rates of this machine, one thread: bytes read by working set; operations on doubles.
+
+Vectors have four doubles, as everywhere in the compiled code of the study.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from pdrom.experiments.roofline.bound import DIVISIONS, FLOPS, READ, ROOTS
+from pdrom.model.compiled.arithmetic import (
+    add,
+    add_product,
+    constant,
+    divide,
+    square_root,
+    total,
+)
+from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.rows import WIDTH, load
+from pdrom.model.constraints.lanes import lane_function
+
+COLUMNS = ["quantity", "working_set", "level", "rate", "low", "high"]
+SMALLEST_SET = 16 * 1024
+AT_ONCE = 8  # independent vectors, enough to hide the latency of what is measured
+MEMORY = "memory"
+
+_CACHES = Path("/sys/devices/system/cpu/cpu0/cache")
+
+
+@compiled(nogil=True)
+def _read(numbers, times):
+    """Sum of the numbers, a multiple of 32 of them, ``times`` times."""
+    a, b, c, d = constant(0.0), constant(0.0), constant(0.0), constant(0.0)
+    e, f, g, h = constant(0.0), constant(0.0), constant(0.0), constant(0.0)
+    for _ in range(times):
+        for i in range(0, len(numbers), AT_ONCE * WIDTH):
+            a, b = add(a, load(numbers, i)), add(b, load(numbers, i + WIDTH))
+            c, d = add(c, load(numbers, i + 2 * WIDTH)), add(d, load(numbers, i + 3 * WIDTH))
+            e, f = add(e, load(numbers, i + 4 * WIDTH)), add(f, load(numbers, i + 5 * WIDTH))
+            g, h = add(g, load(numbers, i + 6 * WIDTH)), add(h, load(numbers, i + 7 * WIDTH))
+    return total(add(add(add(a, b), add(c, d)), add(add(e, f), add(g, h))))
+
+
+def _chains(step):
+    """A function that takes ``step(x, one)`` so many times in `AT_ONCE` independent vectors."""
+
+    @compiled(nogil=True)
+    def run(numbers, times):
+        one = load(numbers, 0)
+        a, b = load(numbers, WIDTH), load(numbers, 2 * WIDTH)
+        c, d = load(numbers, 3 * WIDTH), load(numbers, 4 * WIDTH)
+        e, f = load(numbers, 5 * WIDTH), load(numbers, 6 * WIDTH)
+        g, h = load(numbers, 7 * WIDTH), load(numbers, 8 * WIDTH)
+        for _ in range(times):
+            a, b, c, d = step(a, one), step(b, one), step(c, one), step(d, one)
+            e, f, g, h = step(e, one), step(f, one), step(g, one), step(h, one)
+        return total(add(add(add(a, b), add(c, d)), add(add(e, f), add(g, h))))
+
+    return run
+
+
+@lane_function
+def _multiplied(x, one):
+    return add_product(one, x, one)
+
+
+@lane_function
+def _divided(x, one):
+    return divide(one, x)
+
+
+@lane_function
+def _rooted(x, one):
+    return square_root(add(x, one))
+
+
+# operations a lane and step, and the steps
+_ARITHMETIC = {
+    FLOPS: (2, _chains(_multiplied)),
+    DIVISIONS: (1, _chains(_divided)),
+    ROOTS: (1, _chains(_rooted)),
+}
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """``run`` does ``amount`` of what ``labels`` name in one time."""
+
+    labels: dict[str, Any]
+    run: Callable[[np.ndarray, int], float]
+    numbers: np.ndarray
+    amount: int
+
+    def seconds(self, times: int) -> float:
+        before = perf_counter()
+        self.run(self.numbers, times)
+        return perf_counter() - before
+
+    def times(self, least: float) -> int:
+        """How often it has to run to take ``least`` seconds."""
+        self.run(self.numbers, 1)  # compiles
+        times = 1
+        while self.seconds(times) < least:
+            times *= 2
+        return times
+
+
+def rates(largest: int, seconds: float, repeats: int) -> list[dict[str, Any]]:
+    """Rows of `COLUMNS`, rates in 1e9 a second: median and quartiles of interleaved repeats.
+
+    Parameters
+    ----------
+    largest : of the working sets, bytes; the others are halves of it down to `SMALLEST_SET`
+    seconds : that a repeat takes at least
+    """
+    trials = list(_trials(np.ones(largest // 8)))
+    times = [trial.times(seconds) for trial in trials]
+    found = [
+        [1e-9 * trial.amount * n / trial.seconds(n) for trial, n in zip(trials, times, strict=True)]
+        for _ in range(repeats)
+    ]
+    quartiles = np.percentile(found, [50, 25, 75], axis=0).T.tolist()
+    named = (dict(zip(("rate", "low", "high"), values, strict=True)) for values in quartiles)
+    return [trial.labels | rate for trial, rate in zip(trials, named, strict=True)]
+
+
+def _trials(numbers: np.ndarray) -> Iterator[_Trial]:
+    step, size = AT_ONCE * WIDTH, numbers.nbytes
+    while size >= SMALLEST_SET:
+        part = numbers[: size // (8 * step) * step]
+        labels = {"quantity": READ, "working_set": part.nbytes, "level": level(part.nbytes)}
+        yield _Trial(labels, _read, part, part.nbytes)
+        size //= 2
+    for quantity, (count, run) in _ARITHMETIC.items():
+        yield _Trial({"quantity": quantity}, run, numbers, count * step)
+
+
+def caches(folder: Path = _CACHES) -> list[tuple[str, int]]:
+    """Names and bytes of the caches of data that the system tells of, the smallest first."""
+    found = []
+    for index in sorted(folder.glob("index*")):
+        kind, size, number = (
+            (index / name).read_text().strip() for name in ("type", "size", "level")
+        )
+        if kind != "Instruction" and size.endswith("K"):
+            found.append((f"L{number}", 1024 * int(size[:-1])))
+    return sorted(found, key=lambda cache: cache[1])
+
+
+def level(size: int) -> str | None:
+    """The smallest cache that holds so many bytes; None where the system tells of no cache."""
+    known = caches()
+    return next((name for name, held in known if size <= held), MEMORY if known else None)

@@ -1,0 +1,26 @@
+"""Table machine_rates: what one thread of this machine can do at most."""
+
+import pandas as pd
+
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every
+from pdrom.tables.declaration import number, table, text, timed
+from pdrom.tables.parts import joined
+
+
+@table(
+    title="Rates of this machine, one thread",
+    columns=(
+        text("quantity", "what is done: bytes read, or operations on doubles, four at a time"),
+        number("working_set", "what is read over and over", "B"),
+        text("level", "smallest cache that holds the working set, as the system tells"),
+        timed(number("rate", "median of the repeats", "1e9/s")),
+        timed(number("low", "their first quartile", "1e9/s")),
+        timed(number("high", "their third quartile", "1e9/s")),
+    ),
+    reads={"parts": Every(paths.RATES)},
+)
+def machine_rates(parts: list[File]) -> pd.DataFrame:
+    """Bytes by working set, then operations."""
+    return joined(parts)

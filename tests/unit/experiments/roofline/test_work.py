@@ -1,0 +1,94 @@
+"""Bytes and operations of an iteration, against those of a small scene by hand."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from conftest import make_scene
+from pdrom.core.paths import File
+from pdrom.core.store import read_table, write_table
+from pdrom.experiments.effect_costs import effect_costs
+from pdrom.experiments.names import GLOBAL, RIGHT
+from pdrom.experiments.roofline.experiment import Inputs, Outputs, Roofline, Settings, run
+from pdrom.experiments.roofline.work import COLUMNS, VECTOR, work
+from pdrom.model.mesh.types import save_mesh
+from pdrom.tables.kernels import kernels
+from pdrom.tables.roofline import WHOLE, roofline
+
+EFFECTS = (
+    {"effect": "gravity"},
+    {"effect": "pins", "select": "left"},
+    {"effect": "spring", "weight": 1e5},
+    {"effect": "strain", "weight": 1e4},
+)
+
+
+def test_work_is_that_of_the_arrays():
+    scene = make_scene(*EFFECTS)
+    rows = pd.DataFrame(work(scene, scene.system, 2)).set_index("phase")
+    assert rows.index.tolist() == ["spring", "strain", RIGHT, GLOBAL]
+    n = scene.mesh.vertices
+    assert rows.bytes["right-hand side"] == 2 * VECTOR * n
+    # an edge: two corners of four bytes, weight and length; blocks are filled up
+    blocks = -(-scene.group("spring").elements // 32)
+    assert rows.bytes["spring"] == 32 * blocks * (2 * 4 + 2 * 8) + 3 * VECTOR * n
+    assert rows.divisions["strain"] > 0
+    assert rows.roots["spring"] > 0
+    state = scene.initial_state()
+    fixed, _ = scene.space(scene.system).fixed(0, state.positions)
+    panels, unknowns, _, _ = scene.system.eliminate(fixed).factor
+    assert len(unknowns) == n - len(fixed)
+    entries = len(panels[-1]) - len(unknowns)
+    # forward and backward a product and a sum for each entry; a product and a difference each
+    assert rows.flops[GLOBAL] == 4 * (4 * entries + 2 * len(unknowns))
+    assert rows.bytes[GLOBAL] > 2 * panels[-1].nbytes
+
+
+def test_solvers_that_are_not_compiled_have_no_work():
+    scene = make_scene(*EFFECTS)
+    rows = list(work(scene, scene.system_with("splu"), 1))
+    assert [row["phase"] for row in rows] == ["spring", "strain", RIGHT]
+
+
+@pytest.fixture
+def made(tmp_path):
+    """Tables roofline and kernels of one small scene and a finer mesh of it."""
+    scene = make_scene(*EFFECTS)
+    name = scene.config.name
+    mesh = File(str(tmp_path / "mesh.h5"), {"mesh": scene.config.mesh.identifier})
+    save_mesh(scene.mesh, mesh.path)
+    outputs = Outputs(File(str(tmp_path / "rates.csv"), {}), File(str(tmp_path / "work.csv"), {}))
+    section = Roofline(largest_mb=1, ms=0.01, repeats=2, frames=1)
+    scenes, sizes = {name: scene.config}, {name: (1.0, 1.5)}
+    settings = Settings(every_scene=scenes, sizes=sizes, roofline=section, solver="supernodal")
+    run(settings, Inputs([mesh]), outputs)
+    costs = File(str(tmp_path / "effects.csv"), {"scene": name})
+    write_table(effect_costs(scene, scene.system, 1, 0, 2), costs.path)
+    phases = roofline([outputs.rates], [outputs.work], [costs], [])
+    accuracy = pd.DataFrame({"group": ["spring", "spring"], "worst_over_condition": [1.0, 2.0]})
+    return read_table(outputs.work.path), phases, kernels(phases, accuracy)
+
+
+def test_phases_are_divided_by_their_bounds(made):
+    counted, phases, _ = made
+    assert counted.columns.tolist() == COLUMNS
+    assert counted.factor.tolist() == [1.0] * 4 + [1.5] * 4
+    own, finer = phases[phases.factor == 1.0], phases[phases.factor == 1.5]
+    assert own.phase.tolist() == ["spring", "strain", RIGHT, GLOBAL, WHOLE]
+    np.testing.assert_allclose(own.share * own.measured_us, own.bound_us)
+    assert own.bound_us.iloc[-1] == pytest.approx(own.bound_us.iloc[:-1].sum())
+    # nobody timed the finer mesh
+    assert finer.measured_us.isna().all()
+    assert (finer.bound_us > own.bound_us.to_numpy()).all()
+
+
+def test_kernels_have_their_cost_by_element(made):
+    _, phases, table = made
+    assert table.group.tolist() == ["spring", "spring", "strain", "strain"]
+    assert table.worst_over_condition.tolist()[:2] == [2.0, 2.0]
+    first = phases[phases.phase == "spring"].iloc[0]
+    assert table.ns_per_element.iloc[0] == pytest.approx(1e3 * first.measured_us / first.elements)
+
+
+def test_nothing_counted_gives_empty_tables():
+    assert roofline([], [], [], []).empty
