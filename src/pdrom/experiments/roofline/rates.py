@@ -12,78 +12,21 @@ from typing import Any
 import numpy as np
 
 from pdrom.experiments.roofline.bound import DIVISIONS, FLOPS, READ, ROOTS
-from pdrom.model.compiled.arithmetic import (
-    add,
-    add_product,
-    constant,
-    divide,
-    square_root,
-    total,
-)
-from pdrom.model.compiled.functions import compiled
-from pdrom.model.compiled.rows import WIDTH, load
-from pdrom.model.constraints.lanes import lane_function
+from pdrom.model.compiled.rows import WIDTH
+from pdrom.model.compiled.throughput import AT_ONCE, divisions, products, read, roots
 
 COLUMNS = ["quantity", "working_set", "level", "rate", "low", "high"]
 SMALLEST_SET = 16 * 1024
-AT_ONCE = 8  # independent vectors, enough to hide the latency of what is measured
 MEMORY = "memory"
 
 _CACHES = Path("/sys/devices/system/cpu/cpu0/cache")
 
 
-@compiled(nogil=True)
-def _read(numbers, times):
-    """Sum of the numbers, a multiple of 32 of them, ``times`` times."""
-    a, b, c, d = constant(0.0), constant(0.0), constant(0.0), constant(0.0)
-    e, f, g, h = constant(0.0), constant(0.0), constant(0.0), constant(0.0)
-    for _ in range(times):
-        for i in range(0, len(numbers), AT_ONCE * WIDTH):
-            a, b = add(a, load(numbers, i)), add(b, load(numbers, i + WIDTH))
-            c, d = add(c, load(numbers, i + 2 * WIDTH)), add(d, load(numbers, i + 3 * WIDTH))
-            e, f = add(e, load(numbers, i + 4 * WIDTH)), add(f, load(numbers, i + 5 * WIDTH))
-            g, h = add(g, load(numbers, i + 6 * WIDTH)), add(h, load(numbers, i + 7 * WIDTH))
-    return total(add(add(add(a, b), add(c, d)), add(add(e, f), add(g, h))))
-
-
-def _chains(step):
-    """A function that takes ``step(x, one)`` so many times in `AT_ONCE` independent vectors."""
-
-    @compiled(nogil=True)
-    def run(numbers, times):
-        one = load(numbers, 0)
-        a, b = load(numbers, WIDTH), load(numbers, 2 * WIDTH)
-        c, d = load(numbers, 3 * WIDTH), load(numbers, 4 * WIDTH)
-        e, f = load(numbers, 5 * WIDTH), load(numbers, 6 * WIDTH)
-        g, h = load(numbers, 7 * WIDTH), load(numbers, 8 * WIDTH)
-        for _ in range(times):
-            a, b, c, d = step(a, one), step(b, one), step(c, one), step(d, one)
-            e, f, g, h = step(e, one), step(f, one), step(g, one), step(h, one)
-        return total(add(add(add(a, b), add(c, d)), add(add(e, f), add(g, h))))
-
-    return run
-
-
-@lane_function
-def _multiplied(x, one):
-    return add_product(one, x, one)
-
-
-@lane_function
-def _divided(x, one):
-    return divide(one, x)
-
-
-@lane_function
-def _rooted(x, one):
-    return square_root(add(x, one))
-
-
-# operations a lane and step, and the steps
+# operations a lane and step, and what does the steps
 _ARITHMETIC = {
-    FLOPS: (2, _chains(_multiplied)),
-    DIVISIONS: (1, _chains(_divided)),
-    ROOTS: (1, _chains(_rooted)),
+    FLOPS: (2, products),
+    DIVISIONS: (1, divisions),
+    ROOTS: (1, roots),
 }
 
 
@@ -134,7 +77,7 @@ def _trials(numbers: np.ndarray) -> Iterator[_Trial]:
     while size >= SMALLEST_SET:
         part = numbers[: size // (8 * step) * step]
         labels = {"quantity": READ, "working_set": part.nbytes, "level": level(part.nbytes)}
-        yield _Trial(labels, _read, part, part.nbytes)
+        yield _Trial(labels, read, part, part.nbytes)
         size //= 2
     for quantity, (count, run) in _ARITHMETIC.items():
         yield _Trial({"quantity": quantity}, run, numbers, count * step)

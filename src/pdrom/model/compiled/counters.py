@@ -56,7 +56,7 @@ class Counted(Callback):
         self._contents = np.array(contents, dtype=np.int64).reshape(-1, 3)
         table = ctypes.c_int64 * len(contents)
         place = self._engine.get_global_value_address(_TABLE)
-        self._ran = np.frombuffer(table.from_address(place), dtype=np.int64)
+        self._ran = np.ctypeslib.as_array(table.from_address(place))
         self._address = self._engine.get_function_address(plain.native_name)
 
     @property
