@@ -17,7 +17,7 @@ FIGURE = Declaration(
         "calls a blow-up. Right: the error of every run whose basis suffices "
         "against the contraction number of its iteration, over all scenes with a single group. "
         "Left of the dotted line an error shrinks in every iteration. Dashed: the error from "
-        "which on a run counts as failed."
+        "which on a run counts as failed. Arrows on the rim lie outside the axes."
     ),
     reads=(
         TableOf("bounds"),

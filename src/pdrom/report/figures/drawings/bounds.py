@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 
 from pdrom.report.figures.bounds import Options
 from pdrom.report.figures.kit import style
-from pdrom.report.figures.kit.multiples import clipped, log_axis
+from pdrom.report.figures.kit.multiples import clipped, log_axis, rim_arrows
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 from pdrom.tables.gain_prediction import FAILED, judged_runs
 
@@ -68,8 +68,10 @@ def _dots(ax: Axes, runs: pd.DataFrame, x: str, y: str, colour: str, marker: str
     if runs.empty:
         return
     limits = {"bound": BOUNDS, "max_extent": EXTENTS, "contraction": NUMBERS, "error": ERRORS}
+    across, along = runs[x].to_numpy(float), runs[y].to_numpy(float)
+    rim_arrows(ax, across, along, colour, limits[x], limits[y])
     ax.plot(
-        clipped(runs[x].to_numpy(float), *limits[x]), clipped(runs[y].to_numpy(float), *limits[y]),
+        clipped(across, *limits[x]), clipped(along, *limits[y]),
         linestyle="none", color=colour, marker=marker, markersize=3.2, alpha=0.7,
         markeredgewidth=0.0, clip_on=False,
     )  # fmt: skip

@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 
 from pdrom.report.figures.error_against_gain import Options
 from pdrom.report.figures.kit import style
-from pdrom.report.figures.kit.multiples import clipped, log_axis
+from pdrom.report.figures.kit.multiples import clipped, log_axis, rim_arrows
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 from pdrom.tables.gain_prediction import EVERY, FAILED, judged_runs
 
@@ -54,11 +54,11 @@ def _chosen(runs: pd.DataFrame, results: Results, options: Options) -> pd.DataFr
 
 
 def _draw_method(ax: Axes, runs: pd.DataFrame, colour: str, marker: str) -> None:
-    gain = clipped(runs.gain.to_numpy(float), *GAINS)
-    error = clipped(runs.error.to_numpy(float), *ERRORS)
+    x, y = runs.gain.to_numpy(float), runs.error.to_numpy(float)
+    rim_arrows(ax, x, y, colour, GAINS, ERRORS)
     ax.plot(
-        gain, error, linestyle="none", color=colour, marker=marker, markersize=3.2, alpha=0.7,
-        markeredgewidth=0.0, clip_on=False,
+        clipped(x, *GAINS), clipped(y, *ERRORS), linestyle="none", color=colour, marker=marker,
+        markersize=3.2, alpha=0.7, markeredgewidth=0.0, clip_on=False,
     )  # fmt: skip
 
 

@@ -9,7 +9,13 @@ from matplotlib.ticker import NullFormatter
 from pdrom.experiments.names import ANDERSON, FOM
 from pdrom.report.figures.iterations import Options
 from pdrom.report.figures.kit import style
-from pdrom.report.figures.kit.multiples import clipped, label_outer, log_axis, small_multiples
+from pdrom.report.figures.kit.multiples import (
+    clipped,
+    label_counts,
+    label_outer,
+    log_axis,
+    small_multiples,
+)
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 
 ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
@@ -43,6 +49,12 @@ def draw(results: Results, options: Options) -> Figure:
         for method in RUNS:
             rows = table[(table.scene == scene) & (table.method == method)]
             _draw_run(ax, rows.sort_values("iterations"), method)
+        plain = table[(table.scene == scene) & (table.method == FOM)].sort_values("iterations")
+        low, high = ax.get_xlim()
+        ax.set_xlim(0.5 * low, high)
+        label_counts(
+            ax, plain[TIME], clipped(plain[ERROR].to_numpy(float), LOW, HIGH), plain.iterations
+        )
         ax.set_title(style.words(scene))
     label_outer(axes, options.columns, "time per frame (ms)", "error against K \N{INFINITY}")
     handles = [
@@ -57,10 +69,3 @@ def _draw_run(ax: Axes, rows: pd.DataFrame, method: str) -> None:
     _, colour, marker = RUNS[method]
     error = clipped(rows[ERROR].to_numpy(float), LOW, HIGH)
     ax.plot(rows[TIME], error, color=colour, marker=marker, markersize=3.2)
-    if method != FOM:
-        return
-    for time, height, count in zip(rows[TIME], error, rows.iterations, strict=True):
-        ax.annotate(
-            f"{count:.0f}", (time, height), (0, 4), textcoords="offset points", fontsize=6.5,
-            ha="center",
-        )  # fmt: skip

@@ -1,5 +1,7 @@
 """Small multiples: one panel per experiment, equal axes, one legend."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -8,6 +10,7 @@ from matplotlib.ticker import LogLocator
 from pdrom.report.figures.kit import style
 
 PANEL_HEIGHT = 1.45  # inches
+NEAR = 0.05  # of the axis: markers closer than this share a label
 
 
 def small_multiples(
@@ -44,6 +47,57 @@ def log_axis(ax: Axes, low: float, high: float) -> None:
     style.grid(ax)
 
 
+ARROWS = {"left": 4, "right": 5, "up": 6, "down": 7}  # carets
+
+
+def rim_arrows(
+    ax: Axes,
+    x: np.ndarray,
+    y: np.ndarray,
+    colour: str,
+    across: tuple[float, float],
+    along: tuple[float, float],
+) -> None:
+    """Arrows on the rim for points outside the axes, ``across`` in x and ``along`` in y."""
+    inside_x, inside_y = clipped(x, *across), clipped(y, *along)
+    outside = {
+        "left": x < across[0],
+        "right": x > across[1],
+        "up": y > along[1],
+        "down": y < along[0],
+    }
+    for side, beyond in outside.items():
+        if beyond.any():
+            ax.plot(
+                inside_x[beyond], inside_y[beyond], linestyle="none", color=colour, alpha=0.8,
+                marker=ARROWS[side], markersize=5.0, markeredgewidth=0.0, clip_on=False,
+            )  # fmt: skip
+
+
 def clipped(values: np.ndarray, low: float, high: float) -> np.ndarray:
     """Values moved to the nearest limit; NaN stays NaN."""
     return np.clip(values, low, high)
+
+
+def label_counts(
+    ax: Axes,
+    x: Iterable[float],
+    y: Iterable[float],
+    counts: Iterable[float],
+    prefix: str = "",
+) -> None:
+    """A number below and left of each marker of a logarithmic x axis; near ones share a label.
+
+    x : ascending; the limits of the axis must be final
+    """
+    low, high = np.log10(ax.get_xlim())
+    groups: list[list[tuple[float, float, float]]] = []
+    for marker in zip(x, y, counts, strict=True):
+        near = groups and np.log10(marker[0] / groups[-1][-1][0]) < NEAR * (high - low)
+        groups[-1].append(marker) if near else groups.append([marker])
+    for group in groups:
+        numbers = ", ".join(f"{count:.0f}" for _, _, count in group)
+        ax.annotate(
+            prefix + numbers, (group[0][0], min(height for _, height, _ in group)), (-2.5, -3.5),
+            textcoords="offset points", fontsize=6.5, ha="right", va="top",
+        )  # fmt: skip

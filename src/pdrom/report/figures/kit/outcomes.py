@@ -11,6 +11,7 @@ from matplotlib.patches import Patch, Rectangle
 from pdrom.report.figures.kit import style
 
 GAP = 0.45  # between blocks, in cells
+LEAST = 2.0  # cells, that a title needs
 DENSE = 30  # cells across, from which on labels stand upright and titles take two lines
 
 
@@ -65,6 +66,8 @@ def draw_cells(
     for j, block in enumerate(blocks):
         width = len(block.labels)
         title = block.title.replace("-", "-\n", 1) if dense else block.title
+        room = max(0.5 * (LEAST - width), 0.0)
+        x += room
         ax.text(x + 0.5 * width, -0.25, title, ha="center", va="bottom", fontsize=6.5)
         for k, label in enumerate(block.labels):
             ticks.append(x + k + 0.5)
@@ -73,7 +76,7 @@ def draw_cells(
                 found = cell(i, j, k)
                 if found is not None:
                     _draw_cell(ax, x + k, i, found)
-        x += width + GAP
+        x += width + room + GAP
     ax.set_xlim(0.0, x - GAP)
     ax.set_ylim(len(rows), 0.0)
     ax.set_xticks(ticks, labels, fontsize=6, rotation=90 if dense else 0)
@@ -90,7 +93,7 @@ def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
     )
     mark = f"{int(found.blowup_frame)}" if look.mark == "frame" else look.mark
     if mark:
-        ax.text(x + 0.5, y + 0.52, mark, ha="center", va="center", fontsize=5.5, color=look.ink)
+        ax.text(x + 0.5, y + 0.52, mark, ha="center", va="center", fontsize=6, color=look.ink)
 
 
 def legend(figure: Figure, present: Sequence[str]) -> None:

@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from pdrom.experiments.names import ANDERSON, FOM
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.families import FAMILIES, ITERATIONS, Family, Model, markers
-from pdrom.report.figures.kit.multiples import clipped, log_axis
+from pdrom.report.figures.kit.multiples import clipped, label_counts, log_axis
 from pdrom.report.figures.kit.options import Options
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 from pdrom.tables.accuracy_cost import FEWER, pareto
@@ -26,7 +26,6 @@ LOW, HIGH = 1e-4, 1e2  # errors outside are arrows on the rim
 ABOVE, BELOW, BLOWN_UP = 6, 7, "x"  # markers: carets, and a cross
 OWN = {"color": style.GREY, "linewidth": 1.2}
 BLIND = {"color": style.FAILED, "linewidth": 0.9, "linestyle": "-."}
-_NEAR = 0.05  # of the axis: markers closer than this share a label
 
 
 @dataclass(frozen=True)
@@ -145,19 +144,7 @@ def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
     """Number of iterations beside each run that stops earlier; near ones share a label."""
     rows = found.points[(found.points.scene == scene) & (found.points.method == FEWER)]
     rows = rows.sort_values(TIME)
-    low, high = np.log10(ax.get_xlim())
-    places = (np.log10(rows[TIME].to_numpy(float)) - low) / (high - low)
-    start = 0
-    for end in range(1, len(rows) + 1):
-        if end < len(rows) and places[end] - places[end - 1] < _NEAR:
-            continue
-        together = rows.iloc[start:end]
-        numbers = ", ".join(f"{k:.0f}" for k in together.iterations)
-        ax.annotate(
-            f"K = {numbers}", (together[TIME].iloc[0], together[ERROR].min()), (-3.0, -4.5),
-            textcoords="offset points", fontsize=7, ha="right", va="top",
-        )  # fmt: skip
-        start = end
+    label_counts(ax, rows[TIME], rows[ERROR], rows.iterations, "K = ")
 
 
 def _time_axis(ax: Axes, times: np.ndarray) -> None:
