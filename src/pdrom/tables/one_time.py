@@ -12,6 +12,7 @@ import pandas as pd
 from pdrom.core.paths import File
 from pdrom.tables.parts import joined
 
+NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # frame_times without a scene
 PHASES = (
     "ms_per_frame",
     "inertia_ms",

@@ -7,6 +7,7 @@ from pdrom.core.store import read_table, write_table
 from pdrom.report.scenes.results import SceneResults
 from pdrom.tables.accuracy_cost import accuracy_cost
 from pdrom.tables.effects_contribution import effects_contribution
+from pdrom.tables.one_time import NOT_TIMED
 
 
 def make(results: SceneResults, outputs: Mapping[str, str]) -> None:
@@ -23,6 +24,7 @@ def make(results: SceneResults, outputs: Mapping[str, str]) -> None:
     costs = accuracy_cost(
         results.table("reduced_reruns"),
         [results.file(TIMINGS)],
+        NOT_TIMED,
         [results.file(ITERATIONS)],
         {results.scene: int(results.settings["iterations"])},
     )

@@ -20,6 +20,7 @@ from pdrom.core.store import read_table
 from pdrom.report.figures.kit.holdings import Holdings
 from pdrom.report.figures.kit.options import Rank
 from pdrom.report.figures.kit.results import Results
+from pdrom.tables.one_time import NOT_TIMED
 from pdrom.tables.reconstruction_error import reconstruction_error
 from pdrom.tables.reduced_reruns import reduced_reruns
 
@@ -87,7 +88,7 @@ class SceneResults(Results):
             return reduced_reruns.checked(pd.DataFrame())
         return reduced_reruns(
             self._files(RERUNS), self._files(RERUNS_TRAIN), subspaces, rows, [self.file(TIMINGS)],
-            self.table("sensitivity"), self.settings["sensitivity.reference"],
+            NOT_TIMED, self.table("sensitivity"), self.settings["sensitivity.reference"],
             self.settings["sensitivity.threshold"],
         )  # fmt: skip
 
