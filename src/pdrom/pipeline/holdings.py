@@ -91,11 +91,22 @@ def _noise(study: Study) -> Iterator[Labels]:
             yield {"scene": scene, "group": group}
 
 
-def _sizes(study: Study) -> Iterator[Labels]:
-    for scene, factors in study.settings.scaling.scenes.items():
-        if scene in study.scenes:
-            for factor in factors:
-                yield {"scene": scene, "factor": f"{factor:g}"}
+Factors = dict[str, tuple[float, ...]]
+
+
+def _sized(select: Callable[[Study], Factors]) -> Callable[[Study], Iterator[Labels]]:
+    """The mesh sizes of scenes that the configuration lists, as far as the study holds them."""
+
+    def held(study: Study) -> Iterator[Labels]:
+        for scene, factors in select(study).items():
+            if scene in study.scenes:
+                for factor in factors:
+                    yield {"scene": scene, "factor": f"{factor:g}"}
+
+    return held
+
+
+_sizes = _sized(lambda study: study.settings.scaling.scenes)
 
 
 def _online(study: Study) -> Iterator[Labels]:
@@ -159,6 +170,7 @@ HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.ONLINE_MODELS: _online,
     paths.FRAME_TIMES: _one,
     paths.PROJECTION_SECONDS: _one,
+    paths.ALTERNATIVES: _sized(lambda study: study.settings.alternatives.scenes),
     paths.HARD_CASES: _one,
     paths.KERNEL_ACCURACY: _one,
     paths.GUARD: _one,

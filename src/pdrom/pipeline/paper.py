@@ -103,6 +103,8 @@ def _study(study: Study) -> Row:
         "companion_tolerance": settings.companion.tolerance,
         "companion_alarm": settings.companion.alarm,
         "tolerance": settings.iterations.tolerance,
+        "continuous_tolerance": settings.alternatives.continuous.tolerance,
+        "compared_frames": settings.alternatives.compared,
     }
 
 

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.names import SceneName
 from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
+from pdrom.experiments.alternatives.settings import Alternatives
 from pdrom.experiments.companion import Companion
 from pdrom.experiments.frame_times import FrameTimes
 from pdrom.experiments.guard import GuardSection
@@ -76,6 +77,7 @@ class StudySettings(ConfigModel):
     companion: Companion = Companion()
     hard_cases: HardCases = HardCases()
     online: Online = Online()
+    alternatives: Alternatives = Alternatives()
     viewer: Viewer = Viewer()
     study: str | None = None
 

@@ -1,30 +1,38 @@
 """How the compiled functions of the model are compiled and kept."""
 
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from zlib import crc32
 
 from numba import cfunc, njit
 
+KERNELS = ("compiled", "constraints", "dynamics")  # folders whose functions others inline
 
-def _checksum() -> str:
-    """Of the sources of all compiled functions."""
+
+@cache
+def _checksum(folders: tuple[str, ...]) -> str:
+    """Of the sources in some folders of the model."""
     model = Path(__file__).parents[1]
-    folders = ("compiled", "constraints", "dynamics")
     sources = sorted(path for folder in folders for path in model.glob(f"{folder}/*.py"))
     return f"{crc32(b''.join(path.read_bytes() for path in sources)):08x}"
 
 
-# numba's cache looks at the file of a function only, not at those of what it inlines: without the
-# checksum in its name a function would stay as it was when another file is edited
-_SOURCES = _checksum()
+def _mark(function):
+    """Put a checksum of all that it may inline into the name of a function.
+
+    numba's cache looks at the file of a function only, not at those of what it inlines: without it
+    a function would stay as it was when another file is edited.
+    """
+    own = function.__module__.removeprefix("pdrom.model.").split(".")[0]
+    beside = own if (Path(__file__).parents[1] / own).is_dir() else KERNELS[0]
+    function.__qualname__ += f"_{_checksum(tuple(sorted({*KERNELS, beside})))}"
 
 
 def compiled(function=None, **options):
     """Compile and keep a function: without division checks, without fast-math unless asked for."""
     if function is None:
         return lambda wrapped: compiled(wrapped, **options)
-    function.__qualname__ += f"_{_SOURCES}"
+    _mark(function)
     return njit(cache=True, error_model="numpy", **options)(function)
 
 
@@ -37,7 +45,7 @@ class Callback:
     """
 
     def __init__(self, function, signature):
-        function.__qualname__ += f"_{_SOURCES}"
+        _mark(function)
         self.function, self.signature = function, signature
 
     @cached_property

@@ -11,20 +11,13 @@ import numpy as np
 
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import flat
+from pdrom.model.compiled.vectors import dot
 
 # Relative Tikhonov term of the small least-squares problem: nearly parallel residual differences
 # (close to convergence) must not blow up the weights.
 REGULARISATION = 1e-14
 # Entries of the history's counts: differences so far (-1: no iterate yet), refused iterates.
 DIFFERENCES, REFUSED = 0, 1
-
-
-@compiled
-def _dot(a, b):
-    total = 0.0
-    for i in range(len(a)):
-        total += a[i] * b[i]
-    return total
 
 
 @compiled
@@ -55,6 +48,13 @@ def _weights(gram, projection, count):
             weights[i] -= factor[k, i] * weights[k]
         weights[i] /= factor[i, i]
     return weights
+
+
+@compiled
+def forget(history):
+    """Begin anew, with another frame or substep."""
+    history[6][DIFFERENCES] = -1
+    history[7][0] = np.inf
 
 
 @compiled
@@ -90,8 +90,8 @@ def combine(history, image):
         return
     projection = np.empty(count)
     for j in range(count):
-        gram[slot, j] = gram[j, slot] = _dot(residuals[slot], residuals[j])
-        projection[j] = _dot(residuals[j], residual)
+        gram[slot, j] = gram[j, slot] = dot(residuals[slot], residuals[j])
+        projection[j] = dot(residuals[j], residual)
     weights = _weights(gram, projection, count)
     for j in range(count):
         for i in range(n):
@@ -140,8 +140,8 @@ class Anderson:
         n, refused = _numbers(y).size, self.refused
         if n != len(self.history[0]):
             self.history = _history(self._window, n)
-        self.history[6][:] = -1, refused
-        self.history[7][:] = np.inf
+            self.history[6][REFUSED] = refused
+        forget(self.history)
 
     def refuse(self, y: np.ndarray, objective: float) -> bool:
         """Whether the iterate ``y`` raises the objective (J); it is then replaced by the plain

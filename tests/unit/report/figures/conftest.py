@@ -59,7 +59,7 @@ TABLES = (
     "reconstruction_error", "singular_values", "local_share", "accuracy_cost",
     "ladder", "scaling", "scaling_fit", "stability", "budget", "breakeven", "effects_cost",
     "effects_left_out", "machine_rates", "roofline", "reduced_reruns", "gain_prediction",
-    "subspace_ablation", "noise", "claims_sensitivity", "bounds",
+    "subspace_ablation", "noise", "claims_sensitivity", "alternatives", "bounds",
     "estimates", "effects_contribution",
 )  # fmt: skip
 
@@ -271,6 +271,13 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for name, number, time in (("nothing", 3, 4.0), ("gravity", 3, 3.5), ("a + b", 1, 2.0))
     ]
     rungs = [("up", "published code"), ("up", "+ affine"), ("down", "- QR"), ("signs", "signs 1")]
+    others = [
+        (scene, 400, stiffness, method, n, 0.1 * n, None if n > 4 else 0.1 / n, 0.3 / n)
+        for scene in scenes
+        for stiffness in (1.0, 100.0)
+        for method in ("converged", "projective", "newton", "ecsw")
+        for n in (1, 2, 5)
+    ]
     ladder = [
         (scene, direction, rung, 10.0**i if i < 2 else np.inf, 0.1 * i if i else np.nan)
         for scene in scenes
@@ -379,6 +386,8 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "claims_sensitivity": "claim part varied variation verdict_of_rules same",
         "subspace_ablation": "scene position_basis k r variant gain relative_error_within_horizon"
         " relative_error_full_projections",
+        "alternatives": "scene vertices stiffness method substeps ms_per_frame error_implicit"
+        " error_continuous",
         "bounds": "scene group method r bound max_extent slack contraction finite",
         "estimates": "scene position_basis split relative_error_within_horizon estimate ratio"
         " within resolved",
@@ -386,7 +395,7 @@ def _write_tables(results, scenes, methods, rng) -> None:
     }
     made = (
         values, errors, times, costs, ladder, runs, bought, ratios, shares, removed, rates,
-        phases, reruns, predictions, noise, variations, ablation, bounds, estimates, moved,
+        phases, reruns, predictions, noise, variations, ablation, others, bounds, estimates, moved,
     )  # fmt: skip
     rows = dict(zip(columns, made, strict=True))
     for name, header in columns.items():

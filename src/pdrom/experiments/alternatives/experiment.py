@@ -1,0 +1,171 @@
+"""Error and time of every method on one scene, against two references.
+
+One is the implicit step of the scene, solved to convergence: what more iterations approach. The
+other is the motion in continuous time, which the implicit step itself misses: what a user wants.
+All run the held-out motion; only the reduction has a training motion.
+"""
+
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+
+from pdrom.core.metrics import trajectory_error
+from pdrom.core.paths import ALTERNATIVES, File
+from pdrom.core.reads import SourcesOf
+from pdrom.core.store import write_table
+from pdrom.experiments.alternatives.candidates import Candidate, candidates
+from pdrom.experiments.alternatives.settings import CONVERGED, Comparison, ImplicitReference
+from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.measurement import Variant, measure
+from pdrom.experiments.settings import BlowupExtent
+from pdrom.model.alternatives.continuous import continuous
+from pdrom.model.constraints.base import GroupConfig
+from pdrom.model.runs.converged import ConvergedStepper
+from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.rerun import displacement_norms
+
+log = logging.getLogger(__name__)
+
+COLUMNS = [
+    "scene", "factor", "vertices", "stiffness", "method", "substeps", "iterations", "k",
+    "elements_sampled", "frames", "finite", "ms_per_frame", "error_implicit", "error_continuous",
+    "reference_error",
+]  # fmt: skip
+
+
+class Settings(JobSettings):
+    """What the comparison on a mesh size depends on, beside the machine."""
+
+    scene: SceneConfig
+    alternatives: Comparison
+    blowup_extent: BlowupExtent
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read: that of the mesh, nothing for a generated one."""
+
+    sources: Annotated[list[str], SourcesOf("scene.mesh")]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written: a row for every stiffness, method and pair of steps."""
+
+    table: Annotated[File, ALTERNATIVES]
+
+
+@dataclass(frozen=True)
+class References:
+    """Runs (F + 1, N, 3) that errors are taken against, and the error of the second one.
+
+    ``implicit`` is None where a frame did not converge, or nobody asked.
+    """
+
+    implicit: np.ndarray | None
+    continuous: np.ndarray
+    error: float
+
+    def errors(self, run: np.ndarray | None) -> dict[str, float | None]:
+        """Relative errors of a run, empty if it blew up."""
+        return {
+            "error_implicit": _error(run, self.implicit),
+            "error_continuous": _error(run, self.continuous),
+        }
+
+
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+    """Compare all methods on one mesh: ``factor`` times the vertices along each side."""
+    factor = float(outputs.table["factor"])
+    rows = []
+    for stiffness in settings.alternatives.stiffness.get(settings.scene.name, (1.0,)):
+        for row in _rows(sized(settings.scene, factor, stiffness), settings):
+            rows.append({"factor": factor, "stiffness": stiffness, **row})
+        log.info("%s: stiffness %g done", settings.scene.name, stiffness)
+    write_table(pd.DataFrame(rows, columns=COLUMNS), outputs.table.path)
+
+
+def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
+    """The scene on a finer mesh of the same mass, with all weights times ``stiffness``."""
+    finer = config.coarsened(factor, 1.0)
+    counts = [c.mesh.build(Path()).vertices for c in (config, finer)]
+    effects = tuple(
+        e.model_copy(update={"weight": stiffness * e.weight}) if isinstance(e, GroupConfig) else e
+        for e in finer.effects
+    )
+    mass = config.vertex_mass * counts[0] / counts[1]
+    return finer.model_copy(update={"vertex_mass": mass, "effects": effects})
+
+
+def _rows(config: SceneConfig, settings: Settings) -> list[dict[str, Any]]:
+    asked = settings.alternatives
+    config = config.model_copy(update={"frames": min(asked.compared, config.frames)})
+    training = Scene.build(config, config.mesh.build(Path()))
+    scene = Scene.build(config.heldout_variant(), training.mesh)
+    against = references(scene, asked)
+    found = list(candidates(scene, training, asked))
+    common = {
+        "scene": config.name,
+        "vertices": scene.mesh.vertices,
+        "frames": config.frames,
+        "reference_error": against.error,
+    }
+    implicit = against.errors(against.implicit)
+    rows = [{**common, "method": CONVERGED, "substeps": 1, "finite": True, **implicit}]
+    times = measure([_variant(c, asked.frames) for c in found], asked.warmup, asked.repeats)
+    for candidate, time in zip(found, times, strict=True):
+        with np.errstate(over="ignore", invalid="ignore"):
+            reached = candidate.run(config.frames, settings.blowup_extent, scene.mesh.extent)
+        made = {"finite": reached is not None, "ms_per_frame": candidate.steps * time.frame}
+        rows.append({**common, **candidate.labels, **made, **against.errors(reached)})
+    return rows
+
+
+def references(scene: Scene, asked: Comparison) -> References:
+    """Both references of a scene's own motion."""
+    wanted = asked.continuous
+    exact = continuous(scene, scene.config.frames, wanted.tolerance, wanted.substeps, wanted.limit)
+    name = scene.config.name
+    log.info("%s: %d explicit steps a frame, error %.1e", name, exact.substeps, exact.error)
+    if not exact.within(wanted.tolerance):
+        log.warning("%s: motion in continuous time is known to %.1e only", name, exact.error)
+    implicit = None
+    if asked.takes(CONVERGED, scene.mesh.vertices):
+        implicit = _converged(scene, asked.implicit)
+    return References(implicit, exact.positions, exact.error)
+
+
+def _converged(scene: Scene, asked: ImplicitReference) -> np.ndarray | None:
+    best = ConvergedStepper(scene, scene.system, asked.tolerance, asked.limit)
+    state = scene.initial_state()
+    positions = [state.positions]
+    for frame in range(scene.config.frames):
+        state, _ = best.step(state, frame)
+        positions.append(state.positions)
+    if not best.converged:
+        log.warning("%s: no convergence in %d evaluations", scene.config.name, asked.limit)
+        return None
+    return np.stack(positions)
+
+
+def _variant(candidate: Candidate, frames: int) -> Variant:
+    return Variant({}, candidate.loop, candidate.start, candidate.steps * frames)
+
+
+def _error(run: np.ndarray | None, reference: np.ndarray | None) -> float | None:
+    if run is None or reference is None:
+        return None
+    difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
+    return trajectory_error(difference, displacement_norms(reference))
+
+
+EXPERIMENT = Experiment(
+    "alternatives",
+    "Alternatives to projective dynamics in {scene} with {factor} times the vertices along a side",
+    run,
+    alone=True,
+)

@@ -1,0 +1,114 @@
+"""Section ``alternatives``: methods, their steps, and what they are compared with."""
+
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, Field
+
+from pdrom.core.errors import choices
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.measurement import Protocol
+from pdrom.experiments.settings import Count, Modes, Repeats, Tolerance
+from pdrom.model.alternatives.methods import METHODS
+
+REDUCED = "ecsw"  # the only method that is no full-order one
+CONVERGED = "converged"  # the implicit step itself, however long it takes
+
+Factors = Annotated[tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...], Field(min_length=1)]
+Steps = Annotated[tuple[Count, Count], Field(description="substeps of a frame, iterations of each")]
+
+
+def _known(by_method: dict[str, Any]) -> dict[str, Any]:
+    allowed = (*METHODS, REDUCED, CONVERGED)
+    for name in by_method:
+        if name not in allowed:
+            raise ValueError(f"unknown method '{name}'{choices(name, allowed)}")
+    return by_method
+
+
+def _without_converged(steps: dict[str, Any]) -> dict[str, Any]:
+    if CONVERGED in steps:
+        raise ValueError(f"{CONVERGED}: has no steps, it is the reference")
+    return steps
+
+
+def _sweep(*iterations: int) -> tuple[Steps, ...]:
+    return tuple((1, count) for count in iterations)
+
+
+def _small(*substeps: int) -> tuple[Steps, ...]:
+    return tuple((count, 1) for count in substeps)
+
+
+def default_steps() -> dict[str, tuple[Steps, ...]]:
+    """More iterations of one step, and more steps of one iteration."""
+    return {
+        "projective": (*_sweep(1, 2, 5, 10, 20, 40, 80), *_small(2, 5, 10, 20, 40), (5, 4)),
+        "anderson": (*_sweep(5, 10, 20, 40, 80), (5, 5), (10, 5)),
+        "l-bfgs": (*_sweep(5, 10, 20, 40, 80), (5, 5), (10, 5)),
+        "newton": _sweep(1, 2, 3),
+        "xpbd": (*_sweep(5, 10, 20, 50), *_small(5, 10, 20, 50, 100)),
+        "vertex-descent": (*_sweep(10, 20, 50), *_small(10, 20, 50)),
+        "explicit": _small(5, 10, 20, 40, 80, 160),
+        REDUCED: ((1, 10), (1, 40), (5, 1)),
+    }
+
+
+class ContinuousReference(ConfigModel):
+    """The motion in continuous time: explicit steps, halved from ``substeps`` a frame on.
+
+    They are halved until the estimated error is below ``tolerance``, up to ``limit`` a frame.
+    """
+
+    substeps: Count = 40
+    limit: Count = 6_000
+    tolerance: Tolerance = 1e-4
+
+
+class ImplicitReference(ConfigModel):
+    """The implicit step of the scene: a frame is converged when one more local/global iteration
+    moves no vertex by more than ``tolerance`` times the extent; ``limit`` bounds the evaluations.
+    """
+
+    tolerance: Tolerance = 1e-7
+    limit: Annotated[int, Field(ge=2)] = 4000
+
+
+class Comparison(Protocol):
+    """One scene on one mesh.
+
+    ``steps`` has pairs (substeps of a frame, iterations of each) for each method. Errors are taken
+    over ``compared`` frames of the held-out motion, for each factor on all weights that
+    ``stiffness`` has for the scene (1 if none); ``frames`` of them are timed. The reduction has
+    ``k`` modes and samples to ``tau``, trained on the training motion. A method in ``largest`` is
+    left out on meshes with more vertices (``converged``: the implicit reference).
+    """
+
+    compared: Count = 20
+    stiffness: dict[str, Factors] = Field(default_factory=dict)
+    steps: Annotated[
+        dict[str, tuple[Steps, ...]], AfterValidator(_known), AfterValidator(_without_converged)
+    ] = Field(default_factory=default_steps)
+    largest: Annotated[dict[str, Count], AfterValidator(_known)] = Field(default_factory=dict)
+    k: Modes = 20
+    tau: Tolerance = 1e-2
+    implicit: ImplicitReference = ImplicitReference()
+    continuous: ContinuousReference = ContinuousReference()
+    frames: Count = 4
+    repeats: Repeats = 5
+
+    def takes(self, method: str, vertices: int) -> bool:
+        """Whether a method runs on a mesh of this size."""
+        return vertices <= self.largest.get(method, vertices)
+
+
+class Alternatives(Comparison):
+    """Section ``alternatives``: factors on the vertices along a side for each of ``scenes``.
+
+    The mass of a mesh is that of the scene, whatever the factor. The winners are named for each of
+    ``errors``.
+    """
+
+    scenes: dict[str, tuple[Annotated[float, Field(gt=0.0, le=100.0)], ...]] = Field(
+        default_factory=dict
+    )
+    errors: tuple[Tolerance, ...] = (1e-1, 1e-2, 1e-3)

@@ -1,0 +1,41 @@
+"""Table alternatives: projective dynamics, what else there is, and a reduction, on one scene."""
+
+import pandas as pd
+
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.core.reads import Every
+from pdrom.experiments.alternatives.settings import CONVERGED, REDUCED
+from pdrom.tables.declaration import flag, integer, number, table, text
+from pdrom.tables.parts import joined
+from pdrom.tables.vocabulary import ELEMENTS_SAMPLED, MS_PER_FRAME, SCENE, VERTICES, K
+
+STIFFNESS = number("stiffness", "factor on all weights of the scene")
+SUBSTEPS = integer("substeps", "steps that a frame is divided into")
+ITERATIONS = integer("iterations", "iterations of each substep")
+
+
+@table(
+    title="Error and time of the alternatives to projective dynamics",
+    columns=(
+        SCENE,
+        number("factor", "on the vertices along a side of the scene's own mesh"),
+        VERTICES,
+        STIFFNESS,
+        text("method", f"how a frame is solved; {CONVERGED}: to the end; {REDUCED}: reduced"),
+        SUBSTEPS,
+        ITERATIONS,
+        K,
+        ELEMENTS_SAMPLED,
+        integer("frames", "frames that errors are taken over"),
+        flag("finite", "no frame blew up"),
+        MS_PER_FRAME,
+        number("error_implicit", "error against the converged implicit step of the scene"),
+        number("error_continuous", "error against the motion in continuous time: the total error"),
+        number("reference_error", "estimated error of that motion"),
+    ),
+    reads={"parts": Every(paths.ALTERNATIVES)},
+)
+def alternatives(parts: list[File]) -> pd.DataFrame:
+    """Rows of all scenes and meshes, in order; the held-out motion."""
+    return joined(parts)

@@ -1,0 +1,81 @@
+"""Table winners: the cheapest way to an error, and from what size on a reduction is cheaper."""
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from pdrom.core.reads import Setting, TableOf
+from pdrom.experiments.alternatives.settings import REDUCED
+from pdrom.tables.alternatives import ITERATIONS, STIFFNESS, SUBSTEPS
+from pdrom.tables.declaration import number, table, text, timed
+from pdrom.tables.vocabulary import METHOD, MS_PER_FRAME, SCENE, VERTICES
+
+REFERENCES = ("implicit", "continuous")
+KNOWN = 3.0  # a motion decides about an error only if it is known this many times better
+
+
+# A time decides which row of alternatives wins, hence all that is said of it.
+@table(
+    title="Who reaches an error in the shortest time",
+    columns=(
+        SCENE,
+        VERTICES,
+        STIFFNESS,
+        text("reference", "what the error is taken against: implicit or continuous"),
+        number("limit", "error that is allowed"),
+        timed(METHOD),
+        timed(SUBSTEPS),
+        timed(ITERATIONS),
+        timed(number("error", "error that it has")),
+        MS_PER_FRAME,
+        timed(text("second", "the next best of the other full-order methods")),
+        timed(number("second_ms", "time of a frame of the second", "ms")),
+        timed(number("margin", "time of the second over that of the first")),
+        timed(number("reduced_error", "smallest error of the reduction")),
+        timed(number("reduced_ms", "time of a frame of the reduction, if it reaches it", "ms")),
+        timed(number("reduced_speedup", "time of the first over that of the reduction")),
+    ),
+    reads={"rows": TableOf("alternatives"), "limits": Setting("alternatives.errors")},
+)
+def winners(rows: pd.DataFrame, limits: Sequence[float]) -> pd.DataFrame:
+    """One row per scene, mesh, stiffness, reference and error; no method where none reaches it.
+
+    Errors that are too small to be told from that of the motion in continuous time have no row.
+
+    Parameters
+    ----------
+    rows : the table alternatives
+    limits : relative errors
+    """
+    found = []
+    for labels, case in rows.groupby(["scene", "vertices", "stiffness"], sort=False):
+        named = dict(zip(("scene", "vertices", "stiffness"), labels, strict=True))
+        for reference in REFERENCES:
+            timed_rows = case[case.ms_per_frame.notna()]
+            known = timed_rows.assign(error=timed_rows[f"error_{reference}"])
+            for limit in limits:
+                if reference == "continuous" and not KNOWN * case.reference_error.max() <= limit:
+                    continue
+                row = {**named, "reference": reference, "limit": limit}
+                found.append({**row, **_best(known, limit)})
+    return pd.DataFrame(found, columns=winners.column_names)
+
+
+def _best(rows: pd.DataFrame, limit: float) -> dict[str, object]:
+    """Who reaches ``limit`` first, second and reduced; what nobody does is left out."""
+    reaching = rows[rows.error <= limit].sort_values("ms_per_frame", kind="stable")
+    full, reduced = reaching[reaching.method != REDUCED], reaching[reaching.method == REDUCED]
+    made: dict[str, object] = {"reduced_error": rows.error[rows.method == REDUCED].min()}
+    if len(reduced):
+        made["reduced_ms"] = reduced.ms_per_frame.iloc[0]
+    if len(full):
+        best = full.iloc[0]
+        made |= best[["method", "substeps", "iterations", "error", "ms_per_frame"]].to_dict()
+        if len(reduced):
+            made["reduced_speedup"] = best.ms_per_frame / reduced.ms_per_frame.iloc[0]
+        others = full[full.method != best.method]
+        if len(others):
+            second = others.iloc[0]
+            made |= {"second": second.method, "second_ms": second.ms_per_frame}
+            made["margin"] = second.ms_per_frame / best.ms_per_frame
+    return made

@@ -1,0 +1,129 @@
+"""Rule alternatives: errors against both references, and the tables of the rows."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from conftest import make_scene
+from pdrom.core.errors import ConfigurationError
+from pdrom.core.paths import File
+from pdrom.core.store import read_table
+from pdrom.core.yamlfile import validate
+from pdrom.experiments.alternatives import experiment
+from pdrom.experiments.alternatives.settings import Alternatives, Comparison
+from pdrom.tables.alternatives import alternatives
+from pdrom.tables.winners import winners
+
+EFFECTS = (
+    {"effect": "gravity"},
+    {"effect": "pins", "select": "left"},
+    {"effect": "spring", "weight": 1e4},
+)
+STEPS = {
+    "projective": ((1, 5), (1, 2000), (8, 1)),
+    "newton": ((1, 20),),
+    "explicit": ((1, 1), (64, 1)),
+    "ecsw": ((1, 10), (4, 2)),
+}
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    mesh = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
+    scene = make_scene(*EFFECTS, mesh=mesh, frames=8, held_out={"kick": 0.5})
+    path = tmp_path_factory.mktemp("alternatives") / "x1.csv"
+    settings = experiment.Settings(
+        scene=scene.config,
+        alternatives=Comparison(
+            compared=6,
+            stiffness={"test": (1.0, 4.0)},
+            steps=STEPS,
+            k=4,
+            frames=2,
+            warmup=0,
+            repeats=1,
+        ),
+        blowup_extent=100.0,
+    )
+    output = experiment.Outputs(File(str(path), {"scene": "test", "factor": "1"}))
+    experiment.run(settings, experiment.Inputs([]), output)
+    return path
+
+
+def test_rows_of_a_scene(written):
+    table = read_table(written)
+    assert table.columns.tolist() == experiment.COLUMNS
+    assert len(table) == 2 * (1 + sum(map(len, STEPS.values())))
+    case = table[table.stiffness == 1.0].set_index(["method", "substeps", "iterations"])
+    # many iterations end at the implicit step, many explicit steps in continuous time
+    assert case.error_implicit["newton", 1, 20] < 1e-4
+    assert case.error_implicit["projective", 1, 2000] < 1e-4
+    assert case.error_continuous["explicit", 64, 1] < 1e-3
+    own = table[(table.method == "converged") & (table.stiffness == 1.0)].iloc[0]
+    assert own.error_implicit == 0.0
+    assert own.error_continuous > 1e-3
+    assert case.error_continuous["newton", 1, 20] == pytest.approx(own.error_continuous, rel=1e-2)
+    assert case.elements_sampled["ecsw", 1, 10] > 0
+    timed = table[table.method != "converged"]
+    assert (timed.ms_per_frame > 0.0).all()
+
+
+def test_a_finer_mesh_has_the_mass_of_the_scene():
+    config = make_scene(*EFFECTS, mesh={"kind": "cloth", "rows": 6, "columns": 5}).config
+    finer = experiment.sized(config, 2.0, 10.0)
+    mesh = finer.mesh.build(experiment.Path())
+    assert finer.vertex_mass * mesh.vertices == pytest.approx(30 * config.vertex_mass)
+    weights = [getattr(effect, "weight", None) for effect in finer.effects]
+    assert weights == [None, None, 1e5]
+
+
+def test_tables_of_the_rows(written):
+    table = alternatives([File(str(written), {"scene": "test", "factor": "1"})])
+    found = winners(table, [1.0, 1e-3, 1e-12])
+    assert len(found) == 2 * (3 + 2)
+    assert len(winners(alternatives([]), [0.1])) == 0
+    strict = found[(found.limit == 1e-3) & (found.reference == "continuous")]
+    assert (strict.method == "explicit").all()
+    assert found[found.limit == 1e-12].method.isna().all()
+
+
+def test_winners_are_the_cheapest_that_reach_the_error():
+    rows = pd.DataFrame(
+        [
+            ("a", 1.0, 0.05), ("b", 2.0, 0.005), ("a", 3.0, 0.004), ("ecsw", 0.5, 0.02),
+            ("c", 0.1, np.nan), ("converged", np.nan, 0.0),
+        ],
+        columns=["method", "ms_per_frame", "error_implicit"],
+    ).assign(
+        scene="s", vertices=9, stiffness=1.0, substeps=1, iterations=1,
+        error_continuous=lambda t: t.error_implicit, reference_error=1e-2,
+    )  # fmt: skip
+    found = winners(rows, [0.1, 0.01]).set_index(["reference", "limit"])
+    loose, strict = found.loc[("implicit", 0.1)], found.loc[("implicit", 0.01)]
+    assert (loose.method, loose.second, loose.margin, loose.reduced_speedup) == ("a", "b", 2.0, 2.0)
+    assert (strict.method, strict.second, strict.margin) == ("b", "a", 1.5)
+    assert pd.isna(strict.reduced_ms)
+    # the motion in continuous time is not known well enough for the smaller error
+    assert ("continuous", 0.1) in found.index
+    assert ("continuous", 0.01) not in found.index
+    assert strict.reduced_error == 0.02
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"steps": {"newtn": [[1, 1]]}}, "unknown method 'newtn'.*newton"),
+        ({"steps": {"newton": [[0, 1]]}}, "newton"),
+        ({"stiffness": {"s": [0.0]}}, "stiffness"),
+    ],
+)
+def test_faulty_settings_are_refused(changes, message):
+    with pytest.raises(ConfigurationError, match=message):
+        validate(Alternatives, changes, "here")
+
+
+def test_a_method_is_left_out_on_large_meshes():
+    asked = Comparison(largest={"newton": 100})
+    assert asked.takes("newton", 100)
+    assert not asked.takes("newton", 101)
+    assert asked.takes("xpbd", 10**6)
