@@ -211,7 +211,7 @@ SCENE_CASES = [
           "held_out.frames_factor = 1e+308"),
     scene("held-out kick of no axis", "kick: 0.5", "kick: 0.5, kick_axes: []", "kick_axes = []"),
     scene("mesh of no kind", "kind: cloth, ", "", "mesh", "kind"),
-    scene("mesh of unknown kind", "kind: cloth", "kind: sphere", "mesh", "'cloth', 'bar', 'file'"),
+    scene("mesh of unknown kind", "kind: cloth", "kind: sphere", "mesh", "'cloth', 'bar', 'disc'"),
     scene("sheet of one row", "rows: 5", "rows: 1", "mesh.cloth.rows = 1", "equal to 2"),
     scene("sheet of too many rows", "rows: 5", "rows: 100000", "mesh.cloth.rows = 100000"),
     scene("sheet of too many vertices", "rows: 5, columns: 4", "rows: 2000, columns: 2000",

@@ -119,6 +119,9 @@ def test_no_projection_is_larger_than_its_bound(group, rng):
     scene = make_scene({"effect": group, "weight": 1.0}, mesh=GROUPS[group])
     g = scene.group(group)
     largest = largest_projections(g, scene.mesh.points)
+    if largest is None:
+        assert g.manifold == "size", "only what keeps its size may become as long as it likes"
+        return
     for spread in (1e-3, 1.0, 1e3):
         q = scene.mesh.points + spread * rng.standard_normal(scene.mesh.points.shape)
         g.begin_frame(q)

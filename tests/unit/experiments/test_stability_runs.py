@@ -90,7 +90,7 @@ def study(tmp_path_factory) -> Made:
     subspaces.run(
         subspaces.Settings(scene=scene, subspace=asked, blowup_extent=100.0),
         subspaces.Inputs(grid, *runs.values()),
-        subspaces.Outputs(models, *tables.values()),
+        subspaces.Outputs(models, *tables.values(), file("seconds.csv")),
     )
     return Made(scene, folder, grid, runs, bases, samplings, models, tables)
 
