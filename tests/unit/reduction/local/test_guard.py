@@ -53,7 +53,8 @@ class Case:
         masses = np.ones(chosen.shape[1])
         spec = PRESETS[method]
         basis = compute_basis(chosen, masses, 0.0, self.group.rows_per_element, spec)
-        r = basis.rank if r is None else r
+        # elements that keep their size hardly leave it here: few modes
+        r = basis.rank if r is None else min(r, basis.rank)
         return Reduction(basis, select(basis, spec, r), spec, r)
 
     def run(self, reduction: Reduction, **settings):
