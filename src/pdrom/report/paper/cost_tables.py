@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 import pandas as pd
 
 from pdrom.report.paper.macros import format_number
-from pdrom.report.paper.tabular import longtable, name, tabular
+from pdrom.report.paper.tabular import name, tabular
 from pdrom.report.words.text import escape
 
 Tables = Mapping[str, pd.DataFrame]
@@ -31,7 +31,7 @@ def iterations(tables: Tables) -> str:
     titles = [
         f"$K = {count}$" + (", accelerated" if method != "fom" else "") for method, count in _RUNS
     ]
-    return longtable(["scene", *titles], rows, "l" + "r" * len(_RUNS))
+    return tabular(["scene", *titles], rows, "l" + "r" * len(_RUNS))
 
 
 def positions(tables: Tables) -> str:
@@ -48,7 +48,7 @@ def positions(tables: Tables) -> str:
         "scene", "all", "held out", "sampled", "held out", "elements", "speed-up", "interpolated",
         "hrpd", "skinning, all",
     ]  # fmt: skip
-    return longtable(header, rows, "l" + "r" * 9)
+    return tabular(header, rows, "l" + "r" * 9)
 
 
 def _of_subspaces(runs: pd.DataFrame, heldout: pd.DataFrame) -> list[str]:
@@ -94,7 +94,7 @@ def break_even(tables: Tables) -> str:
         rows.append([name(scene), escape(group.replace("_", " ")), str(int(vertices)), *cells])
     titles = [f"{escape(method)}, {n}" for method in _METHODS for n in (1, 2)]
     narrow = r">{\raggedleft\arraybackslash}p{1.2cm}"
-    return longtable(["scene", "group", "vertices", *titles], rows, "llr" + narrow * len(titles))
+    return tabular(["scene", "group", "vertices", *titles], rows, "llr" + narrow * len(titles))
 
 
 def _break_even(part: pd.DataFrame) -> str:
