@@ -120,7 +120,8 @@ def test_no_projection_is_larger_than_its_bound(group, rng):
     g = scene.group(group)
     largest = largest_projections(g, scene.mesh.points)
     if largest is None:
-        assert g.manifold == "size", "only what keeps its size may become as long as it likes"
+        # what keeps its size may become as long as it likes; a group need not name its manifold
+        assert g.manifold in ("size", None)
         return
     for spread in (1e-3, 1.0, 1e3):
         q = scene.mesh.points + spread * rng.standard_normal(scene.mesh.points.shape)
