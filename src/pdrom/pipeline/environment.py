@@ -1,4 +1,8 @@
-"""Environment variables of the jobs: none that the user has set may change a result."""
+"""Environment variables of the jobs: none that the user has set may change a result.
+
+Who wants to see how far results depend on such settings names those that are to stay:
+``PDROM_KEEP="OPENBLAS_CORETYPE" OPENBLAS_CORETYPE=Nehalem ./reproduce``.
+"""
 
 import os
 import platform
@@ -13,6 +17,8 @@ CLEARED = (
 )  # fmt: skip
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 KEPT = ("NUMBA_CACHE_DIR", "MPLCONFIGDIR", "PYTHON", "PYTHONPATH", "PYTHONDONTWRITEBYTECODE")
+# Names of further variables to keep, and to leave as they are.
+KEEP = "PDROM_KEEP"
 # Date in the manuscript and the figures, so that equal ones are equal bytes: 1 January 2026.
 DATE = "1767225600"
 
@@ -20,14 +26,17 @@ DATE = "1767225600"
 def settled(environment: Mapping[str, str], kernels: str | None) -> dict[str, str]:
     """An environment without inherited settings, and with those of this project.
 
+    What the variable ``PDROM_KEEP`` names is neither cleared nor set.
+
     Parameters
     ----------
     kernels : OpenBLAS's name of the kernels to use, None leaves the choice to it
     """
+    asked = environment.get(KEEP, "").split()
     kept = {
         name: value
         for name, value in environment.items()
-        if name in KEPT or not name.startswith(CLEARED)
+        if name in (*KEPT, *asked) or not name.startswith(CLEARED)
     }
     fixed = {
         **dict.fromkeys(THREADS, "1"),
@@ -37,7 +46,9 @@ def settled(environment: Mapping[str, str], kernels: str | None) -> dict[str, st
         "SOURCE_DATE_EPOCH": DATE,
         "FORCE_SOURCE_DATE": "1",
     }
-    return {**kept, **fixed, **({"OPENBLAS_CORETYPE": kernels} if kernels else {})}
+    if kernels:
+        fixed["OPENBLAS_CORETYPE"] = kernels
+    return kept | {name: value for name, value in fixed.items() if name not in asked}
 
 
 def settle() -> None:

@@ -2,8 +2,8 @@
 
 ``python -m pdrom.pipeline.front`` does what the console command ``snakemake`` does, after the
 arguments were completed and the configuration files were checked. ``scene`` as the first argument
-names what is made of one scene, ``test`` hands the others to pytest, and ``run`` starts a program
-of the environment.
+names what is made of one scene, ``verify`` compares what was made with what is expected, ``test``
+hands the others to pytest, and ``run`` starts a program of the environment.
 """
 
 import os
@@ -26,6 +26,9 @@ from pdrom.pipeline.last_run import recall
 OPTIONS = ("--scheduler", "greedy", "--max-jobs-per-timespan", "1000/20s", "--rerun-incomplete")
 
 LINES = ("--logger", "pdrom")
+
+# First arguments that hand the others on, with the modules that get them.
+HANDED_ON = {"test": "pytest", "verify": "pdrom.verification"}
 
 
 def completed(arguments: Sequence[str]) -> list[str]:
@@ -87,8 +90,9 @@ def _start(command: Sequence[str]) -> NoReturn:
 def main() -> None:
     """Run Snakemake or the tests; end the process with their status."""
     settle()
-    if sys.argv[1:2] == ["test"]:
-        os.execv(sys.executable, [sys.executable, "-m", "pytest", *sys.argv[2:]])
+    if sys.argv[1:2] and sys.argv[1] in HANDED_ON:
+        module = HANDED_ON[sys.argv[1]]
+        os.execv(sys.executable, [sys.executable, "-m", module, *sys.argv[2:]])
     if sys.argv[1:2] == ["run"]:
         _start(sys.argv[2:])
     from snakemake.cli import main as snakemake

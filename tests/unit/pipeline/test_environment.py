@@ -39,6 +39,16 @@ def test_threads_locale_and_kernels_are_fixed():
     assert "OPENBLAS_CORETYPE" not in settled(INHERITED, None)
 
 
+def test_what_is_asked_for_is_kept_as_it_is():
+    asked = INHERITED | {"PDROM_KEEP": "OPENBLAS_CORETYPE OMP_NUM_THREADS NUMBA_CPU_NAME"}
+    made = settled(asked, "Haswell")
+    assert made["OPENBLAS_CORETYPE"] == "Prescott"
+    assert made["OMP_NUM_THREADS"] == "7"
+    assert "NUMBA_CPU_NAME" not in made
+    assert "MKL_CBWR" not in made
+    assert made["OPENBLAS_NUM_THREADS"] == "1"
+
+
 @pytest.mark.parametrize(
     ("machine", "flags", "expected"),
     [

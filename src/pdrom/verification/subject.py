@@ -1,0 +1,65 @@
+"""What is verified: the results of one configuration, that of the last run unless one is named."""
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from snakemake.cli import parse_config
+from snakemake.settings.types import ConfigSettings
+from snakemake.utils import update_config
+
+from pdrom.core.yamlfile import read_yaml
+from pdrom.pipeline.commandline import CommandLine
+from pdrom.pipeline.configfiles import check_files
+from pdrom.pipeline.folders import DEFAULT, Folders, folders
+from pdrom.pipeline.last_run import recall
+from pdrom.pipeline.plan import Plan, load_plan
+
+
+@dataclass(frozen=True)
+class Subject:
+    """Results of a configuration.
+
+    options : those of the command line that name the configuration
+    """
+
+    options: tuple[str, ...]
+    folders: Folders
+
+    @classmethod
+    def of(cls, configfiles: Sequence[str], settings: Sequence[str]) -> "Subject":
+        """Of this configuration, else of that of the last run.
+
+        Raises
+        ------
+        ConfigurationError
+            A configuration file is missing or no mapping.
+        """
+        files = ["--configfile", *configfiles] if configfiles else []
+        options = [*files, *(["--config", *settings] if settings else [])] or recall()
+        command = CommandLine.parse(options)
+        check_files([DEFAULT, *command.configfiles])
+        return cls(tuple(options), folders(command.configfiles, command.settings))
+
+    @property
+    def results(self) -> str:
+        """Folder of the results."""
+        return self.folders.results
+
+    def command(self, *targets: str) -> str:
+        """What makes some targets of this configuration, or all of it."""
+        ends = ["--", *targets] if targets and self.options else targets
+        return shlex.join(["./reproduce", *self.options, *ends])
+
+    @cached_property
+    def plan(self) -> Plan:
+        """Plan of the configuration, as Snakemake merges it."""
+        command = CommandLine.parse(self.options)
+        merged = dict(read_yaml(Path(DEFAULT)))
+        given = ConfigSettings(
+            config=parse_config(command.settings), configfiles=list(map(Path, command.configfiles))
+        )
+        update_config(merged, given.overwrite_config)
+        return load_plan(merged, Path(), command.configfiles, self.results, quiet=True)
