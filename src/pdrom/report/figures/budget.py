@@ -11,7 +11,7 @@ FIGURE = Declaration(
         "Filled markers: reduced models, or the full-order run stopped earlier, against the "
         "scene's own full-order run. Hollow markers: the full-order run with the best number $K$ "
         "of iterations that fits, against the converged run. The two errors have different "
-        "references."
+        "references. A mark on the left rim stands for an error at it or below."
     ),
     reads=(TableOf("budget"),),
     options=Scenes,

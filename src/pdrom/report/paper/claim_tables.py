@@ -21,7 +21,7 @@ def claims(tables: Tables) -> str:
         rows.append([row.claim, escape(row.paper), *cells, name(row.figure_or_table)])
     header = ["claim", "the preprint says", "as published", "beyond", "shown in"]
     left = r">{\raggedright\arraybackslash}"
-    return longtable(header, rows, rf"l{left}p{{3.4cm}}{left}p{{3.5cm}}{left}p{{3.5cm}}l")
+    return longtable(header, rows, rf"l{left}p{{3.2cm}}{left}p{{3.4cm}}{left}p{{3.4cm}}l")
 
 
 def _verdict(verdict: str, measured: str) -> str:

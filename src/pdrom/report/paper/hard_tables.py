@@ -18,19 +18,13 @@ def hard_cases(tables: Tables) -> str:
     """Hard cases in which some reduction fails: what makes them hard, and how each one fails."""
     table = tables["hard_cases"]
     failed = table[table.outcome.isin(FAILURES)]
-    reductions = list(dict.fromkeys(failed.method))
     rows = []
     for case, part in failed.groupby("case", sort=False):
-        by = {row.method: row for row in part.itertuples()}
-        cells = [_failure(by[m]) if m in by else "--" for m in reductions]
-        rows.append([name(case), escape(CASES[case].why), *cells])
-    header = ["case", "why it is hard", *map(name, reductions)]
+        how = [f"{name(row.method)}: {_failure(row)}" for row in part.itertuples()]
+        rows.append([name(case), escape(CASES[case].why), r" \newline ".join(how)])
     left = r">{\raggedright\arraybackslash}"
-    # all of it fits the width of the text
-    why, other = (5.2, 2.6) if len(reductions) < 3 else (2.8, 7.0 / len(reductions))
-    return longtable(
-        header, rows, rf"l{left}p{{{why}cm}}" + f"{left}p{{{other:.2f}cm}}" * len(reductions)
-    )
+    header = ["case", "why it is hard", "how each reduction fails"]
+    return longtable(header, rows, rf"l{left}p{{4.6cm}}{left}p{{6.0cm}}")
 
 
 def _failure(row: Any) -> str:

@@ -46,7 +46,7 @@ def methods(tables: Tables) -> str:
         for row in tables["methods"].itertuples()
     ]
     header = ["method", "title", "centring", "rows", "selection", "samples", "solve"]
-    return tabular(header, rows, "lllllll")
+    return tabular(header, rows, r"l>{\raggedright\arraybackslash}p{3.3cm}lllll")
 
 
 def _samples(row: Any) -> str:

@@ -329,9 +329,9 @@ def test_hard_cases_show_failures_only():
     torn, kicked, folded = rows(TEX_TABLES["tab_hard_cases"](TABLES))
     assert r"\texttt{deim\_x}" in TEX_TABLES["tab_hard_cases"](TABLES)
     assert "pod" not in TEX_TABLES["tab_hard_cases"](TABLES)
-    assert torn.endswith(r"and lets go & singular \\")
-    assert kicked.endswith(r"& blow-up, 7; gain 25 \\")
-    assert folded.endswith(r"& 4\,$\times$ the extent; gain 25 \\")
+    assert torn.endswith(r"and lets go & \texttt{deim\_x}: singular \\")
+    assert kicked.endswith(r"& \texttt{deim\_x}: blow-up, 7; gain 25 \\")
+    assert folded.endswith(r"& \texttt{deim\_x}: 4\,$\times$ the extent; gain 25 \\")
 
 
 def test_hard_reductions_count_outcomes():

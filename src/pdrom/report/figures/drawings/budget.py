@@ -87,7 +87,7 @@ def _draw_budget(
         if CONVERGED in part.index and pd.notna(part.method[CONVERGED]):
             best = part.loc[CONVERGED]
             x = clipped(np.array([best.relative_error_within_horizon]), LOW, HIGH)
-            ax.plot(x, [y + 0.27], markersize=3.6, **_FOM)
+            ax.plot(x, [y + 0.27], markersize=3.6, clip_on=False, **_FOM)
             _name(ax, x[0], y + 0.27, f"K={best.iterations:.0f}", style.FAILED)
 
 
@@ -99,7 +99,8 @@ def _draw_best(ax: Axes, y: int, best: pd.Series, styles: dict[str, tuple[str, s
     else:
         colour, marker = styles[best.model]
         x = clipped(np.array([best.relative_error_within_horizon]), LOW, HIGH)
-        ax.plot(x, [y - 0.1], color=colour, marker=marker, markersize=5.0, linestyle="none")
+        look = {"color": colour, "marker": marker, "linestyle": "none"}
+        ax.plot(x, [y - 0.1], markersize=5.0, clip_on=False, **look)
         _name(ax, x[0], y - 0.1, _setting(best), "#333333")
 
 
