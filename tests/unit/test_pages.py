@@ -12,9 +12,11 @@ from pdrom.model.mesh.selection import KINDS
 from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.front import completed
 from pdrom.reduction.method import MethodSpec
+from pdrom.report.figures.kit.outcomes import LOOKS
 from places import ROOT
 
 PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "docs").rglob("*.md")])
+ADDING = ROOT / "docs" / "adding.md"
 NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
 # Examples of names that a reader chooses.
 EXAMPLES = {"config/scenes/my_sheet.yaml"}
@@ -66,8 +68,8 @@ def test_commands_are_understood(command: str, monkeypatch: pytest.MonkeyPatch) 
     assert completed(shlex.split(command.replace("my_sheet", "spring_oop")))
 
 
-def test_the_readmes_scene_and_method_are_valid() -> None:
-    blocks = re.findall(r"```yaml\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
+def test_the_scene_and_the_method_that_are_added_are_valid() -> None:
+    blocks = re.findall(r"```yaml\n(.*?)```", ADDING.read_text("utf-8"), re.DOTALL)
     scene, methods = map(yaml.safe_load, blocks)
     assert SceneConfig.model_validate(scene).groups == ["spring"]
     assert [MethodSpec.model_validate(method).rows for method in methods.values()] == ["scalar"]
@@ -85,10 +87,32 @@ def test_the_effects_of_the_registry_are_listed_with_their_keys_and_what_a_subsp
         )
 
 
-def test_the_readme_lists_the_effects_of_the_registry() -> None:
-    text = (ROOT / "README.md").read_text("utf-8")
+def test_the_effects_of_the_registry_are_listed_for_who_adds_a_scene() -> None:
+    text = ADDING.read_text("utf-8")
     (sentence,) = re.findall(r"^Effects: (.*?)\.\n", text, re.MULTILINE | re.DOTALL)
     assert sorted(re.findall(r"`(\w+)`", sentence)) == sorted(EFFECTS)
+
+
+def test_the_readme_is_short() -> None:
+    assert len((ROOT / "README.md").read_text("utf-8").splitlines()) <= 110
+
+
+def test_the_classes_of_runs_are_explained() -> None:
+    text = (ROOT / "docs" / "reading.md").read_text("utf-8")
+    table = text.split("## How a run ended")[1].split("##")[0]
+    assert re.findall(r"^\| ([a-z -]+) \| ", table, re.MULTILINE)[1:] == list(LOOKS)
+
+
+def test_the_messages_that_are_explained_exist() -> None:
+    """Their fixed parts; what stands for others is written in capitals or as three dots."""
+    files = [ROOT / "reproduce", *(ROOT / "src" / "pdrom").rglob("*.py")]
+    sources = "\n".join(path.read_text("utf-8") for path in files)
+    sources = re.sub(r'"\s*\n\s*f?"', "", sources)  # a text over several lines
+    page = (ROOT / "docs" / "messages.md").read_text("utf-8")
+    messages = re.findall(r"^\| `([^`]+)` \|", page, re.MULTILINE)
+    assert len(messages) > 10
+    fixed = [part.strip() for text in messages for part in re.split(r"\.\.\.|\b[A-Z]+\b", text)]
+    assert [part for part in fixed if part not in sources] == []
 
 
 def test_every_kind_of_selection_is_listed() -> None:

@@ -2,8 +2,9 @@
 
 ``python -m pdrom.pipeline.front`` does what the console command ``snakemake`` does, after the
 arguments were completed and the configuration files were checked. ``scene`` as the first argument
-names what is made of one scene, ``verify`` compares what was made with what is expected, ``test``
-hands the others to pytest, and ``run`` starts a program of the environment.
+names what is made of one scene, ``figure`` figures by their number in the paper; ``verify``
+compares what was made with what is expected, ``test`` hands the others to pytest, and ``run``
+starts a program of the environment.
 """
 
 import os
@@ -38,13 +39,17 @@ def completed(arguments: Sequence[str]) -> list[str]:
     ------
     ConfigurationError
         A configuration file is missing or no mapping; a target was taken for an option's value;
-        there is no such scene.
+        there is no such scene or figure.
     """
     if arguments[:1] == ["scene"]:
         # late: it loads the whole package
         from pdrom.pipeline.scene_command import scene_arguments
 
         arguments = scene_arguments(arguments[1:])
+    elif arguments[:1] == ["figure"]:
+        from pdrom.pipeline.figure_command import figure_arguments
+
+        arguments = figure_arguments(arguments[1:])
     command = CommandLine.parse(arguments)
     if command.report and not command.configfiles and not command.settings and recall():
         _say(f"a report of the last run, {' '.join(recall())}")

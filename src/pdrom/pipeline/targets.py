@@ -9,6 +9,7 @@ from typing import Protocol
 from pdrom.core import paths
 from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.paths import RESULTS, Place
+from pdrom.pipeline.figure_command import WORD
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.holdings import HELD, paths_of
 from pdrom.pipeline.plan import Plan
@@ -17,6 +18,7 @@ from pdrom.pipeline.tables import all_tables
 from pdrom.report.scenes.catalogue import default_files
 
 SCENE = re.compile(rf"{RESULTS}/scenes/([a-z][a-z0-9_]*)/?")
+FIGURE = re.compile(rf"{WORD} (\w+)")
 PLACES = [place for place in vars(paths).values() if isinstance(place, Place)]
 
 
@@ -45,8 +47,11 @@ class Names:
         """What is to be made for a target; itself unless it is a name.
 
         A file below ``results`` is the study's own, wherever that has its results; the folder of a
-        scene stands for what is made of it by default.
+        scene stands for what is made of it by default, ``figure NAME`` for that figure alone.
         """
+        figure = FIGURE.fullmatch(target)
+        if figure and figure[1] in self.figures:
+            return [paths.FIGURE.at(folders.results, name=figure[1])]
         of_scene = SCENE.fullmatch(target)
         if of_scene:
             return default_files(folders.results, of_scene[1])

@@ -34,6 +34,26 @@ def test_names_become_files_and_it_is_said(capsys):
     assert capsys.readouterr().err == f"reproduce: scaling: {', '.join(made)}\n"
 
 
+@pytest.mark.parametrize("asked", ["8", "reconstruction_error"])
+def test_a_figure_has_its_number_or_its_name(asked, capsys):
+    made = "results/figures/reconstruction_error.pdf"
+    assert completed(["figure", asked, "-n"]) == ["-n", "--cores", "all", *OPTIONS, "--", made]
+    assert capsys.readouterr().err == f"reproduce: figure reconstruction_error: {made}\n"
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ([], r"figure: its number or name is missing \(allowed: 1, .*9, snapshots_and_modes"),
+        (["10"], r"figure 10: there is none \(allowed: 1, 2, 3,"),
+        (["strain_run"], "figure strain_run: .*did you mean 'strain_runs'"),
+    ],
+)
+def test_an_unknown_figure_says_which_there_are(asked, message):
+    with pytest.raises(ConfigurationError, match=message):
+        completed(["figure", *asked])
+
+
 def test_a_faulty_configuration_file_is_named_before_snakemake_reads_it():
     with pytest.raises(ConfigurationError, match=r"none\.yaml: no such configuration file"):
         completed(["--configfile", "none.yaml"])

@@ -30,6 +30,12 @@ TINY = Folders("results/studies/tiny", "results/studies/tiny/paper/main.pdf")
         ("results/studies/tiny/x", ["results/studies/tiny/x"], ["results/studies/tiny/x"]),
         ("paper/main.pdf", ["paper/main.pdf"], ["results/studies/tiny/paper/main.pdf"]),
         ("figure_floor", ["figure_floor"], ["figure_floor"]),
+        (
+            "figure scaling",
+            ["results/figures/scaling.pdf"],
+            ["results/studies/tiny/figures/scaling.pdf"],
+        ),
+        ("figure none", ["figure none"], ["figure none"]),
     ],
 )
 def test_files_of_a_target(target, default, tiny):
