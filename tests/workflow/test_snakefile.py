@@ -10,9 +10,11 @@ import pytest
 import yaml
 from checkout import Checkout, copy_repository
 
+from pdrom.pipeline.graph import Graph
 from pdrom.pipeline.running import hold
 from pdrom.pipeline.tables import all_tables
 from pdrom.report.figures.kit.catalogue import declarations
+from pdrom.verification.subject import Subject
 from places import MICRO_MANUSCRIPT, MICRO_RESULTS
 
 MICRO = {
@@ -67,6 +69,20 @@ def finished(finished_once: Checkout) -> Iterator[Checkout]:
         if path.read_bytes() != content:
             path.write_bytes(content)
             os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+
+
+def test_the_graph_of_the_plan_is_snakemakes(
+    finished: Checkout, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done = finished.snakemake("-n", "--summary", *MICRO_ARGUMENTS)
+    rows = [line.split("\t") for line in done.stdout.splitlines() if "\t" in line]
+    monkeypatch.chdir(finished.folder)
+    plan = Subject.of([MICRO_FILE], []).plan
+    needed = Graph(plan, MICRO_MANUSCRIPT).needed([MICRO_MANUSCRIPT])
+    # columns: file, date, rule, log
+    assert {(file, job.rule, job.log) for job in needed for file in job.outputs} == {
+        (row[0], row[2], row[3]) for row in rows[1:]
+    }
 
 
 def test_a_fresh_clone_plans_the_whole_study(clean: Checkout) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from pdrom.core.errors import PdromError
+from pdrom.core.usage import Meter
 
 INTERRUPTED = 130  # exit status of a program that ends by Ctrl-C
 FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
@@ -32,8 +33,9 @@ def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
 
     A `PdromError` (a user's mistake) ends the job with one line on stderr; any other exception
     keeps its traceback in the log and one line on stderr that says where to look. Lack of memory or
-    of space on the disk is said in words.
+    of space on the disk is said in words. The last line of a job that ends well says what it used.
     """
+    meter = Meter()
     logger = logging.getLogger("pdrom")
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
@@ -47,6 +49,7 @@ def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
     try:
         with threadpool_limits(limits=1):
             yield logger
+        logger.info("%s", meter.read())
     except PdromError as error:
         logger.error("%s", error)
         sys.exit(f"pdrom: {error}")

@@ -1,0 +1,123 @@
+"""What each entry of the claim map takes, measured by the jobs of a run: results/claim_map.csv."""
+
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from pdrom.core.machine import Machine
+from pdrom.core.paths import MACHINE, RESULTS, TABLE, Place
+from pdrom.core.store import Condition, check_file, read_table, write_table
+from pdrom.core.usage import MB, Usage, usage_of
+from pdrom.pipeline.commandline import CommandLine
+from pdrom.pipeline.folders import DEFAULT, Folders
+from pdrom.pipeline.graph import Graph
+from pdrom.pipeline.last_run import recall
+from pdrom.pipeline.plan import Plan
+from pdrom.verification.claim_map.entries import Entry, entries
+
+MAP = Place("claim_map.csv")
+COLUMNS = (
+    "kind", "name", "rule", "target", "command", "jobs", "minutes", "minutes_alone", "memory",
+    "disk", "verdict", "verdict_beyond", "configuration", "machine",
+)  # fmt: skip
+
+
+def write_after(command: CommandLine, plan: Plan, folders: Folders) -> None:
+    """Write the map of a run that has made everything; one with targets leaves it as it is."""
+    if not command.targets:
+        configuration = " ".join([*command.configfiles, *command.settings]) or DEFAULT
+        made = claim_map(plan, folders, recall(), configuration)
+        write_table(made, MAP.at(folders.results))
+
+
+def claim_map(
+    plan: Plan, folders: Folders, options: Sequence[str], configuration: str
+) -> pd.DataFrame:
+    """One row per entry.
+
+    ``jobs`` counts all that it needs from nothing, ``minutes`` is their processor time,
+    ``minutes_alone`` that of its own jobs, ``memory`` (MB) the largest of one of them, ``disk``
+    (MB) what they write. A cell is empty where a job was not measured.
+
+    Parameters
+    ----------
+    options : those of the command line that name the configuration
+    configuration : the same in words
+    """
+    graph = Graph(plan, folders.manuscript)
+    logs = {job.log for job in graph.needed([folders.manuscript])}
+    usages = {log: used for log in sorted(logs) if (used := usage_of(log)) is not None}
+    verdicts, machine = _verdicts(folders.results), _machine(folders.results)
+    rows = [
+        {
+            "kind": entry.kind,
+            "name": entry.name,
+            "rule": entry.rule,
+            "target": " ".join(files := _files(entry, folders)),
+            "command": shlex.join(["./reproduce", *entry.words, *options]),
+            **_costs(graph, usages, files),
+            **(verdicts.get(entry.name, {}) if entry.kind == "claim" else {}),
+            "configuration": configuration,
+            "machine": machine,
+        }
+        for entry in entries(plan.root)
+    ]
+    return pd.DataFrame(rows, columns=list(COLUMNS)).round(3)
+
+
+def _files(entry: Entry, folders: Folders) -> list[str]:
+    own = {Folders().manuscript: folders.manuscript}
+    return [own.get(f, folders.results + f.removeprefix(RESULTS)) for f in entry.files]
+
+
+def _costs(graph: Graph, usages: Mapping[str, Usage], files: Iterable[str]) -> dict[str, Any]:
+    own = [job for job in map(graph.maker, files) if job is not None]
+    needed = graph.needed(files)
+    return {
+        "jobs": len(needed),
+        "minutes": _minutes([usages.get(job.log) for job in needed]),
+        "minutes_alone": _minutes([usages.get(job.log) for job in own]),
+        "memory": _memory([usages.get(job.log) for job in needed]),
+        "disk": sum(_size(file) for job in needed for file in job.outputs) / MB,
+    }
+
+
+def _minutes(used: Sequence[Usage | None]) -> float | None:
+    """Processor time of jobs; None if one of them was not measured."""
+    measured = [one.processor for one in used if one is not None]
+    return sum(measured) / 60.0 if len(measured) == len(used) else None
+
+
+def _memory(used: Sequence[Usage | None]) -> float | None:
+    """The most of one job, MB; None if one of them was not measured."""
+    measured = [one.memory for one in used if one is not None]
+    return max(measured) if measured and len(measured) == len(used) else None
+
+
+def _size(file: str) -> int:
+    """Bytes of a file; none of one that a later step has removed."""
+    return Path(file).stat().st_size if Path(file).is_file() else 0
+
+
+def _verdicts(results: str) -> dict[str, dict[str, str]]:
+    path = TABLE.at(results, name="claims")
+    if not _intact(path):
+        return {}
+    kept = ["verdict", "verdict_beyond"]
+    return read_table(path, ["claim", *kept]).set_index("claim")[kept].to_dict("index")
+
+
+def _machine(results: str) -> str:
+    path = MACHINE.at(results)
+    if not _intact(path):
+        return ""
+    found = Machine.model_validate_json(Path(path).read_bytes())
+    return f"{found.cpu}, {found.cores} cores, {found.system}, Python {found.python}"
+
+
+def _intact(path: str) -> bool:
+    """Whether a file is there as it was written; a job sets a damaged one aside, not this."""
+    return Path(path).is_file() and check_file(path) is Condition.INTACT
