@@ -29,6 +29,7 @@ rule paper:
     log:
         f"{PLAN.results}/logs/paper/main.log",
     params:
+        facts=PLAN.paper.facts.model_dump(mode="json"),
         content=PLAN.digest(*PLAN.paper.sources),
         code=PLAN.code("pdrom.report.paper.build"),
     message:

@@ -1,6 +1,9 @@
 from pdrom.core.logs import job_log
+from pdrom.core.provenance import made_by
 from pdrom.experiments.declaration import load
 
-with job_log(snakemake.log[0]):
+settings = snakemake.params.settings
+told = {**settings, "labels": dict(snakemake.wildcards.items())}
+with job_log(snakemake.log[0]), made_by(snakemake.rule, told, snakemake.params.code):
     experiment = load(snakemake.params.module)
-    experiment.perform(snakemake.params.settings, snakemake.input, snakemake.output)
+    experiment.perform(settings, snakemake.input, snakemake.output)

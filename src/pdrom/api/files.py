@@ -10,7 +10,7 @@ import numpy as np
 from pdrom.api.runs import FullRun, ReducedRun, full_run
 from pdrom.api.scenes import bound
 from pdrom.core.errors import StorageError
-from pdrom.core.provenance import attributes
+from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5, write_hdf5
 from pdrom.core.yamlfile import validate
 from pdrom.model.mesh.types import store_mesh, stored_mesh
@@ -23,8 +23,7 @@ def save(reduced: ReducedRun, path: str | os.PathLike[str]) -> None:
     config = reduced.full.scene.config.model_dump(mode="json")
     labels = {"group": reduced.group, "method": reduced.method, "r": reduced.r}
     outcome = reduced.outcome
-    with write_hdf5(path) as file:
-        file.attrs.update(attributes({"scene": config, **labels}))
+    with made_by("pdrom.api.save", {"scene": config, **labels}), write_hdf5(path) as file:
         file.attrs.update(labels | {"gain": reduced.gain, "ms_per_frame": reduced.ms})
         file.attrs["blowup_frame"] = -1 if outcome.blowup_frame is None else outcome.blowup_frame
         store_mesh(reduced.full.scene.mesh, file.create_group("mesh"))

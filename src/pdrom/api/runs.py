@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from pdrom.core.errors import ConfigurationError, SnapshotError, choices
-from pdrom.core.provenance import attributes
+from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5
 from pdrom.model.dynamics.stepper import FrameReport
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
@@ -99,9 +99,9 @@ def run(
     """
     frames = {group: _training_frames(scene, group) for group in scene.config.groups}
     config = scene.config.model_dump(mode="json")
-    metadata = attributes({"scene": config, "run": "train", "solver": DEFAULT_SOLVER})
-    with _place(out) as path:
-        run_full_order(scene, path, frames, metadata, with_mesh=True, on_frame=on_frame)
+    told = {"scene": config, "run": "train", "solver": DEFAULT_SOLVER}
+    with made_by("pdrom.api.run", told), _place(out) as path:
+        run_full_order(scene, path, frames, with_mesh=True, on_frame=on_frame)
         with open_hdf5(path) as file:
             return full_run(scene, file)
 

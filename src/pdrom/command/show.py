@@ -28,6 +28,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     condition = check_file(path)
     lines = [f"{path}: {path.stat().st_size:,} bytes, {condition.value}"]
     lines += _content(path, arguments.configuration)
+    lines += _provenance(path)
     sys.stdout.write("\n".join(lines) + "\n")
     return Status.DONE
 
@@ -59,8 +60,22 @@ def _hdf5(path: Path, whole: bool) -> Iterator[str]:
     configuration = attributes.pop("configuration", None)
     if configuration is not None:
         yield from _configuration(json.loads(configuration), whole)
-    yield "provenance and attributes:"
-    yield from (f"  {name}: {_short(value)}" for name, value in attributes.items())
+    from pdrom.core.provenance import RECORD
+
+    yield "attributes:"
+    own = {k: v for k, v in attributes.items() if k not in RECORD}
+    yield from (f"  {name}: {_short(value)}" for name, value in own.items())
+
+
+def _provenance(path: Path) -> Iterator[str]:
+    """What made the file, by its seal, which is compared with the file, else by what is in it."""
+    from pdrom.core.embedded import embedded
+    from pdrom.core.provenance import RECORD
+    from pdrom.core.store import provenance_of
+
+    record = provenance_of(path) or embedded(path)
+    yield "provenance:" if record else "provenance: unknown (no seal, and nothing inside says it)"
+    yield from (f"  {name}: {record[name]}" for name in RECORD if name in record)
 
 
 def _item(name: str, item: Any) -> Iterator[str]:

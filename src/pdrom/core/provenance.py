@@ -1,8 +1,18 @@
-"""Where a result comes from: configuration, code, libraries."""
+"""Where a result comes from: what made it, with which settings, code and libraries.
+
+A job says once what it is (`made_by`). Whatever `pdrom.core.store` writes meanwhile carries that:
+every file in its seal, HDF5 files, figures and the manuscript inside as well. Nothing in it differs
+between two equal runs: no date, no folder, and no commit, since a commit that changes a word of the
+documentation makes no other result.
+"""
 
 import hashlib
 import json
 import platform
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -10,12 +20,46 @@ from typing import Any
 from pdrom import __version__
 
 LIBRARIES = ("numpy", "scipy", "numba", "h5py", "pandas", "matplotlib", "snakemake")
+# Keys of a record, in the order in which it is told.
+RECORD = (
+    "made_by",
+    "configuration_sha256",
+    "code_sha256",
+    "pdrom_version",
+    "python_version",
+    "library_versions",
+)
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is at work: a rule of the workflow, or a function of the package.
+
+    configuration : canonical JSON of all that it was told
+    code : fingerprint of the code that it runs; empty outside of the workflow
+    """
+
+    name: str
+    configuration: str
+    code: str
+
+
+_AT_WORK: ContextVar[Job | None] = ContextVar("job", default=None)
+
+
+@contextmanager
+def made_by(name: str, configuration: Any, code: str = "") -> Iterator[None]:
+    """What is written meanwhile is made by the job ``name``."""
+    previous = _AT_WORK.set(Job(name, _canonical(configuration), code))
+    try:
+        yield
+    finally:
+        _AT_WORK.reset(previous)
 
 
 def configuration_hash(configuration: Any) -> str:
     """SHA-256 of the canonical JSON of a configuration."""
-    canonical = json.dumps(configuration, sort_keys=True, default=str)
-    return hashlib.sha256(canonical.encode()).hexdigest()
+    return hashlib.sha256(_canonical(configuration).encode()).hexdigest()
 
 
 @cache
@@ -30,13 +74,33 @@ def library_versions() -> dict[str, str]:
     return found
 
 
-def attributes(configuration: Any) -> dict[str, str]:
-    """Attributes for a result file; nothing in them differs between two equal runs."""
+def provenance() -> dict[str, str]:
+    """What made a file that is written now; the part about the job only where there is one."""
+    job = _AT_WORK.get()
+    made = {}
+    if job is not None:
+        hashed = hashlib.sha256(job.configuration.encode()).hexdigest()
+        made = {"made_by": job.name, "configuration_sha256": hashed}
+        made |= {"code_sha256": job.code} if job.code else {}
     return {
-        "configuration": json.dumps(configuration, sort_keys=True, default=str),
-        "configuration_sha256": configuration_hash(configuration),
+        **made,
         "pdrom_version": __version__,
         "python_version": platform.python_version(),
-        "library_versions": json.dumps(library_versions(), sort_keys=True),
-        "units": "SI (m, s, kg)",
+        "library_versions": ", ".join(f"{k} {v}" for k, v in sorted(library_versions().items())),
     }
+
+
+def attributes() -> dict[str, str]:
+    """`provenance` for a file that can also hold the whole configuration (HDF5)."""
+    job = _AT_WORK.get()
+    told = {"configuration": job.configuration} if job is not None else {}
+    return {**told, **provenance(), "units": "SI (m, s, kg)"}
+
+
+def as_text(record: Mapping[str, str]) -> str:
+    """A record in one line, for a text field of a figure or of the manuscript."""
+    return json.dumps(dict(record), sort_keys=True)
+
+
+def _canonical(configuration: Any) -> str:
+    return json.dumps(configuration, sort_keys=True, default=str)

@@ -21,7 +21,6 @@ from pdrom.core.paths import (
     TRAIN,
     File,
 )
-from pdrom.core.provenance import attributes
 from pdrom.core.reads import Every
 from pdrom.core.store import open_hdf5, write_hdf5, write_table
 from pdrom.experiments.declaration import Experiment, JobSettings
@@ -127,9 +126,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
 
 def _store(model: SubspaceModel, settings: Settings, place: File) -> None:
     labels = {"method": "ecsw", "position_basis": model.position_basis, "base": "companion"}
-    asked = settings.companion.model_dump(mode="json")
     with write_hdf5(place.path) as file:
-        file.attrs.update(attributes({"scene": place["scene"], "settings": asked}))
         store_columns(file.create_group("columns/companion"), model.columns)
         store = file.create_group("models/companion")
         store_model(store, {**labels, "k": settings.companion.modes}, model.samples)

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from pdrom.core.paths import FULL_ORDER, MESH, File
-from pdrom.core.provenance import attributes
 from pdrom.experiments.declaration import Experiment, JobSettings
 from pdrom.experiments.scenes import scene_of
 from pdrom.experiments.settings import Solver, Threads
@@ -44,9 +43,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
         group: test_frames(frames) if motion == "heldout" else stored_frames(frames, plan.train)
         for group, plan in scene.config.reduce.items()
     }
-    config = settings.scene.model_dump(mode="json")
-    metadata = attributes({"scene": config, "run": motion, "solver": settings.solver})
-    run_full_order(scene, outputs.run.path, wanted, metadata, settings.solver)
+    run_full_order(scene, outputs.run.path, wanted, settings.solver)
 
 
 EXPERIMENT = Experiment("fom", "Full-order run of {scene} ({run})", run)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from pdrom.core.paths import BASIS, SNAPSHOTS, File
-from pdrom.core.provenance import attributes
 from pdrom.experiments.declaration import Experiment, JobSettings
 from pdrom.reduction.basis import compute_basis, save_basis
 from pdrom.reduction.method import BasisSpec
@@ -39,7 +38,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     spec, data = settings.basis, load_snapshots(inputs.snapshots.path)
     basis = compute_basis(data.train, data.row_mass, data.roundoff, data.rows_per_element, spec)
     log.info("numerical rank %d of %d snapshots", basis.rank, len(data.train))
-    save_basis(basis, outputs.basis.path, attributes(spec.model_dump(mode="json")))
+    save_basis(basis, outputs.basis.path)
 
 
 EXPERIMENT = Experiment("pod", "POD of {group} in {scene} ({basis})", run)

@@ -21,7 +21,6 @@ from pdrom.core.paths import (
     TRAIN,
     File,
 )
-from pdrom.core.provenance import attributes
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.experiments.declaration import Experiment, JobSettings
 from pdrom.experiments.sampling import Sweep, sample
@@ -92,14 +91,11 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     sample(basis, data, method, settings.sweep, settings.ranks, outputs.sampling, outputs.errors)
     labels = outputs.runs.labels
     trained_extent = largest_extent(positions_of(inputs.fom))
-    config = settings.scene.model_dump(mode="json")
-    spec = method.model_dump(mode="json")
     motions = {
         "train": (settings.ranks, inputs.fom, outputs.table),
         "heldout": (settings.heldout_ranks, inputs.heldout, outputs.heldout),
     }
     with write_hdf5(outputs.runs.path) as file:
-        file.attrs.update(attributes({**labels, "spec": spec, "scene": config}))
         for motion, (ranks, fom, table) in motions.items():
             scene = scene_of(settings.scene, inputs.mesh, motion)
             case = _Case(

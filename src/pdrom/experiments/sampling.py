@@ -9,7 +9,6 @@ import pandas as pd
 
 from pdrom.core.metrics import relative_errors
 from pdrom.core.paths import File
-from pdrom.core.provenance import attributes
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.settings import Count
@@ -61,7 +60,6 @@ def sample(
     path = select_path(basis, method, wanted) if wanted else {}
     rows = []
     with write_hdf5(sampling.path) as file:
-        file.attrs.update(attributes({**labels, "spec": method.model_dump(mode="json")}))
         for r in wanted:
             reduction = Reduction(basis, path[r], method, r)
             _store(file, r, path[r], reduction)

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from pdrom.core.paths import HELDOUT, MESH, SNAPSHOTS, TRAIN, File
-from pdrom.core.provenance import attributes
 from pdrom.experiments.declaration import Experiment, JobSettings
 from pdrom.experiments.scenes import scene_of
 from pdrom.model.scene import SceneConfig
@@ -39,8 +38,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     scene = scene_of(settings.scene, inputs.mesh)
     train = training_frames(scene.config.frames, scene.config.reduce[group].train)
     found = collect(inputs.train.path, inputs.heldout.path, scene.group(group), scene.masses, train)
-    metadata = {"scene": settings.scene.model_dump(mode="json"), "group": group}
-    save_snapshots(found, outputs.snapshots.path, attributes(metadata))
+    save_snapshots(found, outputs.snapshots.path)
 
 
 EXPERIMENT = Experiment("snapshots", "Snapshots of {group} in {scene}", run)

@@ -22,7 +22,6 @@ from pdrom.core.paths import (
     TRAIN,
     File,
 )
-from pdrom.core.provenance import attributes
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.declaration import Experiment, JobSettings
@@ -129,10 +128,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     }
     rows: dict[str, list[dict[str, Any]]] = {name: [] for name in RUNS}
     seconds = []
-    asked = settings.subspace.model_dump(mode="json")
-    config = settings.scene.model_dump(mode="json")
     with write_hdf5(outputs.runs.path) as file:
-        file.attrs.update(attributes({"scene": config, "settings": asked}))
         for name, motion in motions.items():
             file[f"displacement/{name}"] = motion.displacement
         start = motions["train"]

@@ -2,7 +2,7 @@
 
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -92,6 +92,12 @@ class CommandLine:
         options = [a for a in self.arguments if a not in (*self.targets, "--")]
         targets = dict.fromkeys(file for target in self.targets for file in made[target])
         return [*options, *more, *(["--", *targets] if targets else [])]
+
+
+def options(configfiles: Iterable[str], settings: Iterable[str]) -> list[str]:
+    """Options of the command line that name a configuration; none for the default one."""
+    files, pairs = list(configfiles), list(settings)
+    return [*(["--configfile", *files] if files else []), *(["--config", *pairs] if pairs else [])]
 
 
 def _texts(values: Any) -> tuple[str, ...]:

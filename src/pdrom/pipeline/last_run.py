@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from pdrom.core.store import atomic_path
-from pdrom.pipeline.commandline import CommandLine
+from pdrom.pipeline.commandline import CommandLine, options
 
 RECORD = Path(".snakemake/last_run.json")
 
@@ -20,10 +20,6 @@ def recall() -> list[str]:
     """Options that name the configuration of the last run; none of the default one or of no run."""
     try:
         record = json.loads(RECORD.read_text(encoding="utf-8"))
-        files, settings = list(record["configfiles"]), list(record["settings"])
+        return options(map(str, record["configfiles"]), map(str, record["settings"]))
     except (OSError, ValueError, KeyError, TypeError):
         return []
-    return [
-        *(["--configfile", *map(str, files)] if files else []),
-        *(["--config", *map(str, settings)] if settings else []),
-    ]

@@ -6,11 +6,12 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from pdrom.core.errors import ConfigurationError, PdromError
-from pdrom.pipeline.commandline import CommandLine
+from pdrom.pipeline.commandline import CommandLine, options
 from pdrom.pipeline.dates import settle_dates
 from pdrom.pipeline.failures import Failures, listen
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.last_run import recall, remember
+from pdrom.pipeline.manifest import write_manifest
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.running import hold, remove_stale_locks
 from pdrom.pipeline.scheduler import cancel_timers
@@ -70,6 +71,10 @@ class Run:
 
     def succeed(self, plan: Plan, folders: Folders) -> None:
         """End a run whose jobs all succeeded: it says what came of it."""
+        try:
+            write_manifest(plan, folders, options(self.command.configfiles, self.command.settings))
+        except PdromError as error:
+            say_last(f"pdrom: {error}\n")
         say_last(summary(self.command, folders, plan.figures, plan.tables.paths))
         stop_server()
         cancel_timers()

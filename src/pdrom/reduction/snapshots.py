@@ -107,10 +107,9 @@ def _read(path: str | os.PathLike[str], group: str) -> tuple[np.ndarray, np.ndar
     return require_finite(f"{path}: snapshots of '{group}'", p, SnapshotError), frames, roundoff
 
 
-def save_snapshots(snapshots: SnapshotSet, path: str | os.PathLike[str], attributes: dict) -> None:
+def save_snapshots(snapshots: SnapshotSet, path: str | os.PathLike[str]) -> None:
     """Write a snapshot set (datasets train, test, heldout, <split>_frames, row_mass)."""
     with write_hdf5(path) as file:
-        file.attrs.update(attributes)
         for split in SPLITS:
             file[split] = getattr(snapshots, split)
             file[f"{split}_frames"] = snapshots.frames[split]

@@ -8,6 +8,7 @@ from pathlib import Path
 from pdrom.core.paths import TABLE
 from pdrom.core.store import Condition, check_file
 from pdrom.pipeline.tables import all_tables
+from pdrom.verification.files import verify_files
 from pdrom.verification.status import Status
 from pdrom.verification.subject import Subject
 
@@ -23,6 +24,7 @@ def parser() -> argparse.ArgumentParser:
     )
     made.add_argument("--configfile", nargs="+", default=[], metavar="FILE")
     made.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE")
+    made.add_argument("--files", action="store_true", help="compare every file with the manifest")
     return made
 
 
@@ -35,7 +37,8 @@ def verify(arguments: Sequence[str]) -> Status:
         The configuration is faulty.
     """
     asked = parser().parse_args(arguments)
-    return _complete(Subject.of(asked.configfile, asked.config))
+    subject = Subject.of(asked.configfile, asked.config)
+    return verify_files(subject) if asked.files else _complete(subject)
 
 
 def _complete(subject: Subject) -> Status:

@@ -68,7 +68,7 @@ def test_the_whole_configuration_is_shown_as_yaml(folder, capsys):
     run(["run", "small.yaml", "--out", "x.h5"])
     capsys.readouterr()
     assert run(["show", "x.h5", "--configuration"]) == Status.DONE
-    text = capsys.readouterr().out.split("configuration:\n")[1].split("provenance")[0]
+    text = capsys.readouterr().out.split("configuration:\n")[1].split("attributes")[0]
     assert yaml.safe_load(text)["scene"]["name"] == "small"
 
 

@@ -1,4 +1,4 @@
-"""Attributes of result files: the same for equal runs, different for different settings."""
+"""Provenance of results: the same for equal jobs, different for different settings."""
 
 import json
 from importlib.metadata import version
@@ -8,6 +8,7 @@ import pytest
 
 from pdrom import __version__
 from pdrom.core import provenance
+from pdrom.core.provenance import made_by
 
 
 def test_hash_does_not_depend_on_the_order_of_keys():
@@ -23,14 +24,26 @@ def test_hash_depends_on_every_value(other):
     assert provenance.configuration_hash(other) != reference
 
 
-def test_attributes_are_repeatable_and_hold_the_configuration():
+def test_attributes_of_a_job_are_repeatable_and_hold_the_configuration():
     configuration = {"scene": "bend_fall", "path": Path("a/b")}
-    first, second = provenance.attributes(configuration), provenance.attributes(configuration)
+    with made_by("fom", configuration, "c0de"):
+        first, second = provenance.attributes(), provenance.attributes()
     assert first == second
     assert json.loads(first["configuration"]) == {"scene": "bend_fall", "path": "a/b"}
     assert first["configuration_sha256"] == provenance.configuration_hash(configuration)
+    assert (first["made_by"], first["code_sha256"]) == ("fom", "c0de")
     assert first["pdrom_version"] == __version__
+    assert f"numpy {version('numpy')}" in first["library_versions"]
     assert all(isinstance(value, str) for value in first.values())
+
+
+def test_a_record_holds_the_declared_keys_and_ends_with_its_job():
+    with pytest.raises(ValueError, match="inside"), made_by("ladder", {}, "c0de"):
+        assert list(provenance.provenance()) == list(provenance.RECORD)
+        raise ValueError("inside")
+    assert set(provenance.RECORD) - set(provenance.provenance()) == {
+        "made_by", "configuration_sha256", "code_sha256",
+    }  # fmt: skip
 
 
 def test_versions_are_those_installed_and_absent_ones_are_said(monkeypatch):

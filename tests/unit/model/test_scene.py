@@ -75,7 +75,7 @@ def test_unlisted_groups_are_never_evaluated():
 
 def test_only_needed_snapshots_are_stored(tmp_path):
     scene = make_scene(SPRING, {"effect": "strain", "weight": 1e5}, frames=6)
-    run(scene, tmp_path / "run.h5", {"strain": np.array([0, 3])}, {})
+    run(scene, tmp_path / "run.h5", {"strain": np.array([0, 3])})
     with open_hdf5(tmp_path / "run.h5") as file:
         assert set(file["snapshots"]) == {"strain"}
         assert file["snapshots/strain/p"].shape == (2, 2 * scene.group("strain").elements, 3)
@@ -87,7 +87,7 @@ def test_stored_snapshot_is_the_projection_of_the_last_iterate(tmp_path):
     """Replay frame 3 and project at the last local iterate."""
     effects = [{"effect": "gravity"}, {"effect": "pins", "select": "top"}, SPRING]
     scene = make_scene(*effects, frames=5)
-    run(scene, tmp_path / "run.h5", {"spring": np.array([3])}, {})
+    run(scene, tmp_path / "run.h5", {"spring": np.array([3])})
     seen = []
     loop, state = scene.stepper(), scene.initial_state()
     for frame in range(4):

@@ -74,8 +74,8 @@ def runs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs")
     effects = [{"effect": "gravity"}, {"effect": "pins", "select": "top"}]
     scene = make_scene(*effects, {"effect": "spring", "weight": 1e4}, frames=12)
-    run(scene, folder / "train.h5", {"spring": stored_frames(12, 3)}, {})
-    run(scene, folder / "held.h5", {"spring": np.array([1, 6])}, {})
+    run(scene, folder / "train.h5", {"spring": stored_frames(12, 3)})
+    run(scene, folder / "held.h5", {"spring": np.array([1, 6])})
     return scene, folder
 
 
@@ -111,7 +111,7 @@ def test_file_round_trip(runs, tmp_path):
     scene, folder = runs
     group, train = scene.groups[0], training_frames(12, 3)
     got = collect(folder / "train.h5", folder / "held.h5", group, scene.masses, train)
-    save_snapshots(got, tmp_path / "s.h5", {"scene": "test"})
+    save_snapshots(got, tmp_path / "s.h5")
     back = load_snapshots(tmp_path / "s.h5")
     for name, value in vars(got).items():
         if name == "frames":

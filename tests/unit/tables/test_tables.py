@@ -55,7 +55,7 @@ def basis_file(path, sigma, rank) -> File:
         np.zeros((1, 2, rank)),
     )  # fmt: skip
     path.parent.mkdir(parents=True, exist_ok=True)
-    save_basis(basis, path, {})
+    save_basis(basis, path)
     return paths.BASIS.file(str(path))
 
 

@@ -9,15 +9,26 @@ set aside: the next run finds it missing and makes it anew.
 from pdrom.core.store.atomic import atomic_path
 from pdrom.core.store.finite import require_finite
 from pdrom.core.store.hdf5 import open_hdf5, write_hdf5
-from pdrom.core.store.seal import Condition, check_file, require_intact, seal_path
+from pdrom.core.store.seal import (
+    Condition,
+    Seal,
+    check_file,
+    provenance_of,
+    read_seal,
+    require_intact,
+    seal_path,
+)
 from pdrom.core.store.tables import read_table, write_table
 from pdrom.core.store.text import read_text, write_text
 
 __all__ = [
     "Condition",
+    "Seal",
     "atomic_path",
     "check_file",
     "open_hdf5",
+    "provenance_of",
+    "read_seal",
     "read_table",
     "read_text",
     "require_finite",

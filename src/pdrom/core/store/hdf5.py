@@ -8,6 +8,7 @@ from contextlib import contextmanager
 import h5py
 
 from pdrom.core.errors import StorageError
+from pdrom.core.provenance import attributes
 from pdrom.core.store.atomic import atomic_path
 from pdrom.core.store.oserrors import reason
 from pdrom.core.store.seal import require_intact
@@ -15,10 +16,14 @@ from pdrom.core.store.seal import require_intact
 
 @contextmanager
 def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
-    """Yield a new HDF5 file that takes its name only when complete; no time stamps inside."""
+    """Yield a new HDF5 file that takes its name only when complete, with its provenance.
+
+    No time stamps are inside.
+    """
     with atomic_path(path) as temporary, open(temporary, "w+b", buffering=0) as handle:
         sink = _Sink(handle)
         with h5py.File(sink, "w", track_order=True) as file:
+            file.attrs.update(attributes())
             yield file
         if sink.error is not None:
             raise sink.error

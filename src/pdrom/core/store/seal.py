@@ -1,21 +1,26 @@
-"""Seals: beside every result a hidden file with its checksum.
+"""Seals: beside every result a hidden file with its checksum, and with what made it.
 
-The seal of ``t.csv`` is ``.t.csv.blake2b``, one line in the format of the program ``b2sum``: the
-BLAKE2b digest of the file's bytes and the file's name. It is compared whole with the line that the
-file's bytes give now. Whatever differs, in the file or in its seal, is damage; a changed file whose
-seal changed with it would have to meet a digest of 512 bits.
+The seal of ``t.csv`` is ``.t.csv.blake2b``, in the format of the program ``b2sum``: the BLAKE2b
+digest of the file's bytes and the file's name. The line before it is a comment to that program; it
+holds the provenance (`pdrom.core.provenance`) with a checksum of its own. The seal is compared
+whole with the one that the file's bytes give now. Whatever differs, in the file or in its seal, is
+damage; a changed file whose seal changed with it would have to meet a digest of 512 bits.
 """
 
 import errno
 import hashlib
+import json
 import os
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
 from pdrom.core.errors import StorageError
+from pdrom.core.provenance import as_text, provenance
 from pdrom.core.store.oserrors import reason
 
 SEAL_SUFFIX = ".blake2b"
+_SHORT = 16  # hexadecimal digits of the checksum of a comment
 
 
 class Condition(StrEnum):
@@ -26,16 +31,62 @@ class Condition(StrEnum):
     UNSEALED = "unsealed"
 
 
+@dataclass(frozen=True)
+class Seal:
+    """What stands in a seal: digest and name of the file, provenance as JSON or nothing."""
+
+    digest: str
+    name: str
+    provenance: str
+
+    @property
+    def content(self) -> bytes:
+        """Bytes of the seal."""
+        text = self.provenance.encode()
+        short = hashlib.blake2b(text).hexdigest()[:_SHORT]
+        comment = f"# {short} ".encode() + text + b"\n" if text else b""
+        return comment + f"{self.digest}  {self.name}\n".encode()
+
+    @classmethod
+    def parse(cls, content: bytes) -> "Seal":
+        """The seal of these bytes; of damaged ones, a seal whose content is another."""
+        first, _, rest = content.partition(b"\n")
+        commented = first.startswith(b"# ")
+        words = (rest if commented else content).decode(errors="replace").split()
+        text = first[len("# ") + _SHORT + 1 :].decode(errors="replace") if commented else ""
+        return cls(words[0] if words else "", words[-1] if words else "", text)
+
+
 def seal_path(path: str | os.PathLike[str]) -> Path:
     """Where the seal of ``path`` lies."""
     return Path(path).with_name(f".{Path(path).name}{SEAL_SUFFIX}")
 
 
-def seal_of(path: Path, name: str) -> bytes:
-    """The seal of the bytes that ``path`` holds, for a file called ``name``."""
+def digest_of(path: Path, kind: str = "blake2b") -> str:
+    """Digest of the bytes of a file, hexadecimal."""
     with open(path, "rb") as handle:
-        digest = hashlib.file_digest(handle, "blake2b").hexdigest()
-    return f"{digest}  {name}\n".encode()
+        return hashlib.file_digest(handle, kind).hexdigest()
+
+
+def seal_of(path: Path, name: str) -> bytes:
+    """The seal of the bytes that ``path`` holds, for a file called ``name`` that is made now."""
+    return Seal(digest_of(path), name, as_text(provenance())).content
+
+
+def read_seal(path: str | os.PathLike[str]) -> Seal | None:
+    """The seal beside ``path``; None where there is none or it is damaged itself."""
+    place = seal_path(path)
+    if not place.is_file():
+        return None
+    content = place.read_bytes()
+    seal = Seal.parse(content)
+    return seal if seal.content == content else None
+
+
+def provenance_of(path: str | os.PathLike[str]) -> dict[str, str]:
+    """What made a file, as its seal says; nothing where that does not say it."""
+    seal = read_seal(path)
+    return json.loads(seal.provenance) if seal and seal.provenance else {}
 
 
 def check_file(path: str | os.PathLike[str]) -> Condition:
@@ -50,10 +101,11 @@ def check_file(path: str | os.PathLike[str]) -> Condition:
     if not path.is_file():
         raise StorageError(f"{path}: no such file")
     try:
-        expected = seal_of(path, path.name)
         if not seal_path(path).is_file():
             return Condition.UNSEALED
-        return Condition.INTACT if seal_path(path).read_bytes() == expected else Condition.DAMAGED
+        found = seal_path(path).read_bytes()
+        expected = Seal(digest_of(path), path.name, Seal.parse(found).provenance)
+        return Condition.INTACT if found == expected.content else Condition.DAMAGED
     except OSError as error:
         if error.errno == errno.EIO:  # the disk has lost some of it
             return Condition.DAMAGED

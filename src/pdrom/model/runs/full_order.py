@@ -39,7 +39,6 @@ def run(
     scene: Scene,
     path: str | os.PathLike[str],
     snapshot_frames: Mapping[str, np.ndarray],
-    attributes: Mapping[str, Any],
     solver: str = DEFAULT_SOLVER,
     with_mesh: bool = False,
     on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
@@ -58,7 +57,6 @@ def run(
     loop = scene.stepper(system)
     state = scene.initial_state()
     with write_hdf5(path) as file:
-        file.attrs.update(attributes)
         if with_mesh:
             store_mesh(scene.mesh, file.create_group("mesh"))
         series = _create_series(file, scene)

@@ -2,7 +2,6 @@
 
 import os
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -59,10 +58,9 @@ _ARRAYS = ("V", "mean", "singular_values", "trained")
 _ATTRIBUTES = ("rank", "roundoff", "rows_per_element", "separate_axes", "active_axes")
 
 
-def save_basis(basis: Basis, path: str | os.PathLike[str], attributes: dict[str, Any]) -> None:
+def save_basis(basis: Basis, path: str | os.PathLike[str]) -> None:
     """Write a basis to HDF5."""
     with write_hdf5(path) as file:
-        file.attrs.update(attributes)
         for name in _ARRAYS:
             file[name] = getattr(basis, name)
         for name in _ATTRIBUTES:

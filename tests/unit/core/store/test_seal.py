@@ -13,10 +13,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from pdrom import __version__
 from pdrom.core.errors import StorageError
 from pdrom.core.store import (
     check_file,
     open_hdf5,
+    provenance_of,
     read_table,
     read_text,
     require_intact,
@@ -125,6 +127,14 @@ def test_every_cut_seal_is_noticed(result):
     seal = seal_path(result).read_bytes()
     for changed in (*(seal[:kept] for kept in range(len(seal))), seal + b"\n", seal.upper()):
         assert noticed(result, seal=changed)
+
+
+def test_the_seal_tells_the_provenance_and_counts_without_it(result):
+    assert provenance_of(result)["pdrom_version"] == __version__
+    seal = seal_path(result).read_bytes()
+    seal_path(result).write_bytes(seal.split(b"\n", 1)[1])
+    assert (check_file(result), provenance_of(result)) == ("intact", {})
+    seal_path(result).write_bytes(seal)
 
 
 @given(data=st.data())

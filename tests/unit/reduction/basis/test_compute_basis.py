@@ -292,7 +292,7 @@ def test_truncation_names_the_rank():
 def test_file_round_trip(spec, tmp_path):
     path = tmp_path / "scene" / "group" / f"{spec.basis_id}.h5"
     basis = basis_of(snapshots(41)[0], spec)
-    save_basis(basis, path, {"unit": "m"})
+    save_basis(basis, path)
     loaded = load_basis(path)
     for field in dataclasses.fields(Basis):
         if field.name != "origin":
@@ -302,13 +302,13 @@ def test_file_round_trip(spec, tmp_path):
 
 
 def test_empty_basis_survives_a_file(tmp_path):
-    save_basis(basis_of(np.zeros((4, ROWS, 3)), BasisSpec()), tmp_path / "b.h5", {})
+    save_basis(basis_of(np.zeros((4, ROWS, 3)), BasisSpec()), tmp_path / "b.h5")
     assert load_basis(tmp_path / "b.h5").V.shape == (3 * ROWS, 0)
 
 
 def test_damaged_file_is_named(tmp_path):
     path = tmp_path / "b.h5"
-    save_basis(basis_of(snapshots(43)[0], BasisSpec()), path, {})
+    save_basis(basis_of(snapshots(43)[0], BasisSpec()), path)
     path.write_bytes(path.read_bytes()[:-500])
     with pytest.raises(StorageError, match=r"b\.h5"):
         load_basis(path)

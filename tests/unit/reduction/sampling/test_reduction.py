@@ -327,7 +327,7 @@ def test_reduction_from_files_is_the_same(preset, tmp_path):
     p, mass = data(27)
     basis = compute_basis(p, mass, 0.0, P, spec)
     sampling = select(basis, spec, 4)
-    save_basis(basis, tmp_path / "basis.h5", {})
+    save_basis(basis, tmp_path / "basis.h5")
     with write_hdf5(tmp_path / "sampling.h5") as file:
         file["r0004/entries"], file["r0004/elements"] = sampling.entries, sampling.elements
     loaded = load_reduction(basis, tmp_path / "sampling.h5", spec, 4)

@@ -1,0 +1,148 @@
+"""The manifest of a study: each of its results with its checksum and with what made it.
+
+It is written at the end of every run that succeeds, from the seals, so that no large file is read
+again: an HDF5 file has the BLAKE2b digest of its seal, everything else its SHA-256 as well. Equal
+results have an equal manifest.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from pdrom.core import paths
+from pdrom.core.errors import StorageError
+from pdrom.core.store import Condition, Seal, check_file, read_seal, write_text
+from pdrom.core.yamlfile import describe
+from pdrom.pipeline.folders import Folders
+from pdrom.pipeline.holdings import HELD, paths_of
+from pdrom.pipeline.plan import Plan
+from pdrom.pipeline.scenes import scene_names
+from pdrom.pipeline.targets import PLACES
+
+LARGE = ".h5"
+_ENVIRONMENT = ("pdrom_version", "python_version", "library_versions")
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Entry(_Record):
+    """A result; ``environment`` is a key of the manifest's environments.
+
+    sha256 : None for a large file, and for one that was damaged before the manifest was written
+    """
+
+    bytes: int
+    blake2b: str
+    sha256: str | None = None
+    made_by: str | None = None
+    configuration_sha256: str | None = None
+    code_sha256: str | None = None
+    environment: str | None = None
+
+    def fits(self, path: Path) -> bool:
+        """Whether a file has the bytes that the entry tells of."""
+        kind, digest = ("sha256", self.sha256) if self.sha256 else ("blake2b", self.blake2b)
+        with open(path, "rb") as handle:
+            return hashlib.file_digest(handle, kind).hexdigest() == digest
+
+
+class Manifest(_Record):
+    """Results by their paths from the folder that the manifest lies in.
+
+    options : of the command line, which name the configuration
+    environments : versions of the package, of Python and of libraries, by a short key
+    """
+
+    format: Literal[1] = 1
+    options: tuple[str, ...]
+    environments: dict[str, dict[str, str]]
+    files: dict[str, Entry]
+
+
+def write_manifest(plan: Plan, folders: Folders, options: Iterable[str]) -> Manifest:
+    """Write the manifest of a study whose run has succeeded, and return it."""
+    environments: dict[str, dict[str, str]] = {}
+    files = {}
+    for path in sorted(study_files(plan, folders)):
+        seal = read_seal(path)
+        if seal is not None:
+            inside = os.path.relpath(path, folders.results)
+            files[inside] = _entry(Path(path), seal, environments)
+    made = Manifest(options=tuple(options), environments=environments, files=files)
+    text = made.model_dump_json(indent=1, exclude_none=True)
+    write_text(f"{text}\n", paths.MANIFEST.at(folders.results))
+    return made
+
+
+def read_manifest(results: str) -> Manifest:
+    """The manifest in a folder of results; nothing is changed.
+
+    Raises
+    ------
+    StorageError
+        It is missing, damaged, or of another layout.
+    """
+    path = Path(paths.MANIFEST.at(results))
+    if check_file(path) is Condition.DAMAGED:
+        raise StorageError(f"{path}: damaged, its content and its checksum differ")
+    try:
+        return Manifest.model_validate_json(path.read_text(encoding="utf-8"))
+    except (ValidationError, UnicodeDecodeError) as error:
+        fault = describe(error, Manifest) if isinstance(error, ValidationError) else error
+        raise StorageError(f"{path}: {fault}") from error
+
+
+def study_files(plan: Plan, folders: Folders) -> Iterator[str]:
+    """Files on the disk that belong to a study: its own, and what was asked for beside them."""
+    own = {
+        folders.manuscript, paths.MACHINE.at(plan.results), *plan.paper.inputs, *plan.tables.paths,
+        *plan.figures, *(job.png for job in plan.figure_jobs.values()),
+        *(path for place in HELD for path in paths_of(plan.study, place, plan.results)),
+    }  # fmt: skip
+    yield from (path for path in own if Path(path).is_file())
+    scenes, methods = set(scene_names(plan.root)), set(plan.study.methods)
+    for path in _visible(folders.results):
+        if path not in own and _asked_for(path, folders.results, scenes, methods):
+            yield path
+
+
+def _visible(results: str) -> Iterator[str]:
+    """Files below a folder of results, without logs and other studies."""
+    for folder, below, names in os.walk(results):
+        if folder == results:
+            below[:] = [name for name in below if name not in ("logs", "studies")]
+        yield from (f"{folder}/{name}" for name in names if not name.startswith("."))
+
+
+def _asked_for(path: str, results: str, scenes: set[str], methods: set[str]) -> bool:
+    """Whether a target may name the file: something of a scene that there is."""
+    for place in PLACES:
+        try:
+            labels = place.file(path).labels
+        except StorageError:
+            continue
+        known = labels.get("scene") in scenes and labels.get("method", "") in {*methods, ""}
+        if known and place.at(results, **labels) == path:
+            return True
+    return False
+
+
+def _entry(path: Path, seal: Seal, environments: dict[str, dict[str, str]]) -> Entry:
+    made = json.loads(seal.provenance) if seal.provenance else {}
+    environment = {name: made.pop(name) for name in _ENVIRONMENT if name in made}
+    if environment:
+        key = hashlib.sha256(json.dumps(environment, sort_keys=True).encode()).hexdigest()[:8]
+        environments[key] = environment
+        made["environment"] = key
+    if path.suffix != LARGE:
+        content = path.read_bytes()
+        if hashlib.blake2b(content).hexdigest() == seal.digest:
+            made["sha256"] = hashlib.sha256(content).hexdigest()
+    return Entry(bytes=path.stat().st_size, blake2b=seal.digest, **made)
