@@ -11,13 +11,13 @@ from pydantic import Field
 from pdrom.core.metrics import relative_errors
 from pdrom.core.paths import LADDER, MESH, SENSITIVITY, SNAPSHOTS, TRAIN, File
 from pdrom.core.store import write_table
-from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.repetition import Repeater, Repetitions
 from pdrom.experiments.scenes import positions_of, scene_of
 from pdrom.experiments.settings import BlowupExtent, Horizon
 from pdrom.model.runs.horizon import error_within
 from pdrom.model.scene import SceneConfig
-from pdrom.reduction.basis import compute_basis
+from pdrom.reduction.basis import Basis, compute_basis
 from pdrom.reduction.local.local_step import ReducedLocalStep
 from pdrom.reduction.local.rerun import replace_group, rerun
 from pdrom.reduction.method import MethodSpec
@@ -29,21 +29,24 @@ log = logging.getLogger(__name__)
 
 COLUMNS = [
     "scene", "group", "direction", "rung", "r", "condition", "gain", "error_train", "error_test",
-    "error_heldout", "finite", "blowup_frame", "relative_error_within_horizon",
+    "error_heldout", "finite", "blowup_frame", "relative_error_within_horizon", "repetitions",
+    "error_median", "error_low", "error_high", "gain_low", "gain_high",
 ]  # fmt: skip
 Rungs = Annotated[tuple[MethodSpec, ...], Field(min_length=1)]
 
 
-class Ladder(ConfigModel):
-    """The rungs of a ladder.
+class Ladder(Repetitions):
+    """The rungs of a ladder; runs are repeated on other training frames.
 
     r : basis size of all rungs (the numerical rank where that is smaller)
     signs : how many choices of the singular vectors' signs the first rung is repeated with
+    repeated : scenes whose runs are repeated
     up, down : methods, from the published one upwards, and the sound one less one ingredient
     """
 
     r: Annotated[int, Field(ge=1, le=100_000)]
     signs: Annotated[int, Field(ge=0, le=100)]
+    repeated: tuple[str, ...] = ()
     up: Rungs
     down: Rungs
 
@@ -94,32 +97,44 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     end = settings.horizon.frames(inputs.sensitivity)
     displacement = displacement_norms(reference)
     group, system = scene.group(labels["group"]), scene.system
+    repeater = None
+    if labels["scene"] in ladder.repeated:
+        repeater = Repeater(scene, group.name, data, reference, end, ladder, settings.blowup_extent)
+    bases: dict[tuple[str, int | None], Basis] = {}
     rows = []
     for direction, method, seed in ladder.rungs():
         row = {**labels, "direction": direction, "rung": _name(method, seed), "r": ladder.r}
-        reduction = _reduce(data, method, ladder.r, seed)
+        key = (method.basis_id, seed)
+        if key not in bases:
+            bases[key] = _basis(data, method, seed)
+        reduction = _reduce(bases[key], method, ladder.r)
         if reduction is not None:
             steps = replace_group(scene, group.name, ReducedLocalStep(group, reduction))
             outcome = rerun(scene, system, steps, reference, settings.blowup_extent)
             row |= {"r": reduction.r, **_measures(reduction, data)}
             row |= _ran(outcome, displacement, end)
+            if repeater is not None and seed is None:
+                row |= _repeated(repeater, method, reduction.r)
         rows.append(row)
         log.info("%s, %s", direction, row["rung"])
     table = pd.DataFrame(rows, columns=COLUMNS)
-    table["blowup_frame"] = table["blowup_frame"].astype("Int64")
-    write_table(table, outputs.table.path)
+    whole = dict.fromkeys(("blowup_frame", "repetitions"), "Int64")
+    write_table(table.astype(whole), outputs.table.path)
 
 
 def _name(method: MethodSpec, seed: int | None) -> str:
     return method.title if seed is None else f"signs {seed}"
 
 
-def _reduce(data: SnapshotSet, method: MethodSpec, r: int, seed: int | None) -> Reduction | None:
-    """Reduction of a rung; None where the group is round-off."""
+def _basis(data: SnapshotSet, method: MethodSpec, seed: int | None) -> Basis:
     signs = None if seed is None else np.random.default_rng(seed)
-    basis = compute_basis(
+    return compute_basis(
         data.train, data.row_mass, data.roundoff, data.rows_per_element, method, signs
     )
+
+
+def _reduce(basis: Basis, method: MethodSpec, r: int) -> Reduction | None:
+    """Reduction of a rung; None where the group is round-off."""
     size = min(r, basis.rank)
     return Reduction(basis, select(basis, method, size), method, size) if size else None
 
@@ -137,6 +152,22 @@ def _ran(outcome: Rerun, displacement: np.ndarray, end: int) -> dict[str, Any]:
         "finite": outcome.finite,
         "blowup_frame": outcome.blowup_frame,
         "relative_error_within_horizon": error_within(outcome.difference, displacement, end),
+    }
+
+
+def _repeated(repeater: Repeater, method: MethodSpec, r: int) -> dict[str, Any]:
+    """Ranges over the repetitions; a run that ended before the horizon has an infinite error."""
+    runs = list(repeater.repeat(method, [r], "training"))
+    if not runs:
+        return {}
+    errors, gains = [run.error for run in runs], [run.gain for run in runs]
+    return {
+        "repetitions": len(runs),
+        "error_median": float(np.median(errors)),
+        "error_low": min(errors),
+        "error_high": max(errors),
+        "gain_low": min(gains),
+        "gain_high": max(gains),
     }
 
 

@@ -84,6 +84,13 @@ def _ladders(study: Study) -> Iterator[Labels]:
             yield {"scene": scene, "group": group}
 
 
+def _repetitions(study: Study) -> Iterator[Labels]:
+    cells = study.settings.repetitions.cells
+    for scene, group in study.experiments:
+        if any(scene in cell.scenes for cell in cells):
+            yield {"scene": scene, "group": group}
+
+
 def _noise(study: Study) -> Iterator[Labels]:
     cases = study.settings.noise.cases
     for scene, group in study.experiments:
@@ -156,6 +163,7 @@ HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.SUBSPACES_SECONDS: _subspaces,
     paths.BOUNDS: _scenes,
     paths.LADDER: _ladders,
+    paths.REPETITIONS: _repetitions,
     paths.NOISE: _noise,
     paths.STABILITY: _among(lambda study: study.settings.stability.scenes),
     paths.SUBSPACE_ABLATION: _among(lambda study: study.ablation.scenes),

@@ -10,6 +10,7 @@ from typing import Any
 from pdrom.core import paths
 from pdrom.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
 from pdrom.experiments.guard import Trial
+from pdrom.experiments.repetitions import Repeated
 from pdrom.experiments.settings import Horizon
 from pdrom.experiments.stability import Stability
 from pdrom.model.mesh.config import MeshConfig
@@ -120,6 +121,16 @@ def _sizes_of_scenes(study: Study, labels: Labels) -> dict[str, tuple[float, ...
     return {name: factors for name, factors in sizes.items() if name in study.scenes}
 
 
+def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
+    """The cells of a scene, a method after the other; the methods need not be among the study's."""
+    cells = [c for c in study.settings.repetitions.cells if labels["scene"] in c.scenes]
+    return tuple(
+        Repeated(method=name, spec=spec, sizes=cell.sizes, varied=cell.varied)
+        for cell in cells
+        for name, spec in study.named_methods(cell.methods, "repetitions.cells").items()
+    )
+
+
 def _noise_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
     """The methods of the noise runs; they need not be among the study's."""
     return study.named_methods(study.settings.noise.methods, "noise.methods")
@@ -139,6 +150,7 @@ PROVIDERS: dict[str, Callable[[Study, Labels], Any]] = {
     "every_method": lambda study, labels: study.every_method,
     "scaled_methods": scaled_methods,
     "noise_methods": _noise_methods,
+    "repeated": _repeated,
     "basis": _basis,
     "horizon": _horizon,
     "stability": _stability,

@@ -21,6 +21,7 @@ from pdrom.experiments.ladder import LadderFile
 from pdrom.experiments.noise import Noise
 from pdrom.experiments.offline import Offline
 from pdrom.experiments.online import Online
+from pdrom.experiments.repetitions import RepetitionSection
 from pdrom.experiments.roofline.experiment import Roofline
 from pdrom.experiments.sampling import Sweep
 from pdrom.experiments.scaling import Scaling
@@ -73,6 +74,7 @@ class StudySettings(ConfigModel):
     roofline: Roofline = Roofline()
     stability: Stability = Stability()
     noise: Noise = Noise()
+    repetitions: RepetitionSection = RepetitionSection()
     guard: GuardSection = GuardSection()
     companion: Companion = Companion()
     hard_cases: HardCases = HardCases()

@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.tables.declaration import number, table, text
+from pdrom.tables.declaration import integer, number, table, text
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import BLOWUP_FRAME, ERROR_WITHIN, FINITE, GAIN, GROUP, SCENE, R
 
@@ -29,6 +29,12 @@ from pdrom.tables.vocabulary import BLOWUP_FRAME, ERROR_WITHIN, FINITE, GAIN, GR
         FINITE,
         BLOWUP_FRAME,
         ERROR_WITHIN,
+        integer("repetitions", "runs trained on other frames, where they were repeated"),
+        number("error_median", "median of their errors before the horizon"),
+        number("error_low", "the least of them"),
+        number("error_high", "the largest; inf for a run that ended earlier"),
+        number("gain_low", "the least of their gains"),
+        number("gain_high", "the largest"),
     ),
     reads={"parts": Every(paths.LADDER)},
 )

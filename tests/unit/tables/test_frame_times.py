@@ -13,6 +13,7 @@ from pdrom.experiments.fresh_process import COLUMNS
 from pdrom.tables.frame_times import frame_times
 from pdrom.tables.intervals import confirmed_digits, in_words, median_interval
 from pdrom.tables.one_time import in_one_time
+from pdrom.tables.repetitions import repetitions
 from pdrom.tables.speedups import speedups
 
 VALUES = st.lists(st.floats(0.1, 10.0), min_size=1, max_size=12)
@@ -121,3 +122,16 @@ def test_times_of_a_job_are_told_in_the_one_time():
     told = in_one_time(job, pd.Series({"a": 2.0, "b": 5.0}), times, ["ms"])
     assert told.ms.tolist() == [3.0, 1.5, 5.0]
     assert told.r.tolist() == [1, 2, 3]
+
+
+def test_repetitions_are_told_by_median_and_range(tmp_path):
+    errors, gains = [0.2, 0.1, float("inf")], [4.0, 3.0, 5.0]
+    rows = pd.DataFrame({"seed": [1, 2, 3], "error": errors, "gain": gains}).assign(
+        scene="a", group="spring", method="deim", r=6, varied="training", finite=True
+    )
+    write_table(rows, tmp_path / "a.csv")
+    (row,) = repetitions([File(str(tmp_path / "a.csv"), {})]).itertuples()
+    assert (row.repetitions, row.ended) == (3, 1)
+    assert (row.error_low, row.error_median, row.error_high) == (0.1, 0.2, np.inf)
+    assert (row.gain_low, row.gain_median, row.gain_high) == (3.0, 4.0, 5.0)
+    assert len(repetitions([])) == 0

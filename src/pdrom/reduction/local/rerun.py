@@ -25,6 +25,7 @@ def rerun(
     reference: np.ndarray,
     blowup_extent: float,
     guard: Guard | None = None,
+    offset: np.ndarray | None = None,
 ) -> Rerun:
     """Run a scene with other local steps and compare it with its full-order trajectory.
 
@@ -32,6 +33,7 @@ def rerun(
     ----------
     reference : (F + 1, N, 3) positions of the full-order run
     blowup_extent : the run ends when the extent exceeds this multiple of the rest extent
+    offset : (N, 3) m, added to the first positions
     guard : watches steps among ``local_steps``, and may end the run or repeat its frames
     """
     loop = scene.stepper(system, local_steps, track_objective=guard is not None)
@@ -42,5 +44,5 @@ def rerun(
     def stopped() -> bool:
         return guard is not None and guard.record.stopped
 
-    start, frames, unit = scene.initial_state(), scene.config.frames, scene.mesh.extent
+    start, frames, unit = scene.initial_state(offset), scene.config.frames, scene.mesh.extent
     return compare(BoundedRun(advance, start, frames, blowup_extent, unit), reference, stopped)

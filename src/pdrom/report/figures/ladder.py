@@ -11,7 +11,8 @@ FIGURE = Declaration(
         "whole elements with oversampling; below it each row takes a single ingredient away from "
         "the sound method or exchanges it. Left the error of the rerun within the horizon, right "
         "the gain of the interpolation; what blew up or is singular lies on the right rim. Bars "
-        "show the spread over choices of the arbitrary signs of the singular vectors."
+        "show the range over runs that are trained on as many frames drawn anew, on some scenes; "
+        "pale ones that over choices of the arbitrary signs of the singular vectors."
     ),
     reads=(TableOf("ladder"),),
     options=Scenes,

@@ -60,7 +60,7 @@ TABLES = (
     "ladder", "scaling", "scaling_fit", "stability", "budget", "breakeven", "effects_cost",
     "effects_left_out", "machine_rates", "roofline", "reduced_reruns", "gain_prediction",
     "subspace_ablation", "noise", "claims_sensitivity", "alternatives", "bounds",
-    "estimates", "effects_contribution",
+    "estimates", "effects_contribution", "repetitions",
 )  # fmt: skip
 
 
@@ -279,7 +279,14 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for n in (1, 2, 5)
     ]
     ladder = [
-        (scene, direction, rung, 10.0**i if i < 2 else np.inf, 0.1 * i if i else np.nan)
+        (
+            scene,
+            direction,
+            rung,
+            10.0**i if i < 2 else np.inf,
+            0.1 * i if i else np.nan,
+            *((0.05, np.inf, 1.0, 50.0) if i < 2 else 4 * (np.nan,)),
+        )
         for scene in scenes
         for i, (direction, rung) in enumerate(rungs)
     ]
@@ -320,6 +327,10 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for basis in ("full", "pod", "skinning")
         for split in ("train", "heldout")
         for error in (1e-5, 1e-2)
+    ]
+    repetitions = [
+        (scene, group, method, r, "training", 0.01, 0.1, np.inf, 1.0, 2.0, 3.0)
+        for scene, group, method, r, *_ in reruns
     ]
     predictions = [
         ("gain", "10", "100", 40, 0.25, np.nan),
@@ -369,7 +380,10 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "local_share": "scene implementation vertices local_ms assembly_ms global_ms local_share",
         "accuracy_cost": "scene method position_basis k r iterations relative_error_within_horizon"
         " ms_per_frame pareto",
-        "ladder": "scene direction rung gain relative_error_within_horizon",
+        "ladder": "scene direction rung gain relative_error_within_horizon error_low error_high"
+        " gain_low gain_high",
+        "repetitions": "scene group method r varied error_low error_median error_high gain_low"
+        " gain_median gain_high",
         "stability": "scene group method position_basis k r experiment outcome blowup_frame h"
         " stiffness_ratio",
         "budget": "scene budget_ms reference method position_basis k r iterations"
@@ -394,7 +408,7 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "effects_contribution": "scene effect role moved sensitivity_floor above_floor",
     }
     made = (
-        values, errors, times, costs, ladder, runs, bought, ratios, shares, removed, rates,
+        values, errors, times, costs, ladder, repetitions, runs, bought, ratios, shares, removed, rates,
         phases, reruns, predictions, noise, variations, ablation, others, bounds, estimates, moved,
     )  # fmt: skip
     rows = dict(zip(columns, made, strict=True))

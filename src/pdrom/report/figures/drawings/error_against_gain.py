@@ -13,6 +13,15 @@ from pdrom.report.figures.kit.results import NothingToDraw, Results
 from pdrom.tables.gain_prediction import EVERY, FAILED, judged_runs
 
 ERRORS, GAINS = (1e-5, 1e2), (1.0, 1e5)  # limits; what lies outside is drawn on the rim
+ENDS = ("low", "median", "high")
+RANGES = [
+    "scene",
+    "group",
+    "method",
+    "r",
+    "varied",
+    *(f"{q}_{e}" for q in ("error", "gain") for e in ENDS),
+]
 DECADES = ["predictor", "lower", "upper", "runs", "failed_share", "threshold"]
 
 
@@ -32,10 +41,12 @@ def draw(results: Results, options: Options) -> Figure:
         raise NothingToDraw("no run with a gain")
     figure = Figure(figsize=(style.WIDTH, 3.3), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
+    ranges = _ranges(results.table("repetitions", RANGES), runs)
     methods = [m for m in results.holdings.methods if (runs.method == m).any()]
     styles = style.method_styles(methods)
     for method in methods:
         _draw_method(left, runs[runs.method == method], *styles[method])
+        _draw_ranges(left, ranges[ranges.method == method], styles[method][0])
     _draw_limits(left, prediction)
     _draw_decades(right, prediction[prediction.lower != EVERY])
     handles = [
@@ -60,6 +71,22 @@ def _draw_method(ax: Axes, runs: pd.DataFrame, colour: str, marker: str) -> None
         clipped(x, *GAINS), clipped(y, *ERRORS), linestyle="none", color=colour, marker=marker,
         markersize=3.2, alpha=0.7, markeredgewidth=0.0, clip_on=False,
     )  # fmt: skip
+
+
+def _ranges(repetitions: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
+    """Ranges over other training frames of those of the ``runs`` that were repeated."""
+    cells = ["scene", "group", "method", "r"]
+    repeated = repetitions[repetitions.varied == "training"]
+    return runs[[*cells, "gain", "error"]].merge(repeated, on=cells)
+
+
+def _draw_ranges(ax: Axes, ranges: pd.DataFrame, colour: str) -> None:
+    """A cross from least to largest gain and error, at the medians."""
+    gains = [clipped(ranges[f"gain_{e}"].to_numpy(float), *GAINS) for e in ENDS]
+    errors = [clipped(ranges[f"error_{e}"].to_numpy(float), *ERRORS) for e in ENDS]
+    bars = {"color": colour, "linewidth": 0.9, "zorder": 3}
+    ax.vlines(gains[1], errors[0], errors[2], **bars)
+    ax.hlines(errors[1], gains[0], gains[2], **bars)
 
 
 def _draw_limits(ax: Axes, prediction: pd.DataFrame) -> None:

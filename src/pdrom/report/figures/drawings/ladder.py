@@ -12,15 +12,19 @@ from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 from pdrom.report.words.text import plain_words
 
-COLUMNS = ["scene", "direction", "rung", "gain", "relative_error_within_horizon"]
+COLUMNS = [
+    "scene", "direction", "rung", "gain", "relative_error_within_horizon", "error_low",
+    "error_high", "gain_low", "gain_high",
+]  # fmt: skip
 ERRORS, GAINS = (1e-4, 1e2), (1.0, 1e5)  # limits; what lies outside is drawn on the rim
 
 
 def draw(results: Results, options: Scenes) -> Figure:
     """Rungs from top (published) to bottom; left the error of the rerun, right the gain.
 
-    Below the line each row lacks one ingredient of the sound method. A bar shows the spread over
-    choices of the singular vectors' signs for the published method. Runs that blew up before their
+    Below the line each row lacks one ingredient of the sound method. A bar shows the range over
+    other training frames, a broad pale one that over choices of the singular vectors' signs for the
+    published method. Runs that blew up before their
     horizon, and singular interpolations, lie on the right rim. Raises StorageError if the table is
     missing or lacks a column.
     """
@@ -35,8 +39,9 @@ def draw(results: Results, options: Scenes) -> Figure:
     scenes = list(dict.fromkeys(table.scene))
     figure = Figure(figsize=(style.WIDTH, 0.26 * len(rungs) + 1.3), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
-    _draw_quantity(left, table, rungs, scenes, "relative_error_within_horizon", ERRORS)
-    _draw_quantity(right, table, rungs, scenes, "gain", GAINS)
+    error = ("relative_error_within_horizon", "error_low", "error_high")
+    _draw_quantity(left, table, rungs, scenes, error, ERRORS)
+    _draw_quantity(right, table, rungs, scenes, ("gain", "gain_low", "gain_high"), GAINS)
     left.set_xlabel("error of the rerun within the horizon (relative)")
     right.set_xlabel("gain of the interpolation")
     left.set_yticks(range(len(rungs)), [plain_words(rung) for _, rung in rungs])
@@ -50,24 +55,30 @@ def _draw_quantity(
     table: pd.DataFrame,
     rungs: list[tuple[str, str]],
     scenes: list[str],
-    column: str,
+    columns: tuple[str, str, str],
     limits: tuple[float, float],
 ) -> None:
     ax.set_xscale("log")
     ax.set_xlim(limits[0], limits[1] * 1.3)
     style.grid(ax)
     for i, scene in enumerate(scenes):
-        rows = table[table.scene == scene].set_index(["direction", "rung"])[column]
-        found = np.array([rows.get(rung, np.nan) for rung in rungs], float)
+        rows = table[table.scene == scene].set_index(["direction", "rung"])
+        found, low, high = (
+            np.array([rows[column].get(rung, np.nan) for rung in rungs], float)
+            for column in columns
+        )
         values = clipped(np.nan_to_num(found, nan=np.inf), *limits)
         heights = np.arange(len(rungs)) + 0.09 * (i - 0.5 * (len(scenes) - 1))
         colour, marker = style.scene_style(i)
         ax.plot(values, heights, linestyle="none", color=colour, marker=marker, markersize=3.2)
-        signs = table[(table.scene == scene) & (table.direction == "signs")][column]
+        repeated = ~np.isnan(low)
+        ends = (clipped(bound[repeated], *limits) for bound in (low, high))
+        ax.hlines(heights[repeated], *ends, color=colour, linewidth=0.9)
+        signs = table[(table.scene == scene) & (table.direction == "signs")][columns[0]]
         if len(signs):
             spread = clipped(np.nan_to_num(signs.to_numpy(float), nan=np.inf), *limits)
             ax.hlines(
-                heights[0], spread.min(), spread.max(), color=colour, linewidth=0.9, alpha=0.6
+                heights[0], spread.min(), spread.max(), color=colour, linewidth=3.0, alpha=0.25
             )
     first_down = next((i for i, (d, _) in enumerate(rungs) if d == "down"), len(rungs))
     ax.axhline(first_down - 0.5, color="#333333", linewidth=0.8)
@@ -75,5 +86,7 @@ def _draw_quantity(
 
 def _legend(figure: Figure, scenes: list[str]) -> None:
     handles = style.scene_handles(scenes)
-    handles.append(Line2D([], [], color=style.GREY, label="spread over sign choices"))
+    handles.append(Line2D([], [], color=style.GREY, linewidth=0.9, label="other training frames"))
+    pale = {"color": style.GREY, "linewidth": 3.0, "alpha": 0.35}
+    handles.append(Line2D([], [], label="other signs of the modes", **pale))
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
