@@ -81,7 +81,7 @@ class ProjectionCase(ConfigModel):
 class Processes(Protocol):
     """``processes`` that each time every run: ``frames``, ``warmup`` and ``repeats`` of each."""
 
-    frames: Count = 6
+    frames: Count = 4
     repeats: Repeats = 3
     processes: Count = 10
 
