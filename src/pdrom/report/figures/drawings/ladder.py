@@ -86,7 +86,7 @@ def _draw_quantity(
 
 def _legend(figure: Figure, scenes: list[str]) -> None:
     handles = style.scene_handles(scenes)
-    handles.append(Line2D([], [], color=style.GREY, linewidth=0.9, label="other training frames"))
+    handles.append(Line2D([], [], color=style.GREY, linewidth=0.9, label="range: training frames"))
     pale = {"color": style.GREY, "linewidth": 3.0, "alpha": 0.35}
-    handles.append(Line2D([], [], label="other signs of the modes", **pale))
+    handles.append(Line2D([], [], label="range: signs", **pale))
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
