@@ -39,14 +39,20 @@ class Repetitions(ConfigModel):
 
 
 @dataclass(frozen=True)
-class Repeated:
-    """One repetition; ``error`` before the horizon is inf for a run that ended earlier."""
+class Repetition:
+    """One repetition.
+
+    error : before the horizon; inf for a run that ended earlier
+    errors : (F,) of each frame before the horizon, relative to the motion of the whole run (root
+        mean square over its frames); inf from the frame on at which the run ended
+    """
 
     r: int
     seed: int
     gain: float
     error: float
     finite: bool
+    errors: np.ndarray
 
 
 class Repeater:
@@ -74,28 +80,37 @@ class Repeater:
         self.data, self.asked, self.end = data, asked, end
         self.reference = reference[: frames + 1]
         self.blowup_extent = blowup_extent
-        self._displacement = displacement_norms(self.reference)
+        displacement = displacement_norms(reference)
+        self._displacement = displacement[:frames]
+        self._motion = float(np.sqrt(np.mean(displacement**2)))
         self._bases: dict[tuple[str, int | None], Basis] = {}
         self._reductions: dict[tuple[MethodSpec, int | None], dict[int, Reduction]] = {}
 
     def repeat(
         self, method: MethodSpec, sizes: Sequence[int], varied: Varied
-    ) -> Iterator[Repeated]:
+    ) -> Iterator[Repetition]:
         """Every repetition at every size that its basis has."""
         for seed in range(1, self.asked.repetitions + 1):
             subset = None if varied == "start" else seed
             for r, reduction in self._reduced(method, sizes, subset).items():
                 yield self._run(reduction, r, seed, moved=varied != "training")
 
-    def _run(self, reduction: Reduction, r: int, seed: int, moved: bool) -> Repeated:
+    def _run(self, reduction: Reduction, r: int, seed: int, moved: bool) -> Repetition:
         field = perturbation_field(self.scene, self.asked.perturbation, seed) if moved else None
         steps = replace_group(self.scene, self.group.name, ReducedLocalStep(self.group, reduction))
         outcome = rerun(
             self.scene, self.scene.system, steps, self.reference, self.blowup_extent, offset=field
         )
         error = error_within(outcome.difference, self._displacement, self.end)
-        return Repeated(
-            r, seed, reduction.gain, float("inf") if error is None else error, outcome.finite
+        errors = np.full(len(self._displacement), np.inf)
+        errors[: outcome.frames] = outcome.difference / self._motion
+        return Repetition(
+            r=r,
+            seed=seed,
+            gain=reduction.gain,
+            error=float("inf") if error is None else error,
+            finite=outcome.finite,
+            errors=errors,
         )
 
     def _reduced(

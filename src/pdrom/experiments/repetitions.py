@@ -3,17 +3,27 @@
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Annotated, Any
 
+import numpy as np
 import pandas as pd
 from pydantic import Field
 
 from pdrom.core.names import SceneName
-from pdrom.core.paths import MESH, REPETITIONS, SENSITIVITY, SNAPSHOTS, TRAIN, File
+from pdrom.core.paths import (
+    MESH,
+    REPEATED_FRAMES,
+    REPETITIONS,
+    SENSITIVITY,
+    SNAPSHOTS,
+    TRAIN,
+    File,
+)
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.repetition import Repeater, Repetitions, Varied
+from pdrom.experiments.repetition import Repeater, Repetition, Repetitions, Varied
 from pdrom.experiments.scenes import positions_of, scene_of
 from pdrom.experiments.settings import BlowupExtent, Horizon, Modes
 from pdrom.model.scene import SceneConfig
@@ -25,6 +35,8 @@ log = logging.getLogger(__name__)
 COLUMNS = [
     "scene", "group", "method", "r", "varied", "seed", "gain", "finite", "error",
 ]  # fmt: skip
+RANGES = ["error_low", "error_median", "error_high"]
+FRAMES = ["scene", "group", "method", "r", "varied", "frame", *RANGES]
 VARIED: tuple[Varied, ...] = ("start", "training")
 
 
@@ -74,9 +86,10 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
-    """Files written: a row for every repetition."""
+    """Files written: a row for every repetition; and ranges over them, frame by frame."""
 
     table: Annotated[File, REPETITIONS]
+    frames: Annotated[File, REPEATED_FRAMES]
 
 
 def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
@@ -91,16 +104,34 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
         settings.repetitions,
         settings.blowup_extent,
     )
-    rows = [{**labels, **row} for row in _rows(settings, repeater)]
+    rows, frames = [], []
+    for of_cell, runs in _cells(settings, repeater):
+        cell = {**labels, **of_cell}
+        rows += [cell | vars(run) for run in runs]
+        frames.append(_ranges(runs).assign(**cell))
     write_table(pd.DataFrame(rows, columns=COLUMNS), outputs.table.path)
+    ranges = pd.concat(frames) if frames else pd.DataFrame()
+    write_table(ranges.reindex(columns=FRAMES), outputs.frames.path)
 
 
-def _rows(settings: Settings, repeater: Repeater) -> Iterator[dict[str, Any]]:
-    for cell in settings.repeated:
-        for varied in cell.varied:
-            for run in repeater.repeat(cell.spec, cell.sizes, varied):
-                yield {"method": cell.method, "varied": varied, **vars(run)}
-        log.info("%s", cell.method)
+def _cells(
+    settings: Settings, repeater: Repeater
+) -> Iterator[tuple[dict[str, Any], list[Repetition]]]:
+    """Labels of every repeated run, and its repetitions."""
+    for method in settings.repeated:
+        for varied in method.varied:
+            runs = sorted(repeater.repeat(method.spec, method.sizes, varied), key=lambda run: run.r)
+            for r, same in groupby(runs, key=lambda run: run.r):
+                yield {"method": method.method, "r": r, "varied": varied}, list(same)
+        log.info("%s", method.method)
+
+
+def _ranges(runs: list[Repetition]) -> pd.DataFrame:
+    """Least, median and largest error of each frame, from 1."""
+    errors = np.stack([run.errors for run in runs])
+    ranges = np.stack([errors.min(axis=0), np.median(errors, axis=0), errors.max(axis=0)], axis=1)
+    made = pd.DataFrame(ranges, columns=RANGES)
+    return made.assign(frame=np.arange(1, len(made) + 1))
 
 
 EXPERIMENT = Experiment("repetitions", "Repeated runs of {scene}, {group} reduced", run)

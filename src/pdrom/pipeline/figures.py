@@ -6,11 +6,12 @@ from pathlib import Path
 
 from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.paths import FIGURE, FIGURE_PICTURE, TABLE
-from pdrom.core.reads import Chosen, Published, Setting, TableOf
+from pdrom.core.reads import Chosen, Every, Published, Setting, TableOf
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
 from pdrom.pipeline.fingerprint import closure, fingerprint
 from pdrom.pipeline.full import is_full
+from pdrom.pipeline.holdings import labels_of
 from pdrom.pipeline.study import Study
 from pdrom.reduction.method import load_methods
 from pdrom.report.drawing import Order
@@ -115,7 +116,7 @@ def _job(
     on_mesh = ELEMENTS in closure(*modules(name))
     classes = [EFFECTS[group] for group in groups if on_mesh]
     return FigureJob(
-        inputs=list(dict.fromkeys(_inputs(declared, options, held, results))),
+        inputs=list(dict.fromkeys(_inputs(declared, options, held, study, results))),
         pdf=FIGURE.at(results, name=name),
         png=FIGURE_PICTURE.at(results, name=name),
         log=f"{results}/logs/figures/{name}.log",
@@ -128,14 +129,19 @@ def _job(
 
 
 def _inputs(
-    declared: Declaration, options: Options, holdings: Holdings, results: str
+    declared: Declaration, options: Options, holdings: Holdings, study: Study, results: str
 ) -> Iterator[str]:
+    chosen = holdings.experiments(options)
     for read in declared.reads:
         match read:
             case TableOf():
                 yield TABLE.at(results, name=read.name)
             case Chosen():
                 yield from holdings.files(read.place, options, results, read.first)
+            case Every(place):
+                for labels in labels_of(study, place):
+                    if (labels["scene"], labels["group"]) in chosen:
+                        yield place.at(results, **labels)
             case Published() if options.names("published"):
                 yield str(PUBLISHED / f"{read.name}.csv")
 

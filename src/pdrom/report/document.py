@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from pdrom.core.reads import Chosen, Published, Setting, TableOf
+from pdrom.core.reads import Chosen, Every, Published, Setting, TableOf
 from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.figures.kit.declaration import Declaration, FigureRead
 from pdrom.report.words.markup import to_plain
@@ -46,7 +46,7 @@ def _words(read: FigureRead) -> str:
     match read:
         case TableOf():
             return f"table `{read.name}`"
-        case Chosen():
+        case Chosen() | Every():
             return f"`{read.place.pattern}`"
         case Published():
             return f"`config/reference/published_code/{read.name}.csv`"

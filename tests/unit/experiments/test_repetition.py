@@ -6,6 +6,7 @@ import pytest
 from conftest import make_scene
 from pdrom.experiments.repetition import Repeater, Repetitions, drawn
 from pdrom.model.runs.full_order import trajectory
+from pdrom.model.scene import Scene
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.snapshots import SnapshotSet
 
@@ -15,8 +16,8 @@ END = 9
 
 
 @pytest.fixture(scope="module")
-def repeater() -> Repeater:
-    """Two draws of a hanging sheet of springs, judged up to frame `END` of 12."""
+def sheet() -> tuple[Scene, np.ndarray, SnapshotSet]:
+    """A hanging sheet of springs, its run of 12 frames, and the projections of it."""
     scene = make_scene(
         {"effect": "spring", "weight": 1e4},
         {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]},
@@ -31,6 +32,13 @@ def repeater() -> Repeater:
         frames={"train": np.arange(0, 12, 2), "test": np.arange(1, 12, 2)},
         row_mass=np.ones(p.shape[1]), elements=group.elements, rows_per_element=1, roundoff=1e-14,
     )  # fmt: skip
+    return scene, reference, data
+
+
+@pytest.fixture(scope="module")
+def repeater(sheet) -> Repeater:
+    """Two draws, judged up to frame `END`."""
+    scene, reference, data = sheet
     return Repeater(scene, "spring", data, reference, END, Repetitions(repetitions=2), 100.0)
 
 
@@ -58,8 +66,28 @@ def test_other_training_frames_are_another_basis(repeater):
     one, other = repeater.repeat(BLOCK, [3], "training")
     assert one.gain != other.gain
     assert abs(one.error - other.error) > 1e-3 * one.error
-    again = list(repeater.repeat(BLOCK, [3], "training"))
-    assert again == [one, other]
+    again = [run.error for run in repeater.repeat(BLOCK, [3], "training")]
+    assert again == [one.error, other.error]
+
+
+def test_errors_of_the_frames_make_up_the_error_before_the_horizon(sheet, repeater):
+    """Theirs is in units of the motion of the whole run, that of the motion before the horizon."""
+    moved = np.sum(np.square(sheet[1][1:] - sheet[1][0]), axis=(1, 2))
+    run = next(repeater.repeat(BLOCK, [3], "start"))
+    assert run.errors.shape == (END,)
+    unit = moved.mean() / moved[:END].mean()
+    assert np.sqrt(unit * np.mean(run.errors**2)) == pytest.approx(run.error, rel=1e-9)
+
+
+def test_a_run_that_ends_early_is_wrong_without_bound(sheet):
+    """Here one that may extend over half of the sheet only, and ends after a frame."""
+    scene, reference, data = sheet
+    short = Repeater(scene, "spring", data, reference, END, Repetitions(repetitions=1), 0.5)
+    (run,) = short.repeat(BLOCK, [3], "start")
+    assert np.isinf(run.error)
+    assert np.isfinite(run.errors[0])
+    assert np.isinf(run.errors[1:]).all()
+    assert not run.finite
 
 
 def test_sizes_beyond_the_rank_are_left_out(repeater):

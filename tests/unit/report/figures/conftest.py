@@ -13,6 +13,7 @@ from pdrom.core.paths import (
     CONTRIBUTIONS,
     FULL_ORDER,
     MESH,
+    REPEATED_FRAMES,
     RERUNS,
     SAMPLING,
     SENSITIVITY,
@@ -408,8 +409,9 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "effects_contribution": "scene effect role moved sensitivity_floor above_floor",
     }
     made = (
-        values, errors, times, costs, ladder, repetitions, runs, bought, ratios, shares, removed, rates,
-        phases, reruns, predictions, noise, variations, ablation, others, bounds, estimates, moved,
+        values, errors, times, costs, ladder, repetitions, runs, bought, ratios, shares, removed,
+        rates, phases, reruns, predictions, noise, variations, ablation, others, bounds, estimates,
+        moved,
     )  # fmt: skip
     rows = dict(zip(columns, made, strict=True))
     for name, header in columns.items():
@@ -417,9 +419,23 @@ def _write_tables(results, scenes, methods, rng) -> None:
             pd.DataFrame(rows[name], columns=header.split()), TABLE.at(results.folder, name=name)
         )
     _write_scaling(results, scenes)
+    for scene, group in pairs:
+        _write_repeated_frames(results, scene, group, methods)
     for scene in scenes:
         _write_sensitivity(results, scene)
         _write_contributions(results, scene)
+
+
+def _write_repeated_frames(results, scene, group, methods) -> None:
+    """Bands of a tenth to ten times a thousandth, open above in the last frame."""
+    rows = [
+        (scene, group, method, 6, "training", frame, 1e-4, 1e-3, 1e-2 if frame < FRAMES else np.inf)
+        for method in methods
+        for frame in range(1, FRAMES + 1)
+    ]
+    columns = "scene group method r varied frame error_low error_median error_high"
+    table = pd.DataFrame(rows, columns=columns.split())
+    write_table(table, results.path(REPEATED_FRAMES, scene, group))
 
 
 def _write_contributions(results, scene) -> None:

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from pdrom.core.errors import StorageError
 from pdrom.core.paths import MESH, RERUNS, TABLE
-from pdrom.core.reads import Chosen, TableOf
+from pdrom.core.reads import Chosen, Every, TableOf
 from pdrom.core.store import atomic_path, seal_path
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import save_mesh
@@ -126,6 +126,11 @@ def inputs(study: Study, name: str) -> list[Path]:
             paths.append(TABLE.at(root, name=read.name))
         elif isinstance(read, Chosen):
             paths += study.results.holdings.files(read.place, options, root, read.first)
+        elif isinstance(read, Every):
+            paths += [
+                study.results.path(read.place, scene, group)
+                for scene, group in study.results.experiments(options)
+            ]
     return [Path(path) for path in paths]
 
 

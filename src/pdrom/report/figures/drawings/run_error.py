@@ -1,12 +1,14 @@
 """Error of reduced runs against time, with the sensitivity floor behind it."""
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pdrom.core.paths import RERUNS
+from pdrom.core.paths import REPEATED_FRAMES, RERUNS
+from pdrom.core.store import read_table
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.floor import Floors
 from pdrom.report.figures.kit.multiples import clipped, label_outer, log_axis, small_multiples
@@ -14,15 +16,20 @@ from pdrom.report.figures.kit.read import RerunInfo, choose_ranks, rerun_errors,
 from pdrom.report.figures.kit.results import NothingToDraw, Results, asked
 from pdrom.report.figures.run_error import Options
 
+Pair = tuple[str, str]  # scene and group
 LOW, HIGH = 1e-7, 1e3
 LINES = ("--", "-", ":", "-.")
 FLOOR = "#DDD9D0"
+TRAINED = "training"  # what differs between the runs of a band: the frames that train them
+ENDS = ("low", "high")
+FRAMES = ["method", "r", "varied", "frame", *(f"error_{end}" for end in ENDS)]
 
 
 def draw(results: Results, options: Options) -> Figure:
     """A panel per experiment, a line per method and basis size; a cross ends a run that blew up.
 
-    Experiments without a reduced run are left out; errors outside the axis lie on its rim.
+    Behind a line lies the band of its repetitions, where there are any. Experiments without a
+    reduced run are left out; errors outside the axis lie on its rim.
 
     Raises
     ------
@@ -37,18 +44,41 @@ def draw(results: Results, options: Options) -> Figure:
     pairs = [pair for pair in pairs if any(_ran(results, *pair, m, options) for m in methods)]
     if not pairs:
         raise NothingToDraw("no reduced run: all projections are round-off")
+    bands = _bands(results, pairs)
     figure, axes = small_multiples(len(pairs), options.columns, legend_rows=2)
     for ax, (scene, group) in zip(axes, pairs, strict=True):
         log_axis(ax, LOW, HIGH)
         _draw_floor(ax, floors.of(scene), floors.horizon(scene))
         for method in methods:
             runs = _ran(results, scene, group, method, options)
+            if (scene, group) in bands:
+                _draw_bands(ax, bands[scene, group], runs, method)
             _draw_runs(ax, results.path(RERUNS, scene, group, method), runs, options.ranks, method)
         ax.set_title(results.experiment_title(scene, group))
         ax.set_xlim(0, None)
     label_outer(axes, options.columns, "frame", "relative error")
-    _legend(figure, results, methods, options.ranks)
+    _legend(figure, results, methods, options.ranks, bool(bands))
     return figure
+
+
+def _bands(results: Results, pairs: list[Pair]) -> dict[Pair, pd.DataFrame]:
+    """Ranges over other training frames by method, size and frame, where runs were repeated."""
+    table = results.table("repetitions", ["scene", "group", "varied"])
+    table = table[table.varied == TRAINED]
+    repeated = set(zip(table.scene, table.group, strict=True))
+    bands = {}
+    for pair in repeated.intersection(pairs):
+        table = read_table(results.path(REPEATED_FRAMES, *pair), FRAMES)
+        bands[pair] = table[table.varied == TRAINED]
+    return bands
+
+
+def _draw_bands(ax: Axes, bands: pd.DataFrame, runs: list[RerunInfo], method: str) -> None:
+    colour, _ = style.method_styles([method])[method]
+    for info in runs:
+        band = bands[(bands.method == method) & (bands.r == info.r)]
+        low, high = (clipped(band[f"error_{end}"].to_numpy(float), LOW, HIGH) for end in ENDS)
+        ax.fill_between(band.frame, low, high, color=colour, alpha=0.2, linewidth=0.0, zorder=1.5)
 
 
 def _draw_floor(ax: Axes, floor: np.ndarray, end: int | None) -> None:
@@ -93,7 +123,11 @@ def _line(info: RerunInfo, ranks: tuple[int | str, ...]) -> str:
 
 
 def _legend(
-    figure: Figure, results: Results, methods: list[str], ranks: tuple[int | str, ...]
+    figure: Figure,
+    results: Results,
+    methods: list[str],
+    ranks: tuple[int | str, ...],
+    bands: bool,
 ) -> None:
     handles: list = []
     for method, (colour, _) in style.method_styles(methods).items():
@@ -103,6 +137,8 @@ def _legend(
         handles.append(Line2D([], [], color="#555555", linestyle=line, label=label))
     cross = {"linestyle": "none", "marker": "x", "markeredgewidth": 1.3, "markersize": 5}
     handles.append(Line2D([], [], color="#555555", label="blew up", **cross))
+    if bands:
+        handles.append(Patch(color="#555555", alpha=0.2, label="other training frames"))
     handles.append(Patch(color=FLOOR, label="sensitivity floor"))
     dots = {"color": "#8A857A", "linestyle": (0, (1, 1.5))}
     handles.append(Line2D([], [], label="horizon", **dots))
