@@ -103,6 +103,16 @@ def tables() -> dict[str, pd.DataFrame]:
                 "above_roundoff": [True, True, False, False, False],
             }
         ),
+        "repetitions": pd.DataFrame(
+            {
+                "scene": ["a", "b"] * 3 + ["a"],
+                "group": "spring",
+                "method": "deim",
+                "r": [20, 20, 6, 6, 10, 10, 40],
+                "varied": ["training"] * 6 + ["start"],
+                "error_median": [np.inf, 3.0, 0.1, 1.0, 0.2, 2.0, 0.0],
+            }
+        ),
         "reconstruction_error": pd.DataFrame(
             {
                 "scene": ["a", "a", "b"],
@@ -146,6 +156,9 @@ def measured(metric: str, accuracy: float = 0.1, **where) -> list[float]:
         ("error_trend", {"scene": "d", "method": "qdeim"}, [0.0]),
         # blocks of different lengths, and one block alone, have no joint trend
         ("trend_p_value", {"scene": "d", "method": "deim"}, []),
+        # two blocks of three sizes, both ascending: one of 3!^2 orders
+        ("repeated_trend_p_value", {"varied": "training"}, [1.0 / 36.0]),
+        ("repeated_trend_p_value", {"varied": "training", "scene": "a"}, []),
         # full rank blew up at once: the smaller size must not stand in for it
         ("rerun_error", {"scene": "c", "method": "deim-joint", "r": "full"}, [np.inf]),
         ("rerun_error", {"scene": "c", "method": "qdeim"}, []),

@@ -13,6 +13,7 @@ from pdrom.report.claims.run_metrics import (
     error_trend,
     noise_error,
     position_basis_ratio,
+    repeated_trend_p_value,
     rerun_error,
     trend_p_value,
     useful_speedup,
@@ -97,6 +98,11 @@ METRICS = {
     "best_useful_speedup": Metric(best_useful_speedup, "reduced_reruns", (*_RERUN, "speedup")),
     "error_trend": Metric(error_trend, "reduced_reruns", _RERUN),
     "trend_p_value": Metric(trend_p_value, "reduced_reruns", _RERUN),
+    "repeated_trend_p_value": Metric(
+        repeated_trend_p_value,
+        "repetitions",
+        ("scene", "group", "method", "r", "varied", "error_median"),
+    ),
     "singular_value_decay": Metric(
         _decay, "singular_values", ("scene", "group", "above_roundoff", "relative")
     ),

@@ -77,10 +77,20 @@ def trend_p_value(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
     the treatments; blow-ups share the highest rank. Blocks with the most common number of sizes
     count; one value, or none with fewer than two blocks of three sizes.
     """
-    rows = _tried(filtered(_reruns(tables, where), where)).sort_values("r")
+    rows = _tried(filtered(_reruns(tables, where), where))
+    return _page(rows, "relative_error_within_horizon")
+
+
+def repeated_trend_p_value(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
+    """The same of the medians over repetitions, which leave out what one run owes to chance."""
+    return _page(filtered(tables["repetitions"], where), "error_median")
+
+
+def _page(rows: pd.DataFrame, error: str) -> pd.DataFrame:
+    """One p-value, or no row with fewer than two blocks of three sizes."""
     blocks = [
-        run.relative_error_within_horizon.rank(na_option="bottom").to_numpy(float)
-        for _, run in rows.groupby(["scene", "group", "method"], sort=False)
+        run[error].rank(na_option="bottom").to_numpy(float)
+        for _, run in rows.sort_values("r").groupby(["scene", "group", "method"], sort=False)
     ]
     lengths = [len(block) for block in blocks]
     common = max(set(lengths), key=lambda n: (lengths.count(n), n), default=0)
