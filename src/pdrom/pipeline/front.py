@@ -29,7 +29,11 @@ OPTIONS = ("--scheduler", "greedy", "--max-jobs-per-timespan", "1000/20s", "--re
 LINES = ("--logger", "pdrom")
 
 # First arguments that hand the others on, with the modules that get them.
-HANDED_ON = {"test": "pytest", "verify": "pdrom.verification"}
+HANDED_ON = {
+    "test": "pytest",
+    "verify": "pdrom.verification",
+    "bundle": "pdrom.verification.bundle",
+}
 
 
 def completed(arguments: Sequence[str]) -> list[str]:

@@ -66,8 +66,8 @@ class Manifest(_Record):
     files: dict[str, Entry]
 
 
-def write_manifest(plan: Plan, folders: Folders, options: Iterable[str]) -> Manifest:
-    """Write the manifest of a study whose run has succeeded, and return it."""
+def write_manifest(plan: Plan, folders: Folders, options: Iterable[str]) -> tuple[Manifest, bool]:
+    """Write the manifest of a study whose run has succeeded; say whether it is another now."""
     environments: dict[str, dict[str, str]] = {}
     files = {}
     for path in sorted(study_files(plan, folders)):
@@ -76,9 +76,11 @@ def write_manifest(plan: Plan, folders: Folders, options: Iterable[str]) -> Mani
             inside = os.path.relpath(path, folders.results)
             files[inside] = _entry(Path(path), seal, environments)
     made = Manifest(options=tuple(options), environments=environments, files=files)
-    text = made.model_dump_json(indent=1, exclude_none=True)
-    write_text(f"{text}\n", paths.MANIFEST.at(folders.results))
-    return made
+    text = f"{made.model_dump_json(indent=1, exclude_none=True)}\n"
+    place = Path(paths.MANIFEST.at(folders.results))
+    changed = not place.is_file() or place.read_bytes() != text.encode()
+    write_text(text, place)
+    return made, changed
 
 
 def read_manifest(results: str) -> Manifest:

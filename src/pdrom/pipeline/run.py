@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from pdrom.core.errors import ConfigurationError, PdromError
+from pdrom.core.paths import CRATE
 from pdrom.pipeline.commandline import CommandLine, options
 from pdrom.pipeline.dates import settle_dates
 from pdrom.pipeline.failures import Failures, listen
@@ -72,12 +73,22 @@ class Run:
     def succeed(self, plan: Plan, folders: Folders) -> None:
         """End a run whose jobs all succeeded: it says what came of it."""
         try:
-            write_manifest(plan, folders, options(self.command.configfiles, self.command.settings))
+            self._record(plan, folders)
         except PdromError as error:
             say_last(f"pdrom: {error}\n")
         say_last(summary(self.command, folders, plan.figures, plan.tables.paths))
         stop_server()
         cancel_timers()
+
+    def _record(self, plan: Plan, folders: Folders) -> None:
+        """Write what there is now; a run that changed nothing leaves the account of an older."""
+        named = options(self.command.configfiles, self.command.settings)
+        manifest, changed = write_manifest(plan, folders, named)
+        if changed or not Path(CRATE.at(folders.results)).is_file():
+            # late: the library that writes it loads for half a second
+            from pdrom.pipeline.crate import write_crate
+
+            write_crate(plan, folders, manifest)
 
     def fail(self) -> None:
         """End a run that failed or was interrupted: it says why."""

@@ -13,6 +13,8 @@ from pdrom.pipeline.fingerprint import fingerprint
 from pdrom.pipeline.holdings import paths_of, preferred_paths
 from pdrom.pipeline.jobs import digest
 from pdrom.pipeline.study import Study
+from pdrom.report.codecheck import FILE as CODECHECK
+from pdrom.report.codecheck import codecheck
 from pdrom.tables.declaration import Table
 from pdrom.tables.document import document
 from pdrom.tables.find import declared, load
@@ -129,3 +131,4 @@ class Tables:
 
 if __name__ == "__main__":
     Path("docs/tables.md").write_text(document(all_tables().values()), encoding="utf-8")
+    CODECHECK.write_text(codecheck(all_tables().values()), encoding="utf-8")
