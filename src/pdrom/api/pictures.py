@@ -82,4 +82,5 @@ def _viewed(full: FullRun, reduced: list[ReducedRun]) -> ViewedScene:
             )
             for run in reduced
         ),
+        effects=config.effects,
     )

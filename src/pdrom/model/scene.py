@@ -3,15 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 import numpy as np
-from pydantic import (
-    Field,
-    SerializeAsAny,
-    field_validator,
-    model_validator,
-)
+from pydantic import Field, model_validator
 
 from pdrom.core.errors import SceneError
 from pdrom.core.names import SceneName
@@ -23,7 +18,7 @@ from pdrom.model.dynamics.stepper import LocalStep, State, Stepper
 from pdrom.model.dynamics.system import DEFAULT_SOLVER, GlobalSystem
 from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import Boundary, Contact, EffectConfig, Force, Start
-from pdrom.model.effects.entries import bind, effect_config
+from pdrom.model.effects.entries import EffectConfigs, bind
 from pdrom.model.held_out import HeldOut
 from pdrom.model.holding import check_holds, log_holds
 from pdrom.model.masses import Mass, MassConfig, vertex_masses
@@ -57,16 +52,9 @@ class SceneConfig(_Model):
     frames: Annotated[int, Field(ge=1, le=1_000_000)]
     vertex_mass: Mass = 10.0
     masses: tuple[MassConfig, ...] = ()
-    effects: tuple[SerializeAsAny[EffectConfig], ...]
+    effects: EffectConfigs
     reduce: dict[str, ReductionPlan] = Field(default_factory=dict)
     held_out: HeldOut = HeldOut()
-
-    @field_validator("effects", mode="before")
-    @classmethod
-    def _typed_effects(cls, value: Any) -> tuple[EffectConfig, ...]:
-        if not isinstance(value, (list, tuple)):
-            raise ValueError("a list of effects is required")
-        return tuple(effect_config(entry, index) for index, entry in enumerate(value))
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

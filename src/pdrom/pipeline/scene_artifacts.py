@@ -95,5 +95,6 @@ class SceneArtifacts:
                 "iterations": self._study.scene(scene).iterations,
             },
             subspaces=bool(paths_of(self._study.only(scene), SUBSPACES, self._results)),
+            effects=self._study.scene(scene).effects,
         )
         return order.model_dump(mode="json")

@@ -56,6 +56,10 @@ class EffectConfig(ConfigModel):
         """The motion in the opposite direction; an effect that does not move stays as it is."""
         return self
 
+    def body(self, low: np.ndarray, high: np.ndarray) -> Mesh | None:
+        """The surface that pictures of the region from ``low`` to ``high`` (3,) m show of it."""
+        return None
+
 
 def _metadata(field: Any) -> list[Any]:
     """Markers of a field, also those inside ``FrameNumber | None``."""

@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import model_validator
 
 from pdrom.model.effects.base import Vector
+from pdrom.model.effects.bodies import cuboid
 from pdrom.model.effects.obstacle import Obstacle, ObstacleConfig
 from pdrom.model.mesh.selection import require_ordered
 from pdrom.model.mesh.types import Mesh
@@ -24,6 +25,9 @@ class Box(Obstacle):
         @model_validator(mode="after")
         def _ordered(self) -> Self:
             return require_ordered(self)
+
+        def body(self, low: np.ndarray, high: np.ndarray) -> Mesh:
+            return cuboid(np.array(self.lower), np.array(self.upper))
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)

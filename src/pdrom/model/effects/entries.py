@@ -1,9 +1,9 @@
 """Entries of a scene's list of effects: as typed configurations, and bound to a mesh."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import BeforeValidator, SerializeAsAny, ValidationError
 
 from pdrom.core.errors import ConfigurationError, SceneError
 from pdrom.core.yamlfile import describe, shown
@@ -27,6 +27,15 @@ def effect_config(entry: Any, index: int) -> EffectConfig:
     except ValidationError as error:
         fault = describe(error, model)
         raise ValueError(f"effects[{index}] ({entry['effect']}): {fault}") from error
+
+
+def _typed(entries: Any) -> tuple[EffectConfig, ...]:
+    if not isinstance(entries, (list, tuple)):
+        raise ValueError("a list of effects is required")
+    return tuple(effect_config(entry, index) for index, entry in enumerate(entries))
+
+
+EffectConfigs = Annotated[tuple[SerializeAsAny[EffectConfig], ...], BeforeValidator(_typed)]
 
 
 def bind(config: EffectConfig, scene: str, mesh: Mesh, masses: np.ndarray) -> Effect:

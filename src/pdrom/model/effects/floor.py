@@ -6,6 +6,7 @@ import numpy as np
 
 from pdrom.core.yamlfile import Length
 from pdrom.model.effects.base import Contact, EffectConfig
+from pdrom.model.effects.bodies import square
 from pdrom.model.mesh.types import Mesh
 
 
@@ -21,6 +22,9 @@ class Floor(Contact):
 
         effect: Literal["floor"] = "floor"
         height: Length = 0.0
+
+        def body(self, low: np.ndarray, high: np.ndarray) -> Mesh:
+            return square(np.array([0.0, self.height, 0.0]), np.array([0.0, 1.0, 0.0]), low, high)
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)

@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import model_validator
 
 from pdrom.model.effects.base import Vector
+from pdrom.model.effects.bodies import square
 from pdrom.model.effects.obstacle import Obstacle, ObstacleConfig
 from pdrom.model.mesh.selection import require_direction
 from pdrom.model.mesh.types import Mesh
@@ -24,6 +25,9 @@ class Plane(Obstacle):
         @model_validator(mode="after")
         def _directed(self) -> Self:
             return require_direction(self)
+
+        def body(self, low: np.ndarray, high: np.ndarray) -> Mesh:
+            return square(np.array(self.point), np.array(self.normal), low, high)
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)

@@ -6,6 +6,7 @@ import numpy as np
 
 from pdrom.core.yamlfile import PositiveLength
 from pdrom.model.effects.base import Vector
+from pdrom.model.effects.bodies import ball
 from pdrom.model.effects.obstacle import Obstacle, ObstacleConfig
 from pdrom.model.mesh.types import Mesh
 
@@ -21,6 +22,9 @@ class Sphere(Obstacle):
         effect: Literal["sphere"] = "sphere"
         centre: Vector
         radius: PositiveLength
+
+        def body(self, low: np.ndarray, high: np.ndarray) -> Mesh:
+            return ball(np.array(self.centre), self.radius)
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)

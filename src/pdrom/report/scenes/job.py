@@ -5,6 +5,7 @@ from importlib import import_module
 
 from pydantic import BaseModel, ConfigDict
 
+from pdrom.model.effects.entries import EffectConfigs
 from pdrom.report.figures.kit.holdings import Holdings
 from pdrom.report.figures.kit.options import Rank
 from pdrom.report.scenes.catalogue import module
@@ -18,6 +19,7 @@ class SceneOrder(BaseModel):
     ranks : basis sizes, where not every one is shown
     title : of the scene
     subspaces : whether it holds position subspaces
+    effects : of the scene
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -30,6 +32,7 @@ class SceneOrder(BaseModel):
     settings: dict[str, float]
     title: str
     subspaces: bool = False
+    effects: EffectConfigs = ()
 
     @property
     def results(self) -> SceneResults:
@@ -42,6 +45,7 @@ class SceneOrder(BaseModel):
             self.ranks,
             self.title,
             self.subspaces,
+            self.effects,
         )
 
 

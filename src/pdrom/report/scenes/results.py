@@ -17,6 +17,7 @@ from pdrom.core.paths import (
     Place,
 )
 from pdrom.core.store import read_table
+from pdrom.model.effects.base import EffectConfig
 from pdrom.report.figures.kit.holdings import Holdings
 from pdrom.report.figures.kit.options import Rank
 from pdrom.report.figures.kit.results import Results
@@ -37,11 +38,13 @@ class SceneResults(Results):
         ranks: tuple[Rank, ...] = (),
         title: str = "",
         subspaces: bool = False,
+        effects: tuple[EffectConfig, ...] = (),
     ) -> None:
         super().__init__(folder, holdings, settings)
         self.scene = scene
         self.ranks = ranks
         self.title = title
+        self.effects = effects
         self._subspaces = subspaces
 
     @property

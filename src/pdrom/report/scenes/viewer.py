@@ -51,6 +51,7 @@ def viewed(results: SceneResults, times: pd.DataFrame) -> ViewedScene:
         floor=floors.of(scene),
         horizon=floors.horizon(scene),
         runs=tuple(_runs(results, times[times.position_basis.isna()])),
+        effects=results.effects,
     )
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pdrom.model.effects.base import EffectConfig
 from pdrom.model.mesh.types import Mesh
 
 
@@ -35,6 +36,7 @@ class ViewedScene:
     ms : milliseconds a frame of the full order, None where nobody measured
     floor : (F,) sensitivity floor, empty where it is not known
     horizon : frame from which on no run can be judged, None if there is none or it is not known
+    effects : those of the scene; what has a body is shown
     """
 
     name: str
@@ -46,3 +48,4 @@ class ViewedScene:
     floor: np.ndarray = field(default_factory=lambda: np.empty(0))
     horizon: int | None = None
     runs: tuple[ViewedRun, ...] = ()
+    effects: tuple[EffectConfig, ...] = ()

@@ -1,12 +1,12 @@
 "use strict";
 // The page's own script: choices, frames, playing. Plotly draws; its licence stands above its code.
 (async () => {
-  const GREY = "#b9b4a7", WIRE = "#55524a", BLUE = "#0072b2", RED = "#b3261e";
+  const GREY = "#b9b4a7", WIRE = "#55524a", BLUE = "#0072b2", OBSTACLE = "#7a6a9a", RED = "#b3261e";
   const FLOOR = 1e-7; // smaller errors are drawn on the axis
   const at = (id) => document.getElementById(id);
   const scenes = JSON.parse(at("scenes").textContent);
   const unpacked = new WeakMap();
-  let shown = null; // {scene, run, full, reduced, faces}
+  let shown = null; // {scene, run, full, reduced, faces, edges, bodies}
   let timer = null, syncing = false;
   let wanted = null, drawing = null; // what is still to be drawn: null, "frame" or "all"; who draws
 
@@ -14,6 +14,12 @@
     const raw = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
     const stream = new Blob([raw]).stream().pipeThrough(new DecompressionStream("deflate"));
     return new Response(stream).arrayBuffer();
+  }
+
+  // Corners of packed triangles.
+  async function corners(text) {
+    const all = new Uint32Array(await bytes(text)), pick = (corner) => all.filter((_, i) => i % 3 === corner);
+    return { i: pick(0), j: pick(1), k: pick(2) };
   }
 
   // Frames of packed positions: three arrays of coordinates each.
@@ -52,24 +58,13 @@
     return [scene, ofMethod.find((run) => String(run.r) === at("r").value) || null];
   }
 
-  // Cube about the full-order run, with room around it: runs that leave it are cut off.
-  function box(frames) {
-    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-    for (const xyz of frames) xyz.forEach((values, axis) => values.forEach((v) => {
-      low[axis] = Math.min(low[axis], v);
-      high[axis] = Math.max(high[axis], v);
-    }));
-    const size = Math.max(...high.map((v, axis) => v - low[axis]));
-    return low.map((v, axis) => (v + high[axis]) / 2).map((middle) => [middle - 0.7 * size, middle + 0.7 * size]);
-  }
-
   function space(ranges, domain, camera) {
     const axis = (range) => ({ range, visible: false });
     const [x, y, z] = ranges.map(axis);
     return { xaxis: x, yaxis: y, zaxis: z, domain, camera, aspectmode: "cube", uirevision: "camera" };
   }
 
-  const CAMERA = { up: { x: 0, y: 1, z: 0 }, eye: { x: 0.7, y: 0.45, z: 1.2 } };
+  const CAMERA = { up: { x: 0, y: 1, z: 0 }, eye: { x: 0.85, y: 0.55, z: 1.45 } };
 
   function surface(name, xyz, faces, scene, look) {
     const [x, y, z] = xyz;
@@ -132,11 +127,9 @@
 
   async function choose() {
     const [scene, run] = chosenRun();
-    const faces = new Uint32Array(await bytes(scene.triangles));
-    const pick = (corner) => faces.filter((_, i) => i % 3 === corner);
-    shown = { scene, run, faces: { i: pick(0), j: pick(1), k: pick(2) },
-      full: await positions(scene.full), reduced: run && await positions(run.positions) };
-    shown.ranges = box(shown.full);
+    shown = { scene, run, faces: await corners(scene.triangles), full: await positions(scene.full),
+      reduced: run && await positions(run.positions), bodies: [] };
+    for (const { points, triangles } of scene.bodies) shown.bodies.push([points, await corners(triangles)]);
     shown.edges = edgesOf(shown.faces);
     at("frame").max = shown.full.length - 1;
     at("frame").value = Math.min(at("frame").value, shown.full.length - 1);
@@ -151,19 +144,24 @@
     const traces = [above() ? wires("full order", lines(full(k), shown.edges))
       : surface("full order", full(k), shown.faces, "scene", { color: GREY })];
     if (shown.reduced) {
-      const size = Math.max(...shown.ranges.map((range) => range[1] - range[0])) / 1.4;
+      const size = Math.max(...shown.scene.ranges.map((range) => range[1] - range[0])) / 1.4;
       const colour = at("colour").checked
         ? { intensity: distance(reduced(k), full(k)), cmin: 0, cmax: 0.1 * size, colorscale: "Viridis",
           colorbar: { title: { text: "distance, m" }, thickness: 12, len: 0.6 } }
         : { color: BLUE };
       traces.push(surface("reduced", reduced(k), shown.faces, beside ? "scene2" : "scene", colour));
     }
+    const sides = beside ? ["scene", "scene2"] : ["scene"];
+    for (const side of sides) for (const [points, faces] of shown.bodies) {
+      const flatshading = points[0].length < 100; // a ball is round, a box has edges
+      traces.push(surface("obstacle", points, faces, side, { color: OBSTACLE, opacity: 0.3, flatshading }));
+    }
     const note = (text, x) => ({ text, x, y: 1, xref: "paper", yref: "paper", showarrow: false, font: { size: 14 } });
     const layout = { margin: { l: 0, r: 0, t: 24, b: 0 }, uirevision: "camera",
-      scene: space(shown.ranges, { x: [0, beside ? 0.48 : 0.95], y: [0, 1] }, camera),
+      scene: space(shown.scene.ranges, { x: [0, beside ? 0.48 : 0.95], y: [0, 1] }, camera),
       annotations: beside ? [note("full order", 0.2), note("reduced", 0.7)]
         : [note(shown.reduced ? "full order (wires) and reduced" : "full order", 0.45)] };
-    if (beside) layout.scene2 = space(shown.ranges, { x: [0.48, 0.95], y: [0, 1] }, camera);
+    if (beside) layout.scene2 = space(shown.scene.ranges, { x: [0.48, 0.95], y: [0, 1] }, camera);
     await Plotly.react(at("shapes"), traces, layout, { displaylogo: false, responsive: true });
   }
 
@@ -200,7 +198,7 @@
     const runs = shown.reduced ? [first, reduced(k)] : [first];
     const change = { x: runs.map((r) => r[0]), y: runs.map((r) => r[1]), z: runs.map((r) => r[2]) };
     if (shown.reduced && at("colour").checked) change.intensity = [undefined, distance(reduced(k), full(k))];
-    await Plotly.restyle(at("shapes"), change);
+    await Plotly.restyle(at("shapes"), change, runs.map((_, i) => i));
     const line = at("errors").data.length - 1;
     await Plotly.restyle(at("errors"), { x: [[time(frame), time(frame)]] }, [line]);
     at("status").textContent = words(k, frame);

@@ -3,7 +3,7 @@
 import io
 import json
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +14,17 @@ from PIL import Image
 from playwright.sync_api import Locator, Page, sync_playwright
 
 from pdrom.core.errors import StorageError
+from pdrom.model.effects.entries import effect_config
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.report.viewer import page as writer
-from pdrom.report.viewer.pack import FRAMES, LEVELS, pack_positions, pack_scene, unpack_positions
+from pdrom.report.viewer.pack import (
+    FRAMES,
+    LEVELS,
+    pack_positions,
+    pack_scene,
+    shown_region,
+    unpack_positions,
+)
 from pdrom.report.viewer.page import write_page
 from pdrom.report.viewer.runs import ViewedRun, ViewedScene
 
@@ -40,7 +48,18 @@ def test_positions_survive_packing_to_half_a_step(frames, vertices, size, seed):
     assert np.all(np.abs(found - positions) <= 0.5001 * box / LEVELS + 1e-15 * size)
 
 
-def viewed(name: str = "sheet", frames: int = 12, runs: int = 2) -> ViewedScene:
+OBSTACLES = [
+    {"effect": "gravity"},
+    {"effect": "floor", "height": 1.0},
+    {"effect": "sphere", "centre": [0.0, 1.6, 0.0], "radius": 0.3, "friction": float("inf")},
+    {"effect": "box", "lower": [-0.5, 1.0, -0.5], "upper": [-0.2, 1.2, 0.5]},
+    {"effect": "plane", "point": [0.5, 1.5, 0.0], "normal": [-1.0, 0.3, 0.0]},
+]
+
+
+def viewed(
+    name: str = "sheet", frames: int = 12, runs: int = 2, effects: Sequence[dict] = ()
+) -> ViewedScene:
     """A sheet that sinks; one reduced run is near it, the other one bends up and ends early."""
     mesh = cloth(6, 6, "xz", 1.0, 2.0, 0.0)
     t = np.linspace(0.0, 1.0, frames + 1)[:, None]
@@ -54,8 +73,9 @@ def viewed(name: str = "sheet", frames: int = 12, runs: int = 2) -> ViewedScene:
     far = ViewedRun("spring", "far", 6, bent[: half + 1], error[:half], half, None)
     floor = np.geomspace(1e-9, 1e-2, frames)
     return ViewedScene(
-        name, "A <sheet> </script>", mesh, 0.02, full, 1.0, floor, 9, (near, far)[:runs]
-    )
+        name, "A <sheet> </script>", mesh, 0.02, full, 1.0, floor, 9, (near, far)[:runs],
+        tuple(effect_config(entry, i) for i, entry in enumerate(effects)),
+    )  # fmt: skip
 
 
 def test_the_surface_alone_is_packed_and_few_frames():
@@ -66,6 +86,39 @@ def test_the_surface_alone_is_packed_and_few_frames():
     assert FRAMES / 2 < packed["full"]["frames"] <= FRAMES + 1
     assert unpack_positions(packed["full"])[0].max() == pytest.approx(mesh.points.max(), rel=1e-4)
     assert json.dumps(packed, allow_nan=False)
+
+
+def test_every_obstacle_is_packed_with_its_surface():
+    packed = pack_scene(viewed(effects=OBSTACLES))
+    bodies = [np.array(body["points"]) for body in packed["bodies"]]
+    assert len(bodies) == 4  # gravity has none
+    floor, sphere, box, _ = bodies
+    assert floor[1] == pytest.approx(np.full(4, 1.0))
+    radii = np.linalg.norm(sphere.T - [0.0, 1.6, 0.0], axis=1)
+    assert radii == pytest.approx(0.3, abs=1e-3)  # coordinates have four digits
+    assert box.min(axis=1) == pytest.approx([-0.5, 1.0, -0.5])
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "whole"),
+    [
+        ({"centre": [0.0, -0.3, 0.0], "radius": 0.25}, True),
+        ({"centre": [0.0, -9.0, 0.0], "radius": 0.25}, False),
+        ({"centre": [0.0, -3.0, 0.0], "radius": 2.9}, False),
+    ],
+    ids=["beside", "far away", "larger than the run"],
+)
+def test_an_obstacle_near_the_run_is_shown_whole(obstacle, whole):
+    run = np.random.default_rng(0).uniform(-0.5, 0.5, (3, 20, 3))
+    effects = [effect_config({"effect": "sphere", **obstacle}, 0)]
+    low, high = shown_region(run, effects)
+    assert np.ptp(high - low) == pytest.approx(0.0)  # a cube
+    assert (low < run.min(axis=(0, 1))).all()
+    assert (high > run.max(axis=(0, 1))).all()
+    body = effects[0].body(low, high).points
+    assert ((body > low) & (body < high)).all() == whole
+    if not whole:
+        assert np.array_equal((low, high), shown_region(run, []))
 
 
 def test_a_page_that_is_too_large_is_refused(tmp_path, monkeypatch):
@@ -89,7 +142,8 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     if program is None:
         pytest.skip(f"no browser on this machine ({', '.join(BROWSERS)})")
     path = tmp_path_factory.mktemp("viewer") / "index.html"
-    write_page([viewed(), viewed("other", runs=0)], path)
+    scenes = [viewed(), viewed("other", runs=0), viewed("obstacles", effects=OBSTACLES)]
+    write_page(scenes, path)
     with sync_playwright() as play:
         browser = play.chromium.launch(executable_path=program, args=OPTIONS)
         page = browser.new_page(viewport={"width": 1000, "height": 700})
@@ -163,6 +217,23 @@ def test_views_and_scenes_are_chosen(opened: Page) -> None:
     choose(opened, scene="other", view="side by side")
     assert opened.locator("#method").is_disabled()
     assert "A <sheet> </script>" in opened.inner_text("#about")
+
+
+@pytest.mark.slow
+def test_obstacles_are_seen_in_both_views_and_stay(opened: Page) -> None:
+    """Translucent: the sheets behind them still change from frame to frame."""
+    shapes = opened.locator("#shapes")
+    for view in ("side by side", "on top of each other"):
+        choose(opened, view=view, scene="sheet", method="near")
+        go_to(opened, 0)
+        without = picture(shapes)
+        choose(opened, scene="obstacles", method="near")
+        go_to(opened, 0)
+        start = picture(shapes)
+        assert differ(without, start)
+        go_to(opened, 9)
+        assert differ(start, picture(shapes))
+    choose(opened, view="side by side", scene="sheet")
 
 
 @pytest.mark.slow
