@@ -8,7 +8,14 @@ from mpmath import mp
 
 from pdrom.experiments.hard_cases.case import build
 from pdrom.experiments.hard_cases.matrices import CLASSES, VECTORS, MatrixClass
-from pdrom.experiments.hard_cases.reference import clamped, digits_for, exact, half_sphere, spring
+from pdrom.experiments.hard_cases.reference import (
+    clamped,
+    digits_for,
+    exact,
+    half_sphere,
+    sized,
+    spring,
+)
 from pdrom.experiments.hard_cases.shapes import one_tetrahedron, one_triangle, sheet
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
@@ -36,32 +43,42 @@ def projected(group: ConstraintGroup, d: np.ndarray) -> np.ndarray:
     return group.project_elements(y, np.array([0]))
 
 
-def clamped_error(group: ConstraintGroup, d: np.ndarray, unique: bool) -> tuple[float, float]:
+REFERENCES = {"clamped": clamped, "size": sized}
+
+
+def matrix_error(group: ConstraintGroup, d: np.ndarray, unique: bool) -> tuple[float, float]:
     """Relative error of p(d) and the condition number of the projection at d.
 
     Where p is not unique any nearest point is right: the error is that of the distance |d - p|, or
-    of the singular values of p, whichever is larger, and the condition number is 1.
+    of the singular values of p (their product, where that is what is kept), whichever is larger,
+    and the condition number is 1.
     """
     low, high = group.kernel_parameters()
     found = projected(group, d)
     if not np.isfinite(found).all():
         return np.inf, 1.0
-    with mp.workdps(digits_for(d)):
-        p, condition = clamped(d, low, high)
-        if unique:
+    with mp.workdps(digits_for(d, found)):
+        p, condition = REFERENCES[group.manifold or ""](d, low, high)
+        if unique and condition < mp.inf:
             return float(mp.norm(exact(found) - p) / mp.norm(p)), float(condition)
         size = max(mp.norm(exact(d)), mp.norm(p))
         distance, best = mp.norm(exact(d) - exact(found)), mp.norm(exact(d) - p)
-        outside = _outside(found, low, high)
+        outside = _outside(found, low, high, group.manifold == "size")
         return max(float(abs(distance - best) / size), outside), 1.0
 
 
-def _outside(p: np.ndarray, low: float, high: float) -> float:
-    """How far singular values of p lie outside [low, high]; a wrong orientation counts fully."""
+def _outside(p: np.ndarray, low: float, high: float, size: bool) -> float:
+    """How far singular values of p, or their product, lie outside [low, high].
+
+    A wrong orientation counts fully. The product of what is long and thin is told only as exactly
+    as its smallest value.
+    """
     sigma = np.linalg.svd(p, compute_uv=False)
     if len(p) == 3 and np.linalg.det(p) < 0.0:
         return 1.0
-    return float(np.max(np.maximum(low - sigma, sigma - high), initial=0.0))
+    measured = np.array([sigma.prod()]) if size else sigma
+    told = sigma[0] / sigma[-1] if size else 1.0
+    return float(np.max(np.maximum(low - measured, measured - high), initial=0.0)) / told
 
 
 def spring_error(group: ConstraintGroup, d: np.ndarray) -> tuple[float, float]:
@@ -119,12 +136,12 @@ def _errors(cases: int) -> Iterator[tuple[str, str, float, float]]:
     for effect in groups_on("half sphere"):
         for name, error, condition in bending_errors(cases, effect):
             yield effect, name, error, condition
-    for effect in groups_on("clamped"):
+    for effect in (name for manifold in REFERENCES for name in groups_on(manifold)):
         group = unit_group(effect)
         for kind in CLASSES:
             if group.rows_per_element in kind.rows:
                 for d in _samples(kind, group.rows_per_element, cases):
-                    yield effect, kind.name, *clamped_error(group, d, kind.unique)
+                    yield effect, kind.name, *matrix_error(group, d, kind.unique)
 
 
 def kernel_accuracy(cases: int) -> list[dict[str, Any]]:

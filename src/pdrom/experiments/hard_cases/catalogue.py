@@ -25,6 +25,7 @@ from pdrom.experiments.hard_cases.shapes import (
     shifted,
     small_bar,
 )
+from pdrom.model.mesh import shapes
 from pdrom.model.mesh.types import Mesh
 
 GRAVITY = {"effect": "gravity"}
@@ -372,6 +373,44 @@ def _obstacles() -> list[HardCase]:
         HardCase("below_slope", _scene(small_bar, TETRAHEDRON, GRAVITY, {
                      **slope, **sticky, "point": [0, 9, 0]}),
                  "all vertices start far behind a sticky slope", FORCED, bound=4.0),
+        HardCase("slope_at_speed", _scene(sheet, STRAIN, GRAVITY, {**slope, **sticky},
+                                          time_step=0.1),
+                 "a sticky slope is passed by a thousand extents in one frame", FORCED, fast,
+                 bound=20.0),
+        HardCase("vice", _scene(small_bar, VOLUME, _with(TETRAHEDRON, weight=1e5), GRAVITY,
+                                _with(plate, lower=[-9, 0, -9], upper=[9, 2.1, 9]),
+                                _with(plate, lower=[-9, 1.9, -9], upper=[9, 4, 9])),
+                 "two plates that overlap: whatever leaves one is inside the other", FORCED,
+                 bound=20.0),
+    ]  # fmt: skip
+
+
+def _unstructured() -> list[HardCase]:
+    """Meshes that are no grids: no two elements are alike, none lies along an axis."""
+    disc, shell, solid = shapes.disc, shapes.shell, shapes.solid
+    ring = partial(disc, 0.2, 0.3, "xz", 1.0, 2.0)
+    torus = partial(solid, "torus", 0.25, 1.0, 2.0)
+    starfish = partial(solid, "starfish", 0.2, 1.0, 2.0)
+    skin = partial(shell, "starfish", 0.22, 1.0, 2.0)
+    ball = {"effect": "sphere", "centre": [0, 1.6, 0.05], "radius": 0.3, "friction": 0.5}
+    edge = {"effect": "box", "lower": [-0.02, 1.0, -2], "upper": [0.03, 1.7, 2], "friction": 0.5}
+    storm = {"effect": "wind", "velocity": [3e3, 9e3, 3e3]}
+    three = {"effect": "pins", "select": {"kind": "nearest", "point": [0, 2, 0], "count": 3}}
+    return [
+        HardCase("torus_inverted", _scene(torus, ROTATION, frames=60),
+                 "all tetrahedra of a torus are inverted", CALM, scales(1, 1, -1)),
+        HardCase("starfish_flat", _scene(starfish, TETRAHEDRON),
+                 "all tetrahedra of a starfish are flattened", CALM, scales(1, 0, 1)),
+        HardCase("starfish_swollen", _scene(starfish, VOLUME, _with(TETRAHEDRON, weight=1e5)),
+                 "a starfish three times as large along each axis", CALM, scales(3, 3, 3)),
+        HardCase("disc_crumpled", _scene(ring, STRAIN, BENDING),
+                 "a disc with a hole, crumpled into a third of its size", CALM, scrambled(0.3)),
+        HardCase("disc_on_ball", _scene(ring, SPRING, GRAVITY, ball),
+                 "a disc falls on a ball as wide as its hole, beside the middle", FORCED),
+        HardCase("torus_on_edge", _scene(torus, TETRAHEDRON, GRAVITY, edge),
+                 "a torus falls on the edges of a box narrower than its elements", FORCED),
+        HardCase("shell_storm", _scene(skin, SPRING, BENDING, GRAVITY, storm, three),
+                 "wind of ten thousand metres a second on a closed surface", FORCED, bound=20.0),
     ]  # fmt: skip
 
 
@@ -397,6 +436,7 @@ def _collisions() -> list[HardCase]:
 
 PARTS = (
     _squashed, _states, _sizes, _meshes, _settings, _boundaries, _air, _obstacles, _collisions,
+    _unstructured,
 )  # fmt: skip
 CASES: dict[str, HardCase] = {case.name: case for part in PARTS for case in part()}
 

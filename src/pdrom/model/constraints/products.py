@@ -61,6 +61,8 @@ def _start(work, low, high, solid):
         scale = s[0] if s[0] > root else root
         inverse = 1.0 / scale
         target = bound * inverse * inverse * (inverse if solid else 1.0)
+        # less is nothing beside values that are so large
+        target = target if target > SMALLEST else SMALLEST
         first, second = s[0] * inverse, s[1] * inverse if solid else 1.0
         # t_1 >= s_1, t_2 >= s_2, t_1 >= t_2 >= t where the values grow
         least = target / (first * second)

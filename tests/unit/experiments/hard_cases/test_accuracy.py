@@ -7,50 +7,51 @@ from mpmath import mp
 
 from pdrom.experiments.hard_cases.accuracy import (
     bending_errors,
-    clamped_error,
     groups_on,
     kernel_accuracy,
+    matrix_error,
     projected,
     spring_error,
     unit_group,
 )
 from pdrom.experiments.hard_cases.matrices import CLASSES, VECTORS, rotation
-from pdrom.experiments.hard_cases.reference import clamped, digits_for, half_sphere, spring
+from pdrom.experiments.hard_cases.reference import clamped, digits_for, half_sphere, sized, spring
 from strategies import hard_matrices
 
-CLAMPED = groups_on("clamped")
+CLAMPED, SIZED = groups_on("clamped"), groups_on("size")
 EPS = np.finfo(float).eps
 # A backward stable projection is wrong by a few round-offs times the condition number.
 STABLE = 20.0 * EPS
 
-GROUPS = {name: unit_group(name) for name in (*CLAMPED, "spring")}
+GROUPS = {name: unit_group(name) for name in (*CLAMPED, *SIZED, "spring")}
 
 
 @pytest.mark.parametrize("kind", CLASSES, ids=lambda k: k.name)
-@pytest.mark.parametrize("effect", CLAMPED)
-def test_clamped_projections_are_backward_stable(effect, kind):
+@pytest.mark.parametrize("effect", [*CLAMPED, *SIZED])
+def test_projections_of_matrices_are_backward_stable(effect, kind):
     group = GROUPS[effect]
     rng = np.random.default_rng(5)
     for _ in range(10):
         d = kind.make(rng, group.rows_per_element)
-        error, condition = clamped_error(group, d, kind.unique)
+        error, condition = matrix_error(group, d, kind.unique)
         assert error <= STABLE * max(1.0, condition)
 
 
 @settings(max_examples=50, deadline=None)
 @given(drawn=hard_matrices(rows=3))
-@pytest.mark.parametrize("effect", ["tetrahedron_strain", "deformation_gradient"])
+@pytest.mark.parametrize("effect", ["tetrahedron_strain", "deformation_gradient", "volume"])
 def test_any_matrix_of_a_tetrahedron(effect, drawn):
     kind, d = drawn
-    error, condition = clamped_error(GROUPS[effect], d, kind.unique)
+    error, condition = matrix_error(GROUPS[effect], d, kind.unique)
     assert error <= STABLE * max(1.0, condition)
 
 
 @settings(max_examples=50, deadline=None)
 @given(drawn=hard_matrices(rows=2))
-def test_any_matrix_of_a_triangle(drawn):
+@pytest.mark.parametrize("effect", ["strain", "area"])
+def test_any_matrix_of_a_triangle(effect, drawn):
     kind, d = drawn
-    error, condition = clamped_error(GROUPS["strain"], d, kind.unique)
+    error, condition = matrix_error(GROUPS[effect], d, kind.unique)
     assert error <= STABLE * max(1.0, condition)
 
 
@@ -67,7 +68,7 @@ def test_bending():
         assert error <= STABLE * max(1.0, condition), name
 
 
-@pytest.mark.parametrize("effect", CLAMPED)
+@pytest.mark.parametrize("effect", [*CLAMPED, *SIZED])
 def test_the_unit_element_sees_the_matrix_itself(effect, rng):
     group = GROUPS[effect]
     d = rng.standard_normal((group.rows_per_element, 3))
@@ -93,6 +94,28 @@ def test_reference_of_known_matrices():
         assert np.array(p.tolist(), dtype=float) == pytest.approx(expected)
 
 
+def test_reference_of_known_sizes():
+    """Equal values shrink alike as long as that is nearest; of unequal ones a flat last gives way;
+    two values whose product is 1 lie where the normal of the hyperbola meets them."""
+    with mp.workdps(60):
+        p, condition = sized(np.diag([1.9, 1.9, 1.9]), 0.5, 1.0)
+        assert np.array(p.tolist(), dtype=float) == pytest.approx(np.eye(3))
+        assert 1.0 < float(condition) < 10.0
+        p, _ = sized(np.diag([100.0, 90.0, -1e-3]), 1.0, 1.0)
+        found = np.diag(np.array(p.tolist(), dtype=float))
+        assert found == pytest.approx([100.0, 90.0, 1.0 / 9000.0], rel=1e-6)
+        inside = np.diag([2.0, 0.5, 1.0]) @ rotation(np.random.default_rng(0))
+        p, condition = sized(inside, 0.9, 1.1)
+        assert np.array_equal(np.array(p.tolist(), dtype=float), inside)
+        assert condition == 1.0
+        p, _ = sized(np.array([[3.0, 0.0, 0.0], [0.0, 0.0, 0.0]]), 1.0, 1.0)
+        s, t = 3.0, np.linalg.svd(np.array(p.tolist(), dtype=float), compute_uv=False)
+        assert t.prod() == pytest.approx(1.0, rel=1e-14)
+        assert (s - t[0]) * t[0] == pytest.approx(-t[1] * t[1], rel=1e-12)
+        _, condition = sized(np.diag([1.0, 1.0, -1.0]), 1.0, 1.0)
+        assert condition == mp.inf
+
+
 def test_reference_of_known_vectors():
     with mp.workdps(60):
         p = spring(np.array([[0.0, 3e-300, 4e-300]]), np.array([0.0, 0.0, 10.0]))
@@ -112,7 +135,7 @@ def test_digits_follow_the_range_of_the_entries():
 
 def test_the_table_has_every_group_and_class():
     rows = kernel_accuracy(1)
-    assert {r["group"] for r in rows} == {*CLAMPED, "spring", "bending"}
+    assert {r["group"] for r in rows} == {*CLAMPED, *SIZED, "spring", "bending"}
     named = {r["matrix_class"] for r in rows if r["group"] == "tetrahedron_strain"}
     assert named == {k.name for k in CLASSES}
     assert all(r["cases"] == 1 for r in rows)
@@ -122,5 +145,6 @@ def test_the_table_has_every_group_and_class():
 def test_groups_are_those_of_the_registry():
     """A further group that says what it projects on is measured, without a list of names."""
     assert CLAMPED == ["strain", "tetrahedron_strain", "deformation_gradient"]
+    assert SIZED == ["volume", "area"]
     assert groups_on("length") == ["spring"]
     assert groups_on("half sphere") == ["bending"]
