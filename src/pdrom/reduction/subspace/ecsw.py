@@ -21,7 +21,7 @@ from pdrom.reduction.subspace.training import TrainingFrame
 # Rows that the training equations are hashed to, per coordinate of the subspace: several times the
 # elements that are chosen, or the factors would fit the hashing and not the equations.
 SKETCH = 60
-# Elements that may be chosen, at most: neighbours are much alike.
+# Elements that may be chosen, at first: neighbours are much alike.
 CANDIDATES = 5000
 SEED = 0
 
@@ -35,20 +35,39 @@ def ecsw_elements(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Sampled elements (m,) and their factors xi > 0 (m,) for each tolerance.
 
-    Of a large group a random (seeded) part is eligible; the sum that it has to meet is always that
-    of all elements.
+    Of a large group a random (seeded) part is eligible, twice as many where these miss a tolerance;
+    the sum that they have to meet is always that of all elements.
 
     Parameters
     ----------
     tolerances : relative residuals tau of the training equations at which NNLS stops
     """
-    eligible = np.arange(group.elements)
-    if group.elements > CANDIDATES:
-        generator = np.random.default_rng(SEED)
-        eligible = np.sort(generator.choice(group.elements, CANDIDATES, replace=False))
-    rows, total = training_equations(group, columns, training, eligible)
-    solutions = nnls_path(rows, total, tolerances, most)
-    return [(eligible[support], factors) for support, factors in solutions]
+    count = CANDIDATES
+    while True:
+        eligible = _eligible(group.elements, count)
+        rows, total = training_equations(group, columns, training, eligible)
+        solutions = nnls_path(rows, total, tolerances, most)
+        if count >= group.elements or _met(rows, total, solutions, tolerances):
+            return [(eligible[support], factors) for support, factors in solutions]
+        count *= 2
+
+
+def _eligible(elements: int, count: int) -> np.ndarray:
+    if count >= elements:
+        return np.arange(elements)
+    return np.sort(np.random.default_rng(SEED).choice(elements, count, replace=False))
+
+
+def _met(
+    rows: np.ndarray,
+    total: np.ndarray,
+    solutions: Sequence[tuple[np.ndarray, np.ndarray]],
+    tolerances: Sequence[float],
+) -> bool:
+    """Whether every solution keeps to its tolerance, but for round-off."""
+    left = [np.linalg.norm(rows[:, support] @ x - total) for support, x in solutions]
+    allowed = (1.0 + 1e-9) * np.linalg.norm(total) * np.array(tolerances)
+    return bool((np.array(left) <= allowed).all())
 
 
 def training_equations(

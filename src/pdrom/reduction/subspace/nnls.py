@@ -59,9 +59,12 @@ def nnls_path(
     for tolerance in sorted(set(tolerances), reverse=True):
         search.reach(tolerance)
         found[tolerance] = search.solution()
-        log.info(
-            "NNLS: %d of %d columns, residual %.2e",
+        missed = search.relative_residual > tolerance > 0.0
+        log.log(
+            logging.WARNING if missed else logging.INFO,
+            "NNLS: %d of %d columns, residual %.2e%s",
             len(found[tolerance][0]), g.shape[1], search.relative_residual,
+            f", which misses the tolerance {tolerance:g}" if missed else "",
         )  # fmt: skip
     return [found[tolerance] for tolerance in tolerances]
 

@@ -105,6 +105,18 @@ def test_a_part_of_a_large_group_stands_for_all(pulled, monkeypatch):
     assert np.linalg.norm(left) <= 3e-2 * np.linalg.norm(total)
 
 
+def test_a_part_that_misses_the_tolerance_grows(pulled, monkeypatch):
+    scene, _, columns = pulled
+    group = scene.groups[0]
+    training = training_run(scene, columns, [2, 8])
+    rows, total = training_equations(group, columns, training, everything(group))
+    monkeypatch.setattr(ecsw, "CANDIDATES", 3)
+    ((support, factors),) = ecsw_elements(group, columns, training, [1e-2])
+    assert len(support) > 3
+    residual = np.linalg.norm(rows[:, support] @ factors - total)
+    assert residual <= 0.0101 * np.linalg.norm(total)
+
+
 def test_factors_of_one_repeat_the_iterations(pulled):
     """What is trained on is an identity: all equations hold for the iterates of the run."""
     scene, _, columns = pulled
