@@ -12,6 +12,7 @@ from pdrom.core.yamlfile import validate
 from pdrom.experiments.alternatives import experiment
 from pdrom.experiments.alternatives.settings import Alternatives, Comparison
 from pdrom.tables.alternatives import alternatives
+from pdrom.tables.reduction_pays import reduction_pays
 from pdrom.tables.winners import winners
 
 EFFECTS = (
@@ -38,7 +39,7 @@ def written(tmp_path_factory):
             compared=6,
             stiffness={"test": (1.0, 4.0)},
             steps=STEPS,
-            k=4,
+            modes=(4,),
             frames=2,
             warmup=0,
             repeats=1,
@@ -84,6 +85,8 @@ def test_tables_of_the_rows(written):
     assert len(winners(alternatives([]), [0.1])) == 0
     strict = found[(found.limit == 1e-3) & (found.reference == "continuous")]
     assert (strict.method == "explicit").all()
+    assert len(reduction_pays(found)) == 2 * (3 + 2)
+    assert len(reduction_pays(found[:0])) == 0
     assert found[found.limit == 1e-12].method.isna().all()
 
 
@@ -122,8 +125,42 @@ def test_faulty_settings_are_refused(changes, message):
         validate(Alternatives, changes, "here")
 
 
-def test_a_method_is_left_out_on_large_meshes():
-    asked = Comparison(largest={"newton": 100})
-    assert asked.takes("newton", 100)
-    assert not asked.takes("newton", 101)
-    assert asked.takes("xpbd", 10**6)
+def test_steps_that_cost_too_much_are_left_out():
+    asked = Comparison(work={"newton": 200, "converged": 100}, steps=STEPS)
+    assert asked.pairs("newton", 10) == [(1, 20)]
+    assert asked.pairs("newton", 11) == []
+    assert asked.pairs("explicit", 10**6) == [(1, 1), (64, 1)]
+    assert asked.pairs("xpbd", 1) == []
+    assert asked.affords("converged", 100)
+    assert not asked.affords("converged", 101)
+
+
+def test_the_size_from_which_a_reduction_pays():
+    rows = pd.DataFrame(
+        {
+            "vertices": [100, 400, 10_000],
+            "limit": 0.1,
+            "plain_ms": [2.0, 8.0, 200.0],
+            "reduced_ms": [1.0, 1.0, 1.0],
+            "reduced_speedup": [0.25, 0.5, 50.0],
+        }
+    )
+    strict = rows.assign(limit=0.01, reduced_speedup=[0.5, np.nan, 3.0], plain_ms=np.nan)
+    never = rows.assign(limit=0.001, reduced_speedup=[3.0, 2.0, np.nan])
+    always = rows.assign(limit=0.5, reduced_speedup=[2.0, 2.0, 2.0])
+    both = pd.concat([never, always, strict, rows]).assign(
+        scene="s", stiffness=1.0, reference="implicit"
+    )
+    found = reduction_pays(both).set_index("limit")
+    assert found.loc[0.1, ["smallest", "largest", "from_plain", "from_best"]].tolist() == [
+        100, 10_000, 100, 10_000,
+    ]  # fmt: skip
+    # a straight line in both logarithms
+    crossing = 400 * (10_000 / 400) ** (np.log(2.0) / np.log(100.0))
+    assert found.breaks_even[0.1] == pytest.approx(crossing)
+    assert found.from_best[0.01] == 10_000
+    assert pd.isna(found.from_plain[0.01])
+    assert pd.isna(found.breaks_even[0.01])
+    assert pd.isna(found.from_best[0.001])
+    assert found.from_best[0.5] == 100
+    assert pd.isna(found.breaks_even[0.5])

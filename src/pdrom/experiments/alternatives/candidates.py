@@ -1,6 +1,6 @@
 """Step loops of all methods for one scene, ready to be run and timed."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -50,11 +50,10 @@ def candidates(scene: Scene, training: Scene, settings: Comparison) -> Iterator[
     """
     systems: dict[int, GlobalSystem] = {}
     start = scene.initial_state()
-    for method, pairs in settings.steps.items():
-        if not settings.takes(method, scene.mesh.vertices):
-            continue
+    for method in settings.steps:
+        pairs = settings.pairs(method, scene.mesh.vertices)
         if method == REDUCED:
-            yield from _reduced(scene, training, settings)
+            yield from _reduced(scene, training, settings, pairs)
             continue
         for substeps, iterations in pairs:
             if substeps not in systems:
@@ -66,24 +65,29 @@ def candidates(scene: Scene, training: Scene, settings: Comparison) -> Iterator[
             yield Candidate(labels, loop, start)
 
 
-def _reduced(scene: Scene, training: Scene, settings: Comparison) -> Iterator[Candidate]:
+def _reduced(
+    scene: Scene, training: Scene, settings: Comparison, pairs: Sequence[tuple[int, int]]
+) -> Iterator[Candidate]:
     """Position subspace with sampled elements; columns and samples come from ``training``."""
+    if not pairs:
+        return
     seen = trajectory(training, track_objective=False)[1:]
-    columns = make_columns(training, seen, "pod", settings.k)
-    samples: dict[int, dict[str, Samples]] = {}
-    for substeps, iterations in settings.steps[REDUCED]:
-        if substeps not in samples:
-            samples[substeps] = _samples(training, columns, substeps, settings.tau)
-        model = SubspaceModel("pod", columns, samples[substeps])
-        loop, start = model.loop(substepped(scene, substeps, iterations))
-        labels: dict[str, object] = {
-            "method": REDUCED,
-            "substeps": substeps,
-            "iterations": iterations,
-            "k": columns.modes,
-            "elements_sampled": model.elements_evaluated(scene),
-        }
-        yield Candidate(labels, loop, start, substeps, model.positions)
+    for k in settings.modes:
+        columns = make_columns(training, seen, "pod", k)
+        samples: dict[int, dict[str, Samples]] = {}
+        for substeps, iterations in pairs:
+            if substeps not in samples:
+                samples[substeps] = _samples(training, columns, substeps, settings.tau)
+            model = SubspaceModel("pod", columns, samples[substeps])
+            loop, start = model.loop(substepped(scene, substeps, iterations))
+            labels: dict[str, object] = {
+                "method": REDUCED,
+                "substeps": substeps,
+                "iterations": iterations,
+                "k": columns.modes,
+                "elements_sampled": model.elements_evaluated(scene),
+            }
+            yield Candidate(labels, loop, start, substeps, model.positions)
 
 
 def _samples(training: Scene, columns: Columns, substeps: int, tau: float) -> dict[str, Samples]:

@@ -14,6 +14,7 @@ REDUCED = "ecsw"  # the only method that is no full-order one
 CONVERGED = "converged"  # the implicit step itself, however long it takes
 
 Factors = Annotated[tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...], Field(min_length=1)]
+Work = Annotated[int, Field(ge=1, le=10**12, description="vertices times steps")]
 Steps = Annotated[tuple[Count, Count], Field(description="substeps of a frame, iterations of each")]
 
 
@@ -49,18 +50,19 @@ def default_steps() -> dict[str, tuple[Steps, ...]]:
         "xpbd": (*_sweep(5, 10, 20, 50), *_small(5, 10, 20, 50, 100)),
         "vertex-descent": (*_sweep(10, 20, 50), *_small(10, 20, 50)),
         "explicit": _small(5, 10, 20, 40, 80, 160),
-        REDUCED: ((1, 10), (1, 40), (5, 1)),
+        REDUCED: ((1, 10), (1, 40), (1, 80)),
     }
 
 
 class ContinuousReference(ConfigModel):
     """The motion in continuous time: explicit steps, halved from ``substeps`` a frame on.
 
-    They are halved until the estimated error is below ``tolerance``, up to ``limit`` a frame.
+    They are halved until the estimated error is below ``tolerance``, as long as the vertices times
+    the steps of a frame are at most ``limit``.
     """
 
     substeps: Count = 40
-    limit: Count = 6_000
+    limit: Work = 2_400_000
     tolerance: Tolerance = 1e-4
 
 
@@ -79,26 +81,34 @@ class Comparison(Protocol):
     ``steps`` has pairs (substeps of a frame, iterations of each) for each method. Errors are taken
     over ``compared`` frames of the held-out motion, for each factor on all weights that
     ``stiffness`` has for the scene (1 if none); ``frames`` of them are timed. The reduction has
-    ``k`` modes and samples to ``tau``, trained on the training motion. A method in ``largest`` is
-    left out on meshes with more vertices (``converged``: the implicit reference).
+    each of ``modes`` and samples to ``tau``, trained on the training motion. ``work`` bounds the
+    vertices times substeps times iterations of a frame of a method: steps beyond are left out
+    (converged: the implicit reference, one step of one iteration). Runs for the errors come first,
+    so that timings need no warm-up.
     """
 
+    warmup: Annotated[int, Field(ge=0, le=1000)] = 0
     compared: Count = 20
     stiffness: dict[str, Factors] = Field(default_factory=dict)
     steps: Annotated[
         dict[str, tuple[Steps, ...]], AfterValidator(_known), AfterValidator(_without_converged)
     ] = Field(default_factory=default_steps)
-    largest: Annotated[dict[str, Count], AfterValidator(_known)] = Field(default_factory=dict)
-    k: Modes = 20
+    work: Annotated[dict[str, Work], AfterValidator(_known)] = Field(default_factory=dict)
+    modes: Annotated[tuple[Modes, ...], Field(min_length=1)] = (40,)
     tau: Tolerance = 1e-2
     implicit: ImplicitReference = ImplicitReference()
     continuous: ContinuousReference = ContinuousReference()
     frames: Count = 4
     repeats: Repeats = 5
 
-    def takes(self, method: str, vertices: int) -> bool:
-        """Whether a method runs on a mesh of this size."""
-        return vertices <= self.largest.get(method, vertices)
+    def pairs(self, method: str, vertices: int) -> list[tuple[int, int]]:
+        """Substeps and iterations with which a method runs on a mesh of this size."""
+        steps = self.steps.get(method, ())
+        return [(n, k) for n, k in steps if self.affords(method, vertices * n * k)]
+
+    def affords(self, method: str, work: int) -> bool:
+        """Whether a frame of a method may have so many vertices times substeps times iterations."""
+        return work <= self.work.get(method, work)
 
 
 class Alternatives(Comparison):

@@ -54,6 +54,31 @@ def payoff(tables: Tables) -> str:
     return tabular(header, rows, "lrrrrrrrrr")
 
 
+def pays(tables: Tables) -> str:
+    """From what mesh size on a reduction is faster than others, for each error."""
+    rows = [
+        [
+            name(row.scene) + ("" if row.stiffness == 1.0 else rf" $\times {row.stiffness:g}$"),
+            row.reference,
+            format_number(row.limit),
+            str(row.smallest)
+            if row.smallest == row.largest
+            else f"{row.smallest} to {row.largest}",
+            _size(row.from_plain),
+            _size(row.from_best),
+            _number(row.speedup),
+        ]
+        for row in tables["reduction_pays"].itertuples()
+    ]
+    header = ["scene", "error against", "error", "vertices", "beats plain from", "beats all from",
+              "speed-up on the largest"]  # fmt: skip
+    return tabular(header, rows, "lllrrrr")
+
+
+def _size(vertices: Any) -> str:
+    return "--" if pd.isna(vertices) else str(int(vertices))
+
+
 def _model(row: Any) -> str:
     return row.method if row.position_basis == FULL else f"{row.method}, {row.position_basis}"
 

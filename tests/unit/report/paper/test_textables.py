@@ -184,6 +184,24 @@ TABLES = {
             "frames_to_break_even",
         ],
     ),
+    "reduction_pays": pd.DataFrame(
+        [
+            ("s_one", 1.0, "implicit", 0.1, 400, 10_000, 400, 1600, 900.0, 17.0),
+            ("s_two", 100.0, "continuous", 0.01, 400, 400, *4 * [None]),
+        ],
+        columns=[
+            "scene",
+            "stiffness",
+            "reference",
+            "limit",
+            "smallest",
+            "largest",
+            "from_plain",
+            "from_best",
+            "breaks_even",
+            "speedup",
+        ],
+    ),
     "payoff": pd.DataFrame(
         [
             ("full", "deim_x", 3, 0, 0, 0, *5 * [None], 0),

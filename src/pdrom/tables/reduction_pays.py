@@ -1,0 +1,75 @@
+"""Table reduction_pays: from what mesh size on a reduction is the cheapest way to an error."""
+
+import numpy as np
+import pandas as pd
+
+from pdrom.core.reads import TableOf
+from pdrom.tables.alternatives import STIFFNESS
+from pdrom.tables.declaration import integer, number, table, timed
+from pdrom.tables.vocabulary import SCENE
+from pdrom.tables.winners import LIMIT, REFERENCE
+
+CASE = ["scene", "stiffness", "reference", "limit"]
+
+
+@table(
+    title="From what mesh size on a reduction pays",
+    columns=(
+        SCENE,
+        STIFFNESS,
+        REFERENCE,
+        LIMIT,
+        integer("smallest", "vertices of the smallest mesh compared"),
+        integer("largest", "vertices of the largest one"),
+        timed(integer("from_plain", "vertices from which on it beats projective dynamics itself")),
+        timed(integer("from_best", "vertices from which on it beats the best full-order method")),
+        timed(number("breaks_even", "vertices where it would be as fast as that, interpolated")),
+        timed(number("speedup", "over the best full-order method on the largest mesh")),
+    ),
+    reads={"rows": TableOf("winners")},
+)
+def reduction_pays(rows: pd.DataFrame) -> pd.DataFrame:
+    """One row per scene, stiffness, reference and error; empty where it never reaches or pays.
+
+    Parameters
+    ----------
+    rows : the table winners
+    """
+    found = []
+    for labels, case in rows.sort_values("vertices", kind="stable").groupby(CASE, sort=False):
+        sizes = case.vertices.to_numpy(float)
+        plain = (case.plain_ms / case.reduced_ms).to_numpy(float)
+        best = case.reduced_speedup.to_numpy(float)
+        found.append(
+            {
+                **dict(zip(CASE, labels, strict=True)),
+                "smallest": int(sizes[0]),
+                "largest": int(sizes[-1]),
+                "from_plain": _pays_from(sizes, plain),
+                "from_best": _pays_from(sizes, best),
+                "breaks_even": _breaks_even(sizes, best),
+                "speedup": best[-1],
+            }
+        )
+    made = pd.DataFrame(found, columns=reduction_pays.column_names)
+    return made.astype(dict.fromkeys(["from_plain", "from_best"], "Int64"))
+
+
+def _first(speedups: np.ndarray) -> int:
+    """Number of the first mesh from which on all speed-ups exceed one; n if there is none."""
+    losing = np.flatnonzero(~(speedups > 1.0))
+    return int(losing[-1]) + 1 if len(losing) else 0
+
+
+def _pays_from(sizes: np.ndarray, speedups: np.ndarray) -> int | None:
+    first = _first(speedups)
+    return int(sizes[first]) if first < len(sizes) else None
+
+
+def _breaks_even(sizes: np.ndarray, speedups: np.ndarray) -> float | None:
+    """Where the line through the logarithms passes one, between two meshes that both reach it."""
+    first = _first(speedups)
+    if not 0 < first < len(sizes) or np.isnan(speedups[first - 1]):
+        return None
+    before, after = np.log(speedups[first - 1 : first + 1])
+    return float(np.exp(np.interp(0.0, [before, after], np.log(sizes[first - 1 : first + 1]))))
