@@ -135,6 +135,12 @@ def test_steps_that_cost_too_much_are_left_out():
     assert not asked.affords("converged", 101)
 
 
+def test_weights_vary_on_the_own_mesh_only():
+    asked = Comparison(stiffness={"s": (1.0, 100.0)})
+    assert asked.factors("s", 1.0) == (1.0, 100.0)
+    assert asked.factors("s", 2.0) == asked.factors("other", 1.0) == (1.0,)
+
+
 def test_the_size_from_which_a_reduction_pays():
     rows = pd.DataFrame(
         {

@@ -82,7 +82,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     """Compare all methods on one mesh: ``factor`` times the vertices along each side."""
     factor = float(outputs.table["factor"])
     rows = []
-    for stiffness in settings.alternatives.stiffness.get(settings.scene.name, (1.0,)):
+    for stiffness in settings.alternatives.factors(settings.scene.name, factor):
         for row in _rows(sized(settings.scene, factor, stiffness), settings):
             rows.append({"factor": factor, "stiffness": stiffness, **row})
         log.info("%s: stiffness %g done", settings.scene.name, stiffness)

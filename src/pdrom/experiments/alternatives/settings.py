@@ -80,11 +80,11 @@ class Comparison(Protocol):
 
     ``steps`` has pairs (substeps of a frame, iterations of each) for each method. Errors are taken
     over ``compared`` frames of the held-out motion, for each factor on all weights that
-    ``stiffness`` has for the scene (1 if none); ``frames`` of them are timed. The reduction has
-    each of ``modes`` and samples to ``tau``, trained on the training motion. ``work`` bounds the
-    vertices times substeps times iterations of a frame of a method: steps beyond are left out
-    (converged: the implicit reference, one step of one iteration). Runs for the errors come first,
-    so that timings need no warm-up.
+    ``stiffness`` has for the scene (1 if none, and on other meshes than its own); ``frames`` of
+    them are timed. The reduction has each of ``modes`` and samples to ``tau``, trained on the
+    training motion. ``work`` bounds the vertices times substeps times iterations of a frame of a
+    method: steps beyond are left out (converged: the implicit reference, one step of one
+    iteration). Runs for the errors come first, so that timings need no warm-up.
     """
 
     warmup: Annotated[int, Field(ge=0, le=1000)] = 0
@@ -100,6 +100,10 @@ class Comparison(Protocol):
     continuous: ContinuousReference = ContinuousReference()
     frames: Count = 4
     repeats: Repeats = 5
+
+    def factors(self, scene: str, size: float) -> tuple[float, ...]:
+        """Factors on all weights of a scene with ``size`` times the vertices along a side."""
+        return self.stiffness.get(scene, (1.0,)) if size == 1.0 else (1.0,)
 
     def pairs(self, method: str, vertices: int) -> list[tuple[int, int]]:
         """Substeps and iterations with which a method runs on a mesh of this size."""
