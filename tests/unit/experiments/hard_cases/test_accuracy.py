@@ -100,7 +100,7 @@ def test_reference_of_known_sizes():
     with mp.workdps(60):
         p, condition = sized(np.diag([1.9, 1.9, 1.9]), 0.5, 1.0)
         assert np.array(p.tolist(), dtype=float) == pytest.approx(np.eye(3))
-        assert 1.0 < float(condition) < 10.0
+        assert float(condition) == pytest.approx(1.9 / (2.0 - 1.9))
         p, _ = sized(np.diag([100.0, 90.0, -1e-3]), 1.0, 1.0)
         found = np.diag(np.array(p.tolist(), dtype=float))
         assert found == pytest.approx([100.0, 90.0, 1.0 / 9000.0], rel=1e-6)
