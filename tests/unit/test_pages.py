@@ -13,6 +13,8 @@ from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.front import completed
 from pdrom.reduction.method import MethodSpec
 from pdrom.report.figures.kit.outcomes import LOOKS
+from pdrom.verification.bundle import parser as bundle_parser
+from pdrom.verification.command import parser as verify_parser
 from places import ROOT
 
 PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "docs").rglob("*.md")])
@@ -65,7 +67,9 @@ def commands() -> list[str]:
 def test_commands_are_understood(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     # the scene that a reader makes stands for any
-    assert completed(shlex.split(command.replace("my_sheet", "spring_oop")))
+    first, *others = shlex.split(command.replace("my_sheet", "spring_oop"))
+    parsers = {"verify": verify_parser, "bundle": bundle_parser}
+    assert parsers[first]().parse_args(others) if first in parsers else completed([first, *others])
 
 
 def test_the_scene_and_the_method_that_are_added_are_valid() -> None:

@@ -54,7 +54,8 @@ def bundle(arguments: Sequence[str]) -> Status:
     ConfigurationError
         Git does not know the sources, or they are not those of a commit.
     """
-    subject = Subject.of(*_asked(arguments))
+    asked = parser().parse_args(arguments)
+    subject = Subject.of(asked.configfile, asked.config)
     status = verify_files(subject)
     if status is not Status.HOLDS:
         return status
@@ -140,15 +141,15 @@ def write_archive(members: Sequence[Member], target: Path) -> int:
     return target.stat().st_size
 
 
-def _asked(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
-    parser = argparse.ArgumentParser(
+def parser() -> argparse.ArgumentParser:
+    """Parser of the arguments after the word ``bundle``."""
+    made = argparse.ArgumentParser(
         prog="./reproduce bundle",
         description="One archive of the sources and of the results of a finished study.",
     )
-    parser.add_argument("--configfile", nargs="+", default=[], metavar="FILE")
-    parser.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE")
-    found = parser.parse_args(arguments)
-    return found.configfile, found.config
+    made.add_argument("--configfile", nargs="+", default=[], metavar="FILE")
+    made.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE")
+    return made
 
 
 def _tables(subject: Subject) -> dict[str, str]:
