@@ -31,6 +31,7 @@ class CommandLine:
     report : file of ``--report``, None without one
     looks_only : no job runs, nothing that a run makes is written
     own_output, cores : what else decides about the options that `./reproduce` adds
+    executor : Snakemake's executor, of the command line or its profile; None runs jobs here
     """
 
     arguments: tuple[str, ...]
@@ -41,6 +42,7 @@ class CommandLine:
     looks_only: bool
     own_output: bool
     cores: bool
+    executor: str | None = None
 
     @classmethod
     def parse(cls, arguments: Sequence[str]) -> "CommandLine":
@@ -55,6 +57,8 @@ class CommandLine:
         from snakemake.cli import get_argument_parser
 
         found = vars(get_argument_parser().parse_args(list(arguments)))
+        if found["profile"]:
+            found |= _of_profile(arguments, found["profile"])
         command = cls(
             arguments=tuple(arguments),
             configfiles=_texts(found["configfile"]),
@@ -64,6 +68,7 @@ class CommandLine:
             looks_only=any(found[name] for name in LOOKS_ONLY) or _reports(found),
             own_output=any(found[name] is not None and found[name] for name in OWN_OUTPUT),
             cores=found["cores"] is not None or found["jobs"] is not None,
+            executor=found["executor"],
         )
         command._check_values()
         return command
@@ -98,6 +103,15 @@ def options(configfiles: Iterable[str], settings: Iterable[str]) -> list[str]:
     """Options of the command line that name a configuration; none for the default one."""
     files, pairs = list(configfiles), list(settings)
     return [*(["--configfile", *files] if files else []), *(["--config", *pairs] if pairs else [])]
+
+
+def _of_profile(arguments: Sequence[str], profiles: Sequence[str]) -> dict[str, Any]:
+    """Options that a profile sets or the command line; a parser would take those as targets."""
+    from snakemake.cli import get_argument_parser
+
+    options = list(arguments)[: [*arguments, "--"].index("--")]
+    found = vars(get_argument_parser(profiles).parse_args(options))
+    return {name: found[name] for name in ("cores", "jobs", "executor")}
 
 
 def _texts(values: Any) -> tuple[str, ...]:

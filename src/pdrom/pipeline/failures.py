@@ -4,6 +4,7 @@ import logging
 import re
 import shutil
 import signal
+import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,11 @@ ADVICE = "pdrom: what is finished is kept; the same command goes on from there"
 _ERROR = re.compile(r"^[-0-9]+ [0-9:,]+ ERROR +pdrom: (?P<text>.*)$", re.MULTILINE)
 _IN_RULE = re.compile(r"^\w+ in rule (?P<rule>\w+)\b.*\n(?P<text>.*)", re.MULTILINE)
 _ENDING = re.compile(r"died with <Signals\.(?P<signal>\w+)|exit status (?P<status>\d+)")
+# How SLURM says in a job's log, and its executor of a job, why it was ended.
+_BY_SLURM = re.compile(
+    r"\*\*\* JOB \S+ ON \S+ (?P<status>CANCELLED) AT \S+(?: DUE TO (?P<why>[A-Z ]+?))? \*\*\*"
+)
+_SLURM_STATUS = re.compile(r"SLURM status is: '(?P<status>\w+)'")
 # How Snakemake's log says that the user or the system ended the run.
 _STOPS = {
     "Terminating processes on user request": "interrupted",
@@ -42,6 +48,15 @@ class Failure:
     output: str
     said: str
 
+    def wrote_error(self, begun: float) -> bool:
+        """Whether its log, written since ``begun`` (seconds of the clock), holds an error."""
+        path = Path(self.log)
+        return (
+            path.is_file()
+            and path.stat().st_mtime >= begun
+            and bool(_ERROR.search(_content(self.log)))
+        )
+
     def line(self) -> str:
         """Name of the job and cause."""
         folder = next((p for p in Path(self.output).parents if p.is_dir()), Path())
@@ -66,6 +81,8 @@ def cause(said: str, folder: Path) -> str:
         return "no space left on the disk"
     if "MemoryError" in said:
         return "out of memory"
+    if slurm := _SLURM_STATUS.search(said):
+        return f"SLURM says {slurm['status'].lower().replace('_', ' ')}"
     found = _ENDING.search(said)
     if found is None:
         return "it ended without a word"
@@ -83,12 +100,28 @@ def _signal(number: int) -> str:
         return ""
 
 
+@dataclass(frozen=True)
+class Batch:
+    """Jobs that a cluster ran as one, which it ended: name, and log of the whole."""
+
+    name: str
+    log: str
+
+    def line(self) -> str:
+        """Name and cause."""
+        found = _BY_SLURM.search(_content(self.log))
+        how = (found["why"] or found["status"]).lower() if found else "a job of it failed"
+        return f"pdrom: batch {self.name} failed: {how} (log: {self.log})"
+
+
 class Failures(logging.Handler):
     """Listens to Snakemake's log for what fails."""
 
     def __init__(self) -> None:
         super().__init__(logging.INFO)
+        self._begun = time.time()
         self.jobs: list[Failure] = []
+        self.batches: list[Batch] = []
         self.other: list[str] = []
         self.stopped: str | None = None
         # last message of each thread: why a job failed is said before which job it was
@@ -98,10 +131,15 @@ class Failures(logging.Handler):
         """Keep what belongs to a failure."""
         event = getattr(record, "event", None)
         text = record.getMessage()
-        if event == LogEvent.JOB_ERROR:
-            said = self._said.pop(record.thread, "")
+        if event == LogEvent.GROUP_ERROR:
+            self.batches.append(Batch(record.groupid, _first(record.aux_logs)))
+        elif event == LogEvent.JOB_ERROR:
+            said = self._said.pop(record.thread, "") or getattr(record, "rule_msg", None) or ""
             log, output = (_first(getattr(record, name, ())) for name in ("log", "output"))
-            self.jobs.append(Failure(record.rule_name, log, output or "its result", said))
+            failure = Failure(record.rule_name, log, output or "its result", said)
+            # of a batch every job is named, also those that never started
+            if not getattr(record, "indent", False) or failure.wrote_error(self._begun):
+                self.jobs.append(failure)
         elif event == LogEvent.ERROR:
             found = _IN_RULE.search(text)
             if found:
@@ -118,7 +156,7 @@ class Failures(logging.Handler):
         Snakemake prints its own account after a job's message, so every failed job is named once
         more with the error in its log.
         """
-        lines = [failure.line() for failure in self.jobs]
+        lines = [failure.line() for failure in (*self.batches, *self.jobs)]
         if self.stopped:
             # jobs that were ended together with the run did not fail themselves
             lines = [line for line in lines if not line.endswith(tuple(_CAUSES.values()))]

@@ -14,6 +14,7 @@ from typing import NoReturn
 
 from pdrom.core.errors import PdromError
 from pdrom.core.logs import INTERRUPTED
+from pdrom.pipeline.cluster import install_executor
 from pdrom.pipeline.commandline import CommandLine
 from pdrom.pipeline.configfiles import check_files
 from pdrom.pipeline.environment import settle
@@ -44,6 +45,8 @@ def completed(arguments: Sequence[str]) -> list[str]:
     ConfigurationError
         A configuration file is missing or no mapping; a target was taken for an option's value;
         there is no such scene or figure.
+    ClusterError
+        The executor that the command asks for cannot be installed.
     """
     if arguments[:1] == ["scene"]:
         # late: it loads the whole package
@@ -54,6 +57,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
         from pdrom.pipeline.figure_command import figure_arguments
 
         arguments = figure_arguments(arguments[1:])
+    install_executor(arguments)
     command = CommandLine.parse(arguments)
     if command.report and not command.configfiles and not command.settings and recall():
         _say(f"a report of the last run, {' '.join(recall())}")

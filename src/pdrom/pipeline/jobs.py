@@ -12,6 +12,7 @@ from pdrom.core import paths
 from pdrom.core.paths import Place
 from pdrom.core.reads import EachOf, Every, ProjectFile, SourcesOf
 from pdrom.experiments.declaration import Experiment, JobSettings, Source, experiments
+from pdrom.pipeline.costs import Request, Size
 from pdrom.pipeline.fingerprint import fingerprint
 from pdrom.pipeline.holdings import labels_of
 from pdrom.pipeline.providers import provide, scaled_methods
@@ -90,6 +91,32 @@ class Jobs:
         if experiment.alone:
             return cores
         return self._study.settings.threads if "threads" in experiment.settings.model_fields else 1
+
+    def resources(self, experiment: Experiment) -> dict[str, Any]:
+        """Memory (MB) and minutes that a job asks a cluster for; a whole node to be alone on it."""
+
+        def request(job: _Job) -> Request:
+            return self._study.costs.request(
+                experiment.name, self._size(job), job.labels.get("method")
+            )
+
+        asked = {
+            "mem_mb": self._of(experiment, lambda job: request(job).memory_mb),
+            "runtime": self._of(experiment, lambda job: request(job).minutes),
+        }
+        return {**asked, "slurm_extra": "--exclusive"} if experiment.alone else asked
+
+    def _size(self, job: _Job) -> Size | None:
+        if "scene" not in job.labels:
+            return None
+        size = self._study.size(job.labels["scene"])
+        return size.refined(float(job.labels["factor"])) if "factor" in job.labels else size
+
+    def group(self, experiment: Experiment) -> Callable[..., str] | None:
+        """Jobs that a cluster runs as one: those of a scene that need not be alone."""
+        if experiment.alone or "scene" not in experiment.labels:
+            return None
+        return lambda wildcards: f"scene_{wildcards.scene}"
 
     def settings(self, experiment: Experiment, labels: Labels) -> JobSettings:
         """Validated settings of a job."""

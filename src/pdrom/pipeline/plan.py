@@ -126,6 +126,13 @@ class Plan:
         captions = {name: job.tex for name, job in self.figure_jobs.items()}
         return paper_job(self.study, captions, self.configuration, self.results)
 
+    # Resources ------------------------------------------------------------------------------
+
+    def resources(self, kind: str) -> dict[str, Any]:
+        """Memory (MB) and minutes that a job without a scene asks a cluster for."""
+        request = self.study.costs.request(kind)
+        return {"mem_mb": request.memory_mb, "runtime": request.minutes}
+
     # Code -----------------------------------------------------------------------------------
 
     def code(self, *modules: str) -> str:

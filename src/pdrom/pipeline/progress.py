@@ -68,7 +68,9 @@ class Progress(logging.Handler):
             self._show_job(record)
         elif event == LogEvent.JOB_FINISHED:
             self._estimate.finish(record.job_id, record.created)
-        elif event == LogEvent.JOB_ERROR:
+        elif event == LogEvent.GROUP_ERROR:
+            self._write(record, f"FAILED: batch {record.groupid}")
+        elif event == LogEvent.JOB_ERROR and not getattr(record, "indent", False):
             what = self._messages.get(record.jobid, record.rule_name)
             self._write(record, f"FAILED: {what}")
         elif _is_news(record, event):

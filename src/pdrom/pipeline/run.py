@@ -4,9 +4,11 @@ import atexit
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.paths import CRATE
+from pdrom.pipeline.cluster import EXECUTOR, check_nodes
 from pdrom.pipeline.commandline import CommandLine, options
 from pdrom.pipeline.dates import settle_dates
 from pdrom.pipeline.failures import Failures, listen
@@ -66,9 +68,18 @@ class Run:
                 f"report: this configuration has no {folders.manuscript}; {hint}"
             )
 
-    def start(self) -> None:
-        """Before the first job: the process that jobs are forked from."""
-        start_server()
+    def start(self, workflow: Any) -> None:
+        """Before the first job: the process that jobs are forked from, or a look at the cluster.
+
+        On nodes of a cluster jobs have interpreters of their own.
+        """
+        if workflow.local_exec:
+            start_server()
+        elif self.command.executor == EXECUTOR:
+            try:
+                check_nodes(workflow.dag)
+            except PdromError as error:
+                sys.exit(f"pdrom: {error}")
 
     def succeed(self, plan: Plan, folders: Folders) -> None:
         """End a run whose jobs all succeeded: it says what came of it."""

@@ -34,10 +34,10 @@ from pdrom.experiments.timing import Timing
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import Scene, SceneConfig
+from pdrom.pipeline.costs import CostModel, Size
 from pdrom.pipeline.scenes import (
     Coarsen,
     load_bound_scene,
-    load_scene,
     read_scene,
     scene_names,
 )
@@ -111,8 +111,9 @@ class Study:
             name: load_bound_scene(root, name, settings.coarsen) for name in settings.scenes
         }
         self.scenes: dict[str, SceneConfig] = {n: s.config for n, s in self.bound.items()}
+        self._sizes = {name: Size.of(scene) for name, scene in self.bound.items()}
         self.online: dict[str, SceneConfig] = {
-            name: load_scene(root, name, settings.coarsen) for name in settings.online.scenes
+            name: self._loaded(name) for name in settings.online.scenes
         }
         self._others: dict[str, SceneConfig] = {}
         self.methods: dict[str, MethodSpec] = self.named_methods(settings.methods, "methods")
@@ -162,8 +163,24 @@ class Study:
         for held in (self.scenes, self.online, self._others):
             if name in held:
                 return held[name]
-        self._others[name] = load_scene(self.root, name, self.settings.coarsen)
+        self._others[name] = self._loaded(name)
         return self._others[name]
+
+    def _loaded(self, name: str) -> SceneConfig:
+        """Configuration of a scene that the study does not keep bound to its mesh."""
+        bound = load_bound_scene(self.root, name, self.settings.coarsen)
+        self._sizes[name] = Size.of(bound)
+        return bound.config
+
+    def size(self, name: str) -> Size:
+        """What the cost of a scene's jobs grows with; ConfigurationError for an unknown scene."""
+        self.scene(name)
+        return self._sizes[name]
+
+    @cached_property
+    def costs(self) -> CostModel:
+        """Predicted costs of jobs."""
+        return CostModel.load(self.root)
 
     def only(self, scene: str) -> "Study":
         """The same study of one scene, which need not be held."""

@@ -49,11 +49,44 @@ def end(logger):
         (ENDED + "returned non-zero exit status 3.", "exit status 3, without a word"),
         ("OSError: [Errno 28] No space left on device: 'x'", "no space left on the disk"),
         ("MemoryError", "out of memory"),
+        ("SLURM-job '3' failed, SLURM status is: 'CANCELLED'. x", "SLURM says cancelled"),
+        ("SLURM-job '3' failed, SLURM status is: 'OUT_OF_MEMORY'.", "SLURM says out of memory"),
         ("", "it ended without a word"),
     ],
 )
 def test_causes_are_told_apart(said, expected, tmp_path):
     assert cause(said, tmp_path) == expected
+
+
+@pytest.mark.parametrize(
+    ("written", "why"),
+    [
+        ("slurmstepd: error: *** JOB 3 ON vm CANCELLED AT 2026-01-01T00:00:00 ***", "cancelled"),
+        (
+            "error: *** JOB 3 ON n7 CANCELLED AT 2026-01-01T00:00:00 DUE TO TIME LIMIT ***",
+            "time limit",
+        ),
+        ("Exited with exit code 1", "a job of it failed"),
+    ],
+)
+def test_a_batch_on_a_cluster_is_named_with_the_jobs_that_wrote_an_error(
+    snakemake, tmp_path, written, why
+):
+    whole, failed, unstarted = (tmp_path / name for name in ("3.log", "fom.log", "pod.log"))
+    whole.write_text(f"Building DAG\n{written}\n")
+    failed.write_text("2026-01-01 00:00:00,000 ERROR   pdrom: too stiff\n")
+    group = {"event": LogEvent.GROUP_ERROR, "groupid": "scene_x", "aux_logs": [str(whole)]}
+    snakemake.error("Error in group scene_x", extra=group)
+    for rule, log in (("fom", failed), ("pod", unstarted)):
+        job = {"event": LogEvent.JOB_ERROR, "rule_name": rule, "log": [str(log)], "output": []}
+        snakemake.error("Error in rule", extra={**job, "indent": True})
+    assert end(snakemake) == (
+        1,
+        [
+            f"pdrom: batch scene_x failed: {why} (log: {whole})",
+            "pdrom: job fom failed: too stiff",
+        ],
+    )
 
 
 def test_every_failed_job_is_named_with_its_error(snakemake, tmp_path):

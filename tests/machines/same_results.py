@@ -1,0 +1,87 @@
+"""Compare two results folders of one configuration: tables without what a clock says, and runs.
+
+Usage: python tests/machines/same_results.py FOLDER FOLDER [--tables-only]
+
+Tables are compared as text, every digit of them; HDF5 files by the bytes of their datasets, of
+which ``timings`` are left out. The status is 0 for equal folders, 1 for others, whose differences
+are listed.
+"""
+
+import argparse
+import hashlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pandas as pd
+
+from pdrom.pipeline.tables import all_tables
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def table_digests(folder: Path) -> dict[str, str]:
+    """Digest of each table without its timed cells, by path."""
+    found = {}
+    for name, table in all_tables().items():
+        path = folder / "tables" / f"{name}.csv"
+        if path.is_file():
+            kept = table.without_times(pd.read_csv(path, dtype=str), ROOT)
+            found[f"tables/{name}.csv"] = hashlib.sha256(kept.to_csv().encode()).hexdigest()
+    return found
+
+
+def run_digests(folder: Path) -> dict[str, str]:
+    """Digest of the datasets of each HDF5 file, by path."""
+    found = {}
+    for path in sorted(folder.rglob("[!.]*.h5")):
+        found[str(path.relative_to(folder))] = _digest(path)
+    return found
+
+
+def _digest(path: Path) -> str:
+    content = hashlib.sha256()
+
+    def add(name: str, item: h5py.Dataset | h5py.Group) -> None:
+        if isinstance(item, h5py.Dataset) and name.rpartition("/")[2] != "timings":
+            content.update(name.encode())
+            content.update(np.ascontiguousarray(item[()]).tobytes())
+
+    with h5py.File(path) as file:
+        file.visititems(add)
+    return content.hexdigest()
+
+
+def differences(first: dict[str, str], second: dict[str, str]) -> Iterator[str]:
+    """Paths whose digests differ, or that only one folder has."""
+    for path in sorted(first.keys() | second.keys()):
+        if first.get(path) != second.get(path):
+            missing = [
+                side for side, own in (("first", first), ("second", second)) if path not in own
+            ]
+            yield f"{path}: {'not in the ' + missing[0] if missing else 'differs'}"
+
+
+def main() -> None:
+    """Compare the folders of the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("folders", nargs=2, type=Path, metavar="FOLDER")
+    parser.add_argument("--tables-only", action="store_true")
+    asked = parser.parse_args()
+    kinds = {"tables": table_digests} | ({} if asked.tables_only else {"runs": run_digests})
+    different: list[str] = []
+    for kind, digests in kinds.items():
+        first, second = map(digests, asked.folders)
+        if not first:
+            sys.exit(f"{asked.folders[0]}: holds no {kind}")
+        found = list(differences(first, second))
+        sys.stdout.write(f"{kind}: {len(first) - len(found)} of {len(first)} equal\n")
+        different += found
+    sys.stdout.writelines(f"  {line}\n" for line in different)
+    sys.exit(1 if different else 0)
+
+
+if __name__ == "__main__":
+    main()

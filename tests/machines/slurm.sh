@@ -1,0 +1,71 @@
+#!/usr/bin/env bash
+# The tiny study on a real SLURM, against the same study without it.
+#
+# usage (as root): tests/machines/slurm.sh RESULTS [FOLDER]
+#
+# RESULTS holds the tiny study made without SLURM (results/studies/tiny). HEAD is cloned into FOLDER (else a temporary one) and
+# run there by the profile of the project. While the first command runs, one of its jobs is cancelled: the run has to say so.
+# The same command goes on from there; meanwhile the controller is stopped and started again. Tables (without what a clock
+# says) and runs must then be those of RESULTS, bit by bit; and jobs that no node can take must be refused.
+set -euo pipefail
+
+project=$(cd "$(dirname "$0")/../.." && pwd -P)
+service=$project/tests/machines/slurm_service.sh
+expected=$(realpath "${1:?the folder of the results made without SLURM is missing}")
+folder=${2-}
+
+step() { printf '\n== %s (%s s)\n' "$*" "$SECONDS"; }
+fail() {
+    echo "slurm: $*" >&2
+    exit 1
+}
+
+[ -n "$folder" ] || folder=$(mktemp -d)/checkout
+"$service" start
+trap '"$service" stop' EXIT
+
+step "a clone of HEAD in $folder"
+[ -d "$folder" ] || git -c safe.directory='*' clone --quiet --no-hardlinks "$project" "$folder"
+cd "$folder"
+command=(./reproduce --profile workflow/profiles/slurm --configfile config/tiny.yaml --jobs 4)
+running() { [ -n "$(squeue --noheader --states=RUNNING --format=%i)" ]; }
+
+step "jobs that no node can take"
+processors=$(sinfo --noheader --format=%c | tr -d +)
+if "${command[@]}" --cores $((processors + 1)) >too_many.log 2>&1; then fail "too many processors were not refused"; fi
+grep "it would wait for ever" too_many.log || fail "the refusal is missing: $(tail -n 5 too_many.log)"
+[ -z "$(squeue --noheader)" ] || fail "a job was submitted all the same"
+rm too_many.log
+
+step "a run, one job of which is cancelled"
+"${command[@]}" >"$folder/.cache/first.log" 2>&1 &
+run=$!
+until running; do
+    kill -0 "$run" || fail "the run ended before a job ran: $(tail -n 20 "$folder/.cache/first.log")"
+    sleep 1
+done
+victim=$(squeue --noheader --states=RUNNING --format=%i | tail -n 1)
+scancel "$victim"
+echo "cancelled job $victim"
+if wait "$run"; then fail "the run did not notice"; fi
+tail -n 6 "$folder/.cache/first.log"
+grep -q "cancelled" "$folder/.cache/first.log" || fail "the run does not say that a job was cancelled"
+
+step "the same command, and a controller that is restarted"
+"${command[@]}" >"$folder/.cache/second.log" 2>&1 &
+run=$!
+until running; do
+    kill -0 "$run" || fail "the run ended before a job ran: $(tail -n 20 "$folder/.cache/second.log")"
+    sleep 1
+done
+"$service" stop-controller
+echo "the controller is gone"
+sleep 20
+"$service" start-controller
+echo "the controller is back"
+wait "$run" || fail "the run failed: $(tail -n 20 "$folder/.cache/second.log")"
+tail -n 8 "$folder/.cache/second.log"
+
+step "against $expected"
+./reproduce run python tests/machines/same_results.py "$expected" results/studies/tiny
+step "passed"
