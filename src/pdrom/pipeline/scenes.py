@@ -46,13 +46,23 @@ def load_bound_scene(root: Path, name: str, coarsen: Coarsen | None = None) -> S
     ConfigurationError
         Naming the file and the fault; also for faults of the held-out variant.
     """
-    scene = read_scene(root, name, coarsen)
+    return bind(root, read_scene(root, name, coarsen), str(scene_file(root, name)))
+
+
+def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
+    """Scene of a configuration; ``source`` opens the messages about its faults.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the fault; also for those of the held-out variant.
+    """
     try:
         mesh = scene.mesh.build(root)
         Scene.build(scene.heldout_variant(), mesh)
         bound = Scene.build(scene, mesh)
     except PdromError as error:
-        raise ConfigurationError(f"{scene_file(root, name)}: {error}") from error
+        raise ConfigurationError(f"{source}: {error}") from error
     bound.log_holds()
     return bound
 

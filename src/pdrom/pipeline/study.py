@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from copy import copy
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -37,10 +37,12 @@ from pdrom.model.scene import Scene, SceneConfig
 from pdrom.pipeline.costs import CostModel, Size
 from pdrom.pipeline.scenes import (
     Coarsen,
+    bind,
     load_bound_scene,
     read_scene,
     scene_names,
 )
+from pdrom.pipeline.variants import Variants
 from pdrom.reduction.local.ranks import Rank
 from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
 from pdrom.report.viewer.settings import Viewer
@@ -81,6 +83,7 @@ class StudySettings(ConfigModel):
     online: Online = Online()
     alternatives: Alternatives = Alternatives()
     viewer: Viewer = Viewer()
+    variants: Variants = Variants()
     study: str | None = None
 
     @model_validator(mode="after")
@@ -110,6 +113,8 @@ class Study:
         self.bound: dict[str, Scene] = {
             name: load_bound_scene(root, name, settings.coarsen) for name in settings.scenes
         }
+        for config in settings.variants.of(partial(read_scene, root, coarsen=settings.coarsen)):
+            self.bound[config.name] = bind(root, config, "variants")
         self.scenes: dict[str, SceneConfig] = {n: s.config for n, s in self.bound.items()}
         self._sizes = {name: Size.of(scene) for name, scene in self.bound.items()}
         self.online: dict[str, SceneConfig] = {

@@ -1,0 +1,81 @@
+"""Scenes that a configuration makes out of others."""
+
+import re
+
+import pytest
+import yaml
+from pydantic import ValidationError
+
+from pdrom.core.errors import ConfigurationError
+from pdrom.core.paths import LABELS
+from pdrom.model.constraints.base import GroupConfig
+from pdrom.model.scene import Scene, SceneConfig
+from pdrom.pipeline.scenes import read_scene
+from pdrom.pipeline.study import Study
+from pdrom.pipeline.variants import Variants
+from places import ROOT
+
+SECTION = Variants(
+    scenes=("spring_oop",), resolutions=(0.5, 1.5), stiffness_ratios=(0.01, 1), seeds=(1, 2)
+)
+
+
+def read(name: str) -> SceneConfig:
+    return read_scene(ROOT, name)
+
+
+@pytest.fixture(scope="module")
+def made() -> dict[str, SceneConfig]:
+    return {scene.name: scene for scene in SECTION.of(read)}
+
+
+def test_every_combination_has_a_name_that_a_path_takes(made: dict[str, SceneConfig]) -> None:
+    assert len(made) == 2 * 2 * 2
+    assert "spring_oop_m1p5_w0p01_s2" in made
+    assert all(re.fullmatch(LABELS["scene"], name) for name in made)
+
+
+def test_a_variant_differs_in_mesh_weight_and_start_alone(made: dict[str, SceneConfig]) -> None:
+    scene, base = made["spring_oop_m1p5_w0p01_s2"], read("spring_oop")
+    assert scene.mesh == base.mesh.coarsened(1.5)
+    weights = [e.weight for e in scene.effects if isinstance(e, GroupConfig)]
+    before = [e.weight for e in base.effects if isinstance(e, GroupConfig)]
+    assert weights == [0.01 * weight for weight in before]
+    assert scene.effects[-1].model_dump()["seed"] == 2
+    assert len(scene.effects) == len(base.effects) + 1
+    same = set(SceneConfig.model_fields) - {"name", "title", "mesh", "effects"}
+    assert all(getattr(scene, key) == getattr(base, key) for key in same)
+
+
+def test_seeds_are_other_starts_of_the_same_motion(made: dict[str, SceneConfig]) -> None:
+    pair = [made[f"spring_oop_m0p5_w1_s{seed}"] for seed in (1, 2)]
+    mesh = pair[0].mesh.build(ROOT)
+    first, second = (Scene.build(scene, mesh).initial_state().velocities for scene in pair)
+    assert (first != second).any()
+
+
+def test_a_study_holds_its_variants_beside_its_scenes() -> None:
+    config = {"scenes": ["strain_oop"], "methods": ["deim"], "variants": SECTION.model_dump()}
+    study = Study.load({**config, "coarsen": {"resolution": 0.3, "frames": 0.1}}, ROOT)
+    assert len(study.scenes) == 1 + 8
+    assert (
+        study.size("spring_oop_m1p5_w1_s1").vertices > study.size("spring_oop_m0p5_w1_s1").vertices
+    )
+
+
+def test_an_unknown_scene_is_named() -> None:
+    config = {"scenes": ["strain_oop"], "methods": ["deim"], "variants": {"scenes": ["spring_oup"]}}
+    with pytest.raises(ConfigurationError, match="spring_oup"):
+        Study.load(config, ROOT)
+
+
+def test_an_entry_that_is_given_twice_is_refused() -> None:
+    with pytest.raises(ValidationError, match="twice"):
+        Variants(seeds=(1, 1))
+
+
+def test_the_sweep_has_more_than_five_hundred_jobs() -> None:
+    config = yaml.safe_load((ROOT / "config" / "sweep.yaml").read_text("utf-8"))
+    scenes = list(Variants.model_validate(config["variants"]).of(read))
+    of_a_scene = 2 + 1 + len(config["methods"])  # runs, snapshots, reruns; bases come on top
+    assert len(scenes) * of_a_scene > 500
