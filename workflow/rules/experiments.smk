@@ -17,11 +17,11 @@ for experiment in PLAN.jobs.experiments:
             },
         log:
             PLAN.jobs.log(experiment),
+        group:
+            PLAN.jobs.group(experiment)
         threads: PLAN.jobs.threads(experiment, CORES)
         resources:
             **PLAN.jobs.resources(experiment),
-        group:
-            PLAN.jobs.group(experiment)
         params:
             **PLAN.jobs.params(experiment),
         message:

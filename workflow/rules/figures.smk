@@ -17,10 +17,10 @@ for name, job in PLAN.figure_jobs.items():
             png=job.png,
         log:
             job.log,
-        resources:
-            **PLAN.resources("figure"),
         group:
             "report"
+        resources:
+            **PLAN.resources("figure"),
         params:
             order=job.order.model_dump(mode="json"),
             rst=job.rst,

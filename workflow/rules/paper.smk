@@ -9,10 +9,10 @@ rule paper_inputs:
         PLAN.paper.inputs,
     log:
         f"{PLAN.results}/logs/paper/inputs.log",
-    resources:
-        **PLAN.resources("paper"),
     group:
         "report"
+    resources:
+        **PLAN.resources("paper"),
     params:
         facts=PLAN.paper.facts.model_dump(mode="json"),
         content=PLAN.digest(*PLAN.paper.sources, "paper/references.bib"),
@@ -32,10 +32,10 @@ rule paper:
         report(FOLDERS.manuscript, category="Manuscript"),
     log:
         f"{PLAN.results}/logs/paper/main.log",
-    resources:
-        **PLAN.resources("paper"),
     group:
         "report"
+    resources:
+        **PLAN.resources("paper"),
     params:
         facts=PLAN.paper.facts.model_dump(mode="json"),
         content=PLAN.digest(*PLAN.paper.sources),

@@ -10,10 +10,10 @@ for table in PLAN.tables:
             report(PLAN.tables.path(table), category="Tables"),
         log:
             PLAN.tables.log(table),
-        resources:
-            **PLAN.resources("table"),
         group:
             "report"
+        resources:
+            **PLAN.resources("table"),
         params:
             **PLAN.tables.params(table),
         message:
