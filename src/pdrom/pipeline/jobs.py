@@ -97,7 +97,7 @@ class Jobs:
 
         def request(job: _Job) -> Request:
             return self._study.costs.request(
-                experiment.name, self._size(job), job.labels.get("method")
+                experiment.name, self.size(job.labels), job.labels.get("method")
             )
 
         asked = {
@@ -106,11 +106,12 @@ class Jobs:
         }
         return {**asked, "slurm_extra": "--exclusive"} if experiment.alone else asked
 
-    def _size(self, job: _Job) -> Size | None:
-        if "scene" not in job.labels:
+    def size(self, labels: Labels) -> Size | None:
+        """Size of a job's scene, which its cost grows with; None without a scene."""
+        if "scene" not in labels:
             return None
-        size = self._study.size(job.labels["scene"])
-        return size.refined(float(job.labels["factor"])) if "factor" in job.labels else size
+        size = self._study.size(labels["scene"])
+        return size.refined(float(labels["factor"])) if "factor" in labels else size
 
     def group(self, experiment: Experiment) -> Callable[..., str] | None:
         """Jobs that a cluster runs as one: those of a scene that need not be alone."""
