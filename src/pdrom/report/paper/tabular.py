@@ -25,7 +25,7 @@ def _head(header: Sequence[str]) -> list[str]:
 
 def _body(rows: Sequence[Sequence[str]]) -> list[str]:
     """Lines of the rows, below a strut that keeps exponents off the rule of the head."""
-    return [r"\rule{0pt}{2.6ex}%", *map(_line, rows)]
+    return [r"\rule{0pt}{2.6ex}%", *map(_line, rows)] if rows else []
 
 
 def _line(cells: Sequence[str]) -> str:
