@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.paths import FULL_ORDER, RERUNS
 from pdrom.model.mesh.generators import bar, cloth
+from pdrom.model.mesh.shapes import shell
 from pdrom.reduction.sampling.block import block_elements
 from pdrom.reduction.sampling.deim import deim_entries
 from pdrom.report.figures.kit import style
@@ -25,6 +26,7 @@ from pdrom.report.figures.kit.mesh_render import (
     face_normals,
     outline_edges,
     shade,
+    silhouette_edges,
 )
 from pdrom.report.figures.kit.panels import RunPanel, fit_aspect
 from pdrom.report.figures.kit.read import (
@@ -111,6 +113,16 @@ def test_outline_of_sheet_and_bar():
     assert len(outline_edges(sheet.points, sheet.triangles)) == 2 * (3 + 4)
     # the twelve edges of the box, with 3 and twice 2 segments
     assert len(outline_edges(box.points, box.triangles)) == 4 * (3 + 2 + 2)
+
+
+def test_the_silhouette_of_a_round_body_is_a_closed_line_around_it():
+    ball = shell("ball", 0.1, 1.0, 0.0)
+    assert len(outline_edges(ball.points, ball.triangles)) == 0
+    camera = Camera(30.0, 20.0)
+    edges = silhouette_edges(ball.points, ball.triangles, camera)
+    assert (np.unique(edges, return_counts=True)[1] % 2 == 0).all()
+    radii = np.linalg.norm(camera.project(ball.points)[edges.ravel()], axis=1)
+    assert radii.min() > 0.45
 
 
 def test_floor_is_drawn_only_in_view():

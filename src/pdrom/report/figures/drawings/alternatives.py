@@ -43,15 +43,16 @@ def draw(results: Results, options: Scenes) -> Figure:
     cases = list(table[table.scene.isin(asked)].groupby(["scene", "vertices", "stiffness"]))
     if not cases:
         raise NothingToDraw("no alternatives")
-    lines = -(-len(cases) // PAIRS)
+    beside = min(PAIRS, len(cases))
+    lines = -(-len(cases) // beside)
     figure = Figure(figsize=(style.WIDTH, 1.75 * lines + 0.75), layout="constrained")
-    axes = figure.subplots(lines, 2 * PAIRS, squeeze=False, sharey=True)
+    axes = figure.subplots(lines, 2 * beside, squeeze=False, sharey=True)
     for ax in axes.ravel()[2 * len(cases) :]:
         ax.remove()
     pairs = axes.reshape(-1, 2)
     for number, ((labels, case), pair) in enumerate(zip(cases, pairs, strict=False)):
         _draw_case(pair, labels, case)
-        if number + PAIRS >= len(cases):
+        if number + beside >= len(cases):
             for ax in pair:
                 ax.set_xlabel("ms a frame")
     for line in axes:

@@ -61,9 +61,9 @@ def draw(results: Results, options: Options) -> Figure:
 def _kind(results: Results, scene: str) -> str:
     groups = results.holdings.scenes[scene].groups
     if len(groups) > 1:
-        return "all groups"
+        return "several groups"
     on_volume = results.holdings.groups[groups[0]].cells == "tetrahedron"
-    return "volume" if on_volume else style.words(groups[0])
+    return "tetrahedra" if on_volume else style.words(groups[0])
 
 
 def _colours(scenes: list[str]) -> dict[str, str]:

@@ -15,7 +15,7 @@ from pdrom.report.figures.kit.camera import Camera, Window
 
 AMBIENT = 0.45
 RASTER_ABOVE = 1000  # faces; more are drawn as pixels, to keep the PDF small
-SHARP = np.cos(np.radians(35.0))  # edges between faces that turn more are drawn as outline
+SHARP = np.cos(np.radians(80.0))  # edges between faces that turn more are drawn as outline
 # directions towards the lights in the camera's frame, and their strengths
 LIGHTS = (((-0.35, 0.45, 0.82), 0.85), ((0.80, -0.10, 0.59), 0.30))
 BACK = 0.78  # how much of the colour the back of an open surface keeps
@@ -139,16 +139,29 @@ def draw_floor(
 
 def outline_edges(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Edges (n, 2) on the boundary of the surface, or between faces that meet sharply."""
+    edges, first, second = _edges_between(triangles)
+    normals = face_normals(points, triangles)
+    turn = np.einsum("ij,ij->i", normals[first], normals[second])
+    return edges[(first == second) | (turn < SHARP)]
+
+
+def silhouette_edges(points: np.ndarray, triangles: np.ndarray, camera: Camera) -> np.ndarray:
+    """Edges (n, 2) between a face that is seen from the front and one from behind."""
+    edges, first, second = _edges_between(triangles)
+    a, b, c = np.moveaxis(camera.project(points)[triangles], 1, 0)
+    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
+    front = ux * vy > uy * vx
+    return edges[front[first] != front[second]]
+
+
+def _edges_between(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Edges (n, 2) and the two triangles (n,) at each; on the boundary the same one twice."""
     pairs = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     owner = np.repeat(np.arange(len(triangles)), 3)
     edges, inverse, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
     order = np.argsort(inverse.ravel(), kind="stable")
     start = np.concatenate([[0], np.cumsum(count)[:-1]])
-    normals = face_normals(points, triangles)
-    first = owner[order[start]]
-    second = owner[order[start + np.minimum(count - 1, 1)]]
-    turn = np.einsum("ij,ij->i", normals[first], normals[second])
-    return edges[(count == 1) | (turn < SHARP)]
+    return edges, owner[order[start]], owner[order[start + np.minimum(count - 1, 1)]]
 
 
 def draw_outline(

@@ -16,6 +16,7 @@ from pdrom.report.figures.kit.mesh_render import (
     draw_surface,
     outline_edges,
     set_window,
+    silhouette_edges,
 )
 from pdrom.report.figures.kit.style import FAILED
 
@@ -117,7 +118,10 @@ def draw_run(
     if not panel.failure:
         draw_floor(ax, panel.positions, surface, camera, shown)
     if ghost is not None:
-        draw_outline(ax, ghost, outline_edges(mesh.points, mesh.triangles), camera)
+        edges = outline_edges(mesh.points, mesh.triangles)
+        if not len(edges):  # a round body has no edges of its own
+            edges = silhouette_edges(ghost, mesh.triangles, camera)
+        draw_outline(ax, ghost, edges, camera)
     contrast = 0.5 if isinstance(panel.colour, np.ndarray) else 1.0
     draw_surface(ax, panel.positions, surface, camera, panel.colour, contrast=contrast)
     set_window(ax, shown)
