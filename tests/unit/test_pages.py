@@ -34,6 +34,19 @@ def test_links_lead_somewhere(page: Path) -> None:
     assert [link for link in inside if not (page.parent / link).exists()] == []
 
 
+def headings(page: Path) -> set[str]:
+    """Anchors of a page, as GitHub makes them."""
+    found = re.findall(r"^#+ (.*)$", page.read_text("utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title).strip().lower().replace(" ", "-") for title in found}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_anchors_are_headings(page: Path) -> None:
+    links = re.findall(r"\]\(([^):]*)#([^)]+)\)", page.read_text("utf-8"))
+    targets = [(page.parent / file if file else page, anchor) for file, anchor in links]
+    assert [a for target, a in targets if a not in headings(target)] == []
+
+
 @pytest.mark.parametrize("page", [*PAGES, ROOT / "CONTRIBUTING.md"], ids=[*NAMES, "CONTRIBUTING"])
 def test_paths_of_the_project_exist(page: Path) -> None:
     """A recipe's own files stand before its code, with a colon."""

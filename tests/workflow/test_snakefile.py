@@ -42,19 +42,10 @@ def clean(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
 
 @pytest.fixture(scope="module")
 def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
-    """A copy whose micro study counts as finished.
-
-    Empty files stand for the results; ``--touch`` makes Snakemake record code, parameters and
-    inputs of every job, which is all that it looks at when it plans.
-    """
+    """A copy whose micro study counts as finished."""
     checkout = copy_repository(tmp_path_factory.mktemp("finished"))
     (checkout.folder / MICRO_FILE).write_text(yaml.safe_dump(MICRO), encoding="utf-8")
-    for name in checkout.planned(*MICRO_ARGUMENTS):
-        path = checkout.folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch()
-    done = checkout.snakemake("--touch", "--forceall", *MICRO_ARGUMENTS)
-    assert done.returncode == 0, done.stderr
+    checkout.count_as_finished(*MICRO_ARGUMENTS)
     return checkout
 
 

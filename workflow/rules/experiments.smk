@@ -7,14 +7,7 @@ for experiment in PLAN.jobs.experiments:
         input:
             **PLAN.jobs.inputs(experiment),
         output:
-            **{
-                name: (
-                    report(path, category="Tables")
-                    if name in PLAN.jobs.tables(experiment)
-                    else path
-                )
-                for name, path in PLAN.jobs.outputs(experiment).items()
-            },
+            **PLAN.jobs.outputs(experiment),
         log:
             PLAN.jobs.log(experiment),
         group:

@@ -8,13 +8,14 @@ for name, job in PLAN.figure_jobs.items():
         input:
             job.inputs,
         output:
-            pdf=report(
-                job.pdf,
+            pdf=job.pdf,
+            # what every browser shows
+            png=report(
+                job.png,
                 caption="../report/figure.rst",
-                category="Figures",
-                labels={"figure": job.label},
+                category=job.category,
+                labels=job.labels,
             ),
-            png=job.png,
         log:
             job.log,
         group:

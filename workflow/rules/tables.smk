@@ -7,7 +7,11 @@ for table in PLAN.tables:
         input:
             **PLAN.tables.inputs(table),
         output:
-            report(PLAN.tables.path(table), category="Tables"),
+            report(
+                PLAN.tables.path(table),
+                category="Tables",
+                labels=PLAN.tables.labels(table),
+            ),
         log:
             PLAN.tables.log(table),
         group:

@@ -30,7 +30,7 @@ ELEMENTS = "pdrom.report.figures.kit.elements"
 class FigureJob:
     """One figure: files that it reads and writes, what is drawn, and how it is presented.
 
-    label : number in the paper and name
+    category, labels : where the report lists it: the paper's figures by number, then this study's
     rst : title and caption for the report, in which no sign has a meaning
     tex : title and caption for the manuscript
     code : fingerprint of the code that draws it
@@ -41,7 +41,8 @@ class FigureJob:
     png: str
     log: str
     order: Order
-    label: str
+    category: str
+    labels: dict[str, str]
     rst: str
     tex: str
     code: str
@@ -121,11 +122,18 @@ def _job(
         png=FIGURE_PICTURE.at(results, name=name),
         log=f"{results}/logs/figures/{name}.log",
         order=order,
-        label=f"{declared.number} {name}" if declared.number else name,
+        category="Figures of this study" if declared.number is None else "Figures of the paper",
+        labels=_labels(name, declared, order.title),
         rst=f"**{to_rst(title)}.** {to_rst(caption)}",
         tex=f"{to_tex(title)}. {to_tex(caption)}",
         code=fingerprint("pdrom.report.drawing", *modules(name), *classes),
     )
+
+
+def _labels(name: str, declared: Declaration, title: str) -> dict[str, str]:
+    """Columns of the report."""
+    number = {} if declared.number is None else {"figure": str(declared.number)}
+    return {**number, "name": name, "title": title}
 
 
 def _inputs(

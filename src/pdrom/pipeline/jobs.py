@@ -8,7 +8,6 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from pdrom.core import paths
 from pdrom.core.paths import Place
 from pdrom.core.reads import EachOf, Every, ProjectFile, SourcesOf
 from pdrom.experiments.declaration import Experiment, JobSettings, Source, experiments
@@ -53,11 +52,6 @@ class Jobs:
     def outputs(self, experiment: Experiment) -> dict[str, str]:
         """Paths with labels in braces."""
         return {name: place.rule(self._results) for name, place in experiment.outputs.items()}
-
-    def tables(self, experiment: Experiment) -> set[str]:
-        """Names of the outputs that are tables of the study."""
-        folder = paths.TABLE.pattern.partition("{")[0]
-        return {n for n, p in experiment.outputs.items() if p.pattern.startswith(folder)}
 
     def log(self, experiment: Experiment) -> str:
         """Log file with labels in braces."""

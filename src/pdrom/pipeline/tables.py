@@ -48,6 +48,10 @@ class Tables:
         """A table's file."""
         return paths.TABLE.at(self._results, name=name)
 
+    def labels(self, name: str) -> dict[str, str]:
+        """How the report lists a table."""
+        return {"table": name, "title": all_tables()[name].title}
+
     def log(self, name: str) -> str:
         """Log file of the job that makes a table."""
         return f"{self._results}/logs/tables/{name}.log"

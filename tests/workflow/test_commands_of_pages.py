@@ -1,0 +1,137 @@
+"""Every command that a page shows is executed: as it stands, planned by -n, or left out by name."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import meshio
+import pytest
+import yaml
+from checkout import Checkout, copy_repository
+
+from pdrom.core.store import write_text
+from pdrom.model.mesh.generators import cloth
+from places import ROOT
+
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "config" / "README.md"]
+# those of the claim map are planned by test_measured_claim_map.py
+PAGES += sorted(set((ROOT / "docs").rglob("*.md")) - {ROOT / "docs" / "claim_map.md"})
+BLOCK = re.compile(r"^```sh\n(.*?)^```", re.MULTILINE | re.DOTALL)
+INLINE = re.compile(r"`((?:\./reproduce|\.venv/bin/\w+) [^`]+)`")
+COMMENT = re.compile(r"\s+#.*|\s*&&.*")  # of what && joins, the first one
+
+# What cannot be executed here, and why.
+LEFT_OUT = {
+    r"--executor|executor-plugin|workflow/profiles|sinfo|sbatch": "needs a cluster (tests/cluster)",
+    r"[A-Z]{4}": "words in capitals stand for others",
+    r"^\./reproduce test": "the tests themselves",
+    r"^\.ci/run": "runs the tests itself",
+    r"^\.venv/bin/(ruff|snakefmt|mypy)": "executed by .ci/run",
+    r"^\./reproduce --report": "executed by test_report.py",
+    r"^\./reproduce (verify|bundle)": "needs a finished study; executed by tests of their own",
+    r"^pdrom advise": "reads a finished study; executed by tests/unit/command/test_advise.py",
+    r"^\.venv/bin/python -m pdrom\.verification": "executed by tests/unit/verification",
+    r"^\./reproduce (figure [^8]|reduced_reruns)": "planned by test_measured_claim_map.py",
+    r"rest_shapes|mesh_sizes|rest_lengths|leverage": "recipes, executed by test_recipes.py",
+    r"^(docker|(sh |bash )?tests/)": "makes a machine of its own",
+}
+
+
+def commands(start: str) -> list[str]:
+    """Commands of all pages that begin so, without those that are left out."""
+    found: dict[str, None] = {}
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8").replace("\\\n", " ")
+        lines = [line for block in BLOCK.findall(text) for line in block.splitlines()]
+        for line in [*lines, *INLINE.findall(text)]:
+            command = COMMENT.sub("", line).strip()
+            if command:
+                found[command] = None
+    kept = [c for c in found if not any(re.search(pattern, c) for pattern in LEFT_OUT)]
+    return [c for c in kept if c.startswith(start)]
+
+
+def test_every_command_is_executed_or_left_out_by_name() -> None:
+    ways = ("./reproduce", "pdrom ", ".venv/bin/python ", ".venv/bin/pdrom", ".venv/bin/snakemake")
+    assert [c for c in commands("") if not c.startswith((*ways, "find "))] == []
+
+
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
+    """A copy with the scene that the pages add."""
+    made = copy_repository(tmp_path_factory.mktemp("commands"))
+    text = (ROOT / "docs" / "adding.md").read_text(encoding="utf-8")
+    scene = re.findall(r"```yaml\n(name: my_sheet.*?)```", text, re.DOTALL)[0]
+    (made.folder / "config" / "scenes" / "my_sheet.yaml").write_text(scene, encoding="utf-8")
+    mesh = made.folder / yaml.safe_load(scene)["mesh"]["path"]
+    mesh.parent.mkdir()
+    sheet(mesh)
+    (made.folder / "docs").mkdir()
+    return made
+
+
+def sheet(path: Path) -> None:
+    """A mesh file."""
+    mesh = cloth(6, 6, "xz", 1.0, 2.0, 0.0)
+    meshio.write(path, meshio.Mesh(mesh.points, [("triangle", mesh.triangles)]))
+
+
+def run(words: list[str], folder: Path, checkout: Checkout) -> None:
+    """Run a program that has to succeed, with the copy's package; no browser is opened."""
+    environment = {
+        **os.environ,
+        "BROWSER": "true",
+        "PYTHONPATH": str(checkout.folder / "src"),
+        "NUMBA_CACHE_DIR": str(ROOT / ".cache" / "numba"),
+    }
+    done = subprocess.run(
+        words, cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", commands("./reproduce"))
+def test_a_run_is_planned(command: str, checkout: Checkout) -> None:
+    words = shlex.split(command)[1:]
+    if words[:1] in (["run"], ["--help"]):
+        pytest.skip("the script itself: test_reproduce_script.py")
+    run([sys.executable, "-m", "pdrom.pipeline.front", "-n", *words], checkout.folder, checkout)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", commands(".venv/bin/python -m"))
+def test_a_module_is_run(command: str, checkout: Checkout) -> None:
+    run([sys.executable, *shlex.split(command)[1:]], checkout.folder, checkout)
+
+
+@pytest.mark.slow
+def test_the_command_line_works_in_the_order_of_its_page(
+    tmp_path: Path, checkout: Checkout
+) -> None:
+    sheet(tmp_path / "sheet.obj")
+    shown = commands("pdrom ")
+    assert len(shown) > 4
+    for command in shown:
+        run([sys.executable, "-m", "pdrom", *shlex.split(command)[1:]], tmp_path, checkout)
+
+
+@pytest.mark.parametrize("command", commands("find "))
+def test_checksums_are_compared(command: str, tmp_path: Path) -> None:
+    (tmp_path / "paper").mkdir()
+    result = tmp_path / "results" / "x.txt"
+    result.parent.mkdir()
+    write_text("a result\n", result)
+
+    def said() -> str:
+        done = subprocess.run(
+            ["sh", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        return done.stdout + done.stderr
+
+    assert said() == ""
+    result.write_text("another one\n", encoding="utf-8")
+    assert "x.txt" in said()

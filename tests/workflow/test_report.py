@@ -1,0 +1,96 @@
+"""The report of a run opens in a real browser, without a network: every figure, every caption."""
+
+import shutil
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+import yaml
+from checkout import copy_repository
+from PIL import Image
+from playwright.sync_api import Page, sync_playwright
+from sandbox import MICRO, MICRO_FILE
+
+from pdrom.pipeline.tables import all_tables
+from pdrom.report.figures.kit.catalogue import declarations
+from pdrom.report.words.markup import to_plain
+from places import MICRO_RESULTS
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+ARGUMENTS = ("--configfile", MICRO_FILE)
+LIMIT = 120_000  # ms after which a page that does not answer has failed
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    """A report whose figures differ by their width; what the page said and asked for is noted."""
+    program = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if program is None:
+        pytest.skip(f"no browser on this machine ({', '.join(BROWSERS)})")
+    checkout = copy_repository(tmp_path_factory.mktemp("report"))
+    (checkout.folder / MICRO_FILE).write_text(yaml.safe_dump(MICRO), encoding="utf-8")
+    checkout.count_as_finished(*ARGUMENTS)
+    for width, name in enumerate(declarations(), 1):
+        picture = checkout.folder / MICRO_RESULTS / "figures" / f"{name}.png"
+        Image.fromarray(np.full((1, width), 127, dtype=np.uint8)).save(picture)
+    done = checkout.snakemake("--report", "report.html", *ARGUMENTS)
+    assert done.returncode == 0, done.stderr
+    with sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1500, "height": 900})
+        page.set_default_timeout(LIMIT)
+        page.said, page.asked = [], []
+        page.on("console", lambda m: page.said.append(m.text) if m.type == "error" else None)
+        page.on("pageerror", lambda error: page.said.append(str(error)))
+        page.on("request", lambda request: page.asked.append(request.url))
+        page.goto((checkout.folder / "report.html").as_uri())
+        yield page
+        browser.close()
+
+
+def go_to(page: Page, entry: str) -> None:
+    """Open a category, from whatever is open."""
+    page.reload()
+    page.get_by_role("link", name=entry, exact=True).click()
+
+
+@pytest.mark.parametrize("category", ["Figures of the paper", "Figures of this study"])
+def test_every_figure_opens_and_has_its_caption(opened: Page, category: str) -> None:
+    listed = {
+        name: figure
+        for name, figure in declarations().items()
+        if (figure.number is None) == (category == "Figures of this study")
+    }
+    go_to(opened, category)
+    rows = opened.locator("tbody tr")
+    assert rows.count() == len(listed)
+    shown = rows.all_inner_texts()
+    for place, (name, figure) in enumerate(listed.items()):
+        number = f"{figure.number}" if figure.number else name
+        assert shown[place].split()[0] == number, "by number, then by name"
+        rows.nth(place).locator('[iconname="eye"]').click()
+        width = list(declarations()).index(name) + 1
+        opened.wait_for_function(f"[...document.images].some(i => i.naturalWidth === {width})")
+    for place, figure in enumerate(listed.values()):
+        rows.nth(place).locator('[iconname="information-circle"]').click()
+        opened.get_by_text("Description", exact=True).wait_for()
+        assert to_plain(figure.title) in opened.inner_text("body").split("DESCRIPTION")[1]
+        opened.get_by_role("link", name=category, exact=True).click()
+
+
+def test_every_table_is_listed_with_its_title(opened: Page) -> None:
+    go_to(opened, "Tables")
+    text = opened.inner_text("body")
+    assert [t.name for t in all_tables().values() if t.title not in text] == []
+
+
+def test_the_statistics_of_the_run_are_drawn(opened: Page) -> None:
+    go_to(opened, "Statistics")
+    opened.locator("svg, canvas").last.wait_for()
+
+
+def test_nothing_is_asked_of_a_network_and_nothing_fails(opened: Page) -> None:
+    assert [url for url in opened.asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    assert opened.said == []
