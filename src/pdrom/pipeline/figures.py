@@ -47,6 +47,11 @@ class FigureJob:
     tex: str
     code: str
 
+    @property
+    def label(self) -> str:
+        """Number in the paper, if it has one, and name."""
+        return " ".join(self.labels[key] for key in ("figure", "name") if key in self.labels)
+
 
 def figure_jobs(study: Study, results: str) -> dict[str, FigureJob]:
     """Every figure by name, with its paths below the folder ``results``.
