@@ -5,12 +5,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
+import h5py
 import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from pdrom.core.paths import MESH, NOISE, SENSITIVITY, File
-from pdrom.core.store import write_table
+from pdrom.core.paths import MESH, NOISE, NOISE_RUNS, SENSITIVITY, File
+from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.declaration import Experiment, JobSettings
 from pdrom.experiments.scenes import scene_of
@@ -21,7 +22,7 @@ from pdrom.reduction.basis import Basis, compute_basis
 from pdrom.reduction.local.local_step import ReducedLocalStep
 from pdrom.reduction.local.rerun import replace_group, rerun
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.rerun import displacement_norms
+from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling import Reduction, select_path
 from pdrom.reduction.snapshots import row_masses, training_frames
 
@@ -31,7 +32,8 @@ COLUMNS = [
     "scene", "group", "noisy_axes", "seed", "method", "r", "rank", "gain", "frames", "finite",
     "blowup_frame", "relative_error",
 ]  # fmt: skip
-ALL, PLANE = "all", "plane"
+ALL, PLANE, VERTEX = "all", "plane", "vertex"
+DRAWN = 1  # the start whose runs are kept
 
 
 class NoiseRuns(ConfigModel):
@@ -74,9 +76,10 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
-    """Files written: a row for every start, method and size."""
+    """Files written: a row for every start, method and size; the runs of the first start."""
 
     table: Annotated[File, NOISE]
+    runs: Annotated[File, NOISE_RUNS]
 
 
 def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
@@ -86,25 +89,34 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     frames = min(whole.config.frames, max(2, settings.horizon.frames(inputs.sensitivity)))
     scene = Scene.build(whole.config.model_copy(update={"frames": frames}), whole.mesh)
     rows = []
-    for axes in kinds(scene):
-        for seed in range(1, asked.repetitions + 1):
-            found = _runs(scene, labels["group"], axes, seed, settings)
-            rows += [{**labels, "noisy_axes": axes, "seed": seed, **row} for row in found]
-        log.info("%s: %d starts", axes, asked.repetitions)
+    with write_hdf5(outputs.runs.path) as file:
+        for axes in kinds(scene):
+            for seed in range(1, asked.repetitions + 1):
+                for row, outcome in _runs(scene, labels["group"], axes, seed, settings):
+                    rows.append({**labels, "noisy_axes": axes, "seed": seed, **row})
+                    if seed == DRAWN:
+                        name = f"{axes}/{row['method']}/r{row['r']:04d}"
+                        _store(file.create_group(name), row["r"], outcome)
+            log.info("%s: %d starts", axes, asked.repetitions)
     whole_numbers = dict.fromkeys(("frames", "blowup_frame"), "Int64")
     write_table(pd.DataFrame(rows, columns=COLUMNS).astype(whole_numbers), outputs.table.path)
 
 
 def kinds(scene: Scene) -> tuple[str, ...]:
-    """Which axes round-off may reach: all, and those of the plane of a mesh that is flat."""
-    return (ALL, PLANE) if np.ptp(scene.mesh.points, axis=0).min() == 0.0 else (ALL,)
+    """What round-off may reach: all axes; of a flat mesh, too, those of its plane alone, and these
+    with the axis across it at a single vertex."""
+    return (ALL, PLANE, VERTEX) if np.ptp(scene.mesh.points, axis=0).min() == 0.0 else (ALL,)
 
 
 def roundoff_field(scene: Scene, axes: str, size: float, seed: int) -> np.ndarray:
-    """Displacement (N, 3) m of a start; zero across the plane of a flat mesh for `PLANE`."""
+    """Displacement (N, 3) m of a start, zero where `kinds` says; the seed draws the vertex, too."""
     field = perturbation_field(scene, size, seed)
-    if axes == PLANE:
-        field[:, np.ptp(scene.mesh.points, axis=0) == 0.0] = 0.0
+    if axes != ALL:
+        still = np.ones(len(field), dtype=bool)
+        if axes == VERTEX:
+            moved = np.flatnonzero(field.any(axis=1))
+            still[np.random.default_rng(seed).choice(moved)] = False
+        field[np.ix_(still, np.ptp(scene.mesh.points, axis=0) == 0.0)] = 0.0
     return field
 
 
@@ -122,8 +134,8 @@ def noise_basis(
 
 def _runs(
     scene: Scene, name: str, axes: str, seed: int, settings: Settings
-) -> Iterator[dict[str, Any]]:
-    """Rows of one start: its full-order run, then the reductions trained on it."""
+) -> Iterator[tuple[dict[str, Any], Rerun | None]]:
+    """Rows and runs of one start: its full-order run, then the reductions trained on it."""
     group, plan = scene.group(name), scene.config.reduce[name]
     start = roundoff_field(scene, axes, settings.noise.perturbation, seed)
     reference, projections = _full_order(scene, name, start)
@@ -136,6 +148,7 @@ def _runs(
         path = select_path(basis, spec, sizes) if sizes else {}
         for r in settings.noise.sizes:
             row = {"method": method, "r": r, "rank": basis.rank, "frames": 0}
+            outcome = None
             if r in path:
                 reduction = Reduction(basis, path[r], spec, r)
                 steps = replace_group(scene, name, ReducedLocalStep(group, reduction))
@@ -147,7 +160,16 @@ def _runs(
                     "blowup_frame": outcome.blowup_frame,
                     "relative_error": outcome.error(displacement),
                 }
-            yield row
+            yield row, outcome
+
+
+def _store(store: h5py.Group, r: int, outcome: Rerun | None) -> None:
+    """A run in the layout of `pdrom.experiments.reruns`; marked where r exceeds the rank."""
+    store.attrs.update(r=r, marked=outcome is None)
+    if outcome is not None:
+        blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
+        store.attrs.update(blowup_frame=blowup, max_extent=outcome.max_extent)
+        store["positions"] = outcome.positions.astype(np.float32)
 
 
 def _full_order(scene: Scene, name: str, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

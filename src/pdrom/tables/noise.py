@@ -17,7 +17,8 @@ from pdrom.tables.vocabulary import BLOWUP_FRAME, FINITE, FRAMES, GAIN, GROUP, M
         GROUP,
         text(
             "noisy_axes",
-            "which axes the start's round-off reaches: all, or the plane of a flat mesh",
+            "what the start's round-off reaches: all axes; of a flat mesh its plane, or this and "
+            "the axis across it at one vertex",
         ),
         integer("seed", "of the start's round-off"),
         METHOD,

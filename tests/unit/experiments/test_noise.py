@@ -12,6 +12,7 @@ from pdrom.core.store import read_table, write_table
 from pdrom.experiments.noise import (
     ALL,
     PLANE,
+    VERTEX,
     Inputs,
     NoiseRuns,
     Outputs,
@@ -25,6 +26,7 @@ from pdrom.experiments.settings import Horizon
 from pdrom.model.mesh.types import save_mesh
 from pdrom.pipeline.scenes import Coarsen, load_bound_scene
 from pdrom.reduction.method import load_methods
+from pdrom.report.figures.kit.read import rerun_infos
 
 METHODS = load_methods(ROOT / "config" / "methods.yaml")
 
@@ -36,12 +38,14 @@ def fall():
 
 
 def test_a_flat_mesh_may_keep_its_plane(fall):
-    assert kinds(fall) == (ALL, PLANE)
+    assert kinds(fall) == (ALL, PLANE, VERTEX)
     curved = load_bound_scene(ROOT, "bend_curved", Coarsen(resolution=0.4))
     assert kinds(curved) == (ALL,)
-    every, plane = (roundoff_field(fall, axes, 1e-15, 1) for axes in (ALL, PLANE))
+    every, plane, vertex = (roundoff_field(fall, axes, 1e-15, 1) for axes in kinds(fall))
     np.testing.assert_array_equal(plane[:, :2], every[:, :2])
+    np.testing.assert_array_equal(vertex[:, :2], every[:, :2])
     assert not plane[:, 2].any()
+    assert np.count_nonzero(vertex[:, 2]) == 1
     assert every[:, 2].all()
 
 
@@ -68,13 +72,22 @@ def test_the_joint_selection_fails_where_an_axis_carries_nothing(fall, tmp_path)
     )
     mesh = File(str(tmp_path / "mesh.h5"), {"mesh": "m"})
     output = File(str(tmp_path / "noise.csv"), labels)
-    run(settings, Inputs(mesh, File(str(sensitivity), labels)), Outputs(output))
+    runs = File(str(tmp_path / "noise.h5"), labels)
+    run(settings, Inputs(mesh, File(str(sensitivity), labels)), Outputs(output, runs))
     table = read_table(Path(output.path))
-    assert len(table) == 2 * 2 * 2 * 3
+    assert len(table) == 3 * 2 * 2 * 3
     beyond = table.r == 99
     assert (table.frames[beyond] == 0).all()
     assert (table["rank"] < 99).all()
     singular = (table.noisy_axes == PLANE) & (table.method == "deim-joint") & ~beyond
     assert np.isinf(table.gain[singular]).all()
     assert (table.blowup_frame[singular] == 0).all()
-    assert (table.relative_error[~singular & ~beyond] < 1e-10).all()
+    runs_through = table.noisy_axes.isin((ALL, PLANE)) & ~singular & ~beyond
+    assert (table.relative_error[runs_through] < 1e-10).all()
+    drawn = [rerun_infos(runs.path, f"{axes}/deim-joint") for axes in kinds(fall)]
+    assert [[(i.r, i.marked) for i in infos] for infos in drawn] == 3 * [
+        [(2, False), (5, False), (99, True)]
+    ]
+    first = table[(table.seed == 1) & (table.method == "deim-joint") & ~beyond]
+    entries = [info.entries for infos in drawn for info in infos if not info.marked]
+    assert entries == (first.frames + 1).tolist()

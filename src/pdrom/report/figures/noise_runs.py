@@ -12,7 +12,8 @@ FIGURE = Declaration(
         "start, or misses by more than a tenth of the motion), of all starts; columns are methods "
         "and sizes, rows are scenes with the axes that the round-off of the start reaches. Where "
         "it leaves out the axis across the sheet, and nothing else moves the sheet there, the "
-        "joint selection's separate system of that axis is exactly singular."
+        "joint selection's separate system of that axis is exactly singular; where it moves a "
+        "single vertex across the sheet, this hangs on the vertex and on the size."
     ),
     reads=(TableOf("noise"),),
     options=Scenes,

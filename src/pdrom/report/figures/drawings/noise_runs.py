@@ -4,12 +4,11 @@ from matplotlib.figure import Figure
 
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.counts import draw_counts
+from pdrom.report.figures.kit.noise_rows import NOISY, WRONG
 from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 
 COLUMNS = ["scene", "group", "noisy_axes", "method", "r", "rank", "relative_error"]
-WRONG = 0.1  # of the motion
-_AXES = {"all": "all axes", "plane": "in the plane"}
 
 
 def draw(results: Results, options: Scenes) -> Figure:
@@ -33,7 +32,7 @@ def draw(results: Results, options: Scenes) -> Figure:
     }
     figure = Figure(figsize=(style.WIDTH, 0.25 * len(rows) + 1.0), layout="constrained")
     ax = figure.subplots()
-    labels = [f"{style.words(scene)}, {_AXES.get(axes, axes)}" for scene, axes in rows]
+    labels = [f"{style.words(scene)}, {NOISY[axes]}" for scene, axes in rows]
     draw_counts(ax, labels, [f"$r$ = {r}" for _, r in columns], cells)
     methods = [method for method, _ in columns]
     for method in dict.fromkeys(methods):

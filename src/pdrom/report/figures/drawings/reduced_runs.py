@@ -1,25 +1,13 @@
 """Full-order runs beside reduced ones (figures 4 to 7 of the paper, and the bars)."""
 
-import numpy as np
 from matplotlib.figure import Figure
 
-from pdrom.core.paths import FULL_ORDER, MESH, RERUNS
-from pdrom.model.mesh.types import load_mesh
-from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.camera import Camera
+from pdrom.report.figures.kit.experiment_rows import experiment_rows
 from pdrom.report.figures.kit.floor import Floors
 from pdrom.report.figures.kit.options import ReducedRuns
-from pdrom.report.figures.kit.panels import (
-    RunPanel,
-    shared_window,
-)
-from pdrom.report.figures.kit.read import (
-    choose_ranks,
-    positions_at,
-    rerun_infos,
-)
 from pdrom.report.figures.kit.results import NothingToDraw, Results, asked
-from pdrom.report.figures.kit.run_rows import NOTHING_RAN, Row, draw_rows, run_panel
+from pdrom.report.figures.kit.run_rows import Row, draw_rows
 
 
 def draw(results: Results, options: ReducedRuns) -> Figure:
@@ -40,38 +28,5 @@ def draw(results: Results, options: ReducedRuns) -> Figure:
     floors = Floors(results)
     rows: list[Row] = []
     for scene, group in experiments:
-        rows += _experiment_rows(results, options, floors, scene, group)
+        rows += experiment_rows(results, options, floors, scene, group)
     return draw_rows(rows, Camera(options.azimuth, options.elevation))
-
-
-def _experiment_rows(
-    results: Results, options: ReducedRuns, floors: Floors, scene: str, group: str
-) -> list[Row]:
-    camera = Camera(options.azimuth, options.elevation)
-    colour = style.surface_colour(style.group_looks(results.holdings)[group][0])
-    frames, full = positions_at(results.path(FULL_ORDER, scene), options.frames[-1:])
-    frame, mesh = frames[0], load_mesh(results.path(MESH, scene))
-    when = floors.instant(scene, frame).replace(", ", "\n")
-    reference = RunPanel("full order", style.FULL_ORDER, full[0], reference=True)
-    runs = {}
-    for method in results.methods(options):
-        path = results.path(RERUNS, scene, group, method)
-        infos = choose_ranks(rerun_infos(path), options.ranks)
-        runs[method] = [run_panel(path, i, frame, colour, i.title).seen_by(camera) for i in infos]
-    everything = [panel for panels in runs.values() for panel in panels]
-    window = shared_window(camera, full[0], everything)
-    title = results.experiment_title(scene, group)
-    reference = reference.seen_by(camera)
-    if all(panel.positions is None and not panel.failure for panel in everything):
-        label = f"{title}\nany method\n{when}"
-        return [Row(label, mesh, [reference], [window], full, NOTHING_RAN)]
-    return [
-        Row(
-            f"{title}\n{results.method_title(method)}\n{when}",
-            mesh,
-            [reference, *panels],
-            [window] * (len(panels) + 1),
-            np.repeat(full, len(panels) + 1, axis=0),
-        )
-        for method, panels in runs.items()
-    ]

@@ -59,10 +59,11 @@ class RerunInfo:
         return f"r = {self.r} (full rank)" if self.full else f"r = {self.r}"
 
 
-def rerun_infos(path: str) -> list[RerunInfo]:
-    """Basis sizes in a file of reduced runs, ascending."""
+def rerun_infos(path: str, inside: str = "") -> list[RerunInfo]:
+    """Basis sizes in a file of reduced runs, or in a group of it, ascending."""
     with open_hdf5(path) as file:
-        infos = [_info(label, file[label]) for label in file if _is_size(label)]
+        sizes = [label for label in file[f"/{inside}"] if _is_size(label)]
+        infos = [_info(f"{inside}/{label}", file[f"{inside}/{label}"]) for label in sizes]
     return sorted(infos, key=lambda info: (info.r, info.full))
 
 
