@@ -35,7 +35,7 @@ def draw(results: Results, options: Options) -> Figure:
         ax.remove()
     for i, (ax, scene) in enumerate(zip(axes, scenes, strict=False)):
         draw_panel(ax, found, scene, results, size=2.2)
-        ax.set_title(f"{group_title(results, scene)}: {style.words(scene)}", fontsize=7)
+        ax.set_title(f"{group_title(results, scene)}:\n{style.words(scene)}", fontsize=7)
         ax.tick_params(labelleft=i % columns == 0)
     label_outer(list(axes[: len(scenes)]), columns, "time per frame (ms)", "relative error")
     draw_legend(lower, blocks, LEGEND_COLUMNS)
