@@ -21,8 +21,9 @@ from pdrom.reduction.subspace.training import TrainingFrame
 # Rows that the training equations are hashed to, per coordinate of the subspace: several times the
 # elements that are chosen, or the factors would fit the hashing and not the equations.
 SKETCH = 60
-# Elements that may be chosen, at first: neighbours are much alike.
-CANDIDATES = 5000
+# Elements that may be chosen, at first and at most: neighbours are much alike, and the equations
+# of all elements of a large mesh fill the memory.
+CANDIDATES, MOST = 5000, 20_000
 SEED = 0
 
 
@@ -35,8 +36,8 @@ def ecsw_elements(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Sampled elements (m,) and their factors xi > 0 (m,) for each tolerance.
 
-    Of a large group a random (seeded) part is eligible, twice as many where these miss a tolerance;
-    the sum that they have to meet is always that of all elements.
+    Of a large group a random (seeded) part is eligible, twice as many where these miss a tolerance,
+    up to `MOST`; the sum that they have to meet is always that of all elements.
 
     Parameters
     ----------
@@ -47,7 +48,7 @@ def ecsw_elements(
         eligible = _eligible(group.elements, count)
         rows, total = training_equations(group, columns, training, eligible)
         solutions = nnls_path(rows, total, tolerances, most)
-        if count >= group.elements or _met(rows, total, solutions, tolerances):
+        if count >= min(group.elements, MOST) or _met(rows, total, solutions, tolerances):
             return [(eligible[support], factors) for support, factors in solutions]
         count *= 2
 
