@@ -5,6 +5,9 @@ they are (N, 3) views of these. Compiled code sees the flat array and holds a ro
 four lanes. A row may also hold one number of four elements
 (`pdrom.model.compiled.arithmetic.transposed` goes from one to the other).
 
+Arrays of rows are made here, at multiples of a row's size: NumPy's own begin in the middle of one,
+and every second row then straddles two lines of the cache.
+
 Loads and stores check nothing: indices are neither negative nor too large.
 """
 
@@ -35,9 +38,27 @@ class _RowModel(models.PrimitiveModel):  # type: ignore[misc]
         super().__init__(manager, kind, NUMBERS)
 
 
+@compiled
+def empty(numbers):
+    """Array (numbers,) of doubles, to be written to."""
+    return np.empty(numbers)
+
+
+@compiled
+def zeros(numbers):
+    """Array (numbers,) of zeros."""
+    return np.zeros(numbers)
+
+
+@compiled
+def copied(numbers):
+    """A copy of a flat array."""
+    return numbers.copy()
+
+
 def vertices(count: int) -> np.ndarray:
     """Zeros (count, 3), a view of rows of four."""
-    return np.zeros((count, WIDTH))[:, :3]
+    return unflat(zeros(WIDTH * count))
 
 
 def as_vertices(values: np.ndarray) -> np.ndarray:
@@ -56,12 +77,12 @@ def flat(values: np.ndarray) -> np.ndarray:
         and rows.flags.c_contiguous
         and rows.dtype == np.float64
         and values.strides == (8 * WIDTH, 8)
-        and values.ctypes.data == rows.ctypes.data
+        and _same_start(values, rows)
     ):
         return rows.reshape(-1)
-    rows = np.zeros((len(values), WIDTH))
-    rows[:, :3] = values
-    return rows.reshape(-1)
+    copy = zeros(WIDTH * len(values))
+    unflat(copy)[...] = values
+    return copy
 
 
 def unflat(rows: np.ndarray) -> np.ndarray:
@@ -71,7 +92,13 @@ def unflat(rows: np.ndarray) -> np.ndarray:
 
 def shares(values: np.ndarray, rows: np.ndarray) -> bool:
     """Whether ``rows`` = `flat` (values) is no copy."""
-    return values.ctypes.data == rows.ctypes.data and len(values) > 0
+    return len(values) > 0 and _same_start(values, rows)
+
+
+@compiled
+def _same_start(a, b):
+    """Whether two arrays begin at the same address; NumPy takes longer to say where they do."""
+    return a.ctypes.data == b.ctypes.data
 
 
 def _element(context, builder, kind, array, index):

@@ -16,14 +16,14 @@ from pdrom.model.constraints.base import (
 from pdrom.model.constraints.half_spheres import (
     MANIFOLD,
     NEAR_POLE,
-    POLE,
     RIM,
     SIZE,
     accumulate_vertices,
     project_gradients,
     project_vertices,
+    put_poles,
 )
-from pdrom.model.constraints.lanes import LANES, blocks, pack, put, workspace
+from pdrom.model.constraints.lanes import LANES, blocks, pack, workspace, workspaces
 from pdrom.model.constraints.local_kernel import LocalKernel
 from pdrom.model.constraints.surface import (
     cotangent_laplacian,
@@ -89,7 +89,8 @@ class VertexBending(ConstraintGroup):
         normals = np.zeros_like(curvature)
         fans = vertex_fans(self._triangles, len(points))
         self._fan_start, self._fan = fans
-        fan_normals(points, self.vertices, self._fan_start, self._fan, self._triangles, normals)
+        every = np.arange(self.elements)
+        fan_normals(points, self.vertices, every, *fans, self._triangles, normals)
         side = np.sign(np.einsum("ij,ij->i", curvature, normals))
         self.side = np.where(self.magnitude > FLAT * cancelling, side, 0.0)
         self._curved = np.flatnonzero(self.side)
@@ -102,10 +103,9 @@ class VertexBending(ConstraintGroup):
             curved = elements[self.side[elements] != 0.0]
         if len(curved) == 0:
             return
-        normals = np.zeros((len(curved), 3))
-        fan_normals(q, self.vertices[curved], self._fan_start, self._fan, self._triangles, normals)
-        self.normals[curved] = normals
-        put(self._manifold, MANIFOLD, POLE, curved, self.side[curved, None] * normals)
+        fans = (self._fan_start, self._fan, self._triangles)
+        fan_normals(q, self.vertices, curved, *fans, self.normals)
+        put_poles(self._manifold, curved, self.side, self.normals)
 
     @property
     def streamed(self) -> tuple[np.ndarray, ...]:
@@ -154,7 +154,7 @@ class VertexBending(ConstraintGroup):
         self.S.indices = self.S.indices.astype(np.int32)
         numbers = (self.weights, self.magnitude, self.rest, self.side[:, None] * self.normals)
         self._manifold = pack(np.column_stack(numbers))
-        self._work = np.stack([workspace(SIZE) for _ in range(2)])
+        self._work = workspaces(SIZE)
         self._taken = workspace(MANIFOLD)
         self.local_kernel = LocalKernel.of(
             accumulate_vertices,

@@ -11,6 +11,7 @@ from pdrom.model.constraints.lanes import (
     absolute_sum,
     choose,
     dot,
+    kernel,
     lane_function,
     load,
     mix,
@@ -35,6 +36,14 @@ H, P, HEIGHT, SIZE = 0, 3, 6, 7
 # Entries of the record: the numbers of elements and of those to project; then the places of the
 # operator in CSR, the manifold, the working arrays, the elements to project and their manifold.
 ELEMENTS, COUNT, START, INDICES, DATA, SPHERES, WORK, SAMPLED, TAKEN, ARRAYS = range(OWN, OWN + 10)
+
+
+@kernel
+def put_poles(manifold, elements, side, normals):
+    """Write side times normal of some elements."""
+    for e in elements:
+        place = (e // LANES * MANIFOLD + POLE) * LANES + e % LANES
+        save(manifold, 0, place, scaled(side[e], (normals[e, 0], normals[e, 1], normals[e, 2])))
 
 
 @lane_function

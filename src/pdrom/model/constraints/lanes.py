@@ -9,6 +9,7 @@ branches, only selections. No fast-math: an element gives the same bits in every
 
 import numpy as np
 
+from pdrom.model.compiled import rows
 from pdrom.model.compiled.functions import compiled
 
 LANES = 32
@@ -37,21 +38,17 @@ def pack(numbers: np.ndarray) -> np.ndarray:
     e, k = numbers.shape
     padding = np.repeat(numbers[-1:], blocks(e) * LANES - e, axis=0)
     padded = np.concatenate([numbers, padding]).reshape(blocks(e), LANES, k)
-    return np.ascontiguousarray(padded.transpose(0, 2, 1)).ravel()
-
-
-def put(
-    packed: np.ndarray, numbers: int, first: int, elements: np.ndarray, values: np.ndarray
-) -> None:
-    """Write values (m, k) as the numbers ``first``, ... of some elements."""
-    by_lane = packed.reshape(-1, numbers, LANES)
-    for i in range(values.shape[1]):
-        by_lane[elements // LANES, first + i, elements % LANES] = values[:, i]
+    return rows.copied(np.ascontiguousarray(padded.transpose(0, 2, 1)).ravel())
 
 
 def workspace(numbers: int) -> np.ndarray:
     """Zeroed working array of one block with so many numbers a lane."""
-    return np.zeros(numbers * LANES)
+    return rows.zeros(numbers * LANES)
+
+
+def workspaces(numbers: int) -> np.ndarray:
+    """A `workspace` for each of the two parts of a local kernel, (2, LANES numbers)."""
+    return workspace(2 * numbers).reshape(2, -1)
 
 
 @lane_function

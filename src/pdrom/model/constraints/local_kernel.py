@@ -131,10 +131,10 @@ class LocalPass:
         self.second = _tables([kernel for kernel in kernels if kernel.touched])
         touched = [kernel.touched for kernel in kernels if kernel.touched]
         self.touched = range(0)
-        self.other = np.zeros(0)
+        self.other = rows.zeros(0)
         if touched:
             self.touched = range(min(r.start for r in touched), max(r.stop for r in touched))
-            self.other = np.zeros(
+            self.other = rows.zeros(
                 rows.WIDTH * max(int(kernel.record[VERTICES]) for kernel in kernels)
             )
 
@@ -167,7 +167,7 @@ class LocalPass:
         right = rows.flat(rhs)
         if rows.shares(rhs, right):
             return self.add(rows.flat(y), right, threads)
-        added = np.zeros_like(right)
+        added = rows.zeros(len(right))
         energy = self.add(rows.flat(y), added, threads)
         rhs += rows.unflat(added)
         return energy

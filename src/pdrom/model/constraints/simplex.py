@@ -14,7 +14,7 @@ from pdrom.model.compiled.arithmetic import add, constant, subtract, transposed
 from pdrom.model.compiled.rows import WIDTH, at
 from pdrom.model.constraints.base import StencilGroup
 from pdrom.model.constraints.element_order import visiting_order
-from pdrom.model.constraints.lanes import LANES, blocks, lane_function, load, pack, save, workspace
+from pdrom.model.constraints.lanes import LANES, blocks, lane_function, load, pack, save, workspaces
 from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, LocalKernel
 
 # numbers of a lane in the working array: edges, S q, p, forces on the corners but 0, energy
@@ -55,8 +55,8 @@ class SimplexGroup(StencilGroup):
         # the copies that fill up the last block have no force and no energy
         by_lane = self._geometry.reshape(blocks(e), numbers.shape[1], LANES)
         by_lane[-1:, WEIGHT, e - LANES * (blocks(e) - 1) :] = 0.0
-        self._work = np.stack([workspace(self.work_size) for _ in range(2)])
-        self._taken = (np.empty(m * LANES, np.int32), workspace(numbers.shape[1]))
+        self._work = workspaces(self.work_size)
+        self._taken = (np.empty(m * LANES, np.int32), rows.zeros(LANES * numbers.shape[1]))
         self.local_kernel = LocalKernel.of(
             self.accumulate_kernel,
             vertices,

@@ -60,9 +60,12 @@ def _sides(q, triangle):
 
 
 @kernel
-def fan_normals(q, vertices, start, fan, triangles, normals):
-    """Area-weighted unit normals of ``vertices``; zero where the fan has no area."""
-    for i in range(vertices.shape[0]):
+def fan_normals(q, vertices, elements, start, fan, triangles, normals):
+    """Write the area-weighted unit normals of the vertices of some elements to their rows.
+
+    Zero where the fan has no area.
+    """
+    for i in elements:
         first, last = start[vertices[i]], start[vertices[i] + 1]
         largest = 0.0
         for k in range(first, last):

@@ -7,15 +7,16 @@ from pdrom.model.compiled.rows import WIDTH
 
 
 @compiled(nogil=True)
-def predict(positions, velocities, acceleration, time_step, s):
-    """Write q + h v + h^2 a to ``s`` (N, 4); ``acceleration`` is (N, 3), or (1, 3) for all."""
-    square = time_step**2
+def predict(positions, velocities, acceleration, time_step):
+    """q + h v + h^2 a as rows of four, flat; ``acceleration`` is (N, 3), or (1, 3) for all."""
+    s, square = np.empty(WIDTH * len(positions)), time_step**2
     for i in range(len(positions)):
         own = i if len(acceleration) > 1 else 0
         for axis in range(3):
             moved = positions[i, axis] + time_step * velocities[i, axis]
-            s[i, axis] = moved + square * acceleration[own, axis]
-        s[i, 3] = 0.0
+            s[WIDTH * i + axis] = moved + square * acceleration[own, axis]
+        s[WIDTH * i + 3] = 0.0
+    return s
 
 
 @compiled(nogil=True)

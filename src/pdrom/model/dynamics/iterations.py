@@ -37,11 +37,15 @@ class CompiledIterations:
         acceleration: Anderson | None = None,
     ) -> None:
         self._steps = list(local_steps)
-        self._pass = LocalPass([step.local_kernel for step in local_steps])
+        local = self._pass = LocalPass([step.local_kernel for step in local_steps])
         self._inertia = inertia
         self._acceleration = acceleration
         self._counters = np.zeros(3 * LINE, np.int64)
-        self._energy = np.zeros(1)
+        # what every call hands to compiled code
+        touched = local.touched
+        self._tables = (local.addresses, local.records, local.preparing, local.second)
+        self._shared = (np.zeros(1), local.other, touched.start, touched.stop)
+        self._places = (self._counters.ctypes.data, self._counters[LINE:].ctypes.data)
         self._clock = clock()
 
     def takes(self, elimination: object) -> TypeGuard[Elimination]:
@@ -68,18 +72,17 @@ class CompiledIterations:
         s : (N, 3) prediction
         seconds : (4,) times of the local and of the global steps are added to entries 1 and 2
         """
-        local, count = self._pass, len(which)
+        count = len(which)
         history = NO_HISTORY if self._acceleration is None else self._acceleration.history
         asked = len(objective) > 0 or self._acceleration is not None
-        right = np.empty(WIDTH * len(y))
+        right = rows.empty(WIDTH * len(y))
         iterate, start = rows.flat(y), rows.flat(base)
         prediction = rows.flat(s) if asked else start
         factor = elimination.factor
-        threads = max((step.threads for step in self._steps), default=1) if local.parts == 2 else 1
-        touched = local.touched
-        tables = (local.addresses, local.records, local.preparing, local.second)
-        shared = (self._counters, self._energy, local.other, touched.start, touched.stop)
-        places = (self._counters.ctypes.data, self._counters[LINE:].ctypes.data)
+        threads = 1
+        if self._pass.parts == 2:
+            threads = max((step.threads for step in self._steps), default=1)
+        tables, shared, places = self._tables, self._shared, self._places
         self._counters[:] = 0
 
         def first() -> float:
@@ -108,7 +111,7 @@ def _second_part(second, y, other, start, stop):
 @compiled(nogil=True)
 def _assist(count, y, tables, shared, places):
     """The second thread's share of all iterations."""
-    _, energy, other, start, stop = shared
+    energy, other, start, stop = shared
     given, done = places
     for k in range(count):
         wait_for(given, k + 1)
@@ -123,7 +126,7 @@ def _iterate(
     history, objective, seconds, watch,
 ):  # fmt: skip
     addresses, records, preparing, second = tables
-    _, shared_energy, other, start, stop = shared
+    shared_energy, other, start, stop = shared
     given, done = places
     panels, vertices, loads, work = factor
     window = len(history[5])

@@ -112,8 +112,8 @@ class SupernodalSolver(SparseSolver):
         self.panels = Panels.of(lower, factor.U.diagonal())
         unknowns = np.argsort(factor.perm_c)
         order = vertices[unknowns].astype(np.int32)
-        self._loads = np.zeros(rows.WIDTH * n)
-        self._sweep = (self.panels.arrays, order, self._loads, np.empty(rows.WIDTH * n))
+        self._loads = rows.zeros(rows.WIDTH * n)
+        self._sweep = (self.panels.arrays, order, self._loads, rows.empty(rows.WIDTH * n))
         self.factor = self._sweep
         self._coupling = None
         if coupling is not None:

@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pdrom.model.compiled.rows import WIDTH, flat, unflat
+from pdrom.model.compiled.rows import copied, flat, unflat
 from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.frames import end, predict, weighted
 from pdrom.model.dynamics.iterations import CompiledIterations
@@ -104,12 +104,10 @@ class VertexSpace(Space):
 
     def predict(self, positions: np.ndarray, velocities: np.ndarray, h: float) -> np.ndarray:
         acceleration = np.atleast_2d(self.acceleration(positions, velocities))
-        s = np.empty((len(positions), WIDTH))
-        predict(positions, velocities, acceleration, h, s)
-        return s[:, :3]
+        return unflat(predict(positions, velocities, acceleration, h))
 
     def copy(self, s: np.ndarray) -> np.ndarray:
-        return unflat(flat(s).copy())
+        return unflat(copied(flat(s)))
 
     def end(self, y: np.ndarray, before: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
         return end(flat(y), before, h)

@@ -89,6 +89,7 @@ class Stepper:
         self._acceleration = acceleration
         self._track = track_objective
         self._compiled = space.compiled(self.local_steps, acceleration)
+        self._watching = [local for local in local_steps if isinstance(local, WatchedStep)]
 
     def step(
         self,
@@ -135,8 +136,7 @@ class Stepper:
         objective = np.full(self.iterations if self._track else 0, np.nan)
         if self._acceleration is not None:
             self._acceleration.begin_frame(y)
-        watching = (local for local in self.local_steps if isinstance(local, WatchedStep))
-        watched = {k for local in watching for k in local.watched}
+        watched = {k for local in self._watching for k in local.watched}
         compiled = self._compiled
         k, last = 0, self.iterations - 1
         while k <= last:
