@@ -33,7 +33,7 @@ COLUMNS = [
     "blowup_frame", "relative_error",
 ]  # fmt: skip
 ALL, PLANE, VERTEX = "all", "plane", "vertex"
-DRAWN = 1  # the start whose runs are kept
+Runs = list[tuple[dict[str, Any], Rerun | None]]  # rows of one start, and its runs
 
 
 class NoiseRuns(ConfigModel):
@@ -76,7 +76,10 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
-    """Files written: a row for every start, method and size; the runs of the first start."""
+    """Files written: a row for every start, method and size; the runs of a start of each kind.
+
+    That is the first one of which some sizes run and others do not, or else the first one.
+    """
 
     table: Annotated[File, NOISE]
     runs: Annotated[File, NOISE_RUNS]
@@ -91,15 +94,27 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     rows = []
     with write_hdf5(outputs.runs.path) as file:
         for axes in kinds(scene):
+            kept: Runs = []
             for seed in range(1, asked.repetitions + 1):
-                for row, outcome in _runs(scene, labels["group"], axes, seed, settings):
-                    rows.append({**labels, "noisy_axes": axes, "seed": seed, **row})
-                    if seed == DRAWN:
-                        name = f"{axes}/{row['method']}/r{row['r']:04d}"
-                        _store(file.create_group(name), row["r"], outcome)
+                found = list(_runs(scene, labels["group"], axes, seed, settings))
+                rows += [{**labels, "noisy_axes": axes, "seed": seed, **row} for row, _ in found]
+                if not kept or (irregular(found) and not irregular(kept)):
+                    kept = found
+            for row, outcome in kept:
+                store = file.create_group(f"{axes}/{row['method']}/r{row['r']:04d}")
+                _store(store, row["r"], outcome)
             log.info("%s: %d starts", axes, asked.repetitions)
     whole_numbers = dict.fromkeys(("frames", "blowup_frame"), "Int64")
     write_table(pd.DataFrame(rows, columns=COLUMNS).astype(whole_numbers), outputs.table.path)
+
+
+def irregular(runs: Runs) -> bool:
+    """Whether a method runs at some sizes and blows up at others."""
+    ends: dict[str, set[bool]] = {}
+    for row, outcome in runs:
+        if outcome is not None:
+            ends.setdefault(row["method"], set()).add(outcome.finite)
+    return any(len(seen) > 1 for seen in ends.values())
 
 
 def kinds(scene: Scene) -> tuple[str, ...]:

@@ -12,8 +12,9 @@ FIGURE = Declaration(
         "Sheets with bending constraints only, near the end of the run: full order against "
         "reduced projections. The projections of a flat sheet are round-off: in the paper's two "
         "scenes the basis is one of noise, and what it does depends on which axes the round-off "
-        "of the start reaches (one start is drawn, all of them are counted below the picture and "
-        "in `noise_runs`). The curved sheet has projections that matter."
+        "of the start reaches (drawn is the first start of which some sizes run and others do "
+        "not, or else the first; all are counted below the pictures and in `noise_runs`). The "
+        "curved sheet has projections that matter."
     ),
     reads=(
         Chosen(MESH),
