@@ -3,6 +3,7 @@
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -70,6 +71,7 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
     mesh.parent.mkdir()
     sheet(mesh)
     (made.folder / "docs").mkdir()
+    shutil.copy(ROOT / "CITATION.cff", made.folder)
     return made
 
 
@@ -99,7 +101,9 @@ def test_a_run_is_planned(command: str, checkout: Checkout) -> None:
     words = shlex.split(command)[1:]
     if words[:1] in (["run"], ["--help"]):
         pytest.skip("the script itself: test_reproduce_script.py")
-    run([sys.executable, "-m", "pdrom.pipeline.front", "-n", *words], checkout.folder, checkout)
+    # after the names of a figure or a scene, before the hyphens that open targets
+    planned = ["-n", *words] if "--" in words else [*words, "-n"]
+    run([sys.executable, "-m", "pdrom.pipeline.front", *planned], checkout.folder, checkout)
 
 
 @pytest.mark.slow
