@@ -107,11 +107,13 @@ class Jobs:
         size = self._study.size(labels["scene"])
         return size.refined(float(labels["factor"])) if "factor" in labels else size
 
-    def group(self, experiment: Experiment) -> Callable[..., str] | None:
-        """Jobs that a cluster runs as one: those of a scene that need not be alone."""
-        if experiment.alone or "scene" not in experiment.labels:
-            return None
-        return lambda wildcards: f"scene_{wildcards.scene}"
+    def group(self, experiment: Experiment) -> str | None:
+        """Group of jobs of which a cluster runs those that hang together as one batch.
+
+        Scenes have no job in common but their meshes, so that each is a batch; Snakemake's option
+        ``--group-components scene=10`` makes one of ten.
+        """
+        return None if experiment.alone or "scene" not in experiment.labels else "scene"
 
     def settings(self, experiment: Experiment, labels: Labels) -> JobSettings:
         """Validated settings of a job."""
