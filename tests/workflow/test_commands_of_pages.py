@@ -26,7 +26,7 @@ COMMENT = re.compile(r"\s+#.*|\s*&&.*")  # of what && joins, the first one
 
 # What cannot be executed here, and why.
 LEFT_OUT = {
-    r"--executor|executor-plugin|workflow/profiles|sinfo|sbatch": "needs a cluster (tests/cluster)",
+    r"--executor|executor-plugin|workflow/profiles|sinfo|sbatch": "needs a cluster: tests/machines",
     r"[A-Z]{4}": "words in capitals stand for others",
     r"^\./reproduce test": "the tests themselves",
     r"^\.ci/run": "runs the tests itself",

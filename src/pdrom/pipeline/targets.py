@@ -143,10 +143,10 @@ def known(plan: Plan) -> Known:
         files=[*plan.tables.paths, *plan.figures, *held],
         names=names,
         labels={
-            "scene": lambda labels: scene_names(study.root),
+            "scene": lambda labels: {*scene_names(study.root), *study.scenes},
             "group": lambda labels: study.scene(labels["scene"]).reduce,
             "method": lambda labels: study.methods,
             "basis": lambda labels: {spec.basis_id for spec in study.methods.values()},
-            "mesh": lambda labels: map(mesh, scene_names(study.root)),
+            "mesh": lambda labels: {*map(mesh, scene_names(study.root)), *study.meshes},
         },
     )

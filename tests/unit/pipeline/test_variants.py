@@ -10,8 +10,10 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.core.paths import LABELS
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.scene import Scene, SceneConfig
+from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.scenes import read_scene
 from pdrom.pipeline.study import Study
+from pdrom.pipeline.targets import known
 from pdrom.pipeline.variants import Variants
 from places import ROOT
 
@@ -61,6 +63,14 @@ def test_a_study_holds_its_variants_beside_its_scenes() -> None:
     assert (
         study.size("spring_oop_m1p5_w1_s1").vertices > study.size("spring_oop_m0p5_w1_s1").vertices
     )
+
+
+def test_files_of_variants_are_targets() -> None:
+    config = {"scenes": ["strain_oop"], "methods": ["deim"], "variants": SECTION.model_dump()}
+    study = Study.load({**config, "coarsen": {"resolution": 0.3, "frames": 0.1}}, ROOT)
+    labels = known(Plan(study)).labels
+    assert set(labels["scene"]({})) >= set(study.scenes)
+    assert set(labels["mesh"]({})) >= set(study.meshes)
 
 
 def test_an_unknown_scene_is_named() -> None:
