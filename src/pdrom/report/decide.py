@@ -6,8 +6,8 @@ import pandas as pd
 
 from pdrom.core.reads import ProjectFile, TableOf
 from pdrom.report.claims import METRICS, VERDICTS, claims_rows, load_claims, timed_columns
+from pdrom.tables.declaration import compared, text, timed
 from pdrom.tables.declaration import table as declare
-from pdrom.tables.declaration import text, timed
 
 
 def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
@@ -21,20 +21,25 @@ def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         text("claim", "its identifier in config/claims.yaml"),
         text("source", "who claims it"),
         text("paper", "what the paper says"),
-        timed(text("measured", "range of what was measured, of the tests that decide")),
-        timed(text("verdict", f"as published, one of: {', '.join(VERDICTS)}")),
-        timed(text("why", "all tests in words")),
+        compared(
+            "told", timed(text("measured", "range of what was measured, of the tests that decide"))
+        ),
+        compared("verdict", timed(text("verdict", f"as published, one of: {', '.join(VERDICTS)}"))),
+        compared("told", timed(text("why", "all tests in words"))),
         text("figure_or_table", "where to see it"),
         text("section", "section of the paper"),
         text("shown", "figures of the paper"),
         text("text", "the claim in our words"),
         text("qualifiers", "what a fair test has to keep"),
-        timed(text("condition", "what the verdict depends on")),
-        timed(text("measured_beyond", "the same of sound variants on well-posed scenes")),
-        timed(text("verdict_beyond", "the verdict there")),
-        timed(text("condition_beyond", "what it depends on")),
-        timed(text("why_beyond", "all tests there in words")),
-        timed(text("answer", "both verdicts in words")),
+        compared("told", timed(text("condition", "what the verdict depends on"))),
+        compared(
+            "told",
+            timed(text("measured_beyond", "the same of sound variants on well-posed scenes")),
+        ),
+        compared("verdict", timed(text("verdict_beyond", "the verdict there"))),
+        compared("told", timed(text("condition_beyond", "what it depends on"))),
+        compared("told", timed(text("why_beyond", "all tests there in words"))),
+        compared("told", timed(text("answer", "both verdicts in words"))),
         text("history", "when and why the rules became what they are"),
     ),
     reads={

@@ -7,7 +7,7 @@ import pandas as pd
 from pdrom.core.reads import ProjectFile, TableOf
 from pdrom.report.claims import METRICS, VERDICTS, load_claims, timed_columns
 from pdrom.report.claims.sensitivity import PARTS, VARIED, sensitivity_rows
-from pdrom.tables.declaration import flag, table, text, timed
+from pdrom.tables.declaration import compared, flag, table, text, timed
 
 
 def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
@@ -27,9 +27,11 @@ def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         text("part", f"tests that decide: {', '.join(PARTS)}"),
         text("varied", f"what is changed in all of them: {', '.join(VARIED)}"),
         text("variation", "how: factor, share, sizes, split, scene left out"),
-        timed(text("verdict", f"one of: {', '.join(VERDICTS)}")),
-        timed(text("verdict_of_rules", "the verdict of the rules as they are")),
-        timed(flag("same", "the two agree")),
+        compared("fragile", timed(text("verdict", f"one of: {', '.join(VERDICTS)}"))),
+        compared(
+            "fragile", timed(text("verdict_of_rules", "the verdict of the rules as they are"))
+        ),
+        compared("fragile", timed(flag("same", "the two agree"))),
     ),
     reads={
         "rules": ProjectFile("config/claims.yaml"),

@@ -8,7 +8,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, Setting, TableOf
-from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.gain_prediction import FAILED
 from pdrom.tables.parts import joined
 
@@ -21,10 +21,13 @@ _KEYS = ["scene", "group", "method", "r"]
         text("split", "motion of the runs: train, heldout"),
         text("alarm", "of the guard, or of the estimate"),
         number("threshold", "of the estimate"),
-        integer("runs", "runs with projections alone reduced"),
-        integer("failed", f"runs among them that blow up or have an error above {FAILED:g}"),
-        number("detected_share", "failed runs with an alarm before the horizon"),
-        number("false_share", "other runs with an alarm before the horizon"),
+        compared("tally", integer("runs", "runs with projections alone reduced")),
+        compared(
+            "tally",
+            integer("failed", f"runs among them that blow up or have an error above {FAILED:g}"),
+        ),
+        compared("share", number("detected_share", "failed runs with an alarm before the horizon")),
+        compared("share", number("false_share", "other runs with an alarm before the horizon")),
     ),
     reads={
         "estimates": TableOf("estimates"),

@@ -6,7 +6,7 @@ from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
 from pdrom.experiments.alternatives.settings import CONVERGED, REDUCED
-from pdrom.tables.declaration import flag, integer, number, table, text
+from pdrom.tables.declaration import compared, flag, integer, number, table, text
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import ELEMENTS_SAMPLED, MS_PER_FRAME, SCENE, VERTICES, K
 
@@ -28,7 +28,7 @@ ITERATIONS = integer("iterations", "iterations of each substep")
         K,
         ELEMENTS_SAMPLED,
         integer("frames", "frames that errors are taken over"),
-        flag("finite", "no frame blew up"),
+        compared("run", flag("finite", "no frame blew up")),
         MS_PER_FRAME,
         number("error_implicit", "error against the converged implicit step of the scene"),
         number("error_continuous", "error against the motion in continuous time: the total error"),

@@ -6,7 +6,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, TableOf
-from pdrom.tables.declaration import number, table
+from pdrom.tables.declaration import compared, number, table
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import ERROR_WITHIN, FINITE, GROUP, MAX_EXTENT, METHOD, SCENE, R
 
@@ -20,15 +20,31 @@ _KEYS = ["scene", "group", "method", "r"]
         GROUP,
         METHOD,
         R,
-        number("reach", "bound of the static displacement by the projections, in rest extents"),
+        compared(
+            "gain",
+            number("reach", "bound of the static displacement by the projections, in rest extents"),
+        ),
         number("growth", "bound of the dynamic displacement over it, over the frames of the run"),
         number("lasting_growth", "the same for ever, with the vertices that are held last"),
-        number("bound", "bound of the extent of the run, in rest extents; inf if there is none"),
+        compared(
+            "gain",
+            number(
+                "bound", "bound of the extent of the run, in rest extents; inf if there is none"
+            ),
+        ),
         MAX_EXTENT,
-        number("slack", "bound over largest extent"),
-        number("contraction", "how much an iteration may enlarge an error, in the norm of A"),
-        number("spectral_radius", "of the derivative of an iteration"),
-        number("small_gain", "growth times contraction; a small-gain argument needs less than one"),
+        compared("gain", number("slack", "bound over largest extent")),
+        compared(
+            "drift",
+            number("contraction", "how much an iteration may enlarge an error, in the norm of A"),
+        ),
+        compared("drift", number("spectral_radius", "of the derivative of an iteration")),
+        compared(
+            "drift",
+            number(
+                "small_gain", "growth times contraction; a small-gain argument needs less than one"
+            ),
+        ),
         FINITE,
         ERROR_WITHIN,
     ),

@@ -23,6 +23,7 @@ import pandas as pd
 
 from pdrom.core.errors import StorageError
 from pdrom.core.reads import ProjectFile, Read
+from pdrom.tables.quantities import Quantity, usual_quantity
 
 P = ParamSpec("P")
 Kind = Literal["text", "integer", "number", "flag"]
@@ -35,6 +36,8 @@ class Column:
 
     unit : empty for text, counts and what has no dimension
     timed : a clock (or the memory in use) has a say in it, so that two runs may differ
+    declared : its quantity, where the type and the name do not tell it
+    failing : words of a column of outcomes that say that a run failed, or was not judged
     """
 
     name: str
@@ -42,6 +45,13 @@ class Column:
     meaning: str
     unit: str = ""
     timed: bool = False
+    declared: Quantity | None = None
+    failing: tuple[str, ...] = ()
+
+    @property
+    def quantity(self) -> Quantity:
+        """How far two machines may differ in it."""
+        return self.declared or usual_quantity(self.kind, self.name, self.unit, self.timed)
 
     def cast(self, values: pd.Series) -> pd.Series:
         """Values with the type of the column; ValueError or TypeError if they do not fit."""
@@ -82,8 +92,13 @@ def number(name: str, meaning: str, unit: str = "") -> Column:
 
 
 def timed(column: Column) -> Column:
-    """The same column where a clock has a say in it."""
-    return replace(column, timed=True)
+    """The same column where a clock has a say in it, so that it is another quantity."""
+    return replace(column, timed=True, declared=None)
+
+
+def compared(quantity: Quantity, column: Column, failing: Sequence[str] = ()) -> Column:
+    """The same column as another quantity than its type and name tell."""
+    return replace(column, declared=quantity, failing=tuple(failing))
 
 
 class TimedCells(Protocol):

@@ -12,7 +12,8 @@ Written by `python -m pdrom.pipeline.tables` from the declarations; not to be ed
 
 CSV, one row per observation, SI units unless a unit says otherwise, an empty cell where there is no
 value. In a column marked "timed" a clock (or the memory in use) has a say: only there may two runs
-on one machine differ, in `claims` only in claims about times.
+on one machine differ, in `claims` only in claims about times. "Compared as" is the quantity for
+which `./reproduce verify` has a tolerance, see [verification.md](verification.md).
 """
 
 
@@ -30,15 +31,16 @@ def _section(table: Table[Any]) -> str:
         "",
         f"{table.title}. Made by `{table.module}` from {', '.join(_sources(table))}.",
         "",
-        "| column | type | unit | timed | meaning |",
-        "|---|---|---|---|---|",
+        "| column | type | unit | timed | compared as | meaning |",
+        "|---|---|---|---|---|---|",
         *map(_row, table.columns),
     ]
     return "\n".join(lines) + "\n"
 
 
 def _row(column: Column) -> str:
-    cells = (column.name, column.kind, column.unit, "timed" if column.timed else "", column.meaning)
+    timed = "timed" if column.timed else ""
+    cells = (column.name, column.kind, column.unit, timed, column.quantity, column.meaning)
     return f"| {' | '.join(cells)} |"
 
 

@@ -8,7 +8,7 @@ from pdrom.core.paths import File
 from pdrom.core.reads import Every, Setting, TableOf
 from pdrom.model.runs.horizon import floor_of, horizons
 from pdrom.model.runs.sensitivity import without
-from pdrom.tables.declaration import flag, integer, number, table, text, timed
+from pdrom.tables.declaration import compared, flag, integer, number, table, text, timed
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import FLOOR, SCENE
 
@@ -23,11 +23,14 @@ KEYS = ["scene", "effect"]
         text("role", "constraint group, force, contact, hold or start"),
         number("force", "root mean square over the frames of the norm of its force", "N"),
         number("force_share", "of the sum over the effects of the scene"),
-        integer("acting_frames", "frames in which it exerts a force at all"),
+        compared("run", integer("acting_frames", "frames in which it exerts a force at all")),
         number("energy", "range of the energy that it holds, where it has one", "J"),
-        number("moved", "how far the run moves without it: largest drift before the horizon"),
+        compared(
+            "drift",
+            number("moved", "how far the run moves without it: largest drift before the horizon"),
+        ),
         FLOOR,
-        flag("above_floor", "moved is larger than the sensitivity floor"),
+        compared("run", flag("above_floor", "moved is larger than the sensitivity floor")),
         timed(number("own_ms", "its time in a frame of the whole scene", "ms")),
         timed(
             number("saved_ms", "time of the whole scene less that of the scene without it", "ms")

@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, TableOf
-from pdrom.tables.declaration import flag, number, table, text, timed
+from pdrom.tables.declaration import compared, flag, number, table, text, timed
 from pdrom.tables.parts import joined
 from pdrom.tables.reruns import KEYS
 from pdrom.tables.vocabulary import ERROR_WITHIN, GROUP, METHOD, POSITION_BASIS, SCENE, K, R
@@ -25,12 +25,19 @@ MARGIN = 1.5  # an estimate above this multiple of the companion's own error is 
         R,
         text("split", "motion of the run: train, heldout"),
         ERROR_WITHIN,
-        number("estimate", "distance to the companion, relative to its motion, before the horizon"),
-        number("ratio", "effectivity: estimate over error"),
-        flag("within", f"the ratio lies between {BAND[0]:g} and {BAND[1]:g}"),
+        compared(
+            "error",
+            number(
+                "estimate", "distance to the companion, relative to its motion, before the horizon"
+            ),
+        ),
+        compared("magnitude", number("ratio", "effectivity: estimate over error")),
+        compared("run", flag("within", f"the ratio lies between {BAND[0]:g} and {BAND[1]:g}")),
         number("companion_error", "of the companion's own run of the motion before the horizon"),
-        number("floor", "the same of the training motion, which is known offline"),
-        flag("resolved", f"the estimate exceeds {MARGIN:g} times the floor"),
+        compared(
+            "error", number("floor", "the same of the training motion, which is known offline")
+        ),
+        compared("run", flag("resolved", f"the estimate exceeds {MARGIN:g} times the floor")),
         timed(number("overhead", "time of the companion's frame over that of the run")),
         timed(number("full_order_share", "the same over that of the full-order run")),
     ),

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.reads import TableOf
-from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.gain_prediction import best_threshold, failures_ordered, judged_runs
 from pdrom.tables.gains import ORTHOGONAL, reruns_with_gain
 
@@ -20,13 +20,18 @@ _KEYS = ["scene", "group", "method", "r"]
         text("target", f"one of: {', '.join(TARGETS)}"),
         text("predictor", f"one of: {', '.join(PREDICTORS)}"),
         text("method", f"method of the runs; {EVERY}, or {WITHIN}: pairs of the same method"),
-        integer("runs", "runs that count"),
-        integer("failed", "runs among them that fail, or blow up"),
-        number("failures_ordered", "probability that a failed run has the larger value of two"),
-        number("threshold", "of the predictor that separates failed runs best"),
-        number("misclassified_share", "runs on its wrong side"),
-        integer("failed_below_one", "failed runs with a value below one"),
-        integer("below_one", "runs with a value below one"),
+        compared("tally", integer("runs", "runs that count")),
+        compared("tally", integer("failed", "runs among them that fail, or blow up")),
+        compared(
+            "share",
+            number("failures_ordered", "probability that a failed run has the larger value of two"),
+        ),
+        compared(
+            "magnitude", number("threshold", "of the predictor that separates failed runs best")
+        ),
+        compared("share", number("misclassified_share", "runs on its wrong side")),
+        compared("tally", integer("failed_below_one", "failed runs with a value below one")),
+        compared("tally", integer("below_one", "runs with a value below one")),
     ),
     reads={
         "bounds": TableOf("bounds"),

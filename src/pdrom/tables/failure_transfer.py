@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.reads import TableOf
-from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.failure_predictors import EVERY, PREDICTORS, WITHIN, predicted_runs
 from pdrom.tables.gain_prediction import best_threshold, failures_ordered
 
@@ -17,12 +17,21 @@ from pdrom.tables.gain_prediction import best_threshold, failures_ordered
         text("predictor", f"one of: {', '.join(PREDICTORS)}"),
         text("method", f"method of the runs; {EVERY}, or {WITHIN}: a limit for each method"),
         text("scene", f"scene that is left out; {EVERY}: over all of them"),
-        integer("runs", "runs of the scene that count"),
-        integer("failed", "runs among them that fail"),
-        number("threshold", "that separates the failed runs of the other scenes best"),
-        number("misclassified_share", "runs of the scene on its wrong side"),
-        number("majority_share", "the same if all are called what most of the others are"),
-        number("failures_ordered", "probability that a failed run has the larger value of two"),
+        compared("tally", integer("runs", "runs of the scene that count")),
+        compared("tally", integer("failed", "runs among them that fail")),
+        compared(
+            "magnitude",
+            number("threshold", "that separates the failed runs of the other scenes best"),
+        ),
+        compared("share", number("misclassified_share", "runs of the scene on its wrong side")),
+        compared(
+            "share",
+            number("majority_share", "the same if all are called what most of the others are"),
+        ),
+        compared(
+            "share",
+            number("failures_ordered", "probability that a failed run has the larger value of two"),
+        ),
     ),
     reads={
         "bounds": TableOf("bounds"),

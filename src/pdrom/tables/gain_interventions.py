@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.reads import TableOf
-from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.gain_prediction import judged_runs
 
 RESAMPLES, SEED = 2000, 1
@@ -28,15 +28,25 @@ _CELL = ["scene", "group", "r"]
         text("step", f"one of: {', '.join(STEPS)}"),
         text("method_before", "method before the step"),
         text("method_after", "method after it, on the same basis"),
-        integer("pairs", "scenes, groups and sizes at which both methods ran"),
-        integer("scenes", "scenes among them"),
-        number("gain_ratio", "median of the gain after over that before"),
-        number("error_ratio", "median of the error of the run after over that before"),
-        number("error_ratio_low", "2.5 % quantile of this median, scenes drawn anew (bootstrap)"),
-        number("error_ratio_high", "97.5 % quantile"),
-        number("fallen_share", "pairs whose error falls"),
-        integer("scenes_fallen", "scenes whose median error ratio is below one"),
-        number("p_value", "that as many scenes fall if up and down are alike (sign test)"),
+        compared("tally", integer("pairs", "scenes, groups and sizes at which both methods ran")),
+        compared("tally", integer("scenes", "scenes among them")),
+        compared("share", number("gain_ratio", "median of the gain after over that before")),
+        compared(
+            "share", number("error_ratio", "median of the error of the run after over that before")
+        ),
+        compared(
+            "share",
+            number(
+                "error_ratio_low", "2.5 % quantile of this median, scenes drawn anew (bootstrap)"
+            ),
+        ),
+        compared("share", number("error_ratio_high", "97.5 % quantile")),
+        compared("share", number("fallen_share", "pairs whose error falls")),
+        compared("tally", integer("scenes_fallen", "scenes whose median error ratio is below one")),
+        compared(
+            "share",
+            number("p_value", "that as many scenes fall if up and down are alike (sign test)"),
+        ),
     ),
     reads={"reruns": TableOf("reduced_reruns"), "reconstruction": TableOf("reconstruction_error")},
 )

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.reads import TableOf
-from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.gains import ORTHOGONAL, reruns_with_gain
 
 FAILED = 0.1  # error within the horizon above which a run counts as failed
@@ -25,14 +25,19 @@ PREDICTORS: dict[str, Callable[[pd.DataFrame], pd.Series]] = {
         text("predictor", f"one of: {', '.join(PREDICTORS)}"),
         text("lower", f"smallest gain of the decade, or {EVERY}"),
         text("upper", f"largest gain of the decade, or {EVERY}"),
-        integer("runs", "runs that count"),
-        integer("failed", "runs among them that fail"),
-        number("failed_share", "their share"),
+        compared("tally", integer("runs", "runs that count")),
+        compared("tally", integer("failed", "runs among them that fail")),
+        compared("share", number("failed_share", "their share")),
         number("median_error", "of the runs before the horizon"),
-        number("rank_correlation", "of predictor and error (Spearman)"),
-        number("threshold", "of the predictor that separates failed runs best"),
-        number("misclassified_share", "runs on its wrong side"),
-        number("failures_ordered", "probability that a failed run has the larger value of two"),
+        compared("share", number("rank_correlation", "of predictor and error (Spearman)")),
+        compared(
+            "magnitude", number("threshold", "of the predictor that separates failed runs best")
+        ),
+        compared("share", number("misclassified_share", "runs on its wrong side")),
+        compared(
+            "share",
+            number("failures_ordered", "probability that a failed run has the larger value of two"),
+        ),
     ),
     reads={"reruns": TableOf("reduced_reruns"), "reconstruction": TableOf("reconstruction_error")},
 )

@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, TableOf
-from pdrom.tables.declaration import integer, number, table, text, timed
+from pdrom.tables.declaration import compared, integer, number, table, text, timed
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import (
     BLOWUP_FRAME,
@@ -40,8 +40,8 @@ from pdrom.tables.vocabulary import (
         GUARD_FRAME,
         GUARD_REASON,
         GUARD_COUNT,
-        integer("fallback_frames", "frames computed with full projections"),
-        number("fallback_share", "their share of the frames that ran"),
+        compared("run", integer("fallback_frames", "frames computed with full projections")),
+        compared("run", number("fallback_share", "their share of the frames that ran")),
         MS_PER_FRAME,
         timed(number("relative_cost", "time of a frame over that of the full-order run")),
     ),

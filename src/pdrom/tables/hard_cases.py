@@ -5,7 +5,8 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.tables.declaration import flag, number, table, text
+from pdrom.experiments.hard_cases.expectations import FAILURES
+from pdrom.tables.declaration import compared, flag, number, table, text
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import BLOWUP_FRAME, FINITE, FRAMES, GAIN, METHOD, K, R
 
@@ -18,14 +19,19 @@ from pdrom.tables.vocabulary import BLOWUP_FRAME, FINITE, FRAMES, GAIN, METHOD, 
         flag("bounded_projections", "no state makes projections of the reduced group large"),
         K,
         R,
-        GAIN,
+        compared("magnitude", GAIN),
         FRAMES,
-        FINITE,
+        compared("fragile", FINITE),
         BLOWUP_FRAME,
-        number("max_extent", "largest extent over the scale of the full-order run"),
-        number("objective_rise", "largest in one iteration, over the first value of its frame"),
-        text("outcome", "how the reduction fared"),
-        text("why", "reason of a refusal or of an expected failure"),
+        compared(
+            "magnitude", number("max_extent", "largest extent over the scale of the full-order run")
+        ),
+        compared(
+            "rounding",
+            number("objective_rise", "largest in one iteration, over the first value of its frame"),
+        ),
+        compared("fragile", text("outcome", "how the reduction fared"), FAILURES),
+        compared("run", text("why", "reason of a refusal or of an expected failure")),
     ),
     reads={"parts": Every(paths.HARD_CASES)},
 )

@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.parts import joined
 
 
@@ -16,8 +16,11 @@ from pdrom.tables.parts import joined
         text("matrix_class", "kind of matrices that are projected"),
         integer("cases", "matrices of the class"),
         number("condition", "largest condition number of the projection at them"),
-        number("worst_relative_error", "largest relative error"),
-        number("worst_over_condition", "largest relative error over its condition number"),
+        compared("magnitude", number("worst_relative_error", "largest relative error")),
+        compared(
+            "magnitude",
+            number("worst_over_condition", "largest relative error over its condition number"),
+        ),
     ),
     reads={"parts": Every(paths.KERNEL_ACCURACY)},
 )

@@ -4,7 +4,7 @@ import pandas as pd
 
 from pdrom.core.reads import TableOf
 from pdrom.experiments.names import GLOBAL, RIGHT
-from pdrom.tables.declaration import number, table, text, timed
+from pdrom.tables.declaration import compared, number, table, text, timed
 from pdrom.tables.roofline import WHOLE
 from pdrom.tables.vocabulary import ELEMENTS, SCENE, VERTICES
 
@@ -33,7 +33,10 @@ _PER_ELEMENT = {
         timed(number("bound_ns", "least time on this machine", "ns")),
         timed(text("limit", "what the bound comes from")),
         timed(number("share", "the bound over the time")),
-        number("worst_over_condition", "largest relative error over the condition number"),
+        compared(
+            "magnitude",
+            number("worst_over_condition", "largest relative error over the condition number"),
+        ),
     ),
     reads={"phases": TableOf("roofline"), "accuracy": TableOf("kernel_accuracy")},
 )

@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import BLOWUP_FRAME, ERROR_WITHIN, FINITE, GAIN, GROUP, SCENE, R
 
@@ -21,7 +21,7 @@ from pdrom.tables.vocabulary import BLOWUP_FRAME, ERROR_WITHIN, FINITE, GAIN, GR
         ),
         text("rung", "choice that changes on this rung"),
         R,
-        number("condition", "condition number of the sampled modes"),
+        compared("gain", number("condition", "condition number of the sampled modes")),
         GAIN,
         number("error_train", "reconstruction error of the training snapshots"),
         number("error_test", "the same of the snapshots between them"),

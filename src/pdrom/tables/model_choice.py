@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from pdrom.core.reads import Setting, TableOf
-from pdrom.tables.declaration import flag, number, table
+from pdrom.tables.declaration import compared, flag, number, table
 from pdrom.tables.reruns import KEYS
 from pdrom.tables.vocabulary import (
     ERROR_WITHIN,
@@ -31,15 +31,15 @@ _CHOSEN = [
     columns=(
         SCENE,
         number("tolerance", "error that the user allows"),
-        flag("found", "a model has an estimate within the tolerance"),
+        compared("run", flag("found", "a model has an estimate within the tolerance")),
         GROUP,
         METHOD,
         POSITION_BASIS,
         K,
         R,
-        number("estimate", "of the chosen model on the held-out motion"),
+        compared("error", number("estimate", "of the chosen model on the held-out motion")),
         ERROR_WITHIN,
-        flag("met", "its true error is within the tolerance"),
+        compared("run", flag("met", "its true error is within the tolerance")),
         MS_PER_FRAME,
     ),
     reads={

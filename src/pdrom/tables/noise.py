@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import BLOWUP_FRAME, FINITE, FRAMES, GAIN, GROUP, METHOD, SCENE, R
 
@@ -23,7 +23,7 @@ from pdrom.tables.vocabulary import BLOWUP_FRAME, FINITE, FRAMES, GAIN, GROUP, M
         integer("seed", "of the start's round-off"),
         METHOD,
         R,
-        integer("rank", "modes that the snapshots have without a cutoff"),
+        compared("count", integer("rank", "modes that the snapshots have without a cutoff")),
         GAIN,
         FRAMES,
         FINITE,

@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.tables.declaration import integer, number, table, text, timed
+from pdrom.tables.declaration import compared, integer, number, table, text, timed
 from pdrom.tables.parts import joined
 
 
@@ -17,7 +17,10 @@ from pdrom.tables.parts import joined
         integer("rows", "rows of the matrix"),
         integer("columns", "columns of the matrix"),
         timed(number("seconds", "time that it took", "s")),
-        number("difference", "of both results: relative, or the share of indices not in both"),
+        compared(
+            "magnitude",
+            number("difference", "of both results: relative, or the share of indices not in both"),
+        ),
     ),
     reads={"parts": Every(paths.OFFLINE)},
 )

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.reads import TableOf
-from pdrom.tables.declaration import integer, number, table, timed
+from pdrom.tables.declaration import compared, integer, number, table, timed
 from pdrom.tables.gain_prediction import FAILED
 from pdrom.tables.vocabulary import METHOD, POSITION_BASIS
 
@@ -17,8 +17,13 @@ _ERROR = "relative_error_within_horizon"
     columns=(
         POSITION_BASIS,
         METHOD,
-        integer("scenes", "scenes (and groups) with a timed run"),
-        integer("accurate", "those with a run whose error before the horizon is at most a tenth"),
+        compared("tally", integer("scenes", "scenes (and groups) with a timed run")),
+        compared(
+            "tally",
+            integer(
+                "accurate", "those with a run whose error before the horizon is at most a tenth"
+            ),
+        ),
         timed(integer("pays", "those among them with an accurate run faster than the full order")),
         timed(integer("loses", "those whose accurate runs are all slower")),
         timed(number("best_speedup", "median over them of the fastest accurate run's speed-up")),

@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.tables.declaration import flag, number, table, text
+from pdrom.tables.declaration import compared, flag, number, table, text
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import ERROR_WITHIN, POSITION_BASIS, SCENE, K
 
@@ -19,15 +19,31 @@ _PAIR = ["scene", "split", "k"]
         text("split", "motion: train, heldout"),
         POSITION_BASIS,
         K,
-        number(
-            "best_approximation", "error of the best positions in the subspace, before the horizon"
+        compared(
+            "error",
+            number(
+                "best_approximation",
+                "error of the best positions in the subspace, before the horizon",
+            ),
         ),
         ERROR_WITHIN,
-        number("ratio", "the error of the run with full projections over the best one"),
-        flag("loses", "of a snapshot basis: its run has a larger error than the skinning basis'"),
+        compared(
+            "run", number("ratio", "the error of the run with full projections over the best one")
+        ),
+        compared(
+            "run",
+            flag(
+                "loses", "of a snapshot basis: its run has a larger error than the skinning basis'"
+            ),
+        ),
         flag("best_loses", "of a snapshot basis: its best approximation is worse than the other's"),
-        number("full_order_out_of_plane", "of a flat rest shape: share of the motion normal to it"),
-        number("out_of_plane", "the same of the run"),
+        compared(
+            "run",
+            number(
+                "full_order_out_of_plane", "of a flat rest shape: share of the motion normal to it"
+            ),
+        ),
+        compared("run", number("out_of_plane", "the same of the run")),
     ),
     reads={"parts": Every(paths.POSITION_BASES)},
 )

@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import ELEMENTS_SAMPLED, GAIN, GROUP, METHOD, SCENE, R
 
@@ -25,7 +25,7 @@ _SMALL = "empty at round-off level"
         number("relative_error_y", f"of their y-coordinates; {_SMALL}"),
         number("relative_error_z", f"of their z-coordinates; {_SMALL}"),
         GAIN,
-        integer("rows_sampled", "rows of the projections that are evaluated"),
+        compared("count", integer("rows_sampled", "rows of the projections that are evaluated")),
         ELEMENTS_SAMPLED,
     ),
     reads={"parts": Every(paths.RECONSTRUCTION)},

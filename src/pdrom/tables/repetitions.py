@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import GROUP, METHOD, SCENE, R
 
@@ -21,14 +21,16 @@ _CELL = ["scene", "group", "method", "r", "varied"]
         R,
         text("varied", "what differs: training (frames), start"),
         integer("repetitions", "runs; their range encloses the median of all but by 2^(1 - n)"),
-        integer("ended", "runs that ended before the horizon, with an infinite error"),
+        compared(
+            "run", integer("ended", "runs that ended before the horizon, with an infinite error")
+        ),
         number("error_median", "median of the errors of the positions before the horizon"),
         number("error_low", "the least of them"),
         number("error_high", "the largest"),
         number("gain_median", "median of the gains"),
         number("gain_low", "the least of them"),
         number("gain_high", "the largest"),
-        number("spread", "largest error over least"),
+        compared("run", number("spread", "largest error over least")),
     ),
     reads={"parts": Every(paths.REPETITIONS)},
 )

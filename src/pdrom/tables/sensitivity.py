@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import SCENE
 
@@ -16,7 +16,7 @@ from pdrom.tables.vocabulary import SCENE
         SCENE,
         text("perturbation", "of the start, over the extent; or what else was changed"),
         integer("frame", "number of the frame, from 0"),
-        number("relative_difference", "largest over the seeds"),
+        compared("magnitude", number("relative_difference", "largest over the seeds")),
     ),
     reads={"parts": Every(paths.SENSITIVITY)},
 )

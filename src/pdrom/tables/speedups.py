@@ -8,7 +8,7 @@ from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, TableOf
 from pdrom.experiments.fresh_process import FULL, REDUCED
-from pdrom.tables.declaration import flag, integer, number, table, text, timed
+from pdrom.tables.declaration import compared, flag, integer, number, table, text, timed
 from pdrom.tables.intervals import in_words, median_interval
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import (
@@ -51,8 +51,13 @@ _ERROR = "relative_error_within_horizon"
         timed(flag("loses", "dearer than the full order: the upper quantile is below one")),
         timed(number("training_s", "time of the training run", "s")),
         timed(number("reduction_s", "processor time of basis and sampling", "s")),
-        timed(
-            number("frames_to_break_even", "frames after which both are paid back; none if never")
+        compared(
+            "clocked",
+            timed(
+                number(
+                    "frames_to_break_even", "frames after which both are paid back; none if never"
+                )
+            ),
         ),
         number(
             "error_train", "of the training motion before the horizon, over all of a large scene"

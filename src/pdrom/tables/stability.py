@@ -10,7 +10,7 @@ from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, PerScene, Setting, TableOf
 from pdrom.core.store import open_hdf5
-from pdrom.tables.declaration import number, table, text
+from pdrom.tables.declaration import compared, number, table, text
 from pdrom.tables.parts import joined
 from pdrom.tables.reruns import KEYS
 from pdrom.tables.vocabulary import (
@@ -31,6 +31,7 @@ from pdrom.tables.vocabulary import (
     R,
 )
 
+# the first is the only one after which numbers of the run count
 OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
 SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # what has one full-order run
 
@@ -53,7 +54,7 @@ SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # what has one full-o
         K,
         text("experiment", "rerun (of the study) or sweep (a short run)"),
         RELATIVE_ERROR,
-        text("outcome", f"one of: {', '.join(OUTCOMES)}"),
+        compared("run", text("outcome", f"one of: {', '.join(OUTCOMES)}"), OUTCOMES[1:]),
         GUARD_FRAME,
         GUARD_REASON,
         GUARD_COUNT,

@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.tables.declaration import integer, number, table, text
+from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import (
     ELEMENTS_SAMPLED,
@@ -29,9 +29,12 @@ from pdrom.tables.vocabulary import (
         integer("r", "modes of the projections of each group"),
         text("variant", "what differs from plain block DEIM"),
         ELEMENTS_SAMPLED,
-        integer("control_elements", "elements of the safeguard, evaluated twice a frame"),
-        number("fallback_share", "frames of the training motion that it repeats"),
-        number("heldout_fallback_share", "the same of the held-out motion"),
+        compared(
+            "count",
+            integer("control_elements", "elements of the safeguard, evaluated twice a frame"),
+        ),
+        compared("run", number("fallback_share", "frames of the training motion that it repeats")),
+        compared("run", number("heldout_fallback_share", "the same of the held-out motion")),
         GAIN,
         FINITE,
         MAX_EXTENT,

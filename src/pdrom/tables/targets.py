@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.reads import TableOf
-from pdrom.tables.declaration import flag, number, table
+from pdrom.tables.declaration import compared, flag, number, table
 from pdrom.tables.gains import ORTHOGONAL, reruns_with_gain
 from pdrom.tables.vocabulary import ELEMENTS_SAMPLED, GAIN, GROUP, METHOD, SCENE, R
 
@@ -21,13 +21,17 @@ SIZES_FROM = 20  # basis sizes for which the target is set
         R,
         number("error", "of the run before the horizon; inf if it ended earlier"),
         number("orthogonal_error", "the same of the orthogonal projection at the same size"),
-        number("ratio", "the first over the second, neither below the sensitivity floor"),
+        compared(
+            "run", number("ratio", "the first over the second, neither below the sensitivity floor")
+        ),
         flag("asked", f"r is at least {SIZES_FROM}, the sizes for which the target is set"),
-        flag("within", f"ratio is at most {FACTOR}, the target"),
+        compared("run", flag("within", f"ratio is at most {FACTOR}, the target")),
         GAIN,
         ELEMENTS_SAMPLED,
-        number("elements_share", "elements that are evaluated over all elements"),
-        number("spread", "gain sqrt(elements_share)"),
+        compared(
+            "count", number("elements_share", "elements that are evaluated over all elements")
+        ),
+        compared("gain", number("spread", "gain sqrt(elements_share)")),
     ),
     reads={"reruns": TableOf("reduced_reruns"), "reconstruction": TableOf("reconstruction_error")},
 )

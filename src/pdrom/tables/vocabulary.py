@@ -1,37 +1,55 @@
 """Columns that several tables share: each name with one meaning."""
 
-from pdrom.tables.declaration import flag, integer, number, text, timed
+from pdrom.tables.declaration import compared, flag, integer, number, text, timed
 
 SCENE = text("scene", "name of the scene")
 GROUP = text("group", "constraint group whose projections are reduced; all in a position subspace")
 METHOD = text("method", "reduction of the projections; full without one")
 POSITION_BASIS = text("position_basis", "basis of the positions: pod, skinning, full (unreduced)")
 K = integer("k", "modes of the position basis")
-R = integer("r", "modes of the projections; in a position subspace the elements evaluated")
+R = compared(
+    "count", integer("r", "modes of the projections; in a position subspace the elements evaluated")
+)
 VERTICES = integer("vertices", "vertices of the mesh")
 ELEMENTS = integer("elements", "elements of the group")
-ELEMENTS_SAMPLED = integer("elements_sampled", "elements that are evaluated")
+ELEMENTS_SAMPLED = compared("count", integer("elements_sampled", "elements that are evaluated"))
 THREADS = integer("threads", "threads of the local step")
-FRAMES = integer("frames", "frames that the run reached")
-FINITE = flag("finite", "no frame blew up")
-BLOWUP_FRAME = integer("blowup_frame", "first frame that blew up")
-MAX_EXTENT = number("max_extent", "largest extent of a frame over that of the start")
-GAIN = number("gain", "norm of the inverse of the sampled modes; inf if they are singular")
-ENERGY_RATIO = number("energy_ratio", "largest energy over that of the full-order run")
-RELATIVE_ERROR = number("relative_error", "error of the positions over all frames")
-ERROR_WITHIN = number("relative_error_within_horizon", "error of the positions before the horizon")
-ERROR_OVER_EXTENT = number(
-    "error_over_extent",
-    "distance of a vertex (root mean square) before the horizon, over the extent",
+FRAMES = compared("run", integer("frames", "frames that the run reached"))
+FINITE = compared("run", flag("finite", "no frame blew up"))
+BLOWUP_FRAME = compared("run", integer("blowup_frame", "first frame that blew up"))
+MAX_EXTENT = compared(
+    "run", number("max_extent", "largest extent of a frame over that of the start")
 )
-SHAPE_ERROR = number(
-    "shape_error", "the same with the best rigid motion of each frame taken out: of the shape"
+GAIN = compared(
+    "gain", number("gain", "norm of the inverse of the sampled modes; inf if they are singular")
+)
+ENERGY_RATIO = compared(
+    "run", number("energy_ratio", "largest energy over that of the full-order run")
+)
+RELATIVE_ERROR = compared("run", number("relative_error", "error of the positions over all frames"))
+ERROR_WITHIN = number("relative_error_within_horizon", "error of the positions before the horizon")
+ERROR_OVER_EXTENT = compared(
+    "error",
+    number(
+        "error_over_extent",
+        "distance of a vertex (root mean square) before the horizon, over the extent",
+    ),
+)
+SHAPE_ERROR = compared(
+    "error",
+    number(
+        "shape_error", "the same with the best rigid motion of each frame taken out: of the shape"
+    ),
 )
 HORIZON_FRAME = integer("horizon_frame", "first frame that cannot be judged: the scene's horizon")
-FLOOR = number("sensitivity_floor", "largest drift of perturbed runs before the horizon")
-GUARD_FRAME = integer("guard_frame", "first frame in which the guard saw something")
-GUARD_REASON = text("guard_reason", "what the guard saw there")
-GUARD_COUNT = integer("guard_count", "frames in which the guard saw something")
+FLOOR = compared(
+    "drift", number("sensitivity_floor", "largest drift of perturbed runs before the horizon")
+)
+GUARD_FRAME = compared(
+    "run", integer("guard_frame", "first frame in which the guard saw something")
+)
+GUARD_REASON = compared("run", text("guard_reason", "what the guard saw there"))
+GUARD_COUNT = compared("run", integer("guard_count", "frames in which the guard saw something"))
 MS_PER_FRAME = timed(number("ms_per_frame", "time of a frame", "ms"))
 LOCAL_MS = timed(number("local_ms", "time of the local step in a frame", "ms"))
 GLOBAL_MS = timed(number("global_ms", "time of the global solve in a frame", "ms"))

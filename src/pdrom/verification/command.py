@@ -5,14 +5,20 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from pdrom.core.paths import TABLE
-from pdrom.core.store import Condition, check_file
-from pdrom.pipeline.tables import all_tables
+from pdrom.core.errors import ConfigurationError
+from pdrom.core.store import write_text
+from pdrom.verification.examine import Examination
 from pdrom.verification.files import verify_files
+from pdrom.verification.lines import counted, page, status_of
+from pdrom.verification.references import LOG, folder_of, tolerances_path
+from pdrom.verification.settings import load_settings
 from pdrom.verification.status import Status
 from pdrom.verification.subject import Subject
+from pdrom.verification.tolerances import load_tolerances
+from pdrom.verification.update import update
 
 CODES = "exit codes: 0 all holds; 1 faulty input; 2 not understood; 3 differs; 4 not there"
+PAGE = "verification.md"
 
 
 def parser() -> argparse.ArgumentParser:
@@ -24,7 +30,10 @@ def parser() -> argparse.ArgumentParser:
     )
     made.add_argument("--configfile", nargs="+", default=[], metavar="FILE")
     made.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE")
-    made.add_argument("--files", action="store_true", help="compare every file with the manifest")
+    what = made.add_mutually_exclusive_group()
+    what.add_argument("--files", action="store_true", help="compare every file with the manifest")
+    what.add_argument("--update", action="store_true", help="these results are the expected ones")
+    made.add_argument("--reason", default="", help="why --update")
     return made
 
 
@@ -34,21 +43,43 @@ def verify(arguments: Sequence[str]) -> Status:
     Raises
     ------
     ConfigurationError
-        The configuration is faulty.
+        The configuration is faulty, or nothing is expected of it.
+    StorageError
+        A file cannot be read or written; --update is refused.
     """
     asked = parser().parse_args(arguments)
     subject = Subject.of(asked.configfile, asked.config)
-    return verify_files(subject) if asked.files else _complete(subject)
+    if asked.files:
+        return verify_files(subject)
+    if asked.update:
+        _say(f"expected tables: {update(subject, asked.reason)}")
+        return Status.HOLDS
+    return _compare(subject)
 
 
-def _complete(subject: Subject) -> Status:
-    """Whether every table is there, with its checksum."""
-    absent = {
-        name: path
-        for name in all_tables()
-        if not Path(path := TABLE.at(subject.results, name=name)).is_file()
-        or check_file(path) is not Condition.INTACT
-    }
-    for name, path in absent.items():
-        sys.stdout.write(f"{path}: not there or damaged; make it by {subject.command(name)}\n")
-    return Status.MISSING if absent else Status.HOLDS
+def _compare(subject: Subject) -> Status:
+    folder = folder_of(subject.results)
+    if not folder.is_dir():
+        hint = 'write them by ./reproduce verify --update --reason "..."'
+        raise ConfigurationError(f"{folder}: no expected tables of this configuration; {hint}")
+    tolerances = load_tolerances(tolerances_path())
+    lines = Examination(subject, tolerances, load_settings().anew).lines()
+    for line in lines:
+        _say(str(line))
+    written = Path(subject.results) / PAGE
+    write_text(page(lines, _about(subject, folder)), written)
+    _say(counted(lines))
+    _say(f"page: {written}")
+    return status_of(lines)
+
+
+def _about(subject: Subject, folder: Path) -> list[str]:
+    return [
+        f"Results in `{subject.results}`, expected ones in `{folder}` (`{LOG}` says why),",
+        f"tolerances in `{tolerances_path()}`. What is compared, and what the outcomes mean, is",
+        "in `docs/verification.md`.",
+    ]
+
+
+def _say(line: str) -> None:
+    sys.stdout.write(f"{line}\n")

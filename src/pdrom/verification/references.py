@@ -1,0 +1,119 @@
+"""Expected tables, kept in git below ``results/reference``, in a compact form.
+
+Columns that are never compared are left out, numbers have the digits that are compared. A table is
+a CSV file, so that a change of it reads well; a large one is packed (``.csv.xz``), so that all of
+them together stay small.
+"""
+
+import io
+import lzma
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+
+import pandas as pd
+
+from pdrom.core.errors import StorageError
+from pdrom.core.paths import RESULTS
+from pdrom.core.store import atomic_path, seal_path
+from pdrom.tables.declaration import Column, Table
+from pdrom.tables.quantities import Quantity
+
+NOT_KEPT: tuple[Quantity, ...] = ("time", "clocked", "told", "rounding")
+# Digits of numbers; tolerances are a hundred times what these digits leave out, or more.
+DIGITS, FEW_DIGITS = 9, 3
+ROUGH: tuple[Quantity, ...] = ("magnitude", "ratio")
+PACKED_FROM = 50_000
+LOG = "changes.md"
+TOLERANCES = "tolerances.csv"
+HEAD = """# Changes of the expected tables
+
+Written by `./reproduce verify --update --reason "..."`, newest last.
+
+"""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """An expected table: ``frame`` has all declared columns, ``columns`` names those it holds."""
+
+    frame: pd.DataFrame
+    columns: tuple[str, ...]
+
+
+def folder_of(results: str) -> Path:
+    """Where the expected tables of a results folder lie."""
+    root = Path(RESULTS)
+    return root / "reference" / Path(results).relative_to(root)
+
+
+def tolerances_path() -> Path:
+    """The table of tolerances, one for all configurations."""
+    return Path(RESULTS) / "reference" / TOLERANCES
+
+
+def compact(table: Table, frame: pd.DataFrame) -> pd.DataFrame:
+    """What is kept of a table."""
+    kept = [column for column in table.columns if column.quantity not in NOT_KEPT]
+    return pd.DataFrame({c.name: _rounded(c, frame[c.name]) for c in kept}, index=frame.index)
+
+
+def _rounded(column: Column, values: pd.Series) -> pd.Series:
+    if column.kind != "number":
+        return values
+    digits = FEW_DIGITS if column.quantity in ROUGH else DIGITS
+    texts = [f"{value:.{digits}g}" for value in values.to_numpy(dtype=float)]
+    return pd.Series([float(text) for text in texts], values.index, dtype=float)
+
+
+def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
+    """Write the expected form of a table, packed if it is large."""
+    plain = compact(table, frame).to_csv(
+        index=False, float_format=f"%.{DIGITS}g", lineterminator="\n"
+    )
+    content = plain.encode()
+    path, other = _paths(table.name, folder)
+    if len(content) > PACKED_FROM:
+        path, other, content = other, path, lzma.compress(content, preset=9)
+    write_unsealed(path, content)
+    other.unlink(missing_ok=True)
+
+
+def read_reference(table: Table, folder: Path) -> Reference | None:
+    """The expected form of a table; None if there is none.
+
+    Raises
+    ------
+    StorageError
+        If it cannot be read.
+    """
+    plain, packed = _paths(table.name, folder)
+    path = plain if plain.is_file() else packed
+    if not path.is_file():
+        return None
+    try:
+        content = path.read_bytes()
+        text = content if path == plain else lzma.decompress(content)
+        frame = pd.read_csv(io.BytesIO(text))
+    except (OSError, lzma.LZMAError, ValueError) as error:
+        raise StorageError(f"{path}: cannot be read ({' '.join(str(error).split())})") from error
+    whole = frame.reindex(columns=list(table.column_names))
+    return Reference(table.checked(whole), tuple(frame.columns))
+
+
+def note(folder: Path, reason: str, day: date, code: str) -> None:
+    """Add a line to the log of changes."""
+    path = folder / LOG
+    text = path.read_text(encoding="utf-8") if path.is_file() else HEAD
+    write_unsealed(path, f"{text}- {day:%Y-%m-%d}, code {code}: {reason}\n".encode())
+
+
+def write_unsealed(path: Path, content: bytes) -> None:
+    """Write a file that git keeps: whole or not at all, without a checksum beside it."""
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(content)
+    seal_path(path).unlink()
+
+
+def _paths(name: str, folder: Path) -> tuple[Path, Path]:
+    return folder / f"{name}.csv", folder / f"{name}.csv.xz"

@@ -1,0 +1,38 @@
+"""The tracked tables of the tiny study, as what is expected and as what was found."""
+
+import pytest
+
+from pdrom.pipeline.tables import all_tables
+from pdrom.verification.references import read_reference
+from pdrom.verification.settings import load_settings
+from pdrom.verification.spread import comparisons
+from pdrom.verification.tolerances import load_tolerances
+from places import ROOT
+
+REFERENCES = ROOT / "results" / "reference"
+
+
+@pytest.fixture(scope="session")
+def expected():
+    """Expected tables of the tiny study by name; a new one may have none yet."""
+    folder = REFERENCES / "studies" / "tiny"
+    read = {name: read_reference(table, folder) for name, table in all_tables().items()}
+    return {name: reference.frame for name, reference in read.items() if reference is not None}
+
+
+@pytest.fixture(scope="session")
+def unchanged(expected):
+    """Every table compared with itself."""
+    return comparisons(all_tables(), expected, expected)
+
+
+@pytest.fixture(scope="session")
+def tolerances():
+    """The tracked tolerances."""
+    return load_tolerances(REFERENCES / "tolerances.csv")
+
+
+@pytest.fixture(scope="session")
+def settings():
+    """config/verification.yaml."""
+    return load_settings(ROOT)
