@@ -1,5 +1,5 @@
 # Tolerances of `./reproduce verify`, on request (config/verification.yaml, docs/verification.md):
-#   ./reproduce --configfile config/tiny.yaml tolerances
+#   ./reproduce --configfile config/tiny.yaml -- tolerances
 from pdrom.verification.jobs import VariantJobs
 
 VARIANTS = VariantJobs(PLAN, workflow.overwrite_configfiles)

@@ -42,9 +42,9 @@ class Reference:
 
 
 def folder_of(results: str) -> Path:
-    """Where the expected tables of a results folder lie."""
+    """Where the expected tables of a results folder lie: in its folder ``tables``."""
     root = Path(RESULTS)
-    return root / "reference" / Path(results).relative_to(root)
+    return root / "reference" / Path(results).relative_to(root) / "tables"
 
 
 def tolerances_path() -> Path:

@@ -49,7 +49,7 @@ def write(results: str, frames: Mapping[str, pd.DataFrame], reason: str) -> Path
     for name, frame in frames.items():
         write_reference(all_tables()[name], frame, folder)
     for path in [*folder.glob("*.csv"), *folder.glob("*.csv.xz")]:
-        if path.name.partition(".")[0] not in {*frames, "tolerances"}:
+        if path.name.partition(".")[0] not in frames:
             path.unlink()  # a table that there is no longer
     here = machine()
     code = f"{here.pdrom} ({here.commit})"

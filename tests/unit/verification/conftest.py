@@ -15,7 +15,7 @@ REFERENCES = ROOT / "results" / "reference"
 @pytest.fixture(scope="session")
 def expected():
     """Expected tables of the tiny study by name; a new one may have none yet."""
-    folder = REFERENCES / "studies" / "tiny"
+    folder = REFERENCES / "studies" / "tiny" / "tables"
     read = {name: read_reference(table, folder) for name, table in all_tables().items()}
     return {name: reference.frame for name, reference in read.items() if reference is not None}
 

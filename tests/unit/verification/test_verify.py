@@ -73,7 +73,7 @@ def test_a_changed_verdict_and_a_table_without_reference_are_told(project, capsy
     after = before.copy()
     after.loc[after.claim == "C5", "verdict"] = "holds"
     write_table(after, path)
-    reference = project / "results" / "reference" / "studies" / "tiny" / "alarms.csv"
+    reference = project / "results" / "reference" / "studies" / "tiny" / "tables" / "alarms.csv"
     aside = reference.rename(reference.with_suffix(".aside"))
     try:
         assert verify(OPTIONS) == Status.DIFFERS
