@@ -13,7 +13,7 @@ from places import ROOT
 
 LARGEST = 300_000
 # Binary files that are meant: pictures of the pages for readers, compressed tables.
-BINARY = ("docs/*.png", "results/reference/*.xz", "results/reference/*/*/*.xz")
+BINARY = ("docs/*.png", "results/reference/tables/*.xz", "results/reference/studies/*/tables/*.xz")
 
 
 def tracked(*options: str) -> list[Path]:
