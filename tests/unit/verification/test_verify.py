@@ -2,6 +2,7 @@
 
 import shutil
 
+import pandas as pd
 import pytest
 
 from pdrom.core.errors import ConfigurationError
@@ -9,6 +10,7 @@ from pdrom.core.paths import TABLE
 from pdrom.core.store import atomic_path, read_table, write_table
 from pdrom.pipeline.tables import all_tables
 from pdrom.verification.command import parser, verify
+from pdrom.verification.references import folder_of, write_reference
 from pdrom.verification.status import Status
 from pdrom.verification.subject import Subject
 from places import ROOT
@@ -33,8 +35,11 @@ def results(expected, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.setattr("os.fsync", lambda descriptor: None)
-        for name, frame in expected.items():
+        for name, table in all_tables().items():
+            frame = expected.get(name, table.checked(pd.DataFrame()))
             write_table(frame, TABLE.at(RESULTS, name=name))
+            # a new table or column has no tracked reference until a run is taken as one
+            write_reference(table, frame, folder_of(RESULTS))
         figures = Subject.of(OPTIONS[1:], []).plan.figure_jobs.values()
         tables = {TABLE.at(RESULTS, name=name) for name in all_tables()}
         read = {path for job in figures for path in job.inputs if path.startswith("results/")}
