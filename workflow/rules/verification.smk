@@ -1,4 +1,4 @@
-# Tolerances of `./reproduce verify`, on request (config/verification.yaml, docs/verification.md):
+# Tolerances of verify, on request (config/verification.yaml, docs/verification.md):
 #   ./reproduce --configfile config/tiny.yaml -- tolerances
 from pdrom.verification.jobs import VariantJobs
 
