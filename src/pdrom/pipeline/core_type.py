@@ -1,13 +1,11 @@
 """Which kernels OpenBLAS takes, so that the last digits do not depend on the processor.
 
 OpenBLAS holds kernels for many processors and takes the newest that fit; they round differently.
-``python -m pdrom.pipeline.core_type`` prints the value of ``OPENBLAS_CORETYPE`` for this machine,
-or an empty line. It has to be set before NumPy is loaded. OpenBLAS does not check it: kernels that
-the processor lacks instructions for would end the process.
+The variable ``OPENBLAS_CORETYPE`` has to be set before NumPy is loaded. OpenBLAS does not check it:
+kernels that the processor lacks instructions for would end the process.
 """
 
 import platform
-import sys
 from pathlib import Path
 
 CPUINFO = Path("/proc/cpuinfo")
@@ -51,7 +49,3 @@ def core_type_here() -> str | None:
     except OSError:
         cpuinfo = ""
     return core_type(platform.system(), platform.machine(), processor_features(cpuinfo))
-
-
-if __name__ == "__main__":
-    sys.stdout.write((core_type_here() or "") + "\n")

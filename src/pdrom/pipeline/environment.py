@@ -5,9 +5,9 @@ Who wants to see how far results depend on such settings names those that are to
 """
 
 import os
-import platform
 from collections.abc import Mapping
-from pathlib import Path
+
+from pdrom.pipeline.core_type import core_type_here
 
 # Settings of numerical libraries, of Python, Matplotlib and TeX.
 CLEARED = (
@@ -53,18 +53,7 @@ def settled(environment: Mapping[str, str], kernels: str | None) -> dict[str, st
 
 def settle() -> None:
     """Give this process, and so its jobs, the `settled` environment; before NumPy is loaded."""
-    environment = settled(os.environ, openblas_kernels())
+    environment = settled(os.environ, core_type_here())
     for name in set(os.environ) - set(environment):
         del os.environ[name]
     os.environ.update(environment)
-
-
-def openblas_kernels(cpuinfo: Path = Path("/proc/cpuinfo")) -> str | None:
-    """Kernels that every processor with AVX2 has; None where there are none to agree on.
-
-    OpenBLAS chooses by processor, and its kernels sum in different orders.
-    """
-    if platform.machine() not in ("x86_64", "AMD64") or not cpuinfo.is_file():
-        return None
-    flags = cpuinfo.read_text(encoding="utf-8", errors="replace")
-    return "Haswell" if {"avx2", "fma"} <= set(flags.split()) else None

@@ -1,8 +1,6 @@
 """Variables that change results are cleared, those of this project are set, the rest is left."""
 
-import pytest
-
-from pdrom.pipeline.environment import openblas_kernels, settled
+from pdrom.pipeline.environment import settled
 
 INHERITED = {
     "OPENBLAS_CORETYPE": "Prescott",
@@ -47,21 +45,3 @@ def test_what_is_asked_for_is_kept_as_it_is():
     assert "NUMBA_CPU_NAME" not in made
     assert "MKL_CBWR" not in made
     assert made["OPENBLAS_NUM_THREADS"] == "1"
-
-
-@pytest.mark.parametrize(
-    ("machine", "flags", "expected"),
-    [
-        ("x86_64", "fpu sse2 avx avx2 fma", "Haswell"),
-        ("x86_64", "fpu sse2 avx avx2 fma avx512f", "Haswell"),
-        ("x86_64", "fpu sse2 avx", None),
-        ("aarch64", "fp asimd", None),
-        ("x86_64", None, None),
-    ],
-)
-def test_kernels_that_many_processors_share(machine, flags, expected, tmp_path, monkeypatch):
-    monkeypatch.setattr("platform.machine", lambda: machine)
-    cpuinfo = tmp_path / "cpuinfo"
-    if flags is not None:
-        cpuinfo.write_text(f"processor : 0\nflags\t\t: {flags}\n")
-    assert openblas_kernels(cpuinfo) == expected
