@@ -14,8 +14,11 @@ import pandas as pd
 
 from pdrom.core.errors import PdromError
 from pdrom.core.store import read_table
+from pdrom.pipeline.tables import all_tables
 from pdrom.verification.claim_map.entries import Entry, entries
 from pdrom.verification.claim_map.measured import COLUMNS
+from pdrom.verification.references import tolerances_path
+from pdrom.verification.tolerances import Tolerances, load_tolerances, tolerance_text
 
 REFERENCE = Path("results/reference/claim_map.csv")
 PAGE = Path("docs/claim_map.md")
@@ -43,6 +46,8 @@ whole study writes a map of its own, `results/claim_map.csv` (other configuratio
 * **alone**: processor time of the last job, when all that it reads is there.
 * **memory**: the largest resident memory of one of these jobs, MB. **disk**: what they write, MB.
 * A dash: that run did not measure it.
+* **tolerance**: how exactly `./reproduce verify` expects a table, see [verification](verification.md).
+  A figure is reproduced when the tables that it reads are, a claim when its verdict is the same.
 * The rule is `figure_NAME` for a figure, `NAME_table` for a table, `paper` for the manuscript; a
   number of the text is read by `paper_inputs`.
 """
@@ -51,9 +56,10 @@ whole study writes a map of its own, `results/claim_map.csv` (other configuratio
 def pages(root: Path, measured: Measured) -> dict[Path, str]:
     """Text of both pages by their place below ``root``."""
     listed = entries(root)
+    tolerances = load_tolerances(root / tolerances_path())
     readme = (root / README).read_text(encoding="utf-8")
     return {
-        PAGE: _page(listed, measured),
+        PAGE: _page(listed, measured, tolerances),
         README: SECTION.sub(rf"\g<1>{_short(listed, measured)}\g<2>", readme),
     }
 
@@ -66,7 +72,7 @@ def load(root: Path) -> Measured:
     return {(row["kind"], row["name"]): row for row in table.to_dict("records")}
 
 
-def _page(listed: list[Entry], measured: Measured) -> str:
+def _page(listed: list[Entry], measured: Measured, tolerances: Tolerances) -> str:
     def section(kind: str, head: str, row: Callable[[Entry, Row], Iterable[str]]) -> str:
         lines = [row(entry, measured.get(entry.key, {})) for entry in listed if entry.kind == kind]
         return _table(head, lines)
@@ -90,8 +96,13 @@ def _page(listed: list[Entry], measured: Measured) -> str:
         "## Tables\n",
         section(
             "table",
-            f"| table | command | {COSTS} |",
-            lambda e, row: (f"[{e.name}](tables.md#{e.name})", _command(e), *_costs(row)),
+            f"| table | command | {COSTS} | tolerance |",
+            lambda e, row: (
+                f"[{e.name}](tables.md#{e.name})",
+                _command(e),
+                *_costs(row),
+                tolerance_text(all_tables()[e.name], tolerances),
+            ),
         ),
         "## Numbers of the text\n\nBy section of the manuscript: the tables that its numbers are "
         "read from. The command makes these tables.\n",

@@ -13,6 +13,7 @@ from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.verification.claim_map.entries import entries
 from pdrom.verification.claim_map.measured import COLUMNS
 from pdrom.verification.claim_map.pages import PAGE, README, load, main, pages
+from pdrom.verification.references import tolerances_path
 from places import CONFIG, ROOT
 
 COMMAND = ".venv/bin/python -m pdrom.verification.claim_map.pages"
@@ -58,6 +59,9 @@ def test_a_measurement_is_taken_over(tmp_path, monkeypatch):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / "README.md").unlink()
     (tmp_path / "README.md").write_bytes((ROOT / "README.md").read_bytes())
+    kept = tmp_path / tolerances_path()
+    kept.parent.mkdir(parents=True)
+    kept.write_bytes((ROOT / tolerances_path()).read_bytes())
     monkeypatch.chdir(tmp_path)
     row = dict.fromkeys(COLUMNS) | {
         "kind": "claim", "name": "C5", "verdict": "holds", "verdict_beyond": "does not hold",
