@@ -44,12 +44,15 @@ class Graph:
         """The job that makes a file; None for one that people edit."""
         if path in self._made:
             return self._made[path]
-        for experiment in self._plan.jobs.experiments:
-            for place in experiment.outputs.values():
-                labels = self._labels(place, path)
-                if labels is not None:
-                    return self._job(experiment, labels)
-        return None
+        found = [
+            (experiment, labels)
+            for experiment in self._plan.jobs.experiments
+            for place in experiment.outputs.values()
+            if (labels := self._labels(place, path)) is not None
+        ]
+        # `{group}` would match `spring_frames`, too; Snakemake takes the shortest labels
+        found.sort(key=lambda match: sum(map(len, match[1].values())))
+        return self._job(*found[0]) if found else None
 
     def _labels(self, place: Place, path: str) -> dict[str, str] | None:
         try:
