@@ -12,13 +12,13 @@ from typing import Any
 import pandas as pd
 
 from pdrom.core.errors import PdromError
-from pdrom.core.store import atomic_path
 from pdrom.core.usage import usage_of
 from pdrom.core.yamlfile import read_yaml
 from pdrom.pipeline.costs import COLUMNS, MEASURED
 from pdrom.pipeline.folders import DEFAULT, Folders
 from pdrom.pipeline.graph import Graph
 from pdrom.pipeline.plan import Plan, load_plan
+from pdrom.pipeline.tracked import write_tracked
 
 SIZES = ("elements", "vertices", "frames", "iterations")
 # Kinds of the jobs that no experiment is, by how the names of their rules begin or end.
@@ -70,8 +70,7 @@ def main() -> None:
     own = Folders()
     plan = load_plan(read_yaml(Path(DEFAULT)), Path(), (), own.results)
     made = measured_costs(plan, own.manuscript)
-    with atomic_path(MEASURED) as path:
-        made.to_csv(path, index=False)
+    write_tracked(MEASURED, made.to_csv(index=False).encode())
 
 
 if __name__ == "__main__":

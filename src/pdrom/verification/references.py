@@ -15,7 +15,7 @@ import pandas as pd
 
 from pdrom.core.errors import StorageError
 from pdrom.core.paths import RESULTS
-from pdrom.core.store import atomic_path, seal_path
+from pdrom.pipeline.tracked import write_tracked
 from pdrom.tables.declaration import Column, Table
 from pdrom.tables.quantities import Quantity
 
@@ -75,7 +75,7 @@ def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
     path, other = _paths(table.name, folder)
     if len(content) > PACKED_FROM:
         path, other, content = other, path, lzma.compress(content, preset=9)
-    write_unsealed(path, content)
+    write_tracked(path, content)
     other.unlink(missing_ok=True)
 
 
@@ -105,14 +105,7 @@ def note(folder: Path, reason: str, day: date, code: str) -> None:
     """Add a line to the log of changes."""
     path = folder / LOG
     text = path.read_text(encoding="utf-8") if path.is_file() else HEAD
-    write_unsealed(path, f"{text}- {day:%Y-%m-%d}, code {code}: {reason}\n".encode())
-
-
-def write_unsealed(path: Path, content: bytes) -> None:
-    """Write a file that git keeps: whole or not at all, without a checksum beside it."""
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(content)
-    seal_path(path).unlink()
+    write_tracked(path, f"{text}- {day:%Y-%m-%d}, code {code}: {reason}\n".encode())
 
 
 def _paths(name: str, folder: Path) -> tuple[Path, Path]:

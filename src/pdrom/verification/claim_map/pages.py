@@ -15,6 +15,7 @@ import pandas as pd
 from pdrom.core.errors import PdromError
 from pdrom.core.store import read_table
 from pdrom.pipeline.tables import all_tables
+from pdrom.pipeline.tracked import write_tracked
 from pdrom.verification.claim_map.entries import Entry, entries
 from pdrom.verification.claim_map.measured import COLUMNS
 from pdrom.verification.references import tolerances_path
@@ -46,8 +47,8 @@ whole study writes a map of its own, `results/claim_map.csv` (other configuratio
 * **alone**: processor time of the last job, when all that it reads is there.
 * **memory**: the largest resident memory of one of these jobs, MB. **disk**: what they write, MB.
 * A dash: that run did not measure it.
-* **tolerance**: how exactly `./reproduce verify` expects a table, see [verification](verification.md).
-  A figure is reproduced when the tables that it reads are, a claim when its verdict is the same.
+* **tolerance**: how exactly `./reproduce verify` expects a table ([how](verification.md)). A figure
+  is reproduced when the tables that it reads are, a claim when its verdict is the same.
 * The rule is `figure_NAME` for a figure, `NAME_table` for a table, `paper` for the manuscript; a
   number of the text is read by `paper_inputs`.
 """
@@ -195,7 +196,7 @@ def main(arguments: list[str]) -> None:
         # read first, so that a damaged or foreign file replaces nothing
         read_table(arguments[0], COLUMNS)
         REFERENCE.parent.mkdir(parents=True, exist_ok=True)
-        REFERENCE.write_bytes(Path(arguments[0]).read_bytes())
+        write_tracked(REFERENCE, Path(arguments[0]).read_bytes())
     for place, text in pages(Path(), load(Path())).items():
         place.write_text(text, encoding="utf-8")
 
