@@ -121,7 +121,7 @@ def test_file_round_trip(runs, tmp_path):
         else:
             np.testing.assert_array_equal(value, getattr(back, name))
     with open_hdf5(tmp_path / "s.h5") as file:
-        assert file.attrs["scene"] == "test"
+        assert file.attrs["elements"] == got.elements
         assert file["row_mass"].attrs["unit"] == "kg"
 
 

@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 
 from pdrom.experiments.alternatives.settings import CONVERGED, REDUCED
 from pdrom.report.figures.kit import style
-from pdrom.report.figures.kit.multiples import clipped, log_axis
+from pdrom.report.figures.kit.multiples import clipped, log_axis, time_axis
 from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 
@@ -72,7 +72,7 @@ def _draw_case(pair: np.ndarray, labels: tuple[str, int, float], case: pd.DataFr
     name = f"{style.words(scene)}{stiff}, {vertices:,} vertices"
     for ax, reference in zip(pair, ("implicit", "continuous"), strict=True):
         log_axis(ax, LOW, HIGH)
-        ax.set_xscale("log")
+        time_axis(ax, case.ms_per_frame.to_numpy(float))
         kind = "implicit step" if reference == "implicit" else "total error"
         ax.set_title(f"{name}\n{kind}", fontsize=7)
         rows = case.assign(error=case[f"error_{reference}"]).dropna(subset="error")

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from pdrom.report.figures.kit import style
 
@@ -45,6 +45,19 @@ def log_axis(ax: Axes, low: float, high: float) -> None:
     ax.set_ylim(low, high)
     ax.yaxis.set_major_locator(LogLocator(base=10.0, numticks=6))
     style.grid(ax)
+
+
+def time_axis(ax: Axes, times: np.ndarray) -> None:
+    """Logarithmic x axis around ``times``, with as many plain numbers as there is room for."""
+    ax.set_xscale("log")
+    low, high = np.log10(np.nanmin(times)), np.log10(np.nanmax(times))
+    pad = max(0.1, 0.08 * (high - low))
+    ax.set_xlim(10 ** (low - pad), 10 ** (high + pad))
+    steps = [(0.4, (1, 1.5, 2, 3, 5, 7)), (0.7, (1, 2, 3, 5)), (1.3, (1, 2, 5)), (2.0, (1, 3))]
+    subs = next((s for limit, s in steps if high - low < limit), (1,))
+    ax.xaxis.set_major_locator(LogLocator(subs=subs))
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 ARROWS = {"left": 4, "right": 5, "up": 6, "down": 7}  # carets

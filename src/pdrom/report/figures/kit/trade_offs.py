@@ -6,12 +6,11 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from pdrom.experiments.names import ANDERSON, FOM
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.families import FAMILIES, ITERATIONS, Family, Model, markers
-from pdrom.report.figures.kit.multiples import clipped, label_counts, log_axis
+from pdrom.report.figures.kit.multiples import clipped, label_counts, log_axis, time_axis
 from pdrom.report.figures.kit.options import Options
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 from pdrom.tables.accuracy_cost import FEWER, pareto
@@ -112,7 +111,7 @@ def draw_panel(
             markersize=6.0, markeredgewidth=1.8,
         )  # fmt: skip
     times = [*rows[TIME], *lost[TIME], found.own_ms.get(scene, np.nan)]
-    _time_axis(ax, np.asarray(times, dtype=float))
+    time_axis(ax, np.asarray(times, dtype=float))
     if scene in found.own_ms:
         ax.axvline(found.own_ms[scene], zorder=0, **OWN)
     if scene in found.own_error:
@@ -146,17 +145,6 @@ def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
     rows = rows.sort_values(TIME)
     label_counts(ax, rows[TIME], rows[ERROR], rows.iterations, "K = ")
 
-
-def _time_axis(ax: Axes, times: np.ndarray) -> None:
-    """Plain numbers on the logarithmic axis, as many as there is room for."""
-    low, high = np.log10(np.nanmin(times)), np.log10(np.nanmax(times))
-    pad = max(0.1, 0.08 * (high - low))
-    ax.set_xlim(10 ** (low - pad), 10 ** (high + pad))
-    steps = [(0.4, (1, 1.5, 2, 3, 5, 7)), (0.7, (1, 2, 3, 5)), (1.3, (1, 2, 5)), (2.0, (1, 3))]
-    subs = next((s for limit, s in steps if high - low < limit), (1,))
-    ax.xaxis.set_major_locator(LogLocator(subs=subs))
-    ax.xaxis.set_minor_locator(NullLocator())
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def group_title(results: Results, scene: str) -> str:
