@@ -146,7 +146,6 @@ def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
     label_counts(ax, rows[TIME], rows[ERROR], rows.iterations, "K = ")
 
 
-
 def group_title(results: Results, scene: str) -> str:
     """The constraint group that a scene reduces, in words."""
     groups = results.holdings.scenes[scene].groups
