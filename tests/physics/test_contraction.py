@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conftest import GROUPS, make_scene
+from builders import GROUPS, make_scene
 from pdrom.model.boundedness import Compliance, largest_projections
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene

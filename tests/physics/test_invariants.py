@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conftest import make_scene, random_rotation
+from builders import GROUPS, make_scene, random_rotation
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs.full_order import simulate, trajectory
 
@@ -59,8 +59,6 @@ def test_angular_momentum_of_the_converged_step(group, rng):
     Internal forces are derivatives of a rotation-invariant energy, hence sum_v y_v x f_v = 0 at the
     fixed point of the local/global iteration.
     """
-    from conftest import GROUPS
-
     scene = make_scene(
         {"effect": group, "weight": 1e3}, mesh=GROUPS[group], iterations=3000, frames=1
     )

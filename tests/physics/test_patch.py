@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conftest import make_scene, random_rotation
+from builders import GROUPS, make_scene, random_rotation
 
 GRADIENT = np.array([[1.3, 0.2, -0.1], [0.05, 0.8, 0.3], [-0.2, 0.1, 1.1]])
 
@@ -32,8 +32,6 @@ def test_tetrahedra_see_a_constant_gradient():
 
 @pytest.mark.parametrize("group", ["strain", "tetrahedron_strain", "deformation_gradient"])
 def test_rigid_motions_cost_nothing(group, rng):
-    from conftest import GROUPS
-
     scene = make_scene({"effect": group, "weight": 1e6}, mesh=GROUPS[group])
     moved = scene.mesh.points @ random_rotation(rng).T + rng.standard_normal(3)
     rhs = np.zeros_like(moved)

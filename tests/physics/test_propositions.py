@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.basis.types import Basis

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.subspace.interpolated import Training, interpolate
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns

@@ -2,10 +2,10 @@
 
 import pytest
 
-from conftest import ROOT
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.runs.sensitivity import perturbation_field, relative_difference
 from pdrom.pipeline.scenes import load_bound_scene
+from places import ROOT
 
 WELL_POSED = sorted(
     path.stem

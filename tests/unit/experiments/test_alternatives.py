@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.paths import File
 from pdrom.core.store import read_table

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.experiments.effect_costs import (
     COSTS,
     LEFT_OUT,

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from conftest import ROOT
 from pdrom.core.yamlfile import read_yaml, validate
 from pdrom.experiments.ladder import LadderFile
 from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.sampling import Reduction, select
+from places import ROOT
 
 FILE = ROOT / "config" / "ladder.yaml"
 LADDER = validate(LadderFile, read_yaml(FILE), str(FILE))

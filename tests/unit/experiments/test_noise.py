@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from conftest import ROOT
 from pdrom.core.paths import File
 from pdrom.core.store import read_table, write_table
 from pdrom.experiments.noise import (
@@ -27,6 +26,7 @@ from pdrom.model.mesh.types import save_mesh
 from pdrom.pipeline.scenes import Coarsen, load_bound_scene
 from pdrom.reduction.method import load_methods
 from pdrom.report.figures.kit.read import rerun_infos
+from places import ROOT
 
 METHODS = load_methods(ROOT / "config" / "methods.yaml")
 

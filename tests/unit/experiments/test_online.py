@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.paths import File
 from pdrom.core.store import read_table

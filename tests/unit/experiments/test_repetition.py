@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.experiments.repetition import Repeater, Repetitions, drawn
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene

@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from conftest import ROOT, make_scene
+from builders import make_scene
 from pdrom.core.paths import File
 from pdrom.core.store import read_table, write_table
 from pdrom.experiments import bounds, fom, guard, mesh, pod, reruns, snapshots, stability, subspaces
@@ -18,6 +18,7 @@ from pdrom.experiments.subspaces import SubspaceModels
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.method import MethodSpec, load_methods
+from places import ROOT
 
 METHODS = {
     name: spec

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.model.energy import STRIDE, EnergyScale, energies
 from pdrom.model.runs.full_order import trajectory
 

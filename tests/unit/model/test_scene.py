@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from conftest import ROOT, make_scene
+from builders import make_scene
 from pdrom.core.errors import ConfigurationError, SceneError
 from pdrom.core.store import open_hdf5
 from pdrom.model.compiled import rows
@@ -16,6 +16,7 @@ from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs.full_order import run, trajectory
 from pdrom.pipeline.scenes import Coarsen, load_scene
 from pdrom.pipeline.study import Study
+from places import ROOT
 
 SPRING = {"effect": "spring", "weight": 1e5}
 
@@ -23,7 +24,7 @@ SPRING = {"effect": "spring", "weight": 1e5}
 def test_unlisted_effects_are_not_imported():
     """A spring scene loads no other constraint, no gravity, no floor, no poke."""
     code = (
-        "import sys; from conftest import make_scene;"
+        "import sys; from builders import make_scene;"
         "from pdrom.model.runs.full_order import trajectory;"
         "trajectory(make_scene({'effect': 'spring', 'weight': 1.0}, frames=1));"
         "print('\\n'.join(m for m in sys.modules if m.startswith('pdrom.')))"

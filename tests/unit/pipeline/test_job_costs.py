@@ -41,7 +41,7 @@ def test_half_of_the_measured_jobs_are_predicted_within_a_quarter(model: CostMod
     off = np.exp(np.abs(np.log(model.quotients())))
     assert len(off) > 500
     assert off.median() < 1.25
-    assert off.quantile(0.9) < 2.5
+    assert off.quantile(0.9) < 2.7
 
 
 def test_no_measured_job_would_have_run_out_of_time_or_memory(model: CostModel) -> None:

@@ -2,7 +2,6 @@
 
 import pytest
 
-from conftest import ROOT
 from pdrom.core import paths
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import read_yaml, validate
@@ -12,6 +11,7 @@ from pdrom.pipeline.holdings import labels_of
 from pdrom.pipeline.jobs import Jobs
 from pdrom.pipeline.study import Study, StudySettings
 from pdrom.reduction.local.guard_settings import GuardSettings
+from places import ROOT
 
 STUDY = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "gappy"], "ranks": [6, "full"]}
 

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from conftest import ROOT
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.reads import PerScene, Setting, TableOf
 from pdrom.pipeline import tables as module
 from pdrom.pipeline.study import Study
 from pdrom.pipeline.tables import Tables, all_tables
 from pdrom.tables.document import document
+from places import ROOT
 
 CONFIG = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "block-deim"]}
 

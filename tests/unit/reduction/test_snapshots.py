@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.core.errors import SnapshotError, StorageError
 from pdrom.core.store import open_hdf5, write_hdf5
 from pdrom.model.runs.full_order import run

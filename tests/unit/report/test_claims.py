@@ -7,7 +7,6 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from conftest import ROOT
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import validate
 from pdrom.report.claims import (
@@ -26,6 +25,7 @@ from pdrom.report.claims import evaluate as evaluated
 from pdrom.report.claims.verdicts import answer
 from pdrom.report.decide import claims
 from pdrom.tables import declared
+from places import ROOT
 
 RERUNS = [
     # scene, group, method, position_basis, k, r, frames, blowup, error within, local_ms

@@ -3,12 +3,12 @@
 import pandas as pd
 import pytest
 
-from conftest import ROOT
 from pdrom.core.yamlfile import validate
 from pdrom.report.claims import ClaimRule, load_claims
 from pdrom.report.claims.sensitivity import PARTS, VARIED, sensitivity_rows
 from pdrom.report.fragility import claims_sensitivity
 from pdrom.tables import declared
+from places import ROOT
 
 ERRORS = pd.DataFrame(
     {

@@ -1,8 +1,8 @@
 """docs/figures.md is what the declarations say."""
 
-from conftest import ROOT
 from pdrom.report.document import PAGE, figures_page
 from pdrom.report.figures.kit.catalogue import declarations
+from places import ROOT
 
 
 def test_the_page_is_up_to_date():

@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from conftest import ROOT
 from pdrom.core.paths import File
 from pdrom.experiments.scaling import Inputs, Outputs, Settings, Sized, SizedBreakEven, run
 from pdrom.pipeline.scenes import load_scene
@@ -12,6 +11,7 @@ from pdrom.reduction.method import MethodSpec
 from pdrom.tables.break_even import CURVE, breakeven
 from pdrom.tables.scaling import scaling
 from pdrom.tables.scaling_fit import QUANTITIES, scaling_fit
+from places import ROOT
 
 SPEC = MethodSpec(title="block DEIM", centring="affine", rows="element")
 JOINT = MethodSpec(title="joint DEIM", centring="affine", rows="joint")

@@ -65,6 +65,8 @@ class SceneResults(Results):
             return reconstruction_error(self._files(RECONSTRUCTION))
         if name == "reduced_reruns":
             return self._reduced_reruns()
+        if name == "repetitions":
+            return pd.DataFrame(columns=list(columns))  # a scene by itself repeats no run
         raise StorageError(f"scene {self.scene}: the table {name} is made of whole studies only")
 
     def runs(self) -> pd.DataFrame:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from conftest import random_rotation
+from builders import random_rotation
 from pdrom.experiments.hard_cases.catalogue import CASES
 from pdrom.experiments.hard_cases.checks import CHECKS, faults, shape_error
 from pdrom.experiments.hard_cases.record import record

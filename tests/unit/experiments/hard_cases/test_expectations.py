@@ -2,7 +2,6 @@
 
 import pytest
 
-from conftest import ROOT
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import read_yaml
 from pdrom.experiments.hard_cases.expectations import (
@@ -14,6 +13,7 @@ from pdrom.experiments.hard_cases.expectations import (
 from pdrom.experiments.hard_cases.experiment import EXPERIMENT
 from pdrom.pipeline.jobs import Jobs
 from pdrom.pipeline.study import Study
+from places import ROOT
 
 ENTRY = Expectation(why="because of something that is long enough", fails=("a",), may_fail=("b",))
 

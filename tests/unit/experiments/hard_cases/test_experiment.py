@@ -5,7 +5,6 @@ import logging
 import pandas as pd
 import pytest
 
-from conftest import ROOT
 from pdrom.core.paths import File
 from pdrom.experiments.hard_cases.experiment import (
     COLUMNS,
@@ -16,6 +15,7 @@ from pdrom.experiments.hard_cases.experiment import (
     run,
 )
 from pdrom.reduction.method import load_methods
+from places import ROOT
 
 METHODS = {
     name: spec

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.model.alternatives.continuous import continuous
 
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}

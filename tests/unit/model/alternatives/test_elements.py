@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from conftest import GROUPS, make_scene
+from builders import GROUPS, make_scene
 from pdrom.model.alternatives.elements import Elements, decompose_element, workspace
 from pdrom.model.compiled.rows import as_vertices, flat
 

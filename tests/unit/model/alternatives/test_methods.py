@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conftest import GROUPS, make_scene
+from builders import GROUPS, make_scene
 from pdrom.core.errors import ConfigurationError, SceneError
 from pdrom.model.alternatives.methods import METHODS, alternative
 from pdrom.model.alternatives.substeps import inertia_energy

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numba import carray, types
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.counters import Counted, Operations
 from pdrom.model.compiled.functions import Callback

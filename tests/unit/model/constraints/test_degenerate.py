@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 
-from conftest import random_rotation
+from builders import random_rotation
 from pdrom.model.constraints.bending import VertexBending
 from pdrom.model.constraints.deformation_gradient import DeformationGradient
 from pdrom.model.constraints.gradient_kernel import call

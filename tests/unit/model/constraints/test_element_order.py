@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.model.constraints.element_order import visiting_order
 from pdrom.model.constraints.local_kernel import projections
 from pdrom.model.mesh.generators import bar, cloth

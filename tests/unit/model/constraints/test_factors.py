@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from conftest import GROUPS, make_scene
+from builders import GROUPS, make_scene
 from pdrom.core.errors import SceneError
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.variation import varied

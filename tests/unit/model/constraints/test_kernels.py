@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from conftest import GROUPS, make_scene, random_rotation
+from builders import GROUPS, make_scene, random_rotation
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.constraints.gradient_kernel import call
 from pdrom.model.constraints.implementations import IMPLEMENTATIONS

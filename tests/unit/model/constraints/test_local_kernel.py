@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conftest import GROUPS, make_scene
+from builders import GROUPS, make_scene
 from pdrom.model.compiled import rows
 from pdrom.model.constraints.local_kernel import (
     FIRST,

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from conftest import make_scene, random_rotation
+from builders import make_scene, random_rotation
 from pdrom.model.constraints.area import TriangleArea
 from pdrom.model.constraints.products import reference_nearest
 from pdrom.model.constraints.volume import TetrahedronVolume

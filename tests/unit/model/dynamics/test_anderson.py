@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conftest import GROUPS, make_scene
+from builders import GROUPS, make_scene
 from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.runs.full_order import simulate, trajectory
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import sparse
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.core.errors import ConfigurationError, SolverError
 from pdrom.model.dynamics.panels import WIDTHS, Panels
 from pdrom.model.dynamics.solvers import SOLVERS

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.model.effects.bodies import ball, cuboid
 from pdrom.model.effects.entries import effect_config
 from pdrom.model.mesh.measures import barycentric_areas

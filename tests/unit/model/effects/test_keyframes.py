@@ -5,7 +5,7 @@ import pytest
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.model.runs.full_order import trajectory
 
 SPRING = {"effect": "spring", "weight": 1e4}

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.model.runs.full_order import trajectory
 from strategies import SEEDS
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from scipy.spatial.distance import pdist, squareform
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.core.errors import NotReducibleError
 from pdrom.experiments.hard_cases.shapes import folded, noisy, scales, scrambled
 from pdrom.model.runs.full_order import trajectory

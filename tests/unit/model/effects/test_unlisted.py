@@ -8,13 +8,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from conftest import ROOT, make_scene
+from builders import GROUPS, make_scene
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.fingerprint import closure
 from pdrom.pipeline.scenes import load_scene
+from places import ROOT
 
 FRAMES = 12
 SCENES = sorted(path.stem for path in (ROOT / "config" / "scenes").glob("*.yaml"))
@@ -112,8 +113,6 @@ def run_with(*effects):
 
 def check_group(effect):
     """A group always acts; another group's projections have the same bits beside it."""
-    from conftest import GROUPS
-
     if effect not in ("bending", "spring", "strain"):
         mesh, group = GROUPS[effect], "spring"
     else:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.core.errors import SceneError
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.select import select_vertices

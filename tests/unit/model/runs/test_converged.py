@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import optimize, sparse
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.runs.converged import ConvergedStepper, minimise
 

@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.runs.horizon import HELDOUT, horizon
 from pdrom.model.runs.sensitivity import (

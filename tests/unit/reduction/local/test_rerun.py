@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.core.errors import SceneError
 from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.basis import compute_basis

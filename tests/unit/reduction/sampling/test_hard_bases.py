@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from conftest import ROOT
 from pdrom.core.errors import RankError, SnapshotError
 from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.method import load_methods
 from pdrom.reduction.sampling import Reduction, select
+from places import ROOT
 
 METHODS = load_methods(ROOT / "config" / "methods.yaml")
 FRAMES, ELEMENTS, ROWS = 9, 14, 2

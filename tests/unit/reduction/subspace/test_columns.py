@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conftest import make_scene, random_rotation
+from builders import make_scene, random_rotation
 from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.subspace.atoms import atoms
 from pdrom.reduction.subspace.columns import (

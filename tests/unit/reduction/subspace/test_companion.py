@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.core.metrics import trajectory_error
 from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.rerun import displacement_norms

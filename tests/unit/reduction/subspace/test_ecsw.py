@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conftest import GROUPS, make_scene
+from builders import GROUPS, make_scene
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.subspace import ecsw

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conftest import GROUPS, make_scene
+from builders import GROUPS, make_scene
 from pdrom.core.errors import SamplingError
 from pdrom.reduction.subspace.hrpd import SampledSpace, element_centres, sampled_space
 from pdrom.reduction.subspace.skinning import skinning_weights

@@ -5,7 +5,7 @@ import pytest
 from meshless import assert_reads_nothing_of_the_mesh
 from test_subspace_run import GRAVITY, PINS, SCENES, SPRING, run_model, whole_space
 
-from conftest import make_scene, random_rotation
+from builders import make_scene, random_rotation
 from pdrom.core.store import open_hdf5, write_hdf5
 from pdrom.model.constraints.lanes import LANES
 from pdrom.model.runs.full_order import trajectory

@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.core.errors import SolverError
 from pdrom.reduction.subspace.model import make_columns
 from pdrom.reduction.subspace.space import DenseElimination, coordinates

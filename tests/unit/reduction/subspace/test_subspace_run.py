@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from meshless import assert_reads_nothing_of_the_mesh
 
-from conftest import GROUPS, make_scene
+from builders import GROUPS, make_scene
 from pdrom.core.errors import SceneError
 from pdrom.core.store import write_hdf5
 from pdrom.model.dynamics.stepper import Stepper

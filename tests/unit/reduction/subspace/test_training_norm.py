@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conftest import make_scene
+from builders import make_scene
 from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
 from pdrom.reduction.subspace.model import make_columns, sample_elements

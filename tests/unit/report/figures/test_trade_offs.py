@@ -5,7 +5,6 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from conftest import ROOT
 from pdrom.reduction.method import load_methods
 from pdrom.report.figures.kit.families import ENTRIES, FAMILIES, INTERPOLATED, WEIGHTED, Model
 from pdrom.report.figures.kit.holdings import Holdings, MethodHolding
@@ -23,6 +22,7 @@ from pdrom.report.figures.kit.trade_offs import (
     draw_panel,
     label_iterations,
 )
+from places import ROOT
 
 
 @pytest.fixture

@@ -5,7 +5,6 @@ import re
 import pytest
 from matplotlib.figure import Figure
 
-from conftest import ROOT
 from pdrom.core.yamlfile import read_yaml
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.study import Study
@@ -16,6 +15,7 @@ from pdrom.report.paper.known import sentences
 from pdrom.report.paper.macros import keys_of
 from pdrom.report.paper.source import whole_source
 from pdrom.report.paper.tex import build_pdf, packages_of
+from places import ROOT
 
 SOURCE = whole_source(ROOT / "paper" / "main.tex")
 

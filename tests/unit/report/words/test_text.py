@@ -9,11 +9,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cbook import is_math_text
 from matplotlib.figure import Figure
 
-from conftest import ROOT
 from pdrom.core.errors import ConfigurationError, PaperError
 from pdrom.report.figures.kit import style
 from pdrom.report.paper.tex import build_pdf
 from pdrom.report.words.text import characters, escape, plain_words, replaced, require_typeset
+from places import ROOT
 
 TITLES = [
     "costs $ 5",

@@ -1,0 +1,40 @@
+"""Builders of small scenes."""
+
+import numpy as np
+
+from pdrom.model.scene import Scene, SceneConfig
+from places import ROOT
+
+GROUPS = {
+    "bending": {"kind": "cloth", "rows": 7, "columns": 6, "wave": 0.1},
+    "spring": {"kind": "cloth", "rows": 6, "columns": 5},
+    "strain": {"kind": "cloth", "rows": 6, "columns": 5},
+    "tetrahedron_strain": {"kind": "bar", "nx": 5, "ny": 3, "nz": 3},
+    "deformation_gradient": {"kind": "bar", "nx": 5, "ny": 3, "nz": 3},
+    "volume": {"kind": "bar", "nx": 5, "ny": 3, "nz": 3},
+    "area": {"kind": "cloth", "rows": 6, "columns": 5},
+}
+
+
+def make_scene(
+    *effects: dict, mesh: dict | None = None, frames: int = 20, **settings: object
+) -> Scene:
+    """Scene of the given effects on a small mesh."""
+    config = SceneConfig.model_validate(
+        {
+            "name": "test",
+            "title": "test",
+            "mesh": mesh or {"kind": "cloth", "rows": 6, "columns": 5},
+            "frames": frames,
+            "effects": list(effects),
+            **settings,
+        }
+    )
+    return Scene.build(config, config.mesh.build(ROOT))
+
+
+def random_rotation(rng: np.random.Generator) -> np.ndarray:
+    """Uniformly distributed rotation (3, 3)."""
+    q, r = np.linalg.qr(rng.standard_normal((3, 3)))
+    q *= np.sign(np.diag(r))
+    return q * np.sign(np.linalg.det(q))
