@@ -26,7 +26,7 @@ QUANTITIES: dict[Quantity, str] = {
     "fragile": "verdicts and outcomes near a limit: all but a few are equal",
     "ratio": "ratios of times: the column as a whole",
     "time": "times, rates and memory: not comparable between machines",
-    "clocked": "what a clock chooses: not comparable between machines",
+    "clocked": "what a clock or a compiler chooses: not comparable between machines",
     "told": "words about numbers that other columns hold: not compared",
     "rounding": "what is made of rounding errors, or not, by rounding errors: not compared",
 }

@@ -8,7 +8,7 @@ from pdrom.core.reads import Every
 from pdrom.core.store import read_table
 from pdrom.experiments.roofline.bound import bounds
 from pdrom.tables.break_even import OWN_MESH
-from pdrom.tables.declaration import integer, number, table, text, timed
+from pdrom.tables.declaration import compared, integer, number, table, text, timed
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import SCENE, VERTICES
 
@@ -26,9 +26,9 @@ _SUMS = ["bytes", "flops", "divisions", "roots", "bound_us", "measured_us"]
         text("phase", f"group, right-hand side, global solve; {WHOLE}: all of them"),
         integer("elements", "elements of a group, else vertices"),
         number("bytes", "read and written, each array once", "B"),
-        number("flops", "sums and products executed, idle lanes included"),
-        number("divisions", "divisions executed"),
-        number("roots", "square roots executed"),
+        compared("clocked", number("flops", "sums and products executed, idle lanes included")),
+        compared("clocked", number("divisions", "divisions executed")),
+        compared("clocked", number("roots", "square roots executed")),
         number("working_set", "all arrays of an iteration", "B"),
         timed(number("bandwidth", "of reading such a working set", "GB/s")),
         timed(text("limit", "what the bound comes from: the longest of three")),
