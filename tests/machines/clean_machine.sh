@@ -20,6 +20,7 @@ set -euo pipefail
 project=$(cd "$(dirname "$0")/../.." && pwd -P)
 user=visitor
 folder="/home/$user/Étude du projet"
+exchange=/srv # in the bare machine: what it is handed
 root='' same_as='' steps=()
 
 fail() {
@@ -104,12 +105,12 @@ run() { as_user /bin/sh -c 'cd "$1" && shift && exec "$@"' sh "$folder" "$@"; }
 
 step "a clone of HEAD in $folder"
 commit=$(git -c safe.directory='*' -C "$project" rev-parse HEAD)
-git -c safe.directory='*' -C "$project" bundle create --quiet "$root/tmp/project.bundle" HEAD
+git -c safe.directory='*' -C "$project" bundle create --quiet "$root$exchange/project.bundle" HEAD
 if [ -d "$root$folder/.git" ]; then
-    run git fetch --quiet /tmp/project.bundle HEAD
+    run git fetch --quiet "$exchange/project.bundle" HEAD
     run git checkout --quiet "$commit"
 else
-    as_user git clone --quiet /tmp/project.bundle "$folder"
+    as_user git clone --quiet "$exchange/project.bundle" "$folder"
 fi
 echo "commit $commit, $(run python3 --version)"
 
@@ -131,8 +132,8 @@ done
 
 if [ -n "$same_as" ]; then
     step "against $same_as"
-    mkdir -p "$root/tmp/other"
-    mount --bind -o ro "$same_as" "$root/tmp/other"
-    run ./reproduce run python tests/machines/same_results.py /tmp/other results/studies/tiny
+    mkdir -p "$root$exchange/other"
+    mount --bind -o ro "$same_as" "$root$exchange/other"
+    run ./reproduce run python tests/machines/same_results.py "$exchange/other" results/studies/tiny
 fi
 step "passed"
