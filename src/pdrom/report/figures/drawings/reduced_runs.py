@@ -2,12 +2,9 @@
 
 from matplotlib.figure import Figure
 
-from pdrom.report.figures.kit.camera import Camera
-from pdrom.report.figures.kit.experiment_rows import experiment_rows
-from pdrom.report.figures.kit.floor import Floors
+from pdrom.report.figures.kit.experiment_rows import draw_experiments, experiment_rows
 from pdrom.report.figures.kit.options import ReducedRuns
-from pdrom.report.figures.kit.results import NothingToDraw, Results, asked
-from pdrom.report.figures.kit.run_rows import Row, draw_rows
+from pdrom.report.figures.kit.results import Results
 
 
 def draw(results: Results, options: ReducedRuns) -> Figure:
@@ -22,11 +19,4 @@ def draw(results: Results, options: ReducedRuns) -> Figure:
     StorageError
         A file of the results is missing or damaged.
     """
-    experiments = results.experiments(options)
-    if not experiments or not results.methods(options):
-        raise NothingToDraw(asked(options))
-    floors = Floors(results)
-    rows: list[Row] = []
-    for scene, group in experiments:
-        rows += experiment_rows(results, options, floors, scene, group)
-    return draw_rows(rows, Camera(options.azimuth, options.elevation))
+    return draw_experiments(results, options, experiment_rows)

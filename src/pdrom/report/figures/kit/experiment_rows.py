@@ -1,6 +1,9 @@
 """Rows of one experiment: its full-order run beside the reduced ones."""
 
+from collections.abc import Callable
+
 import numpy as np
+from matplotlib.figure import Figure
 
 from pdrom.core.paths import FULL_ORDER, MESH, RERUNS
 from pdrom.model.mesh.types import load_mesh
@@ -10,8 +13,30 @@ from pdrom.report.figures.kit.floor import Floors
 from pdrom.report.figures.kit.options import ReducedRuns
 from pdrom.report.figures.kit.panels import RunPanel, shared_window
 from pdrom.report.figures.kit.read import choose_ranks, positions_at, rerun_infos
-from pdrom.report.figures.kit.results import Results
-from pdrom.report.figures.kit.run_rows import NOTHING_RAN, Row, run_panel
+from pdrom.report.figures.kit.results import NothingToDraw, Results, asked
+from pdrom.report.figures.kit.run_rows import NOTHING_RAN, Row, draw_rows, run_panel
+
+RowsOf = Callable[[Results, ReducedRuns, Floors, str, str], list[Row]]
+
+
+def draw_experiments(results: Results, options: ReducedRuns, rows_of: RowsOf) -> Figure:
+    """The rows of all experiments asked for, below each other.
+
+    Raises
+    ------
+    NothingToDraw
+        The study has no such experiment or method.
+    StorageError
+        A file of the results is missing or damaged.
+    """
+    experiments = results.experiments(options)
+    if not experiments or not results.methods(options):
+        raise NothingToDraw(asked(options))
+    floors = Floors(results)
+    rows: list[Row] = []
+    for scene, group in experiments:
+        rows += rows_of(results, options, floors, scene, group)
+    return draw_rows(rows, Camera(options.azimuth, options.elevation))
 
 
 def experiment_rows(
