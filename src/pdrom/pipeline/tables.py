@@ -20,7 +20,7 @@ from pdrom.tables.document import document
 from pdrom.tables.find import declared, load
 
 # Tables that are declared in rooms right of `pdrom.tables`.
-OTHERS = ("pdrom.report.decide", "pdrom.report.fragility")
+OTHERS = ("pdrom.report.decide", "pdrom.report.fragility", "pdrom.report.tests")
 
 
 @cache

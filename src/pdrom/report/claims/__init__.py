@@ -6,6 +6,7 @@ beside it in the reason.
 """
 
 from pdrom.report.claims.metrics import METRICS, Metric
+from pdrom.report.claims.outcomes import FOUND, outcome_rows
 from pdrom.report.claims.rows import Tables
 from pdrom.report.claims.rules import ClaimRule, TestRule, load_claims
 from pdrom.report.claims.verdicts import (
@@ -17,10 +18,12 @@ from pdrom.report.claims.verdicts import (
     Outcome,
     claims_rows,
     evaluate,
+    is_timed,
     timed_columns,
 )
 
 __all__ = [
-    "DEPENDS", "FAILS", "HOLDS", "METRICS", "UNDECIDED", "VERDICTS", "ClaimRule", "Metric",
-    "Outcome", "Tables", "TestRule", "claims_rows", "evaluate", "load_claims", "timed_columns",
+    "DEPENDS", "FAILS", "FOUND", "HOLDS", "METRICS", "UNDECIDED", "VERDICTS", "ClaimRule", "Metric",
+    "Outcome", "Tables", "TestRule", "claims_rows", "evaluate", "is_timed", "load_claims",
+    "outcome_rows", "timed_columns",
 ]  # fmt: skip

@@ -38,7 +38,7 @@ def timed_columns(rule: ClaimRule) -> set[str]:
     found: set[str] = set()
     for part, suffix in (("published", ""), ("beyond", "_beyond")):
         tests: Sequence[TestRule] = getattr(rule, part)
-        timed = [test for test in tests if _is_timed(test)]
+        timed = [test for test in tests if is_timed(test)]
         if timed:
             found.add(f"why{suffix}")
         if any(test.decides for test in timed):
@@ -47,7 +47,8 @@ def timed_columns(rule: ClaimRule) -> set[str]:
     return found
 
 
-def _is_timed(test: TestRule) -> bool:
+def is_timed(test: TestRule) -> bool:
+    """Whether a clock has a say in what a test compares."""
     metric = METRICS[test.metric]
     timing = declared()[metric.table].timing_columns
     return not set(timing).isdisjoint({*metric.columns, *test.where})

@@ -1,8 +1,8 @@
-r"""Sentences of the manuscript whose numbers a configuration may not hold.
+r"""Sentences and rows of the manuscript whose numbers a configuration may not hold.
 
-The source wraps them: ``\known{... \val{key} ...}``. Where one of the keys is not held, the
-sentence is left out, and the first one of a paragraph is replaced by a note that says which
-configuration holds it.
+The source wraps them: ``\known{... \val{key} ...}`` is a sentence, ``\row{... & \val{key} \\}`` a
+row of a table. Where one of the keys is not held it is left out, and the first such sentence of a
+paragraph is replaced by a note that says which configuration holds it; a row goes without one.
 """
 
 import re
@@ -15,38 +15,39 @@ from pdrom.core.errors import PaperError
 from pdrom.report.paper.macros import is_held, keys_of
 from pdrom.report.words.text import escape
 
-_OPENING = r"\known{"
-_BRACE = re.compile(r"(?<!\\)[{}]")
+_OPENING = re.compile(r"\\(known|row)\{")
+_BRACE = re.compile(r"\\.|[{}]")  # a brace, or an escape, which may be one of a brace
 _BLANK_LINE = re.compile(r"\n[ \t]*\n")
 SHOWN, NOTED, DROPPED = "shown", "noted", "dropped"
 
 
 @dataclass(frozen=True)
 class Sentence:
-    """Text of a block, and the number of its paragraph."""
+    """Text of a block, the number of its paragraph, and whether it is a row of a table."""
 
     text: str
     paragraph: int
+    is_row: bool
 
 
 def sentences(source: str) -> list[Sentence]:
-    r"""Every ``\known`` block of a TeX source, in order.
+    r"""Every ``\known`` and ``\row`` block of a TeX source, in order.
 
     Raises
     ------
     PaperError
         A block is not closed, or holds another one.
     """
-    found = []
-    start = source.find(_OPENING)
-    while start >= 0:
-        inside = start + len(_OPENING)
-        end = _closing(source, inside)
-        text = source[inside:end]
-        if _OPENING in text:
-            raise PaperError(f"{_OPENING}{text[:40]} ...: holds another one")
-        found.append(Sentence(text, len(_BLANK_LINE.findall(source[:start]))))
-        start = source.find(_OPENING, end)
+    found: list[Sentence] = []
+    opening = _OPENING.search(source)
+    while opening:
+        end = _closing(source, opening.end())
+        text = source[opening.end() : end]
+        if _OPENING.search(text):
+            raise PaperError(f"{opening[0]}{text[:40]} ...: holds another one")
+        paragraph = len(_BLANK_LINE.findall(source[: opening.start()]))
+        found.append(Sentence(text, paragraph, is_row=opening[1] == "row"))
+        opening = _OPENING.search(source, end)
     return found
 
 
@@ -56,6 +57,8 @@ def decisions(source: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
     for sentence in sentences(source):
         if all(is_held(key, tables) for key in keys_of(sentence.text)):
             made.append(SHOWN)
+        elif sentence.is_row:
+            made.append(DROPPED)
         else:
             made.append(DROPPED if sentence.paragraph in noted else NOTED)
             noted.add(sentence.paragraph)
@@ -63,7 +66,7 @@ def decisions(source: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
 
 
 def provenance(decided: Sequence[str], part: str | None, full_study: str) -> str:
-    r"""TeX of ``\known``, of the note, and of what a manuscript says that is not of the full study.
+    r"""TeX of ``\known`` and ``\row``, of the note, and of what a manuscript of a part says.
 
     ``\ifpart`` is true where ``part`` names what the study was read from, ``\configuration``.
     """
@@ -84,6 +87,9 @@ def provenance(decided: Sequence[str], part: str | None, full_study: str) -> str
         rf"\newcommand{{\known@noted}}[1]{{\textcolor{{okgrey}}{{[{note}]}}}}",
         r"\let\known@dropped\@gobble",
         r"\newcommand{\known}[1]{\stepcounter{known}\csname known@\arabic{known}\endcsname{#1}}",
+        # a row that is left out must not open a cell
+        r"\newcommand{\row}[1]{\noalign{\stepcounter{known}}"
+        r"\csname known@\arabic{known}\endcsname{#1}}",
     ]
     for number, decision in enumerate(decided, start=1):
         lines.append(rf"\expandafter\let\csname known@{number}\endcsname\known@{decision}")
@@ -94,7 +100,7 @@ def _closing(source: str, start: int) -> int:
     """Place of the brace that closes a block which begins at ``start``."""
     depth = 1
     for brace in _BRACE.finditer(source, start):
-        depth += 1 if brace[0] == "{" else -1
+        depth += {"{": 1, "}": -1}.get(brace[0], 0)
         if depth == 0:
             return brace.start()
-    raise PaperError(f"{_OPENING}{source[start : start + 40]} ...: is not closed")
+    raise PaperError(f"{source[start - 1 : start + 40]} ...: is not closed")

@@ -7,7 +7,7 @@ from pdrom.report.words.text import escape
 
 def tabular(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
     """A tabular with a ruled head; cells are TeX already."""
-    lines = [rf"\begin{{tabular}}{{{columns}}}", *_head(header), *_body(rows)]
+    lines = [rf"\begin{{tabular}}{{{columns}}}", *_head(header), *map(_line, rows)]
     return "\n".join([*lines, r"\hline", r"\end{tabular}"]) + "\n"
 
 
@@ -15,17 +15,12 @@ def longtable(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str
     r"""A table that may break across pages, below ``\captionrow``, which the text defines."""
     head = _head(header)
     lines = [rf"\begin{{longtable}}{{{columns}}}", r"\captionrow", *head, r"\endfirsthead"]
-    lines += [*head, r"\endhead", *_body(rows)]
+    lines += [*head, r"\endhead", *map(_line, rows)]
     return "\n".join([*lines, r"\hline", r"\end{longtable}"]) + "\n"
 
 
 def _head(header: Sequence[str]) -> list[str]:
     return [r"\hline", _line(header), r"\hline"]
-
-
-def _body(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of the rows, below a strut that keeps exponents off the rule of the head."""
-    return [r"\rule{0pt}{2.6ex}%", *map(_line, rows)] if rows else []
 
 
 def _line(cells: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-r"""Sentences whose numbers a configuration does not hold: left out, with one note a paragraph."""
+r"""Sentences and rows whose numbers a configuration does not hold: left out, sentences noted."""
 
 import pandas as pd
 import pytest
@@ -18,23 +18,38 @@ SOURCE = rf"""\known{{The bar has {BAR} \emph{{so}}.}} Always. \known{{The cloth
 \known{{And {CLOTH} again.}}
 
 Next. \known{{Both: {BAR}, {CLOTH}.}}
+
+\begin{{tabular}}{{lr}}
+\hline
+\row{{bar & {BAR} \\}}
+\row{{cloth & {CLOTH} \\}}
+\hline
+\end{{tabular}}
 """
 
 
 def test_blocks_are_found_with_their_paragraphs():
     found = sentences(SOURCE)
-    assert [sentence.paragraph for sentence in found] == [0, 0, 0, 1]
+    assert [sentence.paragraph for sentence in found] == [0, 0, 0, 1, 2, 2]
+    assert [sentence.is_row for sentence in found] == [False] * 4 + [True] * 2
     assert found[0].text == rf"The bar has {BAR} \emph{{so}}."
 
 
-@pytest.mark.parametrize("source", [r"\known{open {x}", r"\known{a \known{b} c}"])
+@pytest.mark.parametrize(
+    "source", [r"\known{open {x}", r"\known{a \known{b} c}", r"\known{\row{b} c}"]
+)
 def test_faulty_blocks_are_named(source):
-    with pytest.raises(PaperError, match="known"):
+    with pytest.raises(PaperError, match=r"another one|not closed"):
         sentences(source)
 
 
 def test_a_sentence_needs_all_of_its_numbers():
-    assert decisions(SOURCE, TABLES) == ["shown", "noted", "dropped", "noted"]
+    assert decisions(SOURCE, TABLES)[:4] == ["shown", "noted", "dropped", "noted"]
+
+
+def test_a_row_goes_without_a_note():
+    assert decisions(SOURCE, TABLES)[4:] == ["shown", "dropped"]
+    assert decisions(rf"\row{{{CLOTH} \\}} \known{{{CLOTH}}}", TABLES) == ["dropped", "noted"]
 
 
 @pytest.mark.parametrize(
