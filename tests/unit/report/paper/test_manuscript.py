@@ -115,6 +115,12 @@ def test_the_text_speaks_of_every_figure():
     assert set(shown) - set(re.findall(r"\\ref\{fig:([a-z_]+)\}", SOURCE)) == set()
 
 
+def test_the_text_speaks_of_every_table():
+    labels = re.findall(r"\\label\{(tab:[a-z]+)\}|\\longtableof\{.*?\}\{(tab:[a-z]+)\}", SOURCE)
+    shown = {one or other for one, other in labels}
+    assert shown == set(re.findall(r"\\ref\{(tab:[a-z]+)\}", SOURCE)) != set()
+
+
 def test_numbers_that_a_configuration_may_lack_stand_in_sentences_that_can_be_left_out():
     """Outside of them only what every configuration holds."""
     blocks = [sentence.text for sentence in sentences(SOURCE)]
