@@ -2,13 +2,13 @@
 # The README's two commands on a bare Debian: nothing but python3, python3-venv, git and ca-certificates, an unprivileged
 # user, a folder with a blank and a letter beyond ASCII in its path, LANG=C.
 #
-# usage (as root, with debootstrap): tests/machines/clean_machine.sh [--root FOLDER] [--same-as RESULTS] [STEP...]
+# usage (as root, with debootstrap): tests/machines/clean_machine.sh [--root FOLDER] [--same-as RESULTS] [STEP...] [-- ARGUMENT...]
 #
 #   plan     ./reproduce -n
 #   tiny     ./reproduce --configfile config/tiny.yaml
 #   quick    ./reproduce test on the tests that take little
 #   study    ./reproduce
-#   tests    ./reproduce test
+#   tests    ./reproduce test, with the arguments that follow two hyphens, as in: tests -- tests/physics
 #
 # Without a step: tiny and quick. HEAD of this repository is what runs. --root keeps the machine in FOLDER, where a second
 # call finds it; --same-as compares the tables and runs of the tiny study, bit by bit, with those in RESULTS.
@@ -21,7 +21,7 @@ project=$(cd "$(dirname "$0")/../.." && pwd -P)
 user=visitor
 folder="/home/$user/Étude du projet"
 exchange=/srv # in the bare machine: what it is handed
-root='' same_as='' steps=()
+root='' same_as='' steps=() arguments=()
 
 fail() {
     echo "clean_machine: $*" >&2
@@ -32,6 +32,7 @@ while [ $# -gt 0 ]; do
     case "$1" in
     --root) root=${2:?a folder is missing} && shift 2 ;;
     --same-as) same_as=$(realpath "${2:?a folder is missing}") && shift 2 ;;
+    --) shift && arguments=("$@") && break ;;
     plan | tiny | quick | study | tests) steps+=("$1") && shift ;;
     *) fail "unknown argument '$1'; steps are plan, tiny, quick, study and tests" ;;
     esac
@@ -46,7 +47,7 @@ if [ -z "${CLEAN_MACHINE_INSIDE-}" ]; then
     [ -n "$root" ] || made=$(mktemp -d)
     status=0
     CLEAN_MACHINE_INSIDE=1 unshare --mount --pid --fork --kill-child "$0" --root "${root:-$made}" \
-        ${same_as:+--same-as "$same_as"} "${steps[@]}" || status=$?
+        ${same_as:+--same-as "$same_as"} "${steps[@]}" -- ${arguments[@]+"${arguments[@]}"} || status=$?
     [ -z "$made" ] || rm -rf --one-file-system "$made"
     exit "$status"
 fi
@@ -126,7 +127,7 @@ for name in "${steps[@]}"; do
         ;;
     quick) run ./reproduce test -q tests/unit/core tests/unit/pipeline tests/physics/test_patch.py </dev/null ;;
     study) run ./reproduce </dev/null ;;
-    tests) run ./reproduce test </dev/null ;;
+    tests) run ./reproduce test ${arguments[@]+"${arguments[@]}"} </dev/null ;;
     esac
 done
 
