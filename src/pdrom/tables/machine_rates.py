@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.tables.declaration import number, table, text, timed
+from pdrom.tables.declaration import compared, number, table, text, timed
 from pdrom.tables.parts import joined
 
 
@@ -14,7 +14,10 @@ from pdrom.tables.parts import joined
     columns=(
         text("quantity", "what is done: bytes read, or operations on doubles, four at a time"),
         number("working_set", "what is read over and over", "B"),
-        text("level", "smallest cache that holds the working set, as the system tells"),
+        compared(
+            "clocked",
+            text("level", "smallest cache that holds the working set, as the system tells"),
+        ),
         timed(number("rate", "median of the repeats", "1e9/s")),
         timed(number("low", "their first quartile", "1e9/s")),
         timed(number("high", "their third quartile", "1e9/s")),

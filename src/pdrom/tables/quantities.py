@@ -13,7 +13,7 @@ Quantity = Literal[
 
 QUANTITIES: dict[Quantity, str] = {
     "exact": "names, parameters, sizes and truth values: equal",
-    "verdict": "verdicts on claims: equal, also where a clock has a say",
+    "verdict": "verdicts on claims: equal, but where times decide and lie close to the limit",
     "value": "well-conditioned numbers",
     "error": "errors; above 0.1 they count as failed, and only that is compared",
     "run": "what else a run tells of itself; not compared where the run failed",
@@ -26,7 +26,7 @@ QUANTITIES: dict[Quantity, str] = {
     "fragile": "verdicts and outcomes near a limit: all but a few are equal",
     "ratio": "ratios of times: the column as a whole",
     "time": "times, rates and memory: not comparable between machines",
-    "clocked": "what a clock or a compiler chooses: not comparable between machines",
+    "clocked": "what a clock, a compiler or a cache chooses: not comparable between machines",
     "told": "words about numbers that other columns hold: not compared",
     "rounding": "what is made of rounding errors, or not, by rounding errors: not compared",
 }

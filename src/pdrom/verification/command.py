@@ -54,10 +54,17 @@ def verify(arguments: Sequence[str]) -> Status:
     if asked.update:
         _say(f"expected tables: {update(subject, asked.reason)}")
         return Status.HOLDS
-    return _compare(subject)
+    return verify_tables(subject)
 
 
-def _compare(subject: Subject) -> Status:
+def verify_tables(subject: Subject) -> Status:
+    """Compare the tables of a configuration with the expected ones, write the page of it.
+
+    Raises
+    ------
+    ConfigurationError
+        Nothing is expected of the configuration.
+    """
     folder = folder_of(subject.results)
     if not folder.is_dir():
         hint = 'write them by ./reproduce verify --update --reason "..."'

@@ -15,7 +15,7 @@ from pdrom.tables.declaration import Column, Table
 from pdrom.tables.quantities import Quantity
 from pdrom.verification.distance import distance
 from pdrom.verification.pairing import pairs
-from pdrom.verification.rows import FAILED, Context, failed, said_to_fail, unresolved
+from pdrom.verification.rows import FAILED, PARTS, Context, failed, said_to_fail, unresolved
 
 CLOCK = ("time", "clocked")
 # Amplifications and counts that differ by less belong to the same samples.
@@ -81,7 +81,10 @@ class Comparison:
                 return {"words about other columns": whole}
             case "rounding":
                 return {"made of rounding errors": whole}
-            case "exact" | "verdict" | "tally" | "share" | "fragile":
+            case "verdict" | "fragile":
+                part = PARTS.get(column.name, "")
+                return {"rests on times": self.context.of_verdict_on_times(self.e, part)}
+            case "exact" | "tally" | "share":
                 return {}
         reasons = {"chaotic beyond the horizon": self.chaotic}
         match column.quantity:

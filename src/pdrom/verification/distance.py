@@ -26,6 +26,9 @@ def distance(quantity: Quantity, expected: pd.Series, found: pd.Series) -> np.nd
 
 
 def _same(a: pd.Series, b: pd.Series) -> np.ndarray:
+    if a.dtype == b.dtype == np.dtype(float):
+        x, y = a.to_numpy(), b.to_numpy()
+        return (x == y) | (np.isnan(x) & np.isnan(y))
     left, right = a.astype(object), b.astype(object)
     equal = (left == right).fillna(False).to_numpy(dtype=bool)
     return equal | (a.isna().to_numpy() & b.isna().to_numpy())

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
@@ -12,17 +11,20 @@ from pdrom.core.paths import TABLE
 from pdrom.core.store import Condition, check_file, read_table
 from pdrom.pipeline.figures import FigureJob
 from pdrom.pipeline.tables import all_tables
-from pdrom.tables.declaration import Table
+from pdrom.report.claims import load_claims
 from pdrom.verification.judge import Judgement, judge
 from pdrom.verification.lines import Line, Outcome, table_line
-from pdrom.verification.references import NOT_KEPT, Reference, folder_of, read_reference
+from pdrom.verification.references import Reference, folder_of, kept, read_reference
+from pdrom.verification.rows import PARTS
+from pdrom.verification.settings import RULES
 from pdrom.verification.spread import COMPARED, comparisons
 from pdrom.verification.subject import Subject
+from pdrom.verification.times import changed_by_times
 from pdrom.verification.tolerances import Tolerances
 
 CLAIMS = "claims"
 MEASURED = (*COMPARED, "verdict")
-VERDICTS = {"verdict": "as published", "verdict_beyond": "beyond"}
+WORDS = {"published": "as published", "beyond": "beyond"}
 
 
 @dataclass
@@ -71,8 +73,17 @@ class Examination:
         """Judgements on tables that are there and expected."""
         frames = {name: reference.frame for name, reference in self.expected.items()}
         found = {name: self._known(name, frame) for name, frame in self.found.items()}
-        compared = comparisons(all_tables(), frames, found)
+        compared = comparisons(all_tables(), frames, found, self.on_times)
         return {name: judge(c, self.tolerances, self.anew) for name, c in compared.items()}
+
+    @cached_property
+    def on_times(self) -> Mapping[tuple[str, str], str]:
+        """Why a changed verdict says nothing, by claim and part."""
+        if CLAIMS not in self.found or CLAIMS not in self.expected:
+            return {}
+        frames = {name: reference.frame for name, reference in self.expected.items()}
+        rules = load_claims(RULES)
+        return changed_by_times(rules, frames, self.found, self.tolerances)
 
     def _known(self, name: str, frame: pd.DataFrame) -> pd.DataFrame:
         """A table with columns emptied that its reference does not have."""
@@ -88,7 +99,7 @@ class Examination:
         if name not in self.expected:
             return Line("table", name, Outcome.NO_REFERENCE, "run verify --update")
         table = all_tables()[name]
-        lacking = _kept(table) - set(self.expected[name].columns)
+        lacking = set(kept(table)) - set(self.expected[name].columns)
         measured = any(column.quantity in MEASURED for column in table.columns)
         return table_line(self.judgements[name], measured, sorted(lacking))
 
@@ -108,7 +119,26 @@ class Examination:
         expected = self.expected[CLAIMS].frame.set_index("claim")
         found = self.found[CLAIMS].set_index("claim")
         names = dict.fromkeys([*expected.index, *found.index])
-        return [_claim(str(name), expected, found) for name in names]
+        return [self._claim(str(name), expected, found) for name in names]
+
+    def _claim(self, name: str, expected: pd.DataFrame, found: pd.DataFrame) -> Line:
+        if name not in expected.index or name not in found.index:
+            text = "the claim is new" if name in found.index else "the claim is gone"
+            return Line("claim", name, Outcome.DIFFERS, text)
+        outcome, same, changed = Outcome.REPRODUCED, [], []
+        for column, part in PARTS.items():
+            a, b = (str(frame.loc[name, column]) for frame in (expected, found))
+            if a == b:
+                same.append(f"{WORDS[part]}: {b}")
+                continue
+            text, why = (
+                f"{WORDS[part]}: expected '{a}', found '{b}'",
+                self.on_times.get((name, part)),
+            )
+            changed.append(text if why is None else f"{text}, which {why}")
+            if outcome is not Outcome.DIFFERS:
+                outcome = Outcome.DIFFERS if why is None else Outcome.NOT_COMPARABLE
+        return Line("claim", name, outcome, "; ".join(changed or same))
 
     def _figures(self, tables: list[Line]) -> list[Line]:
         by_name = {line.name: line for line in tables}
@@ -140,22 +170,3 @@ class Examination:
             return Line("figure", name, Outcome.NOT_COMPARABLE, f"{text}, which hold times")
         more = f" and {len(files)} intact files" if read and files else ""
         return Line("figure", name, Outcome.REPRODUCED, text + more)
-
-
-def _kept(table: Table[Any]) -> set[str]:
-    return {column.name for column in table.columns if column.quantity not in NOT_KEPT}
-
-
-def _claim(name: str, expected: pd.DataFrame, found: pd.DataFrame) -> Line:
-    if name not in expected.index or name not in found.index:
-        text = "the claim is new" if name in found.index else "the claim is gone"
-        return Line("claim", name, Outcome.DIFFERS, text)
-    pairs = {
-        words: (str(expected.loc[name, column]), str(found.loc[name, column]))
-        for column, words in VERDICTS.items()
-    }
-    wrong = [f"{words}: expected '{a}', found '{b}'" for words, (a, b) in pairs.items() if a != b]
-    if wrong:
-        return Line("claim", name, Outcome.DIFFERS, "; ".join(wrong))
-    text = ", ".join(f"{words}: {b}" for words, (_, b) in pairs.items())
-    return Line("claim", name, Outcome.REPRODUCED, text)

@@ -88,7 +88,8 @@ def _rows(comparison: Comparison) -> Iterator[Difference]:
 
 def _equal(comparison: Comparison) -> Iterator[Difference]:
     for column in comparison.columns("exact", "verdict"):
-        for row in np.flatnonzero(comparison.distances[column.name] > 0):
+        apart = (comparison.distances[column.name] > 0) & ~comparison.free(column)
+        for row in np.flatnonzero(apart):
             yield _difference(comparison, column, int(row), np.inf, 0.0)
 
 

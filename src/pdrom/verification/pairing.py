@@ -21,6 +21,8 @@ def pairs(table: Table, expected: pd.DataFrame, found: pd.DataFrame) -> Pairs:
     made: Pairs = []
     left = [list(range(len(expected))), list(range(len(found)))]
     for quantities in (_NAMES_AND_COUNTS, _NAMES):
+        if not all(left):
+            break
         columns = [c.name for c in table.columns if c.quantity in quantities]
         more = _matched(_keys(expected, columns, left[0]), _keys(found, columns, left[1]))
         made += more

@@ -54,8 +54,13 @@ def tolerances_path() -> Path:
 
 def compact(table: Table, frame: pd.DataFrame) -> pd.DataFrame:
     """What is kept of a table."""
-    kept = [column for column in table.columns if column.quantity not in NOT_KEPT]
-    return pd.DataFrame({c.name: _rounded(c, frame[c.name]) for c in kept}, index=frame.index)
+    columns = kept(table)
+    return pd.DataFrame({n: _rounded(c, frame[n]) for n, c in columns.items()}, index=frame.index)
+
+
+def kept(table: Table) -> dict[str, Column]:
+    """Columns that are kept of a table, by name."""
+    return {c.name: c for c in table.columns if c.quantity not in NOT_KEPT}
 
 
 def _rounded(column: Column, values: pd.Series) -> pd.Series:

@@ -15,6 +15,8 @@ FAILED = 0.1
 RESOLVED = EPSILON**-0.5
 RUNS = "reduced_reruns"
 SPECTRA = "singular_values"
+# Columns of the table of claims with a verdict, and the tests that decide it.
+PARTS = {"verdict": "published", "verdict_beyond": "beyond"}
 # What names the samples of a reduction.
 SAMPLES = ("scene", "group", "method", "r")
 
@@ -26,11 +28,14 @@ class Context:
     chaotic : scenes with frames beyond their horizon, where rounding errors decide
     modes : number of modes above round-off by scene and group
     anew : `SAMPLES` of reductions whose samples rounding has chosen anew
+    on_times : claims and parts (published, beyond) with another verdict that says nothing, see
+        `pdrom.verification.times`
     """
 
     chaotic: frozenset[str] = frozenset()
     modes: Mapping[tuple[str, str], int] = field(default_factory=dict)
     anew: frozenset[tuple] = frozenset()
+    on_times: frozenset[tuple[str, str]] = frozenset()
 
     def of_chaotic_scene(self, frame: pd.DataFrame) -> np.ndarray:
         """Rows that belong to a chaotic scene."""
@@ -57,6 +62,14 @@ class Context:
         if self.anew and set(SAMPLES) <= set(frame.columns):
             found[:] = [key in self.anew for key in samples(frame)]
         return found
+
+    def of_verdict_on_times(self, frame: pd.DataFrame, part: str) -> np.ndarray:
+        """Rows of claims whose verdict rests on times: of this part, or of the part they name."""
+        if "claim" not in frame:
+            return np.zeros(len(frame), dtype=bool)
+        parts = frame.part if "part" in frame else [part] * len(frame)
+        pairs = zip(frame.claim, parts, strict=True)
+        return np.array([pair in self.on_times for pair in pairs], dtype=bool)
 
 
 def samples(frame: pd.DataFrame) -> list[tuple]:

@@ -10,6 +10,7 @@ from pdrom.tables.quantities import Quantity
 from pdrom.verification.spread import COMPARED
 
 PATH = Path("config/verification.yaml")
+RULES = Path("config/claims.yaml")
 Positive = Annotated[float, Field(gt=0.0)]
 
 

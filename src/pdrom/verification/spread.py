@@ -1,7 +1,7 @@
 """How far two sets of tables are apart: distances of all cells that are compared, by quantity."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,8 @@ TEN = 10
 class Spread:
     """Distances in a column, of the rows with or without the whole basis.
 
-    rows : which of the two; rows of whole bases have tolerances of their own
+    rows : which of the two; rows of whole bases have tolerances of their own, and so has each
+        metric of claims that compares times
     distances : one a cell; of a quantity that is judged as a whole a single one
     """
 
@@ -82,15 +83,23 @@ def comparisons(
     tables: Mapping[str, Table[Any]],
     expected: Mapping[str, pd.DataFrame],
     found: Mapping[str, pd.DataFrame],
+    on_times: Collection[tuple[str, str]] = (),
 ) -> dict[str, Comparison]:
-    """Comparison of every table that both sides have, each in the context of all."""
-    context = Context(chaotic_scenes(expected), modes_above_roundoff(expected))
+    """Comparison of every table that both sides have, each in the context of all.
+
+    Parameters
+    ----------
+    on_times : claims and parts with another verdict that says nothing
+    """
+    context = Context(
+        chaotic_scenes(expected), modes_above_roundoff(expected), on_times=frozenset(on_times)
+    )
     if RECONSTRUCTION in expected and RECONSTRUCTION in found:
         name = RECONSTRUCTION
         first = Comparison(tables[name], expected[name], found[name], context)
         unsettled = first.anew | beyond_precision(first.table, first.e)
         keys = [k for k, lost in zip(samples(first.e), unsettled, strict=True) if lost]
-        context = Context(context.chaotic, context.modes, frozenset(keys))
+        context = replace(context, anew=frozenset(keys))
     return {
         name: Comparison(tables[name], expected[name], found[name], context)
         for name in tables

@@ -48,12 +48,8 @@ def derived(found: Mapping[str, Iterable[Spread]], settings: Settings) -> pd.Dat
         for spread in spreads:
             _require_finite(variant, spread)
             by_kind.setdefault((spread.quantity, spread.rows), []).append((variant, spread))
-    rows = [
-        _row(quantity, rows, by_kind[quantity, rows], settings)
-        for quantity in COMPARED
-        for rows in (OTHER, WHOLE)
-        if (quantity, rows) in by_kind
-    ]
+    kinds = sorted(by_kind, key=lambda kind: (COMPARED.index(kind[0]), kind[1]))
+    rows = [_row(quantity, rows, by_kind[quantity, rows], settings) for quantity, rows in kinds]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 

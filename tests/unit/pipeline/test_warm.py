@@ -1,6 +1,7 @@
 """Jobs that are forked from a server: they behave as scripts of a plain interpreter do."""
 
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -104,7 +105,7 @@ print(os.getpid(), flush=True)
 signal.pause()
 """
     told = "import os; os.execv('/bin/sh', ['sh', '-c', 'echo $$; exec ' + os.environ['JOB']])"
-    command = f'{sys.executable} -c "{told}"'
+    command = shlex.join([sys.executable, "-c", told])
     environment = {**os.environ, "JOB": script(tmp_path, code)}
     owner = subprocess.Popen(
         [sys.executable, "-c", OWNER, command], stdout=subprocess.PIPE, text=True, env=environment

@@ -16,14 +16,18 @@ from pdrom.report.claims.verdicts import (
     UNDECIDED,
     VERDICTS,
     Outcome,
+    answer,
     claims_rows,
+    combined,
     evaluate,
     is_timed,
+    satisfied,
     timed_columns,
+    values_of,
 )
 
 __all__ = [
     "DEPENDS", "FAILS", "FOUND", "HOLDS", "METRICS", "UNDECIDED", "VERDICTS", "ClaimRule", "Metric",
-    "Outcome", "Tables", "TestRule", "claims_rows", "evaluate", "is_timed", "load_claims",
-    "outcome_rows", "timed_columns",
+    "Outcome", "Tables", "TestRule", "answer", "claims_rows", "combined", "evaluate", "is_timed",
+    "load_claims", "outcome_rows", "satisfied", "timed_columns", "values_of",
 ]  # fmt: skip
