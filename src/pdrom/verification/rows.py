@@ -64,8 +64,11 @@ class Context:
         return found
 
     def of_verdict_on_times(self, frame: pd.DataFrame, part: str) -> np.ndarray:
-        """Rows of claims whose verdict rests on times: of this part, or of the part they name."""
-        if "claim" not in frame:
+        """Rows of claims whose verdict rests on times: of this part, or of the part they name.
+
+        Rows of single tests are none: each of them says by itself whether it compares times.
+        """
+        if "claim" not in frame or "metric" in frame:
             return np.zeros(len(frame), dtype=bool)
         parts = frame.part if "part" in frame else [part] * len(frame)
         pairs = zip(frame.claim, parts, strict=True)
