@@ -6,11 +6,12 @@
 #
 #   plan     ./reproduce -n
 #   tiny     ./reproduce --configfile config/tiny.yaml
+#   verify   ./reproduce verify --configfile config/tiny.yaml, of a tiny study that has been run
 #   quick    ./reproduce test on the tests that take little
 #   study    ./reproduce
 #   tests    ./reproduce test, with the arguments that follow two hyphens, as in: tests -- tests/physics
 #
-# Without a step: tiny and quick. HEAD of this repository is what runs. --root keeps the machine in FOLDER, where a second
+# Without a step: tiny, verify and quick. HEAD of this repository is what runs. --root keeps the machine in FOLDER, where a second
 # call finds it; --same-as compares the tables and runs of the tiny study, bit by bit, with those in RESULTS.
 #
 # The machine gets the caller's settings of pip (variables PIP_*, files of configuration, local folders that they name), of
@@ -33,11 +34,11 @@ while [ $# -gt 0 ]; do
     --root) root=${2:?a folder is missing} && shift 2 ;;
     --same-as) same_as=$(realpath "${2:?a folder is missing}") && shift 2 ;;
     --) shift && arguments=("$@") && break ;;
-    plan | tiny | quick | study | tests) steps+=("$1") && shift ;;
-    *) fail "unknown argument '$1'; steps are plan, tiny, quick, study and tests" ;;
+    plan | tiny | verify | quick | study | tests) steps+=("$1") && shift ;;
+    *) fail "unknown argument '$1'; steps are plan, tiny, verify, quick, study and tests" ;;
     esac
 done
-[ ${#steps[@]} -gt 0 ] || steps=(tiny quick)
+[ ${#steps[@]} -gt 0 ] || steps=(tiny verify quick)
 [ "$(id -u)" -eq 0 ] || fail "root is needed: debootstrap and chroot ask for it"
 command -v debootstrap >/dev/null || fail "debootstrap is missing (apt-get install debootstrap)"
 
@@ -125,6 +126,7 @@ for name in "${steps[@]}"; do
             fail "a second run has something to do"
         [ -z "$(run git status --porcelain)" ] || fail "the run left files that git does not ignore"
         ;;
+    verify) run ./reproduce verify --configfile config/tiny.yaml </dev/null ;;
     quick) run ./reproduce test -q tests/unit/core tests/unit/pipeline tests/physics/test_patch.py </dev/null ;;
     study) run ./reproduce </dev/null ;;
     tests) run ./reproduce test ${arguments[@]+"${arguments[@]}"} </dev/null ;;
