@@ -105,7 +105,7 @@ print(os.getpid(), flush=True)
 signal.pause()
 """
     told = "import os; os.execv('/bin/sh', ['sh', '-c', 'echo $$; exec ' + os.environ['JOB']])"
-    command = shlex.join([sys.executable, "-c", told])
+    command = f"exec {shlex.join([sys.executable, '-c', told])}"
     environment = {**os.environ, "JOB": script(tmp_path, code)}
     owner = subprocess.Popen(
         [sys.executable, "-c", OWNER, command], stdout=subprocess.PIPE, text=True, env=environment
