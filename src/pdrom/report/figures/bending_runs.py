@@ -10,7 +10,7 @@ FIGURE = Declaration(
     title="Bending only, reduced",
     caption=(
         "Sheets with bending constraints only, near the end of the run: full order against "
-        "reduced projections. The projections of a flat sheet are round-off: in the paper's two "
+        "reduced projections. The projections of a flat sheet are round-off: in the preprint's two "
         "scenes the basis is one of noise, and what it does depends on which axes the round-off "
         "of the start reaches (drawn is the first start of which some sizes run and others do "
         "not, or else the first; all are counted below the pictures and in `noise_runs`). The "

@@ -11,7 +11,7 @@ class Options(Experiments, Methods, Splits, Columns, Beside):
 
 FIGURE = Declaration(
     number=8,
-    title="Reconstruction error of the paper's scenes",
+    title="Reconstruction error of the preprint's scenes",
     caption=(
         "Relative error of reconstructed projections against the number $r$ of basis vectors, for "
         "the snapshots used (train), the frames between them (test) and another run (held out). "
