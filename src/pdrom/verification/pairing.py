@@ -32,9 +32,13 @@ def pairs(table: Table, expected: pd.DataFrame, found: pd.DataFrame) -> Pairs:
 
 
 def _keys(frame: pd.DataFrame, columns: Sequence[str], rows: list[int]) -> dict[int, tuple]:
-    texts = frame.iloc[rows][list(columns)].astype(object)
-    texts = texts.where(texts.notna(), "")
-    return dict(zip(rows, texts.itertuples(index=False, name=None), strict=True))
+    part = frame.iloc[rows]
+    cells = [["" if _is_missing(cell) else cell for cell in part[name]] for name in columns]
+    return dict(zip(rows, zip(*cells, strict=True), strict=True))
+
+
+def _is_missing(cell: object) -> bool:
+    return cell is None or cell is pd.NA or cell != cell
 
 
 def _matched(expected: dict[int, tuple], found: dict[int, tuple]) -> Pairs:
