@@ -6,10 +6,21 @@ from pdrom.pipeline.tables import all_tables
 from pdrom.verification.references import read_reference
 from pdrom.verification.settings import load_settings
 from pdrom.verification.spread import comparisons
+from pdrom.verification.subject import Subject
 from pdrom.verification.tolerances import load_tolerances
 from places import ROOT
 
 REFERENCES = ROOT / "results" / "reference"
+
+
+@pytest.fixture(scope="session")
+def subject():
+    """The tiny study, planned once, where its configuration lies."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(ROOT)
+        subject = Subject.of(["config/tiny.yaml"], [])
+        assert subject.plan.figure_jobs
+    return subject
 
 
 @pytest.fixture(scope="session")

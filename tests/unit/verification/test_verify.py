@@ -16,10 +16,8 @@ from pdrom.verification.command import parser, verify, verify_tables
 from pdrom.verification.lines import Line, Outcome, status_of
 from pdrom.verification.references import folder_of, kept, write_reference
 from pdrom.verification.status import Status
-from pdrom.verification.subject import Subject
 from places import ROOT
 
-OPTIONS = ["--configfile", "config/tiny.yaml"]
 RESULTS = "results/studies/tiny"
 
 
@@ -30,7 +28,7 @@ def make(path):
 
 
 @pytest.fixture(scope="module")
-def results(expected, references, tmp_path_factory):
+def results(expected, references, subject, tmp_path_factory):
     """A project with the expected tables as results, and every file that figures read."""
     folder = tmp_path_factory.mktemp("project")
     for name in ("config", "paper", "src"):
@@ -45,13 +43,12 @@ def results(expected, references, tmp_path_factory):
             if name not in references or set(kept(table)) - set(references[name].columns):
                 # a new table or column has no tracked reference until a run is taken as one
                 write_reference(table, frame, folder_of(RESULTS))
-        subject = Subject.of(OPTIONS[1:], [])
         figures = subject.plan.figure_jobs.values()
         tables = {TABLE.at(RESULTS, name=name) for name in all_tables()}
         read = {path for job in figures for path in job.inputs if path.startswith("results/")}
         for path in (read - tables) | {p for job in figures for p in (job.pdf, job.png)}:
             make(path)
-    return folder, subject
+    return folder
 
 
 def verified(subject):
@@ -63,13 +60,12 @@ def verified(subject):
 
 
 @pytest.fixture(scope="module")
-def held(results):
+def held(results, subject):
     """Code, lines and page of the expected tables themselves."""
-    folder, subject = results
     with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
+        patch.chdir(results)
         status, printed = verified(subject)
-    return status, printed, (folder / RESULTS / "verification.md").read_text(encoding="utf-8")
+    return status, printed, (results / RESULTS / "verification.md").read_text(encoding="utf-8")
 
 
 def test_expected_results_hold(held):
@@ -84,17 +80,16 @@ def test_expected_results_hold(held):
 
 
 @pytest.fixture(scope="module")
-def faulty(results, held):
+def faulty(results, subject, held):
     """Code and lines where verdicts have changed, and files and a reference are not there.
 
     After ``held``, since it takes away what that needs.
     """
-    folder, subject = results
     claims, reruns = (TABLE.at(RESULTS, name=name) for name in ("claims", "reduced_reruns"))
     reference = folder_of(RESULTS) / "alarms.csv"
     lost = [TABLE.at(RESULTS, name="noise"), f"{RESULTS}/figures/ladder.png"]
     with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
+        patch.chdir(results)
         patch.setattr("os.fsync", lambda descriptor: None)
         verdicts, runs = read_table(claims), read_table(reruns)
         verdicts.loc[verdicts.claim == "C5", "verdict"] = "holds"
@@ -152,7 +147,7 @@ def test_the_code_is_that_of_the_worst_outcome(outcomes, status):
 
 
 def test_a_configuration_without_references_is_refused(results, tmp_path, monkeypatch):
-    monkeypatch.chdir(results[0])
+    monkeypatch.chdir(results)
     own = tmp_path / "other.yaml"
     own.write_text("ranks: [6]\n")
     with pytest.raises(ConfigurationError, match="no expected tables of this configuration"):

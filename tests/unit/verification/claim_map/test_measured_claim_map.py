@@ -19,15 +19,6 @@ TINY = ["--configfile", "config/tiny.yaml"]
 
 
 @pytest.fixture(scope="module")
-def subject() -> Subject:
-    with pytest.MonkeyPatch.context() as patched:
-        patched.chdir(ROOT)
-        subject = Subject.of(["config/tiny.yaml"], [])
-        assert subject.plan.figure_jobs  # planned once, here, where the configuration lies
-    return subject
-
-
-@pytest.fixture(scope="module")
 def graph(subject: Subject) -> Graph:
     with pytest.MonkeyPatch.context() as patched:
         patched.chdir(ROOT)
