@@ -197,7 +197,10 @@ def test_a_threshold_of_a_claim_reruns_verdicts_and_manuscript_only(finished: Ch
     assert MICRO_MANUSCRIPT in planned
     others = {p for p in planned if _stage(p) != "paper"}
     figure = {f"{MICRO_RESULTS}/figures/claims_sensitivity.{kind}" for kind in ("pdf", "png")}
-    tables = {f"{MICRO_RESULTS}/tables/{name}.csv" for name in ("claims", "claims_sensitivity")}
+    tables = {
+        f"{MICRO_RESULTS}/tables/{name}.csv"
+        for name in ("claims", "claims_sensitivity", "claims_tests")
+    }
     assert others == tables | figure
 
 
