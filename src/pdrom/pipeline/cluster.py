@@ -19,6 +19,7 @@ from pdrom.core.errors import PdromError
 from pdrom.core.yamlfile import read_yaml
 
 EXECUTOR = "slurm"
+JOBSTEP = "slurm-jobstep"
 PLUGIN = "snakemake_executor_plugin_slurm"
 LOCK = "requirements-cluster.lock"
 # Name of each node's partition (with a star if it is the default one), processors, memory, limit.

@@ -27,8 +27,10 @@ COLUMNS = [
 
 # A request leaves at least this much room above the prediction, for slower machines.
 ROOM = 2.0
-# Memory (MB) of the two processes of Snakemake that stand above a job on a node: each has the plan.
-ABOVE_MB = 800
+# What stands above a job on a node: two processes of Snakemake, each of which makes the plan, and the
+# process that jobs are forked from. Seconds until the job begins, on a busy node, and memory in MB.
+ABOVE_SECONDS = 120.0
+ABOVE_MB = 1000
 STEP_MB = 250
 
 
@@ -138,12 +140,15 @@ class CostModel:
         return Cost(max(c.seconds for c in costs), max(c.memory_mb for c in costs))
 
     def request(self, kind: str, size: Size | None = None, method: str | None = None) -> Request:
-        """What to ask for, so that every measured job would have had `ROOM` times its time."""
+        """What to ask for, so that every measured job would have had `ROOM` times its time.
+
+        In a batch each layer of jobs brings the room for what stands above one.
+        """
         expected = self.cost(kind, size, method)
         room = ROOM * (self._kinds[kind].room if kind in self._kinds else 1.0)
         memory = ABOVE_MB + ROOM * expected.memory_mb
         return Request(
-            minutes=max(1, math.ceil(room * expected.seconds / 60.0)),
+            minutes=math.ceil((ABOVE_SECONDS + room * expected.seconds) / 60.0),
             memory_mb=math.ceil(memory / STEP_MB) * STEP_MB,
         )
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.paths import CRATE
-from pdrom.pipeline.cluster import EXECUTOR, check_nodes
+from pdrom.pipeline.cluster import EXECUTOR, JOBSTEP, check_nodes
 from pdrom.pipeline.commandline import CommandLine, options
 from pdrom.pipeline.dates import settle_dates
 from pdrom.pipeline.failures import Failures, listen
@@ -20,7 +20,7 @@ from pdrom.pipeline.running import hold, remove_stale_locks
 from pdrom.pipeline.scheduler import cancel_timers
 from pdrom.pipeline.summary import summary
 from pdrom.pipeline.targets import Rule, known
-from pdrom.pipeline.warm import start_server, stop_server
+from pdrom.pipeline.warm import start_server
 
 # What Snakemake compares by date.
 DATED = ("results", "paper", "config", "workflow")
@@ -69,10 +69,7 @@ class Run:
             )
 
     def start(self, workflow: Any) -> None:
-        """Before the first job: the process that jobs are forked from, or a look at the cluster.
-
-        On nodes of a cluster jobs have interpreters of their own.
-        """
+        """Before the first job: the process that jobs are forked from, or a look at the cluster."""
         if workflow.local_exec:
             start_server()
         elif self.command.executor == EXECUTOR:
@@ -88,7 +85,6 @@ class Run:
         except PdromError as error:
             say_last(f"pdrom: {error}\n")
         say_last(summary(self.command, folders, plan.figures, plan.tables.paths))
-        stop_server()
         cancel_timers()
 
     def _record(self, plan: Plan, folders: Folders) -> None:
@@ -103,11 +99,20 @@ class Run:
 
     def fail(self) -> None:
         """End a run that failed or was interrupted: it says why."""
-        stop_server()
         cancel_timers()
         text, status = self.failures.end()
         say_last(text)
         sys.exit(status)
+
+
+def start_batch(workflow: Any) -> None:
+    """On a node of a cluster: the process that the jobs of a batch are forked from.
+
+    Snakemake runs there twice. The first one hands the batch to the other (by `JOBSTEP`), which
+    runs its jobs.
+    """
+    if workflow.remote_exec and JOBSTEP not in sys.argv:
+        start_server()
 
 
 def say_last(text: str) -> None:

@@ -18,12 +18,11 @@ pytestmark = pytest.mark.skipif(not SUPPORTED, reason="no safe forks on this pla
 # A process that starts the server, runs the shell commands of its arguments, and says how they end.
 OWNER = """
 import subprocess, sys
-from pdrom.pipeline.warm import start_server, stop_server
+from pdrom.pipeline.warm import start_server
 start_server(libraries=["fractions"])
 for command in sys.argv[1:]:
     done = subprocess.run(command, shell=True)
     print("ended", done.returncode, flush=True)
-stop_server()
 """
 
 

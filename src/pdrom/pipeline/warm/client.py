@@ -6,6 +6,7 @@ This file is run by its path, before any package is in reach, and for every job:
 import os
 import signal
 import socket
+import struct
 import sys
 from contextlib import suppress
 
@@ -15,11 +16,11 @@ FORWARDED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 def main() -> int:
     """Exit code of the job; the process dies of the signal that the job died of."""
-    place = os.environ.get(ADDRESS)
+    name = os.environ.get(ADDRESS)
     script = len(sys.argv) == 2 and not sys.argv[1].startswith("-")
     # a signal that comes before the job is known waits until it is
     signal.pthread_sigmask(signal.SIG_BLOCK, FORWARDED)
-    connection = connect(place) if place and script else None
+    connection = connect(name) if name and script else None
     answer = ask(connection) if connection else b""
     if connection is None or not answer:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, FORWARDED)
@@ -40,14 +41,26 @@ def main() -> int:
     return code
 
 
-def connect(place: str) -> socket.socket | None:
-    """Connection to the server; None where nobody listens."""
+def connect(name: str) -> socket.socket | None:
+    """Connection to the server; None where nobody of the same user listens."""
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
-        connection.connect(place)
+        connection.connect(place_of(name))
     except OSError:
         return None
-    return connection
+    return connection if of_this_user(connection) else None
+
+
+def place_of(name: str) -> bytes:
+    """Address of a socket that is a name only, no file (Linux)."""
+    return b"\0" + os.fsencode(name)
+
+
+def of_this_user(connection: socket.socket) -> bool:
+    """Whether the process at the other end is this user's; a name has no permissions of its own."""
+    told = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
+    _process, user, _group = struct.unpack("3i", told)
+    return bool(user == os.geteuid())
 
 
 def ask(connection: socket.socket) -> bytes:

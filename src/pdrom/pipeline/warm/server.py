@@ -15,6 +15,8 @@ import sys
 from contextlib import suppress
 from typing import NoReturn
 
+from pdrom.pipeline.warm.client import of_this_user
+
 NUMBER = b"%20d"
 
 
@@ -87,7 +89,7 @@ class Server:
     def _accept(self) -> str | None:
         """Fork a job; the path of its script in the fork, None in the server."""
         client, _ = self.listener.accept()
-        request = receive(client)
+        request = receive(client) if of_this_user(client) else None
         if request is None:
             client.close()
             return None

@@ -1,17 +1,15 @@
 """Starting the server, and the command that the workflow starts scripts with."""
 
 import os
+import secrets
 import shlex
-import shutil
 import socket
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 
-from pdrom.pipeline.warm.client import ADDRESS
+from pdrom.pipeline.warm.client import ADDRESS, place_of
 
 # Forks of a process that has loaded system frameworks are unsafe on macOS.
 SUPPORTED = sys.platform == "linux"
@@ -41,18 +39,19 @@ def interpreter(python: str = sys.executable) -> str:
 def start_server(python: str = sys.executable, libraries: Sequence[str] = LIBRARIES) -> None:
     """Start the server of this process; it ends when this process does.
 
-    The address goes into the environment, which jobs inherit. Clients that come before the
-    libraries are loaded wait in the socket's queue.
+    The address goes into the environment, which jobs inherit. It is a name that Linux keeps beside
+    the file system and forgets with the last process that listens there, so that nothing is left
+    of a run that was killed. Clients that come before the libraries are loaded wait in the socket's
+    queue.
     """
     if not SUPPORTED:
         return
-    folder = Path(tempfile.mkdtemp(prefix="pdrom-"))
-    place = folder / "jobs"
+    name = f"pdrom-{secrets.token_hex(16)}"
     # the server reads one end of a pipe whose other end only this process holds: when this process
     # is gone, the server notices
     owner, _kept_open = os.pipe()
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
-        listener.bind(str(place))
+        listener.bind(place_of(name))
         listener.listen(64)
         numbers = (listener.fileno(), owner)
         subprocess.Popen(
@@ -62,12 +61,4 @@ def start_server(python: str = sys.executable, libraries: Sequence[str] = LIBRAR
             start_new_session=True,
         )
     os.close(owner)
-    os.environ[ADDRESS] = str(place)
-
-
-def stop_server() -> None:
-    """Forget the server's address and remove its socket; the server ends with this process."""
-    place = os.environ.pop(ADDRESS, None)
-    if place is not None:
-        with suppress(OSError):
-            shutil.rmtree(Path(place).parent)
+    os.environ[ADDRESS] = name
