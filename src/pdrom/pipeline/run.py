@@ -8,6 +8,7 @@ from typing import Any
 
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.paths import CRATE
+from pdrom.pipeline import slurm_executor
 from pdrom.pipeline.cluster import EXECUTOR, JOBSTEP, check_nodes
 from pdrom.pipeline.commandline import CommandLine, options
 from pdrom.pipeline.dates import settle_dates
@@ -47,6 +48,8 @@ class Run:
                 hold()
                 settle_dates(DATED)
                 remember(command)
+                if command.executor == EXECUTOR:
+                    slurm_executor.install(EXECUTOR)
         except PdromError as error:
             sys.exit(f"pdrom: {error}")
         return cls(command, listen())
