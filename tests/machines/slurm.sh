@@ -5,8 +5,9 @@
 #
 # RESULTS holds the tiny study made without SLURM (results/studies/tiny). HEAD is cloned into FOLDER (else a temporary one) and
 # run there by the profile of the project. While the first command runs, one of its jobs is cancelled: the run has to say so.
-# The same command goes on from there. Tables (without what a clock
-# says) and runs must then be those of RESULTS, bit by bit; and jobs that no node can take must be refused.
+# The same command goes on from there, and the controller is restarted under it. Tables (without what a clock says) and runs must
+# then be those of RESULTS, bit by bit; and jobs that no node can take must be refused. At last a controller without accounting
+# is away for longer than the executor asks: a run has to come to its end all the same.
 set -euo pipefail
 
 project=$(cd "$(dirname "$0")/../.." && pwd -P)
@@ -29,6 +30,19 @@ step "a clone of HEAD in $folder"
 cd "$folder"
 command=(./reproduce --profile workflow/profiles/slurm --configfile config/tiny.yaml --jobs 4)
 running() { [ -n "$(squeue --noheader --states=RUNNING --format=%i)" ]; }
+wait_for_job() { # PROCESS LOG
+    until running; do
+        kill -0 "$1" || fail "the run ended before a job ran: $(tail -n 20 "$2")"
+        sleep 1
+    done
+}
+restart() { # SECONDS
+    "$service" stop-controller
+    echo "the controller is gone for $1 s"
+    sleep "$1"
+    "$service" start-controller
+    echo "the controller is back"
+}
 
 step "jobs that no node can take"
 processors=$(sinfo --noheader --format=%c | tr -d +)
@@ -40,10 +54,7 @@ rm too_many.log
 step "a run, one job of which is cancelled"
 "${command[@]}" >"$folder/.cache/first.log" 2>&1 &
 run=$!
-until running; do
-    kill -0 "$run" || fail "the run ended before a job ran: $(tail -n 20 "$folder/.cache/first.log")"
-    sleep 1
-done
+wait_for_job "$run" "$folder/.cache/first.log"
 victim=$(squeue --noheader --states=RUNNING --format=%i | tail -n 1)
 scancel "$victim"
 echo "cancelled job $victim"
@@ -51,10 +62,23 @@ if wait "$run"; then fail "the run did not notice"; fi
 tail -n 6 "$folder/.cache/first.log"
 grep -q "cancelled" "$folder/.cache/first.log" || fail "the run does not say that a job was cancelled"
 
-step "the same command"
-"${command[@]}" >"$folder/.cache/second.log" 2>&1 || fail "the run failed: $(tail -n 20 "$folder/.cache/second.log")"
+step "the same command, and a controller that is restarted"
+"${command[@]}" >"$folder/.cache/second.log" 2>&1 &
+run=$!
+wait_for_job "$run" "$folder/.cache/second.log"
+restart 20
+wait "$run" || fail "the run failed: $(tail -n 20 "$folder/.cache/second.log")"
 tail -n 8 "$folder/.cache/second.log"
 
 step "against $expected"
 ./reproduce run python tests/machines/same_results.py "$expected" results/studies/tiny
+
+step "without accounting, a controller that is away"
+"$service" stop
+"$service" start-unaccounted
+"${command[@]}" --forcerun iterations -- iterations >"$folder/.cache/third.log" 2>&1 &
+run=$!
+wait_for_job "$run" "$folder/.cache/third.log"
+restart 60
+wait "$run" || fail "the run failed: $(tail -n 20 "$folder/.cache/third.log")"
 step "passed"

@@ -29,7 +29,7 @@ COLUMNS = [
 ROOM = 2.0
 # What stands above a job on a node: two processes of Snakemake, each of which makes the plan, and
 # the process that jobs are forked from. Seconds until a job begins on a busy node, memory in MB.
-ABOVE_SECONDS = 120.0
+ABOVE_SECONDS = 60.0
 ABOVE_MB = 1000
 STEP_MB = 250
 

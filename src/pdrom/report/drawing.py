@@ -6,7 +6,6 @@ from pydantic import BaseModel, ConfigDict, JsonValue
 
 from pdrom.report.figures.kit.catalogue import declaration
 from pdrom.report.figures.kit.holdings import Holdings
-from pdrom.report.figures.kit.output import draw_figure, write_figure
 from pdrom.report.figures.kit.results import Results
 
 
@@ -30,6 +29,9 @@ class Order(BaseModel):
 
 def draw(order: Order, results: str, pdf: str, png: str) -> None:
     """Draw a figure from the results of a configuration and write both of its files."""
+    # late: whoever plans gives orders only and needs no plotting library
+    from pdrom.report.figures.kit.output import draw_figure, write_figure
+
     options = declaration(order.name).options.model_validate(order.options)
     published = Path(order.published) if order.published else None
     read = Results(results, order.holdings, order.settings, published)
