@@ -7,10 +7,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from snakemake.cli import get_argument_parser
+from snakemake_interface_executor_plugins.registry import ExecutorPluginRegistry
 
 from pdrom.pipeline import slurm_executor
 from pdrom.pipeline.failures import cause
-from pdrom.pipeline.slurm_executor import FORGOTTEN, patient
+from pdrom.pipeline.slurm_executor import FORGOTTEN, install, patient
 
 
 @dataclass
@@ -134,3 +136,11 @@ def test_the_queue_is_that_of_this_user(monkeypatch: pytest.MonkeyPatch, tmp_pat
     assert slurm_executor.queue() == {"12", "13"}
     program.write_text("#!/bin/sh\nexit 1\n")
     assert slurm_executor.queue() is None
+
+
+def test_snakemake_gets_the_patient_class(monkeypatch: pytest.MonkeyPatch) -> None:
+    get_argument_parser()  # Snakemake collects its plugins for it
+    plugin = ExecutorPluginRegistry().get_plugin("local")
+    monkeypatch.setattr(plugin, "executor", Executor)
+    install("local")
+    assert ExecutorPluginRegistry().get_plugin("local").executor.__mro__[1] is Executor

@@ -3,14 +3,17 @@
 import os
 import shlex
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from pdrom.pipeline import run as running
 from pdrom.pipeline.warm import interpreter
-from pdrom.pipeline.warm.client import ADDRESS
+from pdrom.pipeline.warm.client import ADDRESS, of_this_user
 from pdrom.pipeline.warm.start import SUPPORTED
 
 pytestmark = pytest.mark.skipif(not SUPPORTED, reason="no safe forks on this platform")
@@ -127,3 +130,45 @@ def test_without_a_server_the_client_is_a_plain_interpreter(tmp_path):
         f"{interpreter()} -c 'print(1 + 1)'", shell=True, capture_output=True, text=True
     )
     assert done.stdout == "2\n"
+
+
+def test_a_killed_run_leaves_no_file_behind(tmp_path):
+    """Its job says when it runs; everything that the run might have written lies in TMPDIR."""
+    scripts, temporary = tmp_path / "scripts", tmp_path / "temporary"
+    scripts.mkdir()
+    temporary.mkdir()
+    command = script(scripts, "import signal; print('ready', flush=True); signal.pause()")
+    owner = subprocess.Popen(
+        [sys.executable, "-c", OWNER, command],
+        stdout=subprocess.PIPE, text=True, env={**os.environ, "TMPDIR": str(temporary)},
+    )  # fmt: skip
+    assert owner.stdout.readline() == "ready\n"
+    os.kill(owner.pid, signal.SIGKILL)
+    assert owner.stdout.read() == ""
+    owner.wait()
+    assert list(temporary.iterdir()) == []
+
+
+def test_only_the_same_user_is_answered(monkeypatch):
+    ours, theirs = socket.socketpair(socket.AF_UNIX)
+    with ours, theirs:
+        assert of_this_user(ours)
+        monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+        assert not of_this_user(ours)
+
+
+@pytest.mark.parametrize(
+    ("remote", "arguments", "starts"),
+    [
+        (False, ["--target-jobs", "fom:"], 0),
+        (True, ["--executor", "slurm-jobstep", "--target-jobs", "fom:"], 0),
+        (True, ["--target-jobs", "fom:"], 1),
+    ],
+    ids=["here", "hands the batch on", "runs the batch"],
+)
+def test_a_batch_on_a_node_has_a_server(monkeypatch, remote, arguments, starts):
+    started = []
+    monkeypatch.setattr(running, "start_server", lambda: started.append(1))
+    monkeypatch.setattr(sys, "argv", ["snakemake", *arguments])
+    running.start_batch(SimpleNamespace(remote_exec=remote))
+    assert len(started) == starts

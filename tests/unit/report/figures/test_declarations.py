@@ -108,9 +108,10 @@ def test_holdings_survive_a_round_trip(study):
     assert Holdings.model_validate(holdings.model_dump(mode="json")) == holdings
 
 
-def test_declaring_figures_loads_no_plotting_library():
+def test_planning_loads_no_plotting_library():
     code = (
-        "import sys; from pdrom.report.figures.kit.catalogue import declarations; declarations();"
+        "import sys, pdrom.pipeline.plan;"
+        "from pdrom.report.figures.kit.catalogue import declarations; declarations();"
         "sys.exit('matplotlib' in sys.modules)"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
