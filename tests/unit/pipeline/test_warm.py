@@ -98,6 +98,24 @@ signal.pause()
     assert out == "ended 5\n"
 
 
+def test_a_job_that_ends_well_leaves_nothing_undone(tmp_path):
+    """Though its process does not take itself apart: threads, exit functions, a full buffer."""
+    code = f"""
+import atexit, sys, threading
+begun = threading.Event()
+atexit.register(lambda: open({str(tmp_path / "exit")!r}, "w").write("done"))
+def work():
+    begun.wait()
+    open({str(tmp_path / "thread")!r}, "w").write("done")
+threading.Thread(target=work).start()
+sys.stdout.write("x" * 5000)
+begun.set()
+"""
+    done = run(f"{{ {script(tmp_path, code)}; echo; }}")
+    assert done.stdout == f"{'x' * 5000}\nended 0\n"
+    assert (tmp_path / "exit").read_text() == (tmp_path / "thread").read_text() == "done"
+
+
 @pytest.mark.parametrize("victim", ["client", "owner"])
 def test_no_job_outlives_its_client_or_the_owner(tmp_path, victim):
     """A pipe that the job holds closes when the job is gone, and only then."""

@@ -14,12 +14,15 @@ from pdrom.pipeline.warm.client import ADDRESS, place_of
 # Forks of a process that has loaded system frameworks are unsafe on macOS.
 SUPPORTED = sys.platform == "linux"
 
-# Third-party libraries that most jobs need.
+# Third-party libraries that most jobs need, and modules that every job begins with.
 LIBRARIES = (
     "h5py",
     "numba",
     "numpy",
     "pandas",
+    "pdrom.core.logs",
+    "pdrom.core.provenance",
+    "pdrom.experiments.declaration",
     "pydantic",
     "scipy.linalg",
     "scipy.sparse.linalg",
