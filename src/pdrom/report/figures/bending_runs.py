@@ -13,8 +13,8 @@ FIGURE = Declaration(
         "reduced projections. The projections of a flat sheet are round-off: in the preprint's two "
         "scenes the basis is one of noise, and what it does depends on which axes the round-off "
         "of the start reaches (drawn is the first start of which some sizes run and others do "
-        "not, or else the first; all are counted below the pictures and in `noise_runs`). The "
-        "curved sheet has projections that matter."
+        "not, or else the first; all are counted below the pictures and in the figure of "
+        "reductions on bases of round-off). The curved sheet has projections that matter."
     ),
     reads=(
         Chosen(MESH),
