@@ -14,6 +14,7 @@ from pdrom.core.paths import MESH, NOISE, NOISE_RUNS, SENSITIVITY, File
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.last_iterates import last_iterates
 from pdrom.experiments.scenes import scene_of
 from pdrom.experiments.settings import BlowupExtent, Horizon, Modes
 from pdrom.model.runs.sensitivity import perturbation_field
@@ -153,7 +154,8 @@ def _runs(
     """Rows and runs of one start: its full-order run, then the reductions trained on it."""
     group, plan = scene.group(name), scene.config.reduce[name]
     start = roundoff_field(scene, axes, settings.noise.perturbation, seed)
-    reference, projections = _full_order(scene, name, start)
+    reference, seen = last_iterates(scene, scene.stepper(), group.project, start)
+    projections = np.stack(seen)
     even = training_frames(scene.config.frames, min(plan.train, (scene.config.frames + 1) // 2))
     masses = row_masses(group, scene.masses)
     displacement = displacement_norms(reference)
@@ -185,23 +187,6 @@ def _store(store: h5py.Group, r: int, outcome: Rerun | None) -> None:
         blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
         store.attrs.update(blowup_frame=blowup, max_extent=outcome.max_extent)
         store["positions"] = outcome.positions.astype(np.float32)
-
-
-def _full_order(scene: Scene, name: str, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (F + 1, N, 3) of a run, and projections (F, e p, 3) of its last iterates."""
-    group, loop = scene.group(name), scene.stepper()
-    state = scene.initial_state(start)
-    positions, projections = [state.positions], []
-    for frame in range(scene.config.frames):
-        seen: list[np.ndarray] = []
-
-        def watch(y: np.ndarray, seen: list[np.ndarray] = seen) -> None:
-            seen[:] = [group.project(y)]
-
-        state, _ = loop.step(state, frame, watch)
-        positions.append(state.positions)
-        projections += seen
-    return np.stack(positions), np.stack(projections)
 
 
 EXPERIMENT = Experiment("noise", "Bases of the round-off of {group} in {scene}", run)

@@ -98,6 +98,13 @@ def _noise(study: Study) -> Iterator[Labels]:
             yield {"scene": scene, "group": group}
 
 
+def _published_choices(study: Study) -> Iterator[Labels]:
+    cases = study.settings.published_choices.cases
+    for scene, group in study.experiments:
+        if any((case.scene, case.group) == (scene, group) for case in cases):
+            yield {"scene": scene, "group": group}
+
+
 Factors = dict[str, tuple[float, ...]]
 
 
@@ -167,6 +174,7 @@ HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.REPEATED_FRAMES: _repetitions,
     paths.NOISE: _noise,
     paths.NOISE_RUNS: _noise,
+    paths.PUBLISHED_CHOICES: _published_choices,
     paths.STABILITY: _among(lambda study: study.settings.stability.scenes),
     paths.SUBSPACE_ABLATION: _among(lambda study: study.ablation.scenes),
     paths.TIMINGS: _scenes,

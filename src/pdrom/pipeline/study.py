@@ -21,6 +21,7 @@ from pdrom.experiments.ladder import LadderFile
 from pdrom.experiments.noise import Noise
 from pdrom.experiments.offline import Offline
 from pdrom.experiments.online import Online
+from pdrom.experiments.published_choices.experiment import PublishedChoices
 from pdrom.experiments.repetitions import RepetitionSection
 from pdrom.experiments.roofline.experiment import Roofline
 from pdrom.experiments.sampling import Sweep
@@ -76,6 +77,7 @@ class StudySettings(ConfigModel):
     roofline: Roofline = Roofline()
     stability: Stability = Stability()
     noise: Noise = Noise()
+    published_choices: PublishedChoices = PublishedChoices()
     repetitions: RepetitionSection = RepetitionSection()
     guard: GuardSection = GuardSection()
     companion: Companion = Companion()
