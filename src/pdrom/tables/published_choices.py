@@ -14,6 +14,10 @@ from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import GROUP, SCENE, R
 
 KEYS = ["experiment", "group", "axis", "r"]
+STORED = [
+    "experiment", "group", "split", "num_points",
+    "relative_error_x", "relative_error_y", "relative_error_z",
+]  # fmt: skip
 DIRECTION = text(
     "direction",
     "choices added one after the other (cumulative), each alone, or all of them with the signs of "
@@ -47,7 +51,8 @@ def published_choices(parts: list[File], stored: Path) -> pd.DataFrame:
     rows = joined(parts)
     if rows.empty:
         return rows
-    found = rows.merge(_references(read_table(stored)), on=KEYS, how="left", validate="many_to_one")
+    references = _references(read_table(stored, STORED, result=False))
+    found = rows.merge(references, on=KEYS, how="left", validate="many_to_one")
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.log10(found.error / found.reference)
     return found.assign(log_ratio=ratio.where(np.isfinite(ratio)))

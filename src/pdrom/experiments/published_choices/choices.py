@@ -11,8 +11,7 @@ Choice = Literal[
     "frames", "weighting", "idle", "signs", "system", "rows",
 ]  # fmt: skip
 
-# In the order in which the data pass them: simulation, snapshots, basis, rows, test. The order was
-# fixed before a distance was computed.
+# In the order in which the data pass them: simulation, snapshots, basis, rows, test.
 ALL: tuple[Choice, ...] = get_args(Choice)
 
 TITLES: dict[Choice, str] = {
@@ -25,7 +24,7 @@ TITLES: dict[Choice, str] = {
     "plane": "triangles projected in the rest plane",
     "frames": "every second frame from the first",
     "weighting": "snapshots weighted by areas or volumes",
-    "idle": "axes without motion select, too",
+    "idle": "axes at rest select as well",
     "signs": "signs of the modes as LAPACK returns them",
     "system": "normal equations without Tikhonov term",
     "rows": "tested on rows numbered like elements",

@@ -62,7 +62,7 @@ TABLES = (
     "ladder", "scaling", "scaling_fit", "stability", "budget", "breakeven", "effects_cost",
     "effects_left_out", "machine_rates", "roofline", "reduced_reruns", "gain_prediction",
     "subspace_ablation", "noise", "claims_sensitivity", "alternatives", "bounds",
-    "estimates", "effects_contribution", "repetitions",
+    "estimates", "effects_contribution", "repetitions", "published_choices", "published_distance",
 )  # fmt: skip
 
 
@@ -376,6 +376,18 @@ def _write_tables(results, scenes, methods, rng) -> None:
             ("kick", "start", 1e-15),
         )
     ]
+    steps = [
+        ("cumulative", "as in this study"), ("cumulative", "nothing is pinned"),
+        ("alone", "nothing is pinned"), ("signs", "draw 1"), ("ties", "draw 1"),
+    ]  # fmt: skip
+    chosen = [
+        (scene, group, *step, axis, r, 0.1 * r, 0.2)
+        for scene, group in pairs
+        for step in steps
+        for axis in "xyz"
+        for r in (1, 2, 5)
+    ]
+    distances = [(scene, group, *step, 0.5) for scene, group in pairs for step in steps]
     columns = {
         "singular_values": "scene group component singular_value relative above_roundoff",
         "reconstruction_error": "scene group method r split relative_error gain elements_sampled",
@@ -408,11 +420,13 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "estimates": "scene position_basis split relative_error_within_horizon estimate ratio"
         " within resolved",
         "effects_contribution": "scene effect role moved sensitivity_floor above_floor",
+        "published_choices": "scene group direction choice axis r error reference",
+        "published_distance": "scene group direction choice distance",
     }
     made = (
         values, errors, times, costs, ladder, repetitions, runs, bought, ratios, shares, removed,
         rates, phases, reruns, predictions, noise, variations, ablation, others, bounds, estimates,
-        moved,
+        moved, chosen, distances,
     )  # fmt: skip
     rows = dict(zip(columns, made, strict=True))
     for name, header in columns.items():

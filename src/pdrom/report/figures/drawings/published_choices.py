@@ -1,0 +1,74 @@
+"""Reconstruction errors on the way from this study's `published` to the published code's output."""
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.multiples import label_outer, log_axis, small_multiples
+from pdrom.report.figures.kit.options import Scenes
+from pdrom.report.figures.kit.results import NothingToDraw, Results
+
+COLUMNS = ["scene", "group", "direction", "choice", "axis", "r", "error", "reference"]
+DISTANCES = ["scene", "group", "direction", "choice", "distance"]
+LOW, HIGH = 1e-2, 1e4  # limits of the axis
+PANELS = 3  # in a row
+
+
+def draw(results: Results, options: Scenes) -> Figure:
+    """A panel for each case; its choices added one after the other have a first and a last line.
+
+    Raises
+    ------
+    StorageError
+        A table is missing or lacks a column.
+    """
+    table = results.table("published_choices", COLUMNS)
+    distances = results.table("published_distance", DISTANCES)
+    table = table[table.axis == "x"]
+    if options.scenes:
+        table = table[table.scene.isin(options.scenes)]
+    if table.empty:
+        raise NothingToDraw("no scene that the published code's output is stored of")
+    cases = list(table.groupby(["scene", "group"], sort=False))
+    figure, axes = small_multiples(len(cases), PANELS, legend_rows=2)
+    handles = {}
+    for ax, ((scene, group), rows) in zip(axes, cases, strict=True):
+        log_axis(ax, LOW, HIGH)
+        own = distances[(distances.scene == scene) & (distances.group == group)]
+        _draw_case(ax, rows, own)
+        ax.set_title(results.experiment_title(scene, group))
+        handles |= {line.get_label(): line for line in ax.get_lines()}
+    label_outer(axes, PANELS, "basis size r", "relative error (x)")
+    figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=3)
+    return figure
+
+
+def _draw_case(ax: Axes, rows: pd.DataFrame, distances: pd.DataFrame) -> None:
+    drawn = rows[rows.direction.isin(["signs", "ties"])].groupby("r").error
+    if len(drawn):
+        ax.fill_between(
+            drawn.min().index, drawn.min(), drawn.max(), color=style.BLUE, alpha=0.15, linewidth=0
+        )
+    steps = rows[rows.direction == "cumulative"]
+    names = list(dict.fromkeys(steps.choice))
+    reference = steps[steps.choice == names[0]]
+    ax.plot(reference.r, reference.reference, color=style.GREY, linewidth=3.0,
+            label="published code's output")  # fmt: skip
+    _line(ax, reference, names[0], color=style.PURPLE, linestyle="--", marker="v")
+    alone = distances[distances.direction == "alone"]
+    if alone.distance.notna().any():
+        closest = alone.loc[alone.distance.idxmin(), "choice"]
+        line = rows[(rows.direction == "alone") & (rows.choice == closest)]
+        _line(ax, line, f"only: {closest}", color=style.GREEN, marker="s")
+    _line(ax, steps[steps.choice == names[-1]], "all its choices", color=style.BLUE, marker="o")
+    draws = distances[distances.direction.isin(["signs", "ties"])]
+    if draws.distance.notna().any():
+        direction, choice = draws.loc[draws.distance.idxmin(), ["direction", "choice"]]
+        line = rows[(rows.direction == direction) & (rows.choice == choice)]
+        _line(ax, line, "closest of the draws", color=style.BLACK, linestyle=":", marker=".")
+
+
+def _line(ax: Axes, rows: pd.DataFrame, label: str, **look: str) -> None:
+    shown = rows.error.clip(LOW, HIGH)
+    ax.plot(rows.r, shown, linewidth=1.0, markersize=2.8, label=label, **look)
