@@ -8,8 +8,9 @@ import numpy as np
 from pdrom.experiments.last_iterates import Look, last_iterates
 from pdrom.experiments.published_choices.choices import ALL, Choice
 from pdrom.experiments.published_choices.spaces import PublishedSpace
-from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.constraints.base import ConstraintGroup, GroupConfig
 from pdrom.model.dynamics.stepper import LocalStep, Stepper
+from pdrom.model.effects.base import EffectConfig
 from pdrom.model.effects.floor import Floor
 from pdrom.model.effects.hold import Pins
 from pdrom.model.mesh.config import BarMesh
@@ -69,14 +70,18 @@ def _changed(scene: Scene, taken: Set[Choice]) -> Scene:
     config = scene.config
     effects = config.effects_without("pins") if "pins" in taken else config.effects
     if "stiffness" in taken:
-        effects = tuple(
-            effect.model_copy(update={"weight": 0.5 * effect.weight})
-            if effect.effect == "spring"
-            else effect
-            for effect in effects
-        )
-    mesh = _bar(config.mesh) if "mesh" in taken else scene.mesh
+        effects = tuple(_halved(effect) for effect in effects)
+    mesh = scene.mesh
+    if "mesh" in taken and isinstance(config.mesh, BarMesh):
+        mesh = _bar(config.mesh)
     return Scene.build(config.model_copy(update={"effects": effects}), mesh)
+
+
+def _halved(effect: EffectConfig) -> EffectConfig:
+    """A spring with half its weight; other effects as they are."""
+    if not isinstance(effect, GroupConfig) or effect.effect != "spring":
+        return effect
+    return effect.model_copy(update={"weight": 0.5 * effect.weight})
 
 
 def _bar(config: BarMesh) -> Mesh:

@@ -1,7 +1,11 @@
 """How the published code holds vertices and lets them meet the floor."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
+from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.iterations import CompiledIterations
 from pdrom.model.dynamics.space import Solve, VertexSpace
 from pdrom.model.dynamics.system import GlobalSystem
@@ -46,7 +50,9 @@ class PublishedSpace(VertexSpace):
     def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
         return super().eliminate(*((fixed[:0], targets[:0]) if self._heavy else (fixed, targets)))
 
-    def compiled(self, local_steps, acceleration=None) -> CompiledIterations | None:
+    def compiled(
+        self, local_steps: Sequence[Any], acceleration: Anderson | None = None
+    ) -> CompiledIterations | None:
         """None with heavy vertices: compiled iterations know one mass matrix."""
         return None if self._heavy else super().compiled(local_steps, acceleration)
 

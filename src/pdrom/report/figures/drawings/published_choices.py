@@ -3,6 +3,7 @@
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.multiples import label_outer, log_axis, small_multiples
@@ -32,13 +33,13 @@ def draw(results: Results, options: Scenes) -> Figure:
         raise NothingToDraw("no scene that the published code's output is stored of")
     cases = list(table.groupby(["scene", "group"], sort=False))
     figure, axes = small_multiples(len(cases), PANELS, legend_rows=2)
-    handles = {}
+    handles: dict[str, Line2D] = {}
     for ax, ((scene, group), rows) in zip(axes, cases, strict=True):
         log_axis(ax, LOW, HIGH)
         own = distances[(distances.scene == scene) & (distances.group == group)]
         _draw_case(ax, rows, own)
         ax.set_title(results.experiment_title(scene, group))
-        handles |= {line.get_label(): line for line in ax.get_lines()}
+        handles |= {str(line.get_label()): line for line in ax.get_lines()}
     label_outer(axes, PANELS, "basis size r", "relative error (x)")
     figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=3)
     return figure
