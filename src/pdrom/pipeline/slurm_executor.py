@@ -69,12 +69,19 @@ def patient(executor: Any) -> Any:
             forgotten = self._forgotten(job.external_jobid for job in left)
             for job in left:
                 if job.external_jobid in forgotten:
-                    said = "SLURM does not know it any more; SLURM status is: 'FORGOTTEN'"
-                    self.report_job_error(
-                        job, msg=f"SLURM-job '{job.external_jobid}' failed: {said}"
-                    )
+                    self._give_up(job)
                 else:
                     yield job
+
+        def _give_up(self, job: Any) -> None:
+            """Of a batch Snakemake says no more than where its log is: so a line says why."""
+            said = f"SLURM-job '{job.external_jobid}' failed"
+            self.logger.warning(f"pdrom: SLURM does not know its job {job.external_jobid} any more")
+            self.report_job_error(
+                job,
+                msg=f"{said}, SLURM status is: 'FORGOTTEN'",
+                aux_logs=[str(job.aux["slurm_logfile"])],
+            )
 
         def _forgotten(self, jobs: Iterable[str]) -> set[str]:
             """Jobs that the queue did not name in `FORGOTTEN` answers; accounting forgets none."""

@@ -21,6 +21,11 @@ class Job:
 
     external_jobid: str
 
+    @property
+    def aux(self) -> dict[str, str]:
+        """What the plugin notes of a job."""
+        return {"slurm_logfile": f"{self.external_jobid}.log"}
+
 
 class Executor:
     """The plugin's, as far as it matters here: jobs of an unanswered question are not kept."""
@@ -44,8 +49,9 @@ class Executor:
     def report_job_success(self, job_info: Job) -> None:
         self.reported[job_info.external_jobid] = None
 
-    def report_job_error(self, job_info: Job, msg: str | None = None) -> None:
+    def report_job_error(self, job_info: Job, msg: str | None = None, **more: Any) -> None:
         self.reported[job_info.external_jobid] = msg
+        self.logs = more.get("aux_logs")
 
     async def check_active_jobs(self, active_jobs: list[Job]) -> AsyncIterator[Job]:
         for job in active_jobs if self.status is not None else ():
@@ -108,6 +114,8 @@ def test_a_job_that_slurm_has_forgotten_fails(known: set[str], tmp_path) -> None
         assert kept(executor, jobs) == jobs
     assert kept(executor, jobs) == [jobs[0]]
     assert cause(executor.reported["8_1"], tmp_path) == "SLURM says forgotten"
+    assert executor.logs == ["8_1.log"]
+    assert "its job 8_1" in executor.said[-1]
 
 
 def test_accounting_forgets_nothing(known: set[str]) -> None:
