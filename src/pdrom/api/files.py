@@ -2,7 +2,9 @@
 
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -15,6 +17,7 @@ from pdrom.core.store import open_hdf5, write_hdf5
 from pdrom.core.yamlfile import validate
 from pdrom.model.mesh.types import store_mesh, stored_mesh
 from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.local.guard import GuardRecord
 from pdrom.reduction.rerun import Rerun, displacement_norms
 
 
@@ -26,6 +29,8 @@ def save(reduced: ReducedRun, path: str | os.PathLike[str]) -> None:
     with made_by("pdrom.api.save", {"scene": config, **labels}), write_hdf5(path) as file:
         file.attrs.update(labels | {"gain": reduced.gain, "ms_per_frame": reduced.ms})
         file.attrs["blowup_frame"] = -1 if outcome.blowup_frame is None else outcome.blowup_frame
+        seen = {key: told for key, told in reduced.seen.columns().items() if told is not None}
+        file.attrs.update({**seen, "guard_stopped": reduced.seen.stopped})
         store_mesh(reduced.full.scene.mesh, file.create_group("mesh"))
         _store(file, "reduced", outcome.positions.astype(np.float32), "m")
         _store(file, "full", reduced.full.positions.astype(np.float32), "m")
@@ -71,7 +76,23 @@ def _reduced(scene: Scene, file: h5py.File) -> ReducedRun:
     )
     group, method = str(file.attrs["group"]), str(file.attrs["method"])
     r, gain, ms = int(file.attrs["r"]), float(file.attrs["gain"]), float(file.attrs["ms_per_frame"])
-    return ReducedRun(full, group, method, r, gain, outcome, ms)
+    return ReducedRun(full, group, method, r, gain, outcome, ms, _seen(file.attrs))
+
+
+def _seen(told: Mapping[str, Any]) -> GuardRecord:
+    """What the guard saw; nothing in a file without one."""
+    if "guard_count" not in told:
+        return GuardRecord.unwatched()
+    frame, reason = told.get("guard_frame"), told.get("guard_reason")
+    estimate = told.get("guard_estimate")
+    return GuardRecord(
+        frame=None if frame is None else int(frame),
+        reason=None if reason is None else str(reason),
+        count=int(told["guard_count"]),
+        fallback_frames=int(told["fallback_frames"]),
+        estimate=None if estimate is None else float(estimate),
+        stopped=bool(told["guard_stopped"]),
+    )
 
 
 def _scene(file: h5py.File, path: str | os.PathLike[str]) -> Scene:

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -14,23 +14,28 @@ import numpy as np
 from pdrom.core.errors import ConfigurationError, SnapshotError, choices
 from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5
-from pdrom.model.dynamics.stepper import FrameReport
+from pdrom.model.dynamics.stepper import FrameReport, State
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
+from pdrom.model.runs.bounded import Advance, BoundedRun
 from pdrom.model.runs.full_order import run as run_full_order
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis import Basis, compute_basis
-from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.rerun import replace_group, rerun
+from pdrom.reduction.local.guard import GuardRecord
+from pdrom.reduction.local.guard_settings import GuardSettings
+from pdrom.reduction.local.guarded import Trained, guarded
 from pdrom.reduction.method import MethodSpec, load_methods
-from pdrom.reduction.rerun import Rerun, displacement_norms
+from pdrom.reduction.rerun import Rerun, compare, mean_motion
 from pdrom.reduction.sampling import Reduction
 from pdrom.reduction.sampling.select import select
 from pdrom.reduction.snapshots import row_masses, training_frames
+from pdrom.reduction.subspace.companion import CompanionSpec, companion_model
+from pdrom.reduction.subspace.model import SubspaceModel
 
 METHODS = Path(__file__).resolve().parents[3] / "config" / "methods.yaml"
 SNAPSHOTS = 100  # at most, of a group for which the scene names no number
 # A reduced run ends when its bounding box exceeds this multiple of the mesh's.
 BLOWUP_EXTENT = 100.0
+UNGUARDED = GuardSettings(action="none")
 
 
 @dataclass(frozen=True)
@@ -62,7 +67,8 @@ class ReducedRun:
 
     gain : norm of the sampled equations' solution operator; 1 if every projection is evaluated
     outcome : positions (F' + 1, N, 3) m, differences, and whether it blew up
-    ms : milliseconds a frame (median), comparison included; nan if the first frame blew up
+    ms : milliseconds a frame (median), those of a guard included
+    seen : what the guard saw, if there was one
     """
 
     full: FullRun
@@ -72,12 +78,12 @@ class ReducedRun:
     gain: float
     outcome: Rerun
     ms: float
+    seen: GuardRecord = field(default_factory=GuardRecord.unwatched)
 
     @property
     def error(self) -> np.ndarray:
         """Error of each frame (F',) relative to the root mean square displacement of the run."""
-        displacement = displacement_norms(self.full.positions)
-        return self.outcome.difference / np.sqrt(np.mean(displacement**2))
+        return self.outcome.difference / mean_motion(self.full.positions)
 
     @property
     def title(self) -> str:
@@ -139,25 +145,36 @@ def reduce(
     method: str | MethodSpec = "gappy",
     r: int = 20,
     basis_of_group: Basis | None = None,
+    guard: GuardSettings = UNGUARDED,
 ) -> ReducedRun:
     """The scene again, with the projections of one group reduced to r modes.
 
-    A run that blows up ends there and is a result like any other.
+    A run that blows up, or that its guard stops, ends there and is a result like any other.
+
+    Parameters
+    ----------
+    guard : what watches the run, and what follows from an alarm; a companion that estimates its
+        error is trained on ``full``
 
     Raises
     ------
     RankError
         The snapshots have fewer than r modes above round-off.
+    NotReducibleError
+        A companion is asked for, and the scene has an effect that no position subspace takes.
     """
     scene, spec = full.scene, _spec(method)
     made = basis_of_group or basis(full, group, spec)
     reduction = Reduction(made, select(made, spec, r), spec, r)
-    steps = replace_group(scene, group, ReducedLocalStep(scene.group(group), reduction))
-    clock = _Clock()
-    outcome = rerun(scene, scene.system, [clock, *steps], full.positions, BLOWUP_EXTENT)
-    ms = 1e3 * float(np.median(np.diff(clock.stamps))) if len(clock.stamps) > 1 else np.nan
+    trained = _trained(full, group, guard)
+    advance, seen = guarded(scene, scene.system, group, reduction, guard, trained)
+    seconds: list[float] = []
+    start, frames, unit = scene.initial_state(), scene.config.frames, scene.mesh.extent
+    frame_by_frame = BoundedRun(_clocked(advance, seconds), start, frames, BLOWUP_EXTENT, unit)
+    outcome = compare(frame_by_frame, full.positions, lambda: seen.stopped)
+    ms = 1e3 * float(np.median(seconds))
     name = method if isinstance(method, str) else method.title
-    return ReducedRun(full, group, name, r, float(reduction.gain), outcome, ms)
+    return ReducedRun(full, group, name, r, float(reduction.gain), outcome, ms, seen)
 
 
 def methods() -> dict[str, MethodSpec]:
@@ -165,19 +182,26 @@ def methods() -> dict[str, MethodSpec]:
     return load_methods(METHODS)
 
 
-class _Clock:
-    """A local step that adds nothing and notes when each frame begins."""
+def _trained(full: FullRun, group: str, guard: GuardSettings) -> Trained:
+    """What the guard knows of the full-order run."""
+    companion: SubspaceModel | None = None
+    if guard.action != "none" and guard.alarm == "estimate":
+        frames = _training_frames(full.scene, group)
+        training = full.positions[1:][frames]
+        companion = companion_model(full.scene, training, frames, CompanionSpec())
+    return Trained.on(full.positions, companion)
 
-    name = "clock"
 
-    def __init__(self) -> None:
-        self.stamps: list[float] = []
+def _clocked(advance: Advance, seconds: list[float]) -> Advance:
+    """``advance`` that adds the time of every frame to ``seconds``."""
 
-    def begin_frame(self, q: np.ndarray) -> None:
-        self.stamps.append(perf_counter())
+    def step(state: State, frame: int) -> tuple[State, FrameReport]:
+        started = perf_counter()
+        result = advance(state, frame)
+        seconds.append(perf_counter() - started)
+        return result
 
-    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        return 0.0
+    return step
 
 
 def _spec(method: str | MethodSpec) -> MethodSpec:

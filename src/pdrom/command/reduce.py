@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from pdrom.command.base import Command, Status
 
 if TYPE_CHECKING:
-    from pdrom.api import ReducedRun
+    from pdrom.api import GuardSettings, ReducedRun
 
 
 def _size(text: str) -> int:
@@ -32,6 +32,24 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", metavar="FILE", help="file to write (HDF5); SCENE_G_M_R.h5 without it"
     )
+    parser.add_argument(
+        "--guard",
+        choices=("report", "stop", "fall-back"),
+        help="watch the run, and what follows from an alarm: it is reported, the run ends, or the "
+        "frame is repeated with full projections",
+    )
+    parser.add_argument(
+        "--alarm",
+        choices=("trained-range", "estimate"),
+        help="what gives the alarm: the run leaves what its basis was trained on (without this "
+        "option), or its error, estimated by a finer model that runs beside it, is too large",
+    )
+    parser.add_argument(
+        "--threshold",
+        metavar="E",
+        type=float,
+        help="largest estimated error that is no alarm, relative to the motion (0.15)",
+    )
     parser.add_argument("--plot", metavar="FILE", help="picture of the error against time to write")
 
 
@@ -42,6 +60,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.core.errors import StorageError
     from pdrom.core.store import atomic_path
 
+    guard = _guard(arguments)
     scene = load_scene(arguments.scene)
     scene.group(arguments.group)
     if arguments.run:
@@ -52,7 +71,7 @@ def perform(arguments: argparse.Namespace) -> Status:
             raise StorageError(f"{arguments.run}: a run of another scene than {arguments.scene}")
     else:
         full = run(scene, on_frame=Progress(scene.config.name, scene.config.frames))
-    reduced = reduce(full, arguments.group, arguments.method, arguments.r)
+    reduced = reduce(full, arguments.group, arguments.method, arguments.r, guard=guard)
     out = arguments.out or _file(arguments)
     save(reduced, out)
     if arguments.plot:
@@ -61,6 +80,21 @@ def perform(arguments: argparse.Namespace) -> Status:
             picture.savefig(path, dpi=200)
     sys.stdout.write(f"{out}: {_told(reduced)}\n")
     return Status.DONE if reduced.outcome.finite else Status.BLEW_UP
+
+
+def _guard(arguments: argparse.Namespace) -> "GuardSettings":
+    from pdrom.api import GuardSettings
+    from pdrom.core.errors import ConfigurationError
+    from pdrom.core.yamlfile import validate
+
+    asked = {"alarm": arguments.alarm, "threshold": arguments.threshold}
+    given = {key: value for key, value in asked.items() if value is not None}
+    if given and not arguments.guard:
+        raise ConfigurationError(f"--{next(iter(given))}: --guard is required with it")
+    if arguments.threshold is not None and arguments.alarm != "estimate":
+        raise ConfigurationError("--threshold: --alarm estimate is required with it")
+    action = arguments.guard or "none"
+    return validate(GuardSettings, {"action": action, **given}, "pdrom reduce")
 
 
 def _file(arguments: argparse.Namespace) -> str:
@@ -72,17 +106,34 @@ def _file(arguments: argparse.Namespace) -> str:
 def _told(reduced: "ReducedRun") -> str:
     import numpy as np
 
-    from pdrom.reduction.rerun import displacement_norms
-
     outcome, full = reduced.outcome, reduced.full
     if not outcome.finite:
-        return f"{reduced.title}: blew up at frame {outcome.blowup_frame} (gain {reduced.gain:.3g})"
-    error = outcome.error(displacement_norms(full.positions))
-    told = "no error: nothing moves" if error is None else f"relative error {error:.2g}"
-    return (
-        f"{reduced.title}: {told}, gain {reduced.gain:.3g}, {reduced.ms:.2f} ms a frame "
-        f"(full order {np.median(full.ms):.2f})"
-    )
+        told = f"blew up at frame {outcome.blowup_frame} (gain {reduced.gain:.3g})"
+    else:
+        speed = f"{reduced.ms:.2f} ms a frame (full order {np.median(full.ms):.2f})"
+        told = f"{_error(reduced)}, gain {reduced.gain:.3g}, {speed}"
+    return f"{reduced.title}: {told}{_seen(reduced)}"
+
+
+def _error(reduced: "ReducedRun") -> str:
+    from pdrom.reduction.rerun import displacement_norms
+
+    if reduced.seen.stopped:
+        return f"stopped after frame {reduced.outcome.frames - 1}"
+    error = reduced.outcome.error(displacement_norms(reduced.full.positions))
+    return "no error: nothing moves" if error is None else f"relative error {error:.2g}"
+
+
+def _seen(reduced: "ReducedRun") -> str:
+    """What the guard saw, if there was one."""
+    seen = reduced.seen
+    if not seen.watched:
+        return ""
+    told = "; no alarm"
+    if seen.frame is not None:
+        told = f"; alarms in {seen.count} frames, first in {seen.frame} ({seen.reason})"
+        told += f", {seen.fallback_frames} repeated" if seen.fallback_frames else ""
+    return told if seen.estimate is None else f"{told}; estimated error {seen.estimate:.2g}"
 
 
 COMMAND = Command(

@@ -1,4 +1,4 @@
-"""What a guard at run time costs, and what falling back to full projections buys."""
+"""What a guard at run time costs, by its alarm, and what falling back buys."""
 
 import logging
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from pdrom.core.paths import BASIS, GUARD, MESH, SAMPLING, TRAIN, File
+from pdrom.core.paths import BASIS, COMPANION, GUARD, MESH, SAMPLING, TRAIN, File
 from pdrom.core.reads import EachOf
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
@@ -21,30 +21,34 @@ from pdrom.model.energy import EnergyScale
 from pdrom.model.runs.bounded import Advance, BoundedRun
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import load_basis
-from pdrom.reduction.local.guard import Guard, largest_extent
-from pdrom.reduction.local.guard_settings import GuardSettings
-from pdrom.reduction.local.guarded import guarded_rerun
-from pdrom.reduction.local.local_step import ReducedLocalStep
+from pdrom.reduction.local.guard_settings import Action, AlarmName, GuardSettings
+from pdrom.reduction.local.guarded import Trained, guarded, guarded_rerun
 from pdrom.reduction.local.ranks import Rank, resolve_ranks
-from pdrom.reduction.local.rerun import replace_group
-from pdrom.reduction.local.watched import WatchedLocalStep
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import displacement_norms
 from pdrom.reduction.sampling import Reduction
 from pdrom.reduction.sampling.load import load_reduction
+from pdrom.reduction.subspace.store import load_models
 
 log = logging.getLogger(__name__)
 
-ACTIONS = ("none", "report", "fall-back")
+# Actions and alarms that are compared.
+WATCHES: tuple[tuple[Action, AlarmName], ...] = (
+    ("none", "trained-range"),
+    ("report", "trained-range"),
+    ("fall-back", "trained-range"),
+    ("report", "estimate"),
+    ("fall-back", "estimate"),
+)
 COLUMNS = [
-    "scene", "group", "method", "r", "action", "frames", "finite", "blowup_frame",
-    "relative_error", "energy_ratio", "guard_frame", "guard_reason", "guard_count",
-    "fallback_frames", "fallback_share", "ms_per_frame", "relative_cost",
+    "scene", "group", "method", "r", "action", "alarm", "threshold", "frames", "finite",
+    "blowup_frame", "relative_error", "energy_ratio", "guard_frame", "guard_reason", "guard_count",
+    "guard_estimate", "fallback_frames", "fallback_share", "ms_per_frame", "relative_cost",
 ]  # fmt: skip
 
 
 class TriedGuard(GuardSettings):
-    """A guard whose actions are compared, each timed ``repeats`` times."""
+    """A guard whose actions and alarms are compared, each timed ``repeats`` times."""
 
     repeats: Annotated[int, Field(ge=1)] = 3
 
@@ -58,7 +62,7 @@ class GuardCase(ConfigModel):
 
 
 class GuardSection(TriedGuard):
-    """Section ``guard``: the guard of the reruns, and the ``cases`` that compare its actions."""
+    """Section ``guard``: the guard of the reruns, and the ``cases`` that compare guards."""
 
     cases: tuple[GuardCase, ...] = ()
 
@@ -95,6 +99,7 @@ class Inputs:
     runs: Annotated[list[File], EachOf("trials", TRAIN)]
     bases: Annotated[list[File], EachOf("trials", BASIS)]
     samplings: Annotated[list[File], EachOf("trials", SAMPLING)]
+    companions: Annotated[list[File], EachOf("trials", COMPANION)]
 
 
 @dataclass(frozen=True)
@@ -105,9 +110,11 @@ class Outputs:
 
 
 def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
-    """Run every trial without a guard, watched, and with fall-back, and time all three."""
+    """Run every trial without a guard, watched, and with fall-back, and time all of them."""
     rows = []
-    files = zip(inputs.meshes, inputs.runs, inputs.bases, inputs.samplings, strict=True)
+    files = zip(
+        inputs.meshes, inputs.runs, inputs.bases, inputs.samplings, inputs.companions, strict=True
+    )
     for case, paths in zip(settings.trials, files, strict=True):
         trial = _Trial(case, settings, *paths)
         seconds = trial.seconds(settings.guard.repeats)
@@ -125,23 +132,32 @@ class _Trial:
     """One failing reduction."""
 
     def __init__(
-        self, case: Trial, settings: Settings, mesh: File, run: File, basis: File, sampling: File
+        self,
+        case: Trial,
+        settings: Settings,
+        mesh: File,
+        run: File,
+        basis: File,
+        sampling: File,
+        companion: File,
     ) -> None:
         self.case = case
         self.limit = settings.blowup_extent
         self.scene: Scene = scene_of(case.scene, mesh)
         self.system: GlobalSystem = self.scene.system_with(settings.solver)
         self.settings: list[GuardSettings] = [
-            settings.guard.model_copy(update={"action": action}) for action in ACTIONS
+            settings.guard.model_copy(update={"action": action, "alarm": alarm})
+            for action, alarm in WATCHES
         ]
         self.reference = positions_of(run)
-        self.trained_extent = largest_extent(self.reference)
+        ((_, model),) = load_models(companion.path)
+        self.trained = Trained.on(self.reference, model)
         space = load_basis(basis.path)
         r = min(resolve_ranks([case.r], space.rank)[0], space.rank)
         self.reduction: Reduction = load_reduction(space, sampling.path, case.method, r)
 
     def rows(self) -> list[dict[str, Any]]:
-        """The full-order run, then the actions."""
+        """The full-order run, then the reduced ones."""
         name = self.scene.config.name
         full: dict[str, Any] = {
             "scene": name,
@@ -156,8 +172,9 @@ class _Trial:
     def _row(self, settings: GuardSettings) -> dict[str, Any]:
         outcome, seen = guarded_rerun(
             self.scene, self.system, self.case.group, self.reduction, self.reference, self.limit,
-            settings, self.trained_extent,
+            settings, self.trained,
         )  # fmt: skip
+        estimated = seen.watched and settings.alarm == "estimate"
         share = seen.fallback_frames / outcome.frames if seen.watched else None
         return {
             "scene": self.scene.config.name,
@@ -165,6 +182,8 @@ class _Trial:
             "method": self.case.name,
             "r": self.reduction.r,
             "action": settings.action,
+            "alarm": settings.alarm if seen.watched else None,
+            "threshold": settings.threshold if estimated else None,
             "frames": outcome.frames,
             "finite": outcome.finite,
             "blowup_frame": outcome.blowup_frame,
@@ -184,19 +203,10 @@ class _Trial:
         return self.scene.stepper(self.system, self.scene.groups, track_objective=False).step
 
     def _guarded(self, settings: GuardSettings) -> Advance:
-        group = self.scene.group(self.case.group)
-        watches = settings.action != "none"
-        step: ReducedLocalStep | WatchedLocalStep
-        if watches:
-            step = WatchedLocalStep(group, self.reduction, self.scene.config.iterations)
-        else:
-            step = ReducedLocalStep(group, self.reduction)
-        steps = replace_group(self.scene, self.case.group, step)
-        loop = self.scene.stepper(self.system, steps, track_objective=watches)
-        if not isinstance(step, WatchedLocalStep):
-            return loop.step
-        guard = Guard(settings, [step], self.trained_extent)
-        return lambda state, frame: guard.step(loop, state, frame)
+        advance, _ = guarded(
+            self.scene, self.system, self.case.group, self.reduction, settings, self.trained
+        )
+        return advance
 
 
 def _time(advance: Advance, scene: Scene) -> float:

@@ -10,6 +10,7 @@ import pandas as pd
 
 from pdrom.core.paths import (
     BASIS,
+    COMPANION,
     HELDOUT,
     MESH,
     RECONSTRUCTION,
@@ -21,7 +22,9 @@ from pdrom.core.paths import (
     TRAIN,
     File,
 )
+from pdrom.core.reads import EachOf
 from pdrom.core.store import write_hdf5, write_table
+from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.declaration import Experiment, JobSettings
 from pdrom.experiments.sampling import Sweep, sample
 from pdrom.experiments.scenes import positions_of, scene_of
@@ -29,14 +32,15 @@ from pdrom.experiments.settings import BlowupExtent, Solver
 from pdrom.model.energy import EnergyScale
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, load_basis
-from pdrom.reduction.local.guard import GUARD_COLUMNS, GuardRecord, largest_extent
+from pdrom.reduction.local.guard import GUARD_COLUMNS, GuardRecord
 from pdrom.reduction.local.guard_settings import GuardSettings
-from pdrom.reduction.local.guarded import guarded_rerun
+from pdrom.reduction.local.guarded import Trained, guarded_rerun
 from pdrom.reduction.local.ranks import Rank, resolve_ranks
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun, displacement_norms, extent_norm
 from pdrom.reduction.sampling.load import load_reduction
 from pdrom.reduction.snapshots import load_snapshots
+from pdrom.reduction.subspace.store import load_models
 
 log = logging.getLogger(__name__)
 
@@ -46,8 +50,22 @@ COLUMNS = [
 ]  # fmt: skip
 
 
+class OfScene(ConfigModel):
+    """Names a file of a scene."""
+
+    scene: str
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Labels of the file."""
+        return {"scene": self.scene}
+
+
 class Settings(JobSettings):
-    """What samplings and reruns by one method depend on."""
+    """What samplings and reruns by one method depend on.
+
+    companions : that of the scene, if its guard estimates errors; else none
+    """
 
     scene: SceneConfig
     method: MethodSpec
@@ -56,6 +74,7 @@ class Settings(JobSettings):
     heldout_ranks: tuple[Rank, ...]
     blowup_extent: BlowupExtent
     guard: GuardSettings
+    companions: tuple[OfScene, ...]
     solver: Solver
 
 
@@ -68,6 +87,7 @@ class Inputs:
     heldout: Annotated[File, HELDOUT]
     snapshots: Annotated[File, SNAPSHOTS]
     basis: Annotated[File, BASIS]
+    companions: Annotated[list[File], EachOf("companions", COMPANION)]
 
 
 @dataclass(frozen=True)
@@ -90,7 +110,8 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     data = load_snapshots(inputs.snapshots.path)
     sample(basis, data, method, settings.sweep, settings.ranks, outputs.sampling, outputs.errors)
     labels = outputs.runs.labels
-    trained_extent = largest_extent(positions_of(inputs.fom))
+    companions = [model for file in inputs.companions for _, model in load_models(file.path)]
+    trained = Trained.on(positions_of(inputs.fom), companions[0] if companions else None)
     motions = {
         "train": (settings.ranks, inputs.fom, outputs.table),
         "heldout": (settings.heldout_ranks, inputs.heldout, outputs.heldout),
@@ -98,9 +119,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     with write_hdf5(outputs.runs.path) as file:
         for motion, (ranks, fom, table) in motions.items():
             scene = scene_of(settings.scene, inputs.mesh, motion)
-            case = _Case(
-                scene, motion, labels, settings, basis, outputs.sampling.path, trained_extent
-            )
+            case = _Case(scene, motion, labels, settings, basis, outputs.sampling.path, trained)
             file.attrs["extent_norm"] = extent_norm(positions_of(fom), scene.mesh.extent)
             store = file if motion == "train" else file.create_group(motion)
             rows = pd.DataFrame(case.run(store, ranks, positions_of(fom)), columns=COLUMNS)
@@ -118,7 +137,7 @@ class _Case:
     settings: Settings
     basis: Basis
     sampling: str
-    trained_extent: float
+    trained: Trained
 
     def run(
         self, file: h5py.Group, ranks: tuple[Rank, ...], reference: np.ndarray
@@ -145,7 +164,7 @@ class _Case:
             reduction = load_reduction(self.basis, self.sampling, settings.method, r)
             outcome, seen = guarded_rerun(
                 self.scene, system, self.labels["group"], reduction, reference,
-                settings.blowup_extent, settings.guard, self.trained_extent,
+                settings.blowup_extent, settings.guard, self.trained,
             )  # fmt: skip
             energy = scale.ratio(outcome.positions)
             _store(store, outcome, displacement, seen)

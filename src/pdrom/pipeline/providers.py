@@ -11,6 +11,7 @@ from pdrom.core import paths
 from pdrom.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
 from pdrom.experiments.guard import Trial
 from pdrom.experiments.repetitions import Repeated
+from pdrom.experiments.reruns import OfScene
 from pdrom.experiments.settings import Horizon
 from pdrom.experiments.stability import Stability
 from pdrom.model.mesh.config import MeshConfig
@@ -77,6 +78,13 @@ def _trials(study: Study, labels: Labels) -> tuple[Trial, ...]:
         for case in held
         for group in study.scenes[case.scene].reduce
     )
+
+
+def _companions(study: Study, labels: Labels) -> tuple[OfScene, ...]:
+    """The companion that a job's guard estimates errors with, if it does."""
+    guard = study.settings.guard
+    estimates = guard.action != "none" and guard.alarm == "estimate"
+    return (OfScene(scene=labels["scene"]),) if estimates else ()
 
 
 def _timed_scenes(study: Study, labels: Labels) -> tuple[NamedScene, ...]:
@@ -163,6 +171,7 @@ PROVIDERS: dict[str, Callable[[Study, Labels], Any]] = {
     "horizon": _horizon,
     "stability": _stability,
     "trials": _trials,
+    "companions": _companions,
     "timed_scenes": _timed_scenes,
     "large_scenes": _large_scenes,
     "subspace_cases": _subspace_cases,

@@ -96,3 +96,8 @@ def extent_norm(reference: np.ndarray, extent: float) -> float:
 def displacement_norms(reference: np.ndarray) -> np.ndarray:
     """|| Q_fom - rest ||_F of each frame, (F,) m; rest is the initial state."""
     return np.linalg.norm((reference[1:] - reference[0]).reshape(len(reference) - 1, -1), axis=1)
+
+
+def mean_motion(reference: np.ndarray) -> float:
+    """Root mean square of `displacement_norms` over the frames of a run, m."""
+    return float(np.sqrt(np.mean(displacement_norms(reference) ** 2)))

@@ -31,6 +31,9 @@ MARGIN = 1.5  # an estimate above this multiple of the companion's own error is 
                 "estimate", "distance to the companion, relative to its motion, before the horizon"
             ),
         ),
+        compared(
+            "error", number("largest_estimate", "largest one after any frame before the horizon")
+        ),
         compared("magnitude", number("ratio", "effectivity: estimate over error")),
         compared("run", flag("within", f"the ratio lies between {BAND[0]:g} and {BAND[1]:g}")),
         number("companion_error", "of the companion's own run of the motion before the horizon"),

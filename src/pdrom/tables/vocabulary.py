@@ -50,6 +50,9 @@ GUARD_FRAME = compared(
 )
 GUARD_REASON = compared("run", text("guard_reason", "what the guard saw there"))
 GUARD_COUNT = compared("run", integer("guard_count", "frames in which the guard saw something"))
+GUARD_ESTIMATE = compared(
+    "error", number("guard_estimate", "estimated error over the run, where that is the alarm")
+)
 MS_PER_FRAME = timed(number("ms_per_frame", "time of a frame", "ms"))
 LOCAL_MS = timed(number("local_ms", "time of the local step in a frame", "ms"))
 GLOBAL_MS = timed(number("global_ms", "time of the global solve in a frame", "ms"))

@@ -80,6 +80,16 @@ def test_files_are_read_back(full, tmp_path):
     assert np.array_equal(again.scene.mesh.triangles, full.scene.mesh.triangles)
 
 
+@pytest.mark.parametrize("action", ["none", "report", "stop", "fall-back"])
+def test_what_a_guard_saw_is_read_back(full, tmp_path, action):
+    guard = api.GuardSettings(action=action, alarm="estimate", threshold=1e-9)
+    reduced = api.reduce(full, "spring", "block-deim", 1, guard=guard)
+    assert (reduced.seen.count > 0) == (action != "none")
+    api.save(reduced, tmp_path / "guarded.h5")
+    # which group gave the alarm is the run's own
+    assert api.load(tmp_path / "guarded.h5").seen == replace(reduced.seen, group=None)
+
+
 def test_a_file_without_a_run_is_refused(tmp_path):
     with pytest.raises(StorageError, match="no such file"):
         api.load(tmp_path / "none.h5")

@@ -53,6 +53,21 @@ def test_a_scene_is_run_reduced_and_shown(folder, capsys):
         assert words in shown
 
 
+def test_a_run_is_watched_by_its_companion(folder, capsys):
+    run(["run", "small.yaml"])
+    capsys.readouterr()
+    asked = ["reduce", "small.yaml", "--group", "spring", "--r", "1", "--run", "small.h5"]
+    asked += ["--method", "block-deim", "--alarm", "estimate"]
+    assert run([*asked, "--guard", "report", "--threshold", "1e6"]) == Status.DONE
+    assert "; no alarm; estimated error " in capsys.readouterr().out
+    assert run([*asked, "--guard", "fall-back", "--threshold", "0"]) == Status.DONE
+    told = capsys.readouterr().out
+    assert "relative error 0, " in told
+    assert "; alarms in 12 frames, first in 0 (estimate), 12 repeated" in told
+    assert run([*asked, "--guard", "stop", "--threshold", "0"]) == Status.DONE
+    assert "stopped after frame 0" in capsys.readouterr().out
+
+
 def test_runs_are_put_on_a_page(folder, capsys):
     asked = ["reduce", "small.yaml", "--group", "spring", "--r"]
     assert [run([*asked, r]) for r in ("1", "2")] == [Status.DONE] * 2
@@ -99,6 +114,9 @@ def test_every_commented_effect_of_a_new_scene_is_valid():
     assert scene.mesh.sources == ["m.obj"]
 
 
+GUARDED = ["reduce", "small.yaml", "--group", "spring", "--guard", "stop"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -107,6 +125,9 @@ def test_every_commented_effect_of_a_new_scene_is_valid():
         (["reduce", "small.yaml", "--group", "sprin"], "no group 'sprin'"),
         (["reduce", "small.yaml", "--group", "spring", "--method", "gapy"], "did you mean 'gappy'"),
         (["reduce", "small.yaml", "--group", "spring", "--r", "99"], "r = 99"),
+        (["reduce", "small.yaml", "--group", "spring", "--alarm", "estimate"], "--guard is"),
+        ([*GUARDED, "--threshold", "1"], "--alarm estimate is required"),
+        ([*GUARDED, "--alarm", "estimate", "--threshold", "-1"], "threshold = -1"),
         (["run", "small.yaml", "--out", "nowhere.d/../small.yaml/x.h5"], "cannot be written"),
         (["new", "nowhere/x"], "No such file"),
     ],

@@ -27,7 +27,9 @@ def study(**sections) -> Study:
         ({"guard": {"margin": -0.1}}, "guard.margin = -0.1"),
         ({"guard": {"extent": 0.5}}, "guard.extent = 0.5"),
         ({"guard": {"rise": float("nan")}}, "guard.rise"),
-        ({"guard": {"threshold": 1}}, "unknown key 'guard.threshold'"),
+        ({"guard": {"limit": 1}}, "unknown key 'guard.limit'"),
+        ({"guard": {"threshold": -1}}, "guard.threshold = -1"),
+        ({"guard": {"alarm": "bell"}}, "guard.alarm = 'bell'"),
         ({"guard": {"cases": [{"scene": "a", "method": "b"}]}}, "guard.cases"),
         ({"stability": {"time_steps": [0.0]}}, "stability.time_steps"),
         ({"stability": {"stiffness_ratios": [-1.0]}}, "stability.stiffness_ratios"),
@@ -50,6 +52,21 @@ def test_reruns_depend_on_the_guard_but_not_on_its_cases():
     labels = {"scene": "strain_oop", "group": "strain", "method": "deim"}
     plain = made.settings(reruns, labels).model_dump(mode="json")["guard"]
     assert plain == GuardSettings(action="stop", margin=0.5).model_dump(mode="json")
+
+
+@pytest.mark.parametrize(
+    ("asked", "companions"),
+    [
+        ({"alarm": "estimate", "action": "stop"}, ["results/companion/strain_oop.h5"]),
+        ({"alarm": "estimate", "action": "none"}, []),
+        ({"alarm": "trained-range"}, []),
+    ],
+)
+def test_reruns_wait_for_the_companion_where_it_gives_the_alarm(asked, companions):
+    made = Jobs(study(guard=asked), "results")
+    (reruns,) = (e for e in made.experiments if e.name == "reruns")
+    labels = {"scene": "strain_oop", "group": "strain", "method": "deim"}
+    assert made.inputs(reruns)["companions"](labels) == companions
 
 
 def test_short_runs_are_planned_where_the_study_holds_them():
@@ -80,7 +97,7 @@ def test_cases_are_planned_where_the_study_holds_them():
         "elsewhere/sampling/strain_oop/strain/gappy.h5",
         "elsewhere/sampling/spring_oop/spring/deim.h5",
     ]
-    assert [len(files) for files in inputs.values()] == [2, 2, 2, 2]
+    assert [len(files) for files in inputs.values()] == [2] * 5
 
 
 def test_nothing_to_plan_is_no_fault():

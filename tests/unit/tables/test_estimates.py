@@ -5,8 +5,8 @@ import pytest
 
 from pdrom.core.paths import COMPANION_TIMES, ESTIMATES, RERUNS_HELDOUT, RERUNS_TRAIN
 from pdrom.core.store import write_table
-from pdrom.experiments.companion import COLUMNS
 from pdrom.experiments.companion_times import COLUMNS as TIMES
+from pdrom.experiments.estimates import COLUMNS
 from pdrom.tables.alarms import alarms
 from pdrom.tables.estimates import estimates
 from pdrom.tables.model_choice import model_choice
@@ -31,7 +31,7 @@ def read(tmp_path):
         for method, basis, k, r, error, value, _ in RUNS:
             group = "spring" if basis == "full" else "all"
             labels = ("calm", group, method, basis, k, r, split)
-            rows.append((*labels, error, value, 0.01))
+            rows.append((*labels, error, value, value + 0.01, 0.01))
     part = ESTIMATES.at(str(tmp_path), scene="calm")
     write_table(pd.DataFrame(rows, columns=COLUMNS), part)
     times = COMPANION_TIMES.at(str(tmp_path), scene="calm")
@@ -66,12 +66,25 @@ def test_estimates_stand_beside_the_errors(read):
 
 def test_alarms_of_guard_and_estimate_are_counted_over_the_same_runs(read):
     made, reruns, (train, heldout) = read
-    found = alarms(made, reruns, reruns, train, heldout, 0.15).set_index(["split", "alarm"])
+    found = alarms(made, reruns, reruns, train, heldout, 0.15, "trained-range")
+    found = found.set_index(["split", "alarm"])
     for split in ("train", "heldout"):
-        guard, own = found.loc[(split, "guard")], found.loc[(split, "estimate")]
+        guard, own = found.loc[(split, "trained-range")], found.loc[(split, "estimate")]
         assert (guard.runs, guard.failed, own.runs, own.failed) == (3, 2, 3, 2)
         assert (guard.detected_share, guard.false_share) == (0.5, 1.0)
         assert (own.detected_share, own.false_share) == (1.0, 0.0)
+
+
+def test_what_counts_is_the_largest_estimate_of_a_run(read):
+    made, reruns, (train, heldout) = read
+    found = alarms(made, reruns, reruns, train, heldout, 0.035, "trained-range")
+    assert found[found.alarm == "estimate"].false_share.tolist() == [1.0, 1.0]
+
+
+def test_a_guard_that_listens_to_the_estimate_has_no_other_row(read):
+    made, reruns, (train, heldout) = read
+    found = alarms(made, reruns, reruns, train, heldout, 0.15, "estimate")
+    assert found.alarm.tolist() == ["estimate", "estimate"]
 
 
 def test_the_cheapest_model_within_the_tolerance_is_chosen(read):

@@ -1,16 +1,81 @@
-"""A rerun with one group reduced, watched by a guard as the settings say."""
+"""A run with one group reduced, watched by a guard as the settings say."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
+from pdrom.core.errors import ConfigurationError
+from pdrom.model.dynamics.stepper import LocalStep, Stepper
 from pdrom.model.dynamics.system import GlobalSystem
+from pdrom.model.runs.bounded import Advance, BoundedRun
 from pdrom.model.scene import Scene
+from pdrom.reduction.local.estimate_alarm import EstimateAlarm
 from pdrom.reduction.local.guard import Guard, GuardRecord
 from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.rerun import replace_group, rerun
+from pdrom.reduction.local.rerun import replace_group
+from pdrom.reduction.local.trained_range import TrainedRange, largest_extent
 from pdrom.reduction.local.watched import WatchedLocalStep
-from pdrom.reduction.rerun import Rerun
+from pdrom.reduction.rerun import Rerun, compare, mean_motion
 from pdrom.reduction.sampling.reduction import Reduction
+from pdrom.reduction.subspace.model import SubspaceModel
+
+
+@dataclass(frozen=True)
+class Trained:
+    """What a guard knows of the training run.
+
+    extent : longest side of its bounding box, m
+    motion : see `pdrom.reduction.rerun.mean_motion`, m
+    companion : trained on it; only the estimate needs one
+    """
+
+    extent: float
+    motion: float
+    companion: SubspaceModel | None = None
+
+    @classmethod
+    def on(cls, reference: np.ndarray, companion: SubspaceModel | None = None) -> "Trained":
+        """Of the training run's positions ``reference``, (F + 1, N, 3) m."""
+        return cls(largest_extent(reference), mean_motion(reference), companion)
+
+
+def guarded(
+    scene: Scene,
+    system: GlobalSystem,
+    group: str,
+    reduction: Reduction,
+    settings: GuardSettings,
+    trained: Trained,
+) -> tuple[Advance, GuardRecord]:
+    """What does the frames of a run of ``scene`` with ``group`` reduced, and what its guard saw.
+
+    Raises
+    ------
+    ConfigurationError
+        The estimate is to give the alarm, and there is no companion.
+    """
+
+    def loop(step: LocalStep, watched: bool = False) -> Stepper:
+        return scene.stepper(system, replace_group(scene, group, step), track_objective=watched)
+
+    chosen = scene.group(group)
+    if settings.action == "none":
+        return loop(ReducedLocalStep(chosen, reduction)).step, GuardRecord.unwatched()
+    full = scene.stepper(system, track_objective=False)
+    if settings.alarm == "estimate":
+        if trained.companion is None:
+            raise ConfigurationError("guard.alarm = 'estimate': a companion is required")
+        estimate = EstimateAlarm(
+            scene, group, trained.companion, trained.motion, settings.threshold
+        )
+        reduced = loop(ReducedLocalStep(chosen, reduction))
+        guard = Guard(settings.action, estimate, reduced, full)
+    else:
+        watched = WatchedLocalStep(chosen, reduction, scene.config.iterations)
+        leaves = TrainedRange(settings, [watched], trained.extent)
+        guard = Guard(settings.action, leaves, loop(watched, watched=True), full)
+    return guard.step, guard.record
 
 
 def guarded_rerun(
@@ -21,20 +86,16 @@ def guarded_rerun(
     reference: np.ndarray,
     blowup_extent: float,
     settings: GuardSettings,
-    trained_extent: float,
+    trained: Trained,
 ) -> tuple[Rerun, GuardRecord]:
     """Rerun of ``scene`` with ``group`` reduced, and what the guard saw.
 
     Parameters
     ----------
-    reference, blowup_extent : see `rerun`
-    trained_extent : see `Guard`
+    reference, blowup_extent : see `pdrom.reduction.local.rerun.rerun`
+    settings, trained : see `guarded`
     """
-    chosen = scene.group(group)
-    if settings.action == "none":
-        steps = replace_group(scene, group, ReducedLocalStep(chosen, reduction))
-        return rerun(scene, system, steps, reference, blowup_extent), GuardRecord.unwatched()
-    watched = WatchedLocalStep(chosen, reduction, scene.config.iterations)
-    guard = Guard(settings, [watched], trained_extent)
-    steps = replace_group(scene, group, watched)
-    return rerun(scene, system, steps, reference, blowup_extent, guard), guard.record
+    advance, record = guarded(scene, system, group, reduction, settings, trained)
+    start, frames, unit = scene.initial_state(), scene.config.frames, scene.mesh.extent
+    run = BoundedRun(advance, start, frames, blowup_extent, unit)
+    return compare(run, reference, lambda: record.stopped), record

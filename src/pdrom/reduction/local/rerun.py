@@ -4,11 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pdrom.model.dynamics.stepper import FrameReport, LocalStep, State
+from pdrom.model.dynamics.stepper import LocalStep
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.runs.bounded import BoundedRun
 from pdrom.model.scene import Scene
-from pdrom.reduction.local.guard import Guard
 from pdrom.reduction.rerun import Rerun, compare
 
 
@@ -24,7 +23,6 @@ def rerun(
     local_steps: Sequence[LocalStep],
     reference: np.ndarray,
     blowup_extent: float,
-    guard: Guard | None = None,
     offset: np.ndarray | None = None,
 ) -> Rerun:
     """Run a scene with other local steps and compare it with its full-order trajectory.
@@ -34,15 +32,7 @@ def rerun(
     reference : (F + 1, N, 3) positions of the full-order run
     blowup_extent : the run ends when the extent exceeds this multiple of the rest extent
     offset : (N, 3) m, added to the first positions
-    guard : watches steps among ``local_steps``, and may end the run or repeat its frames
     """
-    loop = scene.stepper(system, local_steps, track_objective=guard is not None)
-
-    def advance(state: State, frame: int) -> tuple[State, FrameReport]:
-        return guard.step(loop, state, frame) if guard else loop.step(state, frame)
-
-    def stopped() -> bool:
-        return guard is not None and guard.record.stopped
-
+    loop = scene.stepper(system, local_steps, track_objective=False)
     start, frames, unit = scene.initial_state(offset), scene.config.frames, scene.mesh.extent
-    return compare(BoundedRun(advance, start, frames, blowup_extent, unit), reference, stopped)
+    return compare(BoundedRun(loop.step, start, frames, blowup_extent, unit), reference)

@@ -1,4 +1,4 @@
-"""A reduced local step that keeps an eye on itself: coefficients, energy, and full projections."""
+"""A reduced local step that keeps an eye on itself: its coefficients and its energy."""
 
 from collections.abc import Collection
 
@@ -20,15 +20,10 @@ class WatchedLocalStep(ReducedLocalStep, WatchedStep):
     Parameters
     ----------
     iterations : K of the step loop
-
-    Attributes
-    ----------
-    full : whether the frames from now on use the full projections of the group
     """
 
     def __init__(self, group: ConstraintGroup, reduction: Reduction, iterations: int) -> None:
         super().__init__(group, reduction)
-        self.full = False
         self._iterations = iterations
         self._boxes = [_Box(*_trained(reduction, b.axis)) for b in reduction.blocks]
         self._stiffness = group.system_matrix()
@@ -46,22 +41,15 @@ class WatchedLocalStep(ReducedLocalStep, WatchedStep):
     @property
     def watched(self) -> Collection[int]:
         """Iterations that compiled code leaves out."""
-        if self.full:
-            return range(self._iterations)
         return (self._iterations // 2, self._iterations - 1)
 
     def begin_frame(self, q: np.ndarray) -> None:
         for box in self._boxes:
             box.reset()
-        if self.full:
-            self._group.begin_frame(q)
-        else:
-            super().begin_frame(q)
+        super().begin_frame(q)
 
     def look(self, y: np.ndarray, rhs: np.ndarray) -> float:
         """`accumulate` in a watched iteration; the energy is that of the reduced projections."""
-        if self.full:
-            return self._group.accumulate(y, rhs)
         before = rhs.copy()
         self.accumulate(y, rhs)
         for box, own in zip(self._boxes, self.coefficients, strict=True):

@@ -9,6 +9,7 @@ sampled elements of its own. It does not depend on the run: one companion serves
 motion, and none of them needs the full order.
 """
 
+from collections.abc import Iterator
 from typing import Annotated
 
 import numpy as np
@@ -44,13 +45,22 @@ def companion_model(
     return SubspaceModel(kind, columns, samples)
 
 
-def companion_run(scene: Scene, model: SubspaceModel) -> np.ndarray:
-    """Positions (F' + 1, N, 3) m of the companion, the initial ones first; finite frames only."""
+def companion_frames(scene: Scene, model: SubspaceModel) -> Iterator[np.ndarray]:
+    """Positions (N, 3) m of the companion, the initial ones first, each computed when asked for.
+
+    They end with the run, or before the first frame that is not finite.
+    """
     loop, start = model.loop(scene)
     frames, unit = scene.config.frames, scene.mesh.extent
     run = BoundedRun(loop.step, start, frames, np.inf, unit, model.positions)
-    first = model.positions(start.positions)
-    return np.stack([first, *(frame.positions for frame in run)])
+    yield model.positions(start.positions)
+    for frame in run:
+        yield frame.positions
+
+
+def companion_run(scene: Scene, model: SubspaceModel) -> np.ndarray:
+    """`companion_frames` of the whole run, (F' + 1, N, 3) m."""
+    return np.stack(list(companion_frames(scene, model)))
 
 
 def estimate(positions: np.ndarray, companion: np.ndarray, end: int) -> float | None:
@@ -68,3 +78,60 @@ def estimate(positions: np.ndarray, companion: np.ndarray, end: int) -> float | 
     if moved == 0.0:
         return None
     return float(np.linalg.norm(positions[1:last] - companion[1:last])) / moved
+
+
+class RunningEstimate:
+    """Estimated relative error of a run while it runs.
+
+    Root mean square of || Q_f - Q'_f ||_F over the frames f so far, over that of the displacement
+    || Q_f - Q_0 ||_F over the training run. What the run itself has moved so far is no unit: at
+    its beginning that is next to nothing, and every run would be wrong.
+
+    Parameters
+    ----------
+    motion : root mean square displacement of the training run, m
+    """
+
+    def __init__(self, motion: float) -> None:
+        self._motion = motion
+        self._squares = 0.0
+        self._frames = 0
+
+    @property
+    def value(self) -> float | None:
+        """The estimate; None before the first frame."""
+        return self._ratio(self._squares, self._frames) if self._frames else None
+
+    def after(self, positions: np.ndarray, companion: np.ndarray) -> float:
+        """What the estimate would be after one more frame, whose ends are (N, 3) m each."""
+        return self._ratio(self._squares + _square(positions, companion), self._frames + 1)
+
+    def add(self, positions: np.ndarray, companion: np.ndarray) -> None:
+        """Take in one more frame."""
+        self._squares += _square(positions, companion)
+        self._frames += 1
+
+    def _ratio(self, squares: float, frames: int) -> float:
+        return float(np.sqrt(squares / frames)) / self._motion
+
+
+def _square(positions: np.ndarray, companion: np.ndarray) -> float:
+    difference = positions - companion
+    return float(np.vdot(difference, difference))
+
+
+def largest_estimate(
+    positions: np.ndarray, companion: np.ndarray, motion: float, end: int
+) -> float | None:
+    """Largest `RunningEstimate` after any frame before ``end``; None if neither run has a frame.
+
+    Parameters
+    ----------
+    positions, companion : (F + 1, N, 3) m, the initial ones first
+    """
+    running, largest = RunningEstimate(motion), None
+    for own, other in zip(positions[1 : end + 1], companion[1:], strict=False):
+        running.add(own, other)
+        value = running.value or 0.0
+        largest = value if largest is None else max(largest, value)
+    return largest

@@ -150,15 +150,18 @@ def guard(tables: Tables) -> str:
     for row in tables["guard"].itertuples():
         full = row.method == "full"
         action = "full order" if full else row.action
+        alarm = "--" if pd.isna(row.alarm) else row.alarm.replace("-", " ")
+        estimate = "--" if pd.isna(row.guard_estimate) else format_number(row.guard_estimate)
         method = "" if full else name(f"{row.method}, r = {int(row.r)}")
         share = "--" if pd.isna(row.fallback_share) else format_number(row.fallback_share)
         first = "--" if pd.isna(row.guard_frame) else f"{int(row.guard_frame)}, {row.guard_reason}"
         error = "blow-up" if pd.isna(row.relative_error) else format_number(row.relative_error)
-        cells = [error, format_number(row.energy_ratio), first, share]
-        rows.append([name(row.scene), method, action, *cells, format_number(row.ms_per_frame)])
-    header = ["scene", "method", "guard", "error", "energy", "first frame, reason", "fallen back",
-              "ms per frame"]  # fmt: skip
-    return tabular(header, rows, "lllrrlrr")
+        cells = [error, estimate, format_number(row.energy_ratio), first, share]
+        ms = format_number(row.ms_per_frame)
+        rows.append([name(row.scene), method, action, alarm, *cells, ms])
+    header = ["scene", "method", "guard", "alarm", "error", "estimate", "energy",
+              "first frame, reason", "fallen back", "ms per frame"]  # fmt: skip
+    return tabular(header, rows, "llllrrrlrr")
 
 
 TEX_TABLES = {

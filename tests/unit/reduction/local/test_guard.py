@@ -11,11 +11,12 @@ from builders import GROUPS, make_scene
 from pdrom.model.dynamics.stepper import FrameReport, State
 from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.basis import compute_basis
-from pdrom.reduction.local.guard import Guard, GuardRecord, largest_extent
+from pdrom.reduction.local.guard import Guard, GuardRecord
 from pdrom.reduction.local.guard_settings import GuardSettings
-from pdrom.reduction.local.guarded import guarded_rerun
+from pdrom.reduction.local.guarded import Trained, guarded_rerun
 from pdrom.reduction.local.local_step import ReducedLocalStep
 from pdrom.reduction.local.rerun import replace_group, rerun
+from pdrom.reduction.local.trained_range import TrainedRange
 from pdrom.reduction.local.watched import WatchedLocalStep
 from pdrom.reduction.method import load_methods
 from pdrom.reduction.sampling import Reduction, select
@@ -60,7 +61,7 @@ class Case:
     def run(self, reduction: Reduction, **settings):
         return guarded_rerun(
             self.scene, self.scene.system, self.group.name, reduction, self.reference, 50.0,
-            GuardSettings(**settings), largest_extent(self.reference),
+            GuardSettings(**settings), Trained.on(self.reference),
         )  # fmt: skip
 
 
@@ -161,7 +162,6 @@ class Quiet:
     """A step whose coefficients lie as far out as it is told."""
 
     name = "spring"
-    full = False
     projection_energy = 1.0
 
     def __init__(self, distance=0.0) -> None:
@@ -177,8 +177,15 @@ FALLING = [np.nan, 2.0, np.nan, 1.0]
 
 def watch(distance=0.0, position=BOX, objective=FALLING, **settings) -> GuardRecord:
     """Record of a guard after frame 3 of a loop."""
-    guard = Guard(GuardSettings(**settings), [Quiet(), Quiet(distance)], 1.0)
-    guard.step(Told({3: position}, {3: objective}), State(BOX, BOX), 3)
+    told = Told({3: position}, {3: objective})
+    return watched([Quiet(), Quiet(distance)], told, 3, **settings)
+
+
+def watched(steps, told, frame, **settings) -> GuardRecord:
+    """Record of a guard after a frame of a loop with these steps."""
+    alarm = TrainedRange(GuardSettings(**settings), steps, 1.0)
+    guard = Guard("report", alarm, told, told)
+    guard.step(State(BOX, BOX), frame)
     return guard.record
 
 
@@ -226,9 +233,8 @@ def test_what_stays_within_the_limits_is_no_news(changes):
 
 @pytest.mark.parametrize(("steps", "group"), [(1, "spring"), (2, "all")])
 def test_a_group_is_named_where_only_it_is_reduced(steps, group):
-    guard = Guard(GuardSettings(), [Quiet() for _ in range(steps)], 1.0)
-    guard.step(Told({0: 9.0 * BOX}, {0: FALLING}), State(BOX, BOX), 0)
-    assert (guard.record.group, guard.record.reason) == (group, "extent")
+    record = watched([Quiet() for _ in range(steps)], Told({0: 9.0 * BOX}, {0: FALLING}), 0)
+    assert (record.group, record.reason) == (group, "extent")
 
 
 @given(st.floats(0.0, 5.0), st.floats(0.0, 5.0))

@@ -38,7 +38,7 @@ from places import ROOT
 
 FRAMES = 20
 SETTINGS = {"sensitivity.reference": 1e-10, "sensitivity.threshold": 1e-3,
-            "stability.wrong": 0.1, "stability.left": 2.0, "companion.alarm": 0.15}  # fmt: skip
+            "stability.wrong": 0.1, "stability.left": 2.0, "guard.threshold": 0.12}  # fmt: skip
 ROWS = {"bending": 1, "spring": 1, "strain": 2, "deformation_gradient": 3, "tetrahedron_strain": 3}
 METHOD_ROWS = {"pod": "all", "deim": "scalar", "qdeim": "scalar", "deim-joint": "joint",
                "published": "joint", "block-deim": "element"}  # fmt: skip

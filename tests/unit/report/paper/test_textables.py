@@ -118,16 +118,18 @@ TABLES = {
     ),
     "guard": pd.DataFrame(
         [
-            ("bar_a", "full", None, "none", 0.0, 1.0, None, None, None, 2.0),
-            ("bar_a", "deim_x", 20, "none", 0.5, 4.0, None, None, None, 1.0),
-            ("bar_a", "deim_x", 20, "fall-back", None, 1.0, 3, "extent", 0.25, 1.5),
+            ("bar_a", "full", None, "none", None, 0.0, None, 1.0, None, None, None, 2.0),
+            ("bar_a", "deim_x", 20, "none", None, 0.5, None, 4.0, None, None, None, 1.0),
+            ("bar_a", "deim_x", 20, "fall-back", "a-b", None, 0.4, 1.0, 3, "extent", 0.25, 1.5),
         ],
         columns=[
             "scene",
             "method",
             "r",
             "action",
+            "alarm",
             "relative_error",
+            "guard_estimate",
             "energy_ratio",
             "guard_frame",
             "guard_reason",
@@ -424,6 +426,6 @@ def test_stability_counts_what_ran():
 
 def test_guard_shows_what_was_seen_and_repeated():
     full, plain, fallen = rows(guard(TABLES))
-    assert full == r"\texttt{bar\_a} &  & full order & 0 & 1 & -- & -- & 2 \\"
-    assert plain.endswith(r"& none & 0.50 & 4 & -- & -- & 1 \\")
-    assert fallen.endswith(r"& fall-back & blow-up & 1 & 3, extent & 0.25 & 1.5 \\")
+    assert full == r"\texttt{bar\_a} &  & full order & -- & 0 & -- & 1 & -- & -- & 2 \\"
+    assert plain.endswith(r"& none & -- & 0.50 & -- & 4 & -- & -- & 1 \\")
+    assert fallen.endswith(r"& fall-back & a b & blow-up & 0.40 & 1 & 3, extent & 0.25 & 1.5 \\")

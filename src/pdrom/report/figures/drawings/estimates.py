@@ -28,7 +28,7 @@ def draw(results: Results, options: Scenes) -> Figure:
     table = table[table.ratio.notna()]
     if table.empty:
         raise NothingToDraw("no run with an estimate and an error")
-    alarm = float(results.settings["companion.alarm"])
+    alarm = float(results.settings["guard.threshold"])
     figure = Figure(figsize=(style.WIDTH, 3.6), layout="constrained")
     axes = figure.subplots(1, 2, sharey=True)
     for ax, (split, title) in zip(axes, SPLITS.items(), strict=True):

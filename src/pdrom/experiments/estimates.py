@@ -1,0 +1,146 @@
+"""Estimated errors of all runs of a scene: their distances to the companion."""
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import h5py
+import numpy as np
+import pandas as pd
+
+from pdrom.core.paths import (
+    COMPANION,
+    ESTIMATES,
+    HELDOUT,
+    MESH,
+    RERUNS,
+    SENSITIVITY,
+    SUBSPACES,
+    TRAIN,
+    File,
+)
+from pdrom.core.reads import Every
+from pdrom.core.store import open_hdf5, write_table
+from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.motion import Motion
+from pdrom.experiments.scenes import RUNS, positions_of, scene_of
+from pdrom.experiments.settings import Horizon
+from pdrom.model.runs.horizon import error_within
+from pdrom.model.scene import SceneConfig
+from pdrom.reduction.rerun import displacement_norms, mean_motion
+from pdrom.reduction.subspace.companion import companion_run, estimate, largest_estimate
+from pdrom.reduction.subspace.store import load_models
+
+log = logging.getLogger(__name__)
+
+COLUMNS = [
+    "scene", "group", "method", "position_basis", "k", "r", "split",
+    "relative_error_within_horizon", "estimate", "largest_estimate", "companion_error",
+]  # fmt: skip
+
+
+class Settings(JobSettings):
+    """What the estimates of a scene depend on."""
+
+    scene: SceneConfig
+    horizon: Horizon
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Files read; the full-order runs are there to judge the estimates only."""
+
+    mesh: Annotated[File, MESH]
+    train: Annotated[File, TRAIN]
+    heldout: Annotated[File, HELDOUT]
+    model: Annotated[File, COMPANION]
+    perturbed: Annotated[File, SENSITIVITY]
+    reruns: Annotated[list[File], Every(RERUNS)]
+    subspaces: Annotated[list[File], Every(SUBSPACES)]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files written: a row for every run of both motions."""
+
+    table: Annotated[File, ESTIMATES]
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A run of a reduced model: its labels, positions (F + 1, N, 3) m and norms by frame (F,)."""
+
+    labels: dict[str, Any]
+    positions: np.ndarray
+    difference: np.ndarray
+    displacement: np.ndarray
+
+
+def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+    """Run both motions with the companion and compare all their runs with it."""
+    ((_, model),) = load_models(inputs.model.path)
+    unit = mean_motion(positions_of(inputs.train))
+    rows: list[dict[str, Any]] = []
+    for split in RUNS:
+        motion = Motion(scene_of(settings.scene, inputs.mesh, split), getattr(inputs, split))
+        companion = companion_run(motion.scene, model)
+        end = settings.horizon.frames(inputs.perturbed, split)
+        own = _companion_error(companion, motion, end)
+        for found in (*_local(inputs.reruns, split), *_inside(inputs.subspaces, split, motion)):
+            error = error_within(found.difference, found.displacement, end)
+            rows.append(
+                {
+                    **found.labels,
+                    "split": split,
+                    "relative_error_within_horizon": error,
+                    "estimate": estimate(found.positions, companion, end),
+                    "largest_estimate": largest_estimate(found.positions, companion, unit, end),
+                    "companion_error": own,
+                }
+            )
+        log.info("%s: companion's own error %s", split, own)
+    whole = {"k": "Int64", "r": "Int64"}
+    write_table(pd.DataFrame(rows, columns=COLUMNS).astype(whole), outputs.table.path)
+
+
+def _companion_error(companion: np.ndarray, motion: Motion, end: int) -> float | None:
+    reference = motion.reference[1 : len(companion)]
+    difference = np.linalg.norm((companion[1:] - reference).reshape(len(reference), -1), axis=1)
+    return error_within(difference, displacement_norms(motion.reference), end)
+
+
+def _local(files: list[File], split: str) -> Iterator[_Run]:
+    """Runs whose positions are not reduced; sizes beyond the rank were not run."""
+    for source in files:
+        with open_hdf5(source.path) as file:
+            store = file if split == "train" else file[split]
+            for run in (run for name, run in store.items() if name.startswith("r")):
+                if "positions" in run:
+                    size = {"k": None, "r": int(run.attrs["r"])}
+                    labels = {**source.labels, "position_basis": "full", **size}
+                    positions = run["positions"][...].astype(np.float64)
+                    yield _made(labels, positions, run, store["displacement"])
+
+
+def _inside(files: list[File], split: str, motion: Motion) -> Iterator[_Run]:
+    """Runs in position subspaces."""
+    for source in files:
+        models = load_models(source.path)
+        with open_hdf5(source.path) as file:
+            for labels, model in models:
+                base = f"{labels['position_basis']}_k{labels['k']:03d}"
+                run = file[f"models/{base}_{labels['method']}/{split}"]
+                size = {"group": "all", "r": model.elements_evaluated(motion.scene)}
+                positions = np.stack([model.positions(z) for z in run["coordinates"][...]])
+                named = {**source.labels, **labels, **size}
+                yield _made(named, positions, run, file[f"displacement/{split}"])
+
+
+def _made(
+    labels: dict[str, Any], positions: np.ndarray, run: h5py.Group, displacement: h5py.Dataset
+) -> _Run:
+    return _Run(labels, positions, run["difference"][...], displacement[...])
+
+
+EXPERIMENT = Experiment("estimates", "Estimated errors of the runs of {scene}", run)

@@ -1,0 +1,25 @@
+"""What a guard asks about a reduced run, frame by frame."""
+
+from abc import ABC, abstractmethod
+
+from pdrom.model.dynamics.stepper import FrameReport, State
+
+
+class Alarm(ABC):
+    """Looks at the end of every frame of a run, without the full order."""
+
+    @abstractmethod
+    def raised(self, state: State, report: FrameReport) -> tuple[str, str] | None:
+        """(group, reason) if the frame gives an alarm; "all" if it may be any group.
+
+        Called once a frame; the frame may be repeated with full projections after it.
+        """
+
+    @abstractmethod
+    def accept(self, state: State) -> None:
+        """The run goes on from ``state``, the end of the frame asked about or of its repetition."""
+
+    @property
+    @abstractmethod
+    def estimate(self) -> float | None:
+        """Estimated error of the run over its accepted frames; None if nobody estimates it."""
