@@ -32,7 +32,10 @@ MARGIN = 1.5  # an estimate above this multiple of the companion's own error is 
             ),
         ),
         compared(
-            "error", number("largest_estimate", "largest one after any frame before the horizon")
+            "error",
+            number(
+                "largest_estimate", "largest one while it runs, over the motion of the training run"
+            ),
         ),
         compared("magnitude", number("ratio", "effectivity: estimate over error")),
         compared("run", flag("within", f"the ratio lies between {BAND[0]:g} and {BAND[1]:g}")),

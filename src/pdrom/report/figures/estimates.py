@@ -12,8 +12,8 @@ FIGURE = Declaration(
         "the companion's run is used. Between the dashed lines the estimate is within a factor of "
         "three. Open dots are not resolved: the estimate is not above one and a half times the "
         "companion's own error on the training motion, and says no more than that the error is "
-        "small. Dotted: an estimate of {guard.threshold}, taken as an alarm. What lies outside is "
-        "drawn on the rim."
+        "small. Dotted: {guard.threshold}, above which a guard takes it as an alarm. What lies "
+        "outside is drawn on the rim."
     ),
     reads=(TableOf("estimates"), Setting("guard.threshold")),
     options=Scenes,
