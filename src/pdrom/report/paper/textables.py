@@ -150,7 +150,7 @@ def guard(tables: Tables) -> str:
     for row in tables["guard"].itertuples():
         full = row.method == "full"
         action = "full order" if full else row.action
-        alarm = "--" if pd.isna(row.alarm) else row.alarm.replace("-", " ")
+        alarm = "--" if pd.isna(row.alarm) else row.alarm.removeprefix("trained-")
         estimate = "--" if pd.isna(row.guard_estimate) else format_number(row.guard_estimate)
         method = "" if full else name(f"{row.method}, r = {int(row.r)}")
         share = "--" if pd.isna(row.fallback_share) else format_number(row.fallback_share)
@@ -159,8 +159,8 @@ def guard(tables: Tables) -> str:
         cells = [error, estimate, format_number(row.energy_ratio), first, share]
         ms = format_number(row.ms_per_frame)
         rows.append([name(row.scene), method, action, alarm, *cells, ms])
-    header = ["scene", "method", "guard", "alarm", "error", "estimate", "energy",
-              "first frame, reason", "fallen back", "ms per frame"]  # fmt: skip
+    header = ["scene", "method", "guard", "alarm", "error", "estimate", "energy", "first alarm",
+              "repeated", "ms"]  # fmt: skip
     return tabular(header, rows, "llllrrrlrr")
 
 
