@@ -119,8 +119,8 @@ TABLES = {
     "guard": pd.DataFrame(
         [
             ("bar_a", "full", None, "none", None, 0.0, None, 1.0, None, None, None, 2.0),
-            ("bar_a", "deim_x", 20, "none", None, 0.5, None, 4.0, None, None, None, 1.0),
-            ("bar_a", "deim_x", 20, "fall-back", "trained-a", None, 0.4, 1.0, 3, "extent", 0.25, 1.5),
+            ("bar_a", "deim", 20, "none", None, 0.5, None, 4.0, None, None, None, 1.0),
+            ("bar_a", "deim", 20, "fall-back", "trained-b", None, 0.4, 1.0, 3, "extent", 0.25, 1.5),
         ],
         columns=[
             "scene",
@@ -428,4 +428,4 @@ def test_guard_shows_what_was_seen_and_repeated():
     full, plain, fallen = rows(guard(TABLES))
     assert full == r"\texttt{bar\_a} &  & full order & -- & 0 & -- & 1 & -- & -- & 2 \\"
     assert plain.endswith(r"& none & -- & 0.50 & -- & 4 & -- & -- & 1 \\")
-    assert fallen.endswith(r"& fall-back & a & blow-up & 0.40 & 1 & 3, extent & 0.25 & 1.5 \\")
+    assert fallen.endswith(r"& fall-back & b & blow-up & 0.40 & 1 & 3, extent & 0.25 & 1.5 \\")
