@@ -74,6 +74,29 @@ def pays(tables: Tables) -> str:
     return tabular(header, rows, "lllrrrr")
 
 
+def large_meshes(tables: Tables) -> str:
+    """Who reaches each error first on which mesh; the scene and the weights are all the same."""
+    rows = [
+        [
+            str(row.vertices),
+            row.reference,
+            format_number(row.limit),
+            "--" if pd.isna(row.method) else f"{name(row.method)}, {_steps(row)}",
+            _number(row.ms_per_frame),
+            "--" if pd.isna(row.second) else name(row.second),
+            _number(row.second_ms),
+            _number(row.reduced_ms),
+        ]
+        for row in tables["large_meshes"].itertuples()
+    ]
+    header = ["vertices", "against", "error", "fastest", "ms", "next", "ms", "reduction (ms)"]
+    return tabular(header, rows, "rlllrlrr")
+
+
+def _steps(row: Any) -> str:
+    return rf"${int(row.substeps)} \times {int(row.iterations)}$"
+
+
 def _size(vertices: Any) -> str:
     return "--" if pd.isna(vertices) else str(int(vertices))
 

@@ -9,7 +9,7 @@ from pdrom.report.paper.claim_tables import claims, claims_in_full
 from pdrom.report.paper.cost_tables import break_even, exponents, iterations, positions
 from pdrom.report.paper.hard_tables import hard_cases, hard_reductions, kernel_accuracy
 from pdrom.report.paper.macros import format_number
-from pdrom.report.paper.speedup_tables import payoff, pays, speedups
+from pdrom.report.paper.speedup_tables import large_meshes, payoff, pays, speedups
 from pdrom.report.paper.tabular import longtable, name, tabular
 from pdrom.report.words.text import escape
 
@@ -181,6 +181,7 @@ TEX_TABLES = {
     "tab_speedups": speedups,
     "tab_payoff": payoff,
     "tab_pays": pays,
+    "tab_large_meshes": large_meshes,
     "tab_hard_cases": hard_cases,
     "tab_hard_reductions": hard_reductions,
     "tab_kernel_accuracy": kernel_accuracy,

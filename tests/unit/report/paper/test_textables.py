@@ -221,6 +221,24 @@ TABLES = {
             "speedup",
         ],
     ),
+    "large_meshes": pd.DataFrame(
+        [
+            (400, "implicit", 0.1, "x_pbd", 1, 5, 0.25, "newton", 0.5, None),
+            (9, "continuous", 0.01, *7 * [None]),
+        ],
+        columns=[
+            "vertices",
+            "reference",
+            "limit",
+            "method",
+            "substeps",
+            "iterations",
+            "ms_per_frame",
+            "second",
+            "second_ms",
+            "reduced_ms",
+        ],
+    ),
     "payoff": pd.DataFrame(
         [
             ("full", "deim_x", 3, 0, 0, 0, *5 * [None], 0),

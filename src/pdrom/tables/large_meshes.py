@@ -1,0 +1,32 @@
+"""Table large_meshes: who wins on meshes that are too large for a default run, as recorded once."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+
+from pdrom.core.reads import ProjectFile
+from pdrom.tables.declaration import table, text
+from pdrom.tables.winners import winners
+
+RECORDED = "config/reference/large_meshes/winners.csv"
+
+
+# Nothing is measured here, hence nothing is timed: the same file gives the same table.
+@table(
+    title="Who reaches an error in the shortest time on larger meshes, recorded",
+    columns=(
+        *(replace(column, timed=False, declared="exact") for column in winners.columns),
+        text("processor", "of the machine that the times belong to"),
+        text("date", "day of the record"),
+    ),
+    reads={"recorded": ProjectFile(RECORDED)},
+)
+def large_meshes(recorded: Path) -> pd.DataFrame:
+    """The rows of the table winners of the study ``config/alternatives.yaml``.
+
+    Parameters
+    ----------
+    recorded : file that `pdrom.pipeline.recorded_meshes` writes
+    """
+    return pd.read_csv(recorded)
