@@ -24,7 +24,8 @@ from pdrom.tables.vocabulary import BLOWUP_FRAME, FINITE, FRAMES, GAIN, GROUP, M
         METHOD,
         R,
         compared("count", integer("rank", "modes that the snapshots have without a cutoff")),
-        GAIN,
+        # the modes are made of round-off
+        compared("magnitude", GAIN),
         FRAMES,
         FINITE,
         BLOWUP_FRAME,

@@ -27,8 +27,10 @@ _PAIR = ["scene", "split", "k"]
             ),
         ),
         ERROR_WITHIN,
+        # both errors may be round-off
         compared(
-            "run", number("ratio", "the error of the run with full projections over the best one")
+            "magnitude",
+            number("ratio", "the error of the run with full projections over the best one"),
         ),
         compared(
             "run",

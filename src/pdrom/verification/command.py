@@ -10,7 +10,7 @@ from pdrom.core.store import write_text
 from pdrom.verification.examine import Examination
 from pdrom.verification.files import verify_files
 from pdrom.verification.lines import counted, page, status_of
-from pdrom.verification.references import LOG, folder_of, tolerances_path
+from pdrom.verification.references import LOG, folder_of, tolerances_paths
 from pdrom.verification.settings import load_settings
 from pdrom.verification.status import Status
 from pdrom.verification.subject import Subject
@@ -69,7 +69,7 @@ def verify_tables(subject: Subject) -> Status:
     if not folder.is_dir():
         hint = 'write them by ./reproduce verify --update --reason "..."'
         raise ConfigurationError(f"{folder}: no expected tables of this configuration; {hint}")
-    tolerances = load_tolerances(tolerances_path())
+    tolerances = load_tolerances(tolerances_paths(subject.results))
     lines = Examination(subject, tolerances, load_settings().anew).lines()
     for line in lines:
         _say(str(line))
@@ -81,9 +81,10 @@ def verify_tables(subject: Subject) -> Status:
 
 
 def _about(subject: Subject, folder: Path) -> list[str]:
+    tolerances = " and ".join(f"`{path}`" for path in tolerances_paths(subject.results))
     return [
         f"Results in `{subject.results}`, expected ones in `{folder}` (`{LOG}` says why),",
-        f"tolerances in `{tolerances_path()}`. What is compared, and what the outcomes mean, is",
+        f"tolerances in {tolerances}. What is compared, and what the outcomes mean, is",
         "in `docs/verification.md`.",
     ]
 

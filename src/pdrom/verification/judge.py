@@ -9,6 +9,7 @@ import pandas as pd
 
 from pdrom.tables.declaration import Column, Table
 from pdrom.verification.compare import SAME, Comparison
+from pdrom.verification.rows import of_fitted_samples
 from pdrom.verification.spread import AS_A_WHOLE, COMPARED, TEN, Spread, spreads
 from pdrom.verification.tolerances import Tolerances
 
@@ -94,10 +95,11 @@ def _equal(comparison: Comparison) -> Iterator[Difference]:
 
 
 def _counts(comparison: Comparison) -> Iterator[Difference]:
-    """Counts are equal but where samples were chosen anew."""
+    """Counts are equal but where samples were chosen anew, or are what a fit leaves."""
+    loose = comparison.anew | of_fitted_samples(comparison.e)
     for column in comparison.columns("count"):
         apart = comparison.distances[column.name]
-        fixed = (apart > SAME) & ~comparison.free(column) & ~comparison.anew
+        fixed = (apart > SAME) & ~comparison.free(column) & ~loose
         for row in np.flatnonzero(fixed):
             yield _difference(comparison, column, int(row), float(apart[row]), 0.0)
 

@@ -25,7 +25,7 @@ DIGITS, FEW_DIGITS = 9, 3
 ROUGH: tuple[Quantity, ...] = ("magnitude", "ratio")
 PACKED_FROM = 50_000
 LOG = "changes.md"
-TOLERANCES = "tolerances.csv"
+TOLERANCES, OWN_TOLERANCES = "tolerances.csv", "own_tolerances.csv"
 HEAD = """# Changes of the expected tables
 
 Written by `./reproduce verify --update --reason "..."`, newest last.
@@ -47,9 +47,11 @@ def folder_of(results: str) -> Path:
     return root / "reference" / Path(results).relative_to(root) / "tables"
 
 
-def tolerances_path() -> Path:
-    """The table of tolerances, one for all configurations."""
-    return Path(RESULTS) / "reference" / TOLERANCES
+def tolerances_paths(results: str, root: Path = Path()) -> list[Path]:
+    """Tables of tolerances: one for all configurations, and one measured with this one, if any."""
+    common = root / RESULTS / "reference" / TOLERANCES
+    own = root / folder_of(results).parent / OWN_TOLERANCES
+    return [common, own] if own.is_file() else [common]
 
 
 def compact(table: Table, frame: pd.DataFrame) -> pd.DataFrame:

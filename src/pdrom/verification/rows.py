@@ -17,6 +17,9 @@ RUNS = "reduced_reruns"
 SPECTRA = "singular_values"
 # Columns of the table of claims with a verdict, and the tests that decide it.
 PARTS = {"verdict": "published", "verdict_beyond": "beyond"}
+# Part of the names of methods whose number of elements is what a fit with non-negative weights
+# leaves: rounding may leave a few more or less of them, at the same error.
+FITTED = "ecsw"
 # What names the samples of a reduction.
 SAMPLES = ("scene", "group", "method", "r")
 
@@ -123,6 +126,13 @@ def said_to_fail(table: Table, frame: pd.DataFrame) -> np.ndarray:
 def is_error(name: str, quantity: str) -> bool:
     """Whether a column holds errors, within the horizon or not."""
     return quantity == "error" or (quantity == "run" and "error" in name)
+
+
+def of_fitted_samples(frame: pd.DataFrame) -> np.ndarray:
+    """Rows of reductions whose number of samples is the outcome of a fit."""
+    if "method" not in frame:
+        return np.zeros(len(frame), dtype=bool)
+    return frame.method.astype(str).str.contains(FITTED).to_numpy(dtype=bool)
 
 
 def unresolved(table: Table, frame: pd.DataFrame) -> np.ndarray:

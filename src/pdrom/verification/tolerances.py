@@ -1,6 +1,6 @@
 """The table of tolerances: derived from variants of a run, kept with the expected tables."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -85,16 +85,24 @@ def _row(
     }
 
 
-def load_tolerances(path: Path) -> Tolerances:
-    """Tolerances by quantity and rows; StorageError if the table is missing or lacks some."""
-    table = read_table(path, COLUMNS, result=False)
-    found: dict[tuple[Quantity, str], Tolerance] = {
-        (row.quantity, row.rows): Tolerance(row.tolerance, row.tolerance_of_nine)
-        for row in table.itertuples()
-    }
+def load_tolerances(paths: Sequence[Path]) -> Tolerances:
+    """Tolerances by quantity and rows, the widest of some tables.
+
+    Raises
+    ------
+    StorageError
+        A table is missing or damaged, or all of them lack a quantity.
+    """
+    found: dict[tuple[Quantity, str], Tolerance] = {}
+    for path in paths:
+        for row in read_table(path, COLUMNS, result=False).itertuples():
+            before = found.get((row.quantity, row.rows), Tolerance(0.0, 0.0))
+            found[row.quantity, row.rows] = Tolerance(
+                max(before.every, row.tolerance), max(before.nine, row.tolerance_of_nine)
+            )
     for quantity in COMPARED:
         if (quantity, OTHER) not in found:
-            raise StorageError(f"{path}: no tolerance of the quantity '{quantity}'")
+            raise StorageError(f"{paths[0]}: no tolerance of the quantity '{quantity}'")
         found.setdefault((quantity, WHOLE), found[quantity, OTHER])
     return found
 

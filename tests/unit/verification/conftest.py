@@ -46,7 +46,7 @@ def unchanged(expected):
 @pytest.fixture(scope="session")
 def tolerances():
     """The tracked tolerances."""
-    return load_tolerances(REFERENCES / "tolerances.csv")
+    return load_tolerances([REFERENCES / "tolerances.csv"])
 
 
 @pytest.fixture(scope="session")

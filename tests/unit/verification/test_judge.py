@@ -10,6 +10,7 @@ from pdrom.pipeline.tables import all_tables
 from pdrom.verification.compare import Comparison
 from pdrom.verification.judge import judge
 from pdrom.verification.references import NOT_KEPT
+from pdrom.verification.rows import FITTED, of_fitted_samples
 from pdrom.verification.spread import AS_A_WHOLE, COMPARED, OTHER, WHOLE
 
 ROWS = 6
@@ -54,6 +55,8 @@ def changed(column, values, cell, tolerances):
 def cell_to_change(comparison, column):
     """A cell that is compared and holds something, well inside the table."""
     held = ~comparison.free(column) & comparison.e[column.name].notna().to_numpy()
+    if column.quantity == "count":
+        held &= ~of_fitted_samples(comparison.e)
     if column.kind == "number":
         held &= np.isfinite(comparison.e[column.name].to_numpy(dtype=float, na_value=np.nan))
     if column.quantity == "magnitude":
@@ -99,6 +102,29 @@ def test_a_row_less_and_a_row_more_are_noticed(unchanged, tolerances, settings):
     words = str(judged(part, more, tolerances, settings).differences[0])
     assert "component 999" in words
     assert "expected none" in words
+
+
+def test_a_fit_may_leave_an_element_more_and_no_other_selection_may(
+    unchanged, tolerances, settings
+):
+    whole = unchanged["online"]
+    rows = whole.expected
+    fitted = of_fitted_samples(rows) & (rows.elements_sampled > 30).to_numpy(dtype=bool)
+    assert fitted.any()
+    one = int(np.flatnonzero(fitted)[0])
+    assert not judged(whole, counted(rows, one, 1), tolerances, settings).differences
+    many = counted(rows, one, int(rows.elements_sampled[one]))
+    assert judged(whole, many, tolerances, settings).differences
+    other = rows.assign(method=rows.method.str.replace(FITTED, "gappy"))
+    more = judged(whole, counted(other, one, 1), tolerances, settings, other).differences
+    assert "elements_sampled" in str(more[0])
+
+
+def counted(rows, row, more):
+    """Rows with a sampled element more in one of them."""
+    changed = rows.elements_sampled.copy()
+    changed[row] += more
+    return rows.assign(elements_sampled=changed)
 
 
 @pytest.fixture

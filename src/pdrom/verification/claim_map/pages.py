@@ -13,12 +13,13 @@ from typing import Any
 import pandas as pd
 
 from pdrom.core.errors import PdromError
+from pdrom.core.paths import RESULTS
 from pdrom.core.store import read_table
 from pdrom.pipeline.tables import all_tables
 from pdrom.pipeline.tracked import write_tracked
 from pdrom.verification.claim_map.entries import Entry, entries
 from pdrom.verification.claim_map.measured import COLUMNS
-from pdrom.verification.references import tolerances_path
+from pdrom.verification.references import tolerances_paths
 from pdrom.verification.tolerances import Tolerances, load_tolerances, tolerance_text
 
 REFERENCE = Path("results/reference/claim_map.csv")
@@ -57,7 +58,7 @@ whole study writes a map of its own, `results/claim_map.csv` (other configuratio
 def pages(root: Path, measured: Measured) -> dict[Path, str]:
     """Text of both pages by their place below ``root``."""
     listed = entries(root)
-    tolerances = load_tolerances(root / tolerances_path())
+    tolerances = load_tolerances(tolerances_paths(RESULTS, root))
     readme = (root / README).read_text(encoding="utf-8")
     return {
         PAGE: _page(listed, measured, tolerances),
