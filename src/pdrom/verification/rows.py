@@ -129,9 +129,12 @@ def is_error(name: str, quantity: str) -> bool:
 
 
 def of_fitted_samples(frame: pd.DataFrame) -> np.ndarray:
-    """Rows of reductions whose number of samples is the outcome of a fit."""
+    """Rows of reductions whose number of samples is the outcome of a fit.
+
+    A table that has its tolerance, ``tau``, and names no methods has no others.
+    """
     if "method" not in frame:
-        return np.zeros(len(frame), dtype=bool)
+        return np.full(len(frame), "tau" in frame)
     return frame.method.astype(str).str.contains(FITTED).to_numpy(dtype=bool)
 
 

@@ -154,7 +154,10 @@ def test_every_table_is_declared_in_a_module_that_has_no_other():
 
 def test_a_time_in_seconds_or_milliseconds_is_timed_unless_it_is_given():
     given_by_the_configuration = {("budget", "budget_ms"), ("stability", "h")}
+    recorded = {"large_meshes"}  # measured once, kept with the sources
     for name, made in declared().items():
+        if name in recorded:
+            continue
         for column in made.columns:
             if column.unit in ("s", "ms") and (name, column.name) not in given_by_the_configuration:
                 assert column.timed, (name, column.name)

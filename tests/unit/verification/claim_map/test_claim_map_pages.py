@@ -5,8 +5,8 @@ import re
 import pandas as pd
 import pytest
 
-from pdrom.core.paths import RESULTS
 from pdrom.core.errors import StorageError
+from pdrom.core.paths import RESULTS
 from pdrom.core.store import write_table
 from pdrom.pipeline.tables import all_tables
 from pdrom.report.claims import load_claims
