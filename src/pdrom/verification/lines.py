@@ -60,7 +60,8 @@ def table_line(judgement: Judgement, measured: bool, lacking: Sequence[str] = ()
         text = f"column(s) {', '.join(lacking)}: run verify --update"
         return Line("table", name, Outcome.NO_REFERENCE, text)
     if not measured:
-        return Line("table", name, Outcome.NOT_COMPARABLE, "its numbers are times or round-off; names and sizes agree")
+        text = "its numbers are times or round-off; names and sizes agree"
+        return Line("table", name, Outcome.NOT_COMPARABLE, text)
     return Line("table", name, Outcome.REPRODUCED, _cells(judgement))
 
 

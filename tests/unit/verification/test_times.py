@@ -4,46 +4,27 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from settled_times import CLAIM, DECIDING, ERROR, PART, RULE, deciding_runs, with_runs
 
 from pdrom.pipeline.tables import all_tables
-from pdrom.report.claims import claims_rows, evaluate, is_timed, load_claims
+from pdrom.report.claims import evaluate, is_timed, load_claims
 from pdrom.verification.judge import judge
 from pdrom.verification.settings import RULES
 from pdrom.verification.spread import comparisons
 from pdrom.verification.times import changed_by_times, rows_of, timed_spreads
 from places import ROOT
 
-CLAIM, PART = "C11", "beyond"
-WHOLE = load_claims(ROOT / RULES)[CLAIM]
-(DECIDING,) = (test for test in WHOLE.beyond if test.decides)
-PUBLISHED = tuple(test for test in WHOLE.published if test.decides)
-RULE = WHOLE.model_copy(update={"published": PUBLISHED, "beyond": (DECIDING,)})
-ERROR = "relative_error_within_horizon"
-
 
 @pytest.fixture(scope="module")
 def reruns(expected):
-    """The runs that the verdict rests on, accurate ones with a speed-up."""
-    table = expected["reduced_reruns"]
-    chosen = np.logical_and.reduce([table[c].isin(v) for c, v in DECIDING.where.items()])
-    return table[chosen & (table.position_basis == "full") & (table[ERROR] <= 0.1)].index
+    """The runs that the verdict rests on."""
+    return deciding_runs(expected)
 
 
 @pytest.fixture(scope="module")
 def limit(tolerances):
     """The factor within which a speed-up may move, less one."""
     return tolerances["ratio", rows_of(DECIDING)].every
-
-
-def with_runs(expected, **columns):
-    """The tables with other columns of the runs, and the verdicts that follow."""
-    tables = {**expected, "reduced_reruns": expected["reduced_reruns"].assign(**columns)}
-    (row,) = claims_rows({CLAIM: RULE}, tables).to_dict("records")
-    claims = expected["claims"].copy()
-    claims.loc[claims.claim == CLAIM, ["verdict", "verdict_beyond"]] = [
-        row["verdict"], row["verdict_beyond"],
-    ]  # fmt: skip
-    return {**tables, "claims": claims}
 
 
 def faster(expected, reruns, factors):
