@@ -49,7 +49,7 @@ class Run:
                 settle_dates(DATED)
                 remember(command)
                 if command.executor == EXECUTOR:
-                    slurm_executor.install(EXECUTOR)
+                    slurm_executor.install(EXECUTOR, slurm_executor.patient)
         except PdromError as error:
             sys.exit(f"pdrom: {error}")
         return cls(command, listen())
@@ -116,6 +116,8 @@ def start_batch(workflow: Any) -> None:
     """
     if workflow.remote_exec and JOBSTEP not in sys.argv:
         start_server()
+    elif workflow.remote_exec:
+        slurm_executor.install(JOBSTEP, slurm_executor.waiting)
 
 
 def say_last(text: str) -> None:

@@ -1,15 +1,16 @@
-"""Snakemake's executor for SLURM, such that a controller that is away does not lose a job.
+"""Snakemake's executors for SLURM, such that a controller that is away does not lose a job.
 
 The executor (2.8) asks for the status of all its jobs at once. Where nobody answers, because the
 controller is restarted and no accounting takes its place, it drops these jobs from its list: they
 go on and end, and the run waits for them for ever. A job that the controller has forgotten it
-waits for as well.
+waits for as well. The executor inside of a job starts its batch by ``srun``, which fails where the
+controller is away.
 """
 
 import subprocess
 import time
 from collections import Counter
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Callable, Iterable
 from typing import Any
 
 from snakemake_interface_executor_plugins.registry import ExecutorPluginRegistry
@@ -22,10 +23,24 @@ QUEUE = ("squeue", "--me", "--states=all", "--noheader", "--format=%i")
 PING = ("scontrol", "ping")
 
 
-def install(name: str) -> None:
-    """Let Snakemake use `patient` in place of the executor ``name``, which is installed."""
+def install(name: str, kind: Callable[[Any], Any]) -> None:
+    """Let Snakemake use a class of ``kind`` in place of the executor ``name``."""
     plugin = ExecutorPluginRegistry().get_plugin(name)
-    plugin.executor = patient(plugin.executor)
+    plugin.executor = kind(plugin.executor)
+
+
+def waiting(executor: Any) -> Any:
+    """A class of the executor inside of a job that waits until the controller answers."""
+
+    class Waiting(executor):  # type: ignore[misc]
+        """See the module."""
+
+        def run_job(self, job: Any) -> None:
+            """Start the batch, once the controller answers."""
+            wait(self.logger)
+            super().run_job(job)
+
+    return Waiting
 
 
 def patient(executor: Any) -> Any:
@@ -44,10 +59,7 @@ def patient(executor: Any) -> Any:
 
         def run_jobs(self, jobs: Any) -> None:
             """Submit jobs, once the controller answers."""
-            if not answers(PING):
-                self.logger.warning("pdrom: SLURM does not answer; jobs wait until it does")
-                while not answers(PING):
-                    time.sleep(PAUSE)
+            wait(self.logger)
             super().run_jobs(jobs)
 
         def report_job_success(self, job_info: Any) -> None:
@@ -95,6 +107,15 @@ def patient(executor: Any) -> Any:
             return {job for job, answers in self._unnamed.items() if answers >= FORGOTTEN}
 
     return Patient
+
+
+def wait(logger: Any) -> None:
+    """Return when the controller answers; say it if it does not at once."""
+    if answers(PING):
+        return
+    logger.warning("pdrom: SLURM does not answer; jobs wait until it does")
+    while not answers(PING):
+        time.sleep(PAUSE)
 
 
 def answers(command: tuple[str, ...]) -> bool:

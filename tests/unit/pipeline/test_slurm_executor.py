@@ -12,7 +12,7 @@ from snakemake_interface_executor_plugins.registry import ExecutorPluginRegistry
 
 from pdrom.pipeline import slurm_executor
 from pdrom.pipeline.failures import cause
-from pdrom.pipeline.slurm_executor import FORGOTTEN, install, patient
+from pdrom.pipeline.slurm_executor import FORGOTTEN, install, patient, waiting
 
 
 @dataclass
@@ -45,6 +45,9 @@ class Executor:
 
     def run_jobs(self, jobs: list[Any]) -> None:
         self.submitted += jobs
+
+    def run_job(self, job: Any) -> None:
+        self.submitted.append(job)
 
     def report_job_success(self, job_info: Job) -> None:
         self.reported[job_info.external_jobid] = None
@@ -135,6 +138,16 @@ def test_nothing_is_submitted_while_the_controller_is_away(monkeypatch: pytest.M
     assert next(later, None) is None
 
 
+def test_no_batch_is_started_while_the_controller_is_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    later = iter([False, False, True])
+    executor = waiting(Executor)()
+    monkeypatch.setattr(slurm_executor, "answers", lambda command: next(later))
+    monkeypatch.setattr(slurm_executor.time, "sleep", lambda pause: executor.submitted.clear())
+    executor.run_job("a")
+    assert executor.submitted == ["a"]
+    assert len(executor.said) == 1
+
+
 def test_the_queue_is_that_of_this_user(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
     """By a squeue that answers, and by one that does not."""
     program = tmp_path / "squeue"
@@ -150,5 +163,5 @@ def test_snakemake_gets_the_patient_class(monkeypatch: pytest.MonkeyPatch) -> No
     get_argument_parser()  # Snakemake collects its plugins for it
     plugin = ExecutorPluginRegistry().get_plugin("local")
     monkeypatch.setattr(plugin, "executor", Executor)
-    install("local")
+    install("local", patient)
     assert ExecutorPluginRegistry().get_plugin("local").executor.__mro__[1] is Executor
