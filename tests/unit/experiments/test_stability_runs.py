@@ -9,7 +9,18 @@ import pytest
 from builders import make_scene
 from pdrom.core.paths import File
 from pdrom.core.store import read_table, write_table
-from pdrom.experiments import bounds, fom, guard, mesh, pod, reruns, snapshots, stability, subspaces
+from pdrom.experiments import (
+    bounds,
+    companion,
+    fom,
+    guard,
+    mesh,
+    pod,
+    reruns,
+    snapshots,
+    stability,
+    subspaces,
+)  # fmt: skip
 from pdrom.experiments.guard import Trial, TriedGuard
 from pdrom.experiments.sampling import Sweep
 from pdrom.experiments.settings import Horizon
@@ -18,6 +29,7 @@ from pdrom.experiments.subspaces import SubspaceModels
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.method import MethodSpec, load_methods
+from pdrom.reduction.subspace.companion import CompanionSpec
 from places import ROOT
 
 METHODS = {
@@ -43,6 +55,7 @@ class Made:
     bases: list[File]
     samplings: list[File]
     subspaces: File
+    companion: File
     tables: dict[str, File]
 
 
@@ -79,9 +92,9 @@ def study(tmp_path_factory) -> Made:
         outputs = reruns.Outputs(*(file(f"{name}/{kind}", **labels) for kind in names))
         settings = reruns.Settings(
             scene=scene, method=spec, sweep=Sweep(dense_to=4, step=4), ranks=(4,),
-            heldout_ranks=(), guard=GuardSettings(), **LIMITS,
+            heldout_ranks=(), guard=GuardSettings(), companions=(), **LIMITS,
         )  # fmt: skip
-        reruns.run(settings, reruns.Inputs(grid, *runs.values(), stored, bases[-1]), outputs)
+        reruns.run(settings, reruns.Inputs(grid, *runs.values(), stored, bases[-1], []), outputs)
         samplings.append(outputs.sampling)
     models = file("models.h5")
     tables = {run: file(f"models_{run}.csv") for run in runs}
@@ -93,7 +106,13 @@ def study(tmp_path_factory) -> Made:
         subspaces.Inputs(grid, *runs.values()),
         subspaces.Outputs(models, *tables.values(), file("seconds.csv")),
     )
-    return Made(scene, folder, grid, runs, bases, samplings, models, tables)
+    beside = file("companion.h5")
+    companion.run(
+        companion.Settings(scene=scene, companion=CompanionSpec(modes=4)),
+        companion.Inputs(grid, runs["train"]),
+        companion.Outputs(beside),
+    )
+    return Made(scene, folder, grid, runs, bases, samplings, models, beside, tables)
 
 
 @pytest.fixture(scope="module")
@@ -157,13 +176,22 @@ def test_guard_compares_its_actions_with_the_full_order(study):
     name = "deim-joint"
     index = list(METHODS).index(name)
     trial = Trial(scene=study.scene, group="strain", name=name, r=4, method=METHODS[name])
-    files = (study.mesh, study.runs["train"], study.bases[index], study.samplings[index])
+    files = (
+        study.mesh, study.runs["train"], study.bases[index], study.samplings[index],
+        study.companion,
+    )  # fmt: skip
     table = try_guard(study.folder, (trial,), guard.Inputs(*([file] for file in files)))
     assert table.columns.tolist() == guard.COLUMNS
-    full, plain, reported, fallen = (row for _, row in table.iterrows())
+    full, plain, reported, fallen, told, mended = (row for _, row in table.iterrows())
     assert [full.method, plain.action, reported.action, fallen.action] == [
         "full", "none", "report", "fall-back",
     ]  # fmt: skip
+    assert [(row.action, row.alarm) for row in (told, mended)] == [
+        ("report", "estimate"), ("fall-back", "estimate"),
+    ]  # fmt: skip
+    assert told.relative_error == plain.relative_error
+    assert told.guard_estimate > 0.0
+    assert table.guard_estimate.notna().sum() == 2
     assert full.relative_cost == 1.0
     assert reported.relative_error == plain.relative_error
     assert reported.fallback_frames == 0
@@ -174,7 +202,7 @@ def test_guard_compares_its_actions_with_the_full_order(study):
 
 
 def test_guard_without_cases_is_an_empty_table(tmp_path):
-    table = try_guard(tmp_path, (), guard.Inputs([], [], [], []))
+    table = try_guard(tmp_path, (), guard.Inputs([], [], [], [], []))
     assert table.columns.tolist() == guard.COLUMNS
     assert len(table) == 0
 
