@@ -3,7 +3,7 @@
 #
 # usage (as root): tests/machines/slurm.sh RESULTS [FOLDER]
 #
-# RESULTS holds the tiny study made without SLURM (results/studies/tiny). HEAD is cloned into FOLDER (else a temporary one) and
+# RESULTS is the folder of the tiny study made without SLURM (.../results/studies/tiny). HEAD is cloned into FOLDER (else a temporary one) and
 # run there by the profile of the project. While the first command runs, one of its jobs is cancelled: the run has to say so.
 # The same command goes on from there, and the controller is restarted under it. Tables (without what a clock says) and runs must
 # then be those of RESULTS, bit by bit; and jobs that no node can take must be refused. At last a controller without accounting
@@ -13,6 +13,10 @@ set -euo pipefail
 project=$(cd "$(dirname "$0")/../.." && pwd -P)
 service=$project/tests/machines/slurm_service.sh
 expected=$(realpath "${1:?the folder of the results made without SLURM is missing}")
+[ -d "$expected/tables" ] || {
+    echo "slurm: no tables in $expected; the tiny study's are in results/studies/tiny" >&2
+    exit 1
+}
 folder=${2-}
 
 step() { printf '\n== %s (%s s)\n' "$*" "$SECONDS"; }

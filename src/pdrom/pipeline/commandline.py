@@ -63,7 +63,7 @@ class CommandLine:
             arguments=tuple(arguments),
             configfiles=_texts(found["configfile"]),
             settings=_texts(found["config"]),
-            targets=tuple(a for a in arguments if a in found["targets"]),
+            targets=_texts(found["targets"]),
             report=_report(found),
             looks_only=any(found[name] for name in LOOKS_ONLY) or _reports(found),
             own_output=any(found[name] is not None and found[name] for name in OWN_OUTPUT),
@@ -94,9 +94,17 @@ class CommandLine:
 
     def rewritten(self, more: Sequence[str], made: Mapping[str, Sequence[str]]) -> list[str]:
         """The arguments with more options, and each target replaced by what is made for it."""
-        options = [a for a in self.arguments if a not in (*self.targets, "--")]
         targets = dict.fromkeys(file for target in self.targets for file in made[target])
-        return [*options, *more, *(["--", *targets] if targets else [])]
+        return [*self._without_targets(), *more, *(["--", *targets] if targets else [])]
+
+    def _without_targets(self) -> list[str]:
+        """The arguments but the targets; an option may have one of their names as its value."""
+        if "--" in self.arguments:
+            return list(self.arguments[: self.arguments.index("--")])
+        options = list(self.arguments)
+        for target in self.targets:
+            options.remove(target)
+        return options
 
 
 def options(configfiles: Iterable[str], settings: Iterable[str]) -> list[str]:

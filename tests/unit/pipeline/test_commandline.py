@@ -80,6 +80,9 @@ def test_targets_are_replaced_and_options_kept():
         "x",
     ]
     assert parse("-n").rewritten([], {}) == ["-n"]
+    forced = parse("-n --forcerun x -- x").rewritten([], {"x": ["a.pdf"]})
+    assert forced == ["-n", "--forcerun", "x", "--", "a.pdf"]
+    assert parse("x --forcerun x").rewritten([], {"x": ["a"]}) == ["--forcerun", "x", "--", "a"]
     assert parse("x -n").rewritten(["--cores", "2"], {"x": ["x"]}) == [
         "-n",
         "--cores",
