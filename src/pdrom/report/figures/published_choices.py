@@ -10,7 +10,8 @@ FIGURE = Declaration(
         "Relative error of the reconstructed training snapshots, $x$ components, against the "
         "number $r$ of basis vectors. Grey: what the published code wrote itself. Dashed: the "
         "method with its choices of basis and rows, as in this study. Green: with one more of its "
-        "choices, the one that alone leads closest. Blue: with all of them. The pale band holds "
+        "choices, the one that alone leads closest and that stands above. Blue: with all of them. "
+        "The pale band holds "
         "all runs in which what rounding decides is drawn at random: the signs of the modes, or "
         "which of several rows with equal residuals is picked; dotted, the closest of these runs."
     ),

@@ -61,7 +61,9 @@ def _draw_case(ax: Axes, rows: pd.DataFrame, distances: pd.DataFrame) -> None:
     if alone.distance.notna().any():
         closest = alone.loc[alone.distance.idxmin(), "choice"]
         line = rows[(rows.direction == "alone") & (rows.choice == closest)]
-        _line(ax, line, f"only: {closest}", color=style.GREEN, marker="s")
+        _line(ax, line, "only the choice named above", color=style.GREEN, marker="s")
+        ax.text(0.98, 0.96, closest, color=style.GREEN, size="x-small", ha="right", va="top",
+                transform=ax.transAxes)  # fmt: skip
     _line(ax, steps[steps.choice == names[-1]], "all its choices", color=style.BLUE, marker="o")
     draws = distances[distances.direction.isin(["signs", "ties"])]
     if draws.distance.notna().any():
