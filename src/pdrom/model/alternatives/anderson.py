@@ -6,13 +6,12 @@ See `pdrom.model.dynamics.acceleration`; here a frame may have substeps.
 import numpy as np
 
 from pdrom.model.alternatives.potential import add_projections
-from pdrom.model.alternatives.substeps import Alternative, begin, end, inertia_energy
+from pdrom.model.alternatives.substeps import Alternative, Substeps, begin, end, inertia_energy
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.dynamics.acceleration import Anderson, combine, forget, refuse
 from pdrom.model.dynamics.frames import weighted
 from pdrom.model.dynamics.sweeps import sweep
-from pdrom.model.dynamics.system import Elimination, GlobalSystem
 from pdrom.model.scene import Scene
 
 WINDOW = 5  # differences of earlier iterates, as in the paper
@@ -23,33 +22,13 @@ class Accelerated(Alternative):
 
     name = "anderson"
 
-    def __init__(
-        self,
-        scene: Scene,
-        substeps: int,
-        iterations: int = 1,
-        system: GlobalSystem | None = None,
-    ) -> None:
-        super().__init__(scene, substeps, iterations, system)
+    def _prepare(self, scene: Scene) -> None:
         self._history = Anderson(WINDOW)
 
-    def _advance(
-        self,
-        y: np.ndarray,
-        v: np.ndarray,
-        acceleration: np.ndarray,
-        fixed: np.ndarray,
-        targets: np.ndarray,
-        substeps: int,
-    ) -> None:
-        self._history.begin_frame(y.reshape(-1, WIDTH))
-        elimination = self.space.eliminate(fixed, targets)
-        assert isinstance(elimination, Elimination)
-        _advance(
-            y, v, acceleration, self.time_step, substeps, self.iterations, fixed, targets,
-            self.space.system.inertia, self.potential.tables, elimination.factor,
-            self._history.history,
-        )  # fmt: skip
+    def _advance(self, part: Substeps) -> None:
+        self._history.begin_frame(part.y.reshape(-1, WIDTH))
+        inertia, tables = self.space.system.inertia, self.potential.tables
+        _advance(*part, inertia, tables, self._factor(part), self._history.history)
 
 
 @compiled(nogil=True)

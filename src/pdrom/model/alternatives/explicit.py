@@ -7,7 +7,7 @@ Stable while the substep is shorter than 2 / omega of the stiffest mode.
 import numpy as np
 
 from pdrom.model.alternatives.potential import add_projections, multiply
-from pdrom.model.alternatives.substeps import Alternative, inverse_masses
+from pdrom.model.alternatives.substeps import Alternative, Substeps, inverse_masses
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
 
@@ -17,23 +17,13 @@ class Explicit(Alternative):
 
     name = "explicit"
 
-    def _advance(
-        self,
-        y: np.ndarray,
-        v: np.ndarray,
-        acceleration: np.ndarray,
-        fixed: np.ndarray,
-        targets: np.ndarray,
-        substeps: int,
-    ) -> None:
-        rows = y.reshape(-1, WIDTH)
-        speed = (targets - rows[fixed, :3]) / (substeps * self.time_step)
-        v.reshape(-1, WIDTH)[fixed, :3] = speed
-        _advance(
-            y, v, acceleration, self.time_step, substeps, inverse_masses(self.masses, fixed),
-            self.potential.tables, self.potential.stiffness,
-        )  # fmt: skip
-        rows[fixed, :3] = targets
+    def _advance(self, part: Substeps) -> None:
+        rows, fixed = part.y.reshape(-1, WIDTH), part.fixed
+        speed = (part.targets - rows[fixed, :3]) / (part.substeps * part.time_step)
+        part.v.reshape(-1, WIDTH)[fixed, :3] = speed
+        inverse = inverse_masses(self.masses, fixed)
+        _advance(*part[:5], inverse, self.potential.tables, self.potential.stiffness)
+        rows[fixed, :3] = part.targets
 
 
 @compiled(nogil=True)

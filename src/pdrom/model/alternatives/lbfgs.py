@@ -8,13 +8,12 @@ local/global iteration itself. Steps are shortened until the objective falls eno
 import numpy as np
 
 from pdrom.model.alternatives.potential import add_projections, multiply, rows_of
-from pdrom.model.alternatives.substeps import Alternative, begin, end, inertia_energy
+from pdrom.model.alternatives.substeps import Alternative, Substeps, begin, end, inertia_energy
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.compiled.vectors import add_multiple, dot
 from pdrom.model.dynamics.frames import weighted
 from pdrom.model.dynamics.sweeps import sweep
-from pdrom.model.dynamics.system import Elimination, GlobalSystem
 from pdrom.model.scene import Scene
 
 MEMORY = 5  # steps remembered, as in the paper
@@ -28,31 +27,13 @@ class QuasiNewton(Alternative):
 
     name = "l-bfgs"
 
-    def __init__(
-        self,
-        scene: Scene,
-        substeps: int,
-        iterations: int = 1,
-        system: GlobalSystem | None = None,
-    ) -> None:
-        super().__init__(scene, substeps, iterations, system)
+    def _prepare(self, scene: Scene) -> None:
         self._matrix = rows_of(self.space.system.matrix)
 
-    def _advance(
-        self,
-        y: np.ndarray,
-        v: np.ndarray,
-        acceleration: np.ndarray,
-        fixed: np.ndarray,
-        targets: np.ndarray,
-        substeps: int,
-    ) -> None:
-        elimination = self.space.eliminate(fixed, np.zeros_like(targets))
-        assert isinstance(elimination, Elimination)
-        _advance(
-            y, v, acceleration, self.time_step, substeps, self.iterations, fixed, targets,
-            self.space.system.inertia, self.potential.tables, self._matrix, elimination.factor,
-        )  # fmt: skip
+    def _advance(self, part: Substeps) -> None:
+        factor = self._factor(part._replace(targets=np.zeros_like(part.targets)))
+        inertia = self.space.system.inertia
+        _advance(*part, inertia, self.potential.tables, self._matrix, factor)
 
 
 @compiled(nogil=True)

@@ -16,11 +16,10 @@ from pdrom.core.errors import SolverError
 from pdrom.model.alternatives.clamping import MODES, hessian
 from pdrom.model.alternatives.elements import Elements, decompose_element, workspace
 from pdrom.model.alternatives.potential import add_projections, multiply
-from pdrom.model.alternatives.substeps import Alternative, begin, end, inertia_energy
+from pdrom.model.alternatives.substeps import Alternative, Substeps, begin, end, inertia_energy
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.constraints.lanes import lane_function
-from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene
 
 SUFFICIENT = 1e-4  # Armijo's constant
@@ -34,34 +33,20 @@ class Newton(Alternative):
 
     name = "newton"
 
-    def __init__(
-        self,
-        scene: Scene,
-        substeps: int,
-        iterations: int = 1,
-        system: GlobalSystem | None = None,
-    ) -> None:
-        super().__init__(scene, substeps, iterations, system)
+    def _prepare(self, scene: Scene) -> None:
         self._elements = Elements.of(scene, self.name)
         self._patterns: dict[bytes, _Pattern] = {}
 
-    def _advance(
-        self,
-        y: np.ndarray,
-        v: np.ndarray,
-        acceleration: np.ndarray,
-        fixed: np.ndarray,
-        targets: np.ndarray,
-        substeps: int,
-    ) -> None:
+    def _advance(self, part: Substeps) -> None:
+        y, v, acceleration, step, substeps, _, fixed, targets = part
         key = fixed.tobytes()
         if key not in self._patterns:
             self._patterns[key] = _Pattern(self._elements, self.space.system.matrix, fixed)
         before, s = np.empty_like(y), np.empty_like(y)
         for _ in range(substeps):
-            begin(y, v, acceleration, self.time_step, fixed, targets, before, s)
+            begin(y, v, acceleration, step, fixed, targets, before, s)
             self._minimise(y, s, self._patterns[key])
-            end(y, before, self.time_step, v)
+            end(y, before, step, v)
 
     def _minimise(self, y: np.ndarray, s: np.ndarray, pattern: "_Pattern") -> None:
         value, gradient = self._evaluate(y, s)

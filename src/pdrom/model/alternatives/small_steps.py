@@ -3,11 +3,10 @@
 import numpy as np
 
 from pdrom.model.alternatives.potential import add_projections
-from pdrom.model.alternatives.substeps import Alternative, begin, end
+from pdrom.model.alternatives.substeps import Alternative, Substeps, begin, end
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.dynamics.frames import weighted
 from pdrom.model.dynamics.sweeps import sweep
-from pdrom.model.dynamics.system import Elimination
 
 
 class SmallSteps(Alternative):
@@ -15,21 +14,8 @@ class SmallSteps(Alternative):
 
     name = "projective"
 
-    def _advance(
-        self,
-        y: np.ndarray,
-        v: np.ndarray,
-        acceleration: np.ndarray,
-        fixed: np.ndarray,
-        targets: np.ndarray,
-        substeps: int,
-    ) -> None:
-        elimination = self.space.eliminate(fixed, targets)
-        assert isinstance(elimination, Elimination)
-        _advance(
-            y, v, acceleration, self.time_step, substeps, self.iterations, fixed, targets,
-            self.space.system.inertia, self.potential.tables, elimination.factor,
-        )  # fmt: skip
+    def _advance(self, part: Substeps) -> None:
+        _advance(*part, self.space.system.inertia, self.potential.tables, self._factor(part))
 
 
 @compiled(nogil=True)

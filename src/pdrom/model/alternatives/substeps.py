@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from collections.abc import Callable
 from time import perf_counter
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -11,11 +11,32 @@ from pdrom.core.errors import SceneError
 from pdrom.model.alternatives.potential import Potential
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH, as_vertices, flat
+from pdrom.model.dynamics.solvers import Factor
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import PHASES, FrameReport, State, Stepper
-from pdrom.model.dynamics.system import GlobalSystem
+from pdrom.model.dynamics.system import Elimination, GlobalSystem
 from pdrom.model.effects.gravity import Gravity
 from pdrom.model.scene import Scene
+
+
+class Substeps(NamedTuple):
+    """Some substeps of a frame, in the order in which the compiled loops take them.
+
+    y, v : positions and velocities as padded rows of four, flat; changed in place
+    acceleration : (3,) m/s^2
+    time_step : of a substep, s
+    substeps, iterations : how many, and in each of them
+    fixed, targets : held vertices (n,) and where they are (n, 3) at the end, m
+    """
+
+    y: np.ndarray
+    v: np.ndarray
+    acceleration: np.ndarray
+    time_step: float
+    substeps: int
+    iterations: int
+    fixed: np.ndarray
+    targets: np.ndarray
 
 
 class Alternative(Stepper):
@@ -50,6 +71,10 @@ class Alternative(Stepper):
         self.substeps = substeps
         self.masses = scene.masses
         self.potential = Potential(scene.groups, scene.mesh.vertices)
+        self._prepare(scene)
+
+    def _prepare(self, scene: Scene) -> None:
+        """Make what the method keeps from frame to frame; nothing by default."""
 
     def _require_constant(self, scene: Scene) -> None:
         for force in scene.forces:
@@ -86,7 +111,12 @@ class Alternative(Stepper):
         parts = 1 if np.array_equal(q[fixed], targets) else self.substeps
         for part in range(1, parts + 1):
             now = targets + (1.0 - part / parts) * (q[fixed] - targets)
-            self._advance(y, v, acceleration, fixed, now, self.substeps // parts)
+            self._advance(
+                Substeps(
+                    *(y, v, acceleration, self.time_step, self.substeps // parts),
+                    *(self.iterations, fixed, now),
+                )
+            )
         after = self._contacts(positions, velocities, q)
         seconds = np.zeros(len(PHASES))
         seconds[1] = perf_counter() - started
@@ -103,23 +133,15 @@ class Alternative(Stepper):
         return State(np.ascontiguousarray(positions), np.ascontiguousarray(velocities))
 
     @abstractmethod
-    def _advance(
-        self,
-        y: np.ndarray,
-        v: np.ndarray,
-        acceleration: np.ndarray,
-        fixed: np.ndarray,
-        targets: np.ndarray,
-        substeps: int,
-    ) -> None:
-        """Do substeps in place.
+    def _advance(self, part: Substeps) -> None:
+        """Do substeps in place."""
 
-        Parameters
-        ----------
-        y, v : positions and velocities as rows of four, flat
-        acceleration : (3,) m/s^2
-        fixed, targets : held vertices (n,) and where they are (n, 3) at the end
-        """
+    def _factor(self, part: Substeps) -> Factor:
+        """Factor of the system matrix without the held vertices, as `sweep` takes it."""
+        elimination = self.space.eliminate(part.fixed, part.targets)
+        assert isinstance(elimination, Elimination)
+        assert elimination.factor is not None
+        return elimination.factor
 
 
 def inverse_masses(masses: np.ndarray, fixed: np.ndarray) -> np.ndarray:

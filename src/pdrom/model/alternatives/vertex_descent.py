@@ -8,11 +8,10 @@ import numpy as np
 
 from pdrom.model.alternatives.clamping import MODES, hessian, residual
 from pdrom.model.alternatives.elements import Elements, decompose_element, workspace
-from pdrom.model.alternatives.substeps import Alternative, begin, end
+from pdrom.model.alternatives.substeps import Alternative, Substeps, begin, end
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.constraints.lanes import lane_function
-from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene
 
 
@@ -21,31 +20,14 @@ class VertexDescent(Alternative):
 
     name = "vertex-descent"
 
-    def __init__(
-        self,
-        scene: Scene,
-        substeps: int,
-        iterations: int = 1,
-        system: GlobalSystem | None = None,
-    ) -> None:
-        super().__init__(scene, substeps, iterations, system)
+    def _prepare(self, scene: Scene) -> None:
         self._elements = Elements.of(scene, self.name)
         self._around = self._elements.around(scene.mesh.vertices)
 
-    def _advance(
-        self,
-        y: np.ndarray,
-        v: np.ndarray,
-        acceleration: np.ndarray,
-        fixed: np.ndarray,
-        targets: np.ndarray,
-        substeps: int,
-    ) -> None:
-        free = np.setdiff1d(np.arange(len(self.masses)), fixed)
-        _advance(
-            y, v, acceleration, self.time_step, substeps, self.iterations, fixed, targets, free,
-            self.space.system.inertia, self._elements.arrays, self._around, workspace(),
-        )  # fmt: skip
+    def _advance(self, part: Substeps) -> None:
+        free = np.setdiff1d(np.arange(len(self.masses)), part.fixed)
+        inertia = self.space.system.inertia
+        _advance(*part, free, inertia, self._elements.arrays, self._around, workspace())
 
 
 @lane_function

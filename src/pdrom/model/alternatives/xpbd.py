@@ -12,12 +12,11 @@ import numpy as np
 
 from pdrom.model.alternatives.clamping import residual
 from pdrom.model.alternatives.elements import Elements, decompose_element, workspace
-from pdrom.model.alternatives.substeps import Alternative, begin, end, inverse_masses
+from pdrom.model.alternatives.substeps import Alternative, Substeps, begin, end, inverse_masses
 from pdrom.model.compiled.arithmetic import add_scaled, multiply, of_three, subtract, total
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH, at, load, store
 from pdrom.model.constraints.lanes import lane_function
-from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene
 
 
@@ -27,29 +26,12 @@ class CompliantConstraints(Alternative):
 
     name = "xpbd"
 
-    def __init__(
-        self,
-        scene: Scene,
-        substeps: int,
-        iterations: int = 1,
-        system: GlobalSystem | None = None,
-    ) -> None:
-        super().__init__(scene, substeps, iterations, system)
+    def _prepare(self, scene: Scene) -> None:
         self._elements = Elements.of(scene, self.name).by_colour()
 
-    def _advance(
-        self,
-        y: np.ndarray,
-        v: np.ndarray,
-        acceleration: np.ndarray,
-        fixed: np.ndarray,
-        targets: np.ndarray,
-        substeps: int,
-    ) -> None:
-        _advance(
-            y, v, acceleration, self.time_step, substeps, self.iterations, fixed, targets,
-            inverse_masses(self.masses, fixed), self._elements.arrays, workspace(),
-        )  # fmt: skip
+    def _advance(self, part: Substeps) -> None:
+        inverse = inverse_masses(self.masses, part.fixed)
+        _advance(*part, inverse, self._elements.arrays, workspace())
 
 
 @lane_function

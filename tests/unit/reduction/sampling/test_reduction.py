@@ -77,9 +77,8 @@ def test_the_presets_are_those_of_the_study():
     assert len(EVERY) > 50
 
 
-@settings(max_examples=5, deadline=None)
-@given(seed=SEEDS)
-@pytest.mark.parametrize("name", PROJECTIONS)
+@settings(max_examples=50)
+@given(seed=SEEDS, name=st.sampled_from(list(PROJECTIONS)))
 def test_what_is_in_the_span_is_reproduced(name, seed):
     spec = PROJECTIONS[name]
     p, mass = data(seed)
@@ -89,9 +88,8 @@ def test_what_is_in_the_span_is_reproduced(name, seed):
     np.testing.assert_allclose(reduction.reconstruct(inside), inside, atol=tolerance)
 
 
-@settings(max_examples=5, deadline=None)
-@given(seed=SEEDS)
-@pytest.mark.parametrize("name", EVERY)
+@settings(max_examples=50)
+@given(seed=SEEDS, name=st.sampled_from(list(EVERY)))
 def test_reconstruction_stays_in_the_space_and_keeps_its_input(name, seed):
     spec = EVERY[name]
     p, mass = data(seed)
@@ -105,9 +103,8 @@ def test_reconstruction_stays_in_the_space_and_keeps_its_input(name, seed):
     np.testing.assert_allclose(result, inside, atol=1e-10 * np.abs(result).max())
 
 
-@settings(max_examples=5, deadline=None)
-@given(seed=SEEDS)
-@pytest.mark.parametrize("name", UNWEIGHTED)
+@settings(max_examples=50)
+@given(seed=SEEDS, name=st.sampled_from(list(UNWEIGHTED)))
 def test_error_is_at_most_gain_times_that_of_the_best_approximation(name, seed):
     """|| p - p^ || <= gain || (I - V V^T)(p - mean) || for data outside the training set."""
     spec = PROJECTIONS[name]
@@ -121,9 +118,8 @@ def test_error_is_at_most_gain_times_that_of_the_best_approximation(name, seed):
     assert (np.linalg.norm(error, axis=(1, 2)) <= bound * (1.0 + 1e-10)).all()
 
 
-@settings(max_examples=20, deadline=None)
-@given(seed=SEEDS)
-@pytest.mark.parametrize("name", [n for n in UNWEIGHTED if UNWEIGHTED[n].rows != "all"])
+@settings(max_examples=50)
+@given(seed=SEEDS, name=st.sampled_from([n for n in UNWEIGHTED if UNWEIGHTED[n].rows != "all"]))
 def test_gain_is_the_norm_of_the_pseudo_inverse_and_attained(name, seed):
     """Some sampled values are amplified by the gain: it is no mere bound."""
     spec = PROJECTIONS[name]
