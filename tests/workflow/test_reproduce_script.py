@@ -19,6 +19,7 @@ SCRIPT = ROOT / "reproduce"
 TOOLS = ["cat", "chmod", "cksum", "cp", "dirname", "grep", "mkdir", "rm", "sed", "sh"]
 TOOLS += ["sleep", "tail", "touch", "tr"]
 PLATFORMS = "src/pdrom/pipeline/platforms.py"
+PACKAGES = "lib/python3.12/site-packages"
 FRONT = "python -m pdrom.pipeline.front"
 LOCK_FILE = f"nowhere==1.0 --hash=sha256:{64 * '0'}\n"
 
@@ -33,7 +34,7 @@ case "$*" in
     [ ! -e unsupported ] || {{ echo "no wheel for it" >&2; exit 1; }}
     ;;
 *"-m venv"*)
-    mkdir -p "$3/bin" "$3/packages"
+    mkdir -p "$3/bin" "$3/{packages}/numpy-2.1.0.dist-info"
     cp "$0" "$3/bin/python"
     ;;
 *"-m pip"*)
@@ -43,7 +44,7 @@ case "$*" in
     while [ -e hold ]; do sleep 0.05; done
     [ ! -e pip-fails ] || {{ cat pip-fails; exit 1; }}
     ;;
-*sysconfig*) echo "$PWD/.venv/packages" ;;
+*sysconfig*) echo "$PWD/.venv/{packages}" ;;
 *) echo "python $*" >>calls ;;
 esac
 """
@@ -70,8 +71,9 @@ class Folder:
     ) -> None:
         """Put a stand-in for Python on the path."""
         text = PYTHON.format(
-            version=version, too_old=int(too_old), no_venv=int(no_venv), real=sys.executable
-        )
+            version=version, too_old=int(too_old), no_venv=int(no_venv), real=sys.executable,
+            packages=PACKAGES,
+        )  # fmt: skip
         program = self.programs / "python3"
         program.write_text(text, encoding="utf-8")
         program.chmod(0o755)
@@ -206,6 +208,49 @@ def test_the_environment_is_made_once_for_each_lock_file(folder: Folder) -> None
     folder.path.joinpath("requirements.lock").write_text("")
     making.append(any("making .venv" in line for line in folder.run()[1]))
     assert making == [True, False, True]
+
+
+@pytest.mark.parametrize("change", ["a version", "one more", "one less"])
+def test_packages_that_another_program_changed_are_noticed(change: str, folder: Folder) -> None:
+    folder.add_python()
+    folder.run()
+    assert folder.run()[1] == []
+    packages = folder.path / ".venv" / PACKAGES
+    installed = packages / "numpy-2.1.0.dist-info"
+    if change == "one more":
+        (packages / "pdrom-0.1.0.dist-info").mkdir()
+    elif change == "one less":
+        installed.rmdir()
+    else:
+        installed.rename(packages / "numpy-2.2.0.dist-info")
+    announcement, why, *_ = folder.run()[1]
+    assert "making .venv" in announcement
+    assert why == "reproduce: .venv holds other packages than those of requirements.lock"
+
+
+def test_the_executor_for_clusters_may_be_added(folder: Folder) -> None:
+    folder.add_python()
+    folder.run()
+    for name in _locked("requirements-cluster.lock"):
+        (folder.path / ".venv" / PACKAGES / f"{name.replace('-', '_')}-1.0.dist-info").mkdir()
+    assert folder.run()[1] == []
+
+
+def _locked(name: str) -> list[str]:
+    lines = (ROOT / name).read_text("utf-8").splitlines()
+    return [line.partition("==")[0] for line in lines if "==" in line]
+
+
+@pytest.mark.parametrize("name", ["two\nlines", "ends\n"])
+def test_a_path_with_a_line_break_is_refused(name: str, folder: Folder) -> None:
+    folder.add_python()
+    folder.path = folder.path.rename(folder.path.with_name(name))
+    status, errors = folder.run()
+    assert status != 0
+    (line,) = errors
+    assert line.startswith("reproduce: ")
+    assert "line break" in line
+    assert not (folder.path / ".venv").exists()
 
 
 def test_arguments_are_handed_on(folder: Folder) -> None:

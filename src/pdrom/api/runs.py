@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 
 from pdrom.core.errors import ConfigurationError, SnapshotError, choices
+from pdrom.core.project import config_file
 from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5
 from pdrom.model.dynamics.stepper import FrameReport, State
@@ -31,7 +32,6 @@ from pdrom.reduction.snapshots import row_masses, training_frames
 from pdrom.reduction.subspace.companion import CompanionSpec, companion_model
 from pdrom.reduction.subspace.model import SubspaceModel
 
-METHODS = Path(__file__).resolve().parents[3] / "config" / "methods.yaml"
 SNAPSHOTS = 100  # at most, of a group for which the scene names no number
 # A reduced run ends when its bounding box exceeds this multiple of the mesh's.
 BLOWUP_EXTENT = 100.0
@@ -178,8 +178,8 @@ def reduce(
 
 
 def methods() -> dict[str, MethodSpec]:
-    """The reduction methods of config/methods.yaml by name."""
-    return load_methods(METHODS)
+    """The reduction methods of config/methods.yaml by name; of an installed package its own."""
+    return load_methods(config_file("methods.yaml"))
 
 
 def _trained(full: FullRun, group: str, guard: GuardSettings) -> Trained:

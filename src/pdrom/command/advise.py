@@ -6,11 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pdrom.command.base import Command, Status
+from pdrom.core.paths import RESULTS
+from pdrom.core.project import checkout
 
 if TYPE_CHECKING:
     import pandas as pd
 
-RESULTS = Path(__file__).resolve().parents[3] / "results"
 
 
 def _positive(text: str) -> float:
@@ -30,8 +31,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--ms", metavar="T", type=_positive, help="longest time of a frame allowed, ms"
     )
     parser.add_argument(
-        "--results", metavar="FOLDER", default=str(RESULTS),
-        help="folder of measured results (those of the project)",
+        "--results", metavar="FOLDER", default=str((checkout() or Path()) / RESULTS),
+        help="folder of measured results (%(default)s)",
     )  # fmt: skip
 
 
@@ -90,7 +91,7 @@ def _rows(folder: str, name: str, scene: str, required: bool = True) -> "pd.Data
 
         return pd.DataFrame() if empty is None else empty
     raise StorageError(
-        f"{scene}: {folder} holds no measurements of it (table {name}); "
+        f"{scene}: {folder} holds no measurements of it (table {name}); --results names another, "
         f"./reproduce scene {scene} advice makes them, for a scene in config/scenes"
     )
 

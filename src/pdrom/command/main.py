@@ -8,18 +8,17 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from pathlib import Path
 
 from pdrom.command.base import Command, Status
 from pdrom.core.errors import PdromError
 from pdrom.core.logs import INTERRUPTED
+from pdrom.core.project import checkout
 from pdrom.pipeline.environment import settle
 
 COMMANDS = ("new", "run", "reduce", "show", "view", "advise")
 CODES = """exit codes: 0 done; 1 faulty input, or a file that cannot be read or written;
 2 the command was not understood; 3 a reduced run blew up (its file is written all the
 same); 4 nothing measured fits the wishes (advise); 130 interrupted"""
-CACHE = Path(__file__).resolve().parents[3] / ".cache"
 
 
 def parser() -> argparse.ArgumentParser:
@@ -70,8 +69,9 @@ def _fail(message: str) -> int:
 
 def main() -> None:
     """Run the command line of this process in the project's environment; end with its code."""
-    if os.access(CACHE, os.W_OK):  # compiled kernels are shared with ./reproduce
-        os.environ.setdefault("NUMBA_CACHE_DIR", str(CACHE / "numba"))
-        os.environ.setdefault("MPLCONFIGDIR", str(CACHE / "matplotlib"))
+    root = checkout()
+    if root and os.access(root / ".cache", os.W_OK):  # compiled kernels: those of ./reproduce
+        os.environ.setdefault("NUMBA_CACHE_DIR", str(root / ".cache" / "numba"))
+        os.environ.setdefault("MPLCONFIGDIR", str(root / ".cache" / "matplotlib"))
     settle()
     sys.exit(run(sys.argv[1:]))

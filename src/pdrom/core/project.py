@@ -1,0 +1,21 @@
+"""The project's folder, and the files of its configuration that the package itself reads.
+
+A wheel carries these files below ``pdrom/config`` (pyproject.toml says which), so that an installed
+package needs no checkout.
+"""
+
+from importlib.resources import files
+from pathlib import Path
+
+
+def checkout() -> Path | None:
+    """Folder of the checkout that the package lies in; None for one that is installed."""
+    source = Path(__file__).resolve().parents[2]
+    inside = source.name == "src" and (source.parent / "config").is_dir()
+    return source.parent if inside else None
+
+
+def config_file(name: str) -> Path:
+    """File of ``config``: that of the checkout, which people edit, else the package's own."""
+    root = checkout() or Path(str(files("pdrom")))
+    return root / "config" / name
