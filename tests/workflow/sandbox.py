@@ -71,7 +71,8 @@ class Sandbox:
         lock = (self.folder / "requirements.lock").read_bytes()
         # the shell hands on a pattern that fits no file
         stamp = f"{_cksum(lock)} {self.folder.resolve()}\n"
-        stamp += f"{_cksum(b'.venv/lib/python*/site-packages/*.dist-info\\n')}\n"
+        packages = b".venv/lib/python*/site-packages/*.dist-info\n"
+        stamp += f"{_cksum(packages)}\n"
         (self.folder / ".venv" / "complete").write_text(stamp, encoding="utf-8")
         # compiled kernels are shared with the repository, whose package the sandbox runs
         compiled = ROOT / ".cache" / "numba"

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-
 def _positive(text: str) -> float:
     value = float(text)
     if not 0.0 < value < float("inf"):
