@@ -15,4 +15,4 @@ class LogHandler(Progress, LogHandlerBase):
     needs_rulegraph = False
 
     def __post_init__(self) -> None:
-        self.start()
+        self.start(self.common_settings.dryrun)

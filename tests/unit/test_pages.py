@@ -122,7 +122,8 @@ def test_the_classes_of_runs_are_explained() -> None:
 
 def test_the_messages_that_are_explained_exist() -> None:
     """Their fixed parts; what stands for others is written in capitals or as three dots."""
-    files = [ROOT / "reproduce", *(ROOT / "src" / "pdrom").rglob("*.py")]
+    files = [ROOT / "reproduce", ROOT / "workflow" / "Snakefile"]
+    files += (ROOT / "src" / "pdrom").rglob("*.py")
     sources = "\n".join(path.read_text("utf-8") for path in files)
     sources = re.sub(r'"\s*\n\s*f?"', "", sources)  # a text over several lines
     page = (ROOT / "docs" / "messages.md").read_text("utf-8")

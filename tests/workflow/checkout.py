@@ -20,9 +20,15 @@ class Checkout:
     folder: Path
 
     def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        """Run snakemake in the copy, on the copy's package."""
+        """Run snakemake in the copy, on the copy's package and one core."""
+        return self.looks("--cores", "1", *arguments)
+
+    def looks(
+        self, *arguments: str, python: str | Path = sys.executable
+    ) -> subprocess.CompletedProcess[str]:
+        """The same without a number of cores, which what only looks does not ask for."""
         return subprocess.run(
-            [sys.executable, "-m", "snakemake", "--cores", "1", *arguments],
+            [python, "-m", "snakemake", *arguments],
             cwd=self.folder,
             env={
                 **os.environ,
@@ -39,7 +45,7 @@ class Checkout:
 
     def planned(self, *arguments: str) -> set[str]:
         """Files that a run would make, by Snakemake's own summary of the plan."""
-        done = self.snakemake("-n", "--summary", *arguments)
+        done = self.looks("--summary", *arguments)
         assert done.returncode == 0, done.stderr
         rows = [line.split("\t") for line in done.stdout.splitlines() if "\t" in line]
         return {row[0] for row in rows[1:] if row[-1] == "update pending"}

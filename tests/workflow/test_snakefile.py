@@ -2,7 +2,10 @@
 
 import os
 import re
+import shutil
 import subprocess
+import sys
+import sysconfig
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -82,7 +85,24 @@ def test_a_fresh_clone_plans_the_whole_study(clean: Checkout) -> None:
     log = done.stdout + done.stderr
     assert "Nothing to be done" not in log
     assert "Manuscript paper/main.pdf" in log
-    assert int(re.search(r"^total +(\d+)$", log, re.MULTILINE)[1]) > 100
+    total = int(re.search(r"^total +(\d+)$", log, re.MULTILINE)[1])
+    assert total > 100
+    told = rf"pdrom: {total} jobs, about \d+ min on 1 core, about \d+ min of processor time"
+    assert re.fullmatch(told, done.stdout.splitlines()[-1])
+
+
+def test_another_snakemake_is_told_where_the_package_is(clean: Checkout, tmp_path: Path) -> None:
+    """One that has all packages of the lock file, but not this project's."""
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path], check=True)
+    locked = Path(sysconfig.get_path("purelib"))
+    own = tmp_path / locked.relative_to(sys.prefix)
+    (own / "locked.pth").write_text(f"{locked}\n", encoding="utf-8")
+    shutil.move(clean.folder / "src", clean.folder / "moved")
+    try:
+        done = clean.looks("-n", python=tmp_path / "bin" / "python")
+    finally:
+        shutil.move(clean.folder / "moved", clean.folder / "src")
+    assert "has no package pdrom: use ./reproduce, or .venv/bin/snakemake" in only_line(done)
 
 
 def test_the_default_target_is_the_manuscript_with_all_tables_and_figures(clean: Checkout) -> None:

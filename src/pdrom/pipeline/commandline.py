@@ -30,6 +30,7 @@ class CommandLine:
     targets : names of files and rules
     report : file of ``--report``, None without one
     looks_only : no job runs, nothing that a run makes is written
+    plans : the jobs are listed, by ``-n``, and nothing else is looked at
     own_output, cores : what else decides about the options that `./reproduce` adds
     executor : Snakemake's executor, of the command line or its profile; None runs jobs here
     """
@@ -40,6 +41,7 @@ class CommandLine:
     targets: tuple[str, ...]
     report: str | None
     looks_only: bool
+    plans: bool
     own_output: bool
     cores: bool
     executor: str | None = None
@@ -59,13 +61,15 @@ class CommandLine:
         found = vars(get_argument_parser().parse_args(list(arguments)))
         if found["profile"]:
             found |= _of_profile(arguments, found["profile"])
+        looks = [name for name in LOOKS_ONLY if found[name]]
         command = cls(
             arguments=tuple(arguments),
             configfiles=_texts(found["configfile"]),
             settings=_texts(found["config"]),
             targets=_texts(found["targets"]),
             report=_report(found),
-            looks_only=any(found[name] for name in LOOKS_ONLY) or _reports(found),
+            looks_only=bool(looks) or _reports(found),
+            plans=looks == ["dryrun"],
             own_output=any(found[name] is not None and found[name] for name in OWN_OUTPUT),
             cores=found["cores"] is not None or found["jobs"] is not None,
             executor=found["executor"],

@@ -69,7 +69,8 @@ def completed(arguments: Sequence[str]) -> list[str]:
         if files != [target]:
             _say(f"{target}: {', '.join(files)}")
     cores = () if command.cores else ("--cores", "all")
-    lines = () if command.looks_only or command.own_output else LINES
+    replaced = command.plans or not command.looks_only
+    lines = LINES if replaced and not command.own_output else ()
     return command.rewritten([*cores, *lines, *OPTIONS], made)
 
 

@@ -52,8 +52,9 @@ class Estimate:
 class Progress(logging.Handler):
     """Writes a line for each job that starts, and what Snakemake warns of."""
 
-    def start(self) -> None:
-        """Nothing was seen yet."""
+    def start(self, plans: bool = False) -> None:
+        """Nothing was seen yet; of a dry run, which ``plans``, no job is shown."""
+        self._plans = plans
         self._started = 0
         self._messages: dict[int, str] = {}
         self._estimate = Estimate()
@@ -65,7 +66,8 @@ class Progress(logging.Handler):
             counts = {r: n for r, n in record.stats.items() if r != "total"}
             self._estimate.planned = Counter(counts)
         elif event == LogEvent.JOB_INFO:
-            self._show_job(record)
+            if not self._plans:
+                self._show_job(record)
         elif event == LogEvent.JOB_FINISHED:
             self._estimate.finish(record.job_id, record.created)
         elif event == LogEvent.GROUP_ERROR:

@@ -17,6 +17,7 @@ from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.last_run import recall, remember
 from pdrom.pipeline.manifest import write_manifest
 from pdrom.pipeline.plan import Plan
+from pdrom.pipeline.preview import preview
 from pdrom.pipeline.running import hold, remove_stale_locks
 from pdrom.pipeline.scheduler import cancel_timers
 from pdrom.pipeline.summary import summary
@@ -54,13 +55,18 @@ class Run:
             sys.exit(f"pdrom: {error}")
         return cls(command, listen())
 
-    def check(self, plan: Plan, folders: Folders, rules: Iterable[Rule]) -> None:
-        """End the process with one line if a target or a report cannot be made."""
+    def check(self, plan: Plan, folders: Folders, rules: Iterable[Rule], cores: int) -> None:
+        """End the process with one line if a target or a report cannot be made.
+
+        A dry run says at its end what it would take on so many ``cores``.
+        """
         try:
             known(plan).check(self.command.targets, list(rules))
             self._check_report(folders)
         except PdromError as error:
             sys.exit(f"pdrom: {error}")
+        if self.command.plans:
+            preview(plan.seconds, cores)
 
     def _check_report(self, folders: Folders) -> None:
         asked = self.command.report and not self.command.targets

@@ -18,7 +18,9 @@ def project(tmp_path, monkeypatch):
 
 
 def test_options_are_added_and_cores_unless_given():
-    assert completed(["-n"]) == ["-n", "--cores", "all", *OPTIONS]
+    assert completed(["-n"]) == ["-n", "--cores", "all", *LINES, *OPTIONS]
+    assert completed(["-n", "--verbose"]) == ["-n", "--verbose", "--cores", "all", *OPTIONS]
+    assert completed(["-n", "--summary"]) == ["-n", "--summary", "--cores", "all", *OPTIONS]
     assert completed(["-j2"]) == ["-j2", *LINES, *OPTIONS]
     assert completed(["--cores", "1"]) == ["--cores", "1", *LINES, *OPTIONS]
 
@@ -37,7 +39,9 @@ def test_names_become_files_and_it_is_said(capsys):
 @pytest.mark.parametrize("asked", ["8", "reconstruction_error"])
 def test_a_figure_has_its_number_or_its_name(asked, capsys):
     made = "results/figures/reconstruction_error.pdf"
-    assert completed(["figure", asked, "-n"]) == ["-n", "--cores", "all", *OPTIONS, "--", made]
+    assert completed(["figure", asked, "-n"]) == [
+        "-n", "--cores", "all", *LINES, *OPTIONS, "--", made,
+    ]  # fmt: skip
     assert capsys.readouterr().err == f"reproduce: figure reconstruction_error: {made}\n"
 
 

@@ -55,6 +55,14 @@ def snakemake(capsys):
     return logger
 
 
+def test_of_a_dry_run_no_job_has_a_line(capsys):
+    plugin = LoggerPluginRegistry().get_plugin("pdrom")
+    handler = plugin.log_handler(OutputSettings(dryrun=True), None)
+    job = {"event": LogEvent.JOB_INFO, "rule_name": "fom", "jobid": 3, "rule_msg": "Run"}
+    handler.handle(logging.makeLogRecord({"created": 0.0, **job}))
+    assert capsys.readouterr().err == ""
+
+
 def test_the_lines_of_a_run(snakemake):
     snakemake.info("Building DAG of jobs...")
     stats = {"fom": 10, "table": 1, "total": 11}
