@@ -18,11 +18,11 @@ from pdrom.pipeline.last_run import recall, remember
 from pdrom.pipeline.manifest import write_manifest
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.preview import preview
-from pdrom.pipeline.running import hold, remove_stale_locks
+from pdrom.pipeline.running import FOLDER, hold, remove_stale_locks
 from pdrom.pipeline.scheduler import cancel_timers
 from pdrom.pipeline.summary import summary
 from pdrom.pipeline.targets import Rule, known
-from pdrom.pipeline.warm import start_server
+from pdrom.pipeline.warm import hold_pipe, start_server
 
 # What Snakemake compares by date.
 DATED = ("results", "paper", "config", "workflow")
@@ -80,6 +80,10 @@ class Run:
     def start(self, workflow: Any) -> None:
         """Before the first job: the process that jobs are forked from, or a look at the cluster."""
         if workflow.local_exec:
+            try:
+                hold_pipe(FOLDER / "run.pipe")
+            except OSError as error:
+                sys.exit(f"pdrom: {FOLDER}/run.pipe: cannot be made ({error.strerror})")
             start_server()
         elif self.command.executor == EXECUTOR:
             try:

@@ -9,11 +9,12 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import psutil
 import pytest
 
 from pdrom.pipeline import run as running
 from pdrom.pipeline.warm import interpreter
-from pdrom.pipeline.warm.client import ADDRESS, of_this_user
+from pdrom.pipeline.warm.client import ADDRESS, of_this_user, place_of
 from pdrom.pipeline.warm.start import SUPPORTED
 
 pytestmark = pytest.mark.skipif(not SUPPORTED, reason="no safe forks on this platform")
@@ -135,6 +136,155 @@ signal.pause()
     rest = owner.stdout.read()
     assert rest == ("ended -9\n" if victim == "client" else "")
     owner.wait()
+
+
+# A process that is a server: its address, its patience; its owner holds its standard input.
+SERVER = """
+import os, socket, sys
+from pdrom.pipeline.warm.client import place_of
+from pdrom.pipeline.warm.server import Server, run
+listener = socket.socket(socket.AF_UNIX)
+listener.bind(place_of(sys.argv[1]))
+listener.listen()
+print("listens", flush=True)
+script = Server(listener, os.dup(0), patience=float(sys.argv[2])).serve()
+if script is not None:
+    run(script)
+"""
+
+
+class ForkServer:
+    """A server with clients that misbehave; it has to come to its end without a word."""
+
+    def __init__(self, folder: Path, patience: float = 1e6) -> None:
+        self.folder = folder
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", SERVER, str(folder), str(patience)],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+
+    def __enter__(self) -> "ForkServer":
+        assert self.process.stdout.readline() == "listens\n", self.process.stderr.read()
+        return self
+
+    def __exit__(self, *_fault: object) -> None:
+        out, errors = self.process.communicate()
+        assert (out, errors) == ("", "")
+
+    def connect(self) -> socket.socket:
+        """Connection of a client."""
+        connection = socket.socket(socket.AF_UNIX)
+        connection.connect(place_of(str(self.folder)))
+        return connection
+
+    def ask(self, connection: socket.socket, code: str, stream: int) -> None:
+        """Request a job that runs ``code``, with one stream for all three."""
+        path = self.folder / "job.py"
+        path.write_text(code)
+        content = f"/\0{path}\0A=b".encode()
+        socket.send_fds(connection, [b"%20d" % len(content)], [stream] * 3)
+        connection.sendall(content)
+
+    def serves(self) -> bool:
+        """Whether another client gets its job, and the job's end."""
+        with self.connect() as connection, open(os.devnull) as nothing:
+            self.ask(connection, "import sys; sys.exit(3)", nothing.fileno())
+            told = b"".join(iter(lambda: connection.recv(20), b""))
+        return os.waitstatus_to_exitcode(int(told[20:])) == 3
+
+
+GARBAGE = {
+    "no number": b"x" * 30,
+    "negative": b"%20d" % -5,
+    "too long": b"%20d" % 10**15,
+    "no streams": b"%20d/\0/script" % 9,
+    "no script": b"%20d/" % 1,
+    "nothing": b"%20d" % 0,
+}
+
+
+@pytest.mark.parametrize("content", GARBAGE.values(), ids=GARBAGE)
+def test_what_is_no_request_is_dropped(tmp_path, content):
+    """The client learns it from the end of its connection."""
+    with ForkServer(tmp_path) as server:
+        with server.connect() as connection:
+            connection.sendall(content)
+            assert connection.recv(20) == b""
+        assert server.serves()
+
+
+@pytest.mark.parametrize("sent", [b"", b"%20d/" % 40], ids=["nothing", "half a request"])
+def test_a_silent_client_keeps_nobody_waiting(tmp_path, sent):
+    with ForkServer(tmp_path) as server, server.connect() as connection:
+        connection.sendall(sent)
+        assert server.serves()
+
+
+def test_the_patience_with_a_silent_client_ends(tmp_path):
+    with ForkServer(tmp_path, patience=0.01) as server, server.connect() as connection:
+        assert connection.recv(20) == b""
+
+
+def test_a_client_that_is_gone_before_its_answer(tmp_path):
+    """Its job ends with it: the pipe that the job holds closes, and others get their jobs."""
+    reader, writer = os.pipe()
+    with ForkServer(tmp_path) as server:
+        os.kill(server.process.pid, signal.SIGSTOP)
+        with server.connect() as connection:
+            server.ask(connection, "import signal; signal.pause()", writer)
+        os.close(writer)
+        os.kill(server.process.pid, signal.SIGCONT)
+        assert os.read(reader, 1) == b""
+        assert server.serves()
+    os.close(reader)
+
+
+def test_a_job_ends_with_its_server(tmp_path):
+    """Also if its client does nothing about it."""
+    reader, writer = os.pipe()
+    with ForkServer(tmp_path) as server, server.connect() as connection:
+        server.ask(connection, "import os, signal; os.write(1, b'x'); signal.pause()", writer)
+        os.close(writer)
+        assert os.read(reader, 1) == b"x"
+        server.process.kill()
+        assert os.read(reader, 1) == b""
+    os.close(reader)
+
+
+def test_what_a_job_has_started_ends_with_the_server(tmp_path):
+    """By the client: the pipe that both hold closes."""
+    code = """
+import os, subprocess
+subprocess.run("echo $PPID; read nothing", shell=True)
+"""
+    owner = subprocess.Popen(
+        [sys.executable, "-c", OWNER, f"exec {script(tmp_path, code)} 2>&1"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    job = int(owner.stdout.readline())
+    os.kill(psutil.Process(job).ppid(), signal.SIGKILL)
+    assert owner.stdout.read() == "pdrom: the process that jobs start from is gone\nended 1\n"
+    owner.communicate()
+
+
+def test_a_plain_interpreter_ends_with_the_run(tmp_path):
+    """The pipe that it holds as its output closes."""
+    path = tmp_path / "script.py"
+    path.write_text("import os; print('ready', flush=True); os.read(0, 1)")
+    code = f"""
+import subprocess
+from pathlib import Path
+from pdrom.pipeline.warm import hold_pipe
+hold_pipe(Path({str(tmp_path / "pipe")!r}))
+subprocess.run({f"{interpreter()} {path}; echo its end"!r}, shell=True)
+"""
+    owner = subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert owner.stdout.readline() == "ready\n"
+    owner.kill()
+    assert owner.stdout.read() == "its end\n"
+    owner.communicate()
 
 
 def test_without_a_server_the_client_is_a_plain_interpreter(tmp_path):

@@ -24,13 +24,16 @@ def main() -> int:
     answer = ask(connection) if connection else b""
     if connection is None or not answer:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, FORWARDED)
-        os.execv(sys.executable, [sys.executable, *sys.argv[1:]])
+        alone = [os.path.join(os.path.dirname(__file__), "alone.py")] if script else []
+        os.execv(sys.executable, [sys.executable, *alone, *sys.argv[1:]])
     job = int(answer)
     for number in FORWARDED:
         signal.signal(number, lambda received, frame: forward(job, received))
     signal.pthread_sigmask(signal.SIG_UNBLOCK, FORWARDED)
     status = receive(connection)
     if not status:
+        # the job has ended with the server; what it had started has not
+        forward(job, signal.SIGKILL)
         sys.stderr.write("pdrom: the process that jobs start from is gone\n")
         return 1
     code = os.waitstatus_to_exitcode(int(status))

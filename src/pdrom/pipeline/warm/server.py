@@ -2,10 +2,12 @@
 
 It has one thread and loads third-party libraries, and the modules that every job begins with: what
 a scene does not list stays unloaded.
-It ends, and its jobs with it, when the process that started it is gone.
+It ends, and its jobs with it, when the process that started it is gone. A client that is killed,
+says nothing or asks for what is no request is dropped, and costs the others nothing.
 """
 
 import atexit
+import ctypes
 import gc
 import importlib
 import os
@@ -15,12 +17,17 @@ import signal
 import socket
 import sys
 import threading
+import time
 from contextlib import suppress
 from typing import NoReturn
 
 from pdrom.pipeline.warm.client import of_this_user
+from pdrom.pipeline.warm.request import Request
 
 NUMBER = b"%20d"
+# Seconds that a client may take for its request, which it sends as soon as it is connected.
+PATIENCE = 30.0
+_DIES_WITH_PARENT = 1  # PR_SET_PDEATHSIG of <sys/prctl.h>
 
 
 class Job:
@@ -49,24 +56,27 @@ class Server:
     ----------
     listener : socket that clients connect to
     owner : read end of a pipe whose other end only the owner holds
+    patience : seconds that a client may take for its request
     """
 
-    def __init__(self, listener: socket.socket, owner: int) -> None:
+    def __init__(self, listener: socket.socket, owner: int, patience: float = PATIENCE) -> None:
         self.listener = listener
         self.owner = owner
+        self.patience = patience
+        self.requests: list[Request] = []
         self.jobs: dict[int, Job] = {}
         # a signal wakes the loop up by a byte in this pipe
         self.wake, self._waker = os.pipe()
         os.set_blocking(self._waker, False)
+        self._process = os.getpid()
+        self._libc = ctypes.CDLL(None)
 
     def serve(self) -> str | None:
         """Path of the script to run, in a fork; None in the server, once its owner is gone."""
         signal.set_wakeup_fd(self._waker, warn_on_full_buffer=False)
         signal.signal(signal.SIGCHLD, lambda number, frame: None)
         while True:
-            clients = {job.client.fileno(): job for job in self.jobs.values()}
-            waiting = [self.listener.fileno(), self.owner, self.wake, *clients]
-            ready, _, _ = select.select(waiting, [], [])
+            ready = self._wait()
             if self.owner in ready:
                 for job in self.jobs.values():
                     job.kill()
@@ -74,13 +84,26 @@ class Server:
             if self.wake in ready:
                 os.read(self.wake, 4096)
             self._collect()
-            for number in ready:
+            for job in self.jobs.values():
                 # a client sends nothing after its request, so that something to read means that it
                 # is gone: its job is ended, too
-                if number in clients and clients[number].process in self.jobs:
-                    clients[number].kill()
-            if self.listener.fileno() in ready and (script := self._accept()):
-                return script
+                if job.client.fileno() in ready:
+                    job.kill()
+            for request in [r for r in self.requests if r.client.fileno() in ready]:
+                if script := self._answer(request):
+                    return script
+            for request in [r for r in self.requests if r.until <= time.monotonic()]:
+                self._drop(request)
+            if self.listener.fileno() in ready:
+                self._accept()
+
+    def _wait(self) -> set[int]:
+        """Descriptors with something to read, or none when a client's patience ends."""
+        clients = [one.client.fileno() for one in (*self.jobs.values(), *self.requests)]
+        waiting = [self.listener.fileno(), self.owner, self.wake, *clients]
+        until = min((request.until for request in self.requests), default=None)
+        limit = None if until is None else max(until - time.monotonic(), 0.0)
+        return set(select.select(waiting, [], [], limit)[0])
 
     def _collect(self) -> None:
         """Report the jobs that have ended."""
@@ -89,39 +112,62 @@ class Server:
             if done:
                 self.jobs.pop(process).end(status)
 
-    def _accept(self) -> str | None:
-        """Fork a job; the path of its script in the fork, None in the server."""
+    def _accept(self) -> None:
+        """Begin to listen to a client."""
         client, _ = self.listener.accept()
-        request = receive(client) if of_this_user(client) else None
-        if request is None:
+        if of_this_user(client):
+            self.requests.append(Request(client, time.monotonic() + self.patience))
+        else:
             client.close()
+
+    def _drop(self, request: Request) -> None:
+        """Leave a client alone, which runs its job itself if it is there."""
+        self.requests.remove(request)
+        request.close_streams()
+        request.client.close()
+
+    def _answer(self, request: Request) -> str | None:
+        """Fork a job once its request is complete; the script in the fork, None in the server."""
+        try:
+            if not request.read():
+                return None
+            parts = request.parts()
+            process = os.fork()
+        except (OSError, ValueError):
+            self._drop(request)
             return None
-        parts, streams = request
-        process = os.fork()
+        if not process:
+            self._become_job(parts, request)
+            return parts[1]
         # the server and the fork both ask for the group, so that it exists before either goes on
         os.setpgid(process, process)
-        if process:
-            for stream in streams:
-                os.close(stream)
-            client.sendall(NUMBER % process)
-            self.jobs[process] = Job(process, client)
-            return None
-        self._become_job(parts, streams, client)
-        return parts[1]
+        self.requests.remove(request)
+        request.close_streams()
+        self.jobs[process] = job = Job(process, request.client)
+        try:
+            job.client.sendall(NUMBER % process)
+        except OSError:
+            job.kill()
+        return None
 
-    def _become_job(self, parts: list[str], streams: list[int], client: socket.socket) -> None:
+    def _become_job(self, parts: list[str], request: Request) -> None:
         """Leave everything of the server behind and take over the client's surroundings."""
+        os.setpgid(0, 0)
+        # end with the server, however that ends; it may have ended just before
+        self._libc.prctl(_DIES_WITH_PARENT, signal.SIGKILL)
+        if os.getppid() != self._process:
+            os._exit(1)
         signal.set_wakeup_fd(-1)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-        for job in self.jobs.values():
-            job.client.close()
-        client.close()
+        for number, stream in enumerate(request.streams):
+            os.dup2(stream, number)
+        for other in self.requests:
+            other.close_streams()
+        for one in (*self.jobs.values(), *self.requests):
+            one.client.close()
         self.listener.close()
         for number in (self.owner, self.wake, self._waker):
             os.close(number)
-        for number, stream in enumerate(streams):
-            os.dup2(stream, number)
-            os.close(stream)
         folder, script, *environment = parts
         os.chdir(folder)
         os.environ.clear()
@@ -130,20 +176,6 @@ class Server:
             os.environ[key] = value
         sys.argv = [script]
         sys.path[0] = os.path.dirname(script)
-
-
-def receive(client: socket.socket) -> tuple[list[str], list[int]] | None:
-    """Folder, script and environment of a request, and its three streams; None if it was cut."""
-    header, streams, _, _ = socket.recv_fds(client, 20, 3)
-    content = b""
-    size = int(header) if len(header) == 20 else 0
-    while len(content) < size and (more := client.recv(size - len(content))):
-        content += more
-    if not size or len(content) < size:
-        for stream in streams:
-            os.close(stream)
-        return None
-    return content.decode("utf-8", "surrogateescape").split("\0"), list(streams)
 
 
 def main() -> None:

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from pdrom.pipeline.warm.alone import PIPE
 from pdrom.pipeline.warm.client import ADDRESS, place_of
 
 # Forks of a process that has loaded system frameworks are unsafe on macOS.
@@ -37,6 +38,26 @@ def interpreter(python: str = sys.executable) -> str:
     """Words of a shell that run a script by the client; ``python`` is the plain interpreter."""
     client = Path(__file__).with_name("client.py")
     return f"{shlex.quote(python)} -I -S {shlex.quote(str(client))}"
+
+
+def hold_pipe(place: Path) -> None:
+    """Open a pipe that closes with this process, which ends the jobs that are no forks.
+
+    Parameters
+    ----------
+    place : file of the pipe, of which jobs learn by the environment; an older one is replaced
+
+    Raises
+    ------
+    OSError
+        The file system has no such files.
+    """
+    place.unlink(missing_ok=True)
+    os.mkfifo(place)
+    reader = os.open(place, os.O_RDONLY | os.O_NONBLOCK)  # a writer needs a reader to begin with
+    os.open(place, os.O_WRONLY)
+    os.close(reader)
+    os.environ[PIPE] = str(place.absolute())
 
 
 def start_server(python: str = sys.executable, libraries: Sequence[str] = LIBRARIES) -> None:
