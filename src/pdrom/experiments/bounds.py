@@ -15,6 +15,7 @@ from pdrom.experiments.declaration import Experiment, JobSettings
 from pdrom.experiments.scenes import positions_of, scene_of
 from pdrom.experiments.settings import Horizon
 from pdrom.model.boundedness import Compliance, largest_projections, linear_extent
+from pdrom.model.premise import outside
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, load_basis
 from pdrom.reduction.local.contraction import Tangent, iteration_numbers
@@ -95,7 +96,10 @@ class _Case:
 
     def __init__(self, scene: Scene, positions: np.ndarray, before: int) -> None:
         self._scene = scene
-        self._compliance = Compliance.of(scene)
+        reason = outside(scene)
+        if reason is not None:
+            log.warning("scene '%s': no bounds: %s", scene.config.name, reason)
+        self._compliance = None if reason else Compliance.of(scene)
         self._largest = _largest(scene)
         self._extents: dict[str, float] = {}
         self._tangents = list(_tangents(scene, positions, before))
@@ -112,7 +116,7 @@ class _Case:
 
     def _bounds(self, group: str, reduction: Reduction) -> dict[str, float]:
         # clipped coefficients are no linear image of the projections
-        if len(self._largest) < len(self._scene.groups) or reduction.spec.bounds != "none":
+        if self._compliance is None or reduction.spec.bounds != "none":
             return {}
         compliance, own = self._compliance, self._largest[group]
         energy = reach(self._scene.group(group), reduction, own, compliance.inverse)

@@ -17,6 +17,7 @@ group                                                               `pdrom.model
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -101,6 +102,10 @@ class Force(Effect):
     time_step: float
     """Step h of the run in seconds, which the scene sets: no force may overshoot in a frame."""
 
+    rate: float | np.ndarray | None = None
+    """Rate c, a number or (N,) 1/s, of an acceleration that is -c v and a part that does not depend
+    on the motion; None for any other (see `pdrom.model.premise`)."""
+
     @abstractmethod
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
         """Acceleration of the frame, (3,) or (N, 3) m/s^2."""
@@ -122,6 +127,10 @@ class Boundary(Effect):
     moves: bool
     """Whether the targets move while held."""
 
+    by_offsets: bool = False
+    """Whether the targets are where vertices were taken hold of and offsets that do not depend on
+    it (see `pdrom.model.premise`)."""
+
     @abstractmethod
     def active(self, frame: int) -> bool:
         """Whether anything is held in ``frame`` (0-based: the step from state f to f + 1)."""
@@ -141,6 +150,12 @@ class Boundary(Effect):
     @abstractmethod
     def units(self) -> list[np.ndarray]:
         """Sets of vertices that are always held together."""
+
+
+def held_vertices(boundaries: Sequence[Boundary], frame: int) -> np.ndarray:
+    """Vertices that any of the ``boundaries`` holds in ``frame``, ascending (n,) int64."""
+    held = [b.held(frame) for b in boundaries if b.active(frame)]
+    return np.unique(np.concatenate(held)) if held else np.empty(0, dtype=np.int64)
 
 
 class Contact(Effect):

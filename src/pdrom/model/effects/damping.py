@@ -27,6 +27,7 @@ class Damping(Force):
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
+        self.rate = config.rate
 
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
         return -self.config.rate * velocities

@@ -30,9 +30,9 @@ class Drag(Force):
         self._rates = config.coefficient * areas / masses
 
     @cached_property
-    def _mean_rates(self) -> np.ndarray:
-        """Velocity lost in a frame over its first value and the step, (N, 1) 1/s."""
-        return -np.expm1(-self._rates * self.time_step)[:, None] / self.time_step
+    def rate(self) -> np.ndarray:  # type: ignore[override]
+        """Velocity lost in a frame over its first value and the step, (N,) 1/s."""
+        return -np.expm1(-self._rates * self.time_step) / self.time_step
 
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
-        return -self._mean_rates * velocities
+        return -self.rate[:, None] * velocities

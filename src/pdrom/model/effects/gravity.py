@@ -17,6 +17,8 @@ class Gravity(Force):
         effect: Literal["gravity"] = "gravity"
         acceleration: Vector = (0.0, -9.81, 0.0)
 
+    rate = 0.0
+
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
         self._acceleration = np.array(config.acceleration)

@@ -64,6 +64,7 @@ class Pins(Hold):
         effect: Literal["pins"] = "pins"
 
     moves = False
+    by_offsets = True
 
     def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
         return anchor
@@ -92,6 +93,7 @@ class Translate(Hold):
             return self.model_copy(update={"offset": tuple(-x for x in self.offset)})
 
     moves = True
+    by_offsets = True
 
     def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
         return anchor + self.config.progress(frame) * np.array(self.config.offset)
