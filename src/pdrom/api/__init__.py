@@ -3,11 +3,12 @@
 docs/python.md has a worked example.
 """
 
+from pdrom.api.arguments import GuardSettings, methods
 from pdrom.api.files import load, save
 from pdrom.api.pictures import plot, view
-from pdrom.api.runs import FullRun, ReducedRun, basis, methods, reduce, run
+from pdrom.api.records import FullRun, ReducedRun
+from pdrom.api.runs import basis, reduce, run
 from pdrom.api.scenes import build_scene, load_scene
-from pdrom.reduction.local.guard_settings import GuardSettings
 
 __all__ = [
     "FullRun",

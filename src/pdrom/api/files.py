@@ -9,11 +9,12 @@ from typing import Any
 import h5py
 import numpy as np
 
-from pdrom.api.runs import FullRun, ReducedRun, full_run
+from pdrom.api.arguments import file_path, require
+from pdrom.api.records import FullRun, ReducedRun, full_run
 from pdrom.api.scenes import bound
 from pdrom.core.errors import StorageError
 from pdrom.core.provenance import made_by
-from pdrom.core.store import open_hdf5, write_hdf5
+from pdrom.core.store import open_hdf5, require_finite, write_hdf5
 from pdrom.core.yamlfile import validate
 from pdrom.model.mesh.types import store_mesh, stored_mesh
 from pdrom.model.scene import Scene, SceneConfig
@@ -22,7 +23,20 @@ from pdrom.reduction.rerun import Rerun, displacement_norms
 
 
 def save(reduced: ReducedRun, path: str | os.PathLike[str]) -> None:
-    """Write a reduced run with its full-order run, as positions in single precision."""
+    """Write a reduced run with its full-order run, as positions in single precision.
+
+    Parameters
+    ----------
+    reduced : run of `pdrom.api.reduce`
+    path : file (HDF5) to write
+
+    Raises
+    ------
+    ConfigurationError, StorageError
+        No reduced run; the file cannot be written.
+    """
+    require(ReducedRun, reduced, "reduced", "pdrom.api.reduce makes one")
+    path = file_path(path)
     config = reduced.full.scene.config.model_dump(mode="json")
     labels = {"group": reduced.group, "method": reduced.method, "r": reduced.r}
     outcome = reduced.outcome
@@ -42,20 +56,58 @@ def save(reduced: ReducedRun, path: str | os.PathLike[str]) -> None:
         _store(file, "displacement", displacement_norms(reduced.full.positions), "m")
 
 
-def load(path: str | os.PathLike[str]) -> FullRun | ReducedRun:
+def load(path: str | os.PathLike[str], unchecked: bool = False) -> FullRun | ReducedRun:
     """A run that `save`, `pdrom.api.run` or the pipeline wrote.
+
+    Parameters
+    ----------
+    path : file (HDF5); it is only read, whatever is wrong with it
+    unchecked : whether a file without a checksum inside is read if it is sound: complete, of the
+        shapes that its scene gives, finite. A wrong checksum is never accepted.
 
     Raises
     ------
     StorageError
-        The file is missing, damaged, or holds no run of a scene.
+        The file is missing, damaged, has no checksum, or holds no run of a scene.
     """
-    with open_hdf5(path) as file:
-        if "positions" in file and "timings" in file:
-            return full_run(_scene(file, path), file)
-        if "reduced" in file and "full" in file:
-            return _reduced(_scene(file, path), file)
-    raise StorageError(f"{path}: holds no run that could be opened here (pdrom show says what)")
+    path = file_path(path)
+    try:
+        with open_hdf5(path, unchecked) as file:
+            found = _run(file, path)
+    except (ValueError, TypeError, LookupError, RuntimeError) as error:
+        fault = " ".join(str(error).split())[:200]
+        raise StorageError(f"{path}: holds no sound run ({fault})") from error
+    if found is None:
+        raise StorageError(f"{path}: holds no run that could be opened here (pdrom show says what)")
+    if unchecked:
+        _require_sound(found, path)
+    return found
+
+
+def _run(file: h5py.File, path: Path) -> FullRun | ReducedRun | None:
+    if "positions" in file and "timings" in file:
+        return full_run(_scene(file, path), file)
+    if "reduced" in file and "full" in file:
+        return _reduced(_scene(file, path), file)
+    return None
+
+
+def _require_sound(found: FullRun | ReducedRun, path: Path) -> None:
+    """StorageError for arrays of other shapes than the scene's, or NaN in them."""
+    full = found.full if isinstance(found, ReducedRun) else found
+    frames, vertices = full.scene.config.frames, full.scene.mesh.vertices
+    arrays = {"positions": (full.positions, (frames + 1, vertices, 3)), "ms": (full.ms, (frames,))}
+    for name, own in full.snapshots.items():
+        group, count = full.scene.group(name), len(own.roundoff)
+        rows = group.elements * group.rows_per_element
+        arrays[f"snapshots of {name}"] = own.p, (count, rows, 3)
+    if isinstance(found, ReducedRun):
+        done = found.outcome.frames
+        arrays["reduced"] = found.outcome.positions, (done + 1, vertices, 3)
+    for name, (array, shape) in arrays.items():
+        if array.shape != shape:
+            raise StorageError(f"{path}: {name} of shape {array.shape}, required: {shape}")
+        require_finite(f"{path}: {name}", array, StorageError)
 
 
 def _store(file: h5py.File, name: str, values: np.ndarray, unit: str) -> None:
@@ -95,7 +147,7 @@ def _seen(told: Mapping[str, Any]) -> GuardRecord:
     )
 
 
-def _scene(file: h5py.File, path: str | os.PathLike[str]) -> Scene:
+def _scene(file: h5py.File, path: Path) -> Scene:
     """The scene of a run; its mesh from the file, where it was stored."""
     config = json.loads(file.attrs["configuration"])["scene"]
     scene = validate(SceneConfig, config, str(path))

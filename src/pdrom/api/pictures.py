@@ -5,8 +5,10 @@ import os
 import numpy as np
 from matplotlib.figure import Figure
 
-from pdrom.api.runs import FullRun, ReducedRun
+from pdrom.api.arguments import file_path, require
+from pdrom.api.records import FullRun, ReducedRun
 from pdrom.core.errors import SceneError
+from pdrom.core.store import require_place
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.multiples import clipped, log_axis
 from pdrom.report.viewer.page import write_page
@@ -18,8 +20,25 @@ LOW, HIGH = 1e-7, 1e3  # errors outside are drawn on the limit
 def plot(*runs: ReducedRun) -> Figure:
     """Errors of reduced runs against time; a cross ends a run that blew up.
 
-    ``plot(...).savefig("errors.png")`` writes the picture.
+    Parameters
+    ----------
+    runs : reduced runs, of one scene or of several; each gets a line and an entry of the legend
+
+    Returns
+    -------
+    Figure
+        Relative error of every frame over seconds; errors below 1e-7 or above 1e3 are drawn on
+        these limits. ``plot(...).savefig("errors.png")`` writes the picture.
+
+    Raises
+    ------
+    ConfigurationError, SceneError
+        An argument is no reduced run; there is none.
     """
+    if not runs:
+        raise SceneError("plot: at least one run is required")
+    for run in runs:
+        require(ReducedRun, run, "plot", "pdrom.api.reduce makes one, load reads one")
     with style.look():
         figure = Figure(figsize=(style.WIDTH, 3.0), layout="constrained")
         ax = figure.subplots()
@@ -42,13 +61,22 @@ def view(path: str | os.PathLike[str], *runs: FullRun | ReducedRun) -> None:
 
     Reduced runs are shown with their full-order run; runs with equal scenes become one scene.
 
+    Parameters
+    ----------
+    path : file to write
+    runs : full-order and reduced runs
+
     Raises
     ------
-    SceneError
-        No run is given, or two scenes that differ have the same name.
+    ConfigurationError, SceneError, StorageError
+        An argument is no run; none is given, or two scenes that differ have the same name; the page
+        would be too large, or cannot be written.
     """
+    require_place(file_path(path))
     if not runs:
         raise SceneError("view: at least one run is required")
+    for run in runs:
+        require((FullRun, ReducedRun), run, "view", "pdrom.api.run and reduce make one")
     scenes: dict[str, tuple[FullRun, list[ReducedRun]]] = {}
     for run in runs:
         full = run.full if isinstance(run, ReducedRun) else run

@@ -3,29 +3,27 @@
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
 
-import h5py
 import numpy as np
 
-from pdrom.core.errors import ConfigurationError, SnapshotError, choices
-from pdrom.core.project import config_file
+from pdrom.api.arguments import file_path, fitting_basis, method_spec, modes, require
+from pdrom.api.records import FullRun, ReducedRun, full_run
+from pdrom.core.errors import SnapshotError
 from pdrom.core.provenance import made_by
-from pdrom.core.store import open_hdf5
+from pdrom.core.store import open_hdf5, require_place
 from pdrom.model.dynamics.stepper import FrameReport, State
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.runs.bounded import Advance, BoundedRun
 from pdrom.model.runs.full_order import run as run_full_order
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis import Basis, compute_basis
-from pdrom.reduction.local.guard import GuardRecord
 from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.local.guarded import Trained, guarded
-from pdrom.reduction.method import MethodSpec, load_methods
-from pdrom.reduction.rerun import Rerun, compare, mean_motion
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.rerun import compare
 from pdrom.reduction.sampling import Reduction
 from pdrom.reduction.sampling.select import select
 from pdrom.reduction.snapshots import row_masses, training_frames
@@ -36,59 +34,8 @@ SNAPSHOTS = 100  # at most, of a group for which the scene names no number
 # A reduced run ends when its bounding box exceeds this multiple of the mesh's.
 BLOWUP_EXTENT = 100.0
 UNGUARDED = GuardSettings(action="none")
-
-
-@dataclass(frozen=True)
-class Snapshots:
-    """Projections p (n, e p, 3) of a group at the training frames, and their round-off (n,)."""
-
-    p: np.ndarray
-    roundoff: np.ndarray
-
-
-@dataclass(frozen=True)
-class FullRun:
-    """A full-order run.
-
-    positions : (F + 1, N, 3) m, the initial ones first
-    ms : (F,) milliseconds of each frame
-    snapshots : of every constraint group, for a basis
-    """
-
-    scene: Scene
-    positions: np.ndarray
-    ms: np.ndarray
-    snapshots: dict[str, Snapshots]
-
-
-@dataclass(frozen=True)
-class ReducedRun:
-    """A run with the projections of one group reduced, compared with its full-order run.
-
-    gain : norm of the sampled equations' solution operator; 1 if every projection is evaluated
-    outcome : positions (F' + 1, N, 3) m, differences, and whether it blew up
-    ms : milliseconds a frame (median), those of a guard included
-    seen : what the guard saw, if there was one
-    """
-
-    full: FullRun
-    group: str
-    method: str
-    r: int
-    gain: float
-    outcome: Rerun
-    ms: float
-    seen: GuardRecord = field(default_factory=GuardRecord.unwatched)
-
-    @property
-    def error(self) -> np.ndarray:
-        """Error of each frame (F',) relative to the root mean square displacement of the run."""
-        return self.outcome.difference / mean_motion(self.full.positions)
-
-    @property
-    def title(self) -> str:
-        """What is reduced, how and to which size."""
-        return f"{self.group.replace('_', ' ')}, {self.method}, r = {self.r}"
+GROUP = "the name of a constraint group"
+FULL_RUN = "pdrom.api.run makes one, load reads one"
 
 
 def run(
@@ -100,9 +47,23 @@ def run(
 
     Parameters
     ----------
+    scene : what is run, by `build_scene` or `load_scene`
     out : file (HDF5) to write; none without it
-    on_frame : called after each frame with its number and what it did
+    on_frame : called after each frame with its number, from 0, and what it did
+
+    Returns
+    -------
+    FullRun
+        Positions and milliseconds of every frame, snapshots of every group.
+
+    Raises
+    ------
+    ConfigurationError, StorageError
+        No scene; ``out`` cannot be written, which is found before anything runs.
     """
+    require(Scene, scene, "scene", "build_scene and load_scene make one")
+    if out is not None:
+        require_place(file_path(out))
     frames = {group: _training_frames(scene, group) for group in scene.config.groups}
     config = scene.config.model_dump(mode="json")
     told = {"scene": config, "run": "train", "solver": DEFAULT_SOLVER}
@@ -112,26 +73,30 @@ def run(
             return full_run(scene, file)
 
 
-def full_run(scene: Scene, file: h5py.File) -> FullRun:
-    """A run as it lies in a file."""
-    stored = file.get("snapshots", {})
-    return FullRun(
-        scene,
-        file["positions"][...],
-        file["timings"][...].sum(axis=1),
-        {name: Snapshots(s["p"][...], s["roundoff"][...]) for name, s in stored.items()},
-    )
-
-
 def basis(full: FullRun, group: str, method: str | MethodSpec = "pod") -> Basis:
     """Basis of a group's projections, as a method asks for it.
+
+    Parameters
+    ----------
+    full : run whose snapshots it is made of
+    group : name of a constraint group of its scene
+    method : name in config/methods.yaml, or a specification; it says how the snapshots are centred
+        and weighted, and whether the axes share their coefficients
+
+    Returns
+    -------
+    Basis
+        Modes ``V`` (3 e p, rank), ``mean`` (3 e p,), all ``singular_values``, the ``rank`` above
+        round-off; e elements of p rows, entries in the order element, row, axis.
 
     Raises
     ------
     ConfigurationError, SceneError, SnapshotError
-        No such method, no such group, or its snapshots are too few or not finite.
+        No run, no such method, no such group, or its snapshots are too few or not finite.
     """
-    chosen, spec = full.scene.group(group), _spec(method)
+    require(FullRun, full, "full", FULL_RUN)
+    chosen = full.scene.group(require(str, group, "group", GROUP))
+    spec = method_spec(method)
     if group not in full.snapshots:
         raise SnapshotError(f"group '{group}': the run stored no snapshots of it")
     data, masses = full.snapshots[group], row_masses(chosen, full.scene.masses)
@@ -153,18 +118,37 @@ def reduce(
 
     Parameters
     ----------
+    full : run of the scene that is reduced; the result is compared with it
+    group : name of the constraint group whose projections are reduced
+    method : name in config/methods.yaml, or a specification
+    r : number of modes, from 1 to the rank of the basis
+    basis_of_group : of the group, by `basis` for the same method; made of ``full`` without it
     guard : what watches the run, and what follows from an alarm; a companion that estimates its
         error is trained on ``full``
 
+    Returns
+    -------
+    ReducedRun
+        ``outcome`` (positions, differences, the frame of a blow-up), ``error`` of each frame,
+        ``gain``, ``ms`` a frame, what the guard has ``seen``.
+
     Raises
     ------
+    ConfigurationError, SceneError, SnapshotError
+        An argument of another kind, no such method or group, a basis of another scene, too few
+        snapshots.
     RankError
         The snapshots have fewer than r modes above round-off.
     NotReducibleError
         A companion is asked for, and the scene has an effect that no position subspace takes.
     """
-    scene, spec = full.scene, _spec(method)
-    made = basis_of_group or basis(full, group, spec)
+    scene, spec = require(FullRun, full, "full", FULL_RUN).scene, method_spec(method)
+    r, chosen = modes(r), scene.group(require(str, group, "group", GROUP))
+    require(GuardSettings, guard, "guard", "as in GuardSettings(action='stop')")
+    if basis_of_group is None:
+        made = basis(full, group, spec)
+    else:
+        made = fitting_basis(basis_of_group, chosen, spec)
     reduction = Reduction(made, select(made, spec, r), spec, r)
     trained = _trained(full, group, guard)
     advance, seen = guarded(scene, scene.system, group, reduction, guard, trained)
@@ -175,11 +159,6 @@ def reduce(
     ms = 1e3 * float(np.median(seconds))
     name = method if isinstance(method, str) else method.title
     return ReducedRun(full, group, name, r, float(reduction.gain), outcome, ms, seen)
-
-
-def methods() -> dict[str, MethodSpec]:
-    """The reduction methods of config/methods.yaml by name; of an installed package its own."""
-    return load_methods(config_file("methods.yaml"))
 
 
 def _trained(full: FullRun, group: str, guard: GuardSettings) -> Trained:
@@ -202,15 +181,6 @@ def _clocked(advance: Advance, seconds: list[float]) -> Advance:
         return result
 
     return step
-
-
-def _spec(method: str | MethodSpec) -> MethodSpec:
-    if isinstance(method, MethodSpec):
-        return method
-    known = methods()
-    if method not in known:
-        raise ConfigurationError(f"unknown method '{method}'{choices(method, known)}")
-    return known[method]
 
 
 def _training_frames(scene: Scene, group: str) -> np.ndarray:

@@ -4,8 +4,10 @@ import os
 from pathlib import Path
 from typing import Any
 
+from pdrom.api.arguments import file_path
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.yamlfile import read_yaml, validate
+from pdrom.model.mesh.given import GivenMesh, given_mesh
 from pdrom.model.scene import Scene, SceneConfig
 
 SCENES = Path("config", "scenes")
@@ -17,12 +19,16 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
     A mesh file is looked for from the folder of the scene's file on; for a scene below
     ``config/scenes``, as in the project, from the folder that holds ``config``.
 
+    Parameters
+    ----------
+    path : the YAML file
+
     Raises
     ------
     ConfigurationError
         Naming the file, the key and the fault.
     """
-    path = Path(path)
+    path = file_path(path)
     config = validate(SceneConfig, read_yaml(path), str(path))
     folder = path.resolve().parent
     if folder.parts[-2:] == SCENES.parts:
@@ -30,13 +36,16 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
     return bound(config, folder, str(path))
 
 
-def build_scene(folder: str | os.PathLike[str] = ".", **keys: Any) -> Scene:
+def build_scene(folder: str | os.PathLike[str] = ".", mesh: Any = None, **keys: Any) -> Scene:
     """Scene of the keys that a scene's file has, bound to its mesh.
 
     Parameters
     ----------
     folder : where a mesh file is looked for
-    keys : ``mesh``, ``effects`` and ``frames`` are required, see config/README.md
+    mesh : a mapping, as in a scene's file; or a pair of arrays: points (N, 3) m with triangles
+        (T, 3) or tetrahedra (E, 4), which name points from 0 on
+    keys : ``effects`` and ``frames`` are required, see config/README.md; ``name`` and ``title``
+        are given ones without them
 
     Raises
     ------
@@ -44,7 +53,14 @@ def build_scene(folder: str | os.PathLike[str] = ".", **keys: Any) -> Scene:
         Naming the key and the fault.
     """
     named = {"name": "scene", "title": "A scene", **keys}
-    return bound(validate(SceneConfig, named, "build_scene"), Path(folder), "build_scene")
+    source = "build_scene"
+    if not isinstance(mesh, (tuple, list)):
+        named |= {} if mesh is None else {"mesh": mesh}
+        return bound(validate(SceneConfig, named, source), file_path(folder), source)
+    if len(mesh) != 2:
+        raise ConfigurationError(f"{source}: mesh of {len(mesh)} parts, required: (points, cells)")
+    made = given_mesh(*mesh, f"{source}: mesh")
+    return Scene.build(validate(SceneConfig, named | {"mesh": GivenMesh.of(made)}, source), made)
 
 
 def bound(config: SceneConfig, folder: Path, source: str) -> Scene:

@@ -39,7 +39,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     """Read the tables that hold the scene and say what follows from them."""
     from pdrom.report.advice import on_choices, on_effects, on_resolution
 
-    scene, folder = Path(arguments.scene).stem, arguments.results
+    scene, folder = _name(arguments.scene), arguments.results
     effects = _rows(folder, "effects_contribution", scene)
     lines = [f"{scene}: effects", *on_effects(effects)]
     fits = True
@@ -56,6 +56,17 @@ def perform(arguments: argparse.Namespace) -> Status:
     return Status.DONE if fits else Status.NOTHING_FITS
 
 
+def _name(asked: str) -> str:
+    """Name of a scene; a scene's file is read, so that its faults are told."""
+    from pdrom.core.yamlfile import read_yaml, validate
+    from pdrom.model.scene import SceneConfig
+
+    path = Path(asked)
+    if path.suffix not in (".yaml", ".yml") or not path.is_file():
+        return path.stem
+    return validate(SceneConfig, read_yaml(path), asked).name
+
+
 def _wish(error: float | None, ms: float | None) -> str:
     parts = [] if error is None else [f"an error of at most {error:g}"]
     parts += [] if ms is None else [f"at most {ms:g} ms a frame"]
@@ -70,11 +81,11 @@ def _rows(folder: str, name: str, scene: str, required: bool = True) -> "pd.Data
     StorageError
         Neither is there, or holds the scene.
     """
-    from pdrom.core.errors import StorageError
+    from pdrom.core.errors import StorageError, choices
     from pdrom.core.paths import SCENE_TABLE, TABLE
     from pdrom.core.store import read_table
 
-    empty = None
+    empty, known = None, list[str]()
     for place in (
         TABLE.at(folder, name=name),
         SCENE_TABLE.at(folder, scene=scene, name=name),
@@ -82,6 +93,7 @@ def _rows(folder: str, name: str, scene: str, required: bool = True) -> "pd.Data
         if Path(place).exists():
             table = read_table(place)
             empty = table[:0]
+            known += [name for name in table.scene.unique() if name not in known]
             rows = table[table.scene == scene] if len(table) else table
             if len(rows):
                 return rows
@@ -90,7 +102,8 @@ def _rows(folder: str, name: str, scene: str, required: bool = True) -> "pd.Data
 
         return pd.DataFrame() if empty is None else empty
     raise StorageError(
-        f"{scene}: {folder} holds no measurements of it (table {name}); --results names another, "
+        f"{scene}: {folder} holds no measurements of it (table {name})"
+        f"{choices(scene, known) if known else ''}; --results names another, "
         f"./reproduce scene {scene} advice makes them, for a scene in config/scenes"
     )
 

@@ -1,9 +1,10 @@
 """What a command says of itself."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from pathlib import Path
 
 
 class Status(IntEnum):
@@ -29,3 +30,27 @@ class Command:
     example: str
     declare: Callable[[argparse.ArgumentParser], None]
     perform: Callable[[argparse.Namespace], Status]
+
+
+def declare_unchecked(parser: argparse.ArgumentParser) -> None:
+    """The option of commands that read runs."""
+    parser.add_argument(
+        "--unchecked", action="store_true",
+        help="read a run without a checksum inside (by an older pdrom) if it is sound",
+    )  # fmt: skip
+
+
+def require_output(path: str | Path, reads: Sequence[str]) -> None:
+    """Whoever computes for long what a file is to hold asks this first.
+
+    Raises
+    ------
+    StorageError
+        The file cannot be written, or it is one of those that the command reads.
+    """
+    from pdrom.core.errors import StorageError
+    from pdrom.core.store import require_place
+
+    require_place(path)
+    if any(Path(path).resolve() == Path(read).resolve() for read in reads):
+        raise StorageError(f"{path}: would be overwritten, and is read by this command")

@@ -5,14 +5,17 @@ A command's module says how it is called (`Command`); what it needs is imported 
 
 import argparse
 import os
+import re
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 
 from pdrom.command.base import Command, Status
-from pdrom.core.errors import PdromError
+from pdrom.core.errors import PdromError, choices
 from pdrom.core.logs import INTERRUPTED
 from pdrom.core.project import checkout
+from pdrom.core.store.oserrors import reason
 from pdrom.pipeline.environment import settle
 
 COMMANDS = ("new", "run", "reduce", "show", "view", "advise")
@@ -41,25 +44,46 @@ def parser() -> argparse.ArgumentParser:
             formatter_class=plain,
         )
         command.declare(own)
-        own.set_defaults(perform=command.perform)
+        own.set_defaults(perform=command.perform, parser=own)
     return top
 
 
 def run(arguments: Sequence[str]) -> int:
     """Do what the command line asks; the exit code."""
-    asked = parser().parse_args(arguments)
     try:
-        return int(asked.perform(asked))
+        try:
+            asked = _asked(arguments)
+            return int(asked.perform(asked))
+        finally:
+            sys.stdout.flush()  # here, not at the end of the process, a failure can be told
     except PdromError as error:
         return _fail(str(error))
     except MemoryError:
         return _fail("out of memory")
     except BrokenPipeError:  # who read the output has had enough
-        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 : until the end
+        _drop_output()
         return Status.DONE
+    except OSError as error:
+        _drop_output()
+        return _fail(f"{error.filename or 'standard output'}: {reason(error)}")
     except KeyboardInterrupt:
         sys.stderr.write("\npdrom: interrupted\n")
         return INTERRUPTED
+
+
+def _asked(arguments: Sequence[str]) -> argparse.Namespace:
+    """The command line, understood; a misspelt option gets a suggestion."""
+    asked, unknown = parser().parse_known_args(arguments)
+    if unknown:
+        known = re.findall(r"--[a-z-]+", asked.parser.format_usage())
+        asked.parser.error(f"not understood: {unknown[0]}{choices(unknown[0], known)}")
+    return asked
+
+
+def _drop_output() -> None:
+    """What is left of the output goes nowhere: the end of the process would fail at it again."""
+    with suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _fail(message: str) -> int:
@@ -74,4 +98,7 @@ def main() -> None:
         os.environ.setdefault("NUMBA_CACHE_DIR", str(root / ".cache" / "numba"))
         os.environ.setdefault("MPLCONFIGDIR", str(root / ".cache" / "matplotlib"))
     settle()
+    # a stream that is closed in this process is None, and its number goes to the next open file
+    sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     sys.exit(run(sys.argv[1:]))

@@ -5,10 +5,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pdrom.command.base import Command, Status
+from pdrom.command.base import Command, Status, declare_unchecked, require_output
 
 if TYPE_CHECKING:
     from pdrom.api import GuardSettings, ReducedRun
+
+PICTURES = ("eps", "jpeg", "jpg", "pdf", "png", "ps", "svg", "tif", "tiff", "webp")
 
 
 def _size(text: str) -> int:
@@ -51,6 +53,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         help="largest estimated error that is no alarm, relative to the motion (0.15)",
     )
     parser.add_argument("--plot", metavar="FILE", help="picture of the error against time to write")
+    declare_unchecked(parser)
 
 
 def perform(arguments: argparse.Namespace) -> Status:
@@ -60,11 +63,12 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.core.errors import StorageError
     from pdrom.core.store import atomic_path
 
-    guard = _guard(arguments)
+    guard, out = _guard(arguments), arguments.out or _file(arguments)
+    _check_outputs(arguments, out)
     scene = load_scene(arguments.scene)
     scene.group(arguments.group)
     if arguments.run:
-        full = load(arguments.run)
+        full = load(arguments.run, arguments.unchecked)
         if not isinstance(full, FullRun):
             raise StorageError(f"{arguments.run}: no full-order run (pdrom run makes one)")
         if full.scene.config != scene.config:
@@ -72,14 +76,29 @@ def perform(arguments: argparse.Namespace) -> Status:
     else:
         full = run(scene, on_frame=Progress(scene.config.name, scene.config.frames))
     reduced = reduce(full, arguments.group, arguments.method, arguments.r, guard=guard)
-    out = arguments.out or _file(arguments)
     save(reduced, out)
     if arguments.plot:
         picture = plot(reduced)
-        with atomic_path(arguments.plot) as path:
+        with atomic_path(arguments.plot, sealed=False) as path:
             picture.savefig(path, dpi=200)
     sys.stdout.write(f"{out}: {_told(reduced)}\n")
     return Status.DONE if reduced.outcome.finite else Status.BLEW_UP
+
+
+def _check_outputs(arguments: argparse.Namespace, out: str) -> None:
+    """What cannot be written is found before anything runs."""
+    from pdrom.core.errors import ConfigurationError, choices
+
+    read = [arguments.scene, *([arguments.run] if arguments.run else [])]
+    require_output(out, read)
+    if arguments.plot is None:
+        return
+    kind = Path(arguments.plot).suffix.lower().removeprefix(".")
+    if kind not in PICTURES:
+        raise ConfigurationError(
+            f"--plot {arguments.plot}: no kind of picture '{kind}'{choices(kind, PICTURES)}"
+        )
+    require_output(arguments.plot, [*read, out])
 
 
 def _guard(arguments: argparse.Namespace) -> "GuardSettings":
@@ -100,7 +119,7 @@ def _guard(arguments: argparse.Namespace) -> "GuardSettings":
 def _file(arguments: argparse.Namespace) -> str:
     path = Path(arguments.scene)
     name = f"{path.stem}_{arguments.group}_{arguments.method}_{arguments.r}.h5"
-    return str(path.with_name(name))
+    return str(path.parent / name)
 
 
 def _told(reduced: "ReducedRun") -> str:

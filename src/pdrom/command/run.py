@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from pdrom.command.base import Command, Status
+from pdrom.command.base import Command, Status, require_output
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -22,8 +22,10 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.api import load_scene, run
     from pdrom.command.progress import Progress
 
+    file = Path(arguments.scene)
+    out = arguments.out or str(file.parent / f"{file.stem}.h5")
+    require_output(out, [arguments.scene])
     scene = load_scene(arguments.scene)
-    out = arguments.out or str(Path(arguments.scene).with_suffix(".h5"))
     full = run(scene, out, Progress(scene.config.name, scene.config.frames))
     sys.stdout.write(
         f"{out}: {scene.config.frames} frames of {scene.mesh.vertices} vertices, "

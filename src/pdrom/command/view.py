@@ -5,7 +5,7 @@ import sys
 import webbrowser
 from pathlib import Path
 
-from pdrom.command.base import Command, Status
+from pdrom.command.base import Command, Status, declare_unchecked, require_output
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -15,14 +15,17 @@ def declare(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", metavar="FILE", help="page to write; the first RESULT as .html")
     parser.add_argument("--open", action="store_true", help="open it in the browser")
+    declare_unchecked(parser)
 
 
 def perform(arguments: argparse.Namespace) -> Status:
     """Write the page and say where it is."""
     from pdrom.api import load, view
 
-    out = Path(arguments.out or Path(arguments.results[0]).with_suffix(".html"))
-    view(out, *map(load, arguments.results))
+    first = Path(arguments.results[0])
+    out = Path(arguments.out or first.parent / f"{first.stem}.html")
+    require_output(out, arguments.results)
+    view(out, *(load(result, arguments.unchecked) for result in arguments.results))
     size = out.stat().st_size / 1e6
     sys.stdout.write(f"{out}: {size:.1f} MB; a browser opens it without a network\n")
     if arguments.open and not webbrowser.open(out.resolve().as_uri()):

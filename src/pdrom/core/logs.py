@@ -10,6 +10,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from pdrom.core.aside import damaged_set_aside
 from pdrom.core.errors import PdromError
 from pdrom.core.usage import Meter
 
@@ -34,6 +35,8 @@ def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
     A `PdromError` (a user's mistake) ends the job with one line on stderr; any other exception
     keeps its traceback in the log and one line on stderr that says where to look. Lack of memory or
     of space on the disk is said in words. The last line of a job that ends well says what it used.
+
+    Damaged results that the job reads are set aside (`pdrom.core.aside`).
     """
     meter = Meter()
     logger = logging.getLogger("pdrom")
@@ -47,7 +50,7 @@ def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
     logger.addHandler(handler)
     logger.setLevel(level)
     try:
-        with threadpool_limits(limits=1):
+        with threadpool_limits(limits=1), damaged_set_aside():
             yield logger
         logger.info("%s", meter.read())
     except PdromError as error:

@@ -71,11 +71,11 @@ class _PlainLoader(yaml.SafeLoader):
 
 def read_yaml(path: Path) -> Any:
     """Content of a YAML file; ConfigurationError if it is missing or not plain YAML."""
-    if not path.is_file():
-        raise ConfigurationError(f"{path}: no such configuration file")
-    if path.stat().st_size > MAX_BYTES:
-        raise ConfigurationError(f"{path}: larger than {MAX_BYTES} bytes")
     try:
+        if not path.is_file():
+            raise ConfigurationError(f"{path}: no such configuration file")
+        if path.stat().st_size > MAX_BYTES:
+            raise ConfigurationError(f"{path}: larger than {MAX_BYTES} bytes")
         # a byte order mark, as some editors write it, is no part of the text
         return yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_PlainLoader)
     except (yaml.YAMLError, ValueError, TypeError, RecursionError) as error:
@@ -126,7 +126,7 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
 def shown(value: Any, width: int) -> str:
     """``value`` as it stands in a message, on one line and cut to ``width``."""
     try:
-        return f"{value!r:.{width}}"
+        return f"{value!r:.{width}}".replace("\n", " ")
     except ValueError:  # Python writes no integer of more than 4300 digits
         return f"a {type(value).__name__} of {value.bit_length()} bits"
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -123,6 +123,15 @@ class Scene:
     boundaries: list[Boundary]
     contacts: list[Contact]
     starts: list[Start]
+
+    def __repr__(self) -> str:
+        size = f"{self.mesh.vertices} vertices, {self.config.frames} frames"
+        effects = ", ".join(each.effect for each in self.config.effects)
+        return f"Scene('{self.config.name}', {size}: {effects})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy, also a pickled one, is built anew: compiled kernels cannot be pickled."""
+        return Scene.build, (self.config, self.mesh, self.groups[0].threads, self.masses)
 
     @classmethod
     def build(

@@ -2,11 +2,10 @@
 
 from pathlib import Path
 
-from pdrom.core.store import atomic_path, seal_path
+from pdrom.core.store import atomic_path
 
 
 def write_tracked(path: Path, content: bytes) -> None:
     """Write a file that git keeps: whole or not at all, without a checksum beside it."""
-    with atomic_path(path) as temporary:
+    with atomic_path(path, sealed=False) as temporary:
         temporary.write_bytes(content)
-    seal_path(path).unlink()

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pdrom.core.brief import brief
 from pdrom.core.metrics import shape_differences, trajectory_error
 from pdrom.model.runs.bounded import BoundedRun
 
@@ -29,6 +30,8 @@ class Rerun:
     blowup_frame: int | None
     coordinates: np.ndarray
     fallbacks: int = 0
+
+    __repr__ = brief
 
     @property
     def frames(self) -> int:

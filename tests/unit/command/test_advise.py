@@ -74,3 +74,25 @@ def test_wishes_are_numbers_above_zero(results, capsys, wish):
         run(["advise", "sheet", *wish, "--results", results])
     assert ended.value.code == 2
     capsys.readouterr()
+
+
+def test_a_misspelt_scene_gets_a_suggestion_and_nothing_is_moved(results, tmp_path, capsys):
+    assert run(["advise", "shet", "--results", results]) == Status.FAULTY
+    told = capsys.readouterr().err
+    if (tmp_path / "scenes").exists():  # the scene's own tables are not read by another name
+        assert "holds no measurements of it" in told
+    else:
+        assert "(allowed: sheet), did you mean 'sheet'?" in told
+    for path in tmp_path.rglob("*.blake2b"):
+        path.unlink()
+    before = sorted(tmp_path.rglob("*"))
+    assert run(["advise", "sheet", "--results", results]) == Status.FAULTY
+    assert "its checksum" in capsys.readouterr().err
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_misspelt_key_of_a_scenes_file_gets_a_suggestion(results, tmp_path, capsys):
+    path = tmp_path / "sheet.yaml"
+    path.write_text("name: sheet\ntitle: Sheet\nframe: 3\n", encoding="utf-8")
+    assert run(["advise", str(path), "--results", results]) == Status.FAULTY
+    assert "did you mean 'frames'?" in capsys.readouterr().err

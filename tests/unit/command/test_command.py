@@ -2,10 +2,13 @@
 
 import io
 import os
+import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import yaml
@@ -46,11 +49,128 @@ def test_a_scene_is_run_reduced_and_shown(folder, capsys):
     asked = ["reduce", "small.yaml", "--group", "spring", "--r", "2", "--run", "small.h5"]
     assert run([*asked, "--plot", "e.png"]) == Status.DONE
     assert capsys.readouterr().out.startswith("small_spring_gappy_2.h5: spring, gappy, r = 2: rel")
-    assert check_file("e.png") == "intact"
+    assert not list(folder.glob(".*"))  # no hidden file beside a user's own
     assert run(["show", "small_spring_gappy_2.h5"]) == Status.DONE
     shown = capsys.readouterr().out
     for words in ("intact", "reduced: 13 x 30 x 3 float32, in m", "method: gappy", "scene: small"):
         assert words in shown
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the scene and its full-order run."""
+    folder = tmp_path_factory.mktemp("finished")
+    (folder / "small.yaml").write_text(SCENE, encoding="utf-8")
+    assert run(["run", str(folder / "small.yaml")]) == Status.DONE
+    return folder
+
+
+REDUCE = ["reduce", "small.yaml", "--group", "spring", "--r", "1"]
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    """Every file of a folder."""
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def reads_of(name: str) -> list[list[str]]:
+    """Commands that read a file as a run."""
+    return [[*REDUCE, "--run", name], ["view", name], ["view", name, "--unchecked"], ["show", name]]
+
+
+def test_a_run_is_read_wherever_it_was_copied(folder, finished, capsys):
+    shutil.copy(finished / "small.h5", "copy.h5")
+    shutil.copy(finished / "small.h5", "no suffix")
+    for name in ("copy.h5", "no suffix"):
+        assert run([*REDUCE, "--run", name]) == Status.DONE
+        assert run(["show", name]) == Status.DONE
+        assert "bytes, intact" in capsys.readouterr().out
+        assert check_file(name) == "intact"
+    made = {"small.yaml", "small_spring_gappy_1.h5"}
+    assert set(content(folder)) == {"copy.h5", "no suffix", *made}
+
+
+@pytest.mark.parametrize("name", ["x.h5", "x.txt", "x", "x.csv"])
+def test_a_file_of_others_is_never_moved_changed_or_removed(folder, name, capsys):
+    Path(name).write_bytes(b"somebody's own\n")
+    before = content(folder)
+    for arguments in reads_of(name)[:3]:
+        assert run(arguments) == Status.FAULTY
+        (told,) = capsys.readouterr().err.splitlines()
+        assert told.startswith(f"pdrom: {name}: ")
+    run(["show", name])
+    assert content(folder) == before
+
+
+@pytest.mark.parametrize("position", [0, 100, 2048, 5000, -1])
+def test_a_damaged_run_is_refused_and_left_where_it_is(folder, finished, position, capsys):
+    damaged = bytearray((finished / "small.h5").read_bytes())
+    damaged[position] ^= 1
+    Path("small.h5").write_bytes(damaged)
+    before = content(folder)
+    for arguments in reads_of("small.h5")[:3]:
+        assert run(arguments) == Status.FAULTY
+        assert "small.h5: damaged, its content and its checksum differ" in capsys.readouterr().err
+    assert content(folder) == before
+
+
+def without_checksum(path: Path, change: Callable[[h5py.File], None]) -> None:
+    """Replace a run by the one that an older pdrom wrote, changed."""
+    with h5py.File(path) as old, h5py.File("new", "w", track_order=True) as new:
+        for name in old:
+            old.copy(name, new)
+        new.attrs.update(old.attrs)
+        change(new)
+    Path("new").rename(path)
+
+
+def test_a_run_without_a_checksum_is_read_if_that_is_asked_for(folder, finished, capsys):
+    shutil.copy(finished / "small.h5", ".")
+    without_checksum(Path("small.h5"), lambda file: None)
+    before = content(folder)
+    assert run([*REDUCE, "--run", "small.h5"]) == Status.FAULTY
+    (told,) = capsys.readouterr().err.splitlines()
+    assert told.startswith("pdrom: small.h5: no checksum inside (")
+    assert "--unchecked" in told
+    assert content(folder) == before
+    assert run([*REDUCE, "--run", "small.h5", "--unchecked"]) == Status.DONE
+    assert run(["view", "small.h5", "--unchecked"]) == Status.DONE
+
+
+def cut_positions(file: h5py.File) -> None:
+    """A run that ends early."""
+    short = file["positions"][:-1]
+    del file["positions"]
+    file["positions"] = short
+
+
+def spoil_snapshots(file: h5py.File) -> None:
+    """A number that is none."""
+    file["snapshots/spring/p"][0, 0, 0] = np.nan
+
+
+def spoil_configuration(file: h5py.File) -> None:
+    """A configuration that is none."""
+    file.attrs["configuration"] = "{"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (cut_positions, "positions of shape (12, 30, 3), required: (13, 30, 3)"),
+        (spoil_snapshots, "snapshots of spring: entry (0, 0, 0) is nan"),
+        (spoil_configuration, "holds no sound run"),
+        (lambda file: file.pop("timings"), "holds no run"),
+        (lambda file: file["mesh"].pop("points"), "points"),
+    ],
+)
+def test_an_unchecked_run_has_to_be_sound(folder, finished, change, words, capsys):
+    shutil.copy(finished / "small.h5", ".")
+    without_checksum(Path("small.h5"), change)
+    assert run([*REDUCE, "--run", "small.h5", "--unchecked"]) == Status.FAULTY
+    (told,) = capsys.readouterr().err.splitlines()
+    assert told.startswith("pdrom: small.h5: ")
+    assert words in told
 
 
 def test_a_run_is_watched_by_its_companion(folder, capsys):
@@ -130,6 +250,12 @@ GUARDED = ["reduce", "small.yaml", "--group", "spring", "--guard", "stop"]
         ([*GUARDED, "--alarm", "estimate", "--threshold", "-1"], "threshold = -1"),
         (["run", "small.yaml", "--out", "nowhere.d/../small.yaml/x.h5"], "cannot be written"),
         (["new", "nowhere/x"], "No such file"),
+        (["run", f"{'a' * 5000}.yaml"], "File name too long"),
+        (["show", "a" * 5000], "File name too long"),
+        (["show", "."], "is a folder"),
+        (["view", "."], "is a folder"),
+        (["run", "."], "no such configuration file"),
+        (["reduce", ".", "--group", "spring"], "no such configuration file"),
     ],
 )
 def test_faults_are_one_line_and_code_1(folder, arguments, words, capsys):
@@ -137,6 +263,85 @@ def test_faults_are_one_line_and_code_1(folder, arguments, words, capsys):
     last = capsys.readouterr().err.splitlines()[-1]
     assert last.startswith("pdrom: ")
     assert words in last
+
+
+UNWRITABLE = [
+    ([*REDUCE, "--plot", "x.exe"], "--plot x.exe: no kind of picture 'exe' (allowed: eps, jpeg"),
+    ([*REDUCE, "--plot", "x.pgn"], "did you mean 'png'?"),
+    ([*REDUCE, "--plot", "."], "--plot .: no kind of picture ''"),
+    ([*REDUCE, "--plot", "folder.png"], "folder.png: cannot be written (a folder)"),
+    ([*REDUCE, "--plot", "small.yaml/e.png"], "small.yaml: not a folder"),
+    ([*REDUCE, "--out", "."], ".: cannot be written (a folder)"),
+    ([*REDUCE, "--out", "small.yaml"], "is read by this command"),
+    ([*REDUCE, "--out", "e.png", "--plot", "e.png"], "is read by this command"),
+    (["run", "small.yaml", "--out", "."], ".: cannot be written (a folder)"),
+    (["run", "small.yaml", "--out", "folder.png"], "cannot be written (a folder)"),
+    (["run", "small.yaml", "--out", "small.yaml"], "is read by this command"),
+    (["run", "small.yaml", "--out", "a" * 5000], "File name too long"),
+    (["view", "x.h5", "--out", "."], ".: cannot be written (a folder)"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), UNWRITABLE)
+def test_what_cannot_be_written_is_found_before_anything_runs(
+    folder, arguments, words, monkeypatch, capsys
+):
+    def called(*_: object, **__: object) -> None:
+        raise AssertionError("a run began")
+
+    (folder / "folder.png").mkdir()
+    monkeypatch.setattr("pdrom.api.load", called)
+    monkeypatch.setattr("pdrom.api.runs.run_full_order", called)
+    assert run(arguments) == Status.FAULTY
+    (told,) = capsys.readouterr().err.splitlines()
+    assert words in told
+    assert (folder / "small.yaml").read_text("utf-8") == SCENE
+
+
+def test_a_mesh_path_that_is_too_long_is_one_line(folder, capsys):
+    mesh = f"{{kind: file, path: {'m' * 5000}.obj}}"
+    text = SCENE.replace("{kind: cloth, rows: 6, columns: 5, plane: xz}", mesh)
+    Path("long.yaml").write_text(text, encoding="utf-8")
+    assert run(["run", "long.yaml"]) == Status.FAULTY
+    (told,) = capsys.readouterr().err.splitlines()
+    assert "no mesh file (File name too long)" in told
+    assert len(told) < 300
+
+
+def shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """A line of the shell that calls ``pdrom``."""
+    called = line.replace("pdrom", f'"{sys.executable}" -m pdrom')
+    command = ["bash", "-o", "pipefail", "-c", called]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(
+    ("command", "status", "said"),
+    [
+        ("pdrom show small.yaml | sh -c 'exec 0<&-'", 0, ""),
+        ("pdrom --help | sh -c 'exec 0<&-'", 0, ""),
+        ("pdrom show small.yaml >&- 2>&-", 0, ""),
+        ("pdrom show none.yaml >&- 2>&-", 1, ""),
+        ("pdrom show none.yaml >&-", 1, "pdrom: none.yaml: no such file\n"),
+    ],
+)
+def test_an_output_that_nobody_reads_is_no_traceback(folder, command, status, said):
+    done = shell(command, folder)
+    assert (done.returncode, done.stderr) == (status, said)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+def test_an_output_that_cannot_be_written_is_one_line(folder):
+    done = shell("pdrom show small.yaml > /dev/full", folder)
+    assert done.returncode == Status.FAULTY
+    assert done.stderr == "pdrom: standard output: No space left on device\n"
+
+
+def test_a_misspelt_option_gets_a_suggestion(capsys):
+    with pytest.raises(SystemExit) as caught:
+        run(["advise", "sheet", "--eror", "1e-2"])
+    assert caught.value.code == 2
+    assert "did you mean '--error'?" in capsys.readouterr().err
 
 
 def test_a_run_of_another_scene_is_not_reduced(folder, capsys):

@@ -8,6 +8,7 @@ import pytest
 import scipy.linalg  # noqa: F401  -- loads libraries that have threads
 from threadpoolctl import threadpool_info, threadpool_limits
 
+from pdrom.core.aside import sets_aside
 from pdrom.core.errors import MeshError
 from pdrom.core.logs import INTERRUPTED, job_log, planning_log
 
@@ -43,6 +44,13 @@ def test_libraries_have_one_thread_in_a_job(path):
         with job_log(str(path)):
             assert threads() == {1}
         assert threads() == {2}
+
+
+def test_damaged_results_are_set_aside_in_a_job_and_nowhere_else(path):
+    with pytest.raises(SystemExit), job_log(str(path)):
+        assert sets_aside()
+        raise MeshError("x")
+    assert not sets_aside()
 
 
 def test_a_new_job_starts_a_new_log(path):

@@ -1,4 +1,4 @@
-"""A file that takes its name only when it is complete, with its seal beside it."""
+"""A file that takes its name only when it is complete, with its seal beside it if it needs one."""
 
 import os
 import re
@@ -9,14 +9,19 @@ from pathlib import Path
 
 from pdrom.core.errors import StorageError
 from pdrom.core.store.oserrors import reason
-from pdrom.core.store.seal import SEAL_SUFFIX, seal_of, seal_path
+from pdrom.core.store.seal import SEAL_SUFFIX, digest_of, new_seal, seal_path
 
 
 @contextmanager
-def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
+def atomic_path(path: str | os.PathLike[str], sealed: bool = True) -> Iterator[Path]:
     """Yield a temporary path beside ``path``; seal and rename it on success, else remove it.
 
     What a killed process left of the same target is removed first: one job at a time makes a file.
+
+    Parameters
+    ----------
+    sealed : whether a seal lies beside the file; not so for one that has its seal inside, or that
+        goes into a user's own folder
 
     Raises
     ------
@@ -24,22 +29,52 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         The folder or the file cannot be written: no permission, no space.
     """
     target = Path(path)
+    _require_no_folder(target)
     temporary = target.with_name(f".{target.stem}.{uuid.uuid4().hex[:12]}{target.suffix}")
     seal = temporary.with_name(f"{temporary.name}{SEAL_SUFFIX}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         _remove_leftovers(target)
         yield temporary
-        seal.write_bytes(seal_of(temporary, target.name))
-        for written in (temporary, seal):
-            _bring_to_disk(written)
-        _rename(temporary, seal, target)
+        _bring_to_disk(temporary)
+        if sealed:
+            seal.write_bytes(new_seal(digest_of(temporary), target.name).content)
+            _bring_to_disk(seal)
+            _rename(temporary, seal, target)
+        else:
+            os.replace(temporary, target)
+            seal_path(target).unlink(missing_ok=True)  # of an earlier file
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
     finally:
         for left in (temporary, seal):
             with suppress(OSError):
                 left.unlink(missing_ok=True)
+
+
+def require_place(path: str | os.PathLike[str]) -> None:
+    """Whoever computes for long what a file is to hold asks this first.
+
+    Raises
+    ------
+    StorageError
+        A folder is in the place of the file, or its own folder cannot be made or written to.
+    """
+    target = Path(path)
+    _require_no_folder(target)
+    above = next((folder for folder in target.parents if folder.exists()), Path())
+    if not above.is_dir() or not os.access(above, os.W_OK | os.X_OK):
+        fault = "no permission to write" if above.is_dir() else "not a folder"
+        raise StorageError(f"{target}: cannot be written ({above}: {fault})")
+
+
+def _require_no_folder(target: Path) -> None:
+    try:
+        folder = target.is_dir()
+    except OSError as error:
+        raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
+    if folder:
+        raise StorageError(f"{target}: cannot be written (a folder)")
 
 
 def _remove_leftovers(target: Path) -> None:

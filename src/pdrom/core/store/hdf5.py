@@ -10,23 +10,26 @@ import h5py
 from pdrom.core.errors import StorageError
 from pdrom.core.provenance import attributes
 from pdrom.core.store.atomic import atomic_path
+from pdrom.core.store.block import SIZE, write_block
+from pdrom.core.store.condition import require_intact
 from pdrom.core.store.oserrors import reason
-from pdrom.core.store.seal import require_intact
 
 
 @contextmanager
 def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
-    """Yield a new HDF5 file that takes its name only when complete, with its provenance.
+    """Yield a new HDF5 file that takes its name only when complete, with provenance and seal.
 
     No time stamps are inside.
     """
-    with atomic_path(path) as temporary, open(temporary, "w+b", buffering=0) as handle:
-        sink = _Sink(handle)
-        with h5py.File(sink, "w", track_order=True) as file:
-            file.attrs.update(attributes())
-            yield file
-        if sink.error is not None:
-            raise sink.error
+    with atomic_path(path, sealed=False) as temporary:
+        with open(temporary, "w+b", buffering=0) as handle:
+            sink = _Sink(handle)
+            with h5py.File(sink, "w", track_order=True, userblock_size=SIZE) as file:
+                file.attrs.update(attributes())
+                yield file
+            if sink.error is not None:
+                raise sink.error
+        write_block(temporary)
 
 
 class _Sink:
@@ -66,22 +69,26 @@ class _Sink:
 
 
 @contextmanager
-def open_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
+def open_hdf5(path: str | os.PathLike[str], unchecked: bool = False) -> Iterator[h5py.File]:
     """Open an HDF5 file of the results for reading.
 
     Its seal is checked before HDF5 sees the file, so that what HDF5 misses in it was never written.
+
+    Parameters
+    ----------
+    unchecked : whether a file without a seal is read
 
     Raises
     ------
     StorageError
         If the file is missing or damaged, or lacks a dataset or attribute that is read from it.
     """
-    require_intact(path)
+    require_intact(path, unchecked)
     try:
         with h5py.File(path, "r") as file:
             yield file
     except KeyError as error:
         raise StorageError(f"{path}: {error.args[0]}") from error
     except OSError as error:
-        require_intact(path)  # damaged since?
+        require_intact(path, unchecked)  # damaged since?
         raise StorageError(f"{path}: cannot be read ({reason(error)})") from error

@@ -9,8 +9,8 @@ import pandas as pd
 
 from pdrom.core.errors import StorageError
 from pdrom.core.store.atomic import atomic_path
+from pdrom.core.store.condition import require_intact
 from pdrom.core.store.oserrors import reason
-from pdrom.core.store.seal import require_intact
 
 FLOAT_FORMAT = "%.10g"
 

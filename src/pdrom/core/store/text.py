@@ -4,12 +4,12 @@ import os
 from pathlib import Path
 
 from pdrom.core.store.atomic import atomic_path
-from pdrom.core.store.seal import require_intact
+from pdrom.core.store.condition import require_intact
 
 
-def write_text(text: str, path: str | os.PathLike[str]) -> None:
-    """Write ``text`` as UTF-8."""
-    with atomic_path(path) as temporary:
+def write_text(text: str, path: str | os.PathLike[str], sealed: bool = True) -> None:
+    """Write ``text`` as UTF-8; ``sealed`` as in `atomic_path`."""
+    with atomic_path(path, sealed) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 

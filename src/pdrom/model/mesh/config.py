@@ -14,6 +14,7 @@ from pdrom.core.yamlfile import Length, PositiveLength
 from pdrom.model.mesh.checks import check_mesh, check_range
 from pdrom.model.mesh.files import read_mesh_file
 from pdrom.model.mesh.generators import Plane, bar, cloth
+from pdrom.model.mesh.given import GivenMesh
 from pdrom.model.mesh.limits import MAX_VERTICES
 from pdrom.model.mesh.mesh_model import MeshModel
 from pdrom.model.mesh.orientation import turned_alike
@@ -163,5 +164,6 @@ class MeshFile(MeshModel):
 
 
 MeshConfig = Annotated[
-    ClothMesh | BarMesh | DiscMesh | ShellMesh | SolidMesh | MeshFile, Field(discriminator="kind")
+    ClothMesh | BarMesh | DiscMesh | ShellMesh | SolidMesh | MeshFile | GivenMesh,
+    Field(discriminator="kind"),
 ]

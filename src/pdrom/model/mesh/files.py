@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from pdrom.core.errors import MeshError
+from pdrom.core.yamlfile import shown
 from pdrom.model.mesh import reader
 from pdrom.model.mesh.checks import check_indices
 from pdrom.model.mesh.generators import boundary, orient
@@ -61,7 +62,11 @@ def read_mesh_file(path: Path) -> Mesh:
         The file is missing or unreadable, of another format, needs more time or memory than
         `mesh_limits` allows, holds other cells, or mixes triangles and tetrahedra.
     """
-    if not path.is_file():
+    try:
+        there = path.is_file()
+    except OSError as error:  # a name that is too long
+        raise MeshError(f"{shown(str(path), 60)}: no mesh file ({error.strerror})") from error
+    if not there:
         raise MeshError(f"{path}: no such mesh file")
     if path.suffix.lower() not in FORMATS:
         raise MeshError(

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import h5py
 import numpy as np
 
+from pdrom.core.brief import brief
 from pdrom.core.store import open_hdf5, write_hdf5
 
 _ARRAYS = ("points", "triangles", "tetrahedra")
@@ -23,6 +24,8 @@ class Mesh:
     points: np.ndarray
     triangles: np.ndarray
     tetrahedra: np.ndarray = field(default_factory=lambda: np.empty((0, 4), dtype=np.int32))
+
+    __repr__ = brief
 
     @property
     def vertices(self) -> int:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pdrom.core.brief import brief
 from pdrom.core.errors import RankError
 from pdrom.core.store import open_hdf5, write_hdf5
 
@@ -38,6 +39,8 @@ class Basis:
     active_axes: tuple[bool, ...]
     trained: np.ndarray
     origin: str = "basis"
+
+    __repr__ = brief
 
     @property
     def elements(self) -> int:

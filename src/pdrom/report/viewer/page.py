@@ -15,8 +15,12 @@ from pdrom.report.viewer.runs import ViewedScene
 LARGEST = 25_000_000  # bytes
 
 
-def write_page(scenes: Sequence[ViewedScene], path: str | os.PathLike[str]) -> None:
+def write_page(
+    scenes: Sequence[ViewedScene], path: str | os.PathLike[str], sealed: bool = True
+) -> None:
     """Write the viewer of some scenes; the library's licence stands in its script.
+
+    ``sealed`` as in `pdrom.core.store.atomic_path`.
 
     Raises
     ------
@@ -30,7 +34,7 @@ def write_page(scenes: Sequence[ViewedScene], path: str | os.PathLike[str]) -> N
             f"{path}: {size / 1e6:.0f} MB, allowed are {LARGEST / 1e6:.0f}: choose fewer scenes, "
             "methods or sizes (keys viewer.scenes, methods, viewer.ranks)"
         )
-    write_text(text, path)
+    write_text(text, path, sealed)
 
 
 def page(packed: Sequence[dict]) -> str:

@@ -82,11 +82,13 @@ def old_file(tmp_path, kind):
     path = tmp_path / "result"
     write_one(path, kind)
     before = path.read_bytes()
+    names = sorted(tmp_path.iterdir())
+    assert names == sorted([path] if kind == "hdf5" else [path, seal_path(path)])
 
     def untouched():
         assert path.read_bytes() == before
         assert check_file(path) == "intact"
-        assert sorted(tmp_path.iterdir()) == sorted([path, seal_path(path)])
+        assert sorted(tmp_path.iterdir()) == names
         return True
 
     return path, untouched
@@ -105,12 +107,12 @@ def let_through(monkeypatch, call, count, fault):
     monkeypatch.setattr(os, call, limited)
 
 
-KINDS = ["hdf5", "table", "text"]
+# a kind of file, and how many calls work: there is a second one for a seal beside it
+CALLS = [("hdf5", 0), ("table", 0), ("table", 1), ("text", 0), ("text", 1)]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("kind", "count"), CALLS)
 @pytest.mark.parametrize("call", ["fsync", "replace"])
-@pytest.mark.parametrize("count", [0, 1])
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO])
 def test_a_system_call_that_fails_leaves_the_old_file(
     tmp_path, monkeypatch, kind, call, count, number
@@ -123,8 +125,7 @@ def test_a_system_call_that_fails_leaves_the_old_file(
     assert untouched()
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("count", [0, 1])
+@pytest.mark.parametrize(("kind", "count"), CALLS)
 @pytest.mark.parametrize("interruption", [KeyboardInterrupt, SystemExit, MemoryError])
 def test_an_interruption_is_handed_on_and_leaves_the_old_file(
     tmp_path, monkeypatch, kind, count, interruption
@@ -186,4 +187,4 @@ def test_what_a_killed_process_left_goes_with_the_next_write(tmp_path):
     (left,) = [p for p in tmp_path.iterdir() if p != other]
     assert left.name.startswith(".result.")
     write_one(path, "hdf5")
-    assert sorted(tmp_path.iterdir()) == sorted([path, seal_path(path), other])
+    assert sorted(tmp_path.iterdir()) == sorted([path, other])

@@ -9,8 +9,9 @@ import h5py
 import numpy as np
 import pytest
 
+from pdrom.core.aside import damaged_set_aside
 from pdrom.core.errors import StorageError
-from pdrom.core.store import open_hdf5, seal_path, write_hdf5, write_text
+from pdrom.core.store import check_file, open_hdf5, seal_path, write_hdf5
 
 
 def test_failed_hdf5_leaves_the_old_file(tmp_path):
@@ -22,7 +23,7 @@ def test_failed_hdf5_leaves_the_old_file(tmp_path):
         file["x"] = np.arange(9)
         raise ZeroDivisionError
     assert path.read_bytes() == before
-    assert sorted(tmp_path.iterdir()) == sorted([path, seal_path(path)])
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_equal_content_equal_bytes(tmp_path):
@@ -91,11 +92,55 @@ def test_no_space_in_the_middle_of_a_file(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_that_is_not_hdf5_is_named(tmp_path):
-    write_text("no HDF5", tmp_path / "a.h5")
-    with pytest.raises(StorageError, match=r"a\.h5: cannot be read"), open_hdf5(tmp_path / "a.h5"):
+def test_a_file_that_is_not_hdf5_is_named_and_left_alone(tmp_path):
+    for name in ("a.h5", "a.yaml"):
+        (tmp_path / name).write_text("no HDF5")
+        for unchecked in (False, True):
+            expected = rf"{name}: .*(checksum|cannot be read)"
+            with pytest.raises(StorageError, match=expected), open_hdf5(tmp_path / name, unchecked):
+                pass
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.h5", "a.yaml"]
+
+
+@pytest.fixture
+def plain(tmp_path):
+    """A file of HDF5 without a checksum inside, as an older pdrom wrote it: with a hidden one."""
+    path = tmp_path / "old.h5"
+    with h5py.File(path, "w") as file:
+        file["x"] = np.arange(1000)
+    seal_path(path).write_text("of an older version\n")
+    return path
+
+
+def test_a_file_without_a_checksum_inside_is_refused_unless_asked_for(plain):
+    assert check_file(plain) == "unsealed"
+    expected = r"old\.h5: no checksum inside .*; --unchecked \(.*\) reads it if it is sound$"
+    with pytest.raises(StorageError, match=expected), open_hdf5(plain):
         pass
-    assert (tmp_path / "a.h5").exists()
+    with open_hdf5(plain, unchecked=True) as file:
+        assert file["x"][...].sum() == 499500
+    os.truncate(plain, 3000)
+    with pytest.raises(StorageError, match=r"old\.h5: cannot be read"), open_hdf5(plain, True):
+        pass
+    assert sorted(plain.parent.iterdir()) == sorted([plain, seal_path(plain)])
+
+
+def test_a_wrong_checksum_is_refused_also_by_who_asks_for_none(tmp_path):
+    path = tmp_path / "a.h5"
+    with write_hdf5(path) as file:
+        file["x"] = np.arange(1000)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(StorageError, match="checksum differ"), open_hdf5(path, unchecked=True):
+        pass
+
+
+def test_a_new_file_takes_the_hidden_checksum_of_an_old_one_along(plain):
+    with write_hdf5(plain) as file:
+        file["x"] = 1
+    assert list(plain.parent.iterdir()) == [plain]
+    assert check_file(plain) == "intact"
 
 
 @pytest.mark.parametrize("damaged", [True, False])
@@ -105,8 +150,8 @@ def test_an_error_while_reading_leads_to_another_check(tmp_path, damaged):
     with write_hdf5(path) as file:
         file["x"] = 1
     message = "set aside" if damaged else os.strerror(errno.ENOLCK)
-    with pytest.raises(StorageError, match=message), open_hdf5(path):
+    with damaged_set_aside(), pytest.raises(StorageError, match=message), open_hdf5(path):
         if damaged:
-            os.truncate(path, 100)
+            os.truncate(path, 3000)
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
     assert path.exists() != damaged

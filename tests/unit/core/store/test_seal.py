@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pdrom import __version__
+from pdrom.core.aside import damaged_set_aside
 from pdrom.core.errors import StorageError
 from pdrom.core.store import (
     check_file,
@@ -27,6 +28,7 @@ from pdrom.core.store import (
     write_table,
     write_text,
 )
+from pdrom.core.store.block import SIZE
 
 
 def write_one(path: Path) -> None:
@@ -59,25 +61,53 @@ def result(request, tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("result") / request.param
     write_one(path)
     assert check_file(path) == "intact"
+    assert [p.name for p in path.parent.iterdir() if p != path] == hidden(path)
     return path
 
 
-def noticed(path: Path, content: bytes | None = None, seal: bytes | None = None) -> bool:
-    """Whether other bytes of the file, or of its seal, are found and the file is set aside.
+def hidden(path: Path) -> list[str]:
+    """Names of the files beside a result: none has its seal inside but HDF5."""
+    return [] if path.suffix == ".h5" else [seal_path(path).name]
 
-    Both are put back.
+
+def seal_of(path: Path) -> bytes:
+    """The bytes of a result's seal, inside it or beside it."""
+    return path.read_bytes()[:SIZE] if path.suffix == ".h5" else seal_path(path).read_bytes()
+
+
+def places(seal: bytes) -> list[int]:
+    """Every byte of a seal, and some of the zeros that fill a block."""
+    told = len(seal.rstrip(b"\0"))
+    return [*range(told), *range(told, len(seal), 100)]
+
+
+def noticed(path: Path, content: bytes | None = None, seal: bytes | None = None) -> bool:
+    """Whether other bytes of the file, or of its seal, are found.
+
+    A job sets the file aside, any other reader leaves it where it is. Both are put back.
     """
-    before = path.read_bytes(), seal_path(path).read_bytes()
-    path.write_bytes(before[0] if content is None else content)
-    seal_path(path).write_bytes(before[1] if seal is None else seal)
+    before = {p: p.read_bytes() for p in path.parent.iterdir()}
+    if content is not None:
+        path.write_bytes(content)
+    if seal is not None and path.suffix == ".h5":
+        path.write_bytes(seal + path.read_bytes()[SIZE:])
+    elif seal is not None:
+        seal_path(path).write_bytes(seal)
+    changed = {p: p.read_bytes() for p in path.parent.iterdir()}
     assert check_file(path) == "damaged"
+    with pytest.raises(
+        StorageError, match=r"damaged, its content and its checksum differ \([^;]*$"
+    ):
+        read_one(path)
+    assert {p: p.read_bytes() for p in path.parent.iterdir()} == changed
     aside = path.with_name(f"{path.name}.damaged")
-    with pytest.raises(StorageError, match=f"damaged, .* set aside as {aside.name}, the next run"):
+    expected = f"damaged, .* set aside as {aside.name}, the next run"
+    with damaged_set_aside(), pytest.raises(StorageError, match=expected):
         read_one(path)
     assert [p.name for p in path.parent.iterdir()] == [aside.name]
     aside.unlink()
-    path.write_bytes(before[0])
-    seal_path(path).write_bytes(before[1])
+    for place, old in before.items():
+        place.write_bytes(old)
     return True
 
 
@@ -118,19 +148,23 @@ def test_appended_bytes_are_noticed(result):
 
 
 def test_a_changed_bit_in_every_byte_of_the_seal_is_noticed(result):
-    seal = seal_path(result).read_bytes()
-    for i in range(len(seal)):
+    seal = seal_of(result)
+    for i in places(seal):
         assert noticed(result, seal=flipped(seal, 8 * i + i % 8))
 
 
 def test_every_cut_seal_is_noticed(result):
-    seal = seal_path(result).read_bytes()
-    for changed in (*(seal[:kept] for kept in range(len(seal))), seal + b"\n", seal.upper()):
+    seal = seal_of(result)
+    # an HDF5 file that has lost its whole block is a file without a seal
+    cuts = [seal[:kept] for kept in places(seal) if kept or result.suffix != ".h5"]
+    for changed in (*cuts, seal + b"\n", seal.upper()):
         assert noticed(result, seal=changed)
 
 
 def test_the_seal_tells_the_provenance_and_counts_without_it(result):
     assert provenance_of(result)["pdrom_version"] == __version__
+    if result.suffix == ".h5":
+        return
     seal = seal_path(result).read_bytes()
     seal_path(result).write_bytes(seal.split(b"\n", 1)[1])
     assert (check_file(result), provenance_of(result)) == ("intact", {})
@@ -140,18 +174,28 @@ def test_the_seal_tells_the_provenance_and_counts_without_it(result):
 @given(data=st.data())
 @settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_changed_bit_in_the_file_and_one_in_the_seal_are_noticed(result, data):
-    content, seal = result.read_bytes(), seal_path(result).read_bytes()
+    content, seal = result.read_bytes(), seal_of(result)
     bit = data.draw(st.integers(0, 8 * len(content) - 1))
     other = data.draw(st.none() | st.integers(0, 8 * len(seal) - 1))
-    changed = seal if other is None else flipped(seal, other)
+    changed = None if other is None else flipped(seal, other)
     assert noticed(result, flipped(content, bit), changed)
 
 
-def test_a_result_without_its_seal_is_unsealed_and_set_aside(result, tmp_path):
-    copy = shutil.copy(result, tmp_path)
+def test_a_copy_without_its_seal_is_refused_and_left_alone_but_by_a_job(result, tmp_path):
+    copy = Path(shutil.copy(result, tmp_path))
+    if copy.suffix == ".h5":  # the seal is inside
+        read_one(copy)
+        assert check_file(copy) == "intact"
+        return
     assert check_file(copy) == "unsealed"
-    with pytest.raises(StorageError, match=r"its checksum .* is missing .*set aside"):
-        read_one(Path(copy))
+    with pytest.raises(
+        StorageError, match=r"its checksum \.r\..* is missing \(copied without it\?\)$"
+    ):
+        read_one(copy)
+    assert list(tmp_path.iterdir()) == [copy]
+    expected = r"damaged, its checksum .* is missing .*set aside"
+    with damaged_set_aside(), pytest.raises(StorageError, match=expected):
+        read_one(copy)
     assert [p.name for p in tmp_path.iterdir()] == [f"{result.name}.damaged"]
 
 
@@ -162,8 +206,11 @@ def test_a_folder_that_is_copied_or_renamed_stays_intact(result, tmp_path):
 
 
 def test_the_seal_of_another_result_does_not_fit(result, tmp_path):
-    """Equal content under another name has another seal."""
+    """Equal content under another name has another seal, where the seal is not inside."""
     shutil.copy(result, tmp_path / "other")
+    if result.suffix == ".h5":
+        assert check_file(tmp_path / "other") == "intact"
+        return
     shutil.copy(seal_path(result), seal_path(tmp_path / "other"))
     assert check_file(tmp_path / "other") == "damaged"
 
@@ -181,7 +228,7 @@ def test_a_new_file_heals(result, tmp_path):
     path = tmp_path / result.name
     write_one(path)
     path.write_bytes(b"")
-    with pytest.raises(StorageError, match="set aside"):
+    with damaged_set_aside(), pytest.raises(StorageError, match="set aside"):
         require_intact(path)
     write_one(path)
     read_one(path)
@@ -206,12 +253,27 @@ def test_only_what_the_disk_lost_is_set_aside(tmp_path, monkeypatch, number, asi
         raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr("hashlib.file_digest", fail)
-    with pytest.raises(StorageError, match="set aside" if aside else os.strerror(number)):
+    expected = "set aside" if aside else os.strerror(number)
+    with damaged_set_aside(), pytest.raises(StorageError, match=expected):
         read_table(path)
     assert path.exists() != aside
 
 
 @pytest.mark.skipif(shutil.which("b2sum") is None, reason="b2sum is not installed")
 def test_the_seal_is_what_b2sum_checks(result):
+    folder = result.parent
+    if result.suffix == ".h5":
+        behind = result.read_bytes()[SIZE:]
+        done = subprocess.run(["b2sum"], input=behind, capture_output=True, check=True)
+        assert done.stdout in seal_of(result)
+        return
     command = ["b2sum", "--check", "--strict", seal_path(result).name]
-    assert subprocess.run(command, cwd=result.parent, check=False).returncode == 0
+    assert subprocess.run(command, cwd=folder, check=False).returncode == 0
+
+
+def test_an_unsealed_file_that_replaces_a_sealed_one_takes_its_seal_along(tmp_path):
+    path = tmp_path / "t.txt"
+    write_text("result", path)
+    write_text("a user's own", path, sealed=False)
+    assert list(tmp_path.iterdir()) == [path]
+    assert check_file(path) == "unsealed"

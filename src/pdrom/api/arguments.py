@@ -1,0 +1,83 @@
+"""Arguments of the functions of `pdrom.api`: a wrong one is named before anything is computed."""
+
+import os
+from numbers import Integral
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+
+from pdrom.core.errors import ConfigurationError, choices
+from pdrom.core.project import config_file
+from pdrom.core.yamlfile import describe, shown
+from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.reduction.basis import Basis
+from pdrom.reduction.local import guard_settings
+from pdrom.reduction.method import MethodSpec, load_methods
+
+T = TypeVar("T")
+
+
+class GuardSettings(guard_settings.GuardSettings):
+    __doc__ = guard_settings.GuardSettings.__doc__
+
+    def __init__(self, **keys: Any) -> None:
+        try:
+            super().__init__(**keys)
+        except ValidationError as error:
+            told = describe(error, guard_settings.GuardSettings)
+            raise ConfigurationError(f"GuardSettings: {told}") from error
+
+
+def require(kind: type[T] | tuple[type[T], ...], value: Any, name: str, source: str) -> T:
+    """``value`` if it is a ``kind``; ``source`` is where one comes from."""
+    if isinstance(value, kind):
+        return value
+    kinds = " or ".join(k.__name__ for k in (kind if isinstance(kind, tuple) else (kind,)))
+    raise ConfigurationError(f"{name} = {shown(value, 60)}: a {kinds} is required ({source})")
+
+
+def file_path(path: Any) -> Path:
+    """``path`` as a path; ConfigurationError if it is none."""
+    if not isinstance(path, (str, os.PathLike)) or "\0" in str(path):
+        raise ConfigurationError(f"{shown(path, 60)}: the name of a file is required")
+    return Path(path)
+
+
+def modes(r: Any) -> int:
+    """Number of modes as an int; which numbers a basis allows is checked where they are taken."""
+    if isinstance(r, bool) or not isinstance(r, Integral):
+        raise ConfigurationError(f"r = {shown(r, 60)}: a whole number of modes is required")
+    return int(r)
+
+
+def method_spec(method: str | MethodSpec) -> MethodSpec:
+    """The method of that name in config/methods.yaml, or the one that is given."""
+    if isinstance(method, MethodSpec):
+        return method
+    known = methods()
+    if not isinstance(method, str) or method not in known:
+        raise ConfigurationError(f"unknown method {shown(method, 60)}{choices(method, known)}")
+    return known[method]
+
+
+def methods() -> dict[str, MethodSpec]:
+    """Reduction methods of config/methods.yaml by name; an installed package has its own copy."""
+    return load_methods(config_file("methods.yaml"))
+
+
+def fitting_basis(made: Any, group: ConstraintGroup, spec: MethodSpec) -> Basis:
+    """``made`` if it is a basis of the group's projections that the method can use."""
+    basis = require(Basis, made, "basis_of_group", "pdrom.api.basis makes one")
+    found, needed = ((each.elements, each.rows_per_element) for each in (basis, group))
+    if found != needed:
+        raise ConfigurationError(
+            f"basis_of_group: of {found[0]} elements with {found[1]} rows each, group "
+            f"'{group.name}' of this scene has {needed[0]} with {needed[1]}: another scene's?"
+        )
+    if basis.separate_axes != spec.separate_axes:
+        raise ConfigurationError(
+            f"basis_of_group: made for another method than '{spec.title}' (axes "
+            f"{'apart' if basis.separate_axes else 'together'})"
+        )
+    return basis

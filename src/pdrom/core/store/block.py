@@ -1,0 +1,42 @@
+"""The seal inside an HDF5 file: its first bytes, which HDF5 leaves to its users (the user block).
+
+A line that says what it is, the seal (`pdrom.core.store.seal`) of all bytes behind the block, and
+zeros. So a copy of the file, wherever it lies, says itself whether it is whole, before HDF5 reads
+any of it; every reader of HDF5 skips the block.
+"""
+
+from pathlib import Path
+
+from pdrom.core.store.seal import digest_of, new_seal
+
+SUFFIXES = (".h5", ".hdf5")
+SIZE = 2048  # bytes; HDF5 allows powers of two from 512 on
+_LINE = b"pdrom: BLAKE2b of the bytes behind the first 2048, and what made them\n"
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+NAME = "-"  # of what `tail -c +2049 FILE | b2sum` reads
+
+
+def is_hdf5(path: Path) -> bool:
+    """Whether a file is HDF5, by its name or its beginning, with a block or without."""
+    with open(path, "rb") as handle:
+        head = handle.read(SIZE + len(_SIGNATURE))
+    told = path.suffix in SUFFIXES or head.startswith((_SIGNATURE, _LINE))
+    return told or head[SIZE:] == _SIGNATURE
+
+
+def write_block(path: Path) -> None:
+    """Seal a complete HDF5 file that begins with ``SIZE`` bytes of no meaning."""
+    content = _LINE + new_seal(digest_of(path, start=SIZE), NAME).content
+    if len(content) > SIZE:
+        raise ValueError(f"{path}: a seal of {len(content)} bytes, allowed: at most {SIZE}")
+    with open(path, "r+b") as handle:
+        handle.write(content.ljust(SIZE, b"\0"))
+
+
+def read_block(path: Path) -> bytes | None:
+    """The seal's bytes in the block of an HDF5 file, b"" if damaged; None without a block."""
+    with open(path, "rb") as handle:
+        block = handle.read(SIZE)
+    if block.startswith(_SIGNATURE):
+        return None
+    return block.removeprefix(_LINE).rstrip(b"\0") if block.startswith(_LINE) else b""
