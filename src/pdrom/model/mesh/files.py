@@ -19,10 +19,11 @@ from pdrom.model.mesh.generators import boundary, orient
 from pdrom.model.mesh.limits import VARIABLE, MeshLimits, mesh_limits
 from pdrom.model.mesh.types import Mesh
 
-# Extension -> meshio's readers, tried in turn. Each opens the mesh file and no other: what a run
-# depends on is this one file, which is hashed and lies in the project. Not among them are formats
-# that keep data in further files (.xdmf, .pvd, .ele and .node, dolfin's .xml), include others
-# (.inp) or link to others (all that are HDF5 or netCDF inside: .med, .h5m, .hmf, .cgns, .e).
+# Extension -> readers, of which the file's beginning chooses one. Each opens the mesh file and no
+# other: what a run depends on is this one file, which is hashed and lies in the project. Not among
+# them are formats that keep data in further files (.xdmf, .pvd, .ele and .node, dolfin's .xml),
+# include others (.inp) or link to others (all that are HDF5 or netCDF inside: .med, .h5m, .hmf,
+# .cgns, .e).
 FORMATS = {
     ".avs": ("avsucd",),
     ".bdf": ("nastran",),

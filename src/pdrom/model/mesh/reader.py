@@ -2,24 +2,38 @@
 
 Readers trust their input: cut files make them loop without end, and a few megabytes of compressed
 zeros unpack to gigabytes. The limits that hold here end only this process. It is a script that
-imports nothing of the package, so that it starts in a fraction of a second.
+imports of the package only `pdrom.model.meshfiles`, so that it starts in a fraction of a second.
 
 usage: reader.py FILE FORMATS SECONDS MEMORY VERTICES CELLS
 
-``FORMATS`` are names of meshio's readers, joined by commas and tried in turn. What comes out is
-points (N, 3) float64 and cells (E, 3 or 4) int64 as two arrays of NumPy's format .npy, or, with
-the exit status `REFUSED`, a sentence that says what is wrong.
+``FORMATS`` are names of readers, joined by commas; how the file begins chooses between them. What
+comes out is points (N, 3) float64 and cells (E, 3 or 4) int64 as two arrays of NumPy's format .npy,
+or, with the exit status `REFUSED`, a sentence that says what is wrong.
 """
 
 import io
 import os
 import sys
 from contextlib import redirect_stderr, redirect_stdout
+from importlib import import_module
+from pathlib import Path
 from types import SimpleNamespace
+
+from pdrom.model.meshfiles.faults import (
+    CORNERS,
+    CutError,
+    RefusedError,
+    UnreadableError,
+    only_kind,
+    reason,
+)
 
 REFUSED = 3
 NO_MEMORY = 4
-ALLOWED_CELLS = ("triangle", "tetra")
+# Formats with a reader of our own: meshio's refuses ordinary files of them.
+OWN = ("obj", "off", "ply", "vtk")
+# How a file begins whose extension leaves two formats.
+OPENINGS = {"ansys": b"(", "gmsh": b"$"}
 
 
 def main(path: str, formats: str, *numbers: str) -> int:
@@ -31,7 +45,7 @@ def main(path: str, formats: str, *numbers: str) -> int:
     try:
         # readers warn, and report some faults by printing and leaving the process
         with redirect_stdout(io.StringIO()) as said, redirect_stderr(said):
-            arrays = _read(path, formats.split(","), vertices, cells)
+            arrays = read(path, formats.split(","), vertices, cells)
         _write(arrays)
     except MemoryError:
         os._exit(NO_MEMORY)  # an orderly end would need memory
@@ -54,47 +68,74 @@ def _limit(name: str, value: int) -> None:
         return
 
 
-def _read(path: str, formats: list[str], max_vertices: int, max_cells: int) -> tuple:
-    """Points and cells of the file; ValueError says what is wrong with it."""
-    import meshio
+def read(path: str, formats: list[str], max_vertices: int, max_cells: int) -> tuple:
+    """Points (N, 3) float64 and cells (E, 3 or 4) int64 of a file.
+
+    Raises
+    ------
+    ValueError
+        Says what is wrong with the file.
+    """
     import numpy as np
 
-    raw = fault = None
-    for name in formats:
-        try:
-            raw = meshio.read(path, file_format=name)
-            break
-        except MemoryError:
-            raise
-        except (SystemExit, Exception) as error:
-            # the first reader is the usual one: its fault says most
-            fault = fault or _reason(error)
-    if raw is None:
-        raise ValueError(f"not a readable mesh ({fault})")
-    kinds = list(dict.fromkeys(b.type for b in raw.cells if b.type not in ("vertex", "line")))
-    if len(kinds) != 1 or kinds[0] not in ALLOWED_CELLS:
-        raise ValueError(
-            f"holds cells {kinds or 'of no kind'}, allowed: only one of {', '.join(ALLOWED_CELLS)}"
-        )
-    blocks = [block.data for block in raw.cells if block.type == kinds[0]]
-    # of a damaged file they may be no arrays, which the conversion refuses
-    _check_size("vertices", len(np.atleast_1d(raw.points)), max_vertices)
-    _check_size("cells", sum(len(np.atleast_1d(block)) for block in blocks), max_cells)
+    with open(path, "rb") as file:
+        begins = file.read(64).lstrip()[:1]
+    name = next((name for name in formats if OPENINGS.get(name) == begins), formats[0])
     try:
-        points = np.ascontiguousarray(raw.points, dtype=np.float64)
-        cells = np.concatenate(blocks).astype(np.int64, casting="same_kind")
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"not a readable mesh ({_reason(error)})") from error
-    corners = 3 if kinds[0] == "triangle" else 4
-    for array, what, width in ((points, "points", 3), (cells, kinds[0], corners)):
-        if array.ndim != 2 or array.shape[1] != width:
+        if name in OWN:
+            points, cells = import_module(f"pdrom.model.meshfiles.{name}").read(Path(path))
+        else:
+            points, cells = _by_meshio(path, name)
+        # of a damaged file they may be no arrays, which the conversion refuses
+        _check_size("vertices", len(np.atleast_1d(points)), max_vertices)
+        _check_size("cells", len(cells), max_cells)
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        cells = cells.astype(np.int64, casting="same_kind")
+    except MemoryError:
+        raise
+    except RefusedError as error:
+        raise ValueError(f"{error}{_last_line(path)}") from error
+    except (SystemExit, Exception) as error:
+        hint = "" if isinstance(error, CutError) else _last_line(path)
+        raise ValueError(f"not a readable mesh ({reason(error)}{hint})") from error
+    for array, what, widths in ((points, "points", (3,)), (cells, "cells", (3, 4))):
+        if array.ndim != 2 or array.shape[1] not in widths:
+            width = " or ".join(map(str, widths))
             raise ValueError(f"{what} of shape {array.shape}, required: (N, {width})")
     return points, cells
 
 
+def _by_meshio(path: str, name: str) -> tuple:
+    """Points and cells that meshio's reader finds, where they are those of the file."""
+    import meshio
+    import numpy as np
+    from meshio.ugrid import _ugrid
+
+    from pdrom.model.meshfiles.guards import check_after, check_before, ends_noticed
+
+    _ugrid.file_types["ascii"]["float_type"] = "f8"  # meshio rounds what is text to single
+    content = Path(path).read_bytes()
+    check_before(name, content)
+    with ends_noticed():
+        raw = meshio.read(path, file_format=name)
+    check_after(name, content, raw)
+    kind = only_kind(block.type for block in raw.cells if block.type not in ("vertex", "line"))
+    cells = np.concatenate([block.data for block in raw.cells if block.type == kind])
+    if cells.shape[1:] != (CORNERS[kind],):
+        raise UnreadableError(f"{kind} with a shape of {cells.shape[1:]}")
+    return raw.points, cells
+
+
+def _last_line(path: str) -> str:
+    """A hint where a text may have been cut within a line."""
+    end = Path(path).read_bytes()[-80:]
+    cut = end and b"\0" not in end and not end.endswith((b"\n", b"\r"))
+    return "; cut off? The last line has no end" if cut else ""
+
+
 def _check_size(what: str, found: int, allowed: int) -> None:
     if found > allowed:
-        raise ValueError(f"holds {found} {what}, allowed: at most {allowed}")
+        raise RefusedError(f"holds {found} {what}, allowed: at most {allowed}")
 
 
 def _write(arrays: tuple) -> None:
@@ -105,13 +146,6 @@ def _write(arrays: tuple) -> None:
     for array in arrays:
         np.save(pipe, array, allow_pickle=False)
     sys.stdout.flush()
-
-
-def _reason(error: BaseException) -> str:
-    """What went wrong, on one short line."""
-    if isinstance(error, SystemExit):
-        return "no reader takes it"
-    return f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
 
 
 if __name__ == "__main__":

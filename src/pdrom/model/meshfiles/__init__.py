@@ -1,0 +1,5 @@
+"""Readers of mesh files, and what is asked of a file that meshio reads.
+
+They run in the process of `pdrom.model.mesh.reader` and import NumPy at most, so that it starts in
+a fraction of a second.
+"""

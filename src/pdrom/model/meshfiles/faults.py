@@ -1,0 +1,87 @@
+"""What is wrong with a mesh file, and the checks that readers share."""
+
+import re
+from collections.abc import Iterable
+
+import numpy as np
+
+# Kinds of cells that are wanted, and how many corners they have.
+CORNERS = {"triangle": 3, "tetra": 4}
+_LAST_NUMBER = re.compile(rb"(?:^|\s)([-+]?[\d.]+(?:[eE][-+]?\d*)?)\Z")
+
+
+class UnreadableError(ValueError):
+    """A file that is no mesh of its format, or one that would be read wrong."""
+
+
+class RefusedError(ValueError):
+    """A mesh that is read, and is not what is wanted."""
+
+
+class CutError(UnreadableError):
+    """A file that ends before its mesh does."""
+
+    def __init__(self, why: str) -> None:
+        super().__init__(f"cut off: {why}")
+
+
+def only_kind(kinds: Iterable[str]) -> str:
+    """The one kind of cells of a mesh; `RefusedError` if there is none, or another."""
+    found = list(dict.fromkeys(kinds))
+    if len(found) != 1 or found[0] not in CORNERS:
+        raise RefusedError(
+            f"holds cells {found or 'of no kind'}, allowed: only one of {', '.join(CORNERS)}"
+        )
+    return found[0]
+
+
+def kind_of_face(corners: int) -> str:
+    """Kind of a face with so many corners."""
+    return {3: "triangle", 4: "quad"}.get(corners, "polygon")
+
+
+def numbers(rows: list[bytes], columns: int, what: str) -> np.ndarray:
+    """The first ``columns`` numbers of every row, (rows, columns) float64."""
+    if not rows:
+        return np.empty((0, columns))
+    try:
+        return np.loadtxt(rows, usecols=range(columns), ndmin=2, encoding="latin-1")
+    except (ValueError, IndexError) as error:
+        raise UnreadableError(f"{what}: {error}") from error
+
+
+def whole(array: np.ndarray, what: str) -> np.ndarray:
+    """The numbers as integers; `UnreadableError` for one that is none."""
+    if not (np.isfinite(array).all() and (np.abs(array) < 2**53).all()):
+        raise UnreadableError(f"{what} that are no whole numbers")
+    integers = array.astype(np.int64)
+    if (integers != array).any():
+        raise UnreadableError(f"{what} that are no whole numbers")
+    return integers
+
+
+def check_last_number(content: bytes, vertices: int) -> None:
+    """`CutError` if a text ends in a number that may be the beginning of a longer one.
+
+    Nothing but the end of the line tells ``12`` from the first digits of ``123``. An index that
+    could not be longer, as there are not so many ``vertices``, is taken.
+    """
+    last = _LAST_NUMBER.search(content[-64:])
+    if last is None:
+        return
+    number = last[1].decode()
+    digits = number.lstrip("+-")
+    if not digits.isdigit() or 0 < 10 * int(digits) <= vertices:
+        raise CutError(
+            f"the last line has no end and may go on after {number} (add an end of line if not)"
+        )
+
+
+def reason(error: BaseException) -> str:
+    """What went wrong, on one short line."""
+    text = " ".join(str(error).split())[:200]
+    if isinstance(error, UnreadableError):
+        return text
+    if isinstance(error, SystemExit):
+        return "no reader takes it"
+    return f"{type(error).__name__}: {text}"

@@ -1,0 +1,194 @@
+"""What is asked of a file before meshio reads it, and while it does.
+
+meshio trusts its input. Where it would read another mesh than the file holds, the file is refused
+here; where it takes the end of a file for the end of its mesh, the end is looked at first.
+"""
+
+import builtins
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from pdrom.model.meshfiles.faults import CutError, UnreadableError, check_last_number, reason
+
+# Bytes that are read at once by who reads piece by piece; reads behind the end before it is a loop.
+PIECE, PATIENCE = 4096, 100
+# What a whole file holds, of formats that mark their end; others say how much they hold.
+ENDS = {
+    "ansys": rb"\)\s*\Z",
+    "gmsh": rb"^\$End\w+\s*\Z",
+    "mdpa": rb"^\s*End \w+\s*\Z",
+    "medit": rb"\A\x01\0\0\0|^\s*End\s*\Z",  # a binary one ends with a number
+    "nastran": rb"^ENDDATA",
+    "netgen": rb"^\s*endmesh\s*\Z",
+    "permas": rb"^\s*\$FIN",
+    "stl": rb"^\s*endsolid[^\n]*\s*\Z",
+    "vtu": rb"</VTKFile>\s*\Z",
+    "wkt": rb"\)\s*\Z",
+}
+# Lines that meshio passes over, and what they would change.
+PASSED_OVER = {
+    "mdpa": (rb"^[ \t]*Begin Nodes\b.*?^[ \t]*(Begin Nodes)\b", "one block of nodes is read"),
+    "nastran": (
+        rb"^[ \t]*(GRDSET|INCLUDE|(?:CTRI|CTETRA)\w*\*)",
+        "no other coordinate systems and files are read, and no elements in large fields",
+    ),
+    "su2": (rb"^[ \t]*(NZONE[ \t]*=[ \t]*0*(?:[2-9]|1\d))", "one zone is read"),
+    "tecplot": (rb"^[ \t]*ZONE\b.*?^[ \t]*(ZONE)\b", "one zone is read"),
+}
+
+
+def check_before(name: str, content: bytes) -> None:
+    """Refuse a file that meshio's reader ``name`` would read wrong.
+
+    Raises
+    ------
+    CutError
+        The mark is missing that ends a file of this format.
+    UnreadableError
+        A line that the reader passes over though it changes the mesh, or vertices that are
+        numbered in another order than they are listed, where the reader takes no notice.
+    """
+    binary = name == "stl" and 84 + 50 * int.from_bytes(content[80:84], "little") == len(content)
+    if name in ENDS and not binary and not re.search(ENDS[name], content, re.M):
+        raise CutError("the file does not end as this format does")
+    if name == "wkt" and content.count(b"(") != content.count(b")"):
+        raise CutError("brackets that are not closed")  # the reader would try for hours
+    if name in PASSED_OVER:
+        pattern, why = PASSED_OVER[name]
+        found = re.search(pattern, content, re.M | re.S | re.I)
+        if found:
+            raise UnreadableError(f"{found[1].decode()}: {why}")
+    if name == "su2":
+        _check_order(content)
+
+
+def check_after(name: str, content: bytes, mesh: Any) -> None:
+    """Refuse, or mend, what meshio has read from ``content``.
+
+    Raises
+    ------
+    CutError
+        The last number may be the beginning of a longer one.
+    UnreadableError
+        Vertices in a coordinate system of their own, or with equal numbers.
+    """
+    if name == "nastran" and np.any(mesh.point_data.get("nastran:ref", 0)):
+        raise UnreadableError("GRID with a coordinate system (CP): only the basic one is read")
+    if name == "mdpa":
+        _count_by_numbers(content, mesh)
+    if name == "su2":
+        counts = re.findall(rb"^[ \t]*(?:NELEM|MARKER_ELEMS)[ \t]*=[ \t]*(\d+)", content, re.M)
+        announced, there = sum(map(int, counts)), sum(len(cells.data) for cells in mesh.cells)
+        if there != announced:
+            raise CutError(f"{announced} elements are announced, {there} are there")
+    if name not in ENDS and b"\0" not in content:
+        check_last_number(content, len(mesh.points))
+
+
+def _check_order(content: bytes) -> None:
+    """Vertices of .su2 may be followed by their number, which no reader takes notice of."""
+    dimension = re.search(rb"^[ \t]*NDIME[ \t]*=[ \t]*(\d+)", content, re.M)
+    points = re.search(rb"^[ \t]*NPOIN[ \t]*=[ \t]*(\d+)[^\n]*\n", content, re.M)
+    if dimension is None or points is None:
+        raise CutError("NDIME or NPOIN is missing")
+    axes, count = int(dimension[1]), int(points[1])
+    lines = content[points.end() :].split(b"\n", count)[:count]
+    listed = [words[axes] for line in lines if len(words := line.split()) > axes]
+    if any(number != b"%d" % place for place, number in enumerate(listed)):
+        raise UnreadableError("NPOIN: vertices are numbered in another order than 0, 1, 2 ...")
+
+
+def _count_by_numbers(content: bytes, mesh: Any) -> None:
+    """Let cells of .mdpa, which name vertices by number, name them by place."""
+    block = content.partition(b"Begin Nodes")[2].partition(b"End Nodes")[0]
+    numbers = np.array(block.split()[::4], dtype=np.int64)
+    order = np.argsort(numbers)
+    if len(numbers) != len(mesh.points) or (np.diff(numbers[order]) == 0).any():
+        raise UnreadableError("nodes with equal numbers")
+    for cells in mesh.cells:
+        found = np.searchsorted(numbers[order], cells.data + 1).clip(max=len(numbers) - 1)
+        if (numbers[order[found]] != cells.data + 1).any():
+            raise UnreadableError("an element names a node that is not there")
+        cells.data = order[found]
+
+
+@contextmanager
+def ends_noticed() -> Iterator[None]:
+    """Let a reader fail when the file ends too early, where it would loop or take less.
+
+    While it holds, files that are opened notice reads behind their end, and ``numpy.fromfile``
+    raises `CutError` for fewer numbers than it was asked for.
+    """
+    opened, fromfile = builtins.open, np.fromfile
+    ends: list[int] = []
+
+    def noticing(path: Any, mode: str = "r", *more: Any, **named: Any) -> Any:
+        if more or named or mode not in ("r", "rb"):
+            return opened(path, mode, *more, **named)
+        file = _Bytes(io.FileIO(path), ends)
+        return file if mode == "rb" else _Text(file, ends)
+
+    def whole(file: Any, *more: Any, **named: Any) -> np.ndarray:
+        array = fromfile(file, *more, **named)
+        asked = named.get("count", more[1] if len(more) > 1 else -1)
+        if len(array) < asked:
+            raise CutError(f"{asked} numbers that follow each other, {len(array)} are there")
+        return array
+
+    builtins.open, np.fromfile = noticing, whole
+    try:
+        yield
+    except (UnreadableError, MemoryError):
+        raise
+    except (SystemExit, Exception) as error:
+        if ends:
+            raise CutError(f"the file ends where more is expected ({reason(error)})") from error
+        raise
+    finally:
+        builtins.open, np.fromfile = opened, fromfile  # type: ignore[assignment]
+
+
+class _Text(io.TextIOWrapper):
+    """A text file that notes in ``ends`` how often it was read behind its end."""
+
+    def __init__(self, file: io.BufferedReader, ends: list[int]) -> None:
+        super().__init__(file, encoding="utf-8")
+        self._ends = ends
+
+    def readline(self, size: int = -1, /) -> str:  # type: ignore[override]
+        line = super().readline(size)
+        if not line:
+            _note(self._ends)
+        return line
+
+
+class _Bytes(io.BufferedReader):
+    """A binary file that notes in ``ends`` how often it was read behind its end."""
+
+    def __init__(self, file: io.FileIO, ends: list[int]) -> None:
+        super().__init__(file)
+        self._ends = ends
+
+    def readline(self, size: int | None = -1, /) -> bytes:
+        line = super().readline(size)
+        if not line:
+            _note(self._ends)
+        return line
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        content = super().read(size)
+        # readers of the whole file ask for all, or for large pieces
+        if size and len(content) < size < PIECE:
+            _note(self._ends)
+        return content
+
+
+def _note(ends: list[int]) -> None:
+    ends.append(1)
+    if len(ends) > PATIENCE:
+        raise EOFError("a reader that goes on for ever")
