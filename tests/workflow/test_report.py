@@ -56,7 +56,7 @@ def go_to(page: Page, entry: str) -> None:
     page.get_by_role("link", name=entry, exact=True).click()
 
 
-@pytest.mark.parametrize("category", ["Figures of the paper", "Figures of this study"])
+@pytest.mark.parametrize("category", ["Figures of the preprint", "Figures of this study"])
 def test_every_figure_opens_and_has_its_caption(opened: Page, category: str) -> None:
     listed = {
         name: figure

@@ -1,19 +1,22 @@
-"""``./reproduce figure NUMBER|NAME ... [OPTIONS]``: figures of the paper by number, as targets."""
+"""``./reproduce figure NUMBER|preprint:NUMBER|NAME ... [OPTIONS]``: figures as targets."""
 
 from collections.abc import Sequence
 from itertools import takewhile
+from pathlib import Path
 
 from pdrom.core.errors import ConfigurationError, choices
-from pdrom.report.figures.kit.catalogue import declarations
+from pdrom.report.figure_numbers import figure_numbers
 
 WORD = "figure"
+PREPRINT = "preprint:"
 
 
 def figure_arguments(arguments: Sequence[str]) -> list[str]:
     """Options and targets for Snakemake, from what follows the word ``figure``.
 
-    A number is that of a figure in the paper; a figure of this study has its name alone. A target
-    reads ``figure NAME`` (one word), which `pdrom.pipeline.targets.Names` turns into its file.
+    A number counts in the manuscript, ``preprint:NUMBER`` in the preprint; every figure has its
+    name, too. A target reads ``figure NAME`` (one word), which `pdrom.pipeline.targets.Names` turns
+    into its file.
 
     Raises
     ------
@@ -22,12 +25,21 @@ def figure_arguments(arguments: Sequence[str]) -> list[str]:
     """
     asked = list(takewhile(lambda word: not word.startswith("-"), arguments))
     options = [word for word in arguments[len(asked) :] if word != "--"]
-    names = {name: name for name in declarations()}
-    numbers = {str(f.number): name for name, f in declarations().items() if f.number is not None}
-    known = numbers | names
+    numbers = figure_numbers(Path())
+    by_place = {n.manuscript: name for name, n in numbers.items() if n.manuscript}
+    known = {str(number): by_place[number] for number in sorted(by_place)}
+    known |= {f"{PREPRINT}{n.preprint}": name for name, n in numbers.items() if n.preprint}
+    known |= {name: name for name in numbers}
     if not asked:
         raise ConfigurationError(f"{WORD}: its number or name is missing{choices('', known)}")
     for word in asked:
         if word not in known:
             raise ConfigurationError(f"{WORD} {word}: there is none{choices(word, known)}")
     return [*options, "--", *(f"{WORD} {known[word]}" for word in asked)]
+
+
+def described(target: str) -> str:
+    """A target with both numbers, if it is a figure that has one; else the target itself."""
+    word, _, name = target.partition(" ")
+    numbers = figure_numbers(Path()).get(name) if word == WORD else None
+    return f"{target} ({numbers.words})" if numbers and numbers.words else target

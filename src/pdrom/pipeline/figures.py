@@ -15,22 +15,25 @@ from pdrom.pipeline.holdings import labels_of
 from pdrom.pipeline.study import Study
 from pdrom.reduction.method import load_methods
 from pdrom.report.drawing import Order
+from pdrom.report.figure_numbers import Numbers, figure_numbers
 from pdrom.report.figures.kit.catalogue import declarations, load_choices, modules
 from pdrom.report.figures.kit.declaration import Declaration
 from pdrom.report.figures.kit.holdings import GroupHolding, Holdings, MethodHolding, SceneHolding
 from pdrom.report.figures.kit.options import Options
 from pdrom.report.words.markup import filled, to_plain, to_rst, to_tex
 
-# Output of the paper's published code, drawn beside ours and never used as our result.
+# Output of the preprint's published code, drawn beside ours and never used as our result.
 PUBLISHED = Path("config/reference/published_code")
 ELEMENTS = "pdrom.report.figures.kit.elements"
+UNNUMBERED = "–"
 
 
 @dataclass(frozen=True)
 class FigureJob:
     """One figure: files that it reads and writes, what is drawn, and how it is presented.
 
-    category, labels : where the report lists it: the paper's figures by number, then this study's
+    category, labels : where the report lists it: the preprint's figures by their number there, then
+        this study's
     rst : title and caption for the report, in which no sign has a meaning
     tex : title and caption for the manuscript
     code : fingerprint of the code that draws it
@@ -47,11 +50,6 @@ class FigureJob:
     tex: str
     code: str
 
-    @property
-    def label(self) -> str:
-        """Number in the paper, if it has one, and name."""
-        return " ".join(self.labels[key] for key in ("figure", "name") if key in self.labels)
-
 
 def figure_jobs(study: Study, results: str) -> dict[str, FigureJob]:
     """Every figure by name, with its paths below the folder ``results``.
@@ -61,13 +59,16 @@ def figure_jobs(study: Study, results: str) -> dict[str, FigureJob]:
     ConfigurationError
         A fault in config/figures.yaml: an unknown figure, key, scene, group or method, or a value
         outside its range.
+    PaperError
+        A section of the manuscript has no file.
     """
     folder = study.root / "config"
     chosen = load_choices(folder / "figures.yaml")
     _check_names(chosen, folder)
     holdings, full = holdings_of(study), is_full(study)
+    numbers = figure_numbers(study.root)
     return {
-        name: _job(name, declared, chosen[name], study, holdings, full, results)
+        name: _job(name, declared, numbers[name], chosen[name], study, holdings, full, results)
         for name, declared in declarations().items()
     }
 
@@ -98,6 +99,7 @@ def holdings_of(study: Study) -> Holdings:
 def _job(
     name: str,
     declared: Declaration,
+    numbers: Numbers,
     options: Options,
     study: Study,
     holdings: Holdings,
@@ -127,18 +129,20 @@ def _job(
         png=FIGURE_PICTURE.at(results, name=name),
         log=f"{results}/logs/figures/{name}.log",
         order=order,
-        category="Figures of this study" if declared.number is None else "Figures of the paper",
-        labels=_labels(name, declared, order.title),
+        category="Figures of this study" if numbers.preprint is None else "Figures of the preprint",
+        labels=_labels(name, numbers, order.title),
         rst=f"**{to_rst(title)}.** {to_rst(caption)}",
         tex=f"{to_tex(title)}. {to_tex(caption)}",
         code=fingerprint("pdrom.report.drawing", *modules(name), *classes),
     )
 
 
-def _labels(name: str, declared: Declaration, title: str) -> dict[str, str]:
-    """Columns of the report."""
-    number = {} if declared.number is None else {"figure": str(declared.number)}
-    return {**number, "name": name, "title": title}
+def _labels(name: str, numbers: Numbers, title: str) -> dict[str, str]:
+    """Columns of the report, which is sorted by the first one."""
+    own = {"main.pdf": str(numbers.manuscript or UNNUMBERED)}
+    if numbers.preprint is None:
+        return {"name": name, **own, "title": title}
+    return {"preprint": str(numbers.preprint), **own, "name": name, "title": title}
 
 
 def _inputs(

@@ -2,9 +2,9 @@
 
 ``python -m pdrom.pipeline.front`` does what the console command ``snakemake`` does, after the
 arguments were completed and the configuration files were checked. ``scene`` as the first argument
-names what is made of one scene, ``figure`` figures by their number in the paper; ``verify``
-compares what was made with what is expected, ``test`` hands the others to pytest, and ``run``
-starts a program of the environment.
+names what is made of one scene, ``figure`` figures by their number in the manuscript or in the
+preprint; ``verify`` compares what was made with what is expected, ``test`` hands the others to
+pytest, and ``run`` starts a program of the environment.
 """
 
 import os
@@ -67,7 +67,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
     made = files_of(command.targets, own) if command.targets else {}
     for target, files in made.items():
         if files != [target]:
-            _say(f"{target}: {', '.join(files)}")
+            _say(f"{_described(target)}: {', '.join(files)}")
     cores = () if command.cores else ("--cores", "all")
     replaced = command.plans or not command.looks_only
     lines = LINES if replaced and not command.own_output else ()
@@ -83,6 +83,13 @@ def files_of(targets: Sequence[str], own: Folders) -> dict[str, list[str]]:
 
     names = Names(list(declarations()), all_tables())
     return {target: names.files(target, own) for target in targets}
+
+
+def _described(target: str) -> str:
+    # late, as above
+    from pdrom.pipeline.figure_command import described
+
+    return described(target)
 
 
 def _say(line: str) -> None:

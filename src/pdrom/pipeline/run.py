@@ -14,13 +14,14 @@ from pdrom.pipeline.commandline import CommandLine, options
 from pdrom.pipeline.dates import settle_dates
 from pdrom.pipeline.failures import Failures, listen
 from pdrom.pipeline.folders import Folders
+from pdrom.pipeline.full import apart
 from pdrom.pipeline.last_run import recall, remember
 from pdrom.pipeline.manifest import write_manifest
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.preview import preview
 from pdrom.pipeline.running import FOLDER, hold, remove_stale_locks
 from pdrom.pipeline.scheduler import cancel_timers
-from pdrom.pipeline.summary import summary
+from pdrom.pipeline.summary import configuration, summary
 from pdrom.pipeline.targets import Rule, known
 from pdrom.pipeline.warm import hold_pipe, start_server
 
@@ -77,6 +78,11 @@ class Run:
                 f"report: this configuration has no {folders.manuscript}; {hint}"
             )
 
+    def title(self, plan: Plan) -> str:
+        """Configuration of this run, and what tells its results from those of the full study."""
+        named, words = configuration(self.command), apart(plan.study)
+        return f"{named} ({words})" if words else named
+
     def start(self, workflow: Any) -> None:
         """Before the first job: the process that jobs are forked from, or a look at the cluster."""
         if workflow.local_exec:
@@ -97,7 +103,8 @@ class Run:
             self._record(plan, folders)
         except PdromError as error:
             say_last(f"pdrom: {error}\n")
-        say_last(summary(self.command, folders, plan.figures, plan.tables.paths))
+        words = apart(plan.study)
+        say_last(summary(self.command, folders, plan.figures, plan.tables.paths, words))
         cancel_timers()
 
     def _record(self, plan: Plan, folders: Folders) -> None:

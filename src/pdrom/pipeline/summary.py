@@ -29,20 +29,25 @@ def processor_seconds() -> float:
 
 
 def summary(
-    command: CommandLine, folders: Folders, figures: Sequence[str], tables: Sequence[str]
+    command: CommandLine,
+    folders: Folders,
+    figures: Sequence[str],
+    tables: Sequence[str],
+    apart: str = "",
 ) -> str:
     """Lines about a run that has ended well.
 
     Parameters
     ----------
     figures, tables : files that the study has when it is complete
+    apart : words that tell its verdicts from those of the full study, if it is another one
     """
     wall = time.time() - psutil.Process().create_time()
-    lines = [f"configuration: {_configuration(command)}"]
+    lines = [f"configuration: {configuration(command)}"]
     if command.targets:
         lines.append(f"made: {', '.join(command.targets)}")
     else:
-        lines += _verdicts(folders)
+        lines += _verdicts(folders, apart)
         lines.append(f"manuscript: {folders.manuscript}")
         for kind, files in (("figures", figures), ("tables", tables)):
             found = sum(Path(file).is_file() for file in files)
@@ -61,12 +66,13 @@ def minutes(seconds: float) -> str:
     return f"{whole // 60} min {whole % 60} s" if whole >= 60 else f"{whole} s"
 
 
-def _configuration(command: CommandLine) -> str:
+def configuration(command: CommandLine) -> str:
+    """Files and settings of a configuration, in one line."""
     names = command.configfiles or ("config/default.yaml",)
     return ", ".join([*names, *command.settings])
 
 
-def _verdicts(folders: Folders) -> list[str]:
+def _verdicts(folders: Folders, apart: str) -> list[str]:
     """All verdicts in one line; none where the table cannot be read."""
     path = paths.TABLE.at(folders.results, name="claims")
     # only looked at: a job sets a damaged one aside
@@ -74,4 +80,5 @@ def _verdicts(folders: Folders) -> list[str]:
         return []
     table = read_table(path, ["claim", "verdict", "verdict_beyond"])
     verdicts = [f"{r.claim} {r.verdict} / {r.verdict_beyond}" for r in table.itertuples()]
-    return [f"verdicts (as published / beyond): {', '.join(verdicts)}"]
+    words = f"as published / beyond; {apart}" if apart else "as published / beyond"
+    return [f"verdicts ({words}): {', '.join(verdicts)}"]

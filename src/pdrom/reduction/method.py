@@ -44,8 +44,8 @@ class MethodSpec(BasisSpec):
     """A reduction of one group's projections.
 
     rows : "all" is the orthogonal projection, "scalar" samples single entries (classical DEIM),
-        "joint" one row for x, y and z with separate coefficients (the paper's variant), "element"
-        all 3p entries of an element
+        "joint" one row for x, y and z with separate coefficients (the preprint's variant),
+        "element" all 3p entries of an element
     selection : name in `SELECTIONS`, such as "greedy" (the residual, DEIM)
     solve : of the sampled equations: "square", least squares by "qr", or normal equations with
         Tikhonov term ("tikhonov", the published code)

@@ -12,6 +12,7 @@ import yaml
 
 from pdrom.core.paths import FIGURE, RESULTS, TABLE
 from pdrom.core.yamlfile import read_yaml
+from pdrom.report.figure_numbers import Numbers, figure_numbers
 from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.words.markup import to_plain
 from pdrom.tables.declaration import Table
@@ -30,10 +31,9 @@ def codecheck(tables: Iterable[Table[Any]]) -> str:
     title = _TITLE.search(Path("paper/main.tex").read_text(encoding="utf-8"))
     assert title, "the manuscript has no title"
     authors = [{"name": each["name"]} for each in read_yaml(Path("CITATION.cff"))["authors"]]
+    numbers = figure_numbers(Path())
     figures = [
-        _entry(
-            FIGURE.at(RESULTS, name=name), f"Figure {_label(name, declared.number)}", declared.title
-        )
+        _entry(FIGURE.at(RESULTS, name=name), _label(name, numbers[name]), declared.title)
         for name, declared in declarations().items()
     ]
     made = [_entry(TABLE.at(RESULTS, name=t.name), f"Table {t.name}", t.title) for t in tables]
@@ -55,5 +55,5 @@ def _entry(file: str, label: str, title: str) -> dict[str, str]:
     return {"file": file, "comment": f"{label}: {to_plain(title)}"}
 
 
-def _label(name: str, number: int | None) -> str:
-    return f"{number} of the paper, {name}" if number else name
+def _label(name: str, numbers: Numbers) -> str:
+    return f"Figure {name} ({numbers.words})" if numbers.words else f"Figure {name}"

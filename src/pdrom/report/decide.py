@@ -1,4 +1,4 @@
-"""Table claims: the verdicts on the paper's claims, with the rules of config/claims.yaml."""
+"""Table claims: the verdicts on the preprint's claims, with the rules of config/claims.yaml."""
 
 from pathlib import Path
 
@@ -16,19 +16,19 @@ def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
 
 
 @declare(
-    title="Verdicts on the claims of the paper",
+    title="Verdicts on the claims of the preprint",
     columns=(
         text("claim", "its identifier in config/claims.yaml"),
         text("source", "who claims it"),
-        text("paper", "what the paper says"),
+        text("paper", "what the preprint says"),
         compared(
             "told", timed(text("measured", "range of what was measured, of the tests that decide"))
         ),
         compared("verdict", timed(text("verdict", f"as published, one of: {', '.join(VERDICTS)}"))),
         compared("told", timed(text("why", "all tests in words"))),
         text("figure_or_table", "where to see it"),
-        text("section", "section of the paper"),
-        text("shown", "figures of the paper"),
+        text("section", "section of the preprint"),
+        text("shown", "figures of the preprint"),
         text("text", "the claim in our words"),
         text("qualifiers", "what a fair test has to keep"),
         compared("told", timed(text("condition", "what the verdict depends on"))),

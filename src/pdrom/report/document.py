@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 from pdrom.core.reads import Chosen, Every, Published, Setting, TableOf
+from pdrom.report.figure_numbers import figure_numbers
 from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.figures.kit.declaration import Declaration, FigureRead
 from pdrom.report.words.markup import to_plain
@@ -15,16 +16,19 @@ HEAD = """\
 Made from the declarations in `src/pdrom/report/figures` by
 `.venv/bin/python -m pdrom.report.document`; a test compares the two.
 
-A figure is drawn to `results/figures/NAME.pdf` and `.png`. What it shows is chosen in
+A figure is drawn to `results/figures/NAME.pdf` and `.png` by `./reproduce figure NAME`; in place of
+the name stands its number in `main.pdf`, as in `figure 10`, or that of the figure of the preprint
+which it rebuilds, as in `figure preprint:8`. What it shows is chosen in
 `config/figures.yaml`, by the keys given here.
 """
 
 
-def figures_page() -> str:
-    """docs/figures.md."""
+def figures_page(root: Path = Path()) -> str:
+    """docs/figures.md, with numbers by the manuscript below ``root``."""
     parts = [HEAD]
+    numbers = figure_numbers(root)
     for name, figure in declarations().items():
-        number = f" (figure {figure.number} of the paper)" if figure.number else ""
+        number = f" ({numbers[name].words})" if numbers[name].words else ""
         keys = ", ".join(f"`{key}`" for key in figure.options.model_fields)
         reads = ", ".join(dict.fromkeys(_words(read) for read in figure.reads))
         parts.append(

@@ -6,6 +6,8 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.pipeline.commandline import CommandLine
 from pdrom.pipeline.front import LINES, OPTIONS, completed
 from pdrom.pipeline.last_run import RECORD, recall, remember
+from pdrom.report.figure_numbers import figure_numbers
+from places import ROOT
 
 
 @pytest.fixture(autouse=True)
@@ -15,6 +17,7 @@ def project(tmp_path, monkeypatch):
     (tmp_path / "my.yaml").write_text("ranks: [3]\n")
     (tmp_path / "config").mkdir()
     (tmp_path / "config" / "figures.yaml").write_text("scaling: {}\n")
+    (tmp_path / "paper").symlink_to(ROOT / "paper")
 
 
 def test_options_are_added_and_cores_unless_given():
@@ -36,20 +39,28 @@ def test_names_become_files_and_it_is_said(capsys):
     assert capsys.readouterr().err == f"reproduce: scaling: {', '.join(made)}\n"
 
 
-@pytest.mark.parametrize("asked", ["8", "reconstruction_error"])
-def test_a_figure_has_its_number_or_its_name(asked, capsys):
+@pytest.mark.parametrize("asked", ["main.pdf", "preprint:8", "reconstruction_error"])
+def test_a_figure_has_two_numbers_and_a_name(asked, capsys):
+    number = figure_numbers(ROOT)["reconstruction_error"].manuscript
+    word = str(number) if asked == "main.pdf" else asked
     made = "results/figures/reconstruction_error.pdf"
-    assert completed(["figure", asked, "-n"]) == [
+    assert completed(["figure", word, "-n"]) == [
         "-n", "--cores", "all", *LINES, *OPTIONS, "--", made,
     ]  # fmt: skip
-    assert capsys.readouterr().err == f"reproduce: figure reconstruction_error: {made}\n"
+    numbers = f"figure {number} of main.pdf, figure 8 of the preprint"
+    said = f"reproduce: figure reconstruction_error ({numbers}): {made}\n"
+    assert capsys.readouterr().err == said
 
 
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
-        ([], r"figure: its number or name is missing \(allowed: 1, .*9, snapshots_and_modes"),
-        (["10"], r"figure 10: there is none \(allowed: 1, 2, 3,"),
+        (
+            [],
+            r"figure: its number or name is missing \(allowed: 1, .*, preprint:1, .*, ladder",
+        ),
+        (["99"], r"figure 99: there is none \(allowed: 1, 2, 3,"),
+        (["preprint:10"], r"figure preprint:10: there is none \(allowed: 1, 2, 3,"),
         (["strain_run"], "figure strain_run: .*did you mean 'strain_runs'"),
     ],
 )

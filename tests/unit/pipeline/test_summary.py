@@ -8,9 +8,13 @@ import pandas as pd
 import pytest
 
 from pdrom.core.store import write_table
+from pdrom.core.yamlfile import read_yaml
 from pdrom.pipeline.commandline import CommandLine
 from pdrom.pipeline.folders import Folders
+from pdrom.pipeline.full import apart
+from pdrom.pipeline.study import Study
 from pdrom.pipeline.summary import minutes, processor_seconds, summary
+from places import ROOT
 
 FIGURES = ("results/figures/a.pdf", "results/figures/b.pdf")
 TABLES = ("results/tables/claims.csv",)
@@ -28,8 +32,8 @@ def project(tmp_path, monkeypatch):
     write_table(claims, TABLES[0])
 
 
-def lines(*arguments: str) -> dict[str, str]:
-    text = summary(CommandLine.parse(arguments), Folders(), FIGURES, TABLES)
+def lines(*arguments: str, words: str = "") -> dict[str, str]:
+    text = summary(CommandLine.parse(arguments), Folders(), FIGURES, TABLES, words)
     assert text.endswith("\n")
     said = [line.removeprefix("pdrom: ") for line in text.splitlines()]
     return dict(line.split(": ", 1) for line in said)
@@ -44,6 +48,27 @@ def test_a_whole_study():
     assert said["tables"] == "1 in results/tables"
     assert said["report"] == "./reproduce --report report.html"
     assert "of processor time" in said["time"]
+
+
+def test_verdicts_of_another_study_are_told_from_those_of_the_full_one():
+    words = "of coarse meshes, not those of the study"
+    said = lines("--configfile", "my.yaml", words=words)
+    assert said[f"verdicts (as published / beyond; {words})"].startswith("C1 holds")
+
+
+@pytest.mark.parametrize(
+    ("config", "words"),
+    [
+        ({}, ""),
+        ({"coarsen": {"resolution": 0.4}}, "of coarse meshes, not"),
+        ({"coarsen": {"resolution": 0.4, "frames": 0.5}}, "of coarse meshes and short runs, not"),
+        ({"ranks": [3]}, "of this configuration, not those of the study"),
+    ],
+)
+def test_a_study_says_how_it_differs_from_the_full_one(config, words):
+    found = apart(Study.load({**read_yaml(ROOT / "config" / "default.yaml"), **config}, ROOT))
+    assert found.startswith(words)
+    assert bool(found) == bool(words)
 
 
 def test_single_files():

@@ -21,7 +21,7 @@ class Poke(Boundary):
     """Moves a vertex 0 -> -z -> +z -> -z -> 0, lets go, and goes on to the next.
 
     The vertices follow farthest-point sampling from the centre, without those of ``avoid``. The
-    paper gives no speeds: amplitude, frames and order are this study's choice.
+    preprint gives no speeds: amplitude, frames and order are this study's choice.
     """
 
     class Config(EffectConfig):

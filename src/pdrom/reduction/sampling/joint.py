@@ -1,4 +1,4 @@
-"""The paper's variant of DEIM: one row for x, y and z by the joint residual norm."""
+"""The preprint's variant of DEIM: one row for x, y and z by the joint residual norm."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Verdicts on the paper's claims, by rules of config/claims.yaml that code evaluates.
+"""Verdicts on the preprint's claims, by rules of config/claims.yaml that code evaluates.
 
 A claim is decided twice, as published and beyond, each time by tests: a metric over chosen rows of
 the tables, compared with a threshold. Tests marked ``decides`` give the verdict, the others stand

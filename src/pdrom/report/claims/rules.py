@@ -1,4 +1,4 @@
-"""Rules of config/claims.yaml: each claim of the paper with the tests that decide it, twice."""
+"""Rules of config/claims.yaml: each claim of the preprint with the tests that decide it, twice."""
 
 import datetime
 import hashlib
@@ -75,13 +75,13 @@ class Change(_Model):
 
 
 class ClaimRule(_Model):
-    """A claim of the paper, where it stands, and the tests that decide it.
+    """A claim of the preprint, where it stands, and the tests that decide it.
 
     text : the claim in our words
-    paper : what the paper says, in a few words
-    section, shown : section and figures of the paper
+    paper : what the preprint says, in a few words
+    section, shown : section and figures of the preprint
     qualifiers : what a fair test has to keep
-    published : tests on the paper's own variants and scenes
+    published : tests on the preprint's own variants and scenes
     beyond : tests on sound variants and well-posed scenes
     changes : history of the rules, oldest first
     """

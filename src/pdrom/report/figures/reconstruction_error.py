@@ -1,4 +1,4 @@
-"""Reconstruction error of snapshots against the basis size, on the paper's scenes."""
+"""Reconstruction error of snapshots against the basis size, on the preprint's scenes."""
 
 from pdrom.core.reads import Published, TableOf
 from pdrom.report.figures.kit.declaration import Declaration

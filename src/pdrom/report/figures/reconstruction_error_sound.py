@@ -12,7 +12,7 @@ class Options(Experiments, Methods, Splits, Columns, Beside):
 FIGURE = Declaration(
     title="Reconstruction error of the well-posed scenes",
     caption=(
-        "As the figure for the paper's scenes, for scenes whose motion is not decided by round- "
+        "As the figure for the preprint's scenes, for scenes whose motion is not decided by round- "
         "off: horizontal sheets held on one side, and a sheet with a curved rest shape."
     ),
     reads=(

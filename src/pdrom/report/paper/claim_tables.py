@@ -1,4 +1,4 @@
-"""Tables of the manuscript about the claims of the paper, as TeX."""
+"""Tables of the manuscript about the claims of the preprint, as TeX."""
 
 from collections.abc import Mapping
 from typing import Any

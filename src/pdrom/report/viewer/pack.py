@@ -11,6 +11,7 @@ import numpy as np
 from pdrom.model.effects.base import EffectConfig
 from pdrom.model.mesh.types import Mesh
 from pdrom.report.viewer.runs import ViewedRun, ViewedScene
+from pdrom.report.viewer.view import view_of
 
 FRAMES = 75  # stored of a run, at most
 ROOM = 0.2  # around a run, of its longest side
@@ -31,6 +32,7 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
         "timeStep": scene.time_step,
         "stride": stride,
         "full": pack_positions(full),
+        "view": view_of(scene.effects),
         "ranges": np.stack([low, high], axis=1).tolist(),
         "bodies": [_pack_body(body) for body in bodies if body is not None],
         "ms": scene.ms,

@@ -43,8 +43,10 @@ def page(packed: Sequence[dict]) -> str:
         "STYLE": _own("viewer.css"),
         "LIBRARY": get_plotlyjs(),
         "SCRIPT": _own("viewer.js"),
-        # no text ends the element that holds it
-        "SCENES": json.dumps(packed, separators=(",", ":"), allow_nan=False).replace("</", "<\\/"),
+        # no text ends the element that holds it, or opens a comment in which its end is none
+        "SCENES": json.dumps(packed, separators=(",", ":"), allow_nan=False).replace(
+            "<", "\\u003c"
+        ),
     }
     before, *rest = _own("viewer.html").split("{{")
     pieces = [before]

@@ -2,7 +2,7 @@
 // The page's own script: choices, frames, playing. Plotly draws; its licence stands above its code.
 (async () => {
   const GREY = "#b9b4a7", WIRE = "#55524a", BLUE = "#0072b2", OBSTACLE = "#7a6a9a", RED = "#b3261e";
-  const FLOOR = 1e-7; // smaller errors are drawn on the axis
+  const LOWEST = 1e-12, HIGHEST = 1e6; // errors outside are drawn on the rim, whatever the axis
   const at = (id) => document.getElementById(id);
   const scenes = JSON.parse(at("scenes").textContent);
   const unpacked = new WeakMap();
@@ -58,18 +58,21 @@
     return [scene, ofMethod.find((run) => String(run.r) === at("r").value) || null];
   }
 
-  function space(ranges, domain, camera) {
+  function space(ranges, domain, camera, uirevision) {
     const axis = (range) => ({ range, visible: false });
     const [x, y, z] = ranges.map(axis);
-    return { xaxis: x, yaxis: y, zaxis: z, domain, camera, aspectmode: "cube", uirevision: "camera" };
+    return { xaxis: x, yaxis: y, zaxis: z, domain, camera, aspectmode: "cube", uirevision };
   }
 
-  const CAMERA = { up: { x: 0, y: 1, z: 0 }, eye: { x: 0.85, y: 0.55, z: 1.45 } };
+  const vector = ([x, y, z]) => ({ x, y, z });
 
+  // Plotly's light goes with the camera: from the upper left, near enough to reach faces seen from the front. Ambient
+  // and diffuse add up to one: more is cut off, and every face looks the same.
   function surface(name, xyz, faces, scene, look) {
     const [x, y, z] = xyz;
     return { type: "mesh3d", name, x, y, z, ...faces, scene, flatshading: true, hoverinfo: "skip",
-      lighting: { ambient: 0.55, diffuse: 0.7, specular: 0.05 }, ...look };
+      lighting: { ambient: 0.2, diffuse: 0.8, specular: 0, fresnel: 0 },
+      lightposition: { x: -1500, y: 1000, z: 0 }, ...look };
   }
 
   // Edges (a, b, a, b, ...) of a surface, each once.
@@ -140,15 +143,18 @@
 
   async function drawShapes() {
     const k = Number(at("frame").value), beside = shown.reduced && !above();
-    const old = at("shapes").layout, camera = (old && old.scene && old.scene.camera) || CAMERA;
+    const { up, eye } = shown.scene.view, own = { up: vector(up), eye: vector(eye) };
+    const old = at("shapes").layout, revision = `camera ${up}`; // scenes with one up share the camera
+    const camera = old && old.uirevision === revision ? old.scene.camera : own;
     const traces = [above() ? wires("full order", lines(full(k), shown.edges))
       : surface("full order", full(k), shown.faces, "scene", { color: GREY })];
     if (shown.reduced) {
       const size = Math.max(...shown.scene.ranges.map((range) => range[1] - range[0])) / 1.4;
-      const colour = at("colour").checked
-        ? { intensity: distance(reduced(k), full(k)), cmin: 0, cmax: 0.1 * size, colorscale: "Viridis",
-          colorbar: { title: { text: "distance, m" }, thickness: 12, len: 0.6 } }
-        : { color: BLUE };
+      // intensity in any case: a surface that once had one keeps it, whatever its colour
+      const scale = at("colour").checked ? { colorscale: "Viridis" }
+        : { colorscale: [[0, BLUE], [1, BLUE]], showscale: false };
+      const colour = { intensity: distance(reduced(k), full(k)), cmin: 0, cmax: 0.1 * size,
+        colorbar: { title: { text: "distance, m" }, thickness: 12, len: 0.6 }, ...scale };
       traces.push(surface("reduced", reduced(k), shown.faces, beside ? "scene2" : "scene", colour));
     }
     const sides = beside ? ["scene", "scene2"] : ["scene"];
@@ -157,34 +163,52 @@
       traces.push(surface("obstacle", points, faces, side, { color: OBSTACLE, opacity: 0.3, flatshading }));
     }
     const note = (text, x) => ({ text, x, y: 1, xref: "paper", yref: "paper", showarrow: false, font: { size: 14 } });
-    const layout = { margin: { l: 0, r: 0, t: 24, b: 0 }, uirevision: "camera",
-      scene: space(shown.scene.ranges, { x: [0, beside ? 0.48 : 0.95], y: [0, 1] }, camera),
+    const layout = { margin: { l: 0, r: 0, t: 24, b: 0 }, uirevision: revision,
+      scene: space(shown.scene.ranges, { x: [0, beside ? 0.48 : 0.95], y: [0, 1] }, camera, revision),
       annotations: beside ? [note("full order", 0.2), note("reduced", 0.7)]
         : [note(shown.reduced ? "full order (wires) and reduced" : "full order", 0.45)] };
-    if (beside) layout.scene2 = space(shown.scene.ranges, { x: [0.48, 0.95], y: [0, 1] }, camera);
+    if (beside) layout.scene2 = space(shown.scene.ranges, { x: [0.48, 0.95], y: [0, 1] }, camera, revision);
     await Plotly.react(at("shapes"), traces, layout, { displaylogo: false, responsive: true });
   }
 
   const time = (frame) => frame * shown.scene.timeStep;
-  const clipped = (error) => (error === null ? null : Math.max(error, FLOOR));
+  const clipped = (error) => (error === null ? null : Math.min(Math.max(error, LOWEST), HIGHEST));
+
+  // Decades of the axis: those of the scene's errors and of its floor, for all its runs the same ones.
+  function decades(scene) {
+    const values = [scene.floor, ...scene.runs.map((run) => run.error)].flat().filter((error) => error > 0).map(clipped);
+    if (!values.length) return [-2, 0];
+    const least = values.reduce((a, b) => Math.min(a, b)), most = values.reduce((a, b) => Math.max(a, b));
+    const low = Math.floor(Math.log10(least)), high = Math.ceil(Math.log10(most));
+    return [low, Math.max(high, low + 1)];
+  }
+
+  // Largest and last error of a run, in words.
+  function told(run) {
+    const known = run.error.flatMap((error, f) => (error === null ? [] : [[error, f + 1]]));
+    if (!known.length) return "no frame has a relative error";
+    const [largest, when] = known.reduce((a, b) => (b[0] > a[0] ? b : a)), [last, end] = known[known.length - 1];
+    return `largest ${largest.toPrecision(2)} (frame ${when}), last ${last.toPrecision(2)} (frame ${end})`;
+  }
 
   async function drawErrors() {
-    const { scene, run } = shown;
+    const { scene, run } = shown, [low, high] = decades(scene);
     const series = (values) => ({ x: values.map((_, f) => time(f + 1)), y: values.map(clipped) });
     const traces = [];
     if (scene.floor.length) traces.push({ ...series(scene.floor), name: "sensitivity floor", fill: "tozeroy",
       mode: "lines", line: { color: "#c9c4b8" } });
     if (run) traces.push({ ...series(run.error), name: "relative error", mode: "lines", line: { color: BLUE } });
-    traces.push({ x: [0, 0], y: [FLOOR, 1e3], name: "now", mode: "lines", line: { color: "#222", width: 1 } });
+    traces.push({ x: [0, 0], y: [10 ** low, 10 ** high], name: "now", mode: "lines", line: { color: "#222", width: 1 } });
     const shapes = scene.horizon === null ? [] : [{ type: "line", x0: time(scene.horizon), x1: time(scene.horizon),
       yref: "paper", y0: 0, y1: 1, line: { dash: "dot", color: RED } }];
     await Plotly.react(at("errors"), traces, { margin: { l: 60, r: 10, t: 24, b: 40 }, shapes,
       legend: { orientation: "h", y: -0.18 }, xaxis: { title: { text: "time, s" }, range: [0, time((shown.full.length - 1) * scene.stride)] },
-      yaxis: { type: "log", range: [-7, 3], title: { text: "relative error" }, exponentformat: "power" } },
+      yaxis: { type: "log", range: [low, high], dtick: Math.max(1, Math.ceil((high - low) / 10)), title: { text: "relative error" }, exponentformat: "power" } },
       { displaylogo: false, responsive: true });
     const ms = (value) => (value === null ? "not timed" : `${value.toPrecision(3)} ms a frame`);
     const parts = [`${scene.title}.`, `Full order: ${ms(scene.ms)}.`];
     if (run) parts.push(`Reduced: ${ms(run.ms)}.`);
+    if (run) parts.push(`Relative error: distance of the two runs over the full order's motion (its distance from the start, root mean square over the frames); ${told(run)}.`);
     if (run && run.blowup !== null) parts.push(`The reduced run blew up at frame ${run.blowup}.`);
     parts.push(!scene.floor.length ? "Sensitivity floor and horizon are not known here."
       : scene.horizon === null ? "The floor stays below the threshold: the whole run can be judged."
@@ -197,7 +221,7 @@
     const first = above() ? lines(full(k), shown.edges) : full(k);
     const runs = shown.reduced ? [first, reduced(k)] : [first];
     const change = { x: runs.map((r) => r[0]), y: runs.map((r) => r[1]), z: runs.map((r) => r[2]) };
-    if (shown.reduced && at("colour").checked) change.intensity = [undefined, distance(reduced(k), full(k))];
+    if (shown.reduced) change.intensity = [undefined, distance(reduced(k), full(k))];
     await Plotly.restyle(at("shapes"), change, runs.map((_, i) => i));
     const line = at("errors").data.length - 1;
     await Plotly.restyle(at("errors"), { x: [[time(frame), time(frame)]] }, [line]);

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pdrom.core.paths import FIGURE, RESULTS, TABLE
+from pdrom.pipeline.figure_command import PREPRINT
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.tables import all_tables
 from pdrom.report.claims import load_claims
@@ -45,7 +46,7 @@ class Entry:
 
 
 def entries(root: Path = Path()) -> list[Entry]:
-    """Claims, figures (those of the paper first), tables, sections and the manuscript."""
+    """Claims, figures (those of the preprint first), tables, sections and the manuscript."""
     return [*_claims(root), *_figures(), *_tables(), *_sections(root), _manuscript()]
 
 
@@ -77,7 +78,7 @@ def _figures() -> Iterator[Entry]:
             title=to_plain(figure.title),
             rule=f"figure_{name}",
             files=(FIGURE.at(RESULTS, name=name),),
-            words=("figure", str(figure.number or name)),
+            words=("figure", f"{PREPRINT}{figure.number}" if figure.number else name),
         )
 
 

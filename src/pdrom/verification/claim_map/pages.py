@@ -17,6 +17,7 @@ from pdrom.core.paths import RESULTS
 from pdrom.core.store import read_table
 from pdrom.pipeline.tables import all_tables
 from pdrom.pipeline.tracked import write_tracked
+from pdrom.report.figure_numbers import Numbers, figure_numbers
 from pdrom.verification.claim_map.entries import Entry, entries
 from pdrom.verification.claim_map.measured import COLUMNS
 from pdrom.verification.references import tolerances_paths
@@ -47,7 +48,7 @@ whole study writes a map of its own, `results/claim_map.csv` (other configuratio
   Jobs share the cores, but for those that take times, which run alone.
 * **alone**: processor time of the last job, when all that it reads is there.
 * **memory**: the largest resident memory of one of these jobs, MB. **disk**: what they write, MB.
-* A dash: that run did not measure it.
+* A dash: that run did not measure it, or a figure does not stand there.
 * **tolerance**: how exactly `./reproduce verify` expects a table ([how](verification.md)). A figure
   is reproduced when the tables that it reads are, a claim when its verdict is the same.
 * The rule is `figure_NAME` for a figure, `NAME_table` for a table, `paper` for the manuscript; a
@@ -57,12 +58,12 @@ whole study writes a map of its own, `results/claim_map.csv` (other configuratio
 
 def pages(root: Path, measured: Measured) -> dict[Path, str]:
     """Text of both pages by their place below ``root``."""
-    listed = entries(root)
+    listed, numbers = entries(root), figure_numbers(root)
     tolerances = load_tolerances(tolerances_paths(RESULTS, root))
     readme = (root / README).read_text(encoding="utf-8")
     return {
-        PAGE: _page(listed, measured, tolerances),
-        README: SECTION.sub(rf"\g<1>{_short(listed, measured)}\g<2>", readme),
+        PAGE: _page(listed, numbers, measured, tolerances),
+        README: SECTION.sub(rf"\g<1>{_short(listed, numbers, measured)}\g<2>", readme),
     }
 
 
@@ -74,7 +75,12 @@ def load(root: Path) -> Measured:
     return {(row["kind"], row["name"]): row for row in table.to_dict("records")}
 
 
-def _page(listed: list[Entry], measured: Measured, tolerances: Tolerances) -> str:
+def _page(
+    listed: list[Entry],
+    numbers: Mapping[str, Numbers],
+    measured: Measured,
+    tolerances: Tolerances,
+) -> str:
     def section(kind: str, head: str, row: Callable[[Entry, Row], Iterable[str]]) -> str:
         lines = [row(entry, measured.get(entry.key, {})) for entry in listed if entry.kind == kind]
         return _table(head, lines)
@@ -86,14 +92,19 @@ def _page(listed: list[Entry], measured: Measured, tolerances: Tolerances) -> st
         "their own below.\n",
         section(
             "claim",
-            "| claim | the paper | as published | beyond | seen in, rests on |",
+            "| claim | the preprint | as published | beyond | seen in, rests on |",
             lambda e, row: (e.name, e.title, *_verdicts(row), _names(e.rests_on)),
         ),
         "## Figures\n",
         section(
             "figure",
-            f"| figure | command | {COSTS} |",
-            lambda e, row: (f"[{e.name}](figures.md)", _command(e), *_costs(row)),
+            f"| figure | main.pdf | preprint | command | {COSTS} |",
+            lambda e, row: (
+                f"[{e.name}](figures.md)",
+                *_places(numbers[e.name]),
+                _command(e),
+                *_costs(row),
+            ),
         ),
         "## Tables\n",
         section(
@@ -126,8 +137,8 @@ def _page(listed: list[Entry], measured: Measured, tolerances: Tolerances) -> st
 COSTS = "minutes | alone | memory | disk"
 
 
-def _short(listed: list[Entry], measured: Measured) -> str:
-    """Claims and the paper's figures, each with one command."""
+def _short(listed: list[Entry], numbers: Mapping[str, Numbers], measured: Measured) -> str:
+    """Claims and the preprint's figures, each with one command."""
     by_name = {e.name: e for e in reversed(listed) if e.kind in ("figure", "table")}
     claims = [e for e in listed if e.kind == "claim"]
     shown = {e.rests_on[0] for e in claims}
@@ -139,11 +150,10 @@ def _short(listed: list[Entry], measured: Measured) -> str:
         )
         for e in claims
     ]
-    numbered = [e for e in listed if e.kind == "figure" and e.words[1].isdigit()]
     lines += [
-        (f"Figure {e.words[1]}: {e.title}", "", "", *_seen(e, measured))
-        for e in numbered
-        if e.name not in shown
+        (f"{e.title} ({numbers[e.name].words})", "", "", *_seen(e, measured))
+        for e in listed
+        if e.kind == "figure" and numbers[e.name].preprint and e.name not in shown
     ]
     return _table("| claim or figure | as published | beyond | command | minutes |", lines)
 
@@ -157,6 +167,10 @@ def _origin(measured: Measured) -> str:
     if not rows:
         return "Nothing was measured yet."
     return f"Measured by the run of `{rows[0]['configuration']}` on {rows[0]['machine']}."
+
+
+def _places(numbers: Numbers) -> tuple[str, str]:
+    return str(numbers.manuscript or UNKNOWN), str(numbers.preprint or UNKNOWN)
 
 
 def _command(entry: Entry) -> str:

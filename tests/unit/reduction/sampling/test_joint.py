@@ -1,4 +1,4 @@
-"""The paper's joint selection: against the definition, and where an axis system is singular."""
+"""The preprint's joint selection: against the definition, and where an axis system is singular."""
 
 import numpy as np
 import pytest

@@ -27,6 +27,7 @@ from pdrom.report.viewer.pack import (
 )
 from pdrom.report.viewer.page import write_page
 from pdrom.report.viewer.runs import ViewedRun, ViewedScene
+from pdrom.report.viewer.view import EYE, Y, rotation_to
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 # software rendering, so that a machine without a graphics card draws, too
@@ -73,8 +74,8 @@ def viewed(
     far = ViewedRun("spring", "far", 6, bent[: half + 1], error[:half], half, None)
     floor = np.geomspace(1e-9, 1e-2, frames)
     return ViewedScene(
-        name, "A <sheet> </script>", mesh, 0.02, full, 1.0, floor, 9, (near, far)[:runs],
-        tuple(effect_config(entry, i) for i, entry in enumerate(effects)),
+        name, "A <sheet> <!--<script> </script>", mesh, 0.02, full, 1.0, floor, 9,
+        (near, far)[:runs], tuple(effect_config(entry, i) for i, entry in enumerate(effects)),
     )  # fmt: skip
 
 
@@ -133,6 +134,38 @@ def test_the_page_keeps_the_licence_and_no_title_ends_its_script(tmp_path):
     text = (tmp_path / "x.html").read_text("utf-8")
     assert "Licensed under the MIT license" in text
     assert text.count("</script>") == 3
+    # neither the element's end nor what hides it from a browser: a comment in which a script begins
+    data = text.split('<script id="scenes" type="application/json">')[1].split("</script>")[0]
+    assert "<" not in data
+    assert json.loads(data)[0]["title"] == viewed().title
+
+
+@pytest.mark.parametrize(
+    ("pulls", "up"),
+    [
+        ([], [0.0, 1.0, 0.0]),
+        ([[0.0, -9.81, 0.0]], [0.0, 1.0, 0.0]),
+        ([[0.0, 0.0, -9.81]], [0.0, 0.0, 1.0]),
+        ([[0.0, 9.81, 0.0]], [0.0, -1.0, 0.0]),
+        ([[0.0, -3.0, 0.0], [4.0, 0.0, 0.0]], [-0.8, 0.6, 0.0]),
+        ([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]], [0.0, 1.0, 0.0]),
+    ],
+)
+def test_up_is_against_gravity_and_the_eye_turns_with_it(pulls, up):
+    effects = [{"effect": "gravity", "acceleration": pull} for pull in pulls]
+    view = pack_scene(viewed(effects=effects))["view"]
+    assert view["up"] == pytest.approx(up)
+    assert np.linalg.norm(view["eye"]) == pytest.approx(np.linalg.norm(EYE))
+    assert np.dot(view["eye"], up) == pytest.approx(EYE @ Y)
+
+
+@given(st.tuples(*3 * [st.floats(-1.0, 1.0)]).filter(lambda v: np.linalg.norm(v) > 0.1))
+def test_the_rotation_takes_y_there_and_mirrors_nothing(direction):
+    up = np.array(direction) / np.linalg.norm(direction)
+    found = rotation_to(up)
+    assert found @ Y == pytest.approx(up, abs=1e-9)
+    assert found.T @ found == pytest.approx(np.eye(3), abs=1e-6)
+    assert np.linalg.det(found) == pytest.approx(1.0)
 
 
 @pytest.fixture(scope="module")
@@ -142,7 +175,13 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     if program is None:
         pytest.skip(f"no browser on this machine ({', '.join(BROWSERS)})")
     path = tmp_path_factory.mktemp("viewer") / "index.html"
-    scenes = [viewed(), viewed("other", runs=0), viewed("obstacles", effects=OBSTACLES)]
+    sideways = [{"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]}]
+    scenes = [
+        viewed(),
+        viewed("other", runs=0),
+        viewed("obstacles", effects=OBSTACLES),
+        viewed("sideways", effects=sideways),
+    ]
     write_page(scenes, path)
     with sync_playwright() as play:
         browser = play.chromium.launch(executable_path=program, args=OPTIONS)
@@ -216,7 +255,48 @@ def test_views_and_scenes_are_chosen(opened: Page) -> None:
     assert differ(beside, picture(shapes))
     choose(opened, scene="other", view="side by side")
     assert opened.locator("#method").is_disabled()
-    assert "A <sheet> </script>" in opened.inner_text("#about")
+    assert "A <sheet> <!--<script> </script>" in opened.inner_text("#about")
+
+
+@pytest.mark.slow
+def test_folds_are_seen_and_the_colour_of_distances_can_be_left_out(opened: Page) -> None:
+    """Lit: the grey sheet, bent as it is, has clearly lighter and darker faces."""
+    choose(opened, scene="sheet", method="far", view="side by side")
+    go_to(opened, 6)
+    shapes = picture(opened.locator("#shapes"))
+    red, _, blue = np.moveaxis(shapes, 2, 0)
+    grey = shapes[(red - blue > 8) & (red - blue < 30) & (red < 230)].mean(axis=1)
+    assert len(grey) > 1000
+    assert np.ptp(np.percentile(grey, [2, 98])) > 8
+    opened.uncheck("#colour")
+    ready(opened)
+    without = picture(opened.locator("#shapes"))
+    opened.check("#colour")
+    ready(opened)
+    blueish = (without[..., 2] - without[..., 0] > 40) & (without[..., 1] - without[..., 0] > 20)
+    assert differ(shapes, without)
+    assert blueish.sum() > 1000
+    yellow = (shapes[..., 0] - shapes[..., 2] > 80).sum()
+    assert yellow > 10 * (without[..., 0] - without[..., 2] > 80).sum(), "one colour alone"
+
+
+@pytest.mark.slow
+def test_the_axis_of_errors_fits_them_and_they_are_explained(opened: Page) -> None:
+    choose(opened, scene="sheet", method="near")
+    shown = opened.evaluate("document.getElementById('errors').layout.yaxis.range")
+    assert shown == [-9, 0]  # the floor begins at 1e-9, the largest error is 1
+    assert "over the full order's motion" in opened.inner_text("#about")
+    assert "largest 1.0 (frame 12), last 1.0 (frame 12)" in opened.inner_text("#about")
+
+
+@pytest.mark.slow
+def test_a_scene_with_another_gravity_is_seen_from_another_side(opened: Page) -> None:
+    choose(opened, scene="sideways", method="near")
+    up = opened.evaluate("document.getElementById('shapes').layout.scene.camera.up")
+    assert up == {"x": 0, "y": 0, "z": 1}
+    choose(opened, scene="sheet", method="near")
+    up = opened.evaluate("document.getElementById('shapes').layout.scene.camera.up")
+    assert up == {"x": 0, "y": 1, "z": 0}
 
 
 @pytest.mark.slow

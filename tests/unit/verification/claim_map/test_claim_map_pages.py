@@ -46,12 +46,12 @@ def test_every_section_with_numbers_has_a_line():
     }
 
 
-def test_the_readme_names_a_command_for_every_claim_and_every_figure_of_the_paper():
+def test_the_readme_names_a_command_for_every_claim_and_every_figure_of_the_preprint():
     text = pages(ROOT, {})[README]
     for name in load_claims(CONFIG / "claims.yaml"):
-        assert re.search(rf"^\| {name}: .*`\./reproduce [a-z_0-9 ]+` \|", text, re.MULTILINE), name
+        assert re.search(rf"^\| {name}: .*`\./reproduce [a-z_0-9 :]+` \|", text, re.MULTILINE), name
     for figure in declarations().values():
-        assert figure.number is None or f"`./reproduce figure {figure.number}`" in text
+        assert figure.number is None or f"`./reproduce figure preprint:{figure.number}`" in text
 
 
 def test_a_measurement_is_taken_over(tmp_path, monkeypatch):
@@ -75,9 +75,11 @@ def test_a_measurement_is_taken_over(tmp_path, monkeypatch):
     main(["map.csv"])
     readme, page = (tmp_path / "README.md").read_text(), (tmp_path / PAGE).read_text()
     assert re.search(
-        r"^\| C5: .* \| holds \| does not hold \| `./reproduce figure 7` \| 12 \|$", readme, re.M
+        r"^\| C5: .* \| holds \| does not hold \| `./reproduce figure preprint:7` \| 12 \|$",
+        readme,
+        re.M,
     )
-    assert "| `./reproduce figure 7` | 12 | – | 512 | – |" in page
+    assert "| `./reproduce figure preprint:7` | 12 | – | 512 | – |" in page
     assert "run of `config/own.yaml` on a machine" in page
 
 

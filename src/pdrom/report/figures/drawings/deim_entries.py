@@ -1,4 +1,4 @@
-"""Which elements the entries of vectorised DEIM hit, and what that costs (figure 3)."""
+"""Elements hit by the entries of vectorised DEIM, and their cost (figure 3 of the preprint)."""
 
 import numpy as np
 from matplotlib.axes import Axes

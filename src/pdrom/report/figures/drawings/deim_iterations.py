@@ -1,4 +1,4 @@
-"""The iterations of DEIM, drawn on the mesh (figure 2)."""
+"""The iterations of DEIM, drawn on the mesh (figure 2 of the preprint)."""
 
 import numpy as np
 from matplotlib.axes import Axes

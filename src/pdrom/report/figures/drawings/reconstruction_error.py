@@ -1,4 +1,4 @@
-"""Reconstruction error of snapshots against the basis size (figure 8)."""
+"""Reconstruction error of snapshots against the basis size (figure 8 of the preprint)."""
 
 import numpy as np
 import pandas as pd

@@ -1,4 +1,4 @@
-"""Full-order runs beside reduced ones (figures 4 to 7 of the paper, and the bars)."""
+"""Full-order runs beside reduced ones (figures 4 to 7 of the preprint, and the bars)."""
 
 from matplotlib.figure import Figure
 

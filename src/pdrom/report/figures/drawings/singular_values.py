@@ -1,4 +1,4 @@
-"""Decay of the singular values of the snapshot matrices (figure 9)."""
+"""Decay of the singular values of the snapshot matrices (figure 9 of the preprint)."""
 
 import numpy as np
 import pandas as pd

@@ -1,4 +1,4 @@
-"""The decomposition of a group's snapshots, with pictures on the mesh (figure 1)."""
+"""Decomposition of a group's snapshots, with pictures on the mesh (figure 1 of the preprint)."""
 
 import numpy as np
 from matplotlib.axes import Axes

@@ -17,7 +17,7 @@ PACKAGE = kit.__name__.rpartition(".")[0]
 
 @cache
 def declarations() -> dict[str, Declaration]:
-    """Every figure by name: those of the paper by their number, then the others by name.
+    """Every figure by name: those of the preprint by their number there, then the others by name.
 
     Raises
     ------

@@ -17,7 +17,7 @@ class Declaration:
     reads : everything that its drawing may read; of `Every` kind of file, those of the scenes and
         groups that its options choose, where the configuration holds them
     options : what a user may choose in config/figures.yaml, with the defaults
-    number : number in the paper that is reproduced; None for a figure of this study
+    number : number in the preprint that is reproduced; None for a figure of this study
     drawing : module of `drawings` that draws it, where that is not the figure's own name
     """
 

@@ -15,7 +15,7 @@ from pdrom.report.figures.kit.camera import Camera
 from pdrom.report.figures.kit.mesh_render import Surface, draw_lines, draw_surface
 
 NEUTRAL = "#E4E1DA"
-# light to dark, so that zero is the paper's white
+# light to dark, so that zero is the page's white
 MAGNITUDE = LinearSegmentedColormap.from_list(
     "pdrom_magnitude", mpl.colormaps["magma_r"](np.linspace(0.02, 0.92, 256))
 )

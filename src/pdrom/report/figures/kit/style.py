@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 
 from pdrom.report.figures.kit.holdings import Holdings
 
-WIDTH = 7.0  # inches, text width of the paper
+WIDTH = 7.0  # inches, text width of the manuscript
 
 # Okabe and Ito (2008): told apart with every common colour deficiency.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
