@@ -7,14 +7,17 @@ from pathlib import Path
 import pytest
 import yaml
 
+from pdrom.core.paths import RESULTS
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.selection import KINDS
 from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.front import completed
+from pdrom.pipeline.tables import all_tables
 from pdrom.reduction.method import MethodSpec
 from pdrom.report.figures.kit.outcomes import LOOKS
 from pdrom.verification.bundle import parser as bundle_parser
 from pdrom.verification.command import parser as verify_parser
+from pdrom.verification.references import folder_of, read_reference
 from places import ROOT
 
 PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "docs").rglob("*.md")])
@@ -138,3 +141,16 @@ def test_every_kind_of_selection_is_listed() -> None:
     assert sorted(
         re.findall(r"`\{kind: (\w+), (?:of|\w+)", page.split("### Selections")[1])
     ) == sorted(KINDS)
+
+
+def test_the_numbers_of_the_readme_s_picture_are_those_of_the_expected_tables() -> None:
+    table = all_tables()["reduced_reruns"]
+    found = read_reference(table, ROOT / folder_of(RESULTS))
+    assert found is not None
+    runs = found.frame[found.frame.scene == "strain_poke"].set_index(["method", "r"])
+    error = runs[runs.position_basis == "full"].relative_error_within_horizon.astype(float)
+    caption = (ROOT / "README.md").read_text("utf-8").split("*Grey:")[1].split("*\n")[0]
+    full = error.loc["pod"].index.max()
+    for method, r in (("pod", 20), ("pod", full), ("block-deim", full), ("gappy", full)):
+        assert f"{error[method, r]:.2g}" in caption, (method, r)
+    assert error["gappy", full] < 0.1 < 1.0 < error["block-deim", full]

@@ -369,3 +369,11 @@ def test_a_scene_without_effects_ends_at_the_tick(study):
     ]  # fmt: skip
     assert [bar.get_width() for bar in without.patches] == [4.0, 3.5, 2.0]
     assert [line.get_xdata()[0] for line in without.lines] == [3.5, 2.0]
+
+
+def test_every_axis_of_the_scaling_has_two_numbers_at_least(study):
+    figure = draw(study, "scaling")
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            low, high = axis.get_view_interval()
+            assert sum(low <= place <= high for place in axis.get_majorticklocs()) >= 2

@@ -6,7 +6,14 @@ import pytest
 from matplotlib.figure import Figure
 
 from pdrom.reduction.method import load_methods
-from pdrom.report.figures.kit.families import ENTRIES, FAMILIES, INTERPOLATED, WEIGHTED, Model
+from pdrom.report.figures.kit.families import (
+    ENTRIES,
+    FAMILIES,
+    INTERPOLATED,
+    WEIGHTED,
+    Model,
+    markers,
+)
 from pdrom.report.figures.kit.holdings import Holdings, MethodHolding
 from pdrom.report.figures.kit.output import draw_figure
 from pdrom.report.figures.kit.results import Results
@@ -20,6 +27,7 @@ from pdrom.report.figures.kit.trade_offs import (
     TIME,
     TradeOffs,
     draw_panel,
+    handles,
     label_iterations,
 )
 from places import ROOT
@@ -43,6 +51,26 @@ def test_every_method_of_the_project_has_a_family(results):
     assert Model("full", "skinning").family(results) == WEIGHTED
     assert Model("block-deim", "pod").family(results) == INTERPOLATED
     assert Model("not drawn", "full").family(results) is None
+
+
+def test_models_that_differ_by_tolerance_or_basis_share_a_marker(results):
+    names = [
+        ("full", "pod"), ("ecsw-1e-02", "pod"), ("ecsw-1e-03", "pod"), ("full", "skinning"),
+        ("ecsw-1e-02", "skinning"), ("deim", "full"), ("deim-joint", "full"),
+    ]  # fmt: skip
+    found = markers([Model(*name) for name in names], results)
+    sampled = {found[Model("ecsw-1e-02", "pod")], found[Model("ecsw-1e-03", "pod")]}
+    assert sampled == {found[Model("ecsw-1e-02", "skinning")]}
+    assert sampled != {found[Model("full", "pod")]}
+    assert found[Model("full", "pod")] == found[Model("full", "skinning")]
+    assert Model("full", "skinning").hollow
+    assert not Model("full", "pod").hollow
+    assert found[Model("deim", "full")] != found[Model("deim-joint", "full")]
+    nothing = TradeOffs(pd.DataFrame(), pd.DataFrame(), {}, {}, found)
+    legend = dict(handles(nothing, results))
+    assert [line.get_label() for line in legend[WEIGHTED.title]] == [
+        "all projections", "ecsw, by tolerance",
+    ]  # fmt: skip
 
 
 def invented(errors, times, method="deim", blown_up=()):

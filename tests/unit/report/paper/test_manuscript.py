@@ -157,3 +157,11 @@ def test_the_same_inputs_give_the_same_bytes_in_every_folder(tmp_path):
         build_pdf(folder / "main.tex", tmp_path / name / "main.pdf", [])
         made.append((tmp_path / name / "main.pdf").read_bytes())
     assert made[0] == made[1]
+
+
+def test_the_pdf_has_the_title_and_the_authors_of_the_manuscript():
+    title = re.search(r"\\title\{([^\\}]*)", SOURCE)
+    author = re.search(r"\\author\{([^}]*)\}", SOURCE)
+    assert title and author
+    assert re.search(rf"\\hypersetup\{{\s*pdftitle=\{{{re.escape(title[1])}\}}", SOURCE)
+    assert rf"pdfauthor={{{author[1]}}}" in SOURCE

@@ -1,12 +1,13 @@
 """Time of an iteration against the number of vertices, for the full model and reduced ones."""
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import NullFormatter
 
 from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.multiples import plain_ticks
 from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 
@@ -57,6 +58,9 @@ def draw(results: Results, options: Scenes) -> Figure:
         lower.set_xlabel("vertices")
     sizes = table[table.scene.isin(scenes)].vertices
     times[0].set_xlim(0.75 * sizes.min(), ROOM * sizes.max())
+    for axis in (times[0].xaxis, times[0].yaxis, offline[0].yaxis):  # shared by all panels
+        low, high = np.log10(axis.get_view_interval())
+        plain_ticks(axis, high - low)
     times[0].set_ylabel("time of an iteration (ms)")
     offline[0].set_ylabel("before the first frame")
     _legend(figure, results, list(dict.fromkeys(table.method)))
@@ -94,7 +98,6 @@ def _draw_offline(ax: Axes, rows: pd.DataFrame) -> None:
     ax.set_xscale("log")
     ax.set_yscale("log")
     style.grid(ax)
-    ax.xaxis.set_minor_formatter(NullFormatter())
     for quantity, (label, colour, marker) in OFFLINE.items():
         shown = rows[rows[quantity] > 0.0]
         ax.plot(shown.vertices, shown[quantity], color=colour, marker=marker, label=label)

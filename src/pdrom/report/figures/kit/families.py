@@ -1,4 +1,4 @@
-"""Families of reduced models: what belongs together has one colour, and a marker each within it."""
+"""Families of reduced models: what belongs together has one colour, and markers within it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,12 +35,18 @@ class Model:
     method: str
     position_basis: str
 
+    @property
+    def hollow(self) -> bool:
+        """Whether its markers are hollow: its position basis is that of skinning."""
+        return self.position_basis == "skinning"
+
     def title(self, results: Results) -> str:
-        """Its name within its family."""
+        """Its name within its family, which models share that differ by tolerance or basis only."""
         if self.position_basis == "full":
             return results.method_title(self.method)
-        projections = "all projections" if self.method == "full" else self.method
-        return f"{self.position_basis}, {projections}"
+        if self.method == "full":
+            return "all projections"
+        return "ecsw, by tolerance" if self.method.startswith("ecsw") else self.method
 
     def family(self, results: Results) -> Family | None:
         """Its family; None for a method that is not drawn."""
@@ -54,10 +60,11 @@ class Model:
 
 
 def markers(models: Sequence[Model], results: Results) -> dict[Model, str]:
-    """A marker for each model, in the order in which its family's models come."""
+    """A marker for each title within a family, in the order in which its models come."""
     found: dict[Model, str] = {}
     for family in FAMILIES[1:]:
         members = [model for model in models if model.family(results) == family]
-        for place, model in enumerate(members):
-            found[model] = MARKERS[place % len(MARKERS)]
+        titles = list(dict.fromkeys(model.title(results) for model in members))
+        for model in members:
+            found[model] = MARKERS[titles.index(model.title(results)) % len(MARKERS)]
     return found

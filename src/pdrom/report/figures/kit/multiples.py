@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
@@ -53,11 +54,16 @@ def time_axis(ax: Axes, times: np.ndarray) -> None:
     low, high = np.log10(np.nanmin(times)), np.log10(np.nanmax(times))
     pad = max(0.1, 0.08 * (high - low))
     ax.set_xlim(10 ** (low - pad), 10 ** (high + pad))
+    plain_ticks(ax.xaxis, high - low)
+
+
+def plain_ticks(axis: Axis, decades: float) -> None:
+    """Plain numbers on a logarithmic axis that spans ``decades``: two at least."""
     steps = [(0.4, (1, 1.5, 2, 3, 5, 7)), (0.7, (1, 2, 3, 5)), (1.3, (1, 2, 5)), (2.0, (1, 3))]
-    subs = next((s for limit, s in steps if high - low < limit), (1,))
-    ax.xaxis.set_major_locator(LogLocator(subs=subs))
-    ax.xaxis.set_minor_locator(NullLocator())
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    subs = next((s for limit, s in steps if decades < limit), (1,))
+    axis.set_major_locator(LogLocator(subs=subs))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 ARROWS = {"left": 4, "right": 5, "up": 6, "down": 7}  # carets

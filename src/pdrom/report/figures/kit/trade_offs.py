@@ -1,6 +1,7 @@
 """Panels of error against time per frame: models by family, and the best trade-offs of each."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -101,7 +102,8 @@ def draw_panel(
         part = rows[rows.family == family.title]
         for model in found.models(family, results):
             own = (part.method == model.method) & (part.position_basis == model.position_basis)
-            _points(ax, part[own], family.colour, found.marker[model], low, size)
+            fill = "none" if model.hollow else "full"
+            _points(ax, part[own], family.colour, found.marker[model], low, size, fill)
         if family == ITERATIONS:
             _points(ax, part, family.colour, "X", low, size)
         _front(ax, part, family.colour, low)
@@ -119,13 +121,19 @@ def draw_panel(
 
 
 def _points(
-    ax: Axes, rows: pd.DataFrame, colour: str, marker: str, low: float, size: float
+    ax: Axes,
+    rows: pd.DataFrame,
+    colour: str,
+    marker: str,
+    low: float,
+    size: float,
+    fill: Literal["full", "none"] = "full",
 ) -> None:
     error, time = rows[ERROR].to_numpy(float), rows[TIME].to_numpy(float)
     looks = ((error < low, BELOW), (error > HIGH, ABOVE))
     inside = (error >= low) & (error <= HIGH)
     common = {"linestyle": "none", "color": colour, "alpha": 0.75, "markeredgewidth": 0.9}
-    ax.plot(time[inside], error[inside], marker=marker, markersize=size, **common)
+    ax.plot(time[inside], error[inside], marker=marker, markersize=size, fillstyle=fill, **common)
     for outside, arrow in looks:
         if outside.any():
             rim = clipped(error[outside], low, HIGH)
@@ -153,35 +161,21 @@ def group_title(results: Results, scene: str) -> str:
 
 
 def handles(found: TradeOffs, results: Results) -> list[tuple[str, list[Line2D]]]:
-    """Legend entries by family, and what is no family last."""
-    entries: list[tuple[str, list[Line2D]]] = []
+    """Legend entries by family: a colour each, and a marker for each title within it."""
+    common = {"linewidth": 1.0, "markersize": 4.0}
+    entries = [
+        ("full order", [
+            Line2D([], [], color=ITERATIONS.colour, marker="X", label="K iterations", **common),
+            Line2D([], [], label="its time", **OWN),
+            Line2D([], [], label="its own error", **BLIND),
+        ]),
+    ]  # fmt: skip
     for family in FAMILIES[1:]:
+        marker = {m.title(results): found.marker[m] for m in found.models(family, results)}
         members = [
-            Line2D(
-                [], [], color=family.colour, marker=found.marker[model], linewidth=1.0,
-                markersize=4.0, label=model.title(results),
-            )
-            for model in found.models(family, results)
-        ]  # fmt: skip
+            Line2D([], [], color=family.colour, marker=shape, label=title, **common)
+            for title, shape in marker.items()
+        ]
         if members:
             entries.append((family.title, members))
-    rest = [
-        Line2D(
-            [],
-            [],
-            color=ITERATIONS.colour,
-            marker="X",
-            linewidth=1.0,
-            markersize=4.0,
-            label="K iterations",
-        ),
-        Line2D([], [], label="its time", **OWN),
-        Line2D([], [], label="its own error", **BLIND),
-    ]
-    rim = {"color": "#555555", "linestyle": "none"}
-    outside = [
-        Line2D([], [], marker=BELOW, markersize=5.5, label="error below the axis", **rim),
-        Line2D([], [], marker=ABOVE, markersize=5.5, label="error above the axis", **rim),
-        Line2D([], [], marker=BLOWN_UP, markersize=6, markeredgewidth=1.8, label="blow-up", **rim),
-    ]
-    return [("full order", rest), *entries, ("on the rim", outside)]
+    return entries
