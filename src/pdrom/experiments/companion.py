@@ -16,9 +16,14 @@ from pdrom.reduction.subspace.store import store_columns, store_model
 
 
 class Companion(CompanionSpec):
-    """Section ``companion``: the companion, and tolerances of users."""
+    """Section ``companion``: the companion, tolerances of users, and a safety factor on estimates.
+
+    The factor was chosen when results were known: an estimate may be too small, since the companion
+    has an error of its own.
+    """
 
     tolerances: tuple[Annotated[float, Field(gt=0.0, allow_inf_nan=False)], ...] = (0.1, 0.03, 0.01)
+    safety: Annotated[float, Field(ge=1.0, allow_inf_nan=False)] = 1.3
 
 
 class Settings(JobSettings):

@@ -37,7 +37,7 @@ from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.local.guarded import Trained, guarded_rerun
 from pdrom.reduction.local.ranks import Rank, resolve_ranks
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.rerun import Rerun, displacement_norms, extent_norm
+from pdrom.reduction.rerun import Rerun, displacement_norms, extent_norm, step_norms
 from pdrom.reduction.sampling.load import load_reduction
 from pdrom.reduction.snapshots import load_snapshots
 from pdrom.reduction.subspace.store import load_models
@@ -151,7 +151,7 @@ class _Case:
         settings = self.settings
         displacement = displacement_norms(reference)
         scale = EnergyScale.of(self.scene, reference)
-        file["displacement"] = displacement
+        file["displacement"], file["step"] = displacement, step_norms(reference)
         system = self.scene.system_with(settings.solver)
         rows = []
         for r in resolve_ranks(ranks, self.basis.rank):
@@ -168,6 +168,8 @@ class _Case:
             )  # fmt: skip
             energy = scale.ratio(outcome.positions)
             _store(store, outcome, displacement, seen)
+            together = reference[: outcome.frames + 1]
+            store["step_difference"] = step_norms(outcome.positions - together)
             store["positions"] = outcome.positions.astype(np.float32)
             measured = {"energy_ratio": energy, "gain": reduction.gain, **seen.columns()}
             rows.append({**self.labels, "r": r, **_row(outcome, displacement), **measured})

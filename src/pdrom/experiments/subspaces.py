@@ -30,7 +30,7 @@ from pdrom.experiments.motion import Motion, training_indices, training_position
 from pdrom.experiments.scenes import RUNS, scene_of
 from pdrom.experiments.settings import BlowupExtent, Modes, PositionBasis, Tolerance
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.rerun import Rerun, extent_norm
+from pdrom.reduction.rerun import Rerun, extent_norm, step_norms
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.hrpd import hrpd, sampled_space
 from pdrom.reduction.subspace.interpolated import Training, interpolate
@@ -131,6 +131,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     with write_hdf5(outputs.runs.path) as file:
         for name, motion in motions.items():
             file[f"displacement/{name}"] = motion.displacement
+            file[f"step/{name}"] = step_norms(motion.reference)
         start = motions["train"]
         file.attrs["extent_norm"] = extent_norm(start.reference, start.scene.mesh.extent)
         subspaces = clocked(_subspaces(motions["train"], settings.subspace))
@@ -152,6 +153,9 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
                     outcome = motion.run(model, settings.blowup_extent)
                     for series in ("coordinates", "difference", "shape_difference", "extent"):
                         store[f"{name}/{series}"] = getattr(outcome, series)
+                    together = motion.reference[: outcome.frames + 1]
+                    apart = step_norms(outcome.positions - together)
+                    store[f"{name}/step_difference"] = apart
                     rows[name].append(_row(motion, labels, model, outcome))
                 log.info("%s %s: error %s", base, method, rows["train"][-1]["relative_error"])
     for name in RUNS:

@@ -102,6 +102,7 @@ def _study(study: Study) -> Row:
         "guard_threshold": settings.guard.threshold,
         "companion_modes": settings.companion.modes,
         "companion_tolerance": settings.companion.tolerance,
+        "companion_safety": settings.companion.safety,
         "tolerance": settings.iterations.tolerance,
         "continuous_tolerance": settings.alternatives.continuous.tolerance,
         "compared_frames": settings.alternatives.compared,

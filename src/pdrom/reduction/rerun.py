@@ -101,6 +101,15 @@ def displacement_norms(reference: np.ndarray) -> np.ndarray:
     return np.linalg.norm((reference[1:] - reference[0]).reshape(len(reference) - 1, -1), axis=1)
 
 
+def step_norms(positions: np.ndarray) -> np.ndarray:
+    """|| Q^(n + 1) - Q^n ||_F of each frame, (F,) m: the time step times the norm of its velocities.
+
+    The step loop has no other velocities. Of the difference of two runs (F + 1, N, 3) it is that of
+    their velocities.
+    """
+    return np.linalg.norm(np.diff(positions, axis=0), axis=(1, 2))
+
+
 def mean_motion(reference: np.ndarray) -> float:
     """Root mean square of `displacement_norms` over the frames of a run, m."""
     return float(np.sqrt(np.mean(displacement_norms(reference) ** 2)))

@@ -7,12 +7,12 @@ from pdrom.core.paths import File
 from pdrom.core.reads import Every, Setting, TableOf
 from pdrom.model.runs.horizon import HELDOUT
 from pdrom.tables.declaration import table
-from pdrom.tables.reruns import COLUMNS, LENGTHS, judged_reruns
+from pdrom.tables.reruns import COLUMNS, MEASURES, judged_reruns
 
 
 @table(
     title="Reduced runs of the held-out motions",
-    columns=(*COLUMNS, *LENGTHS),
+    columns=(*COLUMNS, *MEASURES),
     reads={
         "runs": Every(paths.RERUNS),
         "rows": Every(paths.RERUNS_HELDOUT),

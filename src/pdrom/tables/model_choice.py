@@ -31,7 +31,7 @@ _CHOSEN = [
     columns=(
         SCENE,
         number("tolerance", "error that the user allows"),
-        compared("run", flag("found", "a model has an estimate within the tolerance")),
+        compared("run", flag("found", "an estimate times the safety factor is within the tolerance")),
         GROUP,
         METHOD,
         POSITION_BASIS,
@@ -46,13 +46,15 @@ _CHOSEN = [
         "estimates": TableOf("estimates"),
         "reruns": TableOf("reduced_reruns"),
         "tolerances": Setting("companion.tolerances"),
+        "safety": Setting("companion.safety"),
     },
 )
 def model_choice(
-    estimates: pd.DataFrame, reruns: pd.DataFrame, tolerances: Sequence[float]
+    estimates: pd.DataFrame, reruns: pd.DataFrame, tolerances: Sequence[float], safety: float
 ) -> pd.DataFrame:
     """The cheapest model of each scene whose estimate on the held-out motion meets a tolerance.
 
+    It meets one that it does not exceed when multiplied by ``safety``.
     Nothing of that motion's full order goes into the choice. Cheapest is the one that evaluates
     the fewest elements, then has the fewest modes: times differ from run to run.
     """
@@ -62,7 +64,7 @@ def model_choice(
     rows: list[dict[str, Any]] = []
     for scene, models in runs.groupby("scene", sort=False):
         for tolerance in tolerances:
-            good = models[models.estimate <= tolerance].sort_values(["r", "k"], kind="stable")
+            good = models[safety * models.estimate <= tolerance].sort_values(["r", "k"], kind="stable")
             row: dict[str, Any] = {"scene": scene, "tolerance": tolerance, "found": len(good) > 0}
             if len(good):
                 chosen = good.iloc[0]

@@ -7,13 +7,13 @@ from pdrom.core.paths import File
 from pdrom.core.reads import Every, Setting, TableOf
 from pdrom.tables.declaration import table
 from pdrom.tables.one_time import timings_in_one_time
-from pdrom.tables.reruns import COLUMNS, KEYS, LENGTHS, TRAIN, judged_reruns
+from pdrom.tables.reruns import COLUMNS, KEYS, MEASURES, TRAIN, judged_reruns
 from pdrom.tables.vocabulary import GLOBAL_MS, LOCAL_MS, MS_PER_FRAME, SPEEDUP
 
 
 @table(
     title="Reduced runs of the training motions",
-    columns=(*COLUMNS, MS_PER_FRAME, LOCAL_MS, GLOBAL_MS, SPEEDUP, *LENGTHS),
+    columns=(*COLUMNS, MS_PER_FRAME, LOCAL_MS, GLOBAL_MS, SPEEDUP, *MEASURES),
     reads={
         "runs": Every(paths.RERUNS),
         "rows": Every(paths.RERUNS_TRAIN),

@@ -24,6 +24,7 @@ from pdrom.tables.vocabulary import (
     RELATIVE_ERROR,
     SCENE,
     SHAPE_ERROR,
+    VELOCITY_ERROR,
     K,
     R,
 )
@@ -32,7 +33,7 @@ COLUMNS = (
     SCENE, GROUP, METHOD, POSITION_BASIS, K, R, FRAMES, FINITE, BLOWUP_FRAME, MAX_EXTENT,
     RELATIVE_ERROR, ERROR_WITHIN, HORIZON_FRAME, FLOOR,
 )  # fmt: skip
-LENGTHS = (ERROR_OVER_EXTENT, SHAPE_ERROR)
+MEASURES = (ERROR_OVER_EXTENT, SHAPE_ERROR, VELOCITY_ERROR)  # of the same frames
 KEYS = ["scene", "group", "method", "position_basis", "k", "r"]  # what tells runs apart
 TRAIN = "train"
 
@@ -76,9 +77,9 @@ def _local_only(run: File, row: File, ends: dict[str, int], motion: str) -> pd.D
     table, end = read_table(row.path), ends[run["scene"]]
     with open_hdf5(run.path) as file:
         store = file if motion == TRAIN else file[motion]
-        displacement = store["displacement"][...]
         runs = [store[f"r{r:04d}"] for r in table.r]
-        table = table.assign(**_errors(runs, displacement, file.attrs["extent_norm"], end))
+        norms = (store["displacement"][...], store["step"][...], file.attrs["extent_norm"])
+        table = table.assign(**_errors(runs, *norms, end))
     return table.assign(position_basis="full", k=None)
 
 
@@ -86,15 +87,19 @@ def _subspace(run: File, row: File, ends: dict[str, int], motion: str) -> pd.Dat
     """Rows of runs in position subspaces."""
     table, end = read_table(row.path), ends[run["scene"]]
     with open_hdf5(run.path) as file:
-        displacement = file[f"displacement/{motion}"][...]
         models = [f"{t.position_basis}_k{t.k:03d}_{t.method}" for t in table.itertuples()]
         runs = [file[f"models/{model}/{motion}"] for model in models]
-        table = table.assign(**_errors(runs, displacement, file.attrs["extent_norm"], end))
+        motions = (file[f"{series}/{motion}"][...] for series in ("displacement", "step"))
+        table = table.assign(**_errors(runs, *motions, file.attrs["extent_norm"], end))
     return table
 
 
 def _errors(
-    runs: Sequence[h5py.Group], displacement: np.ndarray, extent_norm: float, end: int
+    runs: Sequence[h5py.Group],
+    displacement: np.ndarray,
+    step: np.ndarray,
+    extent_norm: float,
+    end: int,
 ) -> dict[str, list[float | None]]:
     """Errors before the horizon; a run of a size beyond the rank has no frames and no errors."""
 
@@ -110,4 +115,5 @@ def _errors(
         ),
         "error_over_extent": each("difference", over_extent),
         "shape_error": each("shape_difference", over_extent),
+        "velocity_error": each("step_difference", lambda apart: error_within(apart, step, end)),
     }

@@ -41,6 +41,14 @@ SHAPE_ERROR = compared(
         "shape_error", "the same with the best rigid motion of each frame taken out: of the shape"
     ),
 )
+VELOCITY_ERROR = compared(
+    # no "error": a run whose positions are right has not failed, whatever its velocities are
+    "magnitude",
+    number(
+        "velocity_error",
+        "error of the velocities before the horizon, over the norm of those of the full-order run",
+    ),
+)
 HORIZON_FRAME = integer("horizon_frame", "first frame that cannot be judged: the scene's horizon")
 FLOOR = compared(
     "drift", number("sensitivity_floor", "largest drift of perturbed runs before the horizon")

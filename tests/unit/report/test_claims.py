@@ -6,6 +6,7 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import validate
@@ -14,14 +15,17 @@ from pdrom.report.claims import (
     FAILS,
     HOLDS,
     METRICS,
+    MACHINE,
     UNDECIDED,
     ClaimRule,
     TestRule,
+    answer_of,
     claims_rows,
     load_claims,
     timed_columns,
 )
 from pdrom.report.claims import evaluate as evaluated
+from pdrom.report.claims.rules import MARGIN
 from pdrom.report.claims.verdicts import answer
 from pdrom.report.decide import claims
 from pdrom.tables import declared
@@ -229,7 +233,7 @@ def test_runs_with_reduced_positions_count_only_if_asked_for(metric, monkeypatch
     ],
 )
 def test_share_of_rows_that_must_agree(compare, threshold, share, expected):
-    test = rule("local_share", compare, threshold, share=share,
+    test = rule("local_share", compare, threshold, share=share, margin=1.0,
                 where={"implementation": ["compiled"]})  # fmt: skip
     outcome = evaluated(test, tables())
     assert outcome.verdict == expected
@@ -247,12 +251,68 @@ def test_the_opposite_comparison_gives_the_opposite_answer(share, good, bad):
 
 
 def test_a_condition_breaks_the_answer_down():
-    test = rule("local_share", ">=", 0.6, where={"implementation": ["compiled"]}, by="scene")
+    exact = {"where": {"implementation": ["compiled"]}, "margin": 1.0}
+    test = rule("local_share", ">=", 0.6, **exact, by="scene")
     assert evaluated(test, tables()).condition == "rows, at least 0.6: a 1 of 1, b 0 of 1"
-    plain = rule("local_share", ">=", 0.6, where={"implementation": ["compiled"]})
+    plain = rule("local_share", ">=", 0.6, **exact)
     assert evaluated(plain, tables()).condition == "rows, at least 0.6: 1 of 2"
-    clear = rule("local_share", ">=", 0.5, by="scene")
+    clear = rule("local_share", ">=", 0.5, by="scene", margin=1.0)
     assert evaluated(clear, tables()).condition == ""
+
+
+COMPILED = {"where": {"implementation": ["compiled"]}}  # shares 0.75 and 0.5: ratios 3 and 1
+
+
+@pytest.mark.parametrize(
+    ("compare", "threshold", "margin", "expected"),
+    [
+        (">=", 0.6, 1.0, DEPENDS),  # 0.6: ratio 1.5, from 3 and 1 a factor 2 and 1.5 away
+        (">=", 0.6, 1.49, DEPENDS),
+        (">=", 0.6, 1.51, MACHINE),
+        ("<=", 0.6, 1.51, MACHINE),
+        (">=", 0.4, 1.49, HOLDS),  # 0.4: ratio 2/3
+        (">=", 0.4, 1.51, MACHINE),
+        ("<=", 0.4, 1.49, FAILS),
+        ("<=", 0.4, 1.51, MACHINE),
+    ],
+)
+def test_ratios_of_times_close_to_the_limit_decide_nothing(compare, threshold, margin, expected):
+    test = rule("local_share", compare, threshold, margin=margin, share=0.75, **COMPILED)
+    assert evaluated(test, tables()).verdict == expected
+
+
+def test_what_enough_clear_rows_decide_those_in_between_do_not_change():
+    test = rule("local_share", ">=", 0.4, margin=1.51, share=0.5, **COMPILED)
+    assert evaluated(test, tables()).verdict == HOLDS
+
+
+def test_a_verdict_that_depends_on_the_machine_says_what_was_measured():
+    outcome = evaluated(rule("local_share", ">=", 0.6, margin=1.6, by="scene", **COMPILED), tables())
+    assert outcome.condition == (
+        "rows, at least 0.6: a 1 of 1, b 0 of 1 "
+        "(measured 0.5 to 0.75; 1 of 2 within a factor 1.6 of it, which decides nothing)"
+    )
+
+
+@given(st.lists(st.floats(0.01, 100.0), min_size=1, max_size=20), st.data())
+def test_no_machine_refutes_what_holds_on_one_twice_as_fast(ratios, data):
+    """Ratios that move by less than the margin squared do not cross both of its ends."""
+    test = rule("solve_time_ratio", ">=", 1.0)
+    moves = data.draw(arrays(float, len(ratios), elements=st.floats(0.45, 2.2)))
+    answers = {answer_of(test, np.array(ratios)), answer_of(test, np.array(ratios) * moves)}
+    assert answers != {HOLDS, FAILS}
+
+
+def test_runs_that_are_not_accurate_are_no_times():
+    """Their speed-up counts as 0, clearly below any limit."""
+    test = rule("useful_speedup", "<=", 1.0)
+    assert answer_of(test, np.array([0.0, 0.0, 0.0, 0.9])) == HOLDS
+    assert answer_of(test, np.array([0.0, 0.0, 1.1, 0.9])) == MACHINE
+
+
+def test_what_compares_no_times_has_no_margin():
+    assert rule("rerun_error").factor == 1.0
+    assert rule("local_share").factor == MARGIN == 1.5
 
 
 def test_sentence_counts_and_shows_the_spread():
@@ -278,7 +338,9 @@ WORDS = dict.fromkeys(
 
 
 def claim(*tests: dict) -> dict:
-    base = {"what": "rows", "metric": "local_share", "compare": ">=", "threshold": 0.4}
+    base = {
+        "what": "rows", "metric": "local_share", "compare": ">=", "threshold": 0.4, "margin": 1.0,
+    }  # fmt: skip
     return {
         **WORDS,
         "published": [base | test for test in tests],
@@ -369,6 +431,8 @@ def test_a_threshold_flips_the_verdict(tmp_path):
         ({"share": 1.1}, r"published\.0\.share"),
         ({"threshold": float("nan")}, r"published\.0\.threshold"),
         ({"decides": False}, "published: none of them decides"),
+        ({"margin": 0.9}, r"published\.0\.margin = 0\.9"),
+        ({"metric": "rerun_error", "margin": 2}, "margin = 2: rerun_error compares no times"),
         ({"by": "colour"}, "by: no column 'colour'"),
         ({"where": {"scene": ["@al"]}}, "no set 'al'"),
     ],
@@ -436,7 +500,10 @@ def test_a_fingerprint_changes_with_every_rule_but_not_with_its_words():
 
     same = fingerprint()
     assert fingerprint(what="other words") == same
-    others = [{"threshold": 0.41}, {"share": 0.6}, {"where": {"scene": ["a"]}}, {"compare": "<="}]
+    others = [
+        {"threshold": 0.41}, {"share": 0.6}, {"where": {"scene": ["a"]}}, {"compare": "<="},
+        {"margin": 1.2},
+    ]  # fmt: skip
     assert len({same, *(fingerprint(**other) for other in others)}) == 1 + len(others)
 
 

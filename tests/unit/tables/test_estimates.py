@@ -89,11 +89,22 @@ def test_a_guard_that_listens_to_the_estimate_has_no_other_row(read):
 
 def test_the_cheapest_model_within_the_tolerance_is_chosen(read):
     made, reruns, _ = read
-    chosen = model_choice(made, reruns, (0.1, 0.03, 0.001)).set_index("tolerance")
+    chosen = model_choice(made, reruns, (0.1, 0.03, 0.001), 1.0).set_index("tolerance")
     assert (chosen.loc[0.1, "method"], chosen.loc[0.1, "r"]) == ("ecsw", 20)
     assert (chosen.loc[0.03, "k"], chosen.loc[0.03, "r"]) == (20, 40)
     assert chosen.loc[[0.1, 0.03], "met"].all()
     assert not chosen.loc[0.001, "found"]
+
+
+def test_a_model_is_chosen_only_with_room_for_an_estimate_that_is_too_small(read):
+    """The tolerance is the estimate of the cheapest model: met as it is, not with a margin."""
+    made, reruns, _ = read
+    inside = made[(made.split == "heldout") & (made.position_basis != "full")]
+    tolerance = float(inside.sort_values("r").estimate.iloc[0])
+    first, safer = (model_choice(made, reruns, (tolerance,), f).iloc[0] for f in (1.0, 1.3))
+    assert (first.r, safer.r) == (20, 40)
+    assert first.estimate == tolerance
+    assert 1.3 * safer.estimate <= tolerance
 
 
 def test_no_runs_leave_empty_tables(read, tmp_path):

@@ -129,6 +129,7 @@ def test_floor_is_the_largest_over_the_seeds(tmp_path):
 
 NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # table frame_times without rows
 DISPLACEMENT = np.array([1.0, 2.0, 3.0, 4.0])
+STEP = DISPLACEMENT / 2.0  # of the velocities; their differences are thrice those of the positions
 
 
 @dataclass(frozen=True)
@@ -187,12 +188,13 @@ def files(tmp_path) -> Files:
         with write_hdf5(folder / "deim.h5") as file:
             file.attrs["extent_norm"] = 2.0
             for store in (file, file.create_group("heldout")):
-                store["displacement"] = DISPLACEMENT
+                store["displacement"], store["step"] = DISPLACEMENT, STEP
                 for r, difference in runs.items():
                     run = store.create_group(f"r{r:04d}")
                     if difference is not None:
                         run["difference"] = difference
                         run["shape_difference"] = np.divide(difference, 10.0)
+                        run["step_difference"] = np.multiply(difference, 3.0)
         for r, difference in runs.items():
             row = {"scene": scene, "group": "spring", "method": "deim", "r": r, "frames": 0}
             if difference is not None:
@@ -212,12 +214,13 @@ def files(tmp_path) -> Files:
     with write_hdf5(folder / "models.h5") as file:
         file.attrs["extent_norm"] = 4.0
         for motion in ("train", "heldout"):
-            file[f"displacement/{motion}"] = DISPLACEMENT
+            file[f"displacement/{motion}"], file[f"step/{motion}"] = DISPLACEMENT, STEP
         for (base, k, method), difference in models.items():
             for motion in ("train", "heldout"):
                 run = f"models/{base}_k{k:03d}_{method}/{motion}"
                 file[f"{run}/difference"] = difference
                 file[f"{run}/shape_difference"] = np.divide(difference, 10.0)
+                file[f"{run}/step_difference"] = np.multiply(difference, 3.0)
     rows = [
         {"scene": "b", "group": "all", "method": m, "position_basis": p, "k": k, "r": 33,
          "frames": 4, "finite": True, "max_extent": 1.0, "relative_error": 0.1}
@@ -259,6 +262,8 @@ def test_errors_in_units_of_the_extent(files):
     assert table.error_over_extent[[3, 5]].tolist() == pytest.approx([0.05, 0.1])
     assert table.error_over_extent[[1, 2, 4]].isna().all()
     np.testing.assert_allclose(table.shape_error, table.error_over_extent / 10.0)
+    # over the frames before the horizon, too: three times the difference over half the norm
+    np.testing.assert_allclose(table.velocity_error, 6.0 * table.relative_error_within_horizon)
 
 
 def error(difference, end) -> float:

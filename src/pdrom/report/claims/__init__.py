@@ -13,11 +13,14 @@ from pdrom.report.claims.verdicts import (
     DEPENDS,
     FAILS,
     HOLDS,
+    MACHINE,
     UNDECIDED,
     VERDICTS,
     Outcome,
     answer,
+    answer_of,
     claims_rows,
+    close,
     combined,
     evaluate,
     is_timed,
@@ -27,7 +30,8 @@ from pdrom.report.claims.verdicts import (
 )
 
 __all__ = [
-    "DEPENDS", "FAILS", "FOUND", "HOLDS", "METRICS", "UNDECIDED", "VERDICTS", "ClaimRule", "Metric",
-    "Outcome", "Tables", "TestRule", "answer", "claims_rows", "combined", "evaluate", "is_timed",
-    "load_claims", "outcome_rows", "satisfied", "timed_columns", "values_of",
+    "DEPENDS", "FAILS", "FOUND", "HOLDS", "MACHINE", "METRICS", "UNDECIDED", "VERDICTS",
+    "ClaimRule", "Metric", "Outcome", "Tables", "TestRule", "answer", "answer_of", "claims_rows",
+    "close", "combined", "evaluate", "is_timed", "load_claims", "outcome_rows", "satisfied",
+    "timed_columns", "values_of",
 ]  # fmt: skip

@@ -82,17 +82,25 @@ class Metric:
 
     values : from tables, ``where`` and ``accuracy`` to a row of labels and a `VALUE` for each
     labels : columns that rows may be chosen by, beside those of the table
+    ratio : a value as the ratio of two times, where it is made of times in another way
     """
 
     values: Callable[[Tables, dict, float], pd.DataFrame]
     table: str
     columns: tuple[str, ...]
     labels: tuple[str, ...] = ()
+    ratio: Callable[[np.ndarray], np.ndarray] = np.asarray
+
+
+def _over_the_rest(share: np.ndarray) -> np.ndarray:
+    """A share of a time as the ratio of this part to the rest."""
+    with np.errstate(divide="ignore"):
+        return np.divide(share, np.subtract(1.0, share))
 
 
 _RERUN = ("frames", "blowup_frame", "relative_error_within_horizon", *_PLACE, "r")
 METRICS = {
-    "local_share": Metric(_local_share, "local_share", ("local_share",)),
+    "local_share": Metric(_local_share, "local_share", ("local_share",), ratio=_over_the_rest),
     "rerun_error": Metric(rerun_error, "reduced_reruns", _RERUN),
     "useful_speedup": Metric(useful_speedup, "reduced_reruns", (*_RERUN, "speedup")),
     "best_useful_speedup": Metric(best_useful_speedup, "reduced_reruns", (*_RERUN, "speedup")),

@@ -17,6 +17,7 @@ from pdrom.tables import declared
 
 SETS = "sets"
 _NAMED = "@"  # opens the name of a set in ``where``
+MARGIN = 1.5  # of tests that compare times and name no other
 
 
 class _Model(ConfigModel):
@@ -30,6 +31,8 @@ class TestRule(_Model):
     metric : name in `METRICS`
     where : column -> allowed values
     accuracy : error up to which a run counts as accurate, for the metrics that ask
+    margin : factor between a ratio of times and its limit up to which it decides nothing, see
+        `factor`
     share : fraction of the rows that must agree for a clear answer: the test passes where as many
         satisfy the comparison, fails where as many do not, and depends otherwise
     by : column whose values the answer is broken down by where it depends
@@ -43,9 +46,24 @@ class TestRule(_Model):
     compare: Literal[">=", "<="]
     threshold: FiniteFloat
     accuracy: Annotated[float, Field(gt=0.0)] = 0.1
+    margin: Annotated[FiniteFloat, Field(ge=1.0)] | None = None
     share: Annotated[float, Field(ge=0.5, le=1.0)] = 0.75
     by: str | None = None
     decides: bool = True
+
+    @property
+    def timed(self) -> bool:
+        """Whether a clock has a say in what is compared."""
+        metric = METRICS[self.metric]
+        timing = declared()[metric.table].timing_columns
+        return not set(timing).isdisjoint({*metric.columns, *self.where})
+
+    @property
+    def factor(self) -> float:
+        """The margin, `MARGIN` unless said otherwise; 1 where no clock has a say."""
+        if not self.timed:
+            return 1.0
+        return MARGIN if self.margin is None else self.margin
 
     @model_validator(mode="after")
     def _metric_exists(self) -> Self:
@@ -58,6 +76,8 @@ class TestRule(_Model):
                 raise ValueError(f"where: no column '{column}'{choices(column, columns)}")
         if self.by is not None and self.by not in columns:
             raise ValueError(f"by: no column '{self.by}'{choices(self.by, columns)}")
+        if self.margin is not None and not self.timed:
+            raise ValueError(f"margin = {self.margin:g}: {self.metric} compares no times")
         return self
 
 
@@ -115,7 +135,11 @@ class ClaimRule(_Model):
     def fingerprint(self) -> str:
         """Eight digits that change with every rule, but not with its words."""
         tests = [*self.published, *self.beyond]
-        plain = [test.model_dump(mode="json", exclude={"what"}) for test in tests]
+        plain = [
+            test.model_dump(mode="json", exclude={"what", "margin"})
+            | ({"margin": test.factor} if test.timed else {})
+            for test in tests
+        ]
         content = json.dumps([len(self.published), plain], sort_keys=True)
         return hashlib.blake2b(content.encode(), digest_size=4).hexdigest()
 

@@ -6,14 +6,15 @@ import pandas as pd
 
 from pdrom.report.claims.rows import VALUE, Tables
 from pdrom.report.claims.rules import ClaimRule, TestRule
-from pdrom.report.claims.verdicts import answer, combined, satisfied, values_of
+from pdrom.report.claims.verdicts import answer_of, combined, values_of
 
 FACTORS = (0.5, 0.8, 1.25, 2.0)  # on thresholds
 SHARES = (0.5, 0.6, 0.75, 0.9, 1.0)
+MARGINS = (1.0, 1.25, 1.5, 2.0, 3.0, 5.0)  # of ratios of times; 1: each of them decides
 SMALL = 10  # largest of the small sizes
 SPLITS = ("train", "test", "heldout")
 PARTS = ("published", "beyond")
-VARIED = ("threshold", "share", "sizes", "splits", "scenes")
+VARIED = ("threshold", "share", "margin", "sizes", "splits", "scenes")
 
 _Tests = Sequence[TestRule]
 _Rows = Sequence[pd.DataFrame]
@@ -38,11 +39,8 @@ def sensitivity_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataF
 
 
 def _verdict(tests: _Tests, rows: _Rows) -> str:
-    answers = []
-    for test, values in zip(tests, rows, strict=True):
-        passed = satisfied(test, values[VALUE].to_numpy(float))
-        answers.append(answer(test.share, int(passed.sum()), len(passed)))
-    return combined(answers)
+    found = zip(tests, rows, strict=True)
+    return combined([answer_of(test, values[VALUE].to_numpy(float)) for test, values in found])
 
 
 def _variations(tests: _Tests, tables: Tables) -> Iterator[tuple[str, str, str]]:
@@ -55,6 +53,10 @@ def _variations(tests: _Tests, tables: Tables) -> Iterator[tuple[str, str, str]]
     for share in SHARES:
         changed = [test.model_copy(update={"share": share}) for test in tests]
         yield "share", f"{share:g}", _verdict(changed, rows)
+    if any(test.timed for test in tests):
+        for margin in MARGINS:
+            changed = [_within(test, margin) for test in tests]
+            yield "margin", f"{margin:g}", _verdict(changed, rows)
     yield from _kept(tests, rows, "sizes", _sizes())
     for split in SPLITS:
         changed = [_of_split(test, split) for test in tests]
@@ -92,6 +94,10 @@ def _other_than(scene: str) -> _Keep:
 
 def _always(value: float) -> bool:
     return True
+
+
+def _within(test: TestRule, margin: float) -> TestRule:
+    return test.model_copy(update={"margin": margin}) if test.timed else test
 
 
 def _of_split(test: TestRule, split: str) -> TestRule:

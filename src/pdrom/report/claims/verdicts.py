@@ -10,10 +10,9 @@ import pandas as pd
 from pdrom.report.claims.metrics import METRICS
 from pdrom.report.claims.rows import VALUE, Tables, filtered
 from pdrom.report.claims.rules import Change, ClaimRule, TestRule
-from pdrom.tables import declared
 
-VERDICTS = HOLDS, FAILS, DEPENDS, UNDECIDED = (
-    "holds", "does not hold", "depends", "cannot be decided",
+VERDICTS = HOLDS, FAILS, DEPENDS, MACHINE, UNDECIDED = (
+    "holds", "does not hold", "depends", "depends on the machine", "cannot be decided",
 )  # fmt: skip
 
 
@@ -21,7 +20,8 @@ VERDICTS = HOLDS, FAILS, DEPENDS, UNDECIDED = (
 class Outcome:
     """Result of one test.
 
-    verdict : one of `VERDICTS`; undecided where there was nothing to compare
+    verdict : one of `VERDICTS`; undecided where there was nothing to compare, dependent on the
+        machine where ratios of times close to the limit decide
     measured : range of the values
     sentence : how many rows satisfy the comparison, in words
     condition : where it depends, how many do so for each value of the column that it names
@@ -49,9 +49,7 @@ def timed_columns(rule: ClaimRule) -> set[str]:
 
 def is_timed(test: TestRule) -> bool:
     """Whether a clock has a say in what a test compares."""
-    metric = METRICS[test.metric]
-    timing = declared()[metric.table].timing_columns
-    return not set(timing).isdisjoint({*metric.columns, *test.where})
+    return test.timed
 
 
 def values_of(test: TestRule, tables: Tables) -> pd.DataFrame:
@@ -64,6 +62,13 @@ def satisfied(test: TestRule, values: np.ndarray) -> np.ndarray:
     return values >= test.threshold if test.compare == ">=" else values <= test.threshold
 
 
+def close(test: TestRule, values: np.ndarray) -> np.ndarray:
+    """Whether each value is a ratio of times so close to the limit that it decides nothing."""
+    ratio = METRICS[test.metric].ratio
+    apart = ratio(values) / ratio(np.array(test.threshold))
+    return (apart > 1.0 / test.factor) & (apart < test.factor)
+
+
 def answer(share: float, good: int, total: int) -> str:
     """Verdict of a test that ``good`` of ``total`` rows satisfy, see `TestRule`."""
     if total == 0:
@@ -71,6 +76,14 @@ def answer(share: float, good: int, total: int) -> str:
     if good >= share * total:
         return HOLDS
     return FAILS if total - good >= share * total else DEPENDS
+
+
+def answer_of(test: TestRule, values: np.ndarray) -> str:
+    """Verdict of a test; what values close to the limit would have to decide, the machine does."""
+    near = close(test, values)
+    sure, total = int((satisfied(test, values) & ~near).sum()), len(values)
+    answers = {answer(test.share, sure + more, total) for more in range(int(near.sum()) + 1)}
+    return answers.pop() if len(answers) == 1 else MACHINE
 
 
 def evaluate(test: TestRule, tables: Tables) -> Outcome:
@@ -84,10 +97,15 @@ def evaluate(test: TestRule, tables: Tables) -> Outcome:
     spread = _range(values)
     sign = "at least" if test.compare == ">=" else "at most"
     sentence = f"{test.what}: {good} of {total} {sign} {test.threshold:g} (measured {spread})"
-    verdict = answer(test.share, good, total)
+    near = int(close(test, values).sum())
+    beside = f"{near} of {total} within a factor {test.factor:g} of it" if near else ""
+    sentence += f", {beside}" if beside else ""
+    verdict = answer_of(test, values)
     condition = ""
-    if verdict == DEPENDS:
+    if verdict in (DEPENDS, MACHINE):
         condition = f"{test.what}, {sign} {test.threshold:g}: {_broken_down(test, rows, passed)}"
+    if verdict == MACHINE:
+        condition += f" (measured {spread}; {beside}, which decides nothing)"
     return Outcome(verdict, spread, sentence, condition)
 
 
@@ -128,7 +146,7 @@ def _text(value: float) -> str:
 
 def combined(verdicts: Sequence[str]) -> str:
     """Verdict of a claim whose parts have these: it holds where all of them hold."""
-    for verdict in (UNDECIDED, FAILS, DEPENDS):
+    for verdict in (UNDECIDED, FAILS, MACHINE, DEPENDS):
         if verdict in verdicts:
             return verdict
     return HOLDS

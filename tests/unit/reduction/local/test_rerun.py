@@ -10,7 +10,7 @@ from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.local.local_step import ReducedLocalStep
 from pdrom.reduction.local.rerun import replace_group, rerun
 from pdrom.reduction.method import load_methods
-from pdrom.reduction.rerun import Rerun, displacement_norms
+from pdrom.reduction.rerun import Rerun, displacement_norms, step_norms
 from pdrom.reduction.sampling import Reduction, select
 from places import CONFIG
 
@@ -148,6 +148,21 @@ def test_replacing_what_is_not_there_names_what_is():
     scene = scene_with("spring", "strain")
     with pytest.raises(SceneError, match=r"no group 'bending' \(spring, strain\)"):
         replace_group(scene, "bending", Pushing(0.0))
+
+
+def test_steps_are_those_of_the_velocities():
+    """What a vertex moves in a frame is the time step times the velocity that the loop has then."""
+    scene = scene_with("spring", "strain")
+    loop, state = scene.stepper(scene.system, scene.groups), scene.initial_state()
+    positions, speeds = [state.positions], []
+    for frame in range(scene.config.frames):
+        state, _ = loop.step(state, frame)
+        positions.append(state.positions)
+        speeds.append(np.linalg.norm(state.velocities))
+    expected = scene.config.time_step * np.array(speeds)
+    assert (expected > 0.0).all()
+    np.testing.assert_allclose(step_norms(np.stack(positions)), expected, rtol=1e-12)
+    assert len(step_norms(np.zeros((1, 2, 3)))) == 0
 
 
 def test_displacement_norms_by_hand():

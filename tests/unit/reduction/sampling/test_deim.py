@@ -5,6 +5,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from pymor.algorithms.ei import deim as pymor_deim
+from pymor.algorithms.ei import qdeim as pymor_qdeim
 from pymor.vectorarrays.numpy import NumpyVectorSpace
 from scipy import linalg
 
@@ -170,6 +171,15 @@ def test_qdeim_does_not_depend_on_the_basis_of_the_space(size):
     assume(v.shape[0] > v.shape[1])
     q = np.linalg.qr(np.random.default_rng(size[2] + 1).standard_normal((v.shape[1],) * 2))[0]
     np.testing.assert_array_equal(qdeim_elements(v @ q, 1), qdeim_elements(v, 1))
+
+
+@settings(deadline=None)
+@given(SIZES)
+def test_qdeim_of_entries_picks_those_of_pymor(size):
+    v = orthonormal(size)
+    assume(len(v) > v.shape[1])  # a square one has no longest row
+    expected = pymor_qdeim(NumpyVectorSpace(len(v)).from_numpy(v.copy()), pod=False)[0]
+    np.testing.assert_array_equal(qdeim_elements(v, 1), expected)
 
 
 def test_qdeim_gain_is_below_that_of_the_greedy_on_average():
