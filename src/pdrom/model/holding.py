@@ -1,18 +1,23 @@
-"""Which vertices a scene holds: contradictions are refused, the numbers are logged."""
+"""Which vertices a scene holds: contradictions are refused, numbers and obstacles are logged."""
 
 import logging
 from collections.abc import Sequence
+from copy import deepcopy
 from itertools import combinations
 
 import numpy as np
 
 from pdrom.core.errors import SceneError
-from pdrom.model.effects.base import Boundary
+from pdrom.model.effects.base import Boundary, Contact, held_targets
 
 log = logging.getLogger(__name__)
 
 # Fewer vertices leave a body free to turn about a line.
 FEW = 3
+# Targets no deeper in an obstacle than this part of the extent lie on it.
+SLACK = 1e-9
+# Vertices that a message names.
+NAMED = 10
 
 
 def check_holds(boundaries: Sequence[Boundary], scene: str, frames: int) -> None:
@@ -47,3 +52,39 @@ def log_holds(boundaries: Sequence[Boundary], scene: str, vertices: int) -> None
         else:
             advice = "a list of vertices selects more"
             log.warning("%s, fewer than %d (select: %s; %s)", counted, FEW, boundary.side, advice)
+
+
+def log_obstructed(
+    boundaries: Sequence[Boundary],
+    contacts: Sequence[Contact],
+    scene: str,
+    points: np.ndarray,
+    frames: int,
+) -> None:
+    """Warn of held vertices whose targets lie inside an obstacle, where they stay.
+
+    Vertices that are taken hold of later are taken to be where obstacles have pushed the mesh at
+    rest, ``points`` (N, 3) m.
+    """
+    obstacles = [contact for contact in contacts if contact.each_alone]
+    inside, blocked = np.zeros(len(points), dtype=bool), dict[str, None]()
+    # boundaries remember where they took hold
+    boundaries, positions = deepcopy(boundaries), points.copy()
+    slack = SLACK * float(np.ptp(points, axis=0).max())
+    for frame in range(frames if obstacles and boundaries else 0):
+        held, targets = held_targets(boundaries, frame, positions)
+        positions[held] = targets
+        for obstacle in obstacles:
+            before = positions.copy()
+            obstacle.correct(positions, before)
+            pushed = held[np.linalg.norm(positions[held] - targets, axis=1) > slack]
+            positions[held] = targets
+            if len(pushed):
+                inside[pushed], blocked[obstacle.name] = True, None
+    vertices = np.flatnonzero(inside)
+    if len(vertices):
+        named = ", ".join(map(str, vertices[:NAMED])) + (", ..." if len(vertices) > NAMED else "")
+        log.warning(
+            "scene '%s': %d held vertices have targets inside '%s' and stay there: %s",
+            scene, len(vertices), "', '".join(blocked), named,
+        )  # fmt: skip

@@ -20,7 +20,7 @@ from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import Boundary, Contact, EffectConfig, Force, Start
 from pdrom.model.effects.entries import EffectConfigs, bind
 from pdrom.model.held_out import HeldOut
-from pdrom.model.holding import check_holds, log_holds
+from pdrom.model.holding import check_holds, log_holds, log_obstructed
 from pdrom.model.masses import Mass, MassConfig, vertex_masses
 from pdrom.model.mesh.checks import check_mesh
 from pdrom.model.mesh.config import MeshConfig
@@ -176,8 +176,10 @@ class Scene:
         return scene
 
     def log_holds(self) -> None:
-        """Log how many vertices each effect holds, see `pdrom.model.holding.log_holds`."""
-        log_holds(self.boundaries, self.config.name, self.mesh.vertices)
+        """Log how many vertices each effect holds, and which an obstacle wants elsewhere."""
+        name, points, frames = self.config.name, self.mesh.points, self.config.frames
+        log_holds(self.boundaries, name, len(points))
+        log_obstructed(self.boundaries, self.contacts, name, points, frames)
 
     def group(self, name: str) -> ConstraintGroup:
         """The constraint group called ``name``; SceneError if the scene does not list it."""

@@ -117,15 +117,17 @@ class Alternative(Stepper):
                     *(self.iterations, fixed, now),
                 )
             )
-        after = self._contacts(positions, velocities, q)
+        after = self._contacts(positions, velocities, q, frame)
         seconds = np.zeros(len(PHASES))
         seconds[1] = perf_counter() - started
         return after, FrameReport(np.empty(0), seconds)
 
-    def _contacts(self, positions: np.ndarray, velocities: np.ndarray, q: np.ndarray) -> State:
+    def _contacts(
+        self, positions: np.ndarray, velocities: np.ndarray, q: np.ndarray, number: int
+    ) -> State:
         """State after contacts, which set the velocity of what they move by the whole frame."""
         free = positions.copy()
-        self.space.correct(positions, q)
+        self.space.correct(positions, q, number)
         moved = (positions != free).any(axis=1)
         if moved.any():
             frame = self.time_step * self.substeps

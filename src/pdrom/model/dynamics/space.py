@@ -11,7 +11,7 @@ from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.frames import end, predict, weighted
 from pdrom.model.dynamics.iterations import CompiledIterations
 from pdrom.model.dynamics.system import GlobalSystem
-from pdrom.model.effects.base import Boundary, Contact, Force
+from pdrom.model.effects.base import Boundary, Contact, Force, held_targets, held_vertices
 
 
 class Solve(Protocol):
@@ -63,8 +63,8 @@ class Space(ABC):
         """1/(2 h^2) |M^1/2 difference|^2 in joule."""
 
     @abstractmethod
-    def correct(self, y: np.ndarray, before: np.ndarray) -> None:
-        """Contacts at the end of a frame, in place; ``before`` are its first coordinates."""
+    def correct(self, y: np.ndarray, before: np.ndarray, frame: int) -> None:
+        """Contacts at the end of ``frame``, in place; ``before`` are its first coordinates."""
 
 
 class VertexSpace(Space):
@@ -87,15 +87,7 @@ class VertexSpace(Space):
         return total
 
     def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        active = [b for b in self._boundaries if b.active(frame)]
-        if not active:
-            return np.empty(0, dtype=np.int64), np.empty((0, 3))
-        held = [b.held(frame) for b in active]
-        targets = [b.targets(frame, positions[v]) for b, v in zip(active, held, strict=True)]
-        if len(active) == 1 and (np.diff(held[0]) > 0).all():
-            return held[0], targets[0]
-        vertices, first = np.unique(np.concatenate(held), return_index=True)
-        return vertices, np.concatenate(targets)[first]
+        return held_targets(self._boundaries, frame, positions)
 
     def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
         elimination = self.system.eliminate(fixed)
@@ -126,6 +118,9 @@ class VertexSpace(Space):
         squares = np.einsum("ij,ij->i", difference, difference)
         return 0.5 * float(self.system.inertia @ squares)
 
-    def correct(self, y: np.ndarray, before: np.ndarray) -> None:
+    def correct(self, y: np.ndarray, before: np.ndarray, frame: int) -> None:
+        if not self._contacts:
+            return
+        held = held_vertices(self._boundaries, frame)
         for contact in self._contacts:
-            contact.correct(y, before)
+            contact.apply(y, before, held)

@@ -104,7 +104,7 @@ class Stepper:
         seconds[0] = perf_counter() - started
         y, objective = self._iterate(s, base, elimination, seconds, on_last_iterate)
         before = perf_counter()
-        after = self._finish(state, y)
+        after = self._finish(state, y, frame)
         seconds[3] = perf_counter() - before
         return after, FrameReport(objective, seconds)
 
@@ -189,7 +189,7 @@ class Stepper:
                 acceleration.combine(y)
         seconds[2] += perf_counter() - before
 
-    def _finish(self, state: State, y: np.ndarray) -> State:
+    def _finish(self, state: State, y: np.ndarray, frame: int) -> State:
         """State after the frame: contacts, then the velocities."""
-        self.space.correct(y, state.positions)
+        self.space.correct(y, state.positions, frame)
         return State(*self.space.end(y, state.positions, self.time_step))

@@ -158,8 +158,38 @@ def held_vertices(boundaries: Sequence[Boundary], frame: int) -> np.ndarray:
     return np.unique(np.concatenate(held)) if held else np.empty(0, dtype=np.int64)
 
 
+def held_targets(
+    boundaries: Sequence[Boundary], frame: int, positions: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The vertices that are held in ``frame``, as `held_vertices`, and their targets (n, 3) m.
+
+    ``positions`` (N, 3) m are those at the frame's beginning.
+    """
+    active = [b for b in boundaries if b.active(frame)]
+    if not active:
+        return np.empty(0, dtype=np.int64), np.empty((0, 3))
+    held = [b.held(frame) for b in active]
+    targets = [b.targets(frame, positions[v]) for b, v in zip(active, held, strict=True)]
+    if len(active) == 1 and (np.diff(held[0]) > 0).all():
+        return held[0], targets[0]
+    vertices, first = np.unique(np.concatenate(held), return_index=True)
+    return vertices, np.concatenate(targets)[first]
+
+
 class Contact(Effect):
-    """Corrects positions at the end of a frame."""
+    """Corrects positions at the end of a frame. Held vertices have infinite mass: none moves."""
+
+    each_alone: ClassVar[bool] = True
+    """Whether a vertex is corrected by itself, whatever the others do."""
+
+    def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
+        """`correct` all vertices but those ``held`` (n,), in place.
+
+        A contact that shares a correction between vertices overrides this.
+        """
+        targets = positions[held]
+        self.correct(positions, before)
+        positions[held] = targets
 
     @abstractmethod
     def correct(self, positions: np.ndarray, before: np.ndarray) -> None:

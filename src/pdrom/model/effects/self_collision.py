@@ -28,9 +28,9 @@ class SelfCollision(Contact):
     """Pairs of vertices farther apart at rest than the thickness end no frame closer than it.
 
     Close pairs (found by a k-d tree) are moved apart along the line between them, each vertex by
-    the share of its inverse mass: momentum is kept. The sweeps over the pairs, in the order of
-    their vertices, are repeated until every distance is at least `ENOUGH` of the thickness. Where
-    many vertices are crowded together that may take further frames.
+    the share of its inverse mass, which is zero for a held one: otherwise momentum is kept. The
+    sweeps over the pairs, in the order of their vertices, are repeated until every distance is at
+    least `ENOUGH` of the thickness. Where many are crowded together that may take further frames.
 
     A pair that changed sides during the frame is put back. Vertices stand for the surface:
     nothing slips between them as long as the thickness is above 0.58 edge lengths and no pair moves
@@ -44,6 +44,7 @@ class SelfCollision(Contact):
         thickness: Annotated[float, Field(ge=MIN_LENGTH, le=MAX_LENGTH)]
 
     in_subspace = False
+    each_alone = False
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
@@ -58,10 +59,16 @@ class SelfCollision(Contact):
             )  # fmt: skip
 
     def correct(self, positions: np.ndarray, before: np.ndarray) -> None:
+        self.apply(positions, before, np.empty(0, dtype=np.int64))
+
+    def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
+        inverse_masses = self._inverse_masses.copy()
+        inverse_masses[held] = 0.0
         for _ in range(SEARCHES):
             pairs = self._pairs(positions)
+            pairs = pairs[inverse_masses[pairs].any(axis=1)]
             closest = _separate(
-                positions, before, pairs, self._inverse_masses, self._thickness, ENOUGH, SWEEPS
+                positions, before, pairs, inverse_masses, self._thickness, ENOUGH, SWEEPS
             )
             if closest >= ENOUGH * self._thickness:
                 return

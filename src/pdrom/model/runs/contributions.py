@@ -27,10 +27,10 @@ class _Watched:
         self.name, self._contact = contact.name, contact
         self.moved = np.zeros(())
 
-    def correct(self, positions: np.ndarray, before: np.ndarray) -> None:
+    def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
         """What the contact does."""
         wanted = positions.copy()
-        self._contact.correct(positions, before)
+        self._contact.apply(positions, before, held)
         self.moved = positions - wanted
 
 

@@ -149,4 +149,4 @@ class ConvergedStepper(Stepper):
         self.evaluations.append(end.evaluations)
         if on_last_iterate is not None:
             on_last_iterate(end.y)
-        return self._finish(state, end.y), FrameReport(np.empty(0), np.zeros(4))
+        return self._finish(state, end.y, frame), FrameReport(np.empty(0), np.zeros(4))

@@ -14,7 +14,7 @@ from pdrom.core.errors import NotReducibleError, SolverError
 from pdrom.model.dynamics.space import Solve, Space
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.dynamics.system import require_accurate
-from pdrom.model.effects.base import Boundary, Contact, Effect
+from pdrom.model.effects.base import Boundary, Contact, Effect, held_vertices
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.columns import Columns
 
@@ -110,9 +110,12 @@ class ReducedSpace(Space):
     def inertia_energy(self, difference: np.ndarray) -> float:
         return 0.5 * float(np.sum(difference * (self.inertia_matrix @ difference)))
 
-    def correct(self, y: np.ndarray, before: np.ndarray) -> None:
+    def correct(self, y: np.ndarray, before: np.ndarray, frame: int) -> None:
+        if not self._contacts:
+            return
+        held = held_vertices([b.boundary for b in self._boundaries], frame)
         for contact in self._contacts:
-            contact.correct(y, before)
+            contact.correct(y, before, held)
 
 
 def _require_reducible(effects: Sequence[Effect]) -> None:
@@ -204,18 +207,20 @@ class _ReducedContact:
     def __init__(self, contact: Contact, columns: Columns, scene: Scene) -> None:
         self._contact = contact
         n = scene.mesh.vertices
-        probes = np.unique(np.linspace(0, n - 1, min(PROBES, n)).round().astype(np.int64))
-        self._probes = np.ascontiguousarray(columns.B[probes])
+        self._vertices = np.unique(np.linspace(0, n - 1, min(PROBES, n)).round().astype(np.int64))
+        self._probes = np.ascontiguousarray(columns.B[self._vertices])
         self._columns = columns
         weighted = columns.B * scene.masses[:, None]
         self._project = _mass_solve(columns, scene.masses, weighted.T)
 
-    def correct(self, y: np.ndarray, before: np.ndarray) -> None:
+    def correct(self, y: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
         probed = self._probes @ y
         corrected = probed.copy()
-        self._contact.correct(corrected, self._probes @ before)
+        held_probes = np.flatnonzero(np.isin(self._vertices, held))
+        self._contact.apply(corrected, self._probes @ before, held_probes)
         if np.array_equal(probed, corrected):
             return
+        # columns of held vertices are zero elsewhere: their coordinates stay, too
         full = self._columns.B @ y
-        self._contact.correct(full, self._columns.B @ before)
+        self._contact.apply(full, self._columns.B @ before, held)
         y[...] = self._project @ full

@@ -1,0 +1,109 @@
+"""Held vertices have infinite mass: no contact moves them, in any coordinates."""
+
+import logging
+
+import numpy as np
+import pytest
+
+from builders import make_scene
+from pdrom.model.runs.full_order import trajectory
+from pdrom.reduction.subspace.model import SubspaceModel, make_columns
+
+SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "lift": 1.0}
+BASE = ({"effect": "gravity"}, {"effect": "strain", "weight": 1e4})
+PINS = {"effect": "pins", "select": "bottom", "until": 12}
+# each has the lowest row of the sheet, at y = 0.6, in its inside
+OBSTACLES = {
+    "floor": {"effect": "floor", "height": 0.7},
+    "plane": {"effect": "plane", "point": [0, 0.7, 0], "normal": [0.1, 1, 0], "friction": 0.5},
+    "sphere": {"effect": "sphere", "centre": [0, 0.0, 0], "radius": 0.9},
+    "box": {"effect": "box", "lower": [-2, 0, -1], "upper": [2, 0.7, 1]},
+}
+FLOOR = OBSTACLES["floor"]
+
+
+def warnings_of(scene, caplog) -> list[str]:
+    with caplog.at_level(logging.WARNING, logger="pdrom"):
+        scene.log_holds()
+    return [record.getMessage() for record in caplog.records]
+
+
+@pytest.mark.parametrize("name", OBSTACLES)
+def test_pins_inside_an_obstacle_hold_and_let_go_at_rest(name):
+    scene = make_scene(*BASE, PINS, OBSTACLES[name], mesh=SHEET)
+    held = scene.boundaries[0].vertices
+    loop, state = scene.stepper(), scene.initial_state()
+    for frame in range(12):
+        state, _ = loop.step(state, frame)
+        assert np.array_equal(state.positions[held], scene.mesh.points[held])
+        assert not state.velocities[held].any()
+    state, _ = loop.step(state, 12)
+    assert (state.positions[held] != scene.mesh.points[held]).any()
+
+
+@pytest.mark.parametrize("name", OBSTACLES)
+def test_pins_hold_in_a_subspace(name):
+    scene = make_scene(*BASE, PINS, OBSTACLES[name], mesh=SHEET)
+    held, rest = scene.boundaries[0].vertices, scene.mesh.points
+    model = SubspaceModel("pod", make_columns(scene, trajectory(scene)[1:], "pod", 4))
+    loop, state = model.loop(scene)
+    for frame in range(12):
+        state, _ = loop.step(state, frame)
+        assert model.positions(state.positions)[held] == pytest.approx(rest[held], abs=1e-12)
+        assert model.positions(state.velocities)[held] == pytest.approx(0.0, abs=1e-10)
+
+
+def test_a_collision_moves_only_what_is_free(rng):
+    """Close pairs with one held end: the other end gets the whole distance."""
+    collision = {"effect": "self_collision", "thickness": 0.3}
+    scene = make_scene(*BASE, PINS, collision, mesh=SHEET)
+    (contact,), held = scene.contacts, scene.boundaries[0].vertices
+    before = scene.mesh.points + 0.05 * rng.standard_normal(scene.mesh.points.shape)
+    positions = before.copy()
+    near = held + 2
+    positions[near] = positions[held] + [0.0, 0.02, 0.01]
+    ended = positions.copy()
+    contact.apply(ended, before, held)
+    assert np.array_equal(ended[held], positions[held])
+    gaps = np.linalg.norm(ended[near] - ended[held], axis=1)
+    assert gaps.min() >= 0.9 * 0.3
+    contact.correct(positions, before)
+    assert not np.array_equal(ended[held], positions[held])
+
+
+@pytest.mark.parametrize("name", OBSTACLES)
+def test_targets_inside_an_obstacle_are_named_in_one_line(name, caplog):
+    scene = make_scene(*BASE, PINS, OBSTACLES[name], mesh=SHEET)
+    ids = ", ".join(str(i) for i in scene.boundaries[0].vertices)
+    (message,) = warnings_of(scene, caplog)
+    start = f"scene 'test': 6 held vertices have targets inside '{name}' and stay there: "
+    assert message == start + ids
+
+
+def test_a_handle_that_moves_into_an_obstacle_later_is_named(caplog):
+    down = {"effect": "translate", "select": "bottom", "offset": [0, -0.3, 0], "over": 9}
+    floor = {**FLOOR, "height": 0.5}
+    (message,) = warnings_of(make_scene(*BASE, {**down, "start": 3}, floor, mesh=SHEET), caplog)
+    assert "6 held vertices have targets inside 'floor'" in message
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        [PINS, {**FLOOR, "height": 0.6}],
+        [PINS, {**OBSTACLES["plane"], "point": [0, 0.6, 0], "normal": [0, 0.3, 0]}],
+        [{**PINS, "start": 2}, FLOOR],
+        [PINS, {"effect": "self_collision", "thickness": 0.3}],
+    ],
+    ids=["on the floor", "on a plane", "pushed out before", "no obstacle"],
+)
+def test_targets_that_nothing_obstructs_are_not_named(effects, caplog):
+    assert warnings_of(make_scene(*BASE, *effects, mesh=SHEET), caplog) == []
+
+
+def test_looking_for_obstacles_leaves_the_run_as_it_is():
+    poke = {"effect": "poke", "over": 4, "rest": 1, "count": 2, "amplitude": 0.4}
+    poke["avoid"] = ["bottom"]
+    quiet, looked = (make_scene(*BASE, PINS, poke, FLOOR, mesh=SHEET) for _ in range(2))
+    looked.log_holds()
+    assert np.array_equal(trajectory(quiet), trajectory(looked))
