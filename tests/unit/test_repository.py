@@ -5,10 +5,11 @@ import subprocess
 from pathlib import Path
 
 import pytest
+import yaml
 
 from pdrom.core.yamlfile import read_yaml
 from pdrom.pipeline.tables import all_tables
-from pdrom.report.codecheck import FILE, codecheck
+from pdrom.report.codecheck import FILE, SPECIFICATION, codecheck
 from places import ROOT
 
 LARGEST = 300_000
@@ -61,8 +62,32 @@ def test_the_manifest_for_codecheckers_is_that_of_the_declarations(monkeypatch):
     monkeypatch.chdir(ROOT)
     assert codecheck(all_tables().values()) == FILE.read_text("utf-8")
     content = read_yaml(FILE)
-    assert {"version", "manifest", "paper", "codechecker", "report"} <= set(content)
     assert all(set(entry) == {"file", "comment"} for entry in content["manifest"])
+
+
+def test_the_manifest_for_codecheckers_follows_version_2():
+    """https://raw.githubusercontent.com/codecheckers/register/master/rules-2.0.yml"""
+    assert (ROOT / FILE).read_text("utf-8").startswith("---\n")
+    content = read_yaml(ROOT / FILE)
+    assert content["version"] == SPECIFICATION
+    # the codechecker fills them in
+    assert {"codechecker", "report", "summary", "certificate"} <= set(content)
+    assert content["paper"]["title"]
+    assert all(author["name"] for author in content["paper"]["authors"])
+    assert "Projective Dynamics. Preprint, Max Planck Institute" in content["paper"]["reference"]
+    assert not any(Path(entry["file"]).is_absolute() for entry in content["manifest"])
+
+
+def test_an_author_has_the_orcid_of_the_citation_without_its_address(tmp_path, monkeypatch):
+    citation = (ROOT / "CITATION.cff").read_text("utf-8")
+    known = citation.replace(
+        "developers\n", "developers\n    orcid: https://orcid.org/0000-0002-1825-0097\n"
+    )
+    (tmp_path / "paper").symlink_to(ROOT / "paper")
+    (tmp_path / "CITATION.cff").write_text(known, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    (author,) = yaml.safe_load(codecheck([]))["paper"]["authors"]
+    assert author == {"name": "The pdrom developers", "ORCID": "0000-0002-1825-0097"}
 
 
 def test_the_record_for_zenodo_is_that_of_the_citation():
@@ -71,3 +96,15 @@ def test_the_record_for_zenodo_is_that_of_the_citation():
     for key in ("title", "version", "license", "keywords"):
         assert record[key] == citation[key]
     assert record["creators"] == citation["authors"]
+
+
+def test_the_catalogue_of_snakemake_workflows_finds_what_it_asks_for():
+    """Conditions: https://snakemake.github.io/snakemake-workflow-catalog/docs/about."""
+    readme = (ROOT / "README.md").read_text("utf-8").lower()
+    assert "snakemake" in readme
+    assert "workflow" in readme
+    for name in ("workflow/Snakefile", "config/README.md"):
+        assert (ROOT / name).is_file()
+    assert list((ROOT / "workflow" / "rules").glob("*.smk"))
+    usage = read_yaml(ROOT / ".snakemake-workflow-catalog.yml")["usage"]
+    assert set(usage) <= {"mandatory-flags", "software-stack-deployment", "report"}

@@ -1,6 +1,7 @@
 """The manifest that a codechecker reads, written from the declarations of figures and tables.
 
-Format: https://codecheck.org.uk/spec/config/1.0/. What only the codechecker knows is left empty.
+Format: https://codecheck.org.uk/spec/config/2.0/, of 11 September 2026. What only the codechecker
+knows is left empty; so is an ORCID, which the format asks for, of an author who has none.
 """
 
 import re
@@ -9,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from pybtex.database import parse_file
+from pybtex.richtext import Text
 
 from pdrom.core.paths import FIGURE, RESULTS, TABLE
 from pdrom.core.yamlfile import read_yaml
@@ -18,7 +21,11 @@ from pdrom.report.words.markup import to_plain
 from pdrom.tables.declaration import Table
 
 FILE = Path("codecheck.yml")
+SPECIFICATION = "https://codecheck.org.uk/spec/config/2.0/"
+BIBLIOGRAPHY, PREPRINT = Path("paper/references.bib"), "Monem25DEIM"
+ORCID = "https://orcid.org/"  # how CITATION.cff begins one
 HEAD = """\
+---
 # Written by: .venv/bin/python -m pdrom.pipeline.tables
 # A codechecker runs ./reproduce, compares the files below (./reproduce verify),
 # and fills in what is empty.
@@ -30,7 +37,7 @@ def codecheck(tables: Iterable[Table[Any]]) -> str:
     """Content of ``codecheck.yml``, in the folder of the project."""
     title = _TITLE.search(Path("paper/main.tex").read_text(encoding="utf-8"))
     assert title, "the manuscript has no title"
-    authors = [{"name": each["name"]} for each in read_yaml(Path("CITATION.cff"))["authors"]]
+    authors = [_author(each) for each in read_yaml(Path("CITATION.cff"))["authors"]]
     numbers = figure_numbers(Path())
     figures = [
         _entry(FIGURE.at(RESULTS, name=name), _label(name, numbers[name]), declared.title)
@@ -38,8 +45,8 @@ def codecheck(tables: Iterable[Table[Any]]) -> str:
     ]
     made = [_entry(TABLE.at(RESULTS, name=t.name), f"Table {t.name}", t.title) for t in tables]
     content = {
-        "version": "https://codecheck.org.uk/spec/config/1.0/",
-        "paper": {"title": title[1], "authors": authors, "reference": None},
+        "version": SPECIFICATION,
+        "paper": {"title": title[1], "authors": authors, "reference": _preprint()},
         "manifest": [{"file": "paper/main.pdf", "comment": "The manuscript"}, *figures, *made],
         "codechecker": [{"name": None, "ORCID": None}],
         "report": None,
@@ -49,6 +56,23 @@ def codecheck(tables: Iterable[Table[Any]]) -> str:
         "summary": None,
     }
     return HEAD + yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110)
+
+
+def _author(entry: dict[str, str]) -> dict[str, str]:
+    known = {"ORCID": entry["orcid"].removeprefix(ORCID)} if "orcid" in entry else {}
+    return {"name": entry["name"], **known}
+
+
+def _preprint() -> str:
+    """The paper that is rebuilt, in words: it has no address that lasts."""
+    entry = parse_file(str(BIBLIOGRAPHY)).entries[PREPRINT]
+    people = (
+        [*each.first_names, *each.middle_names, *each.prelast_names, *each.last_names]
+        for each in entry.persons["author"]
+    )
+    authors = ", ".join(" ".join(names) for names in people)
+    title, note = (str(Text.from_latex(entry.fields[key])) for key in ("title", "note"))
+    return f"{authors}: {title}. {note}"
 
 
 def _entry(file: str, label: str, title: str) -> dict[str, str]:
