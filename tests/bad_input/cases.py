@@ -304,6 +304,8 @@ MESH_CASES = [
     mesh_path("mesh path that leaves it in the middle", "meshes/../../x.obj", "..", "below"),
     mesh_path("mesh path with a zero byte", "a\\0b.obj", "printable"),
     mesh_path("empty mesh path", "", "mesh.file.path = ''", "printable"),
+    mesh_path("long name of a mesh file", 130 * "é" + ".obj", "mesh.file.path = 'ééé", "255 bytes"),
+    mesh_path("long path of a mesh file", 600 * "folder/" + "a.obj", "mesh.file.path", "4095 bytes"),
     mesh_path("mesh path of a folder", "meshes", "meshes", "no such mesh file"),
     mesh_path("link out of the project", "meshes/out.obj", "meshes/out.obj", "leads out",
               **{"meshes/out.obj": LinkTo("/etc/passwd")}),

@@ -1,10 +1,14 @@
 """Names that become parts of paths, checked with a sentence a user can act on."""
 
+import os
 import re
+from pathlib import PurePath
 from typing import Annotated
 
 from pydantic import AfterValidator
 
+# What file systems and system calls take, in bytes.
+MAX_NAME, MAX_PATH = 255, 4095
 _SCENE_NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
 
 
@@ -15,6 +19,17 @@ def _scene_name(name: str) -> str:
             "underscores, 64 characters at most"
         )
     return name
+
+
+def check_lengths(path: str) -> None:
+    """ValueError for a path, or a name in it, that is longer than systems take."""
+    if len(os.fsencode(path)) > MAX_PATH:
+        raise ValueError(f"a path of at most {MAX_PATH} bytes is required")
+    for name in PurePath(path).parts:
+        if len(os.fsencode(name)) > MAX_NAME:
+            raise ValueError(
+                f"names of at most {MAX_NAME} bytes are required, found '{name[:20]}...'"
+            )
 
 
 SceneName = Annotated[str, AfterValidator(_scene_name)]

@@ -48,7 +48,7 @@ def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folde
     name = _name(files, pairs)
     if not _NAME.fullmatch(name):
         raise ConfigurationError(
-            f"{KEY} = '{name}': no name of a folder; letters, digits, _ and - are allowed "
+            f"{KEY} = '{name}': no name of a folder; letters, digits, _ and - are allowed, 60 at most "
             f"(set the key {KEY} where the name of the configuration file is none)"
         )
     results = f"{RESULTS}/studies/{name}"

@@ -27,6 +27,11 @@ class Outer(BaseModel):
     other: str = Field(default="x", alias="another")
 
 
+def test_a_name_that_no_system_takes_is_named(tmp_path):
+    with pytest.raises(ConfigurationError, match=r"é\.yaml: cannot be read \(File name too long\)"):
+        read_yaml(tmp_path / f"{130 * 'é'}.yaml")
+
+
 GOOD = {"name": "n", "inner": {"size": 1}}
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from pdrom.core.errors import MeshError
+from pdrom.core.names import check_lengths
 from pdrom.core.yamlfile import Length, PositiveLength
 from pdrom.model.mesh.checks import check_mesh, check_range
 from pdrom.model.mesh.files import read_mesh_file
@@ -108,6 +109,7 @@ class MeshFile(MeshModel):
             raise ValueError("a path below the project's folder is required, without '..'")
         if not value.strip() or not value.isprintable():
             raise ValueError("a path of printable characters is required")
+        check_lengths(value)
         return value
 
     def coarsened(self, factor: float) -> Self:
