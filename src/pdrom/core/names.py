@@ -27,9 +27,7 @@ def check_lengths(path: str) -> None:
         raise ValueError(f"a path of at most {MAX_PATH} bytes is required")
     for name in PurePath(path).parts:
         if len(os.fsencode(name)) > MAX_NAME:
-            raise ValueError(
-                f"names of at most {MAX_NAME} bytes are required, found '{name[:20]}...'"
-            )
+            raise ValueError(f"names of at most {MAX_NAME} bytes are required")
 
 
 SceneName = Annotated[str, AfterValidator(_scene_name)]

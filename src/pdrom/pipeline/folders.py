@@ -48,8 +48,8 @@ def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folde
     name = _name(files, pairs)
     if not _NAME.fullmatch(name):
         raise ConfigurationError(
-            f"{KEY} = '{name}': no name of a folder; letters, digits, _ and - are allowed, 60 at most "
-            f"(set the key {KEY} where the name of the configuration file is none)"
+            f"{KEY} = '{name}': no name of a folder; letters, digits, _ and - are allowed, "
+            f"60 at most (set the key {KEY} where the name of the configuration file is none)"
         )
     results = f"{RESULTS}/studies/{name}"
     return Folders(results, f"{results}/paper/main.pdf")
