@@ -41,5 +41,4 @@ def figure_arguments(arguments: Sequence[str]) -> list[str]:
 def described(target: str) -> str:
     """A target with both numbers, if it is a figure that has one; else the target itself."""
     word, _, name = target.partition(" ")
-    numbers = figure_numbers(Path()).get(name) if word == WORD else None
-    return f"{target} ({numbers.words})" if numbers and numbers.words else target
+    return f"{WORD} {figure_numbers(Path())[name].label(name)}" if word == WORD else target

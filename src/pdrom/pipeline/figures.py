@@ -32,6 +32,7 @@ UNNUMBERED = "–"
 class FigureJob:
     """One figure: files that it reads and writes, what is drawn, and how it is presented.
 
+    label : name, with its numbers in the manuscript and in the preprint
     category, labels : where the report lists it: the preprint's figures by their number there, then
         this study's
     rst : title and caption for the report, in which no sign has a meaning
@@ -44,6 +45,7 @@ class FigureJob:
     png: str
     log: str
     order: Order
+    label: str
     category: str
     labels: dict[str, str]
     rst: str
@@ -129,6 +131,7 @@ def _job(
         png=FIGURE_PICTURE.at(results, name=name),
         log=f"{results}/logs/figures/{name}.log",
         order=order,
+        label=numbers.label(name),
         category="Figures of this study" if numbers.preprint is None else "Figures of the preprint",
         labels=_labels(name, numbers, order.title),
         rst=f"**{to_rst(title)}.** {to_rst(caption)}",

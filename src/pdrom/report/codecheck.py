@@ -15,7 +15,7 @@ from pybtex.richtext import Text
 
 from pdrom.core.paths import FIGURE, RESULTS, TABLE
 from pdrom.core.yamlfile import read_yaml
-from pdrom.report.figure_numbers import Numbers, figure_numbers
+from pdrom.report.figure_numbers import figure_numbers
 from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.words.markup import to_plain
 from pdrom.tables.declaration import Table
@@ -40,7 +40,7 @@ def codecheck(tables: Iterable[Table[Any]]) -> str:
     authors = [_author(each) for each in read_yaml(Path("CITATION.cff"))["authors"]]
     numbers = figure_numbers(Path())
     figures = [
-        _entry(FIGURE.at(RESULTS, name=name), _label(name, numbers[name]), declared.title)
+        _entry(FIGURE.at(RESULTS, name=name), f"Figure {numbers[name].label(name)}", declared.title)
         for name, declared in declarations().items()
     ]
     made = [_entry(TABLE.at(RESULTS, name=t.name), f"Table {t.name}", t.title) for t in tables]
@@ -77,7 +77,3 @@ def _preprint() -> str:
 
 def _entry(file: str, label: str, title: str) -> dict[str, str]:
     return {"file": file, "comment": f"{label}: {to_plain(title)}"}
-
-
-def _label(name: str, numbers: Numbers) -> str:
-    return f"Figure {name} ({numbers.words})" if numbers.words else f"Figure {name}"

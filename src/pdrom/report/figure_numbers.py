@@ -24,6 +24,10 @@ class Numbers:
         places = {"main.pdf": self.manuscript, "the preprint": self.preprint}
         return ", ".join(f"figure {n} of {place}" for place, n in places.items() if n is not None)
 
+    def label(self, name: str) -> str:
+        """Name of the figure with its numbers behind it, if it has one."""
+        return f"{name} ({self.words})" if self.words else name
+
 
 def figure_numbers(root: Path) -> dict[str, Numbers]:
     """Both numbers of every figure by name, from the manuscript's source below ``root``.

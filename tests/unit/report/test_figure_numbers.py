@@ -26,7 +26,8 @@ def test_figures_are_numbered_as_the_source_places_them(tmp_path):
     assert numbers == {"ladder": 1, "bar_runs": 2, "strain_runs": 3, "scaling": 4}
     assert found["strain_runs"].words == "figure 3 of main.pdf, figure 7 of the preprint"
     assert found["singular_values"].words == "figure 9 of the preprint"
-    assert Numbers(None, None).words == ""
+    assert Numbers(None, None).label("a") == "a"
+    assert Numbers(4, None).label("a") == "a (figure 4 of main.pdf)"
     section.unlink()
     with pytest.raises(PaperError, match=r"no file .*a\.tex"):
         figure_numbers(tmp_path)

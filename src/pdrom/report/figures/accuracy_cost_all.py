@@ -15,9 +15,10 @@ FIGURE = Declaration(
         "Error within the horizon against the time per frame, both relative to the scene's own "
         "full-order run, scenes by their constraint group. A colour is a family of models, a "
         "marker one of its members (one for all tolerances; hollow: in a subspace of skinning "
-        "weights), a line the best trade-offs within the family; the lines of the full-order run are its time and its own error. Arrows on the rim are errors outside the "
-        "axis: where several groups are active, the reduction of a weak one changes next to "
-        "nothing. Crosses are runs that blew up before they had an error."
+        "weights), a line the best trade-offs within the family; the lines of the full-order run "
+        "are its time and its own error. Arrows on the rim are errors outside the axis: where "
+        "several groups are active, the reduction of a weak one changes next to nothing. Crosses "
+        "are runs that blew up before they had an error."
     ),
     reads=(TableOf("accuracy_cost"), TableOf("reduced_reruns")),
     options=Options,

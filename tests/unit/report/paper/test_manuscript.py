@@ -162,6 +162,7 @@ def test_the_same_inputs_give_the_same_bytes_in_every_folder(tmp_path):
 def test_the_pdf_has_the_title_and_the_authors_of_the_manuscript():
     title = re.search(r"\\title\{([^\\}]*)", SOURCE)
     author = re.search(r"\\author\{([^}]*)\}", SOURCE)
-    assert title and author
+    assert title
+    assert author
     assert re.search(rf"\\hypersetup\{{\s*pdftitle=\{{{re.escape(title[1])}\}}", SOURCE)
     assert rf"pdfauthor={{{author[1]}}}" in SOURCE
