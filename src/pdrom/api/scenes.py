@@ -59,7 +59,8 @@ def build_scene(folder: str | os.PathLike[str] = ".", mesh: Any = None, **keys: 
         return bound(validate(SceneConfig, named, source), file_path(folder), source)
     if len(mesh) != 2:
         raise ConfigurationError(f"{source}: mesh of {len(mesh)} parts, required: (points, cells)")
-    made = given_mesh(*mesh, f"{source}: mesh")
+    points, cells = mesh
+    made = given_mesh(points, cells, f"{source}: mesh")
     return Scene.build(validate(SceneConfig, named | {"mesh": GivenMesh.of(made)}, source), made)
 
 
