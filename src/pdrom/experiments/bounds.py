@@ -91,15 +91,21 @@ def _reductions(settings: Settings, inputs: Inputs) -> Iterator[tuple[File, Redu
                 yield file, load_reduction(basis, file.path, spec, r)
 
 
+def compliance(scene: Scene) -> Compliance | None:
+    """Compliance of a scene; None, with a warning why, outside of the theorem's premise."""
+    reason = outside(scene)
+    if reason is None:
+        return Compliance.of(scene)
+    log.warning("scene '%s': no bounds: %s", scene.config.name, reason)
+    return None
+
+
 class _Case:
     """A scene with its compliance, the states at which it is linearised, and linear runs."""
 
     def __init__(self, scene: Scene, positions: np.ndarray, before: int) -> None:
         self._scene = scene
-        reason = outside(scene)
-        if reason is not None:
-            log.warning("scene '%s': no bounds: %s", scene.config.name, reason)
-        self._compliance = None if reason else Compliance.of(scene)
+        self._compliance = compliance(scene)
         self._largest = _largest(scene)
         self._extents: dict[str, float] = {}
         self._tangents = list(_tangents(scene, positions, before))

@@ -25,7 +25,10 @@ _KEYS = ["scene", "group", "method", "r"]
             number("reach", "bound of the static displacement by the projections, in rest extents"),
         ),
         number("growth", "bound of the dynamic displacement over it, over the frames of the run"),
-        number("lasting_growth", "the same for ever, with the vertices that are held last"),
+        number(
+            "lasting_growth",
+            "the same for ever, with the vertices that are held last; inf if none is proved",
+        ),
         compared(
             "gain",
             number(
@@ -55,7 +58,8 @@ def bounds(parts: list[File], reruns: pd.DataFrame) -> pd.DataFrame:
 
     contraction and spectral_radius are the largest of two states of the full-order run; empty where
     several groups act, and for scenes too large for dense matrices. The bounds need that no
-    contact acts and are empty where a group has no bounded projections, or the method clips its
+    contact acts, which is not looked at, and are empty where the scene is outside of the rest of
+    the premise (`pdrom.model.premise`; the job's log says why), or the method clips its
     coefficients.
     """
     known = joined(parts)

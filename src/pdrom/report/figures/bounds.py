@@ -13,7 +13,8 @@ FIGURE = Declaration(
     title="Bounds known before a run",
     caption=(
         "Left: the largest extent of every run against its a-priori bound (theorem 1), both in "
-        "rest extents. On the line they are equal; no dot may lie above it. Ringed: what the study "
+        "rest extents. On the line they are equal; where no contact acts, no dot may lie above it. "
+        "Ringed: what the study "
         "calls a blow-up. Right: the error of every run whose basis suffices "
         "against the contraction number of its iteration, over all scenes with a single group. "
         "Left of the dotted line an error shrinks in every iteration. Dashed: the error from "
