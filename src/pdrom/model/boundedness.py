@@ -71,9 +71,11 @@ def held_sets(scene: Scene) -> list[np.ndarray]:
 
 
 def kept_velocity(scene: Scene) -> np.ndarray:
-    """What a frame leaves of a velocity, D = 1 - h c, (N,); every force has its rate c."""
+    """What a frame leaves of a velocity, D = 1 - h c, (N,); ValueError for a force without rate."""
     rates = np.zeros(scene.mesh.vertices)
     for force in scene.forces:
+        if force.rate is None:
+            raise ValueError(f"the force '{force.name}' has no rate")
         rates += force.rate
     return 1.0 - scene.config.time_step * rates
 
