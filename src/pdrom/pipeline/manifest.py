@@ -104,17 +104,27 @@ def read_manifest(results: str) -> Manifest:
         raise StorageError(f"{path}: {fault}") from error
 
 
-def study_files(plan: Plan, folders: Folders) -> Iterator[str]:
-    """Files on the disk that belong to a study: its own, and what was asked for beside them."""
-    own = {
+def own_files(plan: Plan, folders: Folders) -> set[str]:
+    """Files that a whole run of a study makes."""
+    return {
         folders.manuscript, paths.MACHINE.at(plan.results), *plan.paper.inputs, *plan.tables.paths,
         *plan.figures, *(job.png for job in plan.figure_jobs.values()),
         *(path for place in HELD for path in paths_of(plan.study, place, plan.results)),
     }  # fmt: skip
-    yield from (path for path in own if Path(path).is_file())
+
+
+def study_files(plan: Plan, folders: Folders) -> Iterator[str]:
+    """Files on the disk that belong to a study: its own, and what was asked for beside them."""
+    yield from (path for path in own_files(plan, folders) if Path(path).is_file())
+    yield from asked_for(_visible(folders.results), plan, folders)
+
+
+def asked_for(found: Iterable[str], plan: Plan, folders: Folders) -> Iterator[str]:
+    """Those of some paths that a target may name beside the study's own files."""
+    own = own_files(plan, folders)
     scenes, methods = set(scene_names(plan.root)), set(plan.study.methods)
-    for path in _visible(folders.results):
-        if path not in own and _asked_for(path, folders.results, scenes, methods):
+    for path in found:
+        if path not in own and _is_target(path, folders.results, scenes, methods):
             yield path
 
 
@@ -126,7 +136,7 @@ def _visible(results: str) -> Iterator[str]:
         yield from (f"{folder}/{name}" for name in names if not name.startswith("."))
 
 
-def _asked_for(path: str, results: str, scenes: set[str], methods: set[str]) -> bool:
+def _is_target(path: str, results: str, scenes: set[str], methods: set[str]) -> bool:
     """Whether a target may name the file: something of a scene that there is."""
     for place in PLACES:
         try:

@@ -20,10 +20,10 @@ _KEYS = ["scene", "group", "method", "r"]
     columns=(
         text("split", "motion of the runs: train, heldout"),
         text("alarm", "what gives it: trained-range, estimate"),
-        number("threshold", "largest estimate that is no alarm"),
-        compared("tally", integer("runs", "runs with projections alone reduced")),
+        compared("exact", number("threshold", "largest estimate that is no alarm")),
+        compared("share", integer("runs", "runs with projections alone reduced")),
         compared(
-            "tally",
+            "share",
             integer("failed", f"runs among them that blow up or have an error above {FAILED:g}"),
         ),
         compared("share", number("detected_share", "failed runs with an alarm before the horizon")),

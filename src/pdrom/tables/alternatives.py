@@ -10,7 +10,7 @@ from pdrom.tables.declaration import compared, flag, integer, number, table, tex
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import ELEMENTS_SAMPLED, MS_PER_FRAME, SCENE, VERTICES, K
 
-STIFFNESS = number("stiffness", "factor on all weights of the scene")
+STIFFNESS = compared("exact", number("stiffness", "factor on all weights of the scene"))
 SUBSTEPS = integer("substeps", "steps that a frame is divided into")
 ITERATIONS = integer("iterations", "iterations of each substep")
 
@@ -19,7 +19,7 @@ ITERATIONS = integer("iterations", "iterations of each substep")
     title="Error and time of the alternatives to projective dynamics",
     columns=(
         SCENE,
-        number("factor", "on the vertices along a side of the scene's own mesh"),
+        compared("exact", number("factor", "on the vertices along a side of the scene's own mesh")),
         VERTICES,
         STIFFNESS,
         text("method", f"how a frame is solved; {CONVERGED}: to the end; {REDUCED}: reduced"),
@@ -28,7 +28,7 @@ ITERATIONS = integer("iterations", "iterations of each substep")
         K,
         ELEMENTS_SAMPLED,
         integer("frames", "frames that errors are taken over"),
-        compared("run", flag("finite", "no frame blew up")),
+        compared("error", flag("finite", "no frame blew up")),
         MS_PER_FRAME,
         number("error_implicit", "error against the converged implicit step of the scene"),
         number("error_continuous", "error against the motion in continuous time: the total error"),

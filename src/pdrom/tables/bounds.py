@@ -21,7 +21,7 @@ _KEYS = ["scene", "group", "method", "r"]
         METHOD,
         R,
         compared(
-            "gain",
+            "value",
             number("reach", "bound of the static displacement by the projections, in rest extents"),
         ),
         number("growth", "bound of the dynamic displacement over it, over the frames of the run"),
@@ -30,20 +30,20 @@ _KEYS = ["scene", "group", "method", "r"]
             "the same for ever, with the vertices that are held last; inf if none is proved",
         ),
         compared(
-            "gain",
+            "value",
             number(
                 "bound", "bound of the extent of the run, in rest extents; inf if there is none"
             ),
         ),
         MAX_EXTENT,
-        compared("gain", number("slack", "bound over largest extent")),
+        compared("error", number("slack", "bound over largest extent")),
         compared(
-            "drift",
+            "error",
             number("contraction", "how much an iteration may enlarge an error, in the norm of A"),
         ),
-        compared("drift", number("spectral_radius", "of the derivative of an iteration")),
+        compared("error", number("spectral_radius", "of the derivative of an iteration")),
         compared(
-            "drift",
+            "error",
             number(
                 "small_gain", "growth times contraction; a small-gain argument needs less than one"
             ),

@@ -6,7 +6,7 @@ from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
 from pdrom.reduction.local.break_even import break_even
-from pdrom.tables.declaration import integer, number, table, timed
+from pdrom.tables.declaration import compared, integer, number, table, timed
 from pdrom.tables.parts import joined
 from pdrom.tables.vocabulary import ELEMENTS, GROUP, METHOD, SCENE, THREADS, VERTICES, R
 
@@ -21,7 +21,7 @@ OWN_MESH = "1"  # factor of a scene's own mesh, whose curve is measured with its
         SCENE,
         GROUP,
         METHOD,
-        number("factor", "on the vertices along a side of the scene's own mesh"),
+        compared("exact", number("factor", "on the vertices along a side of the scene's own mesh")),
         VERTICES,
         ELEMENTS,
         THREADS,

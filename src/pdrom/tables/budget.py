@@ -6,7 +6,7 @@ import pandas as pd
 
 from pdrom.core.reads import Setting, TableOf
 from pdrom.tables.accuracy_cost import CONVERGED, OWN, reference_of
-from pdrom.tables.declaration import integer, number, table, text, timed
+from pdrom.tables.declaration import compared, integer, number, table, text, timed
 from pdrom.tables.vocabulary import ERROR_WITHIN, METHOD, MS_PER_FRAME, POSITION_BASIS, SCENE, K, R
 
 
@@ -15,7 +15,7 @@ from pdrom.tables.vocabulary import ERROR_WITHIN, METHOD, MS_PER_FRAME, POSITION
     title="What a frame's budget of time buys",
     columns=(
         SCENE,
-        number("budget_ms", "time that a frame may take", "ms"),
+        compared("exact", number("budget_ms", "time that a frame may take", "ms")),
         text("reference", f"what the error is taken against: {CONVERGED} or {OWN}"),
         timed(METHOD),
         timed(POSITION_BASIS),

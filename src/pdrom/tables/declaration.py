@@ -23,7 +23,7 @@ import pandas as pd
 
 from pdrom.core.errors import StorageError
 from pdrom.core.reads import ProjectFile, Read
-from pdrom.tables.quantities import Quantity, usual_quantity
+from pdrom.tables.quantities import TALLY, TOLERANCES, Quantity, usual_quantity
 
 P = ParamSpec("P")
 Kind = Literal["text", "integer", "number", "flag"]
@@ -37,7 +37,8 @@ class Column:
     unit : empty for text, counts and what has no dimension
     timed : a clock (or the memory in use) has a say in it, so that two runs may differ
     declared : its quantity, where the type and the name do not tell it
-    failing : words of a column of outcomes that say that a run failed, or was not judged
+    tolerance : its own, where that of its quantity is not the right one; of words and truth values
+        the share of the rows that may be others
     """
 
     name: str
@@ -46,12 +47,21 @@ class Column:
     unit: str = ""
     timed: bool = False
     declared: Quantity | None = None
-    failing: tuple[str, ...] = ()
+    tolerance: float | None = None
 
     @property
     def quantity(self) -> Quantity:
         """How far two machines may differ in it."""
-        return self.declared or usual_quantity(self.kind, self.name, self.unit, self.timed)
+        return self.declared or usual_quantity(self.kind, self.name, self.timed)
+
+    @property
+    def within(self) -> float:
+        """How far a cell may be off; words, truth values and whole numbers are equal."""
+        if self.tolerance is not None:
+            return self.tolerance
+        if self.kind == "integer":
+            return TALLY if self.quantity == "share" else 0.0
+        return TOLERANCES.get(self.quantity, 0.0) if self.kind == "number" else 0.0
 
     def cast(self, values: pd.Series) -> pd.Series:
         """Values with the type of the column; ValueError or TypeError if they do not fit."""
@@ -92,13 +102,13 @@ def number(name: str, meaning: str, unit: str = "") -> Column:
 
 
 def timed(column: Column) -> Column:
-    """The same column where a clock has a say in it, so that it is another quantity."""
+    """Mark a column as a timing."""
     return replace(column, timed=True, declared=None)
 
 
-def compared(quantity: Quantity, column: Column, failing: Sequence[str] = ()) -> Column:
-    """The same column as another quantity than its type and name tell."""
-    return replace(column, declared=quantity, failing=tuple(failing))
+def compared(quantity: Quantity, column: Column, tolerance: float | None = None) -> Column:
+    """Declare the quantity of a column, and its own tolerance."""
+    return replace(column, declared=quantity, tolerance=tolerance)
 
 
 class TimedCells(Protocol):

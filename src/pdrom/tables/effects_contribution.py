@@ -23,14 +23,14 @@ KEYS = ["scene", "effect"]
         text("role", "constraint group, force, contact, hold or start"),
         number("force", "root mean square over the frames of the norm of its force", "N"),
         number("force_share", "of the sum over the effects of the scene"),
-        compared("run", integer("acting_frames", "frames in which it exerts a force at all")),
+        compared("error", integer("acting_frames", "frames in which it exerts a force at all")),
         number("energy", "range of the energy that it holds, where it has one", "J"),
         compared(
-            "drift",
+            "error",
             number("moved", "how far the run moves without it: largest drift before the horizon"),
         ),
         FLOOR,
-        compared("run", flag("above_floor", "moved is larger than the sensitivity floor")),
+        compared("error", flag("above_floor", "moved is larger than the sensitivity floor")),
         timed(number("own_ms", "its time in a frame of the whole scene", "ms")),
         timed(
             number("saved_ms", "time of the whole scene less that of the scene without it", "ms")

@@ -37,13 +37,13 @@ MARGIN = 1.5  # an estimate above this multiple of the companion's own error is 
                 "largest_estimate", "largest one while it runs, over the motion of the training run"
             ),
         ),
-        compared("magnitude", number("ratio", "effectivity: estimate over error")),
-        compared("run", flag("within", f"the ratio lies between {BAND[0]:g} and {BAND[1]:g}")),
+        compared("error", number("ratio", "effectivity: estimate over error")),
+        compared("error", flag("within", f"the ratio lies between {BAND[0]:g} and {BAND[1]:g}")),
         number("companion_error", "of the companion's own run of the motion before the horizon"),
         compared(
             "error", number("floor", "the same of the training motion, which is known offline")
         ),
-        compared("run", flag("resolved", f"the estimate exceeds {MARGIN:g} times the floor")),
+        compared("error", flag("resolved", f"the estimate exceeds {MARGIN:g} times the floor")),
         timed(number("overhead", "time of the companion's frame over that of the run")),
         timed(number("full_order_share", "the same over that of the full-order run")),
     ),

@@ -20,18 +20,18 @@ _KEYS = ["scene", "group", "method", "r"]
         text("target", f"one of: {', '.join(TARGETS)}"),
         text("predictor", f"one of: {', '.join(PREDICTORS)}"),
         text("method", f"method of the runs; {EVERY}, or {WITHIN}: pairs of the same method"),
-        compared("tally", integer("runs", "runs that count")),
-        compared("tally", integer("failed", "runs among them that fail, or blow up")),
+        compared("share", integer("runs", "runs that count")),
+        compared("share", integer("failed", "runs among them that fail, or blow up")),
         compared(
             "share",
             number("failures_ordered", "probability that a failed run has the larger value of two"),
         ),
         compared(
-            "magnitude", number("threshold", "of the predictor that separates failed runs best")
+            "skipped", number("threshold", "of the predictor that separates failed runs best")
         ),
         compared("share", number("misclassified_share", "runs on its wrong side")),
-        compared("tally", integer("failed_below_one", "failed runs with a value below one")),
-        compared("tally", integer("below_one", "runs with a value below one")),
+        compared("share", integer("failed_below_one", "failed runs with a value below one")),
+        compared("share", integer("below_one", "runs with a value below one")),
     ),
     reads={
         "bounds": TableOf("bounds"),

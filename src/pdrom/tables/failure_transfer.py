@@ -17,10 +17,10 @@ from pdrom.tables.gain_prediction import best_threshold, failures_ordered
         text("predictor", f"one of: {', '.join(PREDICTORS)}"),
         text("method", f"method of the runs; {EVERY}, or {WITHIN}: a limit for each method"),
         text("scene", f"scene that is left out; {EVERY}: over all of them"),
-        compared("tally", integer("runs", "runs of the scene that count")),
-        compared("tally", integer("failed", "runs among them that fail")),
+        compared("share", integer("runs", "runs of the scene that count")),
+        compared("share", integer("failed", "runs among them that fail")),
         compared(
-            "magnitude",
+            "skipped",
             number("threshold", "that separates the failed runs of the other scenes best"),
         ),
         compared("share", number("misclassified_share", "runs of the scene on its wrong side")),

@@ -28,8 +28,8 @@ _CELL = ["scene", "group", "r"]
         text("step", f"one of: {', '.join(STEPS)}"),
         text("method_before", "method before the step"),
         text("method_after", "method after it, on the same basis"),
-        compared("tally", integer("pairs", "scenes, groups and sizes at which both methods ran")),
-        compared("tally", integer("scenes", "scenes among them")),
+        compared("share", integer("pairs", "scenes, groups and sizes at which both methods ran")),
+        compared("share", integer("scenes", "scenes among them")),
         compared("share", number("gain_ratio", "median of the gain after over that before")),
         compared(
             "share", number("error_ratio", "median of the error of the run after over that before")
@@ -42,7 +42,7 @@ _CELL = ["scene", "group", "r"]
         ),
         compared("share", number("error_ratio_high", "97.5 % quantile")),
         compared("share", number("fallen_share", "pairs whose error falls")),
-        compared("tally", integer("scenes_fallen", "scenes whose median error ratio is below one")),
+        compared("share", integer("scenes_fallen", "scenes whose median error ratio is below one")),
         compared(
             "share",
             number("p_value", "that as many scenes fall if up and down are alike (sign test)"),

@@ -25,13 +25,14 @@ PREDICTORS: dict[str, Callable[[pd.DataFrame], pd.Series]] = {
         text("predictor", f"one of: {', '.join(PREDICTORS)}"),
         text("lower", f"smallest gain of the decade, or {EVERY}"),
         text("upper", f"largest gain of the decade, or {EVERY}"),
-        compared("tally", integer("runs", "runs that count")),
-        compared("tally", integer("failed", "runs among them that fail")),
+        compared("share", integer("runs", "runs that count")),
+        compared("share", integer("failed", "runs among them that fail")),
         compared("share", number("failed_share", "their share")),
-        number("median_error", "of the runs before the horizon"),
+        # half of the runs with a large gain are ill-conditioned
+        compared("error", number("median_error", "of the runs before the horizon"), 0.5),
         compared("share", number("rank_correlation", "of predictor and error (Spearman)")),
         compared(
-            "magnitude", number("threshold", "of the predictor that separates failed runs best")
+            "skipped", number("threshold", "of the predictor that separates failed runs best")
         ),
         compared("share", number("misclassified_share", "runs on its wrong side")),
         compared(

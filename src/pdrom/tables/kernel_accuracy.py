@@ -7,6 +7,7 @@ from pdrom.core.paths import File
 from pdrom.core.reads import Every
 from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.parts import joined
+from pdrom.tables.vocabulary import ROUNDING
 
 
 @table(
@@ -16,10 +17,11 @@ from pdrom.tables.parts import joined
         text("matrix_class", "kind of matrices that are projected"),
         integer("cases", "matrices of the class"),
         number("condition", "largest condition number of the projection at them"),
-        compared("magnitude", number("worst_relative_error", "largest relative error")),
+        compared("skipped", number("worst_relative_error", "largest relative error")),
         compared(
-            "magnitude",
+            "share",
             number("worst_over_condition", "largest relative error over its condition number"),
+            ROUNDING,
         ),
     ),
     reads={"parts": Every(paths.KERNEL_ACCURACY)},

@@ -6,7 +6,7 @@ from pdrom.core.reads import TableOf
 from pdrom.experiments.names import GLOBAL, RIGHT
 from pdrom.tables.declaration import compared, number, table, text, timed
 from pdrom.tables.roofline import WHOLE
-from pdrom.tables.vocabulary import ELEMENTS, SCENE, VERTICES
+from pdrom.tables.vocabulary import ELEMENTS, ROUNDING, SCENE, VERTICES
 
 # columns of the table roofline and what they are called over the number of elements
 _PER_ELEMENT = {
@@ -22,23 +22,24 @@ _PER_ELEMENT = {
     columns=(
         text("group", "constraint group"),
         SCENE,
-        number("factor", "on the vertices along a side of the scene's own mesh"),
+        compared("exact", number("factor", "on the vertices along a side of the scene's own mesh")),
         VERTICES,
         ELEMENTS,
         number("bytes_per_element", "read and written, each array once", "B"),
         compared(
-            "clocked",
+            "timed",
             number("flops_per_element", "sums and products executed, idle lanes included"),
         ),
-        compared("clocked", number("divisions_per_element", "divisions executed")),
-        compared("clocked", number("roots_per_element", "square roots executed")),
+        compared("timed", number("divisions_per_element", "divisions executed")),
+        compared("timed", number("roots_per_element", "square roots executed")),
         timed(number("ns_per_element", "time of gather, projection, forces and scatter", "ns")),
         timed(number("bound_ns", "least time on this machine", "ns")),
         timed(text("limit", "what the bound comes from")),
         timed(number("share", "the bound over the time")),
         compared(
-            "magnitude",
+            "share",
             number("worst_over_condition", "largest relative error over the condition number"),
+            ROUNDING,
         ),
     ),
     reads={"phases": TableOf("roofline"), "accuracy": TableOf("kernel_accuracy")},

@@ -21,7 +21,7 @@ from pdrom.tables.vocabulary import BLOWUP_FRAME, ERROR_WITHIN, FINITE, GAIN, GR
         ),
         text("rung", "choice that changes on this rung"),
         R,
-        compared("gain", number("condition", "condition number of the sampled modes")),
+        compared("value", number("condition", "condition number of the sampled modes")),
         GAIN,
         number("error_train", "reconstruction error of the training snapshots"),
         number("error_test", "the same of the snapshots between them"),

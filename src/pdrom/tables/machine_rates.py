@@ -15,7 +15,7 @@ from pdrom.tables.parts import joined
         text("quantity", "what is done: bytes read, or operations on doubles, four at a time"),
         number("working_set", "what is read over and over", "B"),
         compared(
-            "clocked",
+            "timed",
             text("level", "smallest cache that holds the working set, as the system tells"),
         ),
         timed(number("rate", "median of the repeats", "1e9/s")),

@@ -23,9 +23,9 @@ from pdrom.tables.vocabulary import BLOWUP_FRAME, FINITE, FRAMES, GAIN, GROUP, M
         integer("seed", "of the start's round-off"),
         METHOD,
         R,
-        compared("count", integer("rank", "modes that the snapshots have without a cutoff")),
+        compared("value", integer("rank", "modes that the snapshots have without a cutoff")),
         # the modes are made of round-off
-        compared("magnitude", GAIN),
+        compared("skipped", GAIN),
         FRAMES,
         FINITE,
         BLOWUP_FRAME,

@@ -7,6 +7,7 @@ from pdrom.core.paths import File
 from pdrom.core.reads import Every
 from pdrom.tables.declaration import compared, integer, number, table, text, timed
 from pdrom.tables.parts import joined
+from pdrom.tables.vocabulary import ROUNDING
 
 
 @table(
@@ -18,8 +19,9 @@ from pdrom.tables.parts import joined
         integer("columns", "columns of the matrix"),
         timed(number("seconds", "time that it took", "s")),
         compared(
-            "magnitude",
+            "share",
             number("difference", "of both results: relative, or the share of indices not in both"),
+            ROUNDING,
         ),
     ),
     reads={"parts": Every(paths.OFFLINE)},

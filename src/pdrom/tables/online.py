@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, TableOf
-from pdrom.tables.declaration import integer, number, table, timed
+from pdrom.tables.declaration import compared, integer, number, table, timed
 from pdrom.tables.parts import joined
 from pdrom.tables.speedups import timed_reductions
 from pdrom.tables.vocabulary import (
@@ -32,7 +32,7 @@ _TIMES = ["ms_per_frame", "fom_ms_per_frame", "speedup", "speedup_low", "speedup
         integer("elements", "elements of all groups"),
         POSITION_BASIS,
         K,
-        number("tau", "tolerance of the element sampling"),
+        compared("exact", number("tau", "tolerance of the element sampling")),
         ELEMENTS_SAMPLED,
         number("relative_error_train", "error of the positions in the training motion"),
         number("relative_error_heldout", "the same in the held-out motion"),

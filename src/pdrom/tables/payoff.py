@@ -17,9 +17,9 @@ _ERROR = "relative_error_within_horizon"
     columns=(
         POSITION_BASIS,
         METHOD,
-        compared("tally", integer("scenes", "scenes (and groups) with a timed run")),
+        compared("share", integer("scenes", "scenes (and groups) with a timed run")),
         compared(
-            "tally",
+            "share",
             integer(
                 "accurate", "those with a run whose error before the horizon is at most a tenth"
             ),

@@ -29,23 +29,23 @@ _PAIR = ["scene", "split", "k"]
         ERROR_WITHIN,
         # both errors may be round-off
         compared(
-            "magnitude",
+            "error",
             number("ratio", "the error of the run with full projections over the best one"),
         ),
         compared(
-            "run",
+            "error",
             flag(
                 "loses", "of a snapshot basis: its run has a larger error than the skinning basis'"
             ),
         ),
         flag("best_loses", "of a snapshot basis: its best approximation is worse than the other's"),
         compared(
-            "run",
+            "error",
             number(
                 "full_order_out_of_plane", "of a flat rest shape: share of the motion normal to it"
             ),
         ),
-        compared("run", number("out_of_plane", "the same of the run")),
+        compared("error", number("out_of_plane", "the same of the run")),
     ),
     reads={"parts": Every(paths.POSITION_BASES)},
 )

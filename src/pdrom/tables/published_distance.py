@@ -21,12 +21,12 @@ AGREE = np.log10(1.01)
         CHOICE,
         integer("sizes", "numbers of modes that are compared, on each axis that moves"),
         compared(
-            "rounding",
+            "skipped",
             number("distance", "decades between the errors, median over sizes and axes"),
         ),
-        compared("rounding", number("largest", "the largest of these")),
+        compared("skipped", number("largest", "the largest of these")),
         compared(
-            "rounding",
+            "skipped",
             integer("met", "modes up to which all errors agree within one per cent; 0: none"),
         ),
     ),

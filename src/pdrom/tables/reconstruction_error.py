@@ -25,7 +25,7 @@ _SMALL = "empty at round-off level"
         number("relative_error_y", f"of their y-coordinates; {_SMALL}"),
         number("relative_error_z", f"of their z-coordinates; {_SMALL}"),
         GAIN,
-        compared("count", integer("rows_sampled", "rows of the projections that are evaluated")),
+        compared("value", integer("rows_sampled", "rows of the projections that are evaluated")),
         ELEMENTS_SAMPLED,
     ),
     reads={"parts": Every(paths.RECONSTRUCTION)},

@@ -22,7 +22,7 @@ _CELL = ["scene", "group", "method", "r", "varied"]
         text("varied", "what differs: training (frames), start"),
         integer("repetitions", "runs; their range encloses the median of all but by 2^(1 - n)"),
         compared(
-            "run", integer("ended", "runs that ended before the horizon, with an infinite error")
+            "error", integer("ended", "runs that ended before the horizon, with an infinite error")
         ),
         number("error_median", "median of the errors of the positions before the horizon"),
         number("error_low", "the least of them"),
@@ -30,7 +30,7 @@ _CELL = ["scene", "group", "method", "r", "varied"]
         number("gain_median", "median of the gains"),
         number("gain_low", "the least of them"),
         number("gain_high", "the largest"),
-        compared("run", number("spread", "largest error over least")),
+        compared("error", number("spread", "largest error over least")),
     ),
     reads={"parts": Every(paths.REPETITIONS)},
 )

@@ -16,7 +16,7 @@ from pdrom.tables.vocabulary import SCENE
         SCENE,
         text("perturbation", "of the start, over the extent; or what else was changed"),
         integer("frame", "number of the frame, from 0"),
-        compared("magnitude", number("relative_difference", "largest over the seeds")),
+        compared("error", number("relative_difference", "largest over the seeds")),
     ),
     reads={"parts": Every(paths.SENSITIVITY)},
 )

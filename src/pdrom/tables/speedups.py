@@ -52,7 +52,7 @@ _ERROR = "relative_error_within_horizon"
         timed(number("training_s", "time of the training run", "s")),
         timed(number("reduction_s", "processor time of basis and sampling", "s")),
         compared(
-            "clocked",
+            "timed",
             timed(
                 number(
                     "frames_to_break_even", "frames after which both are paid back; none if never"

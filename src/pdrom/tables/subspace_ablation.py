@@ -30,11 +30,13 @@ from pdrom.tables.vocabulary import (
         text("variant", "what differs from plain block DEIM"),
         ELEMENTS_SAMPLED,
         compared(
-            "count",
+            "value",
             integer("control_elements", "elements of the safeguard, evaluated twice a frame"),
         ),
-        compared("run", number("fallback_share", "frames of the training motion that it repeats")),
-        compared("run", number("heldout_fallback_share", "the same of the held-out motion")),
+        compared(
+            "error", number("fallback_share", "frames of the training motion that it repeats")
+        ),
+        compared("error", number("heldout_fallback_share", "the same of the held-out motion")),
         GAIN,
         FINITE,
         MAX_EXTENT,

@@ -22,16 +22,17 @@ SIZES_FROM = 20  # basis sizes for which the target is set
         number("error", "of the run before the horizon; inf if it ended earlier"),
         number("orthogonal_error", "the same of the orthogonal projection at the same size"),
         compared(
-            "run", number("ratio", "the first over the second, neither below the sensitivity floor")
+            "error",
+            number("ratio", "the first over the second, neither below the sensitivity floor"),
         ),
         flag("asked", f"r is at least {SIZES_FROM}, the sizes for which the target is set"),
-        compared("run", flag("within", f"ratio is at most {FACTOR}, the target")),
+        compared("error", flag("within", f"ratio is at most {FACTOR}, the target")),
         GAIN,
         ELEMENTS_SAMPLED,
         compared(
-            "count", number("elements_share", "elements that are evaluated over all elements")
+            "value", number("elements_share", "elements that are evaluated over all elements")
         ),
-        compared("gain", number("spread", "gain sqrt(elements_share)")),
+        compared("value", number("spread", "gain sqrt(elements_share)")),
     ),
     reads={"reruns": TableOf("reduced_reruns"), "reconstruction": TableOf("reconstruction_error")},
 )

@@ -2,31 +2,35 @@
 
 from pdrom.tables.declaration import compared, flag, integer, number, text, timed
 
+# Tolerance of numbers that are rounding errors.
+ROUNDING = 1e-14
 SCENE = text("scene", "name of the scene")
 GROUP = text("group", "constraint group whose projections are reduced; all in a position subspace")
 METHOD = text("method", "reduction of the projections; full without one")
 POSITION_BASIS = text("position_basis", "basis of the positions: pod, skinning, full (unreduced)")
 K = integer("k", "modes of the position basis")
 R = compared(
-    "count", integer("r", "modes of the projections; in a position subspace the elements evaluated")
+    "value", integer("r", "modes of the projections; in a position subspace the elements evaluated")
 )
 VERTICES = integer("vertices", "vertices of the mesh")
 ELEMENTS = integer("elements", "elements of the group")
-ELEMENTS_SAMPLED = compared("count", integer("elements_sampled", "elements that are evaluated"))
+ELEMENTS_SAMPLED = compared("value", integer("elements_sampled", "elements that are evaluated"))
 THREADS = integer("threads", "threads of the local step")
-FRAMES = compared("run", integer("frames", "frames that the run reached"))
-FINITE = compared("run", flag("finite", "no frame blew up"))
-BLOWUP_FRAME = compared("run", integer("blowup_frame", "first frame that blew up"))
+FRAMES = compared("error", integer("frames", "frames that the run reached"))
+FINITE = compared("error", flag("finite", "no frame blew up"))
+BLOWUP_FRAME = compared("error", integer("blowup_frame", "first frame that blew up"))
 MAX_EXTENT = compared(
-    "run", number("max_extent", "largest extent of a frame over that of the start")
+    "error", number("max_extent", "largest extent of a frame over that of the start")
 )
 GAIN = compared(
-    "gain", number("gain", "norm of the inverse of the sampled modes; inf if they are singular")
+    "value", number("gain", "norm of the inverse of the sampled modes; inf if they are singular")
 )
 ENERGY_RATIO = compared(
-    "run", number("energy_ratio", "largest energy over that of the full-order run")
+    "error", number("energy_ratio", "largest energy over that of the full-order run")
 )
-RELATIVE_ERROR = compared("run", number("relative_error", "error of the positions over all frames"))
+RELATIVE_ERROR = compared(
+    "error", number("relative_error", "error of the positions over all frames")
+)
 ERROR_WITHIN = number("relative_error_within_horizon", "error of the positions before the horizon")
 ERROR_OVER_EXTENT = compared(
     "error",
@@ -51,13 +55,13 @@ VELOCITY_ERROR = compared(
 )
 HORIZON_FRAME = integer("horizon_frame", "first frame that cannot be judged: the scene's horizon")
 FLOOR = compared(
-    "drift", number("sensitivity_floor", "largest drift of perturbed runs before the horizon")
+    "error", number("sensitivity_floor", "largest drift of perturbed runs before the horizon")
 )
 GUARD_FRAME = compared(
-    "run", integer("guard_frame", "first frame in which the guard saw something")
+    "error", integer("guard_frame", "first frame in which the guard saw something")
 )
-GUARD_REASON = compared("run", text("guard_reason", "what the guard saw there"))
-GUARD_COUNT = compared("run", integer("guard_count", "frames in which the guard saw something"))
+GUARD_REASON = compared("error", text("guard_reason", "what the guard saw there"))
+GUARD_COUNT = compared("error", integer("guard_count", "frames in which the guard saw something"))
 GUARD_ESTIMATE = compared(
     "error", number("guard_estimate", "estimated error over the run, where that is the alarm")
 )

@@ -7,7 +7,7 @@ import pandas as pd
 from pdrom.core.reads import Setting, TableOf
 from pdrom.experiments.alternatives.settings import REDUCED
 from pdrom.tables.alternatives import ITERATIONS, STIFFNESS, SUBSTEPS
-from pdrom.tables.declaration import number, table, text, timed
+from pdrom.tables.declaration import compared, number, table, text, timed
 from pdrom.tables.vocabulary import METHOD, MS_PER_FRAME, SCENE, VERTICES
 
 REFERENCES = ("implicit", "continuous")
@@ -15,7 +15,7 @@ PLAIN = "projective"
 KNOWN = 3.0  # a motion decides about an error only if it is known this many times better
 
 REFERENCE = text("reference", "what the error is taken against: implicit or continuous")
-LIMIT = number("limit", "error that is allowed")
+LIMIT = compared("exact", number("limit", "error that is allowed"))
 
 
 # A time decides which row of alternatives wins, hence all that is said of it.

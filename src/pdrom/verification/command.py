@@ -10,11 +10,9 @@ from pdrom.core.store import write_text
 from pdrom.verification.examine import Examination
 from pdrom.verification.files import verify_files
 from pdrom.verification.lines import counted, page, status_of
-from pdrom.verification.references import LOG, folder_of, tolerances_paths
-from pdrom.verification.settings import load_settings
+from pdrom.verification.references import LOG, folder_of
 from pdrom.verification.status import Status
 from pdrom.verification.subject import Subject
-from pdrom.verification.tolerances import load_tolerances
 from pdrom.verification.update import update
 
 CODES = "exit codes: 0 all holds; 1 faulty input; 2 not understood; 3 differs; 4 not there"
@@ -31,7 +29,11 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--configfile", nargs="+", default=[], metavar="FILE")
     made.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE")
     what = made.add_mutually_exclusive_group()
-    what.add_argument("--files", action="store_true", help="compare every file with the manifest")
+    what.add_argument(
+        "--files",
+        action="store_true",
+        help="compare every file with the manifest, and with what it is made from",
+    )
     what.add_argument("--update", action="store_true", help="these results are the expected ones")
     made.add_argument("--reason", default="", help="why --update")
     return made
@@ -69,8 +71,7 @@ def verify_tables(subject: Subject) -> Status:
     if not folder.is_dir():
         hint = 'write them by ./reproduce verify --update --reason "..."'
         raise ConfigurationError(f"{folder}: no expected tables of this configuration; {hint}")
-    tolerances = load_tolerances(tolerances_paths(subject.results))
-    lines = Examination(subject, tolerances, load_settings().anew).lines()
+    lines = Examination(subject).lines()
     for line in lines:
         _say(str(line))
     written = Path(subject.results) / PAGE
@@ -81,11 +82,9 @@ def verify_tables(subject: Subject) -> Status:
 
 
 def _about(subject: Subject, folder: Path) -> list[str]:
-    tolerances = " and ".join(f"`{path}`" for path in tolerances_paths(subject.results))
     return [
-        f"Results in `{subject.results}`, expected ones in `{folder}` (`{LOG}` says why),",
-        f"tolerances in {tolerances}. What is compared, and what the outcomes mean, is",
-        "in `docs/verification.md`.",
+        f"Results in `{subject.results}`, expected ones in `{folder}` (`{LOG}` says why).",
+        "What is compared, and what the outcomes mean, is in `docs/verification.md`.",
     ]
 
 

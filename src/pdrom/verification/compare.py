@@ -1,30 +1,29 @@
-"""A table against the expected one, cell by cell.
-
-What is compared depends on the quantity of the column (`pdrom.tables.quantities`) and on the row
-(`pdrom.verification.rows`). Some cells are not compared, each for a reason that is counted.
-"""
+"""A table against the expected one: which rows belong together, how far each cell is off."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from pdrom.core.reads import ProjectFile
 from pdrom.tables.declaration import Column, Table
 from pdrom.tables.quantities import Quantity
 from pdrom.verification.distance import distance
 from pdrom.verification.pairing import pairs
-from pdrom.verification.rows import FAILED, PARTS, Context, failed, said_to_fail, unresolved
+from pdrom.verification.rows import RUN, Context, names, of_fitted_samples, of_wrong_runs
 
-CLOCK = ("time", "clocked")
-# Amplifications and counts that differ by less belong to the same samples.
-SAME = 1e-6
+# Not compared with a reference.
+NOT_COMPARED: tuple[Quantity, ...] = ("timed", "skipped")
+# How far a number of samples may be off that a fit leaves, and what a wrong run tells, relative.
+FITTED, OF_WRONG_RUNS = 0.25, 0.3
 
 
 @dataclass
 class Comparison:
-    """Rows of two tables side by side, and what may differ in them.
+    """Rows of two tables side by side.
 
     e, f : rows of the expected and of the found table that belong together
     """
@@ -38,103 +37,60 @@ class Comparison:
         self.pairs = pairs(self.table, self.expected, self.found)
         self.e = self.expected.iloc[[i for i, _ in self.pairs]].reset_index(drop=True)
         self.f = self.found.iloc[[j for _, j in self.pairs]].reset_index(drop=True)
-        self.failed = failed(self.table, self.e), failed(self.table, self.f)
-        self.ill = unresolved(self.table, self.e) & unresolved(self.table, self.f)
-        self.chaotic = self.context.of_chaotic_scene(self.e)
-        self.whole = self.context.of_whole_basis(self.e)
+        self.wrong = of_wrong_runs(self.table, self.e)
 
-    def columns(self, *quantities: Quantity) -> Iterator[Column]:
-        """Columns of some quantities."""
-        return (c for c in self.table.columns if c.quantity in quantities)
+    def columns(self) -> Iterator[Column]:
+        """Columns that are compared."""
+        return (c for c in self.table.columns if c.quantity not in NOT_COMPARED)
 
-    @cached_property
-    def distances(self) -> dict[str, np.ndarray]:
-        """Distance of each pair of cells, by column."""
-        return {
-            c.name: distance(c.quantity, self.e[c.name], self.f[c.name]) for c in self.table.columns
-        }
+    def loose(self, column: Column) -> dict[str, np.ndarray]:
+        """Cells of a column that rounding decides about, by the reason."""
+        return self.context.loose(self.table, column, self.e)
 
-    @cached_property
-    def anew(self) -> np.ndarray:
-        """Rows whose samples rounding has chosen anew.
+    def compared(self, column: Column) -> np.ndarray:
+        """Cells of a column that are compared: no clock has a say in them."""
+        return np.array([column.name not in names for names in self._timed], dtype=bool)
 
-        Their amplification or their number has changed, and the run with it: either alone would be
-        an error, not another choice.
-        """
-        chosen = self._any(SAME, "gain", "count")
-        moved = self._any(SAME, "error", "run", "magnitude")
-        return (chosen & moved & ~self.ill) | self.context.of_other_samples(self.e)
+    def beyond(self, column: Column, wider: float = 0.0) -> np.ndarray:
+        """Cells that are off by more than the tolerance of their column, or than a wider one."""
+        limit = np.maximum(self.limits(column), wider)
+        return (self.apart(column) > limit) & self.compared(column)
 
-    def _any(self, beyond: float, *quantities: Quantity) -> np.ndarray:
-        found = np.zeros(len(self.e), dtype=bool)
-        for column in self.columns(*quantities):
-            found |= self.distances[column.name] > beyond
-        return found
+    def limits(self, column: Column) -> np.ndarray:
+        """Tolerance of each cell of a column."""
+        limit = np.full(len(self.e), column.within)
+        if column.quantity == "value":
+            limit[of_fitted_samples(self.e)] = FITTED
+        if column.quantity == "error" and column.kind == "number":
+            limit[self.wrong] = max(column.within, OF_WRONG_RUNS)
+        return limit
 
-    def reasons(self, column: Column) -> dict[str, np.ndarray]:
-        """Cells of a column that are not compared, by the reason; the first one counts."""
-        whole = np.ones(len(self.e), dtype=bool)
-        match column.quantity:
-            case "time" | "clocked":
-                return {"a clock has a say": whole}
-            case "told":
-                return {"words about other columns": whole}
-            case "rounding":
-                return {"made of rounding errors": whole}
-            case "verdict" | "fragile":
-                part = PARTS.get(column.name, "")
-                return {"rests on times": self.context.of_verdict_on_times(self.e, part)}
-            case "exact" | "tally" | "share":
-                return {}
-        reasons = {"chaotic beyond the horizon": self.chaotic}
-        match column.quantity:
-            case "run" | "magnitude":
-                reasons["failed run"] = self.failed[0] | self.failed[1]
-            case "error":
-                reasons["failed run"] = self._failed_cells(column)
-        if column.quantity in ("run", "error", "gain", "drift"):
-            reasons["amplification beyond double precision"] = self.ill
-            reasons["samples chosen anew"] = self.anew
-        return reasons
-
-    def _failed_cells(self, column: Column) -> np.ndarray:
-        """Cells that say on both sides that the run failed."""
-        found = []
-        for frame, failing in ((self.e, self.failed[0]), (self.f, self.failed[1])):
-            values = frame[column.name]
-            found.append((values > FAILED).to_numpy(dtype=bool) | (values.isna() & failing))
-        return np.asarray(found[0] & found[1], dtype=bool)
-
-    def free(self, column: Column) -> np.ndarray:
-        """Cells of a column that are not compared."""
-        made = np.zeros(len(self.e), dtype=bool)
-        for cells in self.reasons(column).values():
-            made |= cells
-        return made
-
-    @property
-    def class_changed(self) -> np.ndarray:
-        """Rows that say in words that the run failed, or did not, unlike the expected ones.
-
-        Where an error says it, the error is compared. Fragile outcomes are counted.
-        """
-        words = [said_to_fail(self.table, frame) for frame in (self.e, self.f)]
-        changed = (words[0] != words[1]) & (self.failed[0] != self.failed[1])
-        return changed & ~self.chaotic & (not any(self.columns("fragile")))
+    def apart(self, column: Column) -> np.ndarray:
+        """Distance of each pair of cells."""
+        return distance(column.quantity, self.e[column.name], self.f[column.name])
 
     def unpaired(self) -> tuple[pd.DataFrame, pd.DataFrame]:
         """Rows of the expected and of the found table without a partner.
 
-        Where only one side has such rows, those of failed runs and of chaotic scenes are left out:
-        some tables list no failed runs.
+        Rows of runs that the other side says to have ended early are left out.
         """
-        alone = [
+        missing, new = (
             frame[~np.isin(np.arange(len(frame)), [pair[side] for pair in self.pairs])]
             for side, frame in enumerate((self.expected, self.found))
-        ]
-        if all(len(frame) for frame in alone):
-            return alone[0], alone[1]
-        return self._unexcused(alone[0]), self._unexcused(alone[1])
+        )
+        return self._not_ended(missing, 1), self._not_ended(new, 0)
 
-    def _unexcused(self, rows: pd.DataFrame) -> pd.DataFrame:
-        return rows[~(failed(self.table, rows) | self.context.of_chaotic_scene(rows))]
+    def _not_ended(self, rows: pd.DataFrame, side: int) -> pd.DataFrame:
+        if not set(RUN) <= set(rows.columns):
+            return rows
+        ended = [name in self.context.ended[side] for name in names(rows, RUN)]
+        return rows[~np.array(ended, dtype=bool)]
+
+    @cached_property
+    def _timed(self) -> list[set[str]]:
+        """Names of the timed cells of each row, where they differ from row to row."""
+        if self.table.timed_cells is None:
+            return [set()] * len(self.e)
+        reads = self.table.reads.items()
+        files = {name: Path(r.path) for name, r in reads if isinstance(r, ProjectFile)}
+        return [set(names) for names in self.table.timed_cells(self.e, **files)]

@@ -1,48 +1,47 @@
 """Lines about claims, figures and tables of a results folder."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
+from pdrom.core.errors import StorageError
 from pdrom.core.paths import TABLE
 from pdrom.core.store import Condition, check_file, read_table
 from pdrom.pipeline.figures import FigureJob
 from pdrom.pipeline.tables import all_tables
-from pdrom.report.claims import load_claims
-from pdrom.verification.judge import Judgement, judge
+from pdrom.report.claims import is_timed, load_claims
+from pdrom.verification.again import is_derived, made, table_job
+from pdrom.verification.compare import Comparison
+from pdrom.verification.judge import Judgement, in_words, judge
 from pdrom.verification.lines import Line, Outcome, table_line
 from pdrom.verification.references import Reference, folder_of, kept, read_reference
-from pdrom.verification.rows import PARTS
-from pdrom.verification.settings import RULES
-from pdrom.verification.spread import COMPARED, comparisons
+from pdrom.verification.rows import RUNS, Context
 from pdrom.verification.subject import Subject
-from pdrom.verification.times import changed_by_times
-from pdrom.verification.tolerances import Tolerances
 
+RULES = Path("config/claims.yaml")
 CLAIMS = "claims"
-MEASURED = (*COMPARED, "verdict")
-WORDS = {"published": "as published", "beyond": "beyond"}
+MEASURED = ("value", "error", "share")
+# Columns of the table of claims with a verdict: their tests in the rules, and words.
+PARTS = {"verdict": ("published", "as published"), "verdict_beyond": ("beyond", "beyond")}
+GOOD = (Outcome.REPRODUCED, Outcome.NOT_COMPARABLE)
 
 
 @dataclass
 class Examination:
-    """What is there, what is expected, and what differs.
-
-    anew : share of the rows of a table whose samples may have been chosen anew
-    """
+    """What is there, what is expected, and what differs."""
 
     subject: Subject
-    tolerances: Tolerances
-    anew: float
     conditions: dict[str, Condition | None] = field(default_factory=dict)
+    tables: dict[str, pd.DataFrame] = field(default_factory=dict)
 
     def lines(self) -> list[Line]:
         """Lines of all claims, figures and tables."""
-        tables = [self._table(name) for name in all_tables()]
-        return [*self._claims(), *self._figures(tables), *tables]
+        tables = [*map(self.table, all_tables()), *self._strangers()]
+        return [*self.claims(), *self._figures(tables), *tables]
 
     def condition(self, path: str) -> Condition | None:
         """Condition of a file, None if it is not there."""
@@ -51,15 +50,24 @@ class Examination:
             self.conditions[path] = check_file(path) if there else None
         return self.conditions[path]
 
-    @cached_property
-    def found(self) -> dict[str, pd.DataFrame]:
-        """Tables that are there and intact, by name."""
-        paths = {name: TABLE.at(self.subject.results, name=name) for name in all_tables()}
-        return {
-            name: table.checked(read_table(paths[name]))
-            for name, table in all_tables().items()
-            if self.condition(paths[name]) is Condition.INTACT
-        }
+    def found(self, name: str) -> pd.DataFrame:
+        """A table that is there and intact.
+
+        Raises
+        ------
+        StorageError
+            It cannot be read, or has other columns than those that are declared.
+        """
+        if name not in self.tables:
+            path, table = TABLE.at(self.subject.results, name=name), all_tables()[name]
+            if self.condition(path) is not Condition.INTACT:
+                raise StorageError(f"{path}: not there, or damaged")
+            frame = read_table(path)
+            other = sorted(set(frame.columns) - set(table.column_names))
+            if other:
+                raise StorageError(f"{path}: has the unknown column(s) {', '.join(other)}")
+            self.tables[name] = read_table(path, table.column_names)
+        return all_tables()[name].checked(self.tables[name])
 
     @cached_property
     def expected(self) -> dict[str, Reference]:
@@ -69,39 +77,94 @@ class Examination:
         return {name: reference for name, reference in read.items() if reference is not None}
 
     @cached_property
-    def judgements(self) -> Mapping[str, Judgement]:
-        """Judgements on tables that are there and expected."""
-        frames = {name: reference.frame for name, reference in self.expected.items()}
-        found = {name: self._known(name, frame) for name, frame in self.found.items()}
-        compared = comparisons(all_tables(), frames, found, self.on_times)
-        return {name: judge(c, self.tolerances, self.anew) for name, c in compared.items()}
+    def context(self) -> Context:
+        """What the expected tables say about each other's rows."""
+        tables = {name: reference.frame for name, reference in self.expected.items()}
+        try:
+            return Context.of(tables, self.found(RUNS))
+        except StorageError:
+            return Context.of(tables)
 
-    @cached_property
-    def on_times(self) -> Mapping[tuple[str, str], str]:
-        """Why a changed verdict says nothing, by claim and part."""
-        if CLAIMS not in self.found or CLAIMS not in self.expected:
-            return {}
-        frames = {name: reference.frame for name, reference in self.expected.items()}
-        rules = load_claims(RULES)
-        return changed_by_times(rules, frames, self.found, self.tolerances)
+    def judgement(self, name: str) -> Judgement:
+        """Judgement on a table that is there and expected."""
+        frame, reference, table = self.found(name), self.expected[name], all_tables()[name]
+        lacking = set(frame.columns) - set(reference.columns)
+        known = table.checked(frame.assign(**dict.fromkeys(lacking, None)))
+        return judge(Comparison(table, reference.frame, known, self.context))
 
-    def _known(self, name: str, frame: pd.DataFrame) -> pd.DataFrame:
-        """A table with columns emptied that its reference does not have."""
-        if name not in self.expected:
-            return frame
-        lacking = set(frame.columns) - set(self.expected[name].columns)
-        return all_tables()[name].checked(frame.assign(**dict.fromkeys(lacking, None)))
+    def again(self, name: str) -> pd.DataFrame | None:
+        """A table that is made from other tables alone, made again from those at hand.
 
-    def _table(self, name: str) -> Line:
+        None for other tables, and where one of those is not intact.
+        """
+        if not is_derived(name):
+            return None
+        job = table_job(self.subject.plan, name)
+        if any(self.condition(path) is not Condition.INTACT for path in _results(job.inputs)):
+            return None
+        with made(job) as files:
+            return read_table(files[job.outputs[0]])
+
+    def table(self, name: str) -> Line:
+        """Line of a table."""
         missing = self._missing("table", name, [TABLE.at(self.subject.results, name=name)])
         if missing is not None:
             return missing
         if name not in self.expected:
             return Line("table", name, Outcome.NO_REFERENCE, "run verify --update")
         table = all_tables()[name]
+        try:
+            judgement, again = self.judgement(name), self.again(name)
+        except StorageError as error:
+            return Line("table", name, Outcome.DIFFERS, str(error))
+        other = None if again is None else _first_difference(self.tables[name], again)
+        if other is not None:
+            text = f"not what the tables at hand give, {other}"
+            return Line("table", name, Outcome.DIFFERS, text)
         lacking = set(kept(table)) - set(self.expected[name].columns)
         measured = any(column.quantity in MEASURED for column in table.columns)
-        return table_line(self.judgements[name], measured, sorted(lacking))
+        return table_line(judgement, measured, sorted(lacking))
+
+    def claims(self) -> list[Line]:
+        """Lines of the claims."""
+        line = self.table(CLAIMS)
+        try:
+            found = self.found(CLAIMS).set_index("claim")
+            expected = self.expected[CLAIMS].frame.set_index("claim")
+            again = self.again(CLAIMS)
+        except (KeyError, StorageError):
+            return [Line("claim", "all", line.outcome, line.text)]
+        decided = found if again is None else again.set_index("claim")
+        names = dict.fromkeys([*expected.index, *found.index])
+        return [self._claim(str(name), expected, found, decided) for name in names]
+
+    def _claim(
+        self, name: str, expected: pd.DataFrame, found: pd.DataFrame, decided: pd.DataFrame
+    ) -> Line:
+        if name not in expected.index or name not in found.index:
+            text = "the claim is new" if name in found.index else "the claim is gone"
+            return Line("claim", name, Outcome.DIFFERS, text)
+        outcome, same, changed = Outcome.REPRODUCED, [], []
+        for column, (part, words) in PARTS.items():
+            a, b, c = (str(frame.loc[name, column]) for frame in (expected, found, decided))
+            if a == b == c:
+                same.append(f"{words}: {b}")
+            elif b != c:
+                changed.append(f"{words}: found '{b}', the tables at hand give '{c}'")
+                outcome = Outcome.DIFFERS
+            else:
+                timed = self._rests_on_times(name, part)
+                why = ", which rests on times" if timed else ""
+                changed.append(f"{words}: expected '{a}', found '{b}'{why}")
+                if not timed or outcome is Outcome.DIFFERS:
+                    outcome = Outcome.DIFFERS
+                else:
+                    outcome = Outcome.NOT_COMPARABLE
+        return Line("claim", name, outcome, "; ".join(changed or same))
+
+    def _rests_on_times(self, claim: str, part: str) -> bool:
+        tests = getattr(load_claims(RULES)[claim], part)
+        return any(test.decides and is_timed(test) for test in tests)
 
     def _missing(self, kind: str, name: str, paths: list[str]) -> Line | None:
         for path in paths:
@@ -112,33 +175,15 @@ class Examination:
                 return Line(kind, name, Outcome.MISSING, text)
         return None
 
-    def _claims(self) -> list[Line]:
-        if CLAIMS not in self.found or CLAIMS not in self.expected:
-            missing = self._table(CLAIMS)
-            return [Line("claim", "all", missing.outcome, missing.text)]
-        expected = self.expected[CLAIMS].frame.set_index("claim")
-        found = self.found[CLAIMS].set_index("claim")
-        names = dict.fromkeys([*expected.index, *found.index])
-        return [self._claim(str(name), expected, found) for name in names]
-
-    def _claim(self, name: str, expected: pd.DataFrame, found: pd.DataFrame) -> Line:
-        if name not in expected.index or name not in found.index:
-            text = "the claim is new" if name in found.index else "the claim is gone"
-            return Line("claim", name, Outcome.DIFFERS, text)
-        outcome, same, changed = Outcome.REPRODUCED, [], []
-        for column, part in PARTS.items():
-            a, b = (str(frame.loc[name, column]) for frame in (expected, found))
-            if a == b:
-                same.append(f"{WORDS[part]}: {b}")
-                continue
-            text, why = (
-                f"{WORDS[part]}: expected '{a}', found '{b}'",
-                self.on_times.get((name, part)),
-            )
-            changed.append(text if why is None else f"{text}, which {why}")
-            if outcome is not Outcome.DIFFERS:
-                outcome = Outcome.DIFFERS if why is None else Outcome.NOT_COMPARABLE
-        return Line("claim", name, outcome, "; ".join(changed or same))
+    def _strangers(self) -> list[Line]:
+        """Lines of files that lie among the tables and are none."""
+        known = {TABLE.at(self.subject.results, name=name) for name in all_tables()}
+        folder = Path(TABLE.at(self.subject.results, name="any")).parent
+        return [
+            Line("table", path.stem, Outcome.DIFFERS, f"{path} is no table of the study")
+            for path in sorted(folder.glob("*.csv"))
+            if str(path) not in known and path.name[0] != "."
+        ]
 
     def _figures(self, tables: list[Line]) -> list[Line]:
         by_name = {line.name: line for line in tables}
@@ -150,17 +195,13 @@ class Examination:
         missing = self._missing("figure", name, [job.pdf, job.png])
         if missing is not None:
             return missing
-        paths = {TABLE.at(self.subject.results, name=table): table for table in tables}
+        paths = {TABLE.at(self.subject.results, name=table): table for table in all_tables()}
         read = [paths[path] for path in job.inputs if path in paths]
-        bad = [
-            tables[table]
-            for table in read
-            if tables[table].outcome not in (Outcome.REPRODUCED, Outcome.NOT_COMPARABLE)
-        ]
+        bad = [tables[table] for table in read if tables[table].outcome not in GOOD]
         if bad:
             text = f"reads the table(s) {', '.join(line.name for line in bad)}"
             return Line("figure", name, bad[0].outcome, text)
-        files = [path for path in job.inputs if path not in paths and path.startswith("results/")]
+        files = [path for path in _results(job.inputs) if path not in paths]
         for path in files:
             if self.condition(path) is not Condition.INTACT:
                 text = f"{path}, which it reads, is not there or damaged"
@@ -170,3 +211,20 @@ class Examination:
             return Line("figure", name, Outcome.NOT_COMPARABLE, f"{text}, which hold times")
         more = f" and {len(files)} intact files" if read and files else ""
         return Line("figure", name, Outcome.REPRODUCED, text + more)
+
+
+def _results(paths: Sequence[str]) -> list[str]:
+    return [path for path in paths if path.startswith("results/")]
+
+
+def _first_difference(found: pd.DataFrame, again: pd.DataFrame) -> str | None:
+    """The first cell of a table that is another one when it is made again; None if none is."""
+    if list(found.columns) != list(again.columns) or len(found) != len(again):
+        return f"which have {len(again)} rows of {len(again.columns)} columns"
+    other = (found != again) & ~(found.isna() & again.isna())
+    places = np.argwhere(other.to_numpy())
+    if not len(places):
+        return None
+    row, column = places[0]
+    old, new = (in_words(frame.iloc[row, column]) for frame in (found, again))
+    return f"as in row {row + 1} {found.columns[column]}: found {old}, they give {new}"

@@ -1,15 +1,30 @@
-"""``./reproduce verify --files``: whether every file is the one that the last run left."""
+"""``./reproduce verify --files``: whether every file is the one that the last run left.
+
+The plan says which files there must be, the manifest which bytes they have; what takes seconds is
+made again from the others and compared (`pdrom.verification.again`).
+"""
 
 import os
 import shlex
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 from pdrom.core.errors import StorageError
 from pdrom.core.paths import MANIFEST
-from pdrom.pipeline.manifest import Manifest, read_manifest
+from pdrom.core.store import Condition, check_file
+from pdrom.pipeline.manifest import Entry, Manifest, asked_for, own_files, read_manifest
+from pdrom.verification.again import Job, differing, jobs
 from pdrom.verification.status import Status
 from pdrom.verification.subject import Subject
+
+DAMAGED = "damaged (its checksum differs)"
+LOST = "not there"
+OTHER = "not what its inputs give"
+FOREIGN = "no file of this study"
+UNLISTED = "not in the manifest"
+# Faults that have a line of their own.
+SHOWN = 20
 
 
 def verify_files(subject: Subject) -> Status:
@@ -27,24 +42,57 @@ def verify_files(subject: Subject) -> Status:
 
 
 def _compare(subject: Subject, manifest: Manifest) -> Status:
-    faults = {}
-    for name, entry in manifest.files.items():
-        path = Path(os.path.normpath(Path(subject.results, name)))
-        if not path.is_file():
-            faults[path] = Status.MISSING
-        elif not entry.fits(path):
-            faults[path] = Status.DIFFERS
-    words = {Status.MISSING: "not there", Status.DIFFERS: "damaged (its checksum differs)"}
-    for path, fault in faults.items():
-        _say(f"{path}: {words[fault]}; make it anew by {anew(subject, path)}")
-    count = len(manifest.files)
+    plan, folders = subject.plan, subject.folders
+    entries = {_normal(subject.results, name): entry for name, entry in manifest.files.items()}
+    own = own_files(plan, folders)
+    ours = own | set(asked_for(entries, plan, folders))
+    faults = {path: _fault(path, entry, path in ours) for path, entry in entries.items()}
+    faults |= {path: _unlisted(path) for path in sorted(own - set(entries))}
+    faults = {path: fault for path, fault in faults.items() if fault}
+    faults |= dict.fromkeys(_other(jobs(plan, folders), set(faults)), OTHER)
+    for path, fault in list(faults.items())[:SHOWN]:
+        hint = "" if fault == FOREIGN else f"; make it anew by {anew(subject, path)}"
+        _say(f"{path}: {fault}{hint}")
+    if len(faults) > SHOWN:
+        _say(f"and {len(faults) - SHOWN} more; finish the study by {subject.command()}")
+    count = len(entries | faults)
     _say(f"{count - len(faults)} of {count} files are as the last run left them")
-    return min(faults.values(), default=Status.HOLDS)
+    if LOST in faults.values():
+        return Status.MISSING
+    return Status.DIFFERS if faults else Status.HOLDS
 
 
-def anew(subject: Subject, path: Path) -> str:
+def _normal(results: str, name: str) -> str:
+    return os.path.normpath(Path(results, name))
+
+
+def _fault(path: str, entry: Entry, ours: bool) -> str:
+    """What is wrong with a file of the manifest; empty if nothing is."""
+    if not ours:
+        return FOREIGN
+    if not Path(path).is_file():
+        return LOST
+    intact = entry.fits(Path(path)) and check_file(path) is Condition.INTACT
+    return "" if intact else DAMAGED
+
+
+def _unlisted(path: str) -> str:
+    return UNLISTED if Path(path).is_file() else LOST
+
+
+def _other(made: Iterable[Job], faulty: set[str]) -> list[str]:
+    """Files that are not what their inputs give, where the inputs are without fault."""
+    return [
+        path
+        for job in made
+        if faulty.isdisjoint((*job.inputs, *job.outputs))
+        for path in differing(job)
+    ]
+
+
+def anew(subject: Subject, path: str) -> str:
     """The command that makes one file anew, whatever is in its place."""
-    return shlex.join(["./reproduce", *subject.options, "--force", "--", str(path)])
+    return shlex.join(["./reproduce", *subject.options, "--force", "--", path])
 
 
 def _say(line: str) -> None:

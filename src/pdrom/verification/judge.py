@@ -8,13 +8,22 @@ import numpy as np
 import pandas as pd
 
 from pdrom.tables.declaration import Column, Table
-from pdrom.verification.compare import SAME, Comparison
-from pdrom.verification.rows import of_fitted_samples
-from pdrom.verification.spread import AS_A_WHOLE, COMPARED, TEN, Spread, spreads
-from pdrom.verification.tolerances import Tolerances
+from pdrom.verification.compare import Comparison
+from pdrom.verification.pairing import names_row
+from pdrom.verification.rows import SAMPLES, names
 
 # Columns of a row that say which one it is.
 NAMED = 6
+# Nine of ten cells of a column are closer than its tolerance, which ten cells or more can show.
+NINE, TEN = 1e-5, 10
+# Of cells that rounding decides about, a tenth may have another outcome or another order of
+# magnitude, and half may be off by more than a factor of two; and by what they are counted.
+LOOSE = (
+    (0.1, 1 - 1 / 10, ("scene", "noisy_axes", "method")),
+    (0.5, 1 - 1 / 2, ("scene",)),
+)
+# Cells of a column with a share of its own that may differ in any case.
+FEW = 3
 
 
 @dataclass(frozen=True)
@@ -40,44 +49,29 @@ class Difference:
 
 @dataclass(frozen=True)
 class Judgement:
-    """What came of the comparison of a table, or of what is drawn or said from tables.
+    """What came of the comparison of a table.
 
     differences : worst first
     compared : cells that were compared
-    left_out : cells that were not, by the reason
+    loose : cells that were compared by count, by the reason
     """
 
     name: str
     differences: tuple[Difference, ...]
     compared: int
-    left_out: Counter[str]
+    loose: Counter[str]
 
 
-def judge(comparison: Comparison, tolerances: Tolerances, anew: float) -> Judgement:
-    """Judgement on a table.
-
-    Parameters
-    ----------
-    anew : share of the rows whose samples may have been chosen anew
-    """
-    found = [
-        *_rows(comparison),
-        *_equal(comparison),
-        *_counts(comparison),
-        *_within(comparison, tolerances),
-        *_class(comparison),
-        *_anew(comparison, anew),
-    ]
+def judge(comparison: Comparison) -> Judgement:
+    """Judgement on a table."""
+    found = [*_rows(comparison)]
+    compared, loose = 0, Counter[str]()
+    for column in comparison.columns():
+        found += _cells(comparison, column)
+        compared += int(comparison.compared(column).sum())
+        loose.update({why: int(c.sum()) for why, c in comparison.loose(column).items()})
     found.sort(key=lambda difference: -difference.size)
-    left_out: Counter[str] = Counter()
-    compared = 0
-    for column in comparison.table.columns:
-        seen = np.zeros(len(comparison.e), dtype=bool)
-        for reason, cells in comparison.reasons(column).items():
-            left_out[reason] += int((cells & ~seen).sum())
-            seen |= cells
-        compared += int((~seen).sum())
-    return Judgement(comparison.table.name, tuple(found), compared, +left_out)
+    return Judgement(comparison.table.name, tuple(found), compared, +loose)
 
 
 def _rows(comparison: Comparison) -> Iterator[Difference]:
@@ -85,89 +79,74 @@ def _rows(comparison: Comparison) -> Iterator[Difference]:
     for frame, expected, found in ((missing, "a row", "none"), (new, "none", "a row")):
         for i in range(len(frame)):
             yield Difference(row_in_words(comparison.table, frame, i), expected, found, np.inf, 0)
+    moved = np.flatnonzero(np.diff([row for _, row in comparison.pairs]) < 0)
+    if len(moved):
+        place = row_in_words(comparison.table, comparison.e, int(moved[0]) + 1)
+        yield Difference(f"order of the rows, {place}", "further down", "further up", np.inf, 0)
 
 
-def _equal(comparison: Comparison) -> Iterator[Difference]:
-    for column in comparison.columns("exact", "verdict"):
-        apart = (comparison.distances[column.name] > 0) & ~comparison.free(column)
-        for row in np.flatnonzero(apart):
-            yield _difference(comparison, column, int(row), np.inf, 0.0)
+def _cells(comparison: Comparison, column: Column) -> Iterator[Difference]:
+    beyond = comparison.beyond(column)
+    if column.kind in ("text", "flag") and column.tolerance:
+        yield from _fragile(comparison, column, beyond)
+        return
+    firm = ~np.any([np.zeros(len(beyond)), *comparison.loose(column).values()], axis=0)
+    for row in np.flatnonzero(beyond & firm):
+        yield _difference(comparison, column, int(row))
+    if not (beyond & firm).any():
+        yield from _nine_of_ten(comparison, column, firm & ~comparison.wrong)
+    yield from _loose(comparison, column, ~firm)
 
 
-def _counts(comparison: Comparison) -> Iterator[Difference]:
-    """Counts are equal but where samples were chosen anew, or are what a fit leaves."""
-    loose = comparison.anew | of_fitted_samples(comparison.e)
-    for column in comparison.columns("count"):
-        apart = comparison.distances[column.name]
-        fixed = (apart > SAME) & ~comparison.free(column) & ~loose
-        for row in np.flatnonzero(fixed):
-            yield _difference(comparison, column, int(row), float(apart[row]), 0.0)
+def _fragile(comparison: Comparison, column: Column, other: np.ndarray) -> Iterator[Difference]:
+    """A few cells may be others; the row that is named is the first of them."""
+    allowed = max(FEW, column.within * len(other))
+    if other.sum() > allowed:
+        place = row_in_words(comparison.table, comparison.e, int(np.argmax(other)))
+        words = f"at most {int(allowed)} other cells", f"{other.sum()}"
+        yield Difference(f"{column.name}, as of {place}", *words, float("inf"), allowed)
 
 
-def _within(comparison: Comparison, tolerances: Tolerances) -> Iterator[Difference]:
-    for spread in spreads(comparison):
-        limit = tolerances[spread.quantity, spread.rows]
-        beyond = spread.distances > limit.every
-        column = _column(comparison, spread)
-        for place in np.flatnonzero(beyond):
-            yield _difference(
-                comparison,
-                column,
-                int(spread.cells[place]),
-                float(spread.distances[place]),
-                limit.every,
-                whole=spread.quantity in AS_A_WHOLE,
-            )
-        if spread.nine_of_ten > limit.nine and not beyond.any() and len(spread.distances) >= TEN:
-            share = float(np.mean(spread.distances > limit.nine))
-            yield Difference(
-                f"{column.name}, {spread.rows}",
-                f"nine of ten cells within {limit.nine:.2g}",
-                f"{1 - share:.0%} of them",
-                spread.nine_of_ten,
-                limit.nine,
-            )
+def _nine_of_ten(comparison: Comparison, column: Column, firm: np.ndarray) -> Iterator[Difference]:
+    """A small shift of all cells is noticed although one may be off by more."""
+    usual = column.quantity == "error" and column.kind == "number" and column.tolerance is None
+    if not usual or firm.sum() < TEN:
+        return
+    size = float(np.quantile(comparison.apart(column)[firm], 0.9))
+    if size > NINE:
+        words = f"nine of ten cells within {NINE:g}", f"within {size:.2g}"
+        yield Difference(column.name, *words, size, NINE)
 
 
-def _column(comparison: Comparison, spread: Spread) -> Column:
-    return next(c for c in comparison.columns(*COMPARED) if c.name == spread.column)
+def _loose(comparison: Comparison, column: Column, cells: np.ndarray) -> Iterator[Difference]:
+    """Cells that rounding decides about: most have the same outcome, and the same magnitude.
+
+    A number that is there on one side only is another outcome. Cells of one run count once.
+    """
+    rows = comparison.e[cells]
+    run = [*SAMPLES, *({"seed"} & set(rows.columns))]
+    runs = names(rows, run) if set(run) <= set(rows.columns) else range(len(rows))
+    for share, wider, by in LOOSE if len(rows) else ():
+        other = comparison.beyond(column, wider if column.kind == "number" else 0.0)[cells]
+        counted = pd.DataFrame({"run": runs, "other": other}, rows.index)
+        named = [rows[name] for name in by if name in rows and "scene" in rows]
+        all_rows = [pd.Series("all rows", rows.index)]
+        for group, part in counted.groupby(named or all_rows, dropna=False):
+            of_runs = part.groupby("run").other.any()
+            allowed = max(1.0, share * len(of_runs))
+            if of_runs.sum() > allowed:
+                place = f"{column.name} of {', '.join(map(str, group))}"
+                words = f"at most {int(allowed)} of {len(of_runs)} other", f"{of_runs.sum()}"
+                yield Difference(place, *words, float("inf"), allowed)
 
 
-def _class(comparison: Comparison) -> Iterator[Difference]:
-    words = {True: "a failed run", False: "a run that does not fail"}
-    for row in np.flatnonzero(comparison.class_changed):
-        expected, found = (words[bool(side[row])] for side in comparison.failed)
-        where = row_in_words(comparison.table, comparison.e, int(row))
-        yield Difference(where, expected, found, np.inf, 0.0)
-
-
-def _anew(comparison: Comparison, allowed: float) -> Iterator[Difference]:
-    judged = ~comparison.chaotic
-    share = float(np.mean(comparison.anew[judged])) if judged.any() else 0.0
-    if comparison.anew[judged].sum() > 1 and share > allowed:
-        yield Difference(
-            "rows whose samples were chosen anew",
-            f"at most {allowed:.0%}",
-            f"{share:.0%}",
-            share,
-            allowed,
-        )
-
-
-def _difference(
-    comparison: Comparison,
-    column: Column,
-    row: int,
-    size: float,
-    allowed: float,
-    whole: bool = False,
-) -> Difference:
-    place = row_in_words(comparison.table, comparison.e, row)
-    where = f"{column.name} as a whole, worst {place}" if whole else f"{place} {column.name}"
+def _difference(comparison: Comparison, column: Column, row: int) -> Difference:
+    place = f"{row_in_words(comparison.table, comparison.e, row)} {column.name}".strip()
     expected, found = (
         in_words(frame[column.name].iloc[row]) for frame in (comparison.e, comparison.f)
     )
-    return Difference(where.strip(), expected, found, size, allowed)
+    size, allowed = comparison.apart(column)[row], comparison.limits(column)[row]
+    return Difference(place, expected, found, float(size), float(allowed))
 
 
 def in_words(value: object) -> str:
@@ -179,7 +158,7 @@ def in_words(value: object) -> str:
 
 def row_in_words(table: Table, frame: pd.DataFrame, row: int) -> str:
     """What names a row: its words and sizes."""
-    names = [c.name for c in table.columns if c.quantity in ("exact", "count", "value")]
+    names = [c.name for c in table.columns if names_row(c) or c.quantity == "value"]
     cells = [(name, frame[name].iloc[row]) for name in names]
     named = [f"{name} {in_words(value)}" for name, value in cells if not pd.isna(value)]
     return ", ".join(named[:NAMED])

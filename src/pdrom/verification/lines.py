@@ -69,9 +69,9 @@ def _cells(judgement: Judgement) -> str:
     if judgement.compared == 0:
         return "it has no rows"
     text = f"{judgement.compared} cells"
-    if judgement.left_out:
-        reasons = ", ".join(f"{reason} {n}" for reason, n in judgement.left_out.most_common())
-        text += f"; not compared: {reasons}"
+    if judgement.loose:
+        reasons = ", ".join(f"{reason} {n}" for reason, n in judgement.loose.most_common())
+        text += f"; by count: {reasons}"
     return text
 
 

@@ -4,26 +4,29 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from pdrom.tables.declaration import Table
+from pdrom.tables.declaration import Column, Table
 
 Pairs = list[tuple[int, int]]
-_NAMES = ("exact",)
-_NAMES_AND_COUNTS = ("exact", "count")
+
+
+def names_row(column: Column) -> bool:
+    """Whether a column says which row it is: a name, a parameter, a size."""
+    return column.quantity == "exact" and not column.timed
 
 
 def pairs(table: Table, expected: pd.DataFrame, found: pd.DataFrame) -> Pairs:
     """(row of ``expected``, row of ``found``) of all rows that belong together.
 
-    Rows with the same names, parameters and counts belong together; of those that are left, rows
-    with the same names and parameters, in their order: a count may differ where rounding picks
-    samples.
+    Rows with the same names and numbers of samples belong together; of those that are left, rows
+    with the same names, in their order: a number of samples may differ where a fit leaves it.
     """
     made: Pairs = []
     left = [list(range(len(expected))), list(range(len(found)))]
-    for quantities in (_NAMES_AND_COUNTS, _NAMES):
+    named = [c.name for c in table.columns if names_row(c)]
+    counts = [c.name for c in table.columns if c.quantity == "value" and c.kind == "integer"]
+    for columns in ([*named, *counts], named):
         if not all(left):
             break
-        columns = [c.name for c in table.columns if c.quantity in quantities]
         more = _matched(_keys(expected, columns, left[0]), _keys(found, columns, left[1]))
         made += more
         taken = [{pair[side] for pair in more} for side in (0, 1)]
@@ -33,12 +36,15 @@ def pairs(table: Table, expected: pd.DataFrame, found: pd.DataFrame) -> Pairs:
 
 def _keys(frame: pd.DataFrame, columns: Sequence[str], rows: list[int]) -> dict[int, tuple]:
     part = frame.iloc[rows]
-    cells = [["" if _is_missing(cell) else cell for cell in part[name]] for name in columns]
+    cells = [[_key(cell) for cell in part[name]] for name in columns]
     return dict(zip(rows, zip(*cells, strict=True), strict=True))
 
 
-def _is_missing(cell: object) -> bool:
-    return cell is None or cell is pd.NA or cell != cell
+def _key(cell: object) -> object:
+    """A cell without the digits that references do not have; one word for what is missing."""
+    if cell is None or cell is pd.NA or cell != cell:
+        return ""
+    return f"{cell:.6g}" if isinstance(cell, float) else cell
 
 
 def _matched(expected: dict[int, tuple], found: dict[int, tuple]) -> Pairs:

@@ -17,15 +17,12 @@ from pdrom.core.errors import StorageError
 from pdrom.core.paths import RESULTS
 from pdrom.pipeline.tracked import write_tracked
 from pdrom.tables.declaration import Column, Table
-from pdrom.tables.quantities import Quantity
+from pdrom.verification.compare import NOT_COMPARED
 
-NOT_KEPT: tuple[Quantity, ...] = ("time", "clocked", "told", "rounding")
 # Digits of numbers; tolerances are a hundred times what these digits leave out, or more.
-DIGITS, FEW_DIGITS = 9, 3
-ROUGH: tuple[Quantity, ...] = ("magnitude", "ratio")
+DIGITS = 9
 PACKED_FROM = 50_000
 LOG = "changes.md"
-TOLERANCES, OWN_TOLERANCES = "tolerances.csv", "own_tolerances.csv"
 HEAD = """# Changes of the expected tables
 
 Written by `./reproduce verify --update --reason "..."`, newest last.
@@ -47,13 +44,6 @@ def folder_of(results: str) -> Path:
     return root / "reference" / Path(results).relative_to(root) / "tables"
 
 
-def tolerances_paths(results: str, root: Path = Path()) -> list[Path]:
-    """Tables of tolerances: one for all configurations, and one measured with this one, if any."""
-    common = root / RESULTS / "reference" / TOLERANCES
-    own = root / folder_of(results).parent / OWN_TOLERANCES
-    return [common, own] if own.is_file() else [common]
-
-
 def compact(table: Table, frame: pd.DataFrame) -> pd.DataFrame:
     """What is kept of a table."""
     columns = kept(table)
@@ -62,14 +52,13 @@ def compact(table: Table, frame: pd.DataFrame) -> pd.DataFrame:
 
 def kept(table: Table) -> dict[str, Column]:
     """Columns that are kept of a table, by name."""
-    return {c.name: c for c in table.columns if c.quantity not in NOT_KEPT}
+    return {c.name: c for c in table.columns if c.quantity not in NOT_COMPARED}
 
 
 def _rounded(column: Column, values: pd.Series) -> pd.Series:
     if column.kind != "number":
         return values
-    digits = FEW_DIGITS if column.quantity in ROUGH else DIGITS
-    texts = [f"{value:.{digits}g}" for value in values.to_numpy(dtype=float)]
+    texts = [f"{value:.{DIGITS}g}" for value in values.to_numpy(dtype=float)]
     return pd.Series([float(text) for text in texts], values.index, dtype=float)
 
 

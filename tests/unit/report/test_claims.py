@@ -287,7 +287,9 @@ def test_what_enough_clear_rows_decide_those_in_between_do_not_change():
 
 
 def test_a_verdict_that_depends_on_the_machine_says_what_was_measured():
-    outcome = evaluated(rule("local_share", ">=", 0.6, margin=1.6, by="scene", **COMPILED), tables())
+    outcome = evaluated(
+        rule("local_share", ">=", 0.6, margin=1.6, by="scene", **COMPILED), tables()
+    )
     assert outcome.condition == (
         "rows, at least 0.6: a 1 of 1, b 0 of 1 "
         "(measured 0.5 to 0.75; 1 of 2 within a factor 1.6 of it, which decides nothing)"

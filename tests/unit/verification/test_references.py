@@ -8,8 +8,8 @@ import pytest
 from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.pipeline.tables import all_tables
 from pdrom.verification import references
+from pdrom.verification.compare import NOT_COMPARED
 from pdrom.verification.references import (
-    NOT_KEPT,
     compact,
     folder_of,
     note,
@@ -25,9 +25,9 @@ LIMIT = 1_000_000
 
 
 @pytest.fixture
-def frame(expected):
+def frame(tracked):
     """Some rows of a table."""
-    return expected[TABLE.name].head(20)
+    return tracked[TABLE.name].head(20)
 
 
 def test_a_reference_comes_back_as_it_was_kept(frame, tmp_path):
@@ -43,9 +43,9 @@ def test_a_reference_comes_back_as_it_was_kept(frame, tmp_path):
 def test_what_a_clock_has_a_say_in_is_not_kept(frame, tmp_path):
     write_reference(TABLE, frame, tmp_path)
     columns = read_reference(TABLE, tmp_path).columns
-    assert set(columns) == {c.name for c in TABLE.columns if c.quantity not in NOT_KEPT}
-    assert "ms_per_frame" not in columns
-    assert "speedup" in columns
+    assert set(columns) == {c.name for c in TABLE.columns if c.quantity not in NOT_COMPARED}
+    assert "relative_error" in columns
+    assert "speedup" not in columns
 
 
 def test_a_large_table_is_packed_and_leaves_no_other_form(frame, tmp_path, monkeypatch):

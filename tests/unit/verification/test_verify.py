@@ -1,58 +1,23 @@
 """``./reproduce verify`` on a folder of results: outcomes, exit codes, the page."""
 
 import io
-import shutil
 from contextlib import redirect_stdout
 from pathlib import Path
 
-import pandas as pd
 import pytest
-from settled_times import CHANGED, LOSING, deciding_runs
 
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.paths import TABLE
-from pdrom.core.store import read_table, write_hdf5, write_table, write_text
+from pdrom.core.store import read_table, write_table
 from pdrom.pipeline.tables import all_tables
+from pdrom.verification.again import made, table_job
 from pdrom.verification.command import parser, verify, verify_tables
 from pdrom.verification.lines import Line, Outcome, status_of
-from pdrom.verification.references import folder_of, kept, write_reference
+from pdrom.verification.references import folder_of
 from pdrom.verification.status import Status
-from places import ROOT
 
 RESULTS = "results/studies/tiny"
-
-
-def make(path):
-    """A small file with its checksum."""
-    if path.endswith(".h5"):
-        with write_hdf5(path):
-            return
-    write_text("there\n", path)
-
-
-@pytest.fixture(scope="module")
-def results(expected, references, subject, tmp_path_factory):
-    """A project with the expected tables as results, and every file that figures read."""
-    folder = tmp_path_factory.mktemp("project")
-    for name in ("config", "paper", "src"):
-        (folder / name).symlink_to(ROOT / name)
-    shutil.copytree(ROOT / "results" / "reference", folder / "results" / "reference")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        patch.setattr("os.fsync", lambda descriptor: None)
-        for name, table in all_tables().items():
-            frame = expected.get(name, table.checked(pd.DataFrame()))
-            write_table(frame, TABLE.at(RESULTS, name=name))
-            new = name not in references or set(kept(table)) - set(references[name].columns)
-            if new or name in CHANGED:
-                # a new table or column has no tracked reference until a run is taken as one
-                write_reference(table, frame, folder_of(RESULTS))
-        figures = subject.plan.figure_jobs.values()
-        tables = {TABLE.at(RESULTS, name=name) for name in all_tables()}
-        read = {path for job in figures for path in job.inputs if path.startswith("results/")}
-        for path in (read - tables) | {p for job in figures for p in (job.pdf, job.png)}:
-            make(path)
-    return folder
+CLAIMS = ("claims", "claims_tests", "claims_sensitivity")
 
 
 def verified(subject):
@@ -63,72 +28,58 @@ def verified(subject):
     return status, printed.getvalue().splitlines()
 
 
-@pytest.fixture(scope="module")
-def held(results, subject):
-    """Code, lines and page of the expected tables themselves."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(results)
-        status, printed = verified(subject)
-    return status, printed, (results / RESULTS / "verification.md").read_text(encoding="utf-8")
-
-
-def test_expected_results_hold(held):
-    status, printed, page = held
+def test_expected_results_hold(results, subject):
+    status, printed = verified(subject)
+    page = (results / RESULTS / "verification.md").read_text(encoding="utf-8")
+    assert not any("differs" in line or "not there" in line for line in printed)
     assert status == Status.HOLDS
     names = {line.split(":")[0] for line in printed}
     assert {f"table {name}" for name in all_tables()} <= names
     assert {"claim C1", "claim C12", "figure singular_values"} <= names
-    assert not any("differs" in line or "not there" in line for line in printed)
     assert any(line.startswith("table effects_left_out: not comparable") for line in printed)
     assert "| C1 | reproduced |" in page
 
 
-@pytest.fixture(scope="module")
-def faulty(results, subject, held):
-    """Code and lines where verdicts have changed, and files and a reference are not there.
+def decide_again(subject):
+    """The tables of the claims, as the tables at hand give them."""
+    for name in CLAIMS:
+        with made(table_job(subject.plan, name)) as files:
+            [(path, new)] = files.items()
+            write_table(read_table(new), path)
 
-    After ``held``, since it takes away what that needs.
-    """
-    claims, reruns = (TABLE.at(RESULTS, name=name) for name in ("claims", "reduced_reruns"))
+
+def test_a_verdict_that_times_have_changed_is_shown_and_not_judged(examination, subject):
+    path = TABLE.at(RESULTS, name="local_share")
+    shares = read_table(path)
+    slow = shares.local_share.median() >= 0.7
+    write_table(shares.assign(local_share=0.1 if slow else 0.9), path)
+    decide_again(subject)
+    [line] = [line for line in examination.claims() if line.name == "C1"]
+    assert line.outcome is Outcome.NOT_COMPARABLE
+    now = "does not hold" if slow else "holds"
+    assert f"found '{now}', which rests on times" in line.text
+    assert [str(examination.table(n)) for n in CLAIMS if examination.table(n).details] == []
+
+
+def test_a_verdict_that_errors_have_changed_is_a_difference(examination, subject):
+    path = TABLE.at(RESULTS, name="reconstruction_error")
+    errors = read_table(path)
+    write_table(errors.assign(relative_error=errors.relative_error.where(False, 1e-3)), path)
+    decide_again(subject)
+    [line] = [line for line in examination.claims() if line.name == "C7"]
+    assert line.outcome is Outcome.DIFFERS
+    assert examination.table("claims").outcome is Outcome.DIFFERS
+
+
+def test_what_is_missing_has_its_own_code_and_names_its_command(results, subject):
     reference = folder_of(RESULTS) / "alarms.csv"
-    lost = [TABLE.at(RESULTS, name="noise"), f"{RESULTS}/figures/ladder.png"]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(results)
-        patch.setattr("os.fsync", lambda descriptor: None)
-        verdicts, runs = read_table(claims), read_table(reruns)
-        verdicts.loc[verdicts.claim == "C5", "verdict"] = "holds"
-        verdicts.loc[verdicts.claim == "C11", "verdict_beyond"] = "depends"
-        runs.loc[deciding_runs({"reduced_reruns": runs})[LOSING], "speedup"] = 0.98
-        write_table(verdicts, claims)
-        write_table(runs, reruns)
-        for path in (*lost, reference):
-            Path(path).unlink()
-        return verified(subject)
-
-
-def test_a_changed_verdict_and_a_table_without_reference_are_told(faulty):
-    _, printed = faulty
-    assert [line for line in printed if line.startswith(("claim C5", "table alarms"))] == [
-        "claim C5: differs, as published: expected 'cannot be decided', found 'holds'",
-        "table alarms: no reference, run verify --update",
-    ]
-
-
-def test_a_verdict_that_times_have_changed_is_not_comparable(faulty):
-    _, printed = faulty
-    assert (
-        "claim C11: not comparable on this machine, beyond: expected 'does not hold', "
-        "found 'depends', which rests on times (2 of 9 against 3 of 9)"
-    ) in printed
-    [line] = [line for line in printed if line.startswith("table claims:")]
-    assert "as published" not in line
-    assert "C5" in line  # the only one that differs
-    assert " more" not in line
-
-
-def test_what_is_missing_has_its_own_code_and_names_its_command(faulty):
-    status, printed = faulty
+    kept = reference.read_bytes()
+    for path in (TABLE.at(RESULTS, name="noise"), f"{RESULTS}/figures/ladder.png", reference):
+        Path(path).unlink()
+    status, printed = verified(subject)
+    reference.write_bytes(kept)
     assert status == Status.MISSING
+    assert "table alarms: no reference, run verify --update" in printed
     [line] = [line for line in printed if line.startswith("table noise")]
     assert line.endswith("make it by ./reproduce --configfile config/tiny.yaml -- noise")
     assert any(line.startswith("figure noise_runs: not there") for line in printed)
@@ -149,8 +100,7 @@ def test_the_code_is_that_of_the_worst_outcome(outcomes, status):
     assert status_of([Line("table", "a", outcome) for outcome in outcomes]) == status
 
 
-def test_a_configuration_without_references_is_refused(results, tmp_path, monkeypatch):
-    monkeypatch.chdir(results)
+def test_a_configuration_without_references_is_refused(results, tmp_path):
     own = tmp_path / "other.yaml"
     own.write_text("ranks: [6]\n")
     with pytest.raises(ConfigurationError, match="no expected tables of this configuration"):

@@ -1,4 +1,4 @@
-"""The manifest notices every changed file, and `verify --files` names what makes it anew."""
+"""`verify --files`: changed, lost, unlisted, foreign files, and others than their inputs give."""
 
 import json
 from pathlib import Path
@@ -8,10 +8,12 @@ import pytest
 
 from pdrom.core.errors import StorageError
 from pdrom.core.provenance import made_by
-from pdrom.core.store import write_hdf5, write_table, write_text
+from pdrom.core.store import atomic_path, write_hdf5, write_table, write_text
 from pdrom.pipeline import manifest
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.manifest import read_manifest, write_manifest
+from pdrom.verification import again, files
+from pdrom.verification.again import Job, differing
 from pdrom.verification.files import verify_files
 from pdrom.verification.status import Status
 from pdrom.verification.subject import Subject
@@ -19,6 +21,12 @@ from pdrom.verification.subject import Subject
 NAMES = ("results/tables/a.csv", "results/fom/a/train.h5", "paper/main.pdf", "results/paper/m.tex")
 OPTIONS = ("--configfile", "my study.yaml")
 SUBJECT = Subject(OPTIONS, Folders())
+
+
+def double(folder):
+    """A manuscript made from a table."""
+    text = Path(NAMES[0]).read_text().replace("1.5", "3.0")
+    (folder / "main.pdf").write_text(text)
 
 
 @pytest.fixture(autouse=True)
@@ -29,25 +37,37 @@ def study(tmp_path, monkeypatch):
         write_table(pd.DataFrame({"x": [1.5, 2.5]}), NAMES[0])
         with write_hdf5(NAMES[1]) as file:
             file["x"] = [1.0, 2.0]
-        write_text("a PDF", NAMES[2])
+        write_text("x\n3.0\n2.5\n", NAMES[2])
         write_text(r"\val", NAMES[3])
-    monkeypatch.setattr(
-        manifest, "study_files", lambda *_: [name for name in NAMES if Path(name).is_file()]
-    )
+    monkeypatch.setitem(vars(SUBJECT), "plan", None)
+    monkeypatch.setattr(files, "own_files", lambda *_: set(NAMES))
+    monkeypatch.setattr(files, "asked_for", lambda paths, *_: [])
+    monkeypatch.setattr(files, "jobs", lambda *_: [Job([NAMES[0]], [NAMES[2]], double)])
+    reseal(monkeypatch)
+
+
+def reseal(monkeypatch):
+    """Write the manifest of what is there, as a run does or somebody who hides an edit."""
+    found = [name for name in NAMES if Path(name).is_file()]
+    monkeypatch.setattr(manifest, "study_files", lambda *_: found)
     write_manifest(None, Folders(), OPTIONS)
 
 
+def rewrite(change):
+    """Another manifest, sealed again."""
+    path = Path("results/manifest.json")
+    content = json.loads(path.read_text())
+    change(content["files"])
+    write_text(json.dumps(content), path)
+
+
 def test_an_entry_has_checksums_and_what_made_the_file():
-    files = read_manifest("results").files
-    assert list(files) == ["../paper/main.pdf", "fom/a/train.h5", "paper/m.tex", "tables/a.csv"]
-    assert {name for name, entry in files.items() if entry.sha256 is None} == {"fom/a/train.h5"}
-    assert {(e.made_by, e.code_sha256) for e in files.values()} == {("rule", "c0de")}
-    assert (
-        "numpy"
-        in read_manifest("results").environments[files["paper/m.tex"].environment][
-            "library_versions"
-        ]
-    )
+    entries = read_manifest("results").files
+    assert list(entries) == ["../paper/main.pdf", "fom/a/train.h5", "paper/m.tex", "tables/a.csv"]
+    assert {name for name, e in entries.items() if e.sha256 is None} == {"fom/a/train.h5"}
+    assert {(e.made_by, e.code_sha256) for e in entries.values()} == {("rule", "c0de")}
+    environment = entries["paper/m.tex"].environment
+    assert "numpy" in read_manifest("results").environments[environment]["library_versions"]
 
 
 def test_equal_results_have_an_equal_manifest():
@@ -74,12 +94,66 @@ def test_a_changed_digit_is_noticed_and_its_command_named(name, capsys):
     assert "3 of 4 files" in said
 
 
+@pytest.mark.parametrize("content", ["x\n3.0\n2.6\n", "", "a picture"])
+def test_a_sealed_file_that_its_inputs_do_not_give_is_noticed(content, monkeypatch, capsys):
+    write_text(content, NAMES[2])
+    reseal(monkeypatch)
+    assert verify_files(SUBJECT) is Status.DIFFERS
+    assert f"{NAMES[2]}: not what its inputs give; make it anew by" in capsys.readouterr().out
+
+
+def test_what_inputs_do_not_give_any_more_is_noticed(monkeypatch):
+    monkeypatch.setattr(
+        files, "jobs", lambda *_: [Job([NAMES[0]], [NAMES[2]], lambda _: {}["no such column"])]
+    )
+    assert verify_files(SUBJECT) is Status.DIFFERS
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_entry_that_was_taken_out_is_noticed(name, capsys):
+    rewrite(lambda entries: entries.pop(f"../{name}".replace("../results/", "")))
+    assert verify_files(SUBJECT) is Status.DIFFERS
+    assert f"{name}: not in the manifest; make it anew by" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["../../secret", "/etc/hostname", "../paper/main.tex", "notes.md"])
+def test_a_name_that_is_no_file_of_the_study_is_noticed(name, capsys):
+    rewrite(lambda entries: entries.update({name: entries["tables/a.csv"]}))
+    assert verify_files(SUBJECT) is Status.DIFFERS
+    assert ": no file of this study\n" in capsys.readouterr().out
+
+
+def test_what_a_target_names_beside_the_study_may_be_listed(monkeypatch):
+    monkeypatch.setattr(files, "own_files", lambda *_: set(NAMES[1:]))
+    monkeypatch.setattr(files, "asked_for", lambda paths, *_: [NAMES[0]])
+    assert verify_files(SUBJECT) is Status.HOLDS
+
+
+def test_a_seal_that_does_not_fit_is_noticed():
+    Path(NAMES[3]).with_name(".m.tex.blake2b").unlink()
+    assert verify_files(SUBJECT) is Status.DIFFERS
+
+
 def test_a_lost_file_has_a_code_of_its_own(capsys):
     Path(NAMES[0]).unlink()
     assert verify_files(SUBJECT) is Status.MISSING
     assert f"{NAMES[0]}: not there; make it anew by" in capsys.readouterr().out
-    Path(NAMES[1]).write_bytes(b"")
-    assert verify_files(SUBJECT) is Status.DIFFERS
+
+
+def test_a_file_that_was_removed_and_left_out_of_the_manifest_is_missing(monkeypatch):
+    Path(NAMES[3]).unlink()
+    reseal(monkeypatch)
+    assert "paper/m.tex" not in read_manifest("results").files
+    assert verify_files(SUBJECT) is Status.MISSING
+
+
+def test_many_faults_are_counted(monkeypatch, capsys):
+    more = {f"results/tables/{i}.csv" for i in range(30)}
+    monkeypatch.setattr(files, "own_files", lambda *_: {*NAMES, *more})
+    assert verify_files(SUBJECT) is Status.MISSING
+    said = capsys.readouterr().out
+    assert "and 10 more; finish the study by ./reproduce --configfile 'my study.yaml'\n" in said
+    assert "4 of 34 files" in said
 
 
 def test_damage_before_the_manifest_is_noticed_after_it():
@@ -87,13 +161,6 @@ def test_damage_before_the_manifest_is_noticed_after_it():
     Path(NAMES[0]).write_text("x\n1.5\n2.6\n")
     write_manifest(None, Folders(), OPTIONS)
     assert verify_files(SUBJECT) is Status.DIFFERS
-
-
-def test_a_file_that_was_removed_leaves_the_manifest():
-    Path(NAMES[0]).unlink()
-    write_manifest(None, Folders(), OPTIONS)
-    assert "tables/a.csv" not in read_manifest("results").files
-    assert verify_files(SUBJECT) is Status.HOLDS
 
 
 @pytest.mark.parametrize("content", ["{", '{"format": 2}', '{"format": 1, "file": {}}'])
@@ -113,3 +180,44 @@ def test_an_edited_manifest_is_damaged_and_a_lost_one_missing():
     assert verify_files(SUBJECT) is Status.DIFFERS
     path.unlink()
     assert verify_files(SUBJECT) is Status.MISSING
+
+
+def figure_job(subject):
+    """The job of a figure that reads one table."""
+    path = subject.plan.figure_jobs["singular_values"].pdf
+    return next(j for j in again.jobs(subject.plan, subject.folders) if path in j.outputs)
+
+
+def test_a_figure_is_drawn_again_to_the_byte(results, subject):
+    """Replaced, sealed again: it is not what its table gives. And so is one of another table."""
+    job = figure_job(subject)
+    with again.made(job) as made:
+        for path, new in made.items():
+            with atomic_path(path) as temporary:
+                temporary.write_bytes(new.read_bytes())
+    assert differing(job) == []
+    for path in job.outputs:
+        content = Path(path).read_bytes()
+        with atomic_path(path) as temporary:
+            temporary.write_bytes(content + b"%")
+        assert differing(job) == [path]
+        with atomic_path(path) as temporary:
+            temporary.write_bytes(content)
+    [table] = job.inputs
+    write_table(pd.read_csv(table).assign(relative=0.5), table)
+    assert differing(job) == job.outputs
+
+
+def test_every_artifact_that_takes_seconds_is_made_again(subject):
+    plan, folders = subject.plan, subject.folders
+    made = [path for job in again.jobs(plan, folders) for path in job.outputs]
+    pictures = [job.png for job in plan.figure_jobs.values()]
+    wanted = [*plan.tables.paths, *plan.figures, *pictures, *plan.paper.inputs, folders.manuscript]
+    assert sorted(made) == sorted(wanted)
+
+
+def test_a_changed_number_of_the_manuscript_is_noticed(tmp_path):
+    job = Job([], ["paper/macros.tex"], lambda f: (f / "macros.tex").write_text(r"\def\a{0.1}"))
+    for value, faults in (("0.1", []), ("0.2", ["paper/macros.tex"])):
+        write_text(rf"\def\a{{{value}}}", "paper/macros.tex")
+        assert differing(job) == faults

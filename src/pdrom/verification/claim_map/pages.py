@@ -6,6 +6,7 @@ argument (results/claim_map.csv) this becomes the measurement that the repositor
 
 import re
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,15 +14,14 @@ from typing import Any
 import pandas as pd
 
 from pdrom.core.errors import PdromError
-from pdrom.core.paths import RESULTS
 from pdrom.core.store import read_table
 from pdrom.pipeline.tables import all_tables
 from pdrom.pipeline.tracked import write_tracked
 from pdrom.report.figure_numbers import Numbers, figure_numbers
+from pdrom.tables.declaration import Table
+from pdrom.tables.quantities import QUANTITIES
 from pdrom.verification.claim_map.entries import Entry, entries
 from pdrom.verification.claim_map.measured import COLUMNS
-from pdrom.verification.references import tolerances_paths
-from pdrom.verification.tolerances import Tolerances, load_tolerances, tolerance_text
 
 REFERENCE = Path("results/reference/claim_map.csv")
 PAGE = Path("docs/claim_map.md")
@@ -49,8 +49,9 @@ whole study writes a map of its own, `results/claim_map.csv` (other configuratio
 * **alone**: processor time of the last job, when all that it reads is there.
 * **memory**: the largest resident memory of one of these jobs, MB. **disk**: what they write, MB.
 * A dash: that run did not measure it, or a figure does not stand there.
-* **tolerance**: how exactly `./reproduce verify` expects a table ([how](verification.md)). A figure
-  is reproduced when the tables that it reads are, a claim when its verdict is the same.
+* **columns**: how many of each kind, which says how exactly `./reproduce verify` expects them
+  ([how](verification.md)). A figure is reproduced when the tables that it reads are, a claim when
+  its verdict is the same.
 * The rule is `figure_NAME` for a figure, `NAME_table` for a table, `paper` for the manuscript; a
   number of the text is read by `paper_inputs`.
 """
@@ -59,10 +60,9 @@ whole study writes a map of its own, `results/claim_map.csv` (other configuratio
 def pages(root: Path, measured: Measured) -> dict[Path, str]:
     """Text of both pages by their place below ``root``."""
     listed, numbers = entries(root), figure_numbers(root)
-    tolerances = load_tolerances(tolerances_paths(RESULTS, root))
     readme = (root / README).read_text(encoding="utf-8")
     return {
-        PAGE: _page(listed, numbers, measured, tolerances),
+        PAGE: _page(listed, numbers, measured),
         README: SECTION.sub(rf"\g<1>{_short(listed, numbers, measured)}\g<2>", readme),
     }
 
@@ -75,12 +75,7 @@ def load(root: Path) -> Measured:
     return {(row["kind"], row["name"]): row for row in table.to_dict("records")}
 
 
-def _page(
-    listed: list[Entry],
-    numbers: Mapping[str, Numbers],
-    measured: Measured,
-    tolerances: Tolerances,
-) -> str:
+def _page(listed: list[Entry], numbers: Mapping[str, Numbers], measured: Measured) -> str:
     def section(kind: str, head: str, row: Callable[[Entry, Row], Iterable[str]]) -> str:
         lines = [row(entry, measured.get(entry.key, {})) for entry in listed if entry.kind == kind]
         return _table(head, lines)
@@ -109,12 +104,12 @@ def _page(
         "## Tables\n",
         section(
             "table",
-            f"| table | command | {COSTS} | tolerance |",
+            f"| table | command | {COSTS} | columns |",
             lambda e, row: (
                 f"[{e.name}](tables.md#{e.name})",
                 _command(e),
                 *_costs(row),
-                tolerance_text(all_tables()[e.name], tolerances),
+                _tolerances(all_tables()[e.name]),
             ),
         ),
         "## Numbers of the text\n\nBy section of the manuscript: the tables that its numbers are "
@@ -171,6 +166,12 @@ def _origin(measured: Measured) -> str:
 
 def _places(numbers: Numbers) -> tuple[str, str]:
     return str(numbers.manuscript or UNKNOWN), str(numbers.preprint or UNKNOWN)
+
+
+def _tolerances(table: Table[Any]) -> str:
+    """How exactly a table is expected: the number of columns of each kind."""
+    held = Counter(column.quantity for column in table.columns)
+    return ", ".join(f"{held[kind]} {kind}" for kind in QUANTITIES if held[kind])
 
 
 def _command(entry: Entry) -> str:

@@ -6,7 +6,6 @@ import pandas as pd
 import pytest
 
 from pdrom.core.errors import StorageError
-from pdrom.core.paths import RESULTS
 from pdrom.core.store import write_table
 from pdrom.pipeline.tables import all_tables
 from pdrom.report.claims import load_claims
@@ -14,7 +13,6 @@ from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.verification.claim_map.entries import entries
 from pdrom.verification.claim_map.measured import COLUMNS
 from pdrom.verification.claim_map.pages import PAGE, README, load, main, pages
-from pdrom.verification.references import tolerances_paths
 from places import CONFIG, ROOT
 
 COMMAND = ".venv/bin/python -m pdrom.verification.claim_map.pages"
@@ -60,10 +58,6 @@ def test_a_measurement_is_taken_over(tmp_path, monkeypatch):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / "README.md").unlink()
     (tmp_path / "README.md").write_bytes((ROOT / "README.md").read_bytes())
-    for tracked in tolerances_paths(RESULTS, ROOT):
-        kept = tmp_path / tracked.relative_to(ROOT)
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        kept.write_bytes(tracked.read_bytes())
     monkeypatch.chdir(tmp_path)
     row = dict.fromkeys(COLUMNS) | {
         "kind": "claim", "name": "C5", "verdict": "holds", "verdict_beyond": "does not hold",
