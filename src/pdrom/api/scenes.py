@@ -6,6 +6,7 @@ from typing import Any
 
 from pdrom.api.arguments import file_path
 from pdrom.core.errors import ConfigurationError, PdromError
+from pdrom.core.names import named
 from pdrom.core.yamlfile import read_yaml, validate
 from pdrom.model.mesh.given import GivenMesh, given_mesh
 from pdrom.model.scene import Scene, SceneConfig
@@ -29,11 +30,14 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
         Naming the file, the key and the fault.
     """
     path = file_path(path)
-    config = validate(SceneConfig, read_yaml(path), str(path))
+    config = validate(SceneConfig, named(read_yaml(path), path.stem), str(path))
+    return bound(config, folder_of_meshes(path), str(path))
+
+
+def folder_of_meshes(path: Path) -> Path:
+    """Folder from which the mesh file of the scene in ``path`` is looked for."""
     folder = path.resolve().parent
-    if folder.parts[-2:] == SCENES.parts:
-        folder = folder.parents[1]
-    return bound(config, folder, str(path))
+    return folder.parents[1] if folder.parts[-2:] == SCENES.parts else folder
 
 
 def build_scene(folder: str | os.PathLike[str] = ".", mesh: Any = None, **keys: Any) -> Scene:
@@ -52,16 +56,15 @@ def build_scene(folder: str | os.PathLike[str] = ".", mesh: Any = None, **keys: 
     ConfigurationError
         Naming the key and the fault.
     """
-    named = {"name": "scene", "title": "A scene", **keys}
-    source = "build_scene"
+    keys, source = named(keys, "scene"), "build_scene"
     if not isinstance(mesh, (tuple, list)):
-        named |= {} if mesh is None else {"mesh": mesh}
-        return bound(validate(SceneConfig, named, source), file_path(folder), source)
+        keys |= {} if mesh is None else {"mesh": mesh}
+        return bound(validate(SceneConfig, keys, source), file_path(folder), source)
     if len(mesh) != 2:
         raise ConfigurationError(f"{source}: mesh of {len(mesh)} parts, required: (points, cells)")
     points, cells = mesh
     made = given_mesh(points, cells, f"{source}: mesh")
-    return Scene.build(validate(SceneConfig, named | {"mesh": GivenMesh.of(made)}, source), made)
+    return Scene.build(validate(SceneConfig, keys | {"mesh": GivenMesh.of(made)}, source), made)
 
 
 def bound(config: SceneConfig, folder: Path, source: str) -> Scene:

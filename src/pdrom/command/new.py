@@ -1,21 +1,26 @@
 """``pdrom new SCENE``: the file of a scene to begin with."""
 
 import argparse
-import re
+import json
+import math
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pdrom.command.base import Command, Status
 
+if TYPE_CHECKING:
+    from pdrom.model.mesh.types import Mesh
+
 TEMPLATE = """\
 # A scene. All keys: config/README.md. Units: metres, seconds, kilograms, newtons.
-name: {name}
+name: {name} # this and the title may be left out: they follow from the file's name
 title: {title}
 
 # What moves. Also {{kind: bar, nx: 40, ny: 5, nz: 5}}, {{kind: disc, edge: 0.05, hole: 0.3}},
 # {{kind: solid, shape: torus, edge: 0.08}} (or ball, starfish; kind shell: their surface), or a
 # file with triangles or tetrahedra: {{kind: file, path: sheet.obj, scale: 1.0}}
-mesh: {mesh}
+{about}mesh: {mesh}
 
 frames: 100 # to simulate
 time_step: 0.016 # s
@@ -25,31 +30,36 @@ vertex_mass: 10.0 # kg of each vertex
 # Only what is listed is loaded and computed.
 effects:
   - {{effect: gravity}} # along -y
-  - {{effect: floor}} # at y = 0
-  - {{effect: pins, select: left}} # held: a side (left, right, top ...) or a list of vertices
+  - {floor}
+  - {{effect: pins, select: {side}}} # held: a side (left, right, top ...) or a list of vertices
   # a handle: held vertices, moved by `offset` (m) over 50 frames; any `select` may be a place
   # - {{effect: translate, select: right, offset: [0.3, 0.0, 0.0], over: 50}}
   # - {{effect: pins, select: {{kind: sphere, centre: [0.5, 2.0, 0.0], radius: 0.1}}}}
   # an obstacle; also plane, box
   # - {{effect: sphere, centre: [0.0, 1.0, 0.0], radius: 0.4, friction: 0.3}}
-  # constraint groups of surfaces: edges keep their length, triangles their shape or area, bending
-  - {{effect: spring, weight: 1.0e+5}}
-  # - {{effect: strain, weight: 1.0e+5}}
-  # - {{effect: area, weight: 1.0e+5}}
-  # - {{effect: bending, weight: 0.1}}
-  # and of volumes: tetrahedra keep their shape, or their volume
-  # - {{effect: tetrahedron_strain, weight: 1.0e+6}}
-  # - {{effect: volume, weight: 1.0e+6}}
-
+{groups}
 # Groups whose projections are reduced, and the number of snapshots (even frames of the run) that
 # train a basis.
 reduce:
-  spring: {{train: 40}}
+  {group}: {{train: 40}}
 
 # How the held-out motion, on which a reduction is tested, differs: an initial velocity in m/s.
 held_out: {{kick: 0.5}}
 """
 GENERATED = "{kind: cloth, rows: 20, columns: 20, plane: xz}"
+SURFACE = """\
+  # constraint groups of surfaces: edges keep their length, triangles their shape or area, bending
+  - {effect: spring, weight: 1.0e+5}
+  # - {effect: strain, weight: 1.0e+5}
+  # - {effect: area, weight: 1.0e+5}
+  # - {effect: bending, weight: 0.1}
+"""
+VOLUME = """\
+  # constraint groups of volumes: tetrahedra keep their shape, or their volume
+  - {effect: tetrahedron_strain, weight: 1.0e+6}
+  # - {effect: volume, weight: 1.0e+6}
+"""
+ENOUGH = 3  # held vertices, with which a body does not turn about a line
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -65,9 +75,10 @@ def perform(arguments: argparse.Namespace) -> Status:
 
     path = Path(arguments.scene)
     path = path if path.suffix in (".yaml", ".yml") else path.with_name(f"{path.name}.yaml")
+    text = template(path.stem, *(_read(arguments.mesh, path) if arguments.mesh else ()))
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(template(path.stem, arguments.mesh))
+            file.write(text)
     except FileExistsError:
         raise ConfigurationError(f"{path}: there is such a file already; name another") from None
     except OSError as error:
@@ -76,11 +87,88 @@ def perform(arguments: argparse.Namespace) -> Status:
     return Status.DONE
 
 
-def template(stem: str, mesh: str | None = None) -> str:
-    """Text of a scene called as ``stem`` allows, on a mesh file or a generated sheet."""
-    name = re.sub(r"[^a-z0-9_]+", "_", stem.lower()).lstrip("_0123456789")[:64] or "scene"
-    made = f"{{kind: file, path: '{mesh}'}}" if mesh else GENERATED
-    return TEMPLATE.format(name=name, title=name.replace("_", " ").capitalize(), mesh=made)
+def template(stem: str, file: str | None = None, mesh: "Mesh | None" = None) -> str:
+    """Text of a scene called as ``stem`` allows, on a generated sheet or the ``mesh`` of a file."""
+    from pdrom.core.names import named
+
+    names = {key: json.dumps(value, ensure_ascii=False) for key, value in named({}, stem).items()}
+    if mesh is None:
+        groups = SURFACE + VOLUME.replace("  - {", "  # - {")
+        floor, side, about, made = "{effect: floor} # at y = 0", "left", "", GENERATED
+    else:
+        groups = VOLUME if len(mesh.tetrahedra) else SURFACE
+        floor, side, about = _floor(mesh), _side(mesh), _about(mesh)
+        made = f"{{kind: file, path: {json.dumps(file, ensure_ascii=False)}}}"
+    group = "tetrahedron_strain" if groups == VOLUME else "spring"
+    return TEMPLATE.format(
+        **names, mesh=made, about=about, floor=floor, side=side, groups=groups, group=group
+    )
+
+
+def _read(file: str, scene: Path) -> "tuple[str, Mesh]":
+    """The mesh file as the scene's file names it, and its mesh."""
+    from pdrom.api.scenes import folder_of_meshes
+    from pdrom.core.errors import ConfigurationError
+    from pdrom.core.yamlfile import validate
+    from pdrom.model.mesh.config import MeshFile
+
+    folder = folder_of_meshes(scene)
+    try:
+        inside = (Path(file).parent.resolve() / Path(file).name).relative_to(folder)
+    except ValueError:
+        raise ConfigurationError(
+            f"--mesh {file}: required is a file below {folder}, the folder of the scene"
+        ) from None
+    config = validate(MeshFile, {"kind": "file", "path": inside.as_posix()}, f"--mesh {file}")
+    return config.path, config.build(folder)
+
+
+def _about(mesh: "Mesh") -> str:
+    """Comments: how large the mesh is, where it lies, and how many vertices its sides have."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    places = (
+        f"{axis} from {a:.3g} to {b:.3g}" for axis, a, b in zip("xyz", low, high, strict=True)
+    )
+    cells = f"{len(mesh.triangles)} triangles"
+    if len(mesh.tetrahedra):
+        cells = f"{len(mesh.tetrahedra)} tetrahedra"
+    sides = (f"{side} {count}" for side, count in _sides(mesh).items())
+    return (
+        f"# Of this file: {mesh.vertices} vertices, {cells}; {', '.join(places)} (m).\n"
+        f"# Its sides, with the number of their vertices: {', '.join(sides)}.\n"
+    )
+
+
+def _sides(mesh: "Mesh") -> dict[str, int]:
+    """The sides that the mesh has, and how many vertices lie on each."""
+    from pdrom.core.errors import SceneError
+    from pdrom.model.mesh.select import SIDES, select_vertices
+
+    found = {}
+    for side in SIDES:
+        try:
+            found[side] = len(select_vertices(mesh, side))
+        except SceneError:  # it is flat in this direction
+            continue
+    return found
+
+
+def _side(mesh: "Mesh") -> str:
+    """A selection of enough vertices to hold the mesh by: its first such side, or a few on top."""
+    for side, count in _sides(mesh).items():
+        if count >= ENOUGH:
+            return side
+    top = mesh.points[mesh.points[:, 1].argmax()].tolist()
+    return f"{{kind: nearest, point: {top}, count: {ENOUGH}}}"
+
+
+def _floor(mesh: "Mesh") -> str:
+    """A floor half an extent below the mesh, at a height of few digits."""
+    lowest = float(mesh.points[:, 1].min())
+    step = 10.0 ** math.floor(math.log10(mesh.extent))
+    height = math.floor((lowest - mesh.extent / 2.0) / step) * step
+    below = f"below the mesh, which begins at y = {lowest:.3g}"
+    return f"{{effect: floor, height: {height:.12g}}} # {below}"
 
 
 COMMAND = Command(

@@ -26,6 +26,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     out = arguments.out or str(file.parent / f"{file.stem}.h5")
     require_output(out, [arguments.scene])
     scene = load_scene(arguments.scene)
+    scene.log_contacts()
     full = run(scene, out, Progress(scene.config.name, scene.config.frames))
     sys.stdout.write(
         f"{out}: {scene.config.frames} frames of {scene.mesh.vertices} vertices, "

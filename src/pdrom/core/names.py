@@ -3,7 +3,7 @@
 import os
 import re
 from pathlib import PurePath
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import AfterValidator
 
@@ -28,6 +28,19 @@ def check_lengths(path: str) -> None:
     for name in PurePath(path).parts:
         if len(os.fsencode(name)) > MAX_NAME:
             raise ValueError(f"names of at most {MAX_NAME} bytes are required")
+
+
+def name_of(stem: str) -> str:
+    """A scene's name, as near to the name of its file (without the ending) as is allowed."""
+    return re.sub(r"[^a-z0-9_]+", "_", stem.lower()).lstrip("_0123456789")[:64] or "scene"
+
+
+def named(keys: Any, stem: str) -> Any:
+    """``keys`` of a scene's file with a name and a title, made from the file's name."""
+    if not isinstance(keys, dict):
+        return keys
+    name = keys.get("name", name_of(stem))
+    return {"name": name, "title": str(name).replace("_", " ").capitalize(), **keys}
 
 
 SceneName = Annotated[str, AfterValidator(_scene_name)]

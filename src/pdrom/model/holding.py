@@ -1,4 +1,4 @@
-"""Which vertices a scene holds: contradictions are refused, numbers and obstacles are logged."""
+"""What holds vertices or stops them: contradictions are refused, numbers and doubts are logged."""
 
 import logging
 from collections.abc import Sequence
@@ -88,3 +88,17 @@ def log_obstructed(
             "scene '%s': %d held vertices have targets inside '%s' and stay there: %s",
             scene, len(vertices), "', '".join(blocked), named,
         )  # fmt: skip
+
+
+def log_contacts(
+    contacts: Sequence[Contact], boundaries: Sequence[Boundary], scene: str, rest: np.ndarray
+) -> None:
+    """Warn of contacts that do not fit the rest shape (N, 3) m; held vertices do not count."""
+    free = np.ones(len(rest), dtype=bool)
+    for boundary in boundaries:
+        if boundary.active(0):
+            free[boundary.held(0)] = False
+    for contact in contacts:
+        doubt = contact.doubt(rest, np.flatnonzero(free)) if free.any() else ""
+        if doubt:
+            log.warning("scene '%s', effect '%s': %s", scene, contact.name, doubt)

@@ -20,7 +20,7 @@ from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import Boundary, Contact, EffectConfig, Force, Start
 from pdrom.model.effects.entries import EffectConfigs, bind
 from pdrom.model.held_out import HeldOut
-from pdrom.model.holding import check_holds, log_holds, log_obstructed
+from pdrom.model.holding import check_holds, log_contacts, log_holds, log_obstructed
 from pdrom.model.masses import Mass, MassConfig, vertex_masses
 from pdrom.model.mesh.checks import check_mesh
 from pdrom.model.mesh.config import MeshConfig
@@ -180,6 +180,10 @@ class Scene:
         name, points, frames = self.config.name, self.mesh.points, self.config.frames
         log_holds(self.boundaries, name, len(points))
         log_obstructed(self.boundaries, self.contacts, name, points, frames)
+
+    def log_contacts(self) -> None:
+        """Warn of contacts that do not fit the rest shape, see `Contact.doubt`."""
+        log_contacts(self.contacts, self.boundaries, self.config.name, self.mesh.points)
 
     def group(self, name: str) -> ConstraintGroup:
         """The constraint group called ``name``; SceneError if the scene does not list it."""

@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from pdrom.core.errors import ConfigurationError, PdromError, choices
+from pdrom.core.names import named
 from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
 from pdrom.model.scene import Scene, SceneConfig
 
@@ -64,6 +65,7 @@ def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
     except PdromError as error:
         raise ConfigurationError(f"{source}: {error}") from error
     bound.log_holds()
+    bound.log_contacts()
     return bound
 
 
@@ -71,7 +73,7 @@ def read_scene(root: Path, name: str, coarsen: Coarsen | None = None) -> SceneCo
     """Configuration of scene ``name``, coarsened, without its mesh; ConfigurationError."""
     require_scenes(root, [name], "scenes")
     path = scene_file(root, name)
-    scene = validate(SceneConfig, read_yaml(path), str(path))
+    scene = validate(SceneConfig, named(read_yaml(path), name), str(path))
     if scene.name != name:
         raise ConfigurationError(f"{path}: name = '{scene.name}', required: '{name}', as the file")
     if coarsen is not None and coarsen != Coarsen():

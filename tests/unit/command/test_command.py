@@ -13,13 +13,16 @@ import numpy as np
 import pytest
 import yaml
 
+from pdrom.api import load_scene
 from pdrom.command.base import Status
 from pdrom.command.main import COMMANDS, parser, run
 from pdrom.command.new import template
 from pdrom.command.progress import Progress, line
 from pdrom.core.store import check_file
 from pdrom.model.dynamics.stepper import FrameReport
-from pdrom.model.scene import SceneConfig
+from pdrom.model.mesh.generators import bar, cloth
+from pdrom.model.mesh.types import Mesh
+from pdrom.model.scene import Scene, SceneConfig
 
 SCENE = """\
 name: small
@@ -227,11 +230,85 @@ def test_a_new_scene_is_valid_and_replaces_nothing(folder, capsys):
     assert (folder / "My Sheet-1.yaml").read_text("utf-8") == text
 
 
-def test_every_commented_effect_of_a_new_scene_is_valid():
-    text = template("a", "m.obj").replace("  # - {", "  - {")
+@pytest.mark.parametrize(
+    ("mesh", "listed", "others"),
+    [
+        (None, {"spring"}, {"translate", "strain", "bending", "volume"}),
+        (cloth(4, 3), {"spring"}, {"translate", "strain", "bending"}),
+        (bar(3, 2, 2), {"tetrahedron_strain"}, {"translate", "volume"}),
+    ],
+)
+def test_every_commented_effect_of_a_new_scene_is_valid(mesh, listed, others):
+    """Of a mesh that is known only groups that fit it are named."""
+    text = template("it's", 'o\'b "1" ü.obj', mesh)
     scene = SceneConfig.model_validate(yaml.safe_load(text))
-    assert {"translate", "strain", "bending"} <= {effect.effect for effect in scene.effects}
-    assert scene.mesh.sources == ["m.obj"]
+    assert {*scene.groups, *scene.reduce} == listed
+    assert scene.mesh.sources == ([] if mesh is None else ['o\'b "1" ü.obj'])
+    every = SceneConfig.model_validate(yaml.safe_load(text.replace("  # - {", "  - {")))
+    assert others <= {effect.effect for effect in every.effects}
+    assert (mesh is None) or {"strain", "volume"} - set(every.groups)
+
+
+def written(path: Path, mesh: Mesh) -> None:
+    """A file of the surface."""
+    lines = ["v {} {} {}".format(*point) for point in mesh.points.tolist()]
+    lines += ["f {} {} {}".format(*triangle) for triangle in (mesh.triangles + 1).tolist()]
+    path.write_text("\n".join([*lines, ""]), encoding="utf-8")
+
+
+def test_a_new_scene_tells_of_its_mesh_and_runs(folder, capsys, caplog):
+    """Also where a quote is in the name of the mesh, and the scene lies in another folder."""
+    (folder / "in").mkdir()
+    written(folder / "in" / "o'b.obj", cloth(4, 3, "xz", lift=-7.0))
+    assert run(["new", "in/no", "--mesh", "in/o'b.obj"]) == Status.DONE
+    text = (folder / "in" / "no.yaml").read_text("utf-8")
+    assert (
+        "# Of this file: 12 vertices, 12 triangles; x from -0.5 to 0.5, y from -7 to -7, z" in text
+    )
+    assert "number of their vertices: left 3, right 3, back 4, front 4." in text
+    small = text.replace("frames: 100", "frames: 4").replace("train: 40", "train: 2")
+    (folder / "in" / "no.yaml").write_text(small, encoding="utf-8")
+    scene = load_scene("in/no.yaml")
+    assert scene.config.name == "no"
+    (floor,) = [effect for effect in scene.config.effects if effect.effect == "floor"]
+    assert -9.0 < floor.height <= -7.5
+    assert run(["run", "in/no.yaml"]) == Status.DONE
+    assert caplog.messages == []
+    assert run(["new", "other", "--mesh", "in/../../x.obj"]) == Status.FAULTY
+    assert "required is a file below" in capsys.readouterr().err
+    assert run(["new", "other", "--mesh", "in/none.obj"]) == Status.FAULTY
+    assert "no such mesh file" in capsys.readouterr().err
+    assert not (folder / "other.yaml").exists()
+
+
+def test_a_mesh_without_a_whole_side_is_held_at_its_top(folder):
+    points = np.array([[0, 0, 0], [3, 1, 0], [1, 3, 0.5], [2, 2, 3], [4, 4, 4]], dtype=float)
+    mesh = Mesh(points, np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4]]))
+    scene = SceneConfig.model_validate(yaml.safe_load(template("a", "a.obj", mesh)))
+    built = Scene.build(scene, mesh)
+    assert built.boundaries[0].vertices.tolist() == [2, 3, 4]
+
+
+def test_names_and_titles_follow_from_the_file(folder):
+    short = SCENE.partition("\n")[2].replace("title: Small\n", "")
+    (folder / "Two Words.yaml").write_text(short, encoding="utf-8")
+    config = load_scene("Two Words.yaml").config
+    assert (config.name, config.title) == ("two_words", "Two words")
+    (folder / "on.yaml").write_text(short, encoding="utf-8")
+    assert load_scene("on.yaml").config.name == "on"
+
+
+def test_what_an_obstacle_moves_at_rest_is_said_once(folder, caplog):
+    inside = "  - {effect: floor, height: 2.0}\n  - {effect: self_collision, thickness: 0.01}\n"
+    held = "{kind: cloth, rows: 6, columns: 5, plane: xy}"
+    text = SCENE.replace("{kind: cloth, rows: 6, columns: 5, plane: xz}", held) + inside
+    (folder / "small.yaml").write_text(text, encoding="utf-8")
+    assert run(["run", "small.yaml"]) == Status.DONE
+    lies, thin = caplog.messages
+    start = "scene 'small', effect "
+    free = "10 of 25 free vertices lie inside it at rest and are moved by up to 0.4 m in the first"
+    assert lies.startswith(f"{start}'floor': {free}")
+    assert thin.startswith(f"{start}'self_collision': with thickness 0.01 a vertex can pass")
 
 
 GUARDED = ["reduce", "small.yaml", "--group", "spring", "--guard", "stop"]

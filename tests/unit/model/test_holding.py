@@ -3,6 +3,7 @@
 import logging
 
 import numpy as np
+import pytest
 
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import Mesh
@@ -41,3 +42,28 @@ def test_a_side_of_one_vertex_is_a_warning(caplog):
     )
     assert level == "WARNING"
     assert "effect 'pins': holds 1 of 20 vertices, fewer than 3 (select: left" in message
+
+
+@pytest.mark.parametrize(
+    ("contact", "count", "far"),
+    [
+        ({"effect": "floor", "height": 1.7}, 5, 0.075),
+        ({"effect": "floor", "height": 1.5}, 0, 0.0),
+        ({"effect": "plane", "point": [0, 2.25, 0], "normal": [0, -1, 0]}, 4, 0.125),
+        ({"effect": "sphere", "centre": [0, 1.5, 0], "radius": 0.1}, 0, 0.0),
+        ({"effect": "box", "lower": [-1, 1, -1], "upper": [1, 1.7, 1]}, 5, 0.075),
+        ({"effect": "self_collision", "thickness": 0.3}, 0, 0.0),
+    ],
+)
+def test_free_vertices_inside_an_obstacle_are_a_warning(caplog, contact, count, far):
+    """The sheet hangs from y = 2.375 to y = 1.625; its left top corner is held."""
+    pins = {"effect": "pins", "select": {"kind": "nearest", "point": [-1, 2.5, 0], "count": 1}}
+    spring = {"effect": "spring", "weight": 1.0}
+    config = {"name": "sheet", "title": "t", "mesh": SHEET, "frames": 4}
+    scene = Scene.build(SceneConfig(**config, effects=[pins, contact, spring]), cloth(5, 4))
+    scene.log_contacts()
+    said = [
+        f"scene 'sheet', effect '{contact['effect']}': {count} of 19 free vertices lie inside it "
+        f"at rest and are moved by up to {far:.3g} m in the first frame"
+    ]
+    assert caplog.messages == (said if count else [])

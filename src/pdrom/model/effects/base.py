@@ -26,6 +26,9 @@ from pydantic import Field
 from pdrom.core.yamlfile import ConfigModel, Length
 from pdrom.model.mesh.types import Mesh
 
+# A vertex no deeper than this part of the extent touches an obstacle and is not inside.
+TOUCHING = 1e-6
+
 
 class ScaledWithFrames:
     """Marks a configuration field that counts frames and follows a change of the frame count."""
@@ -197,3 +200,19 @@ class Contact(Effect):
 
         What a scene lists later has the last word.
         """
+
+    def doubt(self, rest: np.ndarray, free: np.ndarray) -> str:
+        """Say what is odd about the rest shape (N, 3) m with its ``free`` vertices; "" if nothing.
+
+        By default: vertices that the first frame moves, whatever the forces.
+        """
+        moved = rest.copy()
+        self.correct(moved, rest)
+        distances = np.linalg.norm(moved - rest, axis=1)[free]
+        count = np.count_nonzero(distances > TOUCHING * np.ptp(rest, axis=0).max())
+        if not count:
+            return ""
+        return (
+            f"{count} of {len(free)} free vertices lie inside it at rest and are moved by up to "
+            f"{distances.max():.3g} m in the first frame"
+        )

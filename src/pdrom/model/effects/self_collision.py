@@ -1,6 +1,5 @@
 """Vertices of one body keep apart."""
 
-import logging
 from typing import Annotated, Literal
 
 import numpy as np
@@ -11,8 +10,6 @@ from scipy.spatial import cKDTree
 from pdrom.core.yamlfile import MAX_LENGTH, MIN_LENGTH
 from pdrom.model.effects.base import Contact, EffectConfig
 from pdrom.model.mesh.types import Mesh
-
-log = logging.getLogger(__name__)
 
 # Searches for close pairs in a frame, and sweeps over the pairs of each search, at most.
 SEARCHES, SWEEPS = 20, 100
@@ -50,13 +47,19 @@ class SelfCollision(Contact):
         super().__init__(config, mesh, masses)
         self._rest, self._inverse_masses = mesh.points, 1.0 / masses
         self._thickness = config.thickness
-        edges = mesh.edges()
-        longest = np.linalg.norm(mesh.points[edges[:, 0]] - mesh.points[edges[:, 1]], axis=1).max()
-        if config.thickness < COVER * longest:
-            log.warning(
-                "self_collision: thickness = %g: vertices slip between others above %g "
-                "(edges of up to %g)", config.thickness, COVER * longest, longest,
-            )  # fmt: skip
+        edges = mesh.points[mesh.edges()]
+        self._needed = COVER * np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1).max()
+
+    def doubt(self, rest: np.ndarray, free: np.ndarray) -> str:
+        """Say which thickness nothing slips through, where the scene's is less."""
+        if self._thickness >= self._needed:
+            return ""
+        # rounded up, so that what the message says is enough
+        step = 10.0 ** (np.floor(np.log10(self._needed)) - 1.0)
+        return (
+            f"with thickness {self._thickness:g} a vertex can pass between others; at least "
+            f"{np.ceil(self._needed / step) * step:.2g} is needed"
+        )
 
     def correct(self, positions: np.ndarray, before: np.ndarray) -> None:
         self.apply(positions, before, np.empty(0, dtype=np.int64))

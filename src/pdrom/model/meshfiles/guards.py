@@ -140,7 +140,7 @@ def ends_noticed() -> Iterator[None]:
             raise CutError(f"{asked} numbers that follow each other, {len(array)} are there")
         return array
 
-    builtins.open, np.fromfile = noticing, whole
+    builtins.open, np.fromfile = noticing, whole  # type: ignore[assignment]
     try:
         yield
     except (UnreadableError, MemoryError):
@@ -160,7 +160,7 @@ class _Text(io.TextIOWrapper):
         super().__init__(file, encoding="utf-8")
         self._ends = ends
 
-    def readline(self, size: int = -1, /) -> str:  # type: ignore[override]
+    def readline(self, size: int = -1, /) -> str:
         line = super().readline(size)
         if not line:
             _note(self._ends)

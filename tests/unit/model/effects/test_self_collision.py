@@ -108,13 +108,15 @@ def folding(scene):
     return folded(scene).positions - scene.mesh.points
 
 
-def test_a_thickness_that_lets_vertices_slip_is_logged(caplog):
+def test_a_thickness_that_lets_vertices_pass_is_said_in_the_log_and_mended_by_what_it_says(caplog):
     with caplog.at_level(logging.WARNING):
-        sheet()
+        sheet().log_contacts()
         assert caplog.messages == []
-        sheet(thickness=0.05)
+        sheet(thickness=0.05).log_contacts()
+        sheet(thickness=0.075).log_contacts()
     (message,) = caplog.messages
-    assert "thickness = 0.05: vertices slip between others above 0.074" in message
+    said = "with thickness 0.05 a vertex can pass between others; at least 0.075 is needed"
+    assert message.endswith(f"effect 'self_collision': {said}")
 
 
 def test_a_position_subspace_refuses_it():
