@@ -50,6 +50,11 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
         browser.close()
 
 
+def test_the_first_page_names_the_configuration(opened: Page) -> None:
+    opened.reload()
+    opened.get_by_text(f"{MICRO_FILE} (of coarse meshes").wait_for()
+
+
 def go_to(page: Page, entry: str) -> None:
     """Open a category, from whatever is open."""
     page.reload()
