@@ -5,9 +5,8 @@ from collections.abc import Callable, Iterator
 from pdrom.core import paths
 from pdrom.core.paths import Place
 from pdrom.core.reads import Preferred
-from pdrom.model.effects import EFFECTS
-from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.study import Study
+from pdrom.pipeline.subspace_scenes import not_taken
 
 Labels = dict[str, str]
 
@@ -137,12 +136,14 @@ def _subspaces(study: Study) -> Iterator[Labels]:
     """The listed scenes, or all; none where no model is asked for, or none takes an effect."""
     section = study.settings.subspace
     for scene, config in study.scenes.items() if section.bases and section.sizes else ():
-        if scene in section.scenes or (not section.scenes and _in_subspace(config)):
+        if scene in section.scenes or (not section.scenes and not not_taken(config)):
             yield {"scene": scene}
 
 
-def _in_subspace(config: SceneConfig) -> bool:
-    return all(EFFECTS.load(entry.effect).in_subspace for entry in config.effects)
+def _companions(study: Study) -> Iterator[Labels]:
+    for scene, config in study.scenes.items():
+        if not not_taken(config):
+            yield {"scene": scene}
 
 
 HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
@@ -164,9 +165,9 @@ HELD: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.SUBSPACES_TRAIN: _subspaces,
     paths.SUBSPACES_HELDOUT: _subspaces,
     paths.POSITION_BASES: _subspaces,
-    paths.COMPANION: _scenes,
-    paths.ESTIMATES: _scenes,
-    paths.COMPANION_TIMES: _scenes,
+    paths.COMPANION: _companions,
+    paths.ESTIMATES: _companions,
+    paths.COMPANION_TIMES: _companions,
     paths.SUBSPACES_SECONDS: _subspaces,
     paths.BOUNDS: _scenes,
     paths.LADDER: _ladders,

@@ -19,6 +19,7 @@ from pdrom.pipeline.paper import PaperJob, check_texts, paper_job
 from pdrom.pipeline.scene_artifacts import SceneArtifacts
 from pdrom.pipeline.scenes import require_scenes
 from pdrom.pipeline.study import Study, StudySettings
+from pdrom.pipeline.subspace_scenes import check_subspaces
 from pdrom.pipeline.tables import Tables
 from pdrom.reduction.method import MethodSpec
 from pdrom.report.claims import load_claims
@@ -78,6 +79,7 @@ class Plan:
         load_claims(folder / "claims.yaml")
         load_expectations(folder / "hard_cases.yaml")
         self._check_scenes(folder)
+        check_subspaces(self.study)
         self.figure_jobs  # noqa: B018 : every figure and text is checked
         check_texts(self.study)
         self.jobs.check()

@@ -102,7 +102,7 @@ def displacement_norms(reference: np.ndarray) -> np.ndarray:
 
 
 def step_norms(positions: np.ndarray) -> np.ndarray:
-    """|| Q^(n + 1) - Q^n ||_F of each frame, (F,) m: the time step times the norm of its velocities.
+    """|| Q^(n + 1) - Q^n ||_F of each frame, (F,) m: of the velocities at its end, times the step.
 
     The step loop has no other velocities. Of the difference of two runs (F + 1, N, 3) it is that of
     their velocities.

@@ -32,7 +32,7 @@ _CHOSEN = [
         SCENE,
         compared("exact", number("tolerance", "error that the user allows")),
         compared(
-            "error", flag("found", "an estimate times the safety factor is within the tolerance")
+            "error", flag("found", "an estimate times the safety factor is within it")
         ),
         GROUP,
         METHOD,
@@ -66,9 +66,8 @@ def model_choice(
     rows: list[dict[str, Any]] = []
     for scene, models in runs.groupby("scene", sort=False):
         for tolerance in tolerances:
-            good = models[safety * models.estimate <= tolerance].sort_values(
-                ["r", "k"], kind="stable"
-            )
+            good = models[safety * models.estimate <= tolerance]
+            good = good.sort_values(["r", "k"], kind="stable")
             row: dict[str, Any] = {"scene": scene, "tolerance": tolerance, "found": len(good) > 0}
             if len(good):
                 chosen = good.iloc[0]

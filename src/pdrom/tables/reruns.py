@@ -78,8 +78,9 @@ def _local_only(run: File, row: File, ends: dict[str, int], motion: str) -> pd.D
     with open_hdf5(run.path) as file:
         store = file if motion == TRAIN else file[motion]
         runs = [store[f"r{r:04d}"] for r in table.r]
-        norms = (store["displacement"][...], store["step"][...], file.attrs["extent_norm"])
-        table = table.assign(**_errors(runs, *norms, end))
+        displacement, step = store["displacement"][...], store["step"][...]
+        extent_norm = file.attrs["extent_norm"]
+        table = table.assign(**_errors(runs, displacement, step, extent_norm, end))
     return table.assign(position_basis="full", k=None)
 
 
@@ -89,8 +90,9 @@ def _subspace(run: File, row: File, ends: dict[str, int], motion: str) -> pd.Dat
     with open_hdf5(run.path) as file:
         models = [f"{t.position_basis}_k{t.k:03d}_{t.method}" for t in table.itertuples()]
         runs = [file[f"models/{model}/{motion}"] for model in models]
-        motions = (file[f"{series}/{motion}"][...] for series in ("displacement", "step"))
-        table = table.assign(**_errors(runs, *motions, file.attrs["extent_norm"], end))
+        displacement, step = file[f"displacement/{motion}"][...], file[f"step/{motion}"][...]
+        extent_norm = file.attrs["extent_norm"]
+        table = table.assign(**_errors(runs, displacement, step, extent_norm, end))
     return table
 
 

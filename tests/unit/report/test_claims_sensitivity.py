@@ -31,10 +31,15 @@ def made(**rule) -> pd.DataFrame:
     test = {
         "what": "w", "metric": "reconstruction_error", "compare": ">=", "threshold": 0.5, **rule,
     }  # fmt: skip
+    return rows_of(test, {"reconstruction_error": ERRORS})
+
+
+def rows_of(test: dict, tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
+    """Variations of a claim with this test, published and beyond, and these tables."""
     change = {"date": "2026-01-31", "after_data": False, "reason": "First version."}
     content = {**WORDS, "published": [test], "beyond": [test], "changes": [change]}
     rules = {"C1": validate(ClaimRule, content, "test")}
-    rows = sensitivity_rows(rules, {"reconstruction_error": ERRORS})
+    rows = sensitivity_rows(rules, tables)
     assert set(rows.part) == set(PARTS)
     return rows[rows.part == "published"]
 
@@ -54,6 +59,20 @@ def test_thresholds_and_shares():
         "0.5": "holds", "0.6": "depends", "0.75": "depends", "0.9": "depends", "1": "depends",
     }  # fmt: skip
     assert (rows.same == (rows.verdict == "depends")).all()
+
+
+def test_margins_vary_where_times_are_compared():
+    assert verdicts(made(), "margin") == {}
+    shares = pd.DataFrame(
+        {"scene": ["a", "b"], "implementation": "compiled", "local_share": [0.75, 0.5]}
+    )
+    test = {"what": "w", "metric": "local_share", "compare": ">=", "threshold": 0.35}
+    rows = rows_of(test, {"local_share": shares})
+    machine = "depends on the machine"
+    assert verdicts(rows, "margin") == {
+        "1": "holds", "1.25": "holds", "1.5": "holds", "2": machine, "3": machine, "5": machine,
+    }  # fmt: skip
+    assert set(rows.verdict_of_rules) == {"holds"}
 
 
 def test_rows_that_are_left_out():

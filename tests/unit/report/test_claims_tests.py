@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from pdrom.report.claims import HOLDS, UNDECIDED, load_claims, outcome_rows
+from pdrom.report.claims import MACHINE, UNDECIDED, load_claims, outcome_rows
 from pdrom.report.claims.verdicts import claims_rows, combined
 from pdrom.report.tests import claims_tests
 from pdrom.tables import declared
@@ -23,7 +23,8 @@ def tables():
 def test_what_a_test_found():
     found = claims_tests.checked(outcome_rows(RULES, tables()))
     one = found[(found.claim == "C1") & (found.part == "beyond") & found.decides].iloc[0]
-    assert (one.satisfied, one.of, one.verdict) == (2, 3, HOLDS)
+    assert (one.satisfied, one.of, one.close, one.verdict) == (2, 3, 2, MACHINE)
+    assert one.margin == 4.0
     assert (one.least, one["median"], one.most) == (0.2, 0.8, 0.9)
 
 

@@ -10,6 +10,7 @@ FIGURE = Declaration(
         "Verdicts on the claims, as published and beyond, when their rules change: each cell holds "
         "the variations that give another verdict, of all of this kind. Thresholds are multiplied "
         "by factors from a half to two, the share of rows that must agree goes from a half to one, "
+        "the margin within which ratios of times decide nothing from none to a factor five, "
         "sizes are the small or the large ones only, splits the training frames, those between "
         "them or the held-out ones, and scenes are left out one at a time. An empty cell: the "
         "variation does not exist. A row without colour is a verdict that does not hang on its "
