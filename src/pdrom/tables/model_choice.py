@@ -31,9 +31,7 @@ _CHOSEN = [
     columns=(
         SCENE,
         compared("exact", number("tolerance", "error that the user allows")),
-        compared(
-            "error", flag("found", "an estimate times the safety factor is within it")
-        ),
+        compared("error", flag("found", "an estimate times the safety factor is within it")),
         GROUP,
         METHOD,
         POSITION_BASIS,
