@@ -7,8 +7,8 @@ The tables of a part of the tiny study (no times among them) are made in a sandb
 first undisturbed. Then one process after the other is killed (SIGKILL): the fork server, a client
 that waits for its job, a job, or the front, Snakemake's process, each kind as often as the others
 while it is there. Whenever a run has ended, no process of it may be left after a minute, and the
-same command goes on; whenever everything is made, a part of it is deleted. The status is 0 if the tables
-and runs at the end are those of the undisturbed run, bit by bit, and nothing was left behind.
+same command goes on; whenever everything is made, a part of it is deleted. The status is 0 if the
+tables and runs at the end are those of the undisturbed run, bit by bit, and nothing was left.
 """
 
 import argparse
