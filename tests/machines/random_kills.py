@@ -1,14 +1,15 @@
 """Kill processes of the tiny study at random, go on by the same command, compare the tables.
 
-Usage: ./reproduce run env PYTHONPATH=tests:tests/workflow \\
-    python tests/machines/random_kills.py FOLDER [--kills 100] [--seed 1]
+Usage: ./reproduce run env PYTHONPATH=tests:tests/workflow python tests/machines/random_kills.py \\
+           FOLDER [--kills 100] [--seed 1]
 
 The tables of a part of the tiny study (no times among them) are made in a sandbox in FOLDER, at
 first undisturbed. Then one process after the other is killed (SIGKILL): the fork server, a client
 that waits for its job, a job, or the front, Snakemake's process, each kind as often as the others
 while it is there. Whenever a run has ended, no process of it may be left after a minute, and the
 same command goes on; whenever everything is made, a part of it is deleted. The status is 0 if the
-tables and runs at the end are those of the undisturbed run, bit by bit, and nothing was left.
+tables and runs at the end are those of the undisturbed run, bit by bit, and nothing was left
+behind.
 """
 
 import argparse

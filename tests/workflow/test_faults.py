@@ -157,6 +157,20 @@ def test_an_interrupted_run_goes_on(undisturbed: Sandbox, tmp_path: Path) -> Non
 
 
 @slow
+def test_sigterm_to_the_run_alone_ends_its_jobs(undisturbed: Sandbox, tmp_path: Path) -> None:
+    """One of which would never end by itself."""
+    sandbox = Sandbox.make(tmp_path / "run")
+    process = _caught_writing(sandbox, "fom", "hold")
+    process.terminate()
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "pdrom: SIGTERM: ending the jobs that run\n" in said
+    assert last_lines(said).startswith("pdrom: ended by SIGTERM\n")
+    sandbox.finish(TABLE)
+    assert sandbox.results() == undisturbed.results()
+
+
+@slow
 def test_the_second_run_at_once_says_so_and_ends(undisturbed: Sandbox, tmp_path: Path) -> None:
     """Whether by ``./reproduce`` or by ``snakemake``; what only looks works meanwhile."""
     sandbox = Sandbox.make(tmp_path / "run")

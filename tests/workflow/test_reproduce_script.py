@@ -279,7 +279,15 @@ def test_set_up_shows_that_it_is_alive(folder: Folder) -> None:
     assert errors[1:] == [
         "reproduce: 10 of 1 packages",
         "reproduce: unpacking 11 packages",
+        "reproduce: planning",
     ]
+
+
+def test_only_what_plans_says_so(folder: Folder) -> None:
+    folder.add_python()
+    folder.run()
+    words = [folder.run(*arguments)[1] for arguments in ([], ["-n"], ["test"], ["run", "true"])]
+    assert words == [["reproduce: planning"], ["reproduce: planning"], [], []]
 
 
 def test_a_platform_without_wheels_ends_before_anything_is_made(folder: Folder) -> None:
@@ -347,3 +355,15 @@ def test_an_interrupted_set_up_says_so(installing: tuple[Folder, subprocess.Pope
     assert first.returncode == 130
     assert "reproduce: interrupted" in errors.splitlines()
     assert folder.calls == []
+
+
+def test_a_signal_to_the_script_alone_ends_a_set_up(
+    installing: tuple[Folder, subprocess.Popen[str]],
+) -> None:
+    """It does not wait for the packages, which are no longer installed: the streams close."""
+    folder, first = installing
+    first.send_signal(signal.SIGTERM)
+    _, errors = first.communicate(timeout=60)
+    assert folder.path.joinpath("hold").exists()
+    assert first.returncode == 130
+    assert errors.splitlines()[-1] == "reproduce: interrupted"

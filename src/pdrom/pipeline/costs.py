@@ -1,6 +1,7 @@
 """What a job costs: seconds and memory, by jobs of the full study that were measured.
 
-`config/reference/job_costs.csv` holds the measured jobs. A kind of job is an experiment's name, or
+`config/reference/job_costs.csv` holds the measured jobs; `job_costs_tiny.csv` beside it those of
+the study `tiny`, for the time that is left of its run. A kind of job is an experiment's name, or
 ``table``, ``figure`` or ``paper``. The seconds of a kind are a + b W + c S with numbers that are
 not negative, where W counts projections (elements x frames x iterations) and S positions (vertices
 x frames) of the job's scene, in millions, times a factor of the method where jobs of several
@@ -124,6 +125,15 @@ class CostModel:
     def load(cls, root: Path) -> "CostModel":
         """Model of the measured jobs of the project in ``root``; StorageError if unreadable."""
         return cls(read_table(root / MEASURED, COLUMNS, result=False))
+
+    @classmethod
+    def of_study(cls, root: Path, results: str) -> "CostModel":
+        """Model of the study with that results folder, where its jobs were measured; else `load`.
+
+        Its seconds are those of processor time, which a busy machine does not stretch.
+        """
+        own = (root / MEASURED).with_name(f"{MEASURED.stem}_{Path(results).name}.csv")
+        return cls(read_table(own, COLUMNS, result=False)) if own.is_file() else cls.load(root)
 
     @cached_property
     def _kinds(self) -> dict[str, _Kind]:

@@ -23,11 +23,8 @@ _BY_SLURM = re.compile(
     r"\*\*\* JOB \S+ ON \S+ (?P<status>CANCELLED) AT \S+(?: DUE TO (?P<why>[A-Z ]+?))? \*\*\*"
 )
 _SLURM_STATUS = re.compile(r"SLURM status is: '(?P<status>\w+)'")
-# How Snakemake's log says that the user or the system ended the run.
-_STOPS = {
-    "Terminating processes on user request": "interrupted",
-    "Will exit after finishing currently running jobs": "ended by SIGTERM",
-}
+# How Snakemake's log says that the user ended the run.
+_INTERRUPTED = "Terminating processes on user request"
 _CAUSES = {
     "SIGKILL": "killed (SIGKILL): out of memory?",
     "SIGTERM": "ended by SIGTERM",
@@ -146,9 +143,12 @@ class Failures(logging.Handler):
                 self.other.append(f"pdrom: job {found['rule']}: {found['text']}")
             else:
                 self._said[record.thread] = text
-        elif event is None:
-            stops = [how for words, how in _STOPS.items() if words in text]
-            self.stopped = stops[0] if stops else self.stopped
+        elif event is None and _INTERRUPTED in text:
+            self.stopped = self.stopped or "interrupted"
+
+    def note_sigterm(self) -> None:
+        """The system ends the run."""
+        self.stopped = "ended by SIGTERM"
 
     def end(self) -> tuple[str, int]:
         """Last lines of a failed run, which say what went wrong, and its exit status.

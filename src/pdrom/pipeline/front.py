@@ -20,6 +20,7 @@ from pdrom.pipeline.configfiles import check_files
 from pdrom.pipeline.environment import settle
 from pdrom.pipeline.folders import Folders, folders
 from pdrom.pipeline.last_run import recall
+from pdrom.pipeline.stopping import end_at_sigterm
 
 # Snakemake's default scheduler solves an integer program for each choice among the jobs; they are
 # short, so that this takes longer than it saves. After every choice it starts a timer, as long as
@@ -116,6 +117,7 @@ def main() -> None:
         os.execv(sys.executable, [sys.executable, "-m", module, *sys.argv[2:]])
     if sys.argv[1:2] == ["run"]:
         _start(sys.argv[2:])
+    end_at_sigterm()
     from snakemake.cli import main as snakemake
 
     try:

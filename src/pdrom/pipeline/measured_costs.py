@@ -5,7 +5,7 @@ anew, from the full study in ``results``.
 """
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from pdrom.pipeline.tracked import write_tracked
 SIZES = ("elements", "vertices", "frames", "iterations")
 # Kinds of the jobs that no experiment is, by how the names of their rules begin or end.
 OTHERS = {"_table": "table", "figure_": "figure", "paper": "paper"}
+OF_OTHERS = "figure"  # the kind that counts for rules of no kind
 
 log = logging.getLogger(__name__)
 
@@ -43,6 +44,13 @@ def measured_costs(plan: Plan, manuscript: str) -> pd.DataFrame:
     return table.sort_values([c for c in COLUMNS if c != "memory_mb"], ignore_index=True)
 
 
+def kind_of(rule: str, experiments: Container[str]) -> str:
+    """Kind of a rule's jobs."""
+    if rule in experiments:
+        return rule
+    return next((kind for part, kind in OTHERS.items() if part in rule), OF_OTHERS)
+
+
 def _rows(plan: Plan, manuscript: str) -> Iterator[dict[str, Any]]:
     experiments = {experiment.name: experiment for experiment in plan.jobs.experiments}
     for job in Graph(plan, manuscript).needed([manuscript]):
@@ -56,7 +64,8 @@ def _rows(plan: Plan, manuscript: str) -> Iterator[dict[str, Any]]:
             labels = place.file(job.outputs[0]).labels
             yield {"kind": job.rule, **_size(plan, labels), **measured}
         else:
-            yield {"kind": next(k for part, k in OTHERS.items() if part in job.rule), **measured}
+            kind = kind_of(job.rule, experiments)
+            yield {"kind": kind, "method": job.rule, **measured}
 
 
 def _size(plan: Plan, labels: dict[str, str]) -> dict[str, Any]:

@@ -3,7 +3,9 @@
 import logging
 import sys
 import time
-from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import accumulate
 
 from snakemake_interface_logger_plugins.common import LogEvent
 
@@ -11,42 +13,94 @@ NOTHING = "Nothing to be done"
 # What Snakemake says of a failed job, which the last lines of the run name with its cause.
 JOB_FAULT = "RuleException"
 CLOSING = "At least one job did not complete successfully"
-# Share of the jobs that must be done before their times say something about the others.
-ENOUGH = 0.05
+# Jobs, and share of the expected work, that must be done before the time that is left is told.
+ENOUGH_JOBS, ENOUGH = 2, 0.05
+# Share of its expected time that a job is taken to need still, however long it has been running.
+REST = 0.1
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What a job is expected to take, on the machine where jobs were measured.
+
+    seconds : of the job
+    share : of this machine that it claims, 1 where there is no limit
+    after : seconds of the longest chain of jobs that wait for it
+    """
+
+    seconds: float
+    share: float
+    after: float
+
+
+@dataclass
+class _Job:
+    """A job of the run; seconds of the clock at which it started and ended, None before."""
+
+    expected: Expected
+    start: float | None = None
+    end: float | None = None
+
+    def ran(self, now: float) -> float:
+        """Seconds that it ran."""
+        return 0.0 if self.start is None else (now if self.end is None else self.end) - self.start
+
+    def rest(self, now: float, slower: float) -> float:
+        """Seconds that it still takes where jobs take ``slower`` times what is expected."""
+        expected = self.expected.seconds * slower
+        return 0.0 if self.end is not None else max(expected - self.ran(now), REST * expected)
 
 
 class Estimate:
-    """Seconds that a run still takes, by the mean time of the finished jobs of each rule."""
+    """Seconds that a run still takes.
+
+    Finished jobs say how much longer jobs take than expected: the median of these quotients,
+    weighted by work, so that the few which compile kernels do not count. What all jobs together
+    claimed until now says how busy the machine is kept.
+    """
 
     def __init__(self) -> None:
-        self.planned: Counter[str] = Counter()
-        self._running: dict[int, tuple[str, float]] = {}
-        self._times: defaultdict[str, list[float]] = defaultdict(list)
-        self._begin: float | None = None
+        self._jobs: dict[int, _Job] = {}
 
-    def start(self, job: int, rule: str, now: float) -> None:
+    def expect(self, jobs: Mapping[int, Expected]) -> None:
+        """All jobs of the run, by their numbers."""
+        self._jobs = {number: _Job(expected) for number, expected in jobs.items()}
+
+    def start(self, job: int, now: float) -> None:
         """A job starts, at ``now`` in seconds."""
-        self._begin = now if self._begin is None else self._begin
-        self._running[job] = (rule, now)
+        if job in self._jobs:
+            self._jobs[job].start = now
 
     def finish(self, job: int, now: float) -> None:
         """A job has ended."""
-        rule, start = self._running.pop(job, ("", now))
-        self._times[rule].append(now - start)
+        if job in self._jobs:
+            self._jobs[job].end = now
 
     def left(self, now: float) -> float | None:
-        """Seconds that are left; None while too few jobs are done."""
-        times = [seconds for rule in self._times.values() for seconds in rule]
-        total = sum(self.planned.values())
-        if self._begin is None or not times or len(times) < ENOUGH * total:
+        """Seconds that are left; None while too little is done."""
+        begun = [job for job in self._jobs.values() if job.start is not None]
+        done = [job for job in begun if job.end is not None]
+        total = sum(job.expected.seconds for job in self._jobs.values())
+        finished = sum(job.expected.seconds for job in done)
+        if len(done) < ENOUGH_JOBS or finished < ENOUGH * total:
             return None
-        mean = sum(times) / len(times)
-        work = 0.0
-        for rule, count in self.planned.items():
-            done = self._times.get(rule, [])
-            work += (count - len(done)) * (sum(done) / len(done) if done else mean)
-        at_once = sum(times) / max(now - self._begin, 1e-9)
-        return max(work, 0.0) / max(at_once, 1.0)
+        slower = _median(
+            (job.ran(now) / job.expected.seconds, job.expected.seconds) for job in done
+        )
+        rests = [(job, job.rest(now, slower)) for job in self._jobs.values() if job.end is None]
+        work = sum(rest * job.expected.share for job, rest in rests)
+        busy = sum(job.ran(now) * job.expected.share for job in begun)
+        idle = (now - min(job.start or 0.0 for job in begun)) / busy
+        chain = max((rest + job.expected.after * slower for job, rest in rests), default=0.0)
+        return max(work * idle, chain)
+
+
+def _median(weighted: Iterable[tuple[float, float]]) -> float:
+    """Median of values with weights."""
+    ordered = sorted(weighted)
+    half = sum(weight for _, weight in ordered) / 2
+    below = accumulate(weight for _, weight in ordered)
+    return next(value for (value, _), sum_ in zip(ordered, below, strict=True) if sum_ >= half)
 
 
 class Progress(logging.Handler):
@@ -55,7 +109,7 @@ class Progress(logging.Handler):
     def start(self, plans: bool = False) -> None:
         """Nothing was seen yet; of a dry run, which ``plans``, no job is shown."""
         self._plans = plans
-        self._started = 0
+        self._started = self._total = 0
         self._messages: dict[int, str] = {}
         self._estimate = Estimate()
 
@@ -63,8 +117,9 @@ class Progress(logging.Handler):
         """Show what a user wants to see of a record."""
         event = getattr(record, "event", None)
         if event == LogEvent.RUN_INFO:
-            counts = {r: n for r, n in record.stats.items() if r != "total"}
-            self._estimate.planned = Counter(counts)
+            self._total = record.stats["total"]
+        elif hasattr(record, "expected"):
+            self._estimate.expect(record.expected)
         elif event == LogEvent.JOB_INFO:
             if not self._plans:
                 self._show_job(record)
@@ -83,11 +138,11 @@ class Progress(logging.Handler):
         what = record.rule_msg or record.rule_name
         self._messages[record.jobid] = what
         left = self._estimate.left(record.created)
-        self._estimate.start(record.jobid, record.rule_name, record.created)
+        self._estimate.start(record.jobid, record.created)
         self._write(record, what + (f"   {rounded(left)} left" if left is not None else ""))
 
     def _write(self, record: logging.LogRecord, text: str) -> None:
-        total = str(sum(self._estimate.planned.values()))
+        total = str(self._total)
         clock = time.strftime("%H:%M", time.localtime(record.created))
         sys.stderr.write(f"[{self._started:>{len(total)}}/{total}] {clock} {text}\n")
 
@@ -102,9 +157,9 @@ def _is_news(record: logging.LogRecord, event: LogEvent | None) -> bool:
 
 def rounded(seconds: float) -> str:
     """A time in words, as roughly as it is known."""
-    if seconds < 60:
+    minutes = seconds / 60
+    if minutes < 1:
         return "less than a minute"
-    minutes = round(seconds / 60)
     if minutes < 90:
-        return f"about {minutes} min"
+        return f"about {round(minutes) if minutes > 5 else round(2 * minutes) / 2:g} min"
     return f"about {minutes / 60:.1f} h"

@@ -1,6 +1,7 @@
 """What every run does first and last, whether ``./reproduce`` or ``snakemake`` started it."""
 
 import atexit
+import os
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -12,6 +13,7 @@ from pdrom.pipeline import slurm_executor
 from pdrom.pipeline.cluster import EXECUTOR, JOBSTEP, check_nodes
 from pdrom.pipeline.commandline import CommandLine, options
 from pdrom.pipeline.dates import settle_dates
+from pdrom.pipeline.expectation import tell_expectation
 from pdrom.pipeline.failures import Failures, listen
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.full import apart
@@ -21,6 +23,7 @@ from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.preview import preview
 from pdrom.pipeline.running import FOLDER, hold, remove_stale_locks
 from pdrom.pipeline.scheduler import cancel_timers
+from pdrom.pipeline.stopping import end_at_sigterm, stop_at_sigterm
 from pdrom.pipeline.summary import configuration, summary
 from pdrom.pipeline.targets import Rule, known
 from pdrom.pipeline.warm import hold_pipe, start_server
@@ -42,6 +45,7 @@ class Run:
 
         A command that only looks needs no lock, so that it works beside a run.
         """
+        end_at_sigterm()
         try:
             command = CommandLine.of_process()
             if command.looks_only:
@@ -83,8 +87,11 @@ class Run:
         named, words = configuration(self.command), apart(plan.study)
         return f"{named} ({words})" if words else named
 
-    def start(self, workflow: Any) -> None:
+    def start(self, workflow: Any, plan: Plan) -> None:
         """Before the first job: the process that jobs are forked from, or a look at the cluster."""
+        stop_at_sigterm(self.failures.note_sigterm)
+        say_compilation(os.environ.get("NUMBA_CACHE_DIR", ""))
+        tell_expectation(workflow, plan)
         if workflow.local_exec:
             try:
                 hold_pipe(FOLDER / "run.pipe")
@@ -135,6 +142,12 @@ def start_batch(workflow: Any) -> None:
         start_server()
     elif workflow.remote_exec:
         slurm_executor.install(JOBSTEP, slurm_executor.waiting)
+
+
+def say_compilation(cache: str) -> None:
+    """Announce that the first jobs take longer, where the folder ``cache`` has no step loop yet."""
+    if not any(Path(cache).glob("dynamics*/*.nbi")):
+        sys.stderr.write("pdrom: the first jobs compile kernels (once, some minutes)\n")
 
 
 def say_last(text: str) -> None:

@@ -97,9 +97,14 @@ class Server:
             if self.listener.fileno() in ready:
                 self._accept()
 
+    def _clients(self) -> list[socket.socket]:
+        """Connections of jobs and of requests."""
+        jobs = [job.client for job in self.jobs.values()]
+        return jobs + [request.client for request in self.requests]
+
     def _wait(self) -> set[int]:
         """Descriptors with something to read, or none when a client's patience ends."""
-        clients = [one.client.fileno() for one in (*self.jobs.values(), *self.requests)]
+        clients = [client.fileno() for client in self._clients()]
         waiting = [self.listener.fileno(), self.owner, self.wake, *clients]
         until = min((request.until for request in self.requests), default=None)
         limit = None if until is None else max(until - time.monotonic(), 0.0)
@@ -163,8 +168,8 @@ class Server:
             os.dup2(stream, number)
         for other in self.requests:
             other.close_streams()
-        for one in (*self.jobs.values(), *self.requests):
-            one.client.close()
+        for client in self._clients():
+            client.close()
         self.listener.close()
         for number in (self.owner, self.wake, self._waker):
             os.close(number)
