@@ -150,7 +150,7 @@ def ends_noticed() -> Iterator[None]:
             raise CutError(f"the file ends where more is expected ({reason(error)})") from error
         raise
     finally:
-        builtins.open, np.fromfile = opened, fromfile  # type: ignore[assignment]
+        builtins.open, np.fromfile = opened, fromfile
 
 
 class _Text(io.TextIOWrapper):
@@ -160,7 +160,7 @@ class _Text(io.TextIOWrapper):
         super().__init__(file, encoding="utf-8")
         self._ends = ends
 
-    def readline(self, size: int = -1, /) -> str:
+    def readline(self, size: int = -1, /) -> str:  # type: ignore[override]
         line = super().readline(size)
         if not line:
             _note(self._ends)
