@@ -45,7 +45,8 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_it_carries_the_package_and_the_files_that_it_reads(wheel: Path) -> None:
     with ZipFile(wheel) as archive:
         names = set(archive.namelist())
-        assert archive.read("pdrom/config/methods.yaml") == (CONFIG / "methods.yaml").read_bytes()
+        for name in ("methods.yaml", "schema/scene.json"):
+            assert archive.read(f"pdrom/config/{name}") == (CONFIG / name).read_bytes()
     source = ROOT / "src"
     own = {str(p.relative_to(source)) for p in source.rglob("*") if p.is_file()}
     assert {name for name in own if "__pycache__" not in name and "egg-info" not in name} <= names
@@ -72,6 +73,9 @@ def test_installed_elsewhere_it_reduces(wheel: Path, tmp_path: Path) -> None:
     pdrom, home = environment / "bin" / "pdrom", {"HOME": str(tmp_path)}
     script = "import pdrom; print(pdrom.__file__)"
     assert call(python, "-c", script, folder=folder).startswith(str(environment))
+    call(pdrom, "new", "sheet", folder=folder, **home)
+    first = (folder / "sheet.yaml").read_text(encoding="utf-8").splitlines()[0]
+    assert Path(first.partition("=file://")[2]).is_file()
     said = call(pdrom, "reduce", "small.yaml", "--group", "spring", "--r", 2, folder=folder, **home)
     assert said.startswith("small_spring_gappy_2.h5: spring, gappy, r = 2: relative error")
     assert "(results)" in " ".join(call(pdrom, "advise", "--help", folder=folder, **home).split())

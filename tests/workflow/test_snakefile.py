@@ -34,6 +34,7 @@ SHARED = (
     "tables", "figures", "paper", "hard_cases", "guard", "offline", "frame_times", "roofline",
 )  # fmt: skip
 MICRO_FILE = "micro.yaml"
+DAY_NS = 86_400 * 10**9
 MICRO_ARGUMENTS = ("--configfile", MICRO_FILE)
 
 
@@ -55,7 +56,7 @@ def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
 @pytest.fixture
 def finished(finished_once: Checkout) -> Iterator[Checkout]:
     """The finished copy; edits of the test are taken back."""
-    folders = [finished_once.folder / name for name in ("src", "config")]
+    folders = [finished_once.folder / name for name in ("src", "config", "workflow")]
     files = [p for f in folders for p in f.rglob("*") if p.suffix in (".py", ".yaml")]
     before = {path: (path.read_bytes(), path.stat()) for path in files}
     yield finished_once
@@ -196,7 +197,35 @@ def test_comments_and_docstrings_rerun_nothing(finished: Checkout) -> None:
     spring = "src/pdrom/model/constraints/spring.py"
     finished.edit(spring, '"""Edge springs:', '"""Springs along edges:')
     finished.edit(spring, "    # scaled: ", "    # divided: ")
+    script = "workflow/scripts/experiment.py"
+    finished.edit(script, "settings = ", "# what it depends on\nsettings = ")
     assert finished.planned(*MICRO_ARGUMENTS) == set()
+
+
+def test_a_clock_that_ran_back_reruns_nothing(finished: Checkout) -> None:
+    """All sources are younger than the results, or all of them younger than now."""
+    parts = ("workflow", "config", "paper", "src", "Snakefile", MICRO_FILE)
+    sources = [p for part in parts for p in _files(finished.folder / part)]
+    results = _files(finished.folder / "results")
+    before = {path: path.stat() for path in (*sources, *results)}
+    try:
+        for late in (sources, results):
+            for path in late:
+                stat = before[path]
+                os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + 3 * DAY_NS))
+            assert finished.planned(*MICRO_ARGUMENTS) == set()
+    finally:
+        for path, stat in before.items():
+            os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+
+
+def _files(path: Path) -> list[Path]:
+    return [path] if path.is_file() else [p for p in path.rglob("*") if p.is_file()]
+
+
+def test_an_edited_script_reruns_what_it_makes(finished: Checkout) -> None:
+    finished.edit("workflow/scripts/paper.py", "list(snakemake.input.figures)", "[]")
+    assert finished.planned(*MICRO_ARGUMENTS) == {MICRO_MANUSCRIPT}
 
 
 def test_a_kernel_reruns_the_scenes_that_use_it_and_what_follows(finished: Checkout) -> None:
