@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from rocrate.rocrate import ROCrate
 
 from pdrom.core import paths
 from pdrom.core.store import write_table, write_text
@@ -46,6 +47,16 @@ def entities(tmp_path_factory):
 def identifiers(value: dict | list) -> list[str]:
     """Identifiers that a property refers to."""
     return [each["@id"] for each in (value if isinstance(value, list) else [value])]
+
+
+def test_a_reader_of_crates_finds_every_entity_and_file(entities):
+    crate = ROCrate(entities["folder"])
+    read = {entity.id for entity in crate.get_entities()}
+    assert read == set(entities) - {"folder"}
+    assert crate.mainEntity["programmingLanguage"]["name"] == "Snakemake"
+    local = [each.id for each in crate.data_entities if each.type == "File"]
+    assert local
+    assert [name for name in local if not (entities["folder"] / name).is_file()] == []
 
 
 def test_the_profiles_are_declared(entities):
