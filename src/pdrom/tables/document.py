@@ -12,8 +12,9 @@ Written by `python -m pdrom.pipeline.tables` from the declarations; not to be ed
 
 CSV, one row per observation, SI units unless a unit says otherwise, an empty cell where there is no
 value. In a column marked "timed" a clock (or the memory in use) has a say: only there may two runs
-on one machine differ, in `claims` only in claims about times. "Compared as" is the quantity for
-which `./reproduce verify` has a tolerance, see [verification.md](verification.md).
+on one machine differ, in `claims` only in claims about times. "Compared as" is the kind for which
+`./reproduce verify` has a tolerance, and the column's own one, see
+[verification.md](verification.md).
 """
 
 
@@ -40,7 +41,9 @@ def _section(table: Table[Any]) -> str:
 
 def _row(column: Column) -> str:
     timed = "timed" if column.timed else ""
-    cells = (column.name, column.kind, column.unit, timed, column.quantity, column.meaning)
+    own = "" if column.tolerance is None else f", {column.tolerance:g}"
+    kind = f"{column.quantity}{own}"
+    cells = (column.name, column.kind, column.unit, timed, kind, column.meaning)
     return f"| {' | '.join(cells)} |"
 
 

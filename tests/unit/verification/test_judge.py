@@ -88,7 +88,9 @@ def mutation(table, column, studies):
         firm, counted = firm_and_loose(table, column, context, frame)
         if len(firm):
             return changed_cell(table, column, context, frame, int(firm[len(firm) // 2]))
-        loose += [changed_cells(table, column, context, frame, counted)] if len(counted) else []
+        # one of them may have any outcome
+        if len(counted) > 1:
+            loose.append(changed_cells(table, column, context, frame, counted))
     return max(loose, key=lambda comparison: len(comparison.e), default=None)
 
 
@@ -98,7 +100,7 @@ def test_a_change_of_any_number_is_noticed(name, studies):
     for column in table.columns:
         if column.kind in ("number", "integer") and column.quantity not in NOT_COMPARED:
             comparison = mutation(table, column, studies)
-            # a column may hold nothing but rounding errors, or nothing at all
+            # a column may hold nothing but rounding errors or one blow-up, or nothing at all
             if comparison is not None:
                 assert judge(comparison).differences, column.name
 
