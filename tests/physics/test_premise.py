@@ -127,15 +127,17 @@ def _used(scene: Scene, rng: np.random.Generator) -> np.ndarray:
 
 def test_the_bound_holds_in_random_scenes_and_is_nearly_met():
     """Masses, forces, holds and pushes at random; one mode pushed in resonance comes close."""
-    used = []
-    for seed in range(SCENES):
+    used: list[np.ndarray] = []
+    for seed in range(2 * SCENES):
+        if len(used) == SCENES:
+            break
         rng = np.random.default_rng(seed)
         scene = _random_scene(rng)
         if outside(scene) is None:
             used.append(_used(scene, rng))
-    assert len(used) > 0.9 * SCENES
+    assert len(used) == SCENES
     most = np.max(used, axis=0)
-    assert (most <= 1.0 + 1e-6).all(), most
+    assert (most <= 1.0 + 1e-6).all(), (seed, most)
     assert (most > 0.9).all(), most
 
 

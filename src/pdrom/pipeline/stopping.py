@@ -23,7 +23,7 @@ def end_at_sigterm() -> None:
     """While no job runs: SIGTERM ends this process with one line."""
 
     def end(number: int, frame: object) -> None:
-        os.write(sys.stderr.fileno(), b"pdrom: ended by SIGTERM\n")
+        _say(b"pdrom: ended by SIGTERM\n")
         os._exit(INTERRUPTED)
 
     signal.signal(signal.SIGTERM, end)
@@ -33,13 +33,19 @@ def stop_at_sigterm(note: Callable[[], None]) -> None:
     """While jobs run: SIGTERM ends them, and then the run as Ctrl-C does; ``note`` is called."""
 
     def stop(number: int, frame: object) -> None:
-        os.write(sys.stderr.fileno(), b"pdrom: SIGTERM: ending the jobs that run\n")
+        _say(b"pdrom: SIGTERM: ending the jobs that run\n")
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         note()
         threading.Thread(target=_end_jobs, daemon=True).start()
         raise KeyboardInterrupt
 
     signal.signal(signal.SIGTERM, stop)
+
+
+def _say(line: bytes) -> None:
+    """Write to standard error, unless nobody reads it any more."""
+    with suppress(OSError):
+        os.write(sys.stderr.fileno(), line)
 
 
 def _end_jobs() -> None:

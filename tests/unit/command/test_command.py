@@ -389,7 +389,9 @@ def shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """A line of the shell that calls ``pdrom``."""
     called = line.replace("pdrom", f'"{sys.executable}" -m pdrom')
     command = ["bash", "-o", "pipefail", "-c", called]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    # as a user's: the output waits in a buffer until the end
+    own = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, env=own, check=False)
 
 
 @pytest.mark.parametrize(
