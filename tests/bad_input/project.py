@@ -12,7 +12,7 @@ from pdrom.core.yamlfile import read_yaml
 from pdrom.pipeline.configfiles import check_files
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.study import Study
-from places import CONFIG
+from places import CONFIG, ROOT
 
 STUDY = "config/default.yaml"
 SCENE = "config/scenes/small.yaml"
@@ -70,6 +70,8 @@ def make_project(folder: Path, changes: Mapping[str, Content]) -> Path:
     """The small project in ``folder``, with ``changes`` (path -> content)."""
     folder.mkdir(parents=True, exist_ok=True)
     shutil.copytree(CONFIG, folder / "config", dirs_exist_ok=True)
+    if not (folder / "paper").exists():
+        (folder / "paper").symlink_to(ROOT / "paper")  # its sources number the figures
     files = {STUDY: SMALL_STUDY, SCENE: SMALL_SCENE, MESH: SQUARE}
     for path, content in [*files.items(), *changes.items()]:
         _write(folder / path, content)

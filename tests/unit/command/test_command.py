@@ -381,7 +381,8 @@ def test_a_mesh_path_that_is_too_long_is_one_line(folder, capsys):
     Path("long.yaml").write_text(text, encoding="utf-8")
     assert run(["run", "long.yaml"]) == Status.FAULTY
     (told,) = capsys.readouterr().err.splitlines()
-    assert "no mesh file (File name too long)" in told
+    assert "long.yaml: mesh.file.path = " in told
+    assert "a path of at most 4095 bytes is required" in told
     assert len(told) < 300
 
 
