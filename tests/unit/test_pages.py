@@ -12,6 +12,7 @@ from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.selection import KINDS
 from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.front import completed
+from pdrom.pipeline.study import StudySettings
 from pdrom.pipeline.tables import all_tables
 from pdrom.reduction.method import MethodSpec
 from pdrom.report.figures.kit.outcomes import LOOKS
@@ -24,7 +25,7 @@ PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "doc
 ADDING = ROOT / "docs" / "adding.md"
 NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
 # Examples of names that a reader chooses.
-EXAMPLES = {"config/scenes/my_sheet.yaml"}
+EXAMPLES = {"config/scenes/my_sheet.yaml", "config/mine.yaml"}
 LINK = re.compile(r"\]\(([^)#]+)[^)]*\)")
 PATH = re.compile(r"`((?:config|docs|paper|src|tests|workflow)/[\w./-]+)`")
 BUILT = {"paper/main.pdf"}
@@ -82,16 +83,18 @@ def commands() -> list[str]:
 @pytest.mark.parametrize("command", commands())
 def test_commands_are_understood(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
-    # the scene that a reader makes stands for any
-    first, *others = shlex.split(command.replace("my_sheet", "spring_oop"))
+    # the scene and the study that a reader makes stand for any
+    words = command.replace("my_sheet", "spring_oop").replace("mine.yaml", "tiny.yaml")
+    first, *others = shlex.split(words)
     parsers = {"verify": verify_parser, "bundle": bundle_parser}
     assert parsers[first]().parse_args(others) if first in parsers else completed([first, *others])
 
 
-def test_the_scene_and_the_method_that_are_added_are_valid() -> None:
+def test_the_scene_the_study_and_the_method_that_are_added_are_valid() -> None:
     blocks = re.findall(r"```yaml\n(.*?)```", ADDING.read_text("utf-8"), re.DOTALL)
-    scene, methods = map(yaml.safe_load, blocks)
+    scene, study, methods = map(yaml.safe_load, blocks)
     assert SceneConfig.model_validate(scene).groups == ["spring"]
+    assert StudySettings.model_validate(study).online.scenes == ()
     assert [MethodSpec.model_validate(method).rows for method in methods.values()] == ["scalar"]
 
 

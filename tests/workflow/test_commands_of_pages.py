@@ -62,11 +62,16 @@ def test_every_command_is_executed_or_left_out_by_name() -> None:
 
 @pytest.fixture(scope="module")
 def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
-    """A copy with the scene that the pages add."""
+    """A copy with the scene and the study that the pages add."""
     made = copy_repository(tmp_path_factory.mktemp("commands"))
     text = (ROOT / "docs" / "adding.md").read_text(encoding="utf-8")
     scene = re.findall(r"```yaml\n(name: my_sheet.*?)```", text, re.DOTALL)[0]
-    (made.folder / "config" / "scenes" / "my_sheet.yaml").write_text(scene, encoding="utf-8")
+    study = re.findall(r"```yaml\n(scenes: \[my_sheet.*?)```", text, re.DOTALL)[0]
+    config = made.folder / "config"
+    (config / "mine.yaml").write_text(study, encoding="utf-8")
+    for name in yaml.safe_load(study)["scenes"]:
+        own = scene.replace("my_sheet", name)
+        (config / "scenes" / f"{name}.yaml").write_text(own, encoding="utf-8")
     mesh = made.folder / yaml.safe_load(scene)["mesh"]["path"]
     mesh.parent.mkdir()
     sheet(mesh)
