@@ -30,7 +30,7 @@ _QUESTIONS: dict[type[Effect], tuple[str, ...]] = {
     ConstraintGroup: ("begin_frame", "accumulate"),
     Force: ("acceleration",),
     Boundary: ("active", "held", "targets"),
-    Contact: ("correct",),
+    Contact: ("apply",),
 }
 
 
