@@ -57,7 +57,9 @@ class Sandbox:
 
     def copy(self, folder: Path) -> "Sandbox":
         """The same state, times of files included, in another folder."""
-        shutil.copytree(self.folder, folder, symlinks=True)
+        # a pipe of the run cannot be copied; the next run makes its own
+        pipes = shutil.ignore_patterns("run.pipe")
+        shutil.copytree(self.folder, folder, symlinks=True, ignore=pipes)
         return Sandbox(folder)._with_environment()
 
     def _with_environment(self, python: Path = Path(sys.executable)) -> "Sandbox":
