@@ -47,7 +47,7 @@ SHAPE_ERROR = compared(
 )
 VELOCITY_ERROR = compared(
     # no "error": a run whose positions are right has not failed, whatever its velocities are
-    "magnitude",
+    "error",
     number(
         "velocity_error",
         "error of the velocities before the horizon, over the norm of those of the full-order run",
