@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 from bad_input.project import SMALL_SCENE, make_project
 from pdrom.core.yamlfile import read_yaml
-from pdrom.experiments.declaration import Experiment
+from pdrom.experiments.kit.declaration import Experiment
 from pdrom.pipeline.jobs import Jobs
 from pdrom.pipeline.scene_artifacts import SceneArtifacts
 from pdrom.pipeline.study import Study

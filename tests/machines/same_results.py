@@ -17,7 +17,7 @@ import h5py
 import numpy as np
 import pandas as pd
 
-from pdrom.pipeline.tables import all_tables
+from pdrom.tables import declared
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 def table_digests(folder: Path) -> dict[str, str]:
     """Digest of each table without its timed cells, by path."""
     found = {}
-    for name, table in all_tables().items():
+    for name, table in declared().items():
         path = folder / "tables" / f"{name}.csv"
         if path.is_file():
             kept = table.without_times(pd.read_csv(path, dtype=str), ROOT)

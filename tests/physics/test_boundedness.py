@@ -1,4 +1,4 @@
-"""Bounded projections carry no run away: the theorem of `pdrom.model.boundedness`, tried."""
+"""Bounded projections carry no run away (`pdrom.experiments.kit.boundedness`), tried."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from builders import GROUPS, make_scene
-from pdrom.model.boundedness import (
+from pdrom.experiments.kit.boundedness import (
     Compliance,
     held_sets,
     largest_projections,

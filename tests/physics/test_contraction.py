@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from builders import GROUPS, make_scene
-from pdrom.model.boundedness import Compliance, largest_projections
+from pdrom.experiments.kit.boundedness import Compliance, largest_projections
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis.compute import compute_basis

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from builders import make_scene
-from pdrom.model.boundedness import Compliance, held_sets, kept_velocity
+from pdrom.experiments.kit.boundedness import Compliance, held_sets, kept_velocity
+from pdrom.experiments.kit.premise import outside
 from pdrom.model.dynamics.stepper import Stepper
-from pdrom.model.premise import outside
 from pdrom.model.scene import Scene
 
 SHEET = {"kind": "cloth", "rows": 4, "columns": 3}

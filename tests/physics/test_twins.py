@@ -2,8 +2,8 @@
 
 import pytest
 
+from pdrom.experiments.kit.sensitivity import perturbation_field, relative_difference
 from pdrom.model.runs.full_order import trajectory
-from pdrom.model.runs.sensitivity import perturbation_field, relative_difference
 from pdrom.pipeline.scenes import load_bound_scene
 from places import ROOT
 

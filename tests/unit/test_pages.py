@@ -13,9 +13,9 @@ from pdrom.model.mesh.selection import KINDS
 from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.front import completed
 from pdrom.pipeline.study import StudySettings
-from pdrom.pipeline.tables import all_tables
 from pdrom.reduction.method import MethodSpec
 from pdrom.report.figures.kit.outcomes import LOOKS
+from pdrom.tables import declared
 from pdrom.verification.bundle import parser as bundle_parser
 from pdrom.verification.command import parser as verify_parser
 from pdrom.verification.references import folder_of, read_reference
@@ -147,7 +147,7 @@ def test_every_kind_of_selection_is_listed() -> None:
 
 
 def test_the_numbers_of_the_readme_s_picture_are_those_of_the_expected_tables() -> None:
-    table = all_tables()["reduced_reruns"]
+    table = declared()["reduced_reruns"]
     found = read_reference(table, ROOT / folder_of(RESULTS))
     assert found is not None
     runs = found.frame[found.frame.scene == "strain_poke"].set_index(["method", "r"])

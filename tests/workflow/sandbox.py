@@ -19,7 +19,7 @@ from checkout import ROOT, copy_repository
 
 from pdrom.core.paths import MANIFEST
 from pdrom.core.store import check_file
-from pdrom.pipeline.tables import all_tables
+from pdrom.tables import declared
 
 MICRO = {
     "scenes": ["spring_oop"],
@@ -161,7 +161,7 @@ def _digest(path: Path, root: Path) -> str:
             file.visititems(lambda name, item: _update(content, name, item))
     elif path.parent.name == "tables" and path.suffix == ".csv":
         table = pd.read_csv(path, dtype=str)
-        kept = all_tables()[path.stem].without_times(table, root)
+        kept = declared()[path.stem].without_times(table, root)
         content.update(kept.to_csv().encode())
     else:
         content.update(path.read_bytes())

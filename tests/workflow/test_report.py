@@ -11,9 +11,9 @@ from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 from sandbox import MICRO, MICRO_FILE
 
-from pdrom.pipeline.tables import all_tables
 from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.words.markup import to_plain
+from pdrom.tables import declared
 from places import MICRO_RESULTS
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
@@ -88,7 +88,7 @@ def test_every_figure_opens_and_has_its_caption(opened: Page, category: str) -> 
 def test_every_table_is_listed_with_its_title(opened: Page) -> None:
     go_to(opened, "Tables")
     text = opened.inner_text("body")
-    assert [t.name for t in all_tables().values() if t.title not in text] == []
+    assert [t.name for t in declared().values() if t.title not in text] == []
 
 
 def test_the_statistics_of_the_run_are_drawn(opened: Page) -> None:

@@ -15,8 +15,8 @@ from checkout import Checkout, copy_repository
 
 from pdrom.pipeline.graph import Graph
 from pdrom.pipeline.running import hold
-from pdrom.pipeline.tables import all_tables
 from pdrom.report.figures.kit.catalogue import declarations
+from pdrom.tables import declared
 from pdrom.verification.subject import Subject
 from places import MICRO_MANUSCRIPT, MICRO_RESULTS
 
@@ -106,10 +106,10 @@ def test_another_snakemake_is_told_where_the_package_is(clean: Checkout, tmp_pat
     assert "has no package pdrom: use ./reproduce, or .venv/bin/snakemake" in only_line(done)
 
 
-def test_the_default_target_is_the_manuscript_with_all_tables_and_figures(clean: Checkout) -> None:
+def test_the_default_target_is_the_manuscript_with_declared_and_figures(clean: Checkout) -> None:
     planned = clean.planned()
     figures = declarations()
-    wanted = {f"results/tables/{name}.csv" for name in all_tables()}
+    wanted = {f"results/tables/{name}.csv" for name in declared()}
     wanted |= {f"results/figures/{name}.{kind}" for name in figures for kind in ("pdf", "png")}
     assert wanted | {"paper/main.pdf"} <= planned
 

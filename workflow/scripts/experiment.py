@@ -1,6 +1,6 @@
 from pdrom.core.logs import job_log
 from pdrom.core.provenance import made_by
-from pdrom.experiments.declaration import load
+from pdrom.experiments.kit.declaration import load
 
 settings = snakemake.params.settings
 told = {**settings, "labels": dict(snakemake.wildcards.items())}

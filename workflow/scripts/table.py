@@ -1,6 +1,6 @@
 from pdrom.core.logs import job_log
 from pdrom.core.provenance import made_by
-from pdrom.tables.make import make_table
+from pdrom.tables.kit.make import make_table
 
 with (
     job_log(snakemake.log[0]),

@@ -109,13 +109,13 @@ def _table(path: Path) -> Iterator[str]:
     from pandas.api.types import is_numeric_dtype
 
     from pdrom.core.store import read_table
-    from pdrom.pipeline.tables import all_tables
+    from pdrom.tables import declared
 
     table = read_table(path, result=False)
-    declared = all_tables().get(path.stem)
-    known = {column.name: column for column in declared.columns} if declared else {}
-    if declared:
-        yield f"table of the study: {declared.title}"
+    of_study = declared().get(path.stem)
+    known = {column.name: column for column in of_study.columns} if of_study else {}
+    if of_study:
+        yield f"table of the study: {of_study.title}"
     yield f"{len(table)} rows of {len(table.columns)} columns:"
     for name in table.columns:
         values, column = table[name].dropna(), known.get(name)

@@ -11,11 +11,11 @@ import pandas as pd
 from pdrom.core.paths import BASIS, BOUNDS, MESH, SAMPLING, SENSITIVITY, TRAIN, File
 from pdrom.core.reads import Every
 from pdrom.core.store import write_table
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.scenes import positions_of, scene_of
-from pdrom.experiments.settings import Horizon
-from pdrom.model.boundedness import Compliance, largest_projections, linear_extent
-from pdrom.model.premise import outside
+from pdrom.experiments.kit.boundedness import Compliance, largest_projections, linear_extent
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.premise import outside
+from pdrom.experiments.kit.scenes import positions_of, scene_of
+from pdrom.experiments.kit.settings import Horizon
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, load_basis
 from pdrom.reduction.local.contraction import Tangent, iteration_numbers

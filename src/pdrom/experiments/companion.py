@@ -7,9 +7,9 @@ from pydantic import Field
 
 from pdrom.core.paths import COMPANION, MESH, TRAIN, File
 from pdrom.core.store import write_hdf5
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.motion import Motion, training_indices, training_positions
-from pdrom.experiments.scenes import scene_of
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.motion import Motion, training_indices, training_positions
+from pdrom.experiments.kit.scenes import scene_of
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.subspace.companion import CompanionSpec, companion_model
 from pdrom.reduction.subspace.store import store_columns, store_model

@@ -7,9 +7,9 @@ import pandas as pd
 
 from pdrom.core.paths import COMPANION, COMPANION_TIMES, MESH, File
 from pdrom.core.store import write_table
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.measurement import Protocol, Variant, measure
-from pdrom.experiments.scenes import scene_of
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.measurement import Protocol, Variant, measure
+from pdrom.experiments.kit.scenes import scene_of
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.subspace.store import load_models
 

@@ -22,11 +22,11 @@ from pdrom.core.paths import (
 )
 from pdrom.core.reads import Every
 from pdrom.core.store import open_hdf5, write_table
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.motion import Motion
-from pdrom.experiments.scenes import RUNS, positions_of, scene_of
-from pdrom.experiments.settings import Horizon
-from pdrom.model.runs.horizon import error_within
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.horizon import error_within
+from pdrom.experiments.kit.motion import Motion
+from pdrom.experiments.kit.scenes import RUNS, positions_of, scene_of
+from pdrom.experiments.kit.settings import Horizon
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.rerun import displacement_norms, mean_motion
 from pdrom.reduction.subspace.companion import companion_run, estimate, largest_estimate

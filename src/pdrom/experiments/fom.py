@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from pdrom.core.paths import FULL_ORDER, MESH, File
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.scenes import scene_of
-from pdrom.experiments.settings import Solver, Threads
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.scenes import scene_of
+from pdrom.experiments.kit.settings import Solver, Threads
 from pdrom.model.runs.full_order import run as run_full_order
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.snapshots import stored_frames, test_frames

@@ -29,16 +29,16 @@ from pdrom.core.paths import (
 from pdrom.core.reads import EachOf
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.fresh_process import (
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.fresh_process import (
     Projections,
     Request,
     Subspaces,
     TimedScene,
     in_fresh_process,
 )
-from pdrom.experiments.measurement import Protocol
-from pdrom.experiments.settings import Count, Modes, PositionBasis, Repeats, Solver, Threads
+from pdrom.experiments.kit.measurement import Protocol
+from pdrom.experiments.kit.settings import Count, Modes, PositionBasis, Repeats, Solver, Threads
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.method import MethodSpec

@@ -13,9 +13,9 @@ from pdrom.core.paths import BASIS, COMPANION, GUARD, MESH, SAMPLING, TRAIN, Fil
 from pdrom.core.reads import EachOf
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.scenes import positions_of, scene_of
-from pdrom.experiments.settings import BlowupExtent, Solver
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.scenes import positions_of, scene_of
+from pdrom.experiments.kit.settings import BlowupExtent, Solver
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.energy import EnergyScale
 from pdrom.model.runs.bounded import Advance, BoundedRun

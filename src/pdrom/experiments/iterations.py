@@ -11,14 +11,14 @@ from pydantic import Field
 from pdrom.core.paths import ITERATIONS, MESH, SENSITIVITY, TRAIN, File
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.scenes import positions_of, scene_of
-from pdrom.experiments.settings import Horizon, Solver, Tolerance
+from pdrom.experiments.kit.converged import ConvergedStepper
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.horizon import error_within
+from pdrom.experiments.kit.scenes import positions_of, scene_of
+from pdrom.experiments.kit.settings import Horizon, Solver, Tolerance
 from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.dynamics.system import GlobalSystem
-from pdrom.model.runs.converged import ConvergedStepper
-from pdrom.model.runs.horizon import error_within
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import displacement_norms
 

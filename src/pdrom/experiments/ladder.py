@@ -8,14 +8,14 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from pdrom.core.metrics import relative_errors
 from pdrom.core.paths import LADDER, MESH, SENSITIVITY, SNAPSHOTS, TRAIN, File
 from pdrom.core.store import write_table
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.repetition import Repeater, Repetitions
-from pdrom.experiments.scenes import positions_of, scene_of
-from pdrom.experiments.settings import BlowupExtent, Horizon
-from pdrom.model.runs.horizon import error_within
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.horizon import error_within
+from pdrom.experiments.kit.repetition import Repeater, Repetitions
+from pdrom.experiments.kit.scenes import positions_of, scene_of
+from pdrom.experiments.kit.settings import BlowupExtent, Horizon
+from pdrom.model.metrics import relative_errors
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.basis import Basis, compute_basis
 from pdrom.reduction.local.local_step import ReducedLocalStep

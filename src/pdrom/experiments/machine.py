@@ -6,7 +6,7 @@ from typing import Annotated
 from pdrom.core.machine import machine
 from pdrom.core.paths import MACHINE, File
 from pdrom.core.store import write_text
-from pdrom.experiments.declaration import Experiment, JobSettings, Nothing
+from pdrom.experiments.kit.declaration import Experiment, JobSettings, Nothing
 
 
 @dataclass(frozen=True)

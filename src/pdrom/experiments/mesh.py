@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pdrom.core.paths import MESH, File
 from pdrom.core.reads import SourcesOf
-from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
 from pdrom.model.mesh.checks import check_mesh
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.mesh.types import save_mesh

@@ -13,11 +13,11 @@ from pydantic import Field
 from pdrom.core.paths import MESH, NOISE, NOISE_RUNS, SENSITIVITY, File
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.last_iterates import last_iterates
-from pdrom.experiments.scenes import scene_of
-from pdrom.experiments.settings import BlowupExtent, Horizon, Modes
-from pdrom.model.runs.sensitivity import perturbation_field
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.last_iterates import last_iterates
+from pdrom.experiments.kit.scenes import scene_of
+from pdrom.experiments.kit.sensitivity import perturbation_field
+from pdrom.experiments.kit.settings import BlowupExtent, Horizon, Modes
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, compute_basis
 from pdrom.reduction.local.local_step import ReducedLocalStep

@@ -13,8 +13,8 @@ from pydantic import Field, model_validator
 from pdrom.core.paths import OFFLINE, File
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.declaration import Experiment, JobSettings, Nothing
-from pdrom.experiments.settings import Tolerance
+from pdrom.experiments.kit.declaration import Experiment, JobSettings, Nothing
+from pdrom.experiments.kit.settings import Tolerance
 from pdrom.model.effects.base import Seed
 from pdrom.reduction.basis.pod import pod
 from pdrom.reduction.sampling.deim import deim_entries

@@ -18,10 +18,10 @@ from pdrom.core.paths import ONLINE, ONLINE_MODELS, File
 from pdrom.core.reads import SourcesOf
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.measurement import clocked
-from pdrom.experiments.motion import training_indices
-from pdrom.experiments.settings import Modes, PositionBasis, Tolerance
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.measurement import clocked
+from pdrom.experiments.kit.motion import training_indices
+from pdrom.experiments.kit.settings import Modes, PositionBasis, Tolerance
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import displacement_norms

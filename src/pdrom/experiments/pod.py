@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from pdrom.core.paths import BASIS, SNAPSHOTS, File
-from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
 from pdrom.reduction.basis import compute_basis, save_basis
 from pdrom.reduction.method import BasisSpec
 from pdrom.reduction.snapshots import load_snapshots

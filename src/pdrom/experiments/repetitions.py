@@ -22,10 +22,10 @@ from pdrom.core.paths import (
 )
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.repetition import Repeater, Repetition, Repetitions, Varied
-from pdrom.experiments.scenes import positions_of, scene_of
-from pdrom.experiments.settings import BlowupExtent, Horizon, Modes
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.repetition import Repeater, Repetition, Repetitions, Varied
+from pdrom.experiments.kit.scenes import positions_of, scene_of
+from pdrom.experiments.kit.settings import BlowupExtent, Horizon, Modes
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.snapshots import load_snapshots

@@ -25,10 +25,10 @@ from pdrom.core.paths import (
 from pdrom.core.reads import EachOf
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.sampling import Sweep, sample
-from pdrom.experiments.scenes import positions_of, scene_of
-from pdrom.experiments.settings import BlowupExtent, Solver
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.sampling import Sweep, sample
+from pdrom.experiments.kit.scenes import positions_of, scene_of
+from pdrom.experiments.kit.settings import BlowupExtent, Solver
 from pdrom.model.energy import EnergyScale
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, load_basis

@@ -19,13 +19,13 @@ from pdrom.core.paths import BREAK_EVEN_SIZED, EFFECTS_SIZED, SCALING, File
 from pdrom.core.reads import SourcesOf
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.effect_costs import effect_costs
-from pdrom.experiments.local_costs import local_costs
-from pdrom.experiments.measurement import Measurement, Protocol, Variant, measure
-from pdrom.experiments.names import FOM
-from pdrom.experiments.settings import Modes, Repeats, Solver, Tolerance
-from pdrom.experiments.training import Training, train
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.effect_costs import effect_costs
+from pdrom.experiments.kit.local_costs import local_costs
+from pdrom.experiments.kit.measurement import Measurement, Protocol, Variant, measure
+from pdrom.experiments.kit.names import FOM
+from pdrom.experiments.kit.settings import Modes, Repeats, Solver, Tolerance
+from pdrom.experiments.kit.training import Training, train
 from pdrom.model.dynamics.stepper import LocalStep
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig

@@ -9,11 +9,11 @@ from pydantic import Field, model_validator
 from pdrom.core.paths import CONTRIBUTIONS, MESH, SENSITIVITY, File
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.scenes import scene_of
+from pdrom.experiments.kit.contributions import contributions
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.scenes import scene_of
+from pdrom.experiments.kit.sensitivity import heldout_floor, sensitivity
 from pdrom.model.effects.base import Seed
-from pdrom.model.runs.contributions import contributions
-from pdrom.model.runs.sensitivity import heldout_floor, sensitivity
 from pdrom.model.scene import SceneConfig
 
 Perturbation = Annotated[float, Field(gt=0.0, lt=1.0)]

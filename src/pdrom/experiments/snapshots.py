@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from pdrom.core.paths import HELDOUT, MESH, SNAPSHOTS, TRAIN, File
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.scenes import scene_of
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.scenes import scene_of
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.snapshots import collect, save_snapshots, training_frames
 

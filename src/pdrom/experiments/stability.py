@@ -13,13 +13,13 @@ from pdrom.core.paths import BASIS, MESH, SAMPLING, STABILITY, SUBSPACES, File
 from pdrom.core.reads import Every
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.scenes import scene_of
-from pdrom.experiments.settings import BlowupExtent, Solver
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.scenes import scene_of
+from pdrom.experiments.kit.settings import BlowupExtent, Solver
+from pdrom.experiments.kit.variation import varied
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.energy import EnergyScale
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.model.variation import varied
 from pdrom.reduction.basis import load_basis
 from pdrom.reduction.local.local_step import ReducedLocalStep
 from pdrom.reduction.local.ranks import Rank, resolve_ranks

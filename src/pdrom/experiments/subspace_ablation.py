@@ -12,11 +12,11 @@ from pdrom.core.errors import SamplingError
 from pdrom.core.paths import HELDOUT, MESH, SENSITIVITY, SUBSPACE_ABLATION, TRAIN, File
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.motion import Motion, training_positions
-from pdrom.experiments.scenes import RUNS, scene_of
-from pdrom.experiments.settings import BlowupExtent, Horizon, Modes
-from pdrom.model.runs.horizon import error_within
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.horizon import error_within
+from pdrom.experiments.kit.motion import Motion, training_positions
+from pdrom.experiments.kit.scenes import RUNS, scene_of
+from pdrom.experiments.kit.settings import BlowupExtent, Horizon, Modes
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.subspace.columns import Columns

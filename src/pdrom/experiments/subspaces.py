@@ -24,11 +24,11 @@ from pdrom.core.paths import (
 )
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.measurement import clocked
-from pdrom.experiments.motion import Motion, training_indices, training_positions
-from pdrom.experiments.scenes import RUNS, scene_of
-from pdrom.experiments.settings import BlowupExtent, Modes, PositionBasis, Tolerance
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.measurement import clocked
+from pdrom.experiments.kit.motion import Motion, training_indices, training_positions
+from pdrom.experiments.kit.scenes import RUNS, scene_of
+from pdrom.experiments.kit.settings import BlowupExtent, Modes, PositionBasis, Tolerance
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import Rerun, extent_norm, step_norms
 from pdrom.reduction.subspace.columns import Columns

@@ -24,14 +24,14 @@ from pdrom.core.paths import (
 )
 from pdrom.core.reads import Every
 from pdrom.core.store import open_hdf5, write_table
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.effect_costs import effect_costs, left_out
 from pdrom.experiments.iterations import IterationCounts, accelerated, stepper_of
-from pdrom.experiments.local_costs import local_costs
-from pdrom.experiments.measurement import Measurement, Protocol, Variant, measure
-from pdrom.experiments.names import ANDERSON, FOM
-from pdrom.experiments.scenes import scene_of
-from pdrom.experiments.settings import Count, Solver, Threads
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.effect_costs import effect_costs, left_out
+from pdrom.experiments.kit.local_costs import local_costs
+from pdrom.experiments.kit.measurement import Measurement, Protocol, Variant, measure
+from pdrom.experiments.kit.names import ANDERSON, FOM
+from pdrom.experiments.kit.scenes import scene_of
+from pdrom.experiments.kit.settings import Count, Solver, Threads
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.constraints.implementations import IMPLEMENTATIONS
 from pdrom.model.dynamics.stepper import LocalStep

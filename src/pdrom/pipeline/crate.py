@@ -26,7 +26,7 @@ from pdrom.core.yamlfile import read_yaml
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.manifest import Manifest
 from pdrom.pipeline.plan import Plan
-from pdrom.pipeline.tables import all_tables
+from pdrom.tables import declared
 
 CITATION = Path("CITATION.cff")
 COPIES = "workflow"  # below the results
@@ -88,7 +88,7 @@ def write_crate(plan: Plan, folders: Folders, manifest: Manifest) -> None:
 
 def published(plan: Plan, folders: Folders, manifest: Manifest) -> list[Published]:
     """Tables, figures, the manuscript with its inputs, and the record of the machine."""
-    tables, figures = all_tables(), plan.figure_jobs
+    tables, figures = declared(), plan.figure_jobs
     titles = {paths.TABLE.at("", name=n)[1:]: f"Table {n}: {t.title}" for n, t in tables.items()}
     for name, job in figures.items():
         for place in (paths.FIGURE, paths.FIGURE_PICTURE):

@@ -78,11 +78,11 @@ def completed(arguments: Sequence[str]) -> list[str]:
 def files_of(targets: Sequence[str], own: Folders) -> dict[str, list[str]]:
     """What is to be made for each target, see `Names.files`."""
     # late: it loads the whole package
-    from pdrom.pipeline.tables import all_tables
     from pdrom.pipeline.targets import Names
     from pdrom.report.figures.kit.catalogue import declarations
+    from pdrom.tables import declared
 
-    names = Names(list(declarations()), all_tables())
+    names = Names(list(declarations()), declared())
     return {target: names.files(target, own) for target in targets}
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from pdrom.core.errors import StorageError
 from pdrom.core.paths import Place
-from pdrom.experiments.declaration import Experiment
+from pdrom.experiments.kit.declaration import Experiment
 from pdrom.pipeline.plan import Plan
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from pdrom.core.paths import Place
 from pdrom.core.reads import EachOf, Every, ProjectFile, SourcesOf
-from pdrom.experiments.declaration import Experiment, JobSettings, Source, experiments
+from pdrom.experiments.kit.declaration import Experiment, JobSettings, Source, experiments
 from pdrom.pipeline.costs import Request, Size
 from pdrom.pipeline.fingerprint import fingerprint
 from pdrom.pipeline.holdings import labels_of

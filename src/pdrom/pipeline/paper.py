@@ -7,11 +7,11 @@ from pdrom.core.paths import MACHINE, PAPER_INPUT
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.pipeline.full import FULL_STUDY, is_full
 from pdrom.pipeline.study import Study
-from pdrom.report.claims import load_claims
 from pdrom.report.paper.build import Facts
 from pdrom.report.paper.source import source_files
 from pdrom.report.paper.textables import TEX_TABLES
 from pdrom.report.words.text import require_typeset
+from pdrom.tables.claims import load_claims
 
 Row = dict[str, Any]
 

@@ -22,8 +22,8 @@ from pdrom.pipeline.study import Study, StudySettings
 from pdrom.pipeline.subspace_scenes import check_subspaces
 from pdrom.pipeline.tables import Tables
 from pdrom.reduction.method import MethodSpec
-from pdrom.report.claims import load_claims
 from pdrom.report.scenes.catalogue import ARTIFACTS
+from pdrom.tables.claims import load_claims
 
 
 def load_plan(

@@ -10,9 +10,9 @@ from typing import Any
 from pdrom.core import paths
 from pdrom.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
 from pdrom.experiments.guard import Trial
+from pdrom.experiments.kit.settings import Horizon
 from pdrom.experiments.repetitions import Repeated
 from pdrom.experiments.reruns import OfScene
-from pdrom.experiments.settings import Horizon
 from pdrom.experiments.stability import Stability
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import SceneConfig

@@ -17,6 +17,8 @@ from pdrom.experiments.frame_times import FrameTimes
 from pdrom.experiments.guard import GuardSection
 from pdrom.experiments.hard_cases.experiment import HardCases
 from pdrom.experiments.iterations import IterationSweep
+from pdrom.experiments.kit.sampling import Sweep
+from pdrom.experiments.kit.settings import BlowupExtent, Solver, Threads
 from pdrom.experiments.ladder import LadderFile
 from pdrom.experiments.noise import Noise
 from pdrom.experiments.offline import Offline
@@ -24,10 +26,8 @@ from pdrom.experiments.online import Online
 from pdrom.experiments.published_choices.experiment import PublishedChoices
 from pdrom.experiments.repetitions import RepetitionSection
 from pdrom.experiments.roofline.experiment import Roofline
-from pdrom.experiments.sampling import Sweep
 from pdrom.experiments.scaling import Scaling
 from pdrom.experiments.sensitivity import Sensitivity
-from pdrom.experiments.settings import BlowupExtent, Solver, Threads
 from pdrom.experiments.stability import Stability
 from pdrom.experiments.subspace_ablation import AblationFile
 from pdrom.experiments.subspaces import Subspace

@@ -1,7 +1,7 @@
 """The tables of a study: what their rules need."""
 
 from collections.abc import Iterator
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -15,19 +15,8 @@ from pdrom.pipeline.jobs import digest
 from pdrom.pipeline.study import Study
 from pdrom.report.codecheck import FILE as CODECHECK
 from pdrom.report.codecheck import codecheck
-from pdrom.tables.declaration import Table
-from pdrom.tables.document import document
-from pdrom.tables.find import declared, load
-
-# Tables that are declared in rooms right of `pdrom.tables`.
-OTHERS = ("pdrom.report.decide", "pdrom.report.fragility", "pdrom.report.tests")
-
-
-@cache
-def all_tables() -> dict[str, Table[Any]]:
-    """Every table of the study by name, in alphabetical order."""
-    others = {table.name: table for table in map(load, OTHERS)}
-    return dict(sorted({**declared(), **others}.items()))
+from pdrom.tables import declared
+from pdrom.tables.kit.document import document
 
 
 class Tables:
@@ -37,7 +26,7 @@ class Tables:
         self._study, self._results = study, results
 
     def __iter__(self) -> Iterator[str]:
-        return iter(all_tables())
+        return iter(declared())
 
     @property
     def paths(self) -> list[str]:
@@ -50,7 +39,7 @@ class Tables:
 
     def labels(self, name: str) -> dict[str, str]:
         """How the report lists a table."""
-        return {"table": name, "title": all_tables()[name].title}
+        return {"table": name, "title": declared()[name].title}
 
     def log(self, name: str) -> str:
         """Log file of the job that makes a table."""
@@ -64,7 +53,7 @@ class Tables:
         ConfigurationError
             If the table reads another one that is not declared.
         """
-        reads = all_tables()[name].reads.items()
+        reads = declared()[name].reads.items()
         found = {key: self._files(name, read) for key, read in reads}
         return {key: files for key, files in found.items() if files is not None}
 
@@ -76,7 +65,7 @@ class Tables:
         ConfigurationError
             If the table reads a key that the configuration does not have.
         """
-        table = all_tables()[name]
+        table = declared()[name]
         edited = [read.path for read in table.reads.values() if isinstance(read, ProjectFile)]
         values = {key: self._value(name, read) for key, read in table.reads.items()}
         return {
@@ -93,8 +82,8 @@ class Tables:
             case Preferred():
                 return preferred_paths(self._study, read, self._results)
             case TableOf(other):
-                if other not in all_tables():
-                    known = choices(other, all_tables())
+                if other not in declared():
+                    known = choices(other, declared())
                     raise ConfigurationError(f"table {name} reads '{other}': unknown{known}")
                 return self.path(other)
             case ProjectFile(path):
@@ -134,5 +123,5 @@ class Tables:
 
 
 if __name__ == "__main__":
-    Path("docs/tables.md").write_text(document(all_tables().values()), encoding="utf-8")
-    CODECHECK.write_text(codecheck(all_tables().values()), encoding="utf-8")
+    Path("docs/tables.md").write_text(document(declared().values()), encoding="utf-8")
+    CODECHECK.write_text(codecheck(declared().values()), encoding="utf-8")

@@ -14,8 +14,8 @@ from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.holdings import HELD, paths_of
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.scenes import read_scene, scene_names
-from pdrom.pipeline.tables import all_tables
 from pdrom.report.scenes.catalogue import default_files
+from pdrom.tables import declared
 
 SCENE = re.compile(rf"{RESULTS}/scenes/([a-z][a-z0-9_]*)/?")
 FIGURE = re.compile(rf"{WORD} (\w+)")
@@ -132,7 +132,7 @@ def _suggestion(value: str, allowed: Iterable[str]) -> str:
 
 def known(plan: Plan) -> Known:
     """What the study of a plan knows."""
-    study, names = plan.study, Names(list(plan.figure_jobs), all_tables())
+    study, names = plan.study, Names(list(plan.figure_jobs), declared())
     held = [path for place in HELD for path in paths_of(study, place, plan.results)]
 
     def mesh(scene: str) -> str:

@@ -8,10 +8,10 @@ from pydantic import Field, model_validator
 
 from pdrom.core.names import SceneName
 from pdrom.core.yamlfile import ConfigModel
+from pdrom.experiments.kit.variation import varied
 from pdrom.model.effects.base import Seed
 from pdrom.model.effects.entries import effect_config
 from pdrom.model.scene import SceneConfig
-from pdrom.model.variation import varied
 
 Positive = Annotated[float, Field(gt=0.0, le=1e12, allow_inf_nan=False)]
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdrom.core.brief import brief
-from pdrom.core.metrics import shape_differences, trajectory_error
+from pdrom.model.metrics import shape_differences, trajectory_error
 from pdrom.model.runs.bounded import BoundedRun
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from pdrom.experiments.names import ANDERSON, FOM
+from pdrom.experiments.kit.names import ANDERSON, FOM
 from pdrom.tables.accuracy_cost import CONVERGED, reference_of
 
 SHOWN = 3  # choices that are named

@@ -18,7 +18,7 @@ from pdrom.core.yamlfile import read_yaml
 from pdrom.report.figure_numbers import figure_numbers
 from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.words.markup import to_plain
-from pdrom.tables.declaration import Table
+from pdrom.tables.kit.declaration import Table
 
 FILE = Path("codecheck.yml")
 SPECIFICATION = "https://codecheck.org.uk/spec/config/2.0/"

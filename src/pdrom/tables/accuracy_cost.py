@@ -22,11 +22,11 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, PerScene, TableOf
-from pdrom.experiments.names import ANDERSON, FOM
-from pdrom.tables.declaration import flag, integer, table, timed
-from pdrom.tables.one_time import timings_in_one_time
-from pdrom.tables.parts import joined
-from pdrom.tables.vocabulary import (
+from pdrom.experiments.kit.names import ANDERSON, FOM
+from pdrom.tables.kit.declaration import flag, integer, table, timed
+from pdrom.tables.kit.one_time import timings_in_one_time
+from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.vocabulary import (
     ERROR_WITHIN,
     GROUP,
     METHOD,

@@ -8,9 +8,9 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, Setting, TableOf
-from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.gain_prediction import FAILED
-from pdrom.tables.parts import joined
+from pdrom.tables.kit.declaration import compared, integer, number, table, text
+from pdrom.tables.kit.parts import joined
 
 _KEYS = ["scene", "group", "method", "r"]
 

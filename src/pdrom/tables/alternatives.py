@@ -6,9 +6,9 @@ from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
 from pdrom.experiments.alternatives.settings import CONVERGED, REDUCED
-from pdrom.tables.declaration import compared, flag, integer, number, table, text
-from pdrom.tables.parts import joined
-from pdrom.tables.vocabulary import ELEMENTS_SAMPLED, MS_PER_FRAME, SCENE, VERTICES, K
+from pdrom.tables.kit.declaration import compared, flag, integer, number, table, text
+from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.vocabulary import ELEMENTS_SAMPLED, MS_PER_FRAME, SCENE, VERTICES, K
 
 STIFFNESS = compared("exact", number("stiffness", "factor on all weights of the scene"))
 SUBSTEPS = integer("substeps", "steps that a frame is divided into")

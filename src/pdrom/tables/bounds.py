@@ -6,9 +6,9 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, TableOf
-from pdrom.tables.declaration import compared, number, table
-from pdrom.tables.parts import joined
-from pdrom.tables.vocabulary import ERROR_WITHIN, FINITE, GROUP, MAX_EXTENT, METHOD, SCENE, R
+from pdrom.tables.kit.declaration import compared, number, table
+from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.vocabulary import ERROR_WITHIN, FINITE, GROUP, MAX_EXTENT, METHOD, SCENE, R
 
 _KEYS = ["scene", "group", "method", "r"]
 
@@ -59,7 +59,7 @@ def bounds(parts: list[File], reruns: pd.DataFrame) -> pd.DataFrame:
     contraction and spectral_radius are the largest of two states of the full-order run; empty where
     several groups act, and for scenes too large for dense matrices. The bounds need that no
     contact acts, which is not looked at, and are empty where the scene is outside of the rest of
-    the premise (`pdrom.model.premise`; the job's log says why), or the method clips its
+    the premise (`pdrom.experiments.kit.premise`; the job's log says why), or the method clips its
     coefficients.
     """
     known = joined(parts)

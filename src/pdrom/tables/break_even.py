@@ -6,9 +6,9 @@ from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
 from pdrom.reduction.local.break_even import break_even
-from pdrom.tables.declaration import compared, integer, number, table, timed
-from pdrom.tables.parts import joined
-from pdrom.tables.vocabulary import ELEMENTS, GROUP, METHOD, SCENE, THREADS, VERTICES, R
+from pdrom.tables.kit.declaration import compared, integer, number, table, timed
+from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.vocabulary import ELEMENTS, GROUP, METHOD, SCENE, THREADS, VERTICES, R
 
 # What the sizes r of one line of the table have in common.
 CURVE = ["scene", "group", "method", "factor", "threads"]

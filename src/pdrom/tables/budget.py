@@ -6,8 +6,16 @@ import pandas as pd
 
 from pdrom.core.reads import Setting, TableOf
 from pdrom.tables.accuracy_cost import CONVERGED, OWN, reference_of
-from pdrom.tables.declaration import compared, integer, number, table, text, timed
-from pdrom.tables.vocabulary import ERROR_WITHIN, METHOD, MS_PER_FRAME, POSITION_BASIS, SCENE, K, R
+from pdrom.tables.kit.declaration import compared, integer, number, table, text, timed
+from pdrom.tables.kit.vocabulary import (
+    ERROR_WITHIN,
+    METHOD,
+    MS_PER_FRAME,
+    POSITION_BASIS,
+    SCENE,
+    K,
+    R,
+)
 
 
 # A time decides which point of accuracy_cost a row names, hence all that the row says of it.

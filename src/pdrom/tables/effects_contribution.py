@@ -6,11 +6,11 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, Setting, TableOf
-from pdrom.model.runs.horizon import floor_of, horizons
-from pdrom.model.runs.sensitivity import without
-from pdrom.tables.declaration import compared, flag, integer, number, table, text, timed
-from pdrom.tables.parts import joined
-from pdrom.tables.vocabulary import FLOOR, SCENE
+from pdrom.experiments.kit.horizon import floor_of, horizons
+from pdrom.experiments.kit.sensitivity import without
+from pdrom.tables.kit.declaration import compared, flag, integer, number, table, text, timed
+from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.vocabulary import FLOOR, SCENE
 
 KEYS = ["scene", "effect"]
 

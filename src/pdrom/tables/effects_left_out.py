@@ -5,10 +5,10 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, TableOf
-from pdrom.tables.declaration import integer, number, table, text, timed
-from pdrom.tables.one_time import in_one_time
-from pdrom.tables.parts import joined
-from pdrom.tables.vocabulary import MS_PER_FRAME, SCENE
+from pdrom.tables.kit.declaration import integer, number, table, text, timed
+from pdrom.tables.kit.one_time import in_one_time
+from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.vocabulary import MS_PER_FRAME, SCENE
 
 NOTHING = "nothing"
 TIMES = ("ms_per_frame", "saved_ms", "own_ms")

@@ -5,10 +5,10 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, TableOf
-from pdrom.tables.declaration import compared, flag, number, table, text, timed
-from pdrom.tables.parts import joined
-from pdrom.tables.reruns import KEYS
-from pdrom.tables.vocabulary import ERROR_WITHIN, GROUP, METHOD, POSITION_BASIS, SCENE, K, R
+from pdrom.tables.kit.declaration import compared, flag, number, table, text, timed
+from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.reruns import KEYS
+from pdrom.tables.kit.vocabulary import ERROR_WITHIN, GROUP, METHOD, POSITION_BASIS, SCENE, K, R
 
 BAND = (0.3, 3.0)  # estimates between these multiples of the error count as good
 MARGIN = 1.5  # an estimate above this multiple of the companion's own error is resolved

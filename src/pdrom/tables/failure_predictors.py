@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.reads import TableOf
-from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.gain_prediction import best_threshold, failures_ordered, judged_runs
-from pdrom.tables.gains import ORTHOGONAL, reruns_with_gain
+from pdrom.tables.kit.declaration import compared, integer, number, table, text
+from pdrom.tables.kit.gains import ORTHOGONAL, reruns_with_gain
 
 EVERY, WITHIN = "all", "within"
 PREDICTORS = ("gain", "reach", "contraction", "small_gain", "spectral_radius")

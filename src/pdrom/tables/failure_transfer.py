@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.reads import TableOf
-from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.failure_predictors import EVERY, PREDICTORS, WITHIN, predicted_runs
 from pdrom.tables.gain_prediction import best_threshold, failures_ordered
+from pdrom.tables.kit.declaration import compared, integer, number, table, text
 
 
 @table(

@@ -5,11 +5,11 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.experiments.fresh_process import CONTROL, FULL
-from pdrom.tables.declaration import flag, integer, number, table, timed
-from pdrom.tables.intervals import confirmed_digits, median_interval
-from pdrom.tables.parts import joined
-from pdrom.tables.vocabulary import MS_PER_FRAME, SCENE, VERTICES
+from pdrom.experiments.kit.fresh_process import CONTROL, FULL
+from pdrom.tables.kit.declaration import flag, integer, number, table, timed
+from pdrom.tables.kit.intervals import confirmed_digits, median_interval
+from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.vocabulary import MS_PER_FRAME, SCENE, VERTICES
 
 TWIN = "_twin"
 

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.reads import TableOf
-from pdrom.tables.declaration import compared, integer, number, table, text
 from pdrom.tables.gain_prediction import judged_runs
+from pdrom.tables.kit.declaration import compared, integer, number, table, text
 
 RESAMPLES, SEED = 2000, 1
 STEPS = {

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.reads import TableOf
-from pdrom.tables.declaration import compared, integer, number, table, text
-from pdrom.tables.gains import ORTHOGONAL, reruns_with_gain
+from pdrom.tables.kit.declaration import compared, integer, number, table, text
+from pdrom.tables.kit.gains import ORTHOGONAL, reruns_with_gain
 
 FAILED = 0.1  # error within the horizon above which a run counts as failed
 EVERY = "all"

@@ -5,9 +5,9 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, Setting, TableOf
-from pdrom.model.runs.horizon import HELDOUT
-from pdrom.tables.declaration import table
-from pdrom.tables.reruns import COLUMNS, MEASURES, judged_reruns
+from pdrom.experiments.kit.horizon import HELDOUT
+from pdrom.tables.kit.declaration import table
+from pdrom.tables.kit.reruns import COLUMNS, MEASURES, judged_reruns
 
 
 @table(

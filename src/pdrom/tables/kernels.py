@@ -3,10 +3,10 @@
 import pandas as pd
 
 from pdrom.core.reads import TableOf
-from pdrom.experiments.names import GLOBAL, RIGHT
-from pdrom.tables.declaration import compared, number, table, text, timed
+from pdrom.experiments.kit.names import GLOBAL, RIGHT
+from pdrom.tables.kit.declaration import compared, number, table, text, timed
+from pdrom.tables.kit.vocabulary import ELEMENTS, ROUNDING, SCENE, VERTICES
 from pdrom.tables.roofline import WHOLE
-from pdrom.tables.vocabulary import ELEMENTS, ROUNDING, SCENE, VERTICES
 
 # columns of the table roofline and what they are called over the number of elements
 _PER_ELEMENT = {

@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from pdrom.core.reads import ProjectFile
-from pdrom.tables.declaration import table, text
+from pdrom.tables.kit.declaration import table, text
 from pdrom.tables.winners import winners
 
 RECORDED = "config/reference/large_meshes/winners.csv"

@@ -5,9 +5,9 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, TableOf
-from pdrom.tables.declaration import number, table, text, timed
-from pdrom.tables.one_time import timings_in_one_time
-from pdrom.tables.vocabulary import GLOBAL_MS, LOCAL_MS, LOCAL_SHARE, SCENE, VERTICES
+from pdrom.tables.kit.declaration import number, table, text, timed
+from pdrom.tables.kit.one_time import timings_in_one_time
+from pdrom.tables.kit.vocabulary import GLOBAL_MS, LOCAL_MS, LOCAL_SHARE, SCENE, VERTICES
 
 IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")
 

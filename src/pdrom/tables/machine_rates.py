@@ -5,8 +5,8 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.tables.declaration import compared, number, table, text, timed
-from pdrom.tables.parts import joined
+from pdrom.tables.kit.declaration import compared, number, table, text, timed
+from pdrom.tables.kit.parts import joined
 
 
 @table(

@@ -6,9 +6,9 @@ from typing import Any
 import pandas as pd
 
 from pdrom.core.reads import Setting, TableOf
-from pdrom.tables.declaration import compared, flag, number, table
-from pdrom.tables.reruns import KEYS
-from pdrom.tables.vocabulary import (
+from pdrom.tables.kit.declaration import compared, flag, number, table
+from pdrom.tables.kit.reruns import KEYS
+from pdrom.tables.kit.vocabulary import (
     ERROR_WITHIN,
     GROUP,
     METHOD,

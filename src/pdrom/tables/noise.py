@@ -5,9 +5,9 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.tables.declaration import compared, integer, number, table, text
-from pdrom.tables.parts import joined
-from pdrom.tables.vocabulary import BLOWUP_FRAME, FINITE, FRAMES, GAIN, GROUP, METHOD, SCENE, R
+from pdrom.tables.kit.declaration import compared, integer, number, table, text
+from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.vocabulary import BLOWUP_FRAME, FINITE, FRAMES, GAIN, GROUP, METHOD, SCENE, R
 
 
 @table(

@@ -5,9 +5,9 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
-from pdrom.tables.declaration import compared, integer, number, table, text, timed
-from pdrom.tables.parts import joined
-from pdrom.tables.vocabulary import ROUNDING
+from pdrom.tables.kit.declaration import compared, integer, number, table, text, timed
+from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.vocabulary import ROUNDING
 
 
 @table(

@@ -5,10 +5,9 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, TableOf
-from pdrom.tables.declaration import compared, integer, number, table, timed
-from pdrom.tables.parts import joined
-from pdrom.tables.speedups import timed_reductions
-from pdrom.tables.vocabulary import (
+from pdrom.tables.kit.declaration import compared, integer, number, table, timed
+from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.vocabulary import (
     ELEMENTS_SAMPLED,
     MS_PER_FRAME,
     POSITION_BASIS,
@@ -19,6 +18,7 @@ from pdrom.tables.vocabulary import (
     VERTICES,
     K,
 )
+from pdrom.tables.speedups import timed_reductions
 
 _KEYS = ["scene", "position_basis", "k", "method"]
 _TIMES = ["ms_per_frame", "fom_ms_per_frame", "speedup", "speedup_low", "speedup_high"]

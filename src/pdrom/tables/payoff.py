@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.reads import TableOf
-from pdrom.tables.declaration import compared, integer, number, table, timed
 from pdrom.tables.gain_prediction import FAILED
-from pdrom.tables.vocabulary import METHOD, POSITION_BASIS
+from pdrom.tables.kit.declaration import compared, integer, number, table, timed
+from pdrom.tables.kit.vocabulary import METHOD, POSITION_BASIS
 
 _RUN = ["scene", "group", "method", "position_basis", "k", "r"]
 _ERROR = "relative_error_within_horizon"

@@ -9,9 +9,9 @@ from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, ProjectFile
 from pdrom.core.store import read_table
-from pdrom.tables.declaration import compared, number, table, text
-from pdrom.tables.parts import joined
-from pdrom.tables.vocabulary import GROUP, SCENE, R
+from pdrom.tables.kit.declaration import compared, number, table, text
+from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.vocabulary import GROUP, SCENE, R
 
 KEYS = ["experiment", "group", "axis", "r"]
 STORED = [

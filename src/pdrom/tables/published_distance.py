@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.reads import TableOf
-from pdrom.tables.declaration import compared, integer, number, table
+from pdrom.tables.kit.declaration import compared, integer, number, table
+from pdrom.tables.kit.vocabulary import GROUP, SCENE
 from pdrom.tables.published_choices import CHOICE, DIRECTION
-from pdrom.tables.vocabulary import GROUP, SCENE
 
 KEYS = ["scene", "group", "direction", "choice"]
 AGREE = np.log10(1.01)

@@ -5,10 +5,10 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, Setting, TableOf
-from pdrom.tables.declaration import table
-from pdrom.tables.one_time import timings_in_one_time
-from pdrom.tables.reruns import COLUMNS, KEYS, MEASURES, TRAIN, judged_reruns
-from pdrom.tables.vocabulary import GLOBAL_MS, LOCAL_MS, MS_PER_FRAME, SPEEDUP
+from pdrom.tables.kit.declaration import table
+from pdrom.tables.kit.one_time import timings_in_one_time
+from pdrom.tables.kit.reruns import COLUMNS, KEYS, MEASURES, TRAIN, judged_reruns
+from pdrom.tables.kit.vocabulary import GLOBAL_MS, LOCAL_MS, MS_PER_FRAME, SPEEDUP
 
 
 @table(

@@ -5,8 +5,8 @@ import pandas as pd
 
 from pdrom.core.reads import TableOf
 from pdrom.tables.alternatives import STIFFNESS
-from pdrom.tables.declaration import integer, number, table, timed
-from pdrom.tables.vocabulary import SCENE
+from pdrom.tables.kit.declaration import integer, number, table, timed
+from pdrom.tables.kit.vocabulary import SCENE
 from pdrom.tables.winners import LIMIT, REFERENCE
 
 CASE = ["scene", "stiffness", "reference", "limit"]

@@ -8,9 +8,9 @@ from pdrom.core.reads import Every
 from pdrom.core.store import read_table
 from pdrom.experiments.roofline.bound import bounds
 from pdrom.tables.break_even import OWN_MESH
-from pdrom.tables.declaration import compared, integer, number, table, text, timed
-from pdrom.tables.parts import joined
-from pdrom.tables.vocabulary import SCENE, VERTICES
+from pdrom.tables.kit.declaration import compared, integer, number, table, text, timed
+from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.vocabulary import SCENE, VERTICES
 
 WHOLE = "iteration"  # all phases together
 _MESH = ["scene", "factor"]

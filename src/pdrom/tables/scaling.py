@@ -6,9 +6,9 @@ from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every
 from pdrom.core.store import read_table
-from pdrom.experiments.names import FOM
-from pdrom.tables.declaration import integer, number, table, text, timed
-from pdrom.tables.vocabulary import (
+from pdrom.experiments.kit.names import FOM
+from pdrom.tables.kit.declaration import integer, number, table, text, timed
+from pdrom.tables.kit.vocabulary import (
     ELEMENTS_SAMPLED,
     LOCAL_SHARE,
     SCENE,

@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.reads import TableOf
-from pdrom.tables.declaration import integer, number, table, text, timed
-from pdrom.tables.vocabulary import METHOD, SCENE, THREADS
+from pdrom.tables.kit.declaration import integer, number, table, text, timed
+from pdrom.tables.kit.vocabulary import METHOD, SCENE, THREADS
 
 QUANTITIES = ("ms_per_iteration", "local_ms", "global_ms", "factorisation_ms", "memory_mb")
 FEWEST = 3  # sizes

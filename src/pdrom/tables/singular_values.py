@@ -6,8 +6,8 @@ from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Preferred
 from pdrom.reduction.basis import load_basis
-from pdrom.tables.declaration import flag, integer, number, table
-from pdrom.tables.vocabulary import GROUP, SCENE
+from pdrom.tables.kit.declaration import flag, integer, number, table
+from pdrom.tables.kit.vocabulary import GROUP, SCENE
 
 
 @table(

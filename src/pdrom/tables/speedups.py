@@ -7,11 +7,11 @@ import pandas as pd
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, TableOf
-from pdrom.experiments.fresh_process import FULL, REDUCED
-from pdrom.tables.declaration import compared, flag, integer, number, table, text, timed
-from pdrom.tables.intervals import in_words, median_interval
-from pdrom.tables.parts import joined
-from pdrom.tables.vocabulary import (
+from pdrom.experiments.kit.fresh_process import FULL, REDUCED
+from pdrom.tables.kit.declaration import compared, flag, integer, number, table, text, timed
+from pdrom.tables.kit.intervals import in_words, median_interval
+from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.vocabulary import (
     GROUP,
     METHOD,
     MS_PER_FRAME,

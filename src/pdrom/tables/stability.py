@@ -10,10 +10,10 @@ from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.core.reads import Every, PerScene, Setting, TableOf
 from pdrom.core.store import open_hdf5
-from pdrom.tables.declaration import compared, number, table, text
-from pdrom.tables.parts import joined
-from pdrom.tables.reruns import KEYS
-from pdrom.tables.vocabulary import (
+from pdrom.tables.kit.declaration import compared, number, table, text
+from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.reruns import KEYS
+from pdrom.tables.kit.vocabulary import (
     BLOWUP_FRAME,
     ENERGY_RATIO,
     FINITE,

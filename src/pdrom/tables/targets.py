@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.reads import TableOf
-from pdrom.tables.declaration import compared, flag, number, table
-from pdrom.tables.gains import ORTHOGONAL, reruns_with_gain
-from pdrom.tables.vocabulary import ELEMENTS_SAMPLED, GAIN, GROUP, METHOD, SCENE, R
+from pdrom.tables.kit.declaration import compared, flag, number, table
+from pdrom.tables.kit.gains import ORTHOGONAL, reruns_with_gain
+from pdrom.tables.kit.vocabulary import ELEMENTS_SAMPLED, GAIN, GROUP, METHOD, SCENE, R
 
 FACTOR = 1.5  # of the orthogonal projection's error
 SIZES_FROM = 20  # basis sizes for which the target is set

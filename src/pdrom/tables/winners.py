@@ -7,8 +7,8 @@ import pandas as pd
 from pdrom.core.reads import Setting, TableOf
 from pdrom.experiments.alternatives.settings import REDUCED
 from pdrom.tables.alternatives import ITERATIONS, STIFFNESS, SUBSTEPS
-from pdrom.tables.declaration import compared, number, table, text, timed
-from pdrom.tables.vocabulary import METHOD, MS_PER_FRAME, SCENE, VERTICES
+from pdrom.tables.kit.declaration import compared, number, table, text, timed
+from pdrom.tables.kit.vocabulary import METHOD, MS_PER_FRAME, SCENE, VERTICES
 
 REFERENCES = ("implicit", "continuous")
 PLAIN = "projective"

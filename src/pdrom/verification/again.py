@@ -18,10 +18,10 @@ from pdrom.core.provenance import made_by
 from pdrom.core.reads import Every, Preferred
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.plan import Plan
-from pdrom.pipeline.tables import all_tables
 from pdrom.report.drawing import draw
 from pdrom.report.paper.build import build, write_inputs
-from pdrom.tables.make import make_table
+from pdrom.tables import declared
+from pdrom.tables.kit.make import make_table
 
 REFERENCES = "paper/references.bib"
 # Faults that edited tables lead a job to.
@@ -81,7 +81,7 @@ def jobs(plan: Plan, folders: Folders) -> Iterator[Job]:
 
 def is_derived(name: str) -> bool:
     """Whether a table is made from other tables alone."""
-    reads = all_tables()[name].reads.values()
+    reads = declared()[name].reads.values()
     return not any(isinstance(read, Every | Preferred) for read in reads)
 
 

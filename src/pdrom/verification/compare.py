@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.reads import ProjectFile
-from pdrom.tables.declaration import Column, Table
-from pdrom.tables.quantities import Quantity
+from pdrom.tables.kit.declaration import Column, Table
+from pdrom.tables.kit.quantities import Quantity
 from pdrom.verification.distance import distance
 from pdrom.verification.pairing import pairs
 from pdrom.verification.rows import RUN, Context, names, of_fitted_samples, of_wrong_runs

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from pdrom.tables.quantities import Quantity
+from pdrom.tables.kit.quantities import Quantity
 
 # Differences below it count for nothing: rounding errors of sums.
 FLOOR = 1e-12

@@ -12,8 +12,8 @@ from pdrom.core.errors import StorageError
 from pdrom.core.paths import TABLE
 from pdrom.core.store import Condition, check_file, read_table
 from pdrom.pipeline.figures import FigureJob
-from pdrom.pipeline.tables import all_tables
-from pdrom.report.claims import is_timed, load_claims
+from pdrom.tables import declared
+from pdrom.tables.claims import is_timed, load_claims
 from pdrom.verification.again import is_derived, made, table_job
 from pdrom.verification.compare import Comparison
 from pdrom.verification.judge import Judgement, in_words, judge
@@ -41,7 +41,7 @@ class Examination:
 
     def lines(self) -> list[Line]:
         """Lines of all claims, figures and tables."""
-        tables = [*map(self.table, all_tables()), *self._strangers()]
+        tables = [*map(self.table, declared()), *self._strangers()]
         return [*self.claims(), *self._figures(tables), *tables]
 
     def condition(self, path: str) -> Condition | None:
@@ -60,7 +60,7 @@ class Examination:
             It cannot be read, or has other columns than those that are declared.
         """
         if name not in self.tables:
-            path, table = TABLE.at(self.subject.results, name=name), all_tables()[name]
+            path, table = TABLE.at(self.subject.results, name=name), declared()[name]
             if self.condition(path) is not Condition.INTACT:
                 raise StorageError(f"{path}: not there, or damaged")
             frame = read_table(path)
@@ -68,13 +68,13 @@ class Examination:
             if other:
                 raise StorageError(f"{path}: has the unknown column(s) {', '.join(other)}")
             self.tables[name] = read_table(path, table.column_names)
-        return all_tables()[name].checked(self.tables[name])
+        return declared()[name].checked(self.tables[name])
 
     @cached_property
     def expected(self) -> dict[str, Reference]:
         """Expected tables that there are, by name."""
         folder = folder_of(self.subject.results)
-        read = {name: read_reference(table, folder) for name, table in all_tables().items()}
+        read = {name: read_reference(table, folder) for name, table in declared().items()}
         return {name: reference for name, reference in read.items() if reference is not None}
 
     @cached_property
@@ -88,7 +88,7 @@ class Examination:
 
     def judgement(self, name: str) -> Judgement:
         """Judgement on a table that is there and expected."""
-        frame, reference, table = self.found(name), self.expected[name], all_tables()[name]
+        frame, reference, table = self.found(name), self.expected[name], declared()[name]
         lacking = set(frame.columns) - set(reference.columns)
         known = table.checked(frame.assign(**dict.fromkeys(lacking, None)))
         return judge(Comparison(table, reference.frame, known, self.context))
@@ -115,7 +115,7 @@ class Examination:
             return missing
         if name not in self.expected:
             return Line("table", name, Outcome.NO_REFERENCE, "run verify --update")
-        table = all_tables()[name]
+        table = declared()[name]
         try:
             judgement, again = self.judgement(name), self.again(name)
         except StorageError as error:
@@ -180,7 +180,7 @@ class Examination:
 
     def _strangers(self) -> list[Line]:
         """Lines of files that lie among the tables and are none."""
-        known = {TABLE.at(self.subject.results, name=name) for name in all_tables()}
+        known = {TABLE.at(self.subject.results, name=name) for name in declared()}
         folder = Path(TABLE.at(self.subject.results, name="any")).parent
         return [
             Line("table", path.stem, Outcome.DIFFERS, f"{path} is no table of the study")
@@ -198,7 +198,7 @@ class Examination:
         missing = self._missing("figure", name, [job.pdf, job.png])
         if missing is not None:
             return missing
-        paths = {TABLE.at(self.subject.results, name=table): table for table in all_tables()}
+        paths = {TABLE.at(self.subject.results, name=table): table for table in declared()}
         read = [paths[path] for path in job.inputs if path in paths]
         bad = [tables[table] for table in read if tables[table].outcome not in GOOD]
         if bad:

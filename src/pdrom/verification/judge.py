@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from pdrom.tables.declaration import Column, Table
+from pdrom.tables.kit.declaration import Column, Table
 from pdrom.verification.compare import Comparison
 from pdrom.verification.pairing import names_row
 from pdrom.verification.rows import SAMPLES, names

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from pdrom.tables.declaration import Column, Table
+from pdrom.tables.kit.declaration import Column, Table
 
 Pairs = list[tuple[int, int]]
 

@@ -16,7 +16,7 @@ import pandas as pd
 from pdrom.core.errors import StorageError
 from pdrom.core.paths import RESULTS
 from pdrom.pipeline.tracked import write_tracked
-from pdrom.tables.declaration import Column, Table
+from pdrom.tables.kit.declaration import Column, Table
 from pdrom.verification.compare import NOT_COMPARED
 
 # Digits of numbers; tolerances are a hundred times what these digits leave out, or more.

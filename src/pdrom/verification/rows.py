@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from pdrom.tables.declaration import Column, Table
+from pdrom.tables.kit.declaration import Column, Table
 from pdrom.verification.pairing import names_row
 
 # Errors of runs on samples with a larger amplification, and errors of approximations and the

@@ -12,7 +12,7 @@ from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.machine import machine
 from pdrom.core.paths import TABLE
 from pdrom.core.store import Condition, check_file, read_table
-from pdrom.pipeline.tables import all_tables
+from pdrom.tables import declared
 from pdrom.verification.references import folder_of, note, write_reference
 from pdrom.verification.subject import Subject
 
@@ -32,14 +32,14 @@ def update(subject: Subject, reason: str) -> Path:
     words = " ".join(reason.split())
     if not words:
         raise ConfigurationError('verify --update: say why, as in --reason "a new method"')
-    paths = {name: TABLE.at(subject.results, name=name) for name in all_tables()}
+    paths = {name: TABLE.at(subject.results, name=name) for name in declared()}
     for name, path in paths.items():
         if not Path(path).is_file():
             raise StorageError(f"{path}: not there; make it by {subject.command(name)}")
         if check_file(path) is not Condition.INTACT:
             raise StorageError(f"{path}: damaged; delete it and run {subject.command(name)}")
     _require_new(subject)
-    frames = {name: all_tables()[name].checked(read_table(path)) for name, path in paths.items()}
+    frames = {name: declared()[name].checked(read_table(path)) for name, path in paths.items()}
     return write(subject.results, frames, words)
 
 
@@ -47,7 +47,7 @@ def write(results: str, frames: Mapping[str, pd.DataFrame], reason: str) -> Path
     """Write the expected form of tables and a line about it."""
     folder = folder_of(results)
     for name, frame in frames.items():
-        write_reference(all_tables()[name], frame, folder)
+        write_reference(declared()[name], frame, folder)
     for path in [*folder.glob("*.csv"), *folder.glob("*.csv.xz")]:
         if path.name.partition(".")[0] not in frames:
             path.unlink()  # a table that there is no longer
@@ -60,7 +60,7 @@ def write(results: str, frames: Mapping[str, pd.DataFrame], reason: str) -> Path
 def _require_new(subject: Subject) -> None:
     """StorageError if a run would make one of the tables anew."""
     command = [sys.executable, "-m", "pdrom.pipeline.front", "-n", *subject.options, "--"]
-    done = subprocess.run([*command, *all_tables()], capture_output=True, text=True, check=False)
+    done = subprocess.run([*command, *declared()], capture_output=True, text=True, check=False)
     if done.returncode != 0:
         last = (done.stderr.strip().splitlines() or ["no word"])[-1]
         raise StorageError(f"verify --update: the run cannot be planned: {last}")

@@ -15,7 +15,7 @@ from pdrom.experiments.iterations import (
     Settings,
     run,
 )
-from pdrom.experiments.settings import Horizon
+from pdrom.experiments.kit.settings import Horizon
 from pdrom.model.mesh.types import save_mesh
 
 

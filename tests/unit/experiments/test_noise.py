@@ -8,6 +8,7 @@ import pytest
 
 from pdrom.core.paths import File
 from pdrom.core.store import read_table, write_table
+from pdrom.experiments.kit.settings import Horizon
 from pdrom.experiments.noise import (
     ALL,
     PLANE,
@@ -21,7 +22,6 @@ from pdrom.experiments.noise import (
     roundoff_field,
     run,
 )
-from pdrom.experiments.settings import Horizon
 from pdrom.model.mesh.types import save_mesh
 from pdrom.pipeline.scenes import Coarsen, load_bound_scene
 from pdrom.reduction.method import load_methods

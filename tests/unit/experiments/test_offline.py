@@ -5,7 +5,7 @@ import pytest
 
 from pdrom.core.paths import File
 from pdrom.core.store import read_table
-from pdrom.experiments.declaration import Nothing
+from pdrom.experiments.kit.declaration import Nothing
 from pdrom.experiments.offline import Offline, Outputs, Settings, decaying, run
 
 SMALL = {"rows": 400, "snapshots": 12, "r": 12, "elements": 300, "equations": 40}

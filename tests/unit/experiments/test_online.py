@@ -9,8 +9,8 @@ from pdrom.core.paths import File
 from pdrom.core.store import read_table
 from pdrom.core.yamlfile import validate
 from pdrom.experiments import online as experiment
-from pdrom.experiments.fresh_process import Request, Subspaces, TimedScene, in_fresh_process
-from pdrom.experiments.measurement import Protocol
+from pdrom.experiments.kit.fresh_process import Request, Subspaces, TimedScene, in_fresh_process
+from pdrom.experiments.kit.measurement import Protocol
 from pdrom.experiments.online import COLUMNS, Online, OnlineModels, relative_error
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.runs.full_order import trajectory

@@ -22,8 +22,8 @@ from pdrom.experiments import (
     subspaces,
 )  # fmt: skip
 from pdrom.experiments.guard import Trial, TriedGuard
-from pdrom.experiments.sampling import Sweep
-from pdrom.experiments.settings import Horizon
+from pdrom.experiments.kit.sampling import Sweep
+from pdrom.experiments.kit.settings import Horizon
 from pdrom.experiments.stability import ShortRuns
 from pdrom.experiments.subspaces import SubspaceModels
 from pdrom.model.scene import SceneConfig

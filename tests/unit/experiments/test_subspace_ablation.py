@@ -10,7 +10,7 @@ from pdrom.core.paths import File
 from pdrom.core.store import read_table, write_hdf5, write_table
 from pdrom.core.yamlfile import read_yaml, validate
 from pdrom.experiments import subspace_ablation as experiment
-from pdrom.experiments.settings import Horizon
+from pdrom.experiments.kit.settings import Horizon
 from pdrom.experiments.subspace_ablation import COLUMNS, Ablation, AblationFile
 from pdrom.model.mesh.types import save_mesh
 from pdrom.model.runs.full_order import trajectory

@@ -150,7 +150,7 @@ def test_selections_are_in_no_closure_that_does_not_list_them():
 
 
 def test_order_and_repetition_of_modules_do_not_matter():
-    names = ["pdrom.experiments.mesh", "pdrom.core.metrics", "pdrom.reduction.snapshots"]
+    names = ["pdrom.experiments.mesh", "pdrom.model.metrics", "pdrom.reduction.snapshots"]
     assert fingerprint(*names) == fingerprint(*reversed(names), names[0])
     assert fingerprint(*names) != fingerprint(*names[1:])
 

@@ -8,8 +8,9 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.core.reads import PerScene, Setting, TableOf
 from pdrom.pipeline import tables as module
 from pdrom.pipeline.study import Study
-from pdrom.pipeline.tables import Tables, all_tables
-from pdrom.tables.document import document
+from pdrom.pipeline.tables import Tables
+from pdrom.tables import declared
+from pdrom.tables.kit.document import document
 from places import ROOT
 
 CONFIG = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "block-deim"]}
@@ -22,19 +23,19 @@ def made(**changes) -> Tables:
 def test_the_list_of_tables_is_up_to_date():
     """Else: python -m pdrom.pipeline.tables"""
     written = (ROOT / "docs" / "tables.md").read_text(encoding="utf-8")
-    assert written == document(all_tables().values())
+    assert written == document(declared().values())
 
 
 def test_verdicts_are_a_table_like_others():
-    assert {"claims", "singular_values", "guard"} <= set(all_tables())
-    assert list(made()) == sorted(all_tables())
+    assert {"claims", "singular_values", "guard"} <= set(declared())
+    assert list(made()) == sorted(declared())
 
 
-@pytest.mark.parametrize("name", all_tables())
+@pytest.mark.parametrize("name", declared())
 def test_every_table_finds_what_it_reads(name):
     tables = made()
     inputs, settings = tables.inputs(name), tables.params(name)["settings"]
-    assert inputs.keys() | settings.keys() == all_tables()[name].reads.keys()
+    assert inputs.keys() | settings.keys() == declared()[name].reads.keys()
     assert not inputs.keys() & settings.keys()
     assert tables.path(name) == f"out/tables/{name}.csv"
 
@@ -85,8 +86,8 @@ def test_a_setting_is_a_parameter_of_those_who_read_it_only():
     ],
 )
 def test_what_does_not_exist_is_named(read, message, monkeypatch):
-    faulty = replace(all_tables()["budget"], reads={"points": read})
-    monkeypatch.setattr(module, "all_tables", lambda: {**all_tables(), "budget": faulty})
+    faulty = replace(declared()["budget"], reads={"points": read})
+    monkeypatch.setattr(module, "declared", lambda: {**declared(), "budget": faulty})
     tables = made()
     with pytest.raises(ConfigurationError, match=message):
         tables.inputs("budget")

@@ -9,10 +9,10 @@ from scipy.stats import binom
 
 from pdrom.core.paths import File
 from pdrom.core.store import write_table
-from pdrom.experiments.fresh_process import COLUMNS
+from pdrom.experiments.kit.fresh_process import COLUMNS
 from pdrom.tables.frame_times import frame_times
-from pdrom.tables.intervals import confirmed_digits, in_words, median_interval
-from pdrom.tables.one_time import in_one_time
+from pdrom.tables.kit.intervals import confirmed_digits, in_words, median_interval
+from pdrom.tables.kit.one_time import in_one_time
 from pdrom.tables.repetitions import repetitions
 from pdrom.tables.speedups import speedups
 

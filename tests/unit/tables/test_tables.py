@@ -12,7 +12,7 @@ from pdrom.core import paths
 from pdrom.core.errors import StorageError
 from pdrom.core.paths import File, Place
 from pdrom.core.store import write_hdf5, write_table
-from pdrom.model.runs.horizon import floor_of
+from pdrom.experiments.kit.horizon import floor_of
 from pdrom.reduction.basis import Basis, save_basis
 from pdrom.tables.accuracy_cost import accuracy_cost, pareto, reference_of
 from pdrom.tables.heldout_reruns import heldout_reruns

@@ -10,7 +10,7 @@ import pytest
 from pdrom.core.paths import TABLE
 from pdrom.core.reads import TableOf
 from pdrom.core.store import read_table, write_hdf5, write_table, write_text
-from pdrom.pipeline.tables import all_tables
+from pdrom.tables import declared
 from pdrom.verification.again import is_derived, made, table_job
 from pdrom.verification.examine import Examination
 from pdrom.verification.references import folder_of, read_reference, write_reference
@@ -35,7 +35,7 @@ def subject():
 def tracked():
     """Expected tables of the tiny study as they are kept; a new one may have none yet."""
     folder = REFERENCES / "studies" / "tiny" / "tables"
-    read = {name: read_reference(table, folder) for name, table in all_tables().items()}
+    read = {name: read_reference(table, folder) for name, table in declared().items()}
     return {name: reference.frame for name, reference in read.items() if reference is not None}
 
 
@@ -63,14 +63,14 @@ def project(tracked, subject, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.setattr("os.fsync", lambda descriptor: None)
-        for name, table in all_tables().items():
+        for name, table in declared().items():
             frame = tracked.get(name, table.checked(pd.DataFrame()))
             write_table(timed(table, frame), TABLE.at(RESULTS, name=name))
         for name in derived_tables():
             with made(table_job(subject.plan, name)) as files:
                 [(path, new)] = files.items()
                 write_table(read_table(new), path)
-        for name, table in all_tables().items():
+        for name, table in declared().items():
             frame = table.checked(read_table(TABLE.at(RESULTS, name=name)))
             write_reference(table, frame, folder_of(RESULTS))
         figures = subject.plan.figure_jobs.values()
@@ -83,10 +83,10 @@ def project(tracked, subject, tmp_path_factory):
 
 def derived_tables():
     """Tables that are made from others, these first."""
-    names = [name for name in all_tables() if is_derived(name)]
+    names = [name for name in declared() if is_derived(name)]
 
     def rank(name):
-        reads = all_tables()[name].reads.values()
+        reads = declared()[name].reads.values()
         return max([1 + rank(r.name) for r in reads if isinstance(r, TableOf)], default=0)
 
     return sorted(names, key=rank)

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pdrom.pipeline.tables import all_tables
-from pdrom.tables.quantities import QUANTITIES, TALLY, TOLERANCES
+from pdrom.tables import declared
+from pdrom.tables.kit.quantities import QUANTITIES, TALLY, TOLERANCES
 from pdrom.verification.compare import FITTED, NOT_COMPARED, Comparison
 from pdrom.verification.judge import judge
 from pdrom.verification.references import read_reference
@@ -23,7 +23,7 @@ SMALL = 1e-9
 
 def read(folder: Path) -> tuple[dict, Context]:
     """Expected tables by name, and what they say of each other's rows."""
-    references = {name: read_reference(table, folder) for name, table in all_tables().items()}
+    references = {name: read_reference(table, folder) for name, table in declared().items()}
     tables = {name: found.frame for name, found in references.items() if found is not None}
     return tables, Context.of(tables)
 
@@ -94,9 +94,9 @@ def mutation(table, column, studies):
     return max(loose, key=lambda comparison: len(comparison.e), default=None)
 
 
-@pytest.mark.parametrize("name", all_tables())
+@pytest.mark.parametrize("name", declared())
 def test_a_change_of_any_number_is_noticed(name, studies):
-    table = all_tables()[name]
+    table = declared()[name]
     for column in table.columns:
         if column.kind in ("number", "integer") and column.quantity not in NOT_COMPARED:
             comparison = mutation(table, column, studies)
@@ -108,7 +108,7 @@ def test_a_change_of_any_number_is_noticed(name, studies):
 def test_few_columns_are_compared_by_count_alone_or_hold_nothing(studies):
     """Else the test above would say little."""
     others = {}
-    for table in all_tables().values():
+    for table in declared().values():
         for column in table.columns:
             if column.kind in ("number", "integer") and column.quantity not in NOT_COMPARED:
                 frames = [(t[table.name], c) for t, c in studies if table.name in t]
@@ -121,7 +121,7 @@ def test_most_cells_are_compared_one_by_one(studies):
     for tables, context in studies:
         loose = total = 0
         for name, frame in tables.items():
-            table = all_tables()[name]
+            table = declared()[name]
             alone = Comparison(table, frame, frame, context)
             for column in alone.columns():
                 cells = np.any([np.zeros(len(frame)), *alone.loose(column).values()], axis=0)
@@ -132,12 +132,12 @@ def test_most_cells_are_compared_one_by_one(studies):
 def test_unchanged_tables_pass(studies):
     for tables, context in studies:
         for name, frame in tables.items():
-            assert judge(Comparison(all_tables()[name], frame, frame, context)).differences == ()
+            assert judge(Comparison(declared()[name], frame, frame, context)).differences == ()
 
 
 def test_no_tolerance_exceeds_a_factor_of_two():
     assert set(TOLERANCES) | set(NOT_COMPARED) == set(QUANTITIES)
-    for table in all_tables().values():
+    for table in declared().values():
         for column in table.columns:
             assert column.within <= (TALLY if column.kind == "integer" else 0.5), column.name
     assert FITTED <= 0.5
@@ -150,7 +150,7 @@ def tiny(studies):
 
 
 def judged(tables, context, name, found):
-    return judge(Comparison(all_tables()[name], tables[name], found, context)).differences
+    return judge(Comparison(declared()[name], tables[name], found, context)).differences
 
 
 def test_a_run_on_amplified_samples_may_end_otherwise(tiny):

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from pdrom.core.errors import ConfigurationError, StorageError
-from pdrom.pipeline.tables import all_tables
+from pdrom.tables import declared
 from pdrom.verification import references
 from pdrom.verification.compare import NOT_COMPARED
 from pdrom.verification.references import (
@@ -20,7 +20,7 @@ from pdrom.verification.subject import Subject
 from pdrom.verification.update import update
 from places import ROOT
 
-TABLE = all_tables()["reduced_reruns"]
+TABLE = declared()["reduced_reruns"]
 LIMIT = 1_000_000
 
 
@@ -37,7 +37,7 @@ def test_a_reference_comes_back_as_it_was_kept(frame, tmp_path):
         found.frame, TABLE.checked(compact(TABLE, frame).reindex(columns=list(TABLE.column_names)))
     )
     assert [path.name for path in tmp_path.iterdir()] == ["reduced_reruns.csv"]
-    assert read_reference(all_tables()["claims"], tmp_path) is None
+    assert read_reference(declared()["claims"], tmp_path) is None
 
 
 def test_what_a_clock_has_a_say_in_is_not_kept(frame, tmp_path):
@@ -79,8 +79,8 @@ def test_tracked_references_are_small_and_whole():
     assert sum(p.stat().st_size for p in files if studies not in p.parents) < LIMIT
     for own in (folder / "tables", studies / "tiny" / "tables"):
         names = {path.name.partition(".")[0] for path in own.glob("*.csv*")}
-        assert names <= set(all_tables())
-        assert all(read_reference(all_tables()[name], own) for name in names)
+        assert names <= set(declared())
+        assert all(read_reference(declared()[name], own) for name in names)
         assert {"claims", "reduced_reruns", "reconstruction_error"} <= names
 
 
@@ -112,7 +112,7 @@ def test_from_missing_tables_nothing_is_updated(subject, tmp_path):
 def test_from_a_damaged_table_nothing_is_updated(subject, tmp_path):
     folder = tmp_path / "results" / "studies" / "tiny" / "tables"
     folder.mkdir(parents=True)
-    (folder / f"{min(all_tables())}.csv").write_text("scene\n")
+    (folder / f"{min(declared())}.csv").write_text("scene\n")
     with pytest.raises(StorageError, match="damaged"):
         update(subject, "a reason")
     assert not (tmp_path / "results" / "reference").exists()

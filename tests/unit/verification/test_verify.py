@@ -9,7 +9,7 @@ import pytest
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.paths import TABLE
 from pdrom.core.store import read_table, write_table
-from pdrom.pipeline.tables import all_tables
+from pdrom.tables import declared
 from pdrom.verification.again import made, table_job
 from pdrom.verification.command import parser, verify, verify_tables
 from pdrom.verification.lines import Line, Outcome, status_of
@@ -34,7 +34,7 @@ def test_expected_results_hold(results, subject):
     assert not any("differs" in line or "not there" in line for line in printed)
     assert status == Status.HOLDS
     names = {line.split(":")[0] for line in printed}
-    assert {f"table {name}" for name in all_tables()} <= names
+    assert {f"table {name}" for name in declared()} <= names
     assert {"claim C1", "claim C12", "figure singular_values"} <= names
     assert any(line.startswith("table effects_left_out: not comparable") for line in printed)
     assert "| C1 | reproduced |" in page

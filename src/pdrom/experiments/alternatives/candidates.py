@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pdrom.experiments.alternatives.settings import REDUCED, Comparison
-from pdrom.model.alternatives.methods import alternative
+from pdrom.experiments.alternatives.solvers.methods import alternative
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.runs.bounded import BoundedRun

@@ -13,18 +13,18 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 
-from pdrom.core.metrics import trajectory_error
 from pdrom.core.paths import ALTERNATIVES, File
 from pdrom.core.reads import SourcesOf
 from pdrom.core.store import write_table
 from pdrom.experiments.alternatives.candidates import Candidate, candidates
 from pdrom.experiments.alternatives.settings import CONVERGED, Comparison, ImplicitReference
-from pdrom.experiments.declaration import Experiment, JobSettings
-from pdrom.experiments.measurement import Variant, measure
-from pdrom.experiments.settings import BlowupExtent
-from pdrom.model.alternatives.continuous import continuous
+from pdrom.experiments.alternatives.solvers.continuous import continuous
+from pdrom.experiments.kit.converged import ConvergedStepper
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.measurement import Variant, measure
+from pdrom.experiments.kit.settings import BlowupExtent
 from pdrom.model.constraints.base import GroupConfig
-from pdrom.model.runs.converged import ConvergedStepper
+from pdrom.model.metrics import trajectory_error
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import displacement_norms
 

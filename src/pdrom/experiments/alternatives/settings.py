@@ -6,9 +6,9 @@ from pydantic import AfterValidator, Field
 
 from pdrom.core.errors import choices
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.measurement import Protocol
-from pdrom.experiments.settings import Count, Modes, Repeats, Tolerance
-from pdrom.model.alternatives.methods import METHODS
+from pdrom.experiments.alternatives.solvers.methods import METHODS
+from pdrom.experiments.kit.measurement import Protocol
+from pdrom.experiments.kit.settings import Count, Modes, Repeats, Tolerance
 
 REDUCED = "ecsw"  # the only method that is no full-order one
 CONVERGED = "converged"  # the implicit step itself, however long it takes

@@ -13,11 +13,11 @@ from pdrom.core.paths import HARD_CASES, KERNEL_ACCURACY, File
 from pdrom.core.reads import ProjectFile
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.declaration import Experiment, JobSettings
 from pdrom.experiments.hard_cases.accuracy import kernel_accuracy
 from pdrom.experiments.hard_cases.catalogue import CASES, modules_of, reducible_cases
 from pdrom.experiments.hard_cases.expectations import load_expectations, surprise
 from pdrom.experiments.hard_cases.outcomes import rows
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
 from pdrom.reduction.method import MethodSpec
 
 log = logging.getLogger(__name__)

@@ -16,7 +16,7 @@ from pdrom.experiments.hard_cases.expectations import (
     Expectation,
 )
 from pdrom.experiments.hard_cases.reductions import ReducedRun, Training, names, reduced_run
-from pdrom.model.boundedness import largest_projections
+from pdrom.experiments.kit.boundedness import largest_projections
 from pdrom.reduction.method import MethodSpec
 
 # Multiples of the full-order run's scale: a larger extent is a blow-up, or a distorted shape.

@@ -12,7 +12,9 @@ from pydantic import Field
 from pdrom.core.paths import MESH, PUBLISHED_CHOICES, File
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.scenes import scene_of
+from pdrom.experiments.kit.settings import Modes
 from pdrom.experiments.published_choices.choices import Case, Choice, Variant, variants
 from pdrom.experiments.published_choices.reconstruction import (
     Decomposed,
@@ -21,8 +23,6 @@ from pdrom.experiments.published_choices.reconstruction import (
     training_snapshots,
 )
 from pdrom.experiments.published_choices.simulation import SIMULATION, applicable, projections
-from pdrom.experiments.scenes import scene_of
-from pdrom.experiments.settings import Modes
 from pdrom.model.scene import Scene, SceneConfig
 
 log = logging.getLogger(__name__)

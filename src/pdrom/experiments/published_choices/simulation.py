@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from pdrom.experiments.last_iterates import Look, last_iterates
+from pdrom.experiments.kit.last_iterates import Look, last_iterates
 from pdrom.experiments.published_choices.choices import ALL, Choice
 from pdrom.experiments.published_choices.spaces import PublishedSpace
 from pdrom.model.constraints.base import ConstraintGroup, GroupConfig

@@ -13,10 +13,10 @@ from pdrom.core.paths import MESH, RATES, WORK, File
 from pdrom.core.reads import Every
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.scenes import scene_of
+from pdrom.experiments.kit.settings import Count, Repeats, Solver
 from pdrom.experiments.roofline import rates, work
-from pdrom.experiments.scenes import scene_of
-from pdrom.experiments.settings import Count, Repeats, Solver
 from pdrom.model.scene import Scene, SceneConfig
 
 log = logging.getLogger(__name__)

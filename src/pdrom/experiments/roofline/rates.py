@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from pdrom.experiments.roofline.bound import DIVISIONS, FLOPS, READ, ROOTS
+from pdrom.experiments.roofline.throughput import AT_ONCE, divisions, products, read, roots
 from pdrom.model.compiled.rows import WIDTH
-from pdrom.model.compiled.throughput import AT_ONCE, divisions, products, read, roots
 
 COLUMNS = ["quantity", "working_set", "level", "rate", "low", "high"]
 SMALLEST_SET = 16 * 1024

@@ -2,7 +2,7 @@
 
 Bytes are those of the arrays themselves, each counted once a phase: a vertex that several elements
 share stays in the nearest cache. Operations of a local kernel are counted while it runs
-(`pdrom.model.compiled.counters`), those of the sweeps follow from the factor.
+(`pdrom.experiments.roofline.counters`), those of the sweeps follow from the factor.
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from pdrom.experiments.names import GLOBAL, RIGHT
-from pdrom.model.compiled.counters import Operations
+from pdrom.experiments.kit.names import GLOBAL, RIGHT
+from pdrom.experiments.roofline.counted_kernel import operations
+from pdrom.experiments.roofline.counters import Operations
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.constraints.counted_kernel import operations
 from pdrom.model.constraints.local_kernel import LocalPass
 from pdrom.model.dynamics.solvers import Factor
 from pdrom.model.dynamics.system import GlobalSystem

@@ -23,7 +23,7 @@ LIBRARIES = (
     "pandas",
     "pdrom.core.logs",
     "pdrom.core.provenance",
-    "pdrom.experiments.declaration",
+    "pdrom.experiments.kit.declaration",
     "pydantic",
     "scipy.linalg",
     "scipy.sparse.linalg",

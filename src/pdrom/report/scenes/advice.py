@@ -7,7 +7,7 @@ from pdrom.core.store import read_table, write_table
 from pdrom.report.scenes.results import SceneResults
 from pdrom.tables.accuracy_cost import accuracy_cost
 from pdrom.tables.effects_contribution import effects_contribution
-from pdrom.tables.one_time import NOT_TIMED
+from pdrom.tables.kit.one_time import NOT_TIMED
 
 
 def make(results: SceneResults, outputs: Mapping[str, str]) -> None:

@@ -21,7 +21,7 @@ from pdrom.model.effects.base import EffectConfig
 from pdrom.report.figures.kit.holdings import Holdings
 from pdrom.report.figures.kit.options import Rank
 from pdrom.report.figures.kit.results import Results
-from pdrom.tables.one_time import NOT_TIMED
+from pdrom.tables.kit.one_time import NOT_TIMED
 from pdrom.tables.reconstruction_error import reconstruction_error
 from pdrom.tables.reduced_reruns import reduced_reruns
 

@@ -8,13 +8,13 @@ from pathlib import Path
 from pdrom.core.paths import FIGURE, RESULTS, TABLE
 from pdrom.pipeline.figure_command import PREPRINT
 from pdrom.pipeline.folders import Folders
-from pdrom.pipeline.tables import all_tables
-from pdrom.report.claims import load_claims
-from pdrom.report.claims.metrics import METRICS
 from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.paper.macros import keys_of
 from pdrom.report.paper.source import source_files
 from pdrom.report.words.markup import to_plain
+from pdrom.tables import declared
+from pdrom.tables.claims import load_claims
+from pdrom.tables.claims.metrics import METRICS
 
 CLAIMS = "claims"
 TITLE = re.compile(r"\\section\{([^{}]*)\}")
@@ -83,7 +83,7 @@ def _figures() -> Iterator[Entry]:
 
 
 def _tables() -> Iterator[Entry]:
-    for name, table in all_tables().items():
+    for name, table in declared().items():
         file = TABLE.at(RESULTS, name=name)
         rule = f"{name}_table"
         yield Entry("table", name, table.title, rule, (file,), (table_words(name),))
@@ -93,7 +93,7 @@ def _sections(root: Path) -> Iterator[Entry]:
     r"""Sections of the manuscript that hold numbers (``\val``), with their tables."""
     for path in source_files(root):
         text = (root / path).read_text(encoding="utf-8")
-        held = sorted({key.partition("|")[0] for key in keys_of(text)} & all_tables().keys())
+        held = sorted({key.partition("|")[0] for key in keys_of(text)} & declared().keys())
         found = TITLE.search(text)
         if held:
             yield Entry(

@@ -15,11 +15,11 @@ import pandas as pd
 
 from pdrom.core.errors import PdromError
 from pdrom.core.store import read_table
-from pdrom.pipeline.tables import all_tables
 from pdrom.pipeline.tracked import write_tracked
 from pdrom.report.figure_numbers import Numbers, figure_numbers
-from pdrom.tables.declaration import Table
-from pdrom.tables.quantities import QUANTITIES
+from pdrom.tables import declared
+from pdrom.tables.kit.declaration import Table
+from pdrom.tables.kit.quantities import QUANTITIES
 from pdrom.verification.claim_map.entries import Entry, entries
 from pdrom.verification.claim_map.measured import COLUMNS
 
@@ -109,7 +109,7 @@ def _page(listed: list[Entry], numbers: Mapping[str, Numbers], measured: Measure
                 f"[{e.name}](tables.md#{e.name})",
                 _command(e),
                 *_costs(row),
-                _tolerances(all_tables()[e.name]),
+                _tolerances(declared()[e.name]),
             ),
         ),
         "## Numbers of the text\n\nBy section of the manuscript: the tables that its numbers are "

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from pdrom.core.metrics import relative_errors
 from pdrom.experiments.published_choices.choices import (
     ALONE,
     CUMULATIVE,
@@ -18,6 +17,7 @@ from pdrom.experiments.published_choices.reconstruction import (
     idle_axes,
     training_snapshots,
 )
+from pdrom.model.metrics import relative_errors
 from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.method import load_methods
 from pdrom.reduction.sampling import Reduction, select

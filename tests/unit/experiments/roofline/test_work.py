@@ -7,8 +7,8 @@ import pytest
 from builders import make_scene
 from pdrom.core.paths import File
 from pdrom.core.store import read_table, write_table
-from pdrom.experiments.effect_costs import effect_costs
-from pdrom.experiments.names import GLOBAL, RIGHT
+from pdrom.experiments.kit.effect_costs import effect_costs
+from pdrom.experiments.kit.names import GLOBAL, RIGHT
 from pdrom.experiments.roofline.experiment import Inputs, Outputs, Roofline, Settings, run
 from pdrom.experiments.roofline.work import COLUMNS, VECTOR, work
 from pdrom.model.mesh.types import save_mesh

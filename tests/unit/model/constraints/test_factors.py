@@ -6,8 +6,8 @@ from pydantic import ValidationError
 
 from builders import GROUPS, make_scene
 from pdrom.core.errors import SceneError
+from pdrom.experiments.kit.variation import varied
 from pdrom.model.runs.full_order import trajectory
-from pdrom.model.variation import varied
 
 BOX = {"kind": "plane", "point": [0.1, 0, 0], "normal": [-1, 0, 0]}
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from builders import make_scene
-from pdrom.core.metrics import trajectory_error
+from pdrom.model.metrics import trajectory_error
 from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.rerun import displacement_norms
 from pdrom.reduction.subspace.companion import (

@@ -22,7 +22,7 @@ from pdrom.core.paths import (
     TABLE,
 )
 from pdrom.core.store import write_hdf5, write_table
-from pdrom.experiments.names import GLOBAL, RIGHT
+from pdrom.experiments.kit.names import GLOBAL, RIGHT
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh, save_mesh

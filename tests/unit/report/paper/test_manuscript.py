@@ -8,13 +8,13 @@ from matplotlib.figure import Figure
 from pdrom.core.yamlfile import read_yaml
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.study import Study
-from pdrom.pipeline.tables import all_tables
 from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.paper.bibliography import bibliography, cited_keys
 from pdrom.report.paper.known import sentences
 from pdrom.report.paper.macros import keys_of
 from pdrom.report.paper.source import whole_source
 from pdrom.report.paper.tex import build_pdf, packages_of
+from pdrom.tables import declared
 from places import ROOT
 
 SOURCE = whole_source(ROOT / "paper" / "main.tex")
@@ -92,7 +92,7 @@ def test_only_packages_of_both_tex_systems():
 def test_every_key_names_a_column_of_a_table():
     study = Study.load(read_yaml(ROOT / "config" / "default.yaml"), ROOT)
     facts = Plan(study).paper.facts.tables
-    columns = {name: set(table.column_names) for name, table in all_tables().items()}
+    columns = {name: set(table.column_names) for name, table in declared().items()}
     columns |= {name: set(rows[0]) for name, rows in facts.items()}
     for key in keys_of(SOURCE):
         table, *parts = key.split("|")

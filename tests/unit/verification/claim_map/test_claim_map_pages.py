@@ -7,9 +7,9 @@ import pytest
 
 from pdrom.core.errors import StorageError
 from pdrom.core.store import write_table
-from pdrom.pipeline.tables import all_tables
-from pdrom.report.claims import load_claims
 from pdrom.report.figures.kit.catalogue import declarations
+from pdrom.tables import declared
+from pdrom.tables.claims import load_claims
 from pdrom.verification.claim_map.entries import entries
 from pdrom.verification.claim_map.measured import COLUMNS
 from pdrom.verification.claim_map.pages import PAGE, README, load, main, pages
@@ -29,13 +29,13 @@ def test_every_claim_figure_and_table_has_a_line():
     claims = load_claims(CONFIG / "claims.yaml")
     assert [name for name in claims if f"| {name} |" not in page] == []
     assert [name for name in declarations() if f"| [{name}](figures.md) |" not in page] == []
-    assert [name for name in all_tables() if f"(tables.md#{name}) |" not in page] == []
+    assert [name for name in declared() if f"(tables.md#{name}) |" not in page] == []
 
 
 def test_every_section_with_numbers_has_a_line():
     texts = {p.stem: p.read_text("utf-8") for p in (ROOT / "paper" / "sections").glob("*.tex")}
     uses = {
-        name: {table for table in all_tables() if rf"\val{{{table}|" in text}
+        name: {table for table in declared() if rf"\val{{{table}|" in text}
         for name, text in texts.items()
     }
     listed = {e.name: set(e.rests_on) for e in entries(ROOT) if e.kind == "section"}

@@ -2,11 +2,11 @@
 
 from matplotlib.figure import Figure
 
-from pdrom.report.claims.sensitivity import VARIED
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.counts import draw_counts
 from pdrom.report.figures.kit.options import Options
 from pdrom.report.figures.kit.results import NothingToDraw, Results
+from pdrom.tables.claims.sensitivity import VARIED
 
 COLUMNS = ["claim", "part", "varied", "variation", "verdict_of_rules", "same"]
 PANELS = {"published": "as published", "beyond": "beyond"}

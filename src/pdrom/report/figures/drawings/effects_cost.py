@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pdrom.experiments.names import GLOBAL, REST, RIGHT
+from pdrom.experiments.kit.names import GLOBAL, REST, RIGHT
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import NothingToDraw, Results

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
-from pdrom.experiments.names import ANDERSON, FOM
+from pdrom.experiments.kit.names import ANDERSON, FOM
 from pdrom.report.figures.iterations import Options
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.multiples import (

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from pdrom.experiments.names import GLOBAL, RIGHT
+from pdrom.experiments.kit.names import GLOBAL, RIGHT
 from pdrom.experiments.roofline.bound import MEMORY, READ
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.options import Scenes

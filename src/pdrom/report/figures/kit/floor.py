@@ -4,7 +4,7 @@ import numpy as np
 
 from pdrom.core.paths import SENSITIVITY
 from pdrom.core.store import read_table
-from pdrom.model.runs.horizon import floor_of, horizon
+from pdrom.experiments.kit.horizon import floor_of, horizon
 from pdrom.report.figures.kit.results import Results
 
 COLUMNS = ["scene", "perturbation", "frame", "relative_difference"]

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from pdrom.experiments.names import ANDERSON, FOM
+from pdrom.experiments.kit.names import ANDERSON, FOM
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.families import FAMILIES, ITERATIONS, Family, Model, markers
 from pdrom.report.figures.kit.multiples import clipped, label_counts, log_axis, time_axis

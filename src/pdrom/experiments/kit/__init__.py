@@ -1,0 +1,1 @@
+"""What experiments share: settings, measurement, runs that only experiments make."""

@@ -1,0 +1,42 @@
+"""The training or the held-out motion of a scene, on which position subspaces are run."""
+
+import numpy as np
+
+from pdrom.core.paths import File
+from pdrom.experiments.kit.scenes import positions_of
+from pdrom.model.energy import EnergyScale
+from pdrom.model.scene import Scene
+from pdrom.reduction.rerun import Rerun, displacement_norms
+from pdrom.reduction.snapshots import training_frames
+from pdrom.reduction.subspace.model import SubspaceModel
+from pdrom.reduction.subspace.rerun import rerun_model
+
+
+class Motion:
+    """A motion of a scene with its full-order run.
+
+    reference : (F + 1, N, 3) m
+    displacement : (F,) m, see `displacement_norms`
+    scale : of the energies of its runs
+    """
+
+    def __init__(self, scene: Scene, full_order: File) -> None:
+        self.scene = scene
+        self.reference = positions_of(full_order)
+        self.displacement = displacement_norms(self.reference)
+        self.scale = EnergyScale.of(scene, self.reference)
+
+    def run(self, model: SubspaceModel, limit: float) -> Rerun:
+        """Run a model; a blow-up ends the run and is recorded."""
+        return rerun_model(self.scene, model, self.reference, limit)
+
+
+def training_indices(scene: Scene) -> np.ndarray:
+    """Training frames (n,): the even ones that train the projections, too."""
+    count = max(plan.train for plan in scene.config.reduce.values())
+    return training_frames(scene.config.frames, count)
+
+
+def training_positions(motion: Motion) -> np.ndarray:
+    """Positions (n, N, 3) m after the training frames."""
+    return motion.reference[1:][training_indices(motion.scene)]

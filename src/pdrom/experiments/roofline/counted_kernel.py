@@ -1,0 +1,26 @@
+"""Operations of a local kernel at some positions."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from pdrom.experiments.roofline.counters import Counted, Operations
+from pdrom.model.compiled import rows
+from pdrom.model.compiled.functions import Callback
+from pdrom.model.constraints.local_kernel import LocalKernel, LocalPass
+
+
+@cache
+def counting(function: Callback) -> Counted:
+    """A local kernel that counts."""
+    return Counted(function)
+
+
+def operations(kernel: LocalKernel, y: np.ndarray) -> Operations:
+    """What one pass over all units executes at the positions y (N, 3)."""
+    counted = counting(kernel.function)
+    counted.reset()
+    places = rows.flat(y)
+    LocalPass([replace(kernel, function=counted)]).add(places, np.zeros_like(places), 1)
+    return counted.operations

@@ -1,0 +1,1 @@
+"""What tables share: how they are declared, found and made, and columns that several have."""

@@ -1,0 +1,225 @@
+"""What a table says of itself: title, columns, what it reads, and the function that makes it.
+
+A module of this package holds one table, a function under its declaration::
+
+    @table(
+        title="What part of a frame the local step takes",
+        columns=(SCENE, number("local_share", "local over all", timed=True)),
+        reads={"timings": Every(paths.TIMINGS), "wrong": Setting("stability.wrong")},
+    )
+    def local_share(timings: list[File], wrong: float) -> pd.DataFrame: ...
+
+The function gets what it reads by name: files as a list of `File`, tables as frames, values of the
+configuration as plain data. Whatever it returns is brought to the declared columns and types.
+"""
+
+import inspect
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Generic, Literal, ParamSpec, Protocol
+
+import pandas as pd
+
+from pdrom.core.errors import StorageError
+from pdrom.core.reads import ProjectFile, Read
+from pdrom.tables.kit.quantities import TALLY, TOLERANCES, Quantity, usual_quantity
+
+P = ParamSpec("P")
+Kind = Literal["text", "integer", "number", "flag"]
+_DTYPES: dict[Kind, str] = {"integer": "Int64", "number": "float64", "flag": "boolean"}
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column; any cell may be empty.
+
+    unit : empty for text, counts and what has no dimension
+    timed : a clock (or the memory in use) has a say in it, so that two runs may differ
+    declared : its quantity, where the type and the name do not tell it
+    tolerance : its own, where that of its quantity is not the right one; of words and truth values
+        the share of the rows that may be others
+    """
+
+    name: str
+    kind: Kind
+    meaning: str
+    unit: str = ""
+    timed: bool = False
+    declared: Quantity | None = None
+    tolerance: float | None = None
+
+    @property
+    def quantity(self) -> Quantity:
+        """How far two machines may differ in it."""
+        return self.declared or usual_quantity(self.kind, self.name, self.timed)
+
+    @property
+    def within(self) -> float:
+        """How far a cell may be off; words, truth values and whole numbers are equal."""
+        if self.tolerance is not None:
+            return self.tolerance
+        if self.kind == "integer":
+            return TALLY if self.quantity == "share" else 0.0
+        return TOLERANCES.get(self.quantity, 0.0) if self.kind == "number" else 0.0
+
+    def cast(self, values: pd.Series) -> pd.Series:
+        """Values with the type of the column; ValueError or TypeError if they do not fit."""
+        if self.kind == "text":
+            return values
+        if self.kind == "flag":
+            values = _flags(values)
+        return values.astype(_DTYPES[self.kind])
+
+
+def _flags(values: pd.Series) -> pd.Series:
+    """Flags as objects: True, False, None; joined with an empty column they are numbers."""
+    others = values[values.notna() & ~values.isin([True, False])]
+    if len(others):
+        raise ValueError(f"'{others.iloc[0]}'")
+    flags = [None if pd.isna(value) else bool(value) for value in values]
+    return pd.Series(flags, values.index, dtype=object)
+
+
+def text(name: str, meaning: str) -> Column:
+    """A column of words."""
+    return Column(name, "text", meaning)
+
+
+def integer(name: str, meaning: str) -> Column:
+    """A column of counts, sizes or indices."""
+    return Column(name, "integer", meaning)
+
+
+def flag(name: str, meaning: str) -> Column:
+    """A column of True and False."""
+    return Column(name, "flag", meaning)
+
+
+def number(name: str, meaning: str, unit: str = "") -> Column:
+    """A column of floating-point numbers."""
+    return Column(name, "number", meaning, unit)
+
+
+def timed(column: Column) -> Column:
+    """Mark a column as a timing."""
+    return replace(column, timed=True, declared=None)
+
+
+def compared(quantity: Quantity, column: Column, tolerance: float | None = None) -> Column:
+    """Declare the quantity of a column, and its own tolerance."""
+    return replace(column, declared=quantity, tolerance=tolerance)
+
+
+class TimedCells(Protocol):
+    """Names of the timed columns of each row, from the table and the project files it reads."""
+
+    def __call__(self, table: pd.DataFrame, **files: Path) -> Sequence[Collection[str]]: ...
+
+
+@dataclass(frozen=True)
+class Table(Generic[P]):
+    """A table of the study; calling it makes it.
+
+    timed_cells : where not the column alone says whether a clock has a say in a cell
+    """
+
+    name: str
+    title: str
+    columns: tuple[Column, ...]
+    reads: Mapping[str, Read]
+    function: Callable[P, pd.DataFrame]
+    timed_cells: TimedCells | None = None
+
+    def __call__(self, *arguments: P.args, **named: P.kwargs) -> pd.DataFrame:
+        """Make the table from what it reads, see `checked`."""
+        return self.checked(self.function(*arguments, **named))
+
+    @property
+    def module(self) -> str:
+        """Module that makes the table."""
+        return self.function.__module__
+
+    @property
+    def column_names(self) -> tuple[str, ...]:
+        """Columns in their order."""
+        return tuple(column.name for column in self.columns)
+
+    @property
+    def timing_columns(self) -> tuple[str, ...]:
+        """Columns that may differ between two runs on one machine, in some row at least."""
+        return tuple(column.name for column in self.columns if column.timed)
+
+    def checked(self, table: pd.DataFrame) -> pd.DataFrame:
+        """``table`` with exactly the declared columns, in order and with their types.
+
+        Raises
+        ------
+        StorageError
+            If there are rows and a column is missing or holds a value that does not fit.
+        """
+        missing = [name for name in self.column_names if name not in table.columns]
+        if missing and len(table):
+            raise StorageError(f"table {self.name}: lacks the column(s) {', '.join(missing)}")
+        table = table.reindex(columns=list(self.column_names)).reset_index(drop=True)
+        return table.assign(**{c.name: self._cast(c, table[c.name]) for c in self.columns})
+
+    def _cast(self, column: Column, values: pd.Series) -> pd.Series:
+        try:
+            return column.cast(values)
+        except (TypeError, ValueError) as error:
+            place = f"table {self.name}: column '{column.name}'"
+            raise StorageError(f"{place} is no {column.kind} ({error})") from error
+
+    def without_times(self, table: pd.DataFrame, root: Path) -> pd.DataFrame:
+        """``table``, as text, with every cell emptied in which a clock has a say.
+
+        Parameters
+        ----------
+        root : folder of the project, for the files that the table reads there
+        """
+        cells: Sequence[Collection[str]] = [self.timing_columns] * len(table)
+        if self.timed_cells is not None:
+            files = {k: r.path for k, r in self.reads.items() if isinstance(r, ProjectFile)}
+            cells = self.timed_cells(table, **{name: root / path for name, path in files.items()})
+        kept = table.astype(object)
+        for name in self.timing_columns:
+            kept[name] = [
+                "" if name in of_row else value
+                for value, of_row in zip(kept[name], cells, strict=True)
+            ]
+        return kept.astype(str)
+
+
+def table(
+    *,
+    title: str,
+    columns: Sequence[Column],
+    reads: Mapping[str, Read],
+    timed_cells: TimedCells | None = None,
+) -> Callable[[Callable[P, pd.DataFrame]], Table[P]]:
+    """Declare the function below as the one that makes the table of its name.
+
+    Raises
+    ------
+    TypeError
+        If a column is declared twice, or the function does not take what it reads.
+    """
+
+    def declare(function: Callable[P, pd.DataFrame]) -> Table[P]:
+        made = Table(function.__name__, title, tuple(columns), reads, function, timed_cells)
+        _require_consistent(made)
+        return made
+
+    return declare
+
+
+def _require_consistent(made: Table[Any]) -> None:
+    names = made.column_names
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise TypeError(f"table {made.name}: column(s) declared twice: {', '.join(twice)}")
+    try:
+        inspect.signature(made.function).bind(**made.reads)
+    except TypeError as error:
+        raise TypeError(f"table {made.name}: {error}") from error

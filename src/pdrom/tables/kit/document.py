@@ -1,0 +1,66 @@
+"""The list of tables for a reader: every table with what it reads and every column."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from pdrom.core.reads import Every, PerScene, Preferred, ProjectFile, Read, Setting, TableOf
+from pdrom.tables.kit.declaration import Column, Table
+
+HEAD = """# Tables of the study
+
+Written by `python -m pdrom.pipeline.tables` from the declarations; not to be edited by hand.
+
+CSV, one row per observation, SI units unless a unit says otherwise, an empty cell where there is no
+value. In a column marked "timed" a clock (or the memory in use) has a say: only there may two runs
+on one machine differ, in `claims` only in claims about times. "Compared as" is the kind for which
+`./reproduce verify` has a tolerance, and the column's own one, see
+[verification.md](verification.md).
+"""
+
+
+def document(tables: Iterable[Table[Any]]) -> str:
+    """Markdown of all tables."""
+    tables = list(tables)
+    names = [f"- [{table.name}](#{table.name}): {table.title}" for table in tables]
+    parts = [HEAD, "\n".join(names) + "\n", *map(_section, tables)]
+    return "\n".join(parts)
+
+
+def _section(table: Table[Any]) -> str:
+    lines = [
+        f"## {table.name}",
+        "",
+        f"{table.title}. Made by `{table.module}` from {', '.join(_sources(table))}.",
+        "",
+        "| column | type | unit | timed | compared as | meaning |",
+        "|---|---|---|---|---|---|",
+        *map(_row, table.columns),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _row(column: Column) -> str:
+    timed = "timed" if column.timed else ""
+    own = "" if column.tolerance is None else f", {column.tolerance:g}"
+    kind = f"{column.quantity}{own}"
+    cells = (column.name, column.kind, column.unit, timed, kind, column.meaning)
+    return f"| {' | '.join(cells)} |"
+
+
+def _sources(table: Table[Any]) -> list[str]:
+    return list(dict.fromkeys(_source(read) for read in table.reads.values()))
+
+
+def _source(read: Read) -> str:
+    match read:
+        case Every(place) | Preferred(place):
+            return f"`{place.pattern}`"
+        case TableOf(name):
+            return f"table [{name}](#{name})"
+        case Setting(key):
+            return f"setting `{key}`"
+        case PerScene(key):
+            return f"`{key}` of every scene"
+        case ProjectFile(path):
+            return f"`{path}`"
+    raise TypeError(f"{read} has no words")

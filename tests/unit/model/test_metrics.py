@@ -1,0 +1,116 @@
+"""Errors and norms of the tables."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from pdrom.model.metrics import relative_errors, shape_differences, squared_norms, trajectory_error
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def test_known_errors():
+    """Errors 3, 4 and 0 of norms 5, 10 and 1."""
+    p = np.array([[[5.0, 6.0, 1.0], [0.0, 8.0, 0.0]]])
+    p_hat = np.array([[[2.0, 6.0, 1.0], [0.0, 12.0, 0.0]]])
+    assert squared_norms(p).tolist() == [126.0, 25.0, 100.0, 1.0]
+    total = 5.0 / np.sqrt(126.0)
+    assert relative_errors(p, p_hat, 0.0) == pytest.approx([total, 0.6, 0.4, 0.0])
+
+
+@settings(deadline=None)
+@given(SEEDS)
+def test_agrees_with_norms_of_matrices(seed):
+    rng = np.random.default_rng(seed)
+    p, p_hat = rng.standard_normal((2, 4, 5, 3))
+    axes = [np.linalg.norm(p[..., a] - p_hat[..., a]) / np.linalg.norm(p[..., a]) for a in range(3)]
+    total = np.linalg.norm(p - p_hat) / np.linalg.norm(p)
+    assert relative_errors(p, p_hat, 0.0) == pytest.approx([total, *axes])
+
+
+@settings(deadline=None)
+@given(SEEDS, st.floats(1e-6, 1e6))
+def test_relative_errors_have_no_unit(seed, unit):
+    rng = np.random.default_rng(seed)
+    p, p_hat = rng.standard_normal((2, 4, 5, 3))
+    expected = relative_errors(p, p_hat, 1e-9)
+    assert relative_errors(unit * p, unit * p_hat, unit * 1e-9) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-17, 1e-12])
+def test_an_axis_of_round_off_has_no_error(rng, size):
+    p = rng.standard_normal((6, 8, 3))
+    p[..., 2] *= size
+    errors = relative_errors(p, 0.9 * p, 1e-10)
+    assert errors[:3] == pytest.approx([0.1, 0.1, 0.1])
+    assert errors[3] is None
+
+
+def test_round_off_relative_to_the_largest_axis_counts_without_a_level(rng):
+    p = rng.standard_normal((6, 8, 3)) * [1.0, 1.0, 1e-17]
+    assert relative_errors(p, 0.9 * p, 0.0)[3] is None
+
+
+def test_small_data_above_their_round_off_have_an_error(rng):
+    p = 1e-14 * rng.standard_normal((6, 8, 3))
+    assert relative_errors(p, 0.9 * p, 1e-20) == pytest.approx([0.1] * 4)
+    assert relative_errors(p, 0.9 * p, 1e-12) == [None] * 4
+
+
+def test_nothing_has_no_error():
+    zero = np.zeros((2, 4, 3))
+    assert relative_errors(zero, zero, 0.0) == [None] * 4
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
+def test_a_reconstruction_that_does_not_exist_has_no_error(rng, bad):
+    """An axis that failed leaves the others their errors; the whole has none."""
+    p = rng.standard_normal((6, 8, 3))
+    p_hat = 0.9 * p
+    p_hat[..., 1] = bad
+    total, x, y, z = relative_errors(p, p_hat, 0.0)
+    assert total is None
+    assert y is None
+    assert (x, z) == pytest.approx((0.1, 0.1))
+
+
+def test_trajectory_error_weighs_frames_by_their_motion():
+    assert trajectory_error(np.array([3.0, 4.0]), np.array([6.0, 8.0])) == 0.5
+    assert trajectory_error(np.zeros(3), np.ones(3)) == 0.0
+
+
+@pytest.mark.parametrize("frames", [0, 3])
+def test_a_run_at_rest_has_no_trajectory_error(frames):
+    assert trajectory_error(np.ones(frames), np.zeros(frames)) is None
+
+
+@settings(max_examples=25)
+@given(SEEDS)
+def test_a_rigid_motion_leaves_the_shape(seed):
+    """Its error is round-off; that of SciPy's best rotation is met otherwise."""
+    rng = np.random.default_rng(seed)
+    shape, moved = rng.normal(size=(2, 9, 3)), rng.normal(size=3)
+    rotation = Rotation.random(random_state=seed)
+    rigid = np.stack([rotation.apply(frame) + moved for frame in shape])
+    assert shape_differences(rigid, shape) == pytest.approx(np.zeros(2), abs=1e-13)
+    other = rng.normal(size=(2, 9, 3))
+    centred = [x - x.mean(axis=1, keepdims=True) for x in (other, shape)]
+    expected = [Rotation.align_vectors(b, a)[1] for a, b in zip(*centred, strict=True)]
+    assert shape_differences(other, shape) == pytest.approx(expected)
+
+
+def test_a_mirror_image_is_another_shape():
+    shape = np.random.default_rng(1).normal(size=(1, 9, 3))
+    assert shape_differences(shape * [1.0, 1.0, -1.0], shape)[0] > 0.1
+
+
+def test_shapes_of_flat_and_of_far_grown_frames_are_finite():
+    flat = np.random.default_rng(2).normal(size=(1, 9, 3)) * [1.0, 1.0, 0.0]
+    assert shape_differences(flat, flat)[0] == pytest.approx(0.0, abs=1e-13)
+    assert shape_differences(np.zeros((1, 9, 3)), flat)[0] == pytest.approx(
+        np.linalg.norm(flat - flat.mean(axis=1))
+    )
+    assert np.isfinite(shape_differences(1e200 * flat, flat)).all()
+    assert len(shape_differences(np.zeros((0, 9, 3)), np.zeros((0, 9, 3)))) == 0
