@@ -6,8 +6,8 @@ However many local/global iterations a frame has, its end obeys
 
 with the projections p_n of the last iteration, held vertices eliminated. M are the masses, which
 may differ, f the part of the forces that does not depend on the motion, and D = 1 - h c, |D| <= 1,
-what forces -M c v leave of a velocity (the whole premise: `pdrom.experiments.kit.premise`). The p_n
-are bounded (rest lengths, clamped singular values), and so is whatever replaces them linearly. Let e
+what forces -M c v leave of a velocity (see `pdrom.experiments.kit.premise`). The p_n are
+bounded (rest lengths, clamped singular values), and so is whatever replaces them linearly. Let e
 be the difference of two runs whose projections differ by d_n, with F = S^T W d and
 
     reach  >=  | F_n |_{K^+}    for all n,
