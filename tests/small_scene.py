@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 from bad_input.project import SMALL_SCENE, make_project
 from pdrom.core.yamlfile import read_yaml
-from pdrom.experiments.kit.declaration import Experiment
-from pdrom.pipeline.jobs import Jobs
+from pdrom.experiments.kit.declaration import experiments
+from pdrom.pipeline.resolve import Resolver
 from pdrom.pipeline.scene_artifacts import SceneArtifacts
 from pdrom.pipeline.study import Study
 from pdrom.report.scenes.job import SceneOrder
@@ -20,9 +20,8 @@ NEEDED = (
     "iterations",
     "snapshots",
     "pod",
-    "sampling",
     "reruns",
-    "hyper",
+    "subspaces",
     "timing",
 )
 CHANGES = {
@@ -45,11 +44,11 @@ def small_study(root: Path) -> Study:
 
 def run_jobs(study: Study, results: str) -> None:
     """Every job that the scene's artifacts need, in this process, as the workflow runs them."""
-    jobs = Jobs(study, results)
-    known = {experiment.name: experiment for experiment in jobs.experiments}
+    resolver = Resolver(study, results)
     for name in NEEDED:
         for labels in _labels(study, name):
-            _run(jobs, known[name], labels)
+            job = resolver.job(experiments()[name], labels)
+            job.make(job.outputs)
 
 
 def order(study: Study, results: str, artifact: str) -> SceneOrder:
@@ -65,7 +64,7 @@ def _labels(study: Study, name: str) -> Iterator[dict[str, str]]:
             yield {"mesh": study.mesh_of(SCENE)}
         case "fom":
             yield from ({"scene": SCENE, "run": run} for run in ("train", "heldout"))
-        case "sensitivity" | "iterations" | "hyper" | "timing":
+        case "sensitivity" | "iterations" | "subspaces" | "timing":
             yield {"scene": SCENE}
         case "snapshots":
             yield from ({"scene": s, "group": g} for s, g in only.experiments)
@@ -76,15 +75,3 @@ def _labels(study: Study, name: str) -> Iterator[dict[str, str]]:
         case "reruns":
             found = [(s, g, m) for s, g in only.experiments for m in study.methods]
             yield from ({"scene": s, "group": g, "method": m} for s, g, m in found)
-
-
-def _run(jobs: Jobs, experiment: Experiment, labels: dict[str, str]) -> None:
-    wildcards = _Wildcards(labels)
-    inputs = {name: files(wildcards) for name, files in jobs.inputs(experiment).items()}
-    outputs = {n: path.format(**labels) for n, path in jobs.outputs(experiment).items()}
-    settings = jobs.settings(experiment, labels).model_dump(mode="json")
-    experiment.perform(settings, inputs, outputs)
-
-
-class _Wildcards(dict[str, str]):
-    """Labels of a job, as Snakemake hands them over."""

@@ -73,7 +73,7 @@ def test_the_graph_of_the_plan_is_snakemakes(
     rows = [line.split("\t") for line in done.stdout.splitlines() if "\t" in line]
     monkeypatch.chdir(finished.folder)
     plan = Subject.of([MICRO_FILE], []).plan
-    needed = Graph(plan, MICRO_MANUSCRIPT).needed([MICRO_MANUSCRIPT])
+    needed = Graph(plan).needed([MICRO_MANUSCRIPT])
     # columns: file, date, rule, log
     assert {(file, job.rule, job.log) for job in needed for file in job.outputs} == {
         (row[0], row[2], row[3]) for row in rows[1:]
@@ -148,7 +148,7 @@ def test_the_artifacts_of_a_scene_need_that_scene_alone(clean: Checkout) -> None
     )
     assert {_stage(path) for path in planned} == {
         "meshes", "fom", "sensitivity", "contributions", "snapshots", "pod", "reruns", "sampling",
-        "hyper", "timings", "breakeven", "effects", "left_out", "scenes", "seconds",
+        "subspaces", "timings", "breakeven", "effects", "left_out", "scenes", "seconds",
     }  # fmt: skip
     others = {path for path in planned if _stage(path) != "meshes"}
     assert {path.split("/")[2].removesuffix(".csv") for path in others} == {"spring_oop", "bar140"}

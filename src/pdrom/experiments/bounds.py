@@ -2,17 +2,17 @@
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from pdrom.core.paths import BASIS, BOUNDS, MESH, SAMPLING, SENSITIVITY, TRAIN, File
-from pdrom.core.reads import Every
+from pdrom.core.reads import Every, Settings
 from pdrom.core.store import write_table
+from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.boundedness import Compliance, largest_projections, linear_extent
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.premise import outside
 from pdrom.experiments.kit.scenes import positions_of, scene_of
 from pdrom.experiments.kit.settings import Horizon
@@ -37,7 +37,7 @@ MOST_VERTICES = 3000
 TANGENTS = (0.25, 0.75)
 
 
-class Settings(JobSettings):
+class Options(ConfigModel):
     """What the bounds of a scene depend on."""
 
     scene: SceneConfig
@@ -46,46 +46,50 @@ class Settings(JobSettings):
     horizon: Horizon
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """Files read."""
-
-    mesh: Annotated[File, MESH]
-    fom: Annotated[File, TRAIN]
-    perturbed: Annotated[File, SENSITIVITY]
-    bases: Annotated[list[File], Every(BASIS)]
-    samplings: Annotated[list[File], Every(SAMPLING)]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written."""
-
-    table: Annotated[File, BOUNDS]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "A-priori bounds of {scene}",
+    reads={
+        "mesh": MESH,
+        "fom": TRAIN,
+        "perturbed": SENSITIVITY,
+        "bases": Every(BASIS),
+        "samplings": Every(SAMPLING),
+        "settings": Settings(Options),
+    },
+    writes={"out": BOUNDS},
+)
+def bounds(
+    mesh: File,
+    fom: File,
+    perturbed: File,
+    bases: list[File],
+    samplings: list[File],
+    settings: Options,
+    out: File,
+) -> None:
     """One row for every group, method and size that the basis holds."""
-    scene = scene_of(settings.scene, inputs.mesh)
+    scene = scene_of(settings.scene, mesh)
     if scene.mesh.vertices > MOST_VERTICES:
         log.warning("%d vertices: no bounds above %d", scene.mesh.vertices, MOST_VERTICES)
-        write_table(pd.DataFrame([], columns=COLUMNS), outputs.table.path)
+        write_table(pd.DataFrame([], columns=COLUMNS), out.path)
         return
-    before = settings.horizon.frames(inputs.perturbed)
-    case = _Case(scene, positions_of(inputs.fom), before)
+    before = settings.horizon.frames(perturbed)
+    case = _Case(scene, positions_of(fom), before)
     rows = [
         {**file.labels, "r": reduction.r, **case.numbers(file["group"], reduction)}
-        for file, reduction in _reductions(settings, inputs)
+        for file, reduction in _reductions(settings, bases, samplings)
     ]
-    write_table(pd.DataFrame(rows, columns=COLUMNS), outputs.table.path)
+    write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
 
 
-def _reductions(settings: Settings, inputs: Inputs) -> Iterator[tuple[File, Reduction]]:
-    bases: dict[str, Basis] = {}
-    for file in inputs.samplings:
+def _reductions(
+    settings: Options, bases: list[File], samplings: list[File]
+) -> Iterator[tuple[File, Reduction]]:
+    loaded: dict[str, Basis] = {}
+    for file in samplings:
         spec = settings.methods[file["method"]]
-        path = basis_of(file, spec, inputs.bases).path
-        basis = bases.setdefault(path, load_basis(path))
+        path = basis_of(file, spec, bases).path
+        basis = loaded.setdefault(path, load_basis(path))
         for r in resolve_ranks(settings.ranks, basis.rank):
             if r <= basis.rank:
                 yield file, load_reduction(basis, file.path, spec, r)
@@ -169,6 +173,3 @@ def _tangents(scene: Scene, positions: np.ndarray, before: int) -> Iterator[Tang
         frame = min(frame, scene.config.frames - 1)
         held = space.fixed(frame, positions[frame])[0]
         yield Tangent.at(group, matrix, held, positions[frame], positions[frame + 1])
-
-
-EXPERIMENT = Experiment("bounds", "A-priori bounds of {scene}", run)

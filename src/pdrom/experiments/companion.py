@@ -1,13 +1,13 @@
 """The companion of a scene's runs: a finer model, trained on the training motion."""
 
-from dataclasses import dataclass
 from typing import Annotated
 
 from pydantic import Field
 
 from pdrom.core.paths import COMPANION, MESH, TRAIN, File
+from pdrom.core.reads import Setting
 from pdrom.core.store import write_hdf5
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.motion import Motion, training_indices, training_positions
 from pdrom.experiments.kit.scenes import scene_of
 from pdrom.model.scene import SceneConfig
@@ -26,38 +26,23 @@ class Companion(CompanionSpec):
     safety: Annotated[float, Field(ge=1.0, allow_inf_nan=False)] = 1.3
 
 
-class Settings(JobSettings):
-    """What the companion of a scene depends on."""
-
-    scene: SceneConfig
-    companion: CompanionSpec
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """Files read."""
-
-    mesh: Annotated[File, MESH]
-    train: Annotated[File, TRAIN]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written."""
-
-    model: Annotated[File, COMPANION]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Companion of the runs of {scene}",
+    reads={
+        "mesh": MESH,
+        "train": TRAIN,
+        "config": Setting("scene"),
+        "spec": Setting("companion"),
+    },
+    writes={"out": COMPANION},
+)
+def companion(mesh: File, train: File, config: SceneConfig, spec: CompanionSpec, out: File) -> None:
     """Make the companion."""
-    motion = Motion(scene_of(settings.scene, inputs.mesh), inputs.train)
+    motion = Motion(scene_of(config, mesh), train)
     frames, training = training_indices(motion.scene), training_positions(motion)
-    model = companion_model(motion.scene, training, frames, settings.companion)
+    model = companion_model(motion.scene, training, frames, spec)
     labels = {"method": "ecsw", "position_basis": model.position_basis, "base": "companion"}
-    with write_hdf5(outputs.model.path) as file:
+    with write_hdf5(out.path) as file:
         store_columns(file.create_group("columns/companion"), model.columns)
         store = file.create_group("models/companion")
-        store_model(store, {**labels, "k": settings.companion.modes}, model.samples)
-
-
-EXPERIMENT = Experiment("companion", "Companion of the runs of {scene}", run)
+        store_model(store, {**labels, "k": spec.modes}, model.samples)

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 import h5py
 import numpy as np
@@ -20,9 +20,9 @@ from pdrom.core.paths import (
     TRAIN,
     File,
 )
-from pdrom.core.reads import Every
+from pdrom.core.reads import Every, Setting
 from pdrom.core.store import open_hdf5, write_table
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.motion import Motion
 from pdrom.experiments.kit.scenes import RUNS, positions_of, scene_of
@@ -40,33 +40,6 @@ COLUMNS = [
 ]  # fmt: skip
 
 
-class Settings(JobSettings):
-    """What the estimates of a scene depend on."""
-
-    scene: SceneConfig
-    horizon: Horizon
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """Files read; the full-order runs are there to judge the estimates only."""
-
-    mesh: Annotated[File, MESH]
-    train: Annotated[File, TRAIN]
-    heldout: Annotated[File, HELDOUT]
-    model: Annotated[File, COMPANION]
-    perturbed: Annotated[File, SENSITIVITY]
-    reruns: Annotated[list[File], Every(RERUNS)]
-    subspaces: Annotated[list[File], Every(SUBSPACES)]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written: a row for every run of both motions."""
-
-    table: Annotated[File, ESTIMATES]
-
-
 @dataclass(frozen=True)
 class _Run:
     """A run of a reduced model: its labels, positions (F + 1, N, 3) m and norms by frame (F,)."""
@@ -77,31 +50,57 @@ class _Run:
     displacement: np.ndarray
 
 
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Estimated errors of the runs of {scene}",
+    reads={
+        "mesh": MESH,
+        "train": TRAIN,
+        "heldout": HELDOUT,
+        "model": COMPANION,
+        "perturbed": SENSITIVITY,
+        "reruns": Every(RERUNS),
+        "subspaces": Every(SUBSPACES),
+        "config": Setting("scene"),
+        "horizon": Setting("horizon"),
+    },
+    writes={"out": ESTIMATES},
+)
+def estimates(
+    mesh: File,
+    train: File,
+    heldout: File,
+    model: File,
+    perturbed: File,
+    reruns: list[File],
+    subspaces: list[File],
+    config: SceneConfig,
+    horizon: Horizon,
+    out: File,
+) -> None:
     """Run both motions with the companion and compare all their runs with it."""
-    ((_, model),) = load_models(inputs.model.path)
-    unit = mean_motion(positions_of(inputs.train))
+    ((_, companion),) = load_models(model.path)
+    unit = mean_motion(positions_of(train))
     rows: list[dict[str, Any]] = []
-    for split in RUNS:
-        motion = Motion(scene_of(settings.scene, inputs.mesh, split), getattr(inputs, split))
-        companion = companion_run(motion.scene, model)
-        end = settings.horizon.frames(inputs.perturbed, split)
-        own = _companion_error(companion, motion, end)
-        for found in (*_local(inputs.reruns, split), *_inside(inputs.subspaces, split, motion)):
+    for split, run in zip(RUNS, (train, heldout), strict=True):
+        motion = Motion(scene_of(config, mesh, split), run)
+        beside = companion_run(motion.scene, companion)
+        end = horizon.frames(perturbed, split)
+        own = _companion_error(beside, motion, end)
+        for found in (*_local(reruns, split), *_inside(subspaces, split, motion)):
             error = error_within(found.difference, found.displacement, end)
             rows.append(
                 {
                     **found.labels,
                     "split": split,
                     "relative_error_within_horizon": error,
-                    "estimate": estimate(found.positions, companion, end),
-                    "largest_estimate": largest_estimate(found.positions, companion, unit, end),
+                    "estimate": estimate(found.positions, beside, end),
+                    "largest_estimate": largest_estimate(found.positions, beside, unit, end),
                     "companion_error": own,
                 }
             )
         log.info("%s: companion's own error %s", split, own)
     whole = {"k": "Int64", "r": "Int64"}
-    write_table(pd.DataFrame(rows, columns=COLUMNS).astype(whole), outputs.table.path)
+    write_table(pd.DataFrame(rows, columns=COLUMNS).astype(whole), out.path)
 
 
 def _companion_error(companion: np.ndarray, motion: Motion, end: int) -> float | None:
@@ -141,6 +140,3 @@ def _made(
     labels: dict[str, Any], positions: np.ndarray, run: h5py.Group, displacement: h5py.Dataset
 ) -> _Run:
     return _Run(labels, positions, run["difference"][...], displacement[...])
-
-
-EXPERIMENT = Experiment("estimates", "Estimated errors of the runs of {scene}", run)

@@ -6,11 +6,9 @@ twice, the second time as a control: what two identical runs differ by is no spe
 
 import logging
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import process_time
-from typing import Annotated
 
 import pandas as pd
 
@@ -26,10 +24,10 @@ from pdrom.core.paths import (
     SUBSPACES,
     File,
 )
-from pdrom.core.reads import EachOf
+from pdrom.core.reads import EachOf, Settings
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.fresh_process import (
     Projections,
     Request,
@@ -107,7 +105,7 @@ class NamedScene(ConfigModel):
         return {"scene": self.scene.name}
 
 
-class Settings(JobSettings):
+class Options(ConfigModel):
     """What the times depend on, beside the machine."""
 
     frame_times: Processes
@@ -120,30 +118,37 @@ class Settings(JobSettings):
     threads: Threads
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """Files read: of every scene, of every quoted reduction, of every large scene."""
-
-    meshes: Annotated[list[File], EachOf("timed_scenes", MESH)]
-    subspaces: Annotated[list[File], EachOf("subspace_cases", SUBSPACES)]
-    bases: Annotated[list[File], EachOf("projection_cases", BASIS)]
-    samplings: Annotated[list[File], EachOf("projection_cases", SAMPLING)]
-    snapshots: Annotated[list[File], EachOf("projection_cases", SNAPSHOTS)]
-    large: Annotated[list[File], EachOf("large_scenes", ONLINE_MODELS)]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written: a row per process and run; what the quoted reductions of projections took."""
-
-    times: Annotated[File, FRAME_TIMES]
-    seconds: Annotated[File, PROJECTION_SECONDS]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Times of frames in several processes",
+    reads={
+        "meshes": EachOf(MESH, "timed_scenes"),
+        "subspaces": EachOf(SUBSPACES, "subspace_cases"),
+        "bases": EachOf(BASIS, "projection_cases"),
+        "samplings": EachOf(SAMPLING, "projection_cases"),
+        "snapshots": EachOf(SNAPSHOTS, "projection_cases"),
+        "large": EachOf(ONLINE_MODELS, "large_scenes"),
+        "settings": Settings(Options),
+    },
+    writes={"times": FRAME_TIMES, "seconds": PROJECTION_SECONDS},
+    alone=True,
+)
+def frame_times(
+    meshes: list[File],
+    subspaces: list[File],
+    bases: list[File],
+    samplings: list[File],
+    snapshots: list[File],
+    large: list[File],
+    settings: Options,
+    times: File,
+    seconds: File,
+) -> None:
     """Start the processes one after the other, and join what they measured."""
     asked = settings.frame_times
-    scenes = tuple(_scenes(settings, inputs))
+    scenes = (
+        *_small(settings, meshes, _projections(settings, bases, samplings), subspaces),
+        *_large(settings, large),
+    )
     parts = []
     with TemporaryDirectory() as folder:
         for process in range(1, asked.processes + 1):
@@ -157,33 +162,42 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
             )
             parts.append(in_fresh_process(request, Path(folder)))
             log.info("process %d of %d", process, asked.processes)
-    write_table(pd.concat(parts, ignore_index=True), outputs.times.path)
+    write_table(pd.concat(parts, ignore_index=True), times.path)
     rows = [
         (case.scene, case.group, case.method, case.r, _seconds(case, file, settings))
-        for case, file in zip(settings.projection_cases, inputs.snapshots, strict=True)
+        for case, file in zip(settings.projection_cases, snapshots, strict=True)
     ]
-    write_table(pd.DataFrame(rows, columns=SECONDS_COLUMNS), outputs.seconds.path)
+    write_table(pd.DataFrame(rows, columns=SECONDS_COLUMNS), seconds.path)
 
 
-def _scenes(settings: Settings, inputs: Inputs) -> Iterator[TimedScene]:
-    """The study's scenes with their quoted reductions, then the large ones."""
-    projections = list(_projections(settings, inputs))
-    for named, mesh in zip(settings.timed_scenes, inputs.meshes, strict=True):
+def _small(
+    settings: Options,
+    meshes: list[File],
+    projections: list[tuple[str, Projections]],
+    subspaces: list[File],
+) -> Iterator[TimedScene]:
+    """Yield the study's scenes with their quoted reductions."""
+    for named, mesh in zip(settings.timed_scenes, meshes, strict=True):
         name = named.scene.name
         yield TimedScene(
             scene=named.scene,
             mesh=mesh.path,
             projections=tuple(own for scene, own in projections if scene == name),
-            subspaces=_subspaces(name, settings.subspace_cases, inputs.subspaces),
+            subspaces=_subspaces(name, settings.subspace_cases, subspaces),
         )
-    for named, models in zip(settings.large_scenes, inputs.large, strict=True):
+
+
+def _large(settings: Options, large: list[File]) -> Iterator[TimedScene]:
+    for named, models in zip(settings.large_scenes, large, strict=True):
         yield TimedScene(scene=named.scene, subspaces=Subspaces(path=models.path))
 
 
-def _projections(settings: Settings, inputs: Inputs) -> Iterator[tuple[str, Projections]]:
-    files = zip(inputs.bases, inputs.samplings, strict=True)
-    for case, (basis, sampling) in zip(settings.projection_cases, files, strict=True):
-        yield (
+def _projections(
+    settings: Options, bases: list[File], samplings: list[File]
+) -> list[tuple[str, Projections]]:
+    cases = zip(settings.projection_cases, bases, samplings, strict=True)
+    return [
+        (
             case.scene,
             Projections(
                 group=case.group,
@@ -194,6 +208,8 @@ def _projections(settings: Settings, inputs: Inputs) -> Iterator[tuple[str, Proj
                 sampling=sampling.path,
             ),
         )
+        for case, basis, sampling in cases
+    ]
 
 
 def _subspaces(
@@ -206,13 +222,10 @@ def _subspaces(
     return Subspaces(path=own[0][1].path, chosen=chosen)
 
 
-def _seconds(case: ProjectionCase, snapshots: File, settings: Settings) -> float:
+def _seconds(case: ProjectionCase, snapshots: File, settings: Options) -> float:
     """Processor time of basis and sampling, s."""
     data, spec = load_snapshots(snapshots.path), settings.projection_methods[case.method]
     before = process_time()
     basis = compute_basis(data.train, data.row_mass, data.roundoff, data.rows_per_element, spec)
     select(basis, spec, case.r)
     return process_time() - before
-
-
-EXPERIMENT = Experiment("frame_times", "Times of frames in several processes", run, alone=True)

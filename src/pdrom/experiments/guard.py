@@ -1,7 +1,6 @@
 """What a guard at run time costs, by its alarm, and what falling back buys."""
 
 import logging
-from dataclasses import dataclass
 from time import perf_counter
 from typing import Annotated, Any
 
@@ -10,10 +9,10 @@ import pandas as pd
 from pydantic import Field
 
 from pdrom.core.paths import BASIS, COMPANION, GUARD, MESH, SAMPLING, TRAIN, File
-from pdrom.core.reads import EachOf
+from pdrom.core.reads import EachOf, Settings
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.scenes import positions_of, scene_of
 from pdrom.experiments.kit.settings import BlowupExtent, Solver
 from pdrom.model.dynamics.system import GlobalSystem
@@ -82,7 +81,7 @@ class Trial(ConfigModel):
         return {"scene": self.scene.name, "group": self.group, "method": self.name}
 
 
-class Settings(JobSettings):
+class Options(ConfigModel):
     """What the trials of the guard depend on."""
 
     trials: tuple[Trial, ...]
@@ -91,30 +90,31 @@ class Settings(JobSettings):
     solver: Solver
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """Files read, one of each kind for every trial."""
-
-    meshes: Annotated[list[File], EachOf("trials", MESH)]
-    runs: Annotated[list[File], EachOf("trials", TRAIN)]
-    bases: Annotated[list[File], EachOf("trials", BASIS)]
-    samplings: Annotated[list[File], EachOf("trials", SAMPLING)]
-    companions: Annotated[list[File], EachOf("trials", COMPANION)]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written."""
-
-    table: Annotated[File, GUARD]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Guard at run time: what falling back buys",
+    reads={
+        "meshes": EachOf(MESH, "trials"),
+        "runs": EachOf(TRAIN, "trials"),
+        "bases": EachOf(BASIS, "trials"),
+        "samplings": EachOf(SAMPLING, "trials"),
+        "companions": EachOf(COMPANION, "trials"),
+        "settings": Settings(Options),
+    },
+    writes={"out": GUARD},
+    alone=True,
+)
+def guard(
+    meshes: list[File],
+    runs: list[File],
+    bases: list[File],
+    samplings: list[File],
+    companions: list[File],
+    settings: Options,
+    out: File,
+) -> None:
     """Run every trial without a guard, watched, and with fall-back, and time all of them."""
     rows = []
-    files = zip(
-        inputs.meshes, inputs.runs, inputs.bases, inputs.samplings, inputs.companions, strict=True
-    )
+    files = zip(meshes, runs, bases, samplings, companions, strict=True)
     for case, paths in zip(settings.trials, files, strict=True):
         trial = _Trial(case, settings, *paths)
         seconds = trial.seconds(settings.guard.repeats)
@@ -125,7 +125,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
         log.info("%s, %s", case.scene.name, case.name)
     table = pd.DataFrame(rows, columns=COLUMNS)
     whole = ["r", "blowup_frame", "guard_frame", "guard_count", "fallback_frames"]
-    write_table(table.astype(dict.fromkeys(whole, "Int64")), outputs.table.path)
+    write_table(table.astype(dict.fromkeys(whole, "Int64")), out.path)
 
 
 class _Trial:
@@ -134,7 +134,7 @@ class _Trial:
     def __init__(
         self,
         case: Trial,
-        settings: Settings,
+        settings: Options,
         mesh: File,
         run: File,
         basis: File,
@@ -215,6 +215,3 @@ def _time(advance: Advance, scene: Scene) -> float:
     started = perf_counter()
     frames = sum(1 for _ in run)
     return (perf_counter() - started) / max(1, frames)
-
-
-EXPERIMENT = Experiment("guard", "Guard at run time: what falling back buys", run, alone=True)

@@ -1,7 +1,6 @@
 """What the number of iterations K costs in accuracy, against the limit K -> infinity."""
 
 import logging
-from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -9,10 +8,11 @@ import pandas as pd
 from pydantic import Field
 
 from pdrom.core.paths import ITERATIONS, MESH, SENSITIVITY, TRAIN, File
+from pdrom.core.reads import Setting
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.converged import ConvergedStepper
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.scenes import positions_of, scene_of
 from pdrom.experiments.kit.settings import Horizon, Solver, Tolerance
@@ -50,32 +50,29 @@ class IterationSweep(IterationCounts):
     limit: Annotated[int, Field(ge=2)] = 4000
 
 
-class Settings(JobSettings):
-    """What the sweep over K depends on."""
-
-    scene: SceneConfig
-    iterations: IterationSweep
-    horizon: Horizon
-    solver: Solver
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """Files read."""
-
-    mesh: Annotated[File, MESH]
-    fom: Annotated[File, TRAIN]
-    sensitivity: Annotated[File, SENSITIVITY]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written."""
-
-    table: Annotated[File, ITERATIONS]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Accuracy of {scene} against the number of iterations",
+    reads={
+        "mesh": MESH,
+        "fom": TRAIN,
+        "sensitivity": SENSITIVITY,
+        "config": Setting("scene"),
+        "sweep": Setting("iterations"),
+        "horizon": Setting("horizon"),
+        "solver": Setting("solver"),
+    },
+    writes={"out": ITERATIONS},
+)
+def iterations(
+    mesh: File,
+    fom: File,
+    sensitivity: File,
+    config: SceneConfig,
+    sweep: IterationSweep,
+    horizon: Horizon,
+    solver: Solver,
+    out: File,
+) -> None:
     """Run a scene with every K up to its horizon, and once to convergence.
 
     Each K runs plainly (``window`` 0) and with Anderson acceleration. Each row has the error of a
@@ -84,11 +81,11 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     relative to the extent. If a frame stays above the tolerance there is no converged reference,
     and the errors against it are empty.
     """
-    scene, sweep = scene_of(settings.scene, inputs.mesh), settings.iterations
-    system = scene.system_with(settings.solver)
+    scene = scene_of(config, mesh)
+    system = scene.system_with(solver)
     name = scene.config.name
-    frames = max(1, settings.horizon.frames(inputs.sensitivity))
-    own = positions_of(inputs.fom, frames)
+    frames = max(1, horizon.frames(sensitivity))
+    own = positions_of(fom, frames)
     best = ConvergedStepper(scene, system, sweep.tolerance, sweep.limit)
     limit = _run(best, scene, frames)
     if not best.converged:
@@ -106,7 +103,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     converged = 0.0 if best.converged else None
     rows.append((name, None, None, frames, converged, _error(limit, own), residual))
     table = pd.DataFrame(rows, columns=COLUMNS).astype({"iterations": "Int64", "window": "Int64"})
-    write_table(table, outputs.table.path)
+    write_table(table, out.path)
 
 
 def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
@@ -135,6 +132,3 @@ def _run(loop: Stepper, scene: Scene, frames: int) -> np.ndarray:
 def _error(run: np.ndarray, reference: np.ndarray) -> float | None:
     difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
     return error_within(difference, displacement_norms(reference), len(difference))
-
-
-EXPERIMENT = Experiment("iterations", "Accuracy of {scene} against the number of iterations", run)

@@ -1,7 +1,6 @@
 """The ladder: from the published choices to sound ones, one ingredient at a time."""
 
 import logging
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
@@ -9,8 +8,9 @@ import pandas as pd
 from pydantic import Field
 
 from pdrom.core.paths import LADDER, MESH, SENSITIVITY, SNAPSHOTS, TRAIN, File
+from pdrom.core.reads import Setting
 from pdrom.core.store import write_table
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.repetition import Repeater, Repetitions
 from pdrom.experiments.kit.scenes import positions_of, scene_of
@@ -63,43 +63,41 @@ class LadderFile(Ladder):
     scenes: tuple[str, ...]
 
 
-class Settings(JobSettings):
-    """What a climb depends on."""
-
-    scene: SceneConfig
-    ladder: Ladder
-    horizon: Horizon
-    blowup_extent: BlowupExtent
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """Files read."""
-
-    mesh: Annotated[File, MESH]
-    fom: Annotated[File, TRAIN]
-    snapshots: Annotated[File, SNAPSHOTS]
-    sensitivity: Annotated[File, SENSITIVITY]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written: a row for every rung."""
-
-    table: Annotated[File, LADDER]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Ladder of {group} in {scene}",
+    reads={
+        "mesh": MESH,
+        "fom": TRAIN,
+        "snapshots": SNAPSHOTS,
+        "sensitivity": SENSITIVITY,
+        "config": Setting("scene"),
+        "ladder": Setting("ladder"),
+        "horizon": Setting("horizon"),
+        "blowup_extent": Setting("blowup_extent"),
+    },
+    writes={"out": LADDER},
+)
+def ladder(
+    mesh: File,
+    fom: File,
+    snapshots: File,
+    sensitivity: File,
+    config: SceneConfig,
+    ladder: Ladder,
+    horizon: Horizon,
+    blowup_extent: BlowupExtent,
+    out: File,
+) -> None:
     """Reduce and rerun the scene with every rung."""
-    labels, ladder = outputs.table.labels, settings.ladder
-    scene, data = scene_of(settings.scene, inputs.mesh), load_snapshots(inputs.snapshots.path)
-    reference = positions_of(inputs.fom)
-    end = settings.horizon.frames(inputs.sensitivity)
+    labels = out.labels
+    scene, data = scene_of(config, mesh), load_snapshots(snapshots.path)
+    reference = positions_of(fom)
+    end = horizon.frames(sensitivity)
     displacement = displacement_norms(reference)
     group, system = scene.group(labels["group"]), scene.system
     repeater = None
     if labels["scene"] in ladder.repeated:
-        repeater = Repeater(scene, group.name, data, reference, end, ladder, settings.blowup_extent)
+        repeater = Repeater(scene, group.name, data, reference, end, ladder, blowup_extent)
     bases: dict[tuple[str, int | None], Basis] = {}
     rows = []
     for direction, method, seed in ladder.rungs():
@@ -110,7 +108,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
         reduction = _reduce(bases[key], method, ladder.r)
         if reduction is not None:
             steps = replace_group(scene, group.name, ReducedLocalStep(group, reduction))
-            outcome = rerun(scene, system, steps, reference, settings.blowup_extent)
+            outcome = rerun(scene, system, steps, reference, blowup_extent)
             row |= {"r": reduction.r, **_measures(reduction, data)}
             row |= _ran(outcome, displacement, end)
             if repeater is not None and seed is None:
@@ -119,7 +117,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
         log.info("%s, %s", direction, row["rung"])
     table = pd.DataFrame(rows, columns=COLUMNS)
     whole = dict.fromkeys(("blowup_frame", "repetitions"), "Int64")
-    write_table(table.astype(whole), outputs.table.path)
+    write_table(table.astype(whole), out.path)
 
 
 def _name(method: MethodSpec, seed: int | None) -> str:
@@ -169,6 +167,3 @@ def _repeated(repeater: Repeater, method: MethodSpec, r: int) -> dict[str, Any]:
         "gain_low": min(gains),
         "gain_high": max(gains),
     }
-
-
-EXPERIMENT = Experiment("ladder", "Ladder of {group} in {scene}", run)

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any
 
 import h5py
@@ -11,9 +11,10 @@ import pandas as pd
 from pydantic import Field
 
 from pdrom.core.paths import MESH, NOISE, NOISE_RUNS, SENSITIVITY, File
+from pdrom.core.reads import Settings
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.last_iterates import last_iterates
 from pdrom.experiments.kit.scenes import scene_of
 from pdrom.experiments.kit.sensitivity import perturbation_field
@@ -57,7 +58,7 @@ class Noise(NoiseRuns):
     methods: tuple[str, ...] = ("deim-joint", "published")
 
 
-class Settings(JobSettings):
+class Options(ConfigModel):
     """What the runs of a scene depend on."""
 
     scene: SceneConfig
@@ -67,33 +68,19 @@ class Settings(JobSettings):
     blowup_extent: BlowupExtent
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """Files read."""
-
-    mesh: Annotated[File, MESH]
-    sensitivity: Annotated[File, SENSITIVITY]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written: a row for every start, method and size; the runs of a start of each kind.
-
-    That is the first one of which some sizes run and others do not, or else the first one.
-    """
-
-    table: Annotated[File, NOISE]
-    runs: Annotated[File, NOISE_RUNS]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Bases of the round-off of {group} in {scene}",
+    reads={"mesh": MESH, "sensitivity": SENSITIVITY, "settings": Settings(Options)},
+    writes={"out": NOISE, "runs": NOISE_RUNS},
+)
+def noise(mesh: File, sensitivity: File, settings: Options, out: File, runs: File) -> None:
     """Perturb, run, make bases without a cutoff, rerun; up to the scene's horizon."""
-    labels, asked = outputs.table.labels, settings.noise
-    whole = scene_of(settings.scene, inputs.mesh)
-    frames = min(whole.config.frames, max(2, settings.horizon.frames(inputs.sensitivity)))
+    labels, asked = out.labels, settings.noise
+    whole = scene_of(settings.scene, mesh)
+    frames = min(whole.config.frames, max(2, settings.horizon.frames(sensitivity)))
     scene = Scene.build(whole.config.model_copy(update={"frames": frames}), whole.mesh)
     rows = []
-    with write_hdf5(outputs.runs.path) as file:
+    with write_hdf5(runs.path) as file:
         for axes in kinds(scene):
             kept: Runs = []
             for seed in range(1, asked.repetitions + 1):
@@ -106,7 +93,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
                 _store(store, row["r"], outcome)
             log.info("%s: %d starts", axes, asked.repetitions)
     whole_numbers = dict.fromkeys(("frames", "blowup_frame"), "Int64")
-    write_table(pd.DataFrame(rows, columns=COLUMNS).astype(whole_numbers), outputs.table.path)
+    write_table(pd.DataFrame(rows, columns=COLUMNS).astype(whole_numbers), out.path)
 
 
 def irregular(runs: Runs) -> bool:
@@ -149,7 +136,7 @@ def noise_basis(
 
 
 def _runs(
-    scene: Scene, name: str, axes: str, seed: int, settings: Settings
+    scene: Scene, name: str, axes: str, seed: int, settings: Options
 ) -> Iterator[tuple[dict[str, Any], Rerun | None]]:
     """Rows and runs of one start: its full-order run, then the reductions trained on it."""
     group, plan = scene.group(name), scene.config.reduce[name]
@@ -187,6 +174,3 @@ def _store(store: h5py.Group, r: int, outcome: Rerun | None) -> None:
         blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
         store.attrs.update(blowup_frame=blowup, max_extent=outcome.max_extent)
         store["positions"] = outcome.positions.astype(np.float32)
-
-
-EXPERIMENT = Experiment("noise", "Bases of the round-off of {group} in {scene}", run)

@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from time import perf_counter
 from typing import Annotated, Any, Self
 
@@ -11,9 +10,10 @@ import pandas as pd
 from pydantic import Field, model_validator
 
 from pdrom.core.paths import OFFLINE, File
+from pdrom.core.reads import Setting
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.kit.declaration import Experiment, JobSettings, Nothing
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.settings import Tolerance
 from pdrom.model.effects.base import Seed
 from pdrom.reduction.basis.pod import pod
@@ -55,26 +55,19 @@ class Offline(ConfigModel):
         return self.model_copy(update={**changes, "rows": 80})
 
 
-class Settings(JobSettings):
-    """What the measurement depends on."""
-
-    offline: Offline
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written: each algorithm, pyMOR's beside it where it has one."""
-
-    table: Annotated[File, OFFLINE]
-
-
-def run(settings: Settings, inputs: Nothing, outputs: Outputs) -> None:
+@experiment(
+    "Cost of the offline algorithms",
+    reads={"sizes": Setting("offline")},
+    writes={"out": OFFLINE},
+    alone=True,
+)
+def offline(sizes: Offline, out: File) -> None:
     """Time every algorithm."""
-    for _, *tasks in _tasks(settings.offline.small()):
+    for _, *tasks in _tasks(sizes.small()):
         for task in filter(None, tasks):
             task()
     rows = []
-    for labels, own, other in _tasks(settings.offline):
+    for labels, own, other in _tasks(sizes):
         seconds, result = _timed(own)
         row = {**labels, "implementation": "pdrom", "seconds": seconds}
         if other is not None:
@@ -85,7 +78,7 @@ def run(settings: Settings, inputs: Nothing, outputs: Outputs) -> None:
         log.info("%s: %.2f s", labels["task"], seconds)
     table = pd.DataFrame(rows, columns=COLUMNS)
     ordered = table.sort_values(["task", "implementation"], kind="stable")
-    write_table(ordered, outputs.table.path)
+    write_table(ordered, out.path)
 
 
 def _timed(task: Task) -> tuple[float, np.ndarray]:
@@ -149,6 +142,3 @@ def _pymor_deim(basis: np.ndarray) -> np.ndarray:
     _quiet()
     vectors = NumpyVectorSpace(len(basis)).from_numpy(basis)
     return np.asarray(deim(vectors, pod=False)[0])
-
-
-EXPERIMENT = Experiment("offline", "Cost of the offline algorithms", run, alone=True)

@@ -7,18 +7,17 @@ for each.
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from pdrom.core.paths import ONLINE, ONLINE_MODELS, File
-from pdrom.core.reads import SourcesOf
+from pdrom.core.reads import Setting, SourcesOf
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.measurement import clocked
 from pdrom.experiments.kit.motion import training_indices
 from pdrom.experiments.kit.settings import Modes, PositionBasis, Tolerance
@@ -60,38 +59,26 @@ class Online(OnlineModels):
     scenes: tuple[str, ...] = ()
 
 
-class Settings(JobSettings):
-    """What the rows of a large scene depend on, beside the machine."""
-
-    scene: SceneConfig
-    online: OnlineModels
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """Files read: that of the mesh, nothing for a generated one."""
-
-    sources: Annotated[list[str], SourcesOf("scene.mesh")]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written: a row for every basis, size and tolerance, and the models."""
-
-    table: Annotated[File, ONLINE]
-    models: Annotated[File, ONLINE_MODELS]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Reduction of {scene}",
+    reads={
+        "sources": SourcesOf("scene.mesh"),
+        "config": Setting("scene"),
+        "asked": Setting("online"),
+    },
+    writes={"out": ONLINE, "models": ONLINE_MODELS},
+)
+def online(
+    sources: list[Path], config: SceneConfig, asked: OnlineModels, out: File, models: File
+) -> None:
     """Reduce a scene by every model and run both motions with each."""
-    config, asked = settings.scene, settings.online
     mesh = config.mesh.build(Path())
     train = Scene.build(config, mesh)
     heldout = Scene.build(config.heldout_variant(), mesh)
     references = [trajectory(motion, track_objective=False) for motion in (train, heldout)]
     log.info("%s: full-order runs of %d vertices", config.name, mesh.vertices)
     rows = []
-    with write_hdf5(outputs.models.path) as file:
+    with write_hdf5(models.path) as file:
         made = clocked(_models(train, references[0], asked))
         for seconds, (base, k, columns, found) in made:
             store_columns(file.create_group(f"columns/{base}"), columns)
@@ -108,7 +95,7 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
                 keys = ("relative_error_train", "relative_error_heldout", "reduction_s")
                 rows.append({**row, **dict(zip(keys, (*errors, seconds), strict=True))})
                 log.info("%s k=%d tau=%g", base, k, tolerance)
-    write_table(pd.DataFrame(rows, columns=COLUMNS), outputs.table.path)
+    write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
 
 
 def _models(
@@ -141,6 +128,3 @@ def relative_error(scene: Scene, model: SubspaceModel, reference: np.ndarray) ->
     """Relative error of a run against ``reference`` (F + 1, N, 3); None if it blows up."""
     error = rerun_model(scene, model, reference).error(displacement_norms(reference))
     return error if error is not None and np.isfinite(error) else None
-
-
-EXPERIMENT = Experiment("online", "Reduction of {scene}", run)

@@ -1,8 +1,7 @@
 """How well each position subspace could follow a motion, beside how well its run does."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,8 +16,9 @@ from pdrom.core.paths import (
     TRAIN,
     File,
 )
+from pdrom.core.reads import Setting
 from pdrom.core.store import open_hdf5, write_table
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.motion import Motion
 from pdrom.experiments.kit.scenes import RUNS, scene_of
@@ -34,40 +34,36 @@ COLUMNS = [
 FLAT = 1e-9
 
 
-class Settings(JobSettings):
-    """What the rows of a scene depend on."""
-
-    scene: SceneConfig
-    horizon: Horizon
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """Files read."""
-
-    mesh: Annotated[File, MESH]
-    train: Annotated[File, TRAIN]
-    heldout: Annotated[File, HELDOUT]
-    perturbed: Annotated[File, SENSITIVITY]
-    subspaces: Annotated[File, SUBSPACES]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written: a row for every subspace and motion."""
-
-    table: Annotated[File, POSITION_BASES]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "What the position subspaces of {scene} can hold",
+    reads={
+        "mesh": MESH,
+        "train": TRAIN,
+        "heldout": HELDOUT,
+        "perturbed": SENSITIVITY,
+        "subspaces": SUBSPACES,
+        "config": Setting("scene"),
+        "horizon": Setting("horizon"),
+    },
+    writes={"out": POSITION_BASES},
+)
+def position_bases(
+    mesh: File,
+    train: File,
+    heldout: File,
+    perturbed: File,
+    subspaces: File,
+    config: SceneConfig,
+    horizon: Horizon,
+    out: File,
+) -> None:
     """Compare the runs with full projections with the best positions in their subspace."""
     rows: list[dict[str, Any]] = []
-    for split in RUNS:
-        scene = scene_of(settings.scene, inputs.mesh, split)
-        motion = Motion(scene, getattr(inputs, split))
-        end = settings.horizon.frames(inputs.perturbed, split)
-        rows += _rows(motion, inputs.subspaces, split, end)
-    write_table(pd.DataFrame(rows, columns=COLUMNS), outputs.table.path)
+    for split, run in zip(RUNS, (train, heldout), strict=True):
+        motion = Motion(scene_of(config, mesh, split), run)
+        end = horizon.frames(perturbed, split)
+        rows += _rows(motion, subspaces, split, end)
+    write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
 
 
 def _rows(motion: Motion, source: File, split: str, end: int) -> Iterator[dict[str, Any]]:
@@ -119,6 +115,3 @@ def out_of_plane(positions: np.ndarray, normal: int | None, end: int) -> float |
     if normal is None or whole == 0.0:
         return None
     return float(np.linalg.norm(moved[..., normal])) / whole
-
-
-EXPERIMENT = Experiment("position_bases", "What the position subspaces of {scene} can hold", run)

@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import groupby
 from typing import Annotated, Any
 
@@ -20,9 +19,10 @@ from pdrom.core.paths import (
     TRAIN,
     File,
 )
+from pdrom.core.reads import Settings
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.repetition import Repeater, Repetition, Repetitions, Varied
 from pdrom.experiments.kit.scenes import positions_of, scene_of
 from pdrom.experiments.kit.settings import BlowupExtent, Horizon, Modes
@@ -64,7 +64,7 @@ class Repeated(ConfigModel):
     varied: tuple[Varied, ...]
 
 
-class Settings(JobSettings):
+class Options(ConfigModel):
     """What the repetitions in a scene depend on."""
 
     scene: SceneConfig
@@ -74,33 +74,34 @@ class Settings(JobSettings):
     blowup_extent: BlowupExtent
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """Files read."""
-
-    mesh: Annotated[File, MESH]
-    fom: Annotated[File, TRAIN]
-    snapshots: Annotated[File, SNAPSHOTS]
-    sensitivity: Annotated[File, SENSITIVITY]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written: a row for every repetition; and ranges over them, frame by frame."""
-
-    table: Annotated[File, REPETITIONS]
-    frames: Annotated[File, REPEATED_FRAMES]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Repeated runs of {scene}, {group} reduced",
+    reads={
+        "mesh": MESH,
+        "fom": TRAIN,
+        "snapshots": SNAPSHOTS,
+        "sensitivity": SENSITIVITY,
+        "settings": Settings(Options),
+    },
+    writes={"out": REPETITIONS, "by_frame": REPEATED_FRAMES},
+)
+def repetitions(
+    mesh: File,
+    fom: File,
+    snapshots: File,
+    sensitivity: File,
+    settings: Options,
+    out: File,
+    by_frame: File,
+) -> None:
     """Repeat every listed run of the scene and group."""
-    labels = outputs.table.labels
+    labels = out.labels
     repeater = Repeater(
-        scene_of(settings.scene, inputs.mesh),
+        scene_of(settings.scene, mesh),
         labels["group"],
-        load_snapshots(inputs.snapshots.path),
-        positions_of(inputs.fom),
-        settings.horizon.frames(inputs.sensitivity),
+        load_snapshots(snapshots.path),
+        positions_of(fom),
+        settings.horizon.frames(sensitivity),
         settings.repetitions,
         settings.blowup_extent,
     )
@@ -109,13 +110,13 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
         cell = {**labels, **of_cell}
         rows += [cell | vars(run) for run in runs]
         frames.append(_ranges(runs).assign(**cell))
-    write_table(pd.DataFrame(rows, columns=COLUMNS), outputs.table.path)
+    write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
     ranges = pd.concat(frames) if frames else pd.DataFrame()
-    write_table(ranges.reindex(columns=FRAMES), outputs.frames.path)
+    write_table(ranges.reindex(columns=FRAMES), by_frame.path)
 
 
 def _cells(
-    settings: Settings, repeater: Repeater
+    settings: Options, repeater: Repeater
 ) -> Iterator[tuple[dict[str, Any], list[Repetition]]]:
     """Labels of every repeated run, and its repetitions."""
     for method in settings.repeated:
@@ -132,6 +133,3 @@ def _ranges(runs: list[Repetition]) -> pd.DataFrame:
     ranges = np.stack([errors.min(axis=0), np.median(errors, axis=0), errors.max(axis=0)], axis=1)
     made = pd.DataFrame(ranges, columns=RANGES)
     return made.assign(frame=np.arange(1, len(made) + 1))
-
-
-EXPERIMENT = Experiment("repetitions", "Repeated runs of {scene}, {group} reduced", run)

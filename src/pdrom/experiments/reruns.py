@@ -2,7 +2,7 @@
 
 import logging
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 import h5py
 import numpy as np
@@ -22,10 +22,10 @@ from pdrom.core.paths import (
     TRAIN,
     File,
 )
-from pdrom.core.reads import EachOf
+from pdrom.core.reads import EachOf, Settings
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.sampling import Sweep, sample
 from pdrom.experiments.kit.scenes import positions_of, scene_of
 from pdrom.experiments.kit.settings import BlowupExtent, Solver
@@ -61,11 +61,8 @@ class OfScene(ConfigModel):
         return {"scene": self.scene}
 
 
-class Settings(JobSettings):
-    """What samplings and reruns by one method depend on.
-
-    companions : that of the scene, if its guard estimates errors; else none
-    """
+class Options(ConfigModel):
+    """What samplings and reruns by one method depend on."""
 
     scene: SceneConfig
     method: MethodSpec
@@ -74,55 +71,62 @@ class Settings(JobSettings):
     heldout_ranks: tuple[Rank, ...]
     blowup_extent: BlowupExtent
     guard: GuardSettings
-    companions: tuple[OfScene, ...]
     solver: Solver
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """Files read."""
-
-    mesh: Annotated[File, MESH]
-    fom: Annotated[File, TRAIN]
-    heldout: Annotated[File, HELDOUT]
-    snapshots: Annotated[File, SNAPSHOTS]
-    basis: Annotated[File, BASIS]
-    companions: Annotated[list[File], EachOf("companions", COMPANION)]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written: samples and reconstruction errors; runs, and a table of each motion."""
-
-    sampling: Annotated[File, SAMPLING]
-    errors: Annotated[File, RECONSTRUCTION]
-    runs: Annotated[File, RERUNS]
-    table: Annotated[File, RERUNS_TRAIN]
-    heldout: Annotated[File, RERUNS_HELDOUT]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Sampling and reruns of {scene}, {group} by {method}",
+    reads={
+        "mesh": MESH,
+        "fom": TRAIN,
+        "heldout": HELDOUT,
+        "snapshots": SNAPSHOTS,
+        "basis": BASIS,
+        "companions": EachOf(COMPANION, "companions"),
+        "settings": Settings(Options),
+    },
+    writes={
+        "sampling": SAMPLING,
+        "errors": RECONSTRUCTION,
+        "runs": RERUNS,
+        "out": RERUNS_TRAIN,
+        "heldout_table": RERUNS_HELDOUT,
+    },
+)
+def reruns(
+    mesh: File,
+    fom: File,
+    heldout: File,
+    snapshots: File,
+    basis: File,
+    companions: list[File],
+    settings: Options,
+    sampling: File,
+    errors: File,
+    runs: File,
+    out: File,
+    heldout_table: File,
+) -> None:
     """Sample the group, then rerun the scene for every r, as trained and as held out.
 
     One job does both: starting another process takes longer than the sampling.
     """
-    method, basis = settings.method, load_basis(inputs.basis.path)
-    data = load_snapshots(inputs.snapshots.path)
-    sample(basis, data, method, settings.sweep, settings.ranks, outputs.sampling, outputs.errors)
-    labels = outputs.runs.labels
-    companions = [model for file in inputs.companions for _, model in load_models(file.path)]
-    trained = Trained.on(positions_of(inputs.fom), companions[0] if companions else None)
+    space, data = load_basis(basis.path), load_snapshots(snapshots.path)
+    sample(space, data, settings.method, settings.sweep, settings.ranks, sampling, errors)
+    labels = runs.labels
+    models = [model for file in companions for _, model in load_models(file.path)]
+    trained = Trained.on(positions_of(fom), models[0] if models else None)
     motions = {
-        "train": (settings.ranks, inputs.fom, outputs.table),
-        "heldout": (settings.heldout_ranks, inputs.heldout, outputs.heldout),
+        "train": (settings.ranks, fom, out),
+        "heldout": (settings.heldout_ranks, heldout, heldout_table),
     }
-    with write_hdf5(outputs.runs.path) as file:
-        for motion, (ranks, fom, table) in motions.items():
-            scene = scene_of(settings.scene, inputs.mesh, motion)
-            case = _Case(scene, motion, labels, settings, basis, outputs.sampling.path, trained)
-            file.attrs["extent_norm"] = extent_norm(positions_of(fom), scene.mesh.extent)
+    with write_hdf5(runs.path) as file:
+        for motion, (ranks, run, table) in motions.items():
+            scene = scene_of(settings.scene, mesh, motion)
+            case = _Case(scene, motion, labels, settings, space, sampling.path, trained)
+            file.attrs["extent_norm"] = extent_norm(positions_of(run), scene.mesh.extent)
             store = file if motion == "train" else file.create_group(motion)
-            rows = pd.DataFrame(case.run(store, ranks, positions_of(fom)), columns=COLUMNS)
+            rows = pd.DataFrame(case.run(store, ranks, positions_of(run)), columns=COLUMNS)
             whole = ["guard_frame", "guard_count", "fallback_frames"]
             write_table(rows.astype(dict.fromkeys(whole, "Int64")), table.path)
 
@@ -134,7 +138,7 @@ class _Case:
     scene: Scene
     motion: str
     labels: dict[str, str]
-    settings: Settings
+    settings: Options
     basis: Basis
     sampling: str
     trained: Trained
@@ -195,6 +199,3 @@ def _row(outcome: Rerun, displacement: np.ndarray) -> dict[str, Any]:
         "max_extent": outcome.max_extent,
         "relative_error": outcome.error(displacement),
     }
-
-
-EXPERIMENT = Experiment("reruns", "Sampling and reruns of {scene}, {group} by {method}", run)

@@ -5,7 +5,6 @@ import gc
 import logging
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -16,10 +15,10 @@ import psutil
 from pydantic import Field
 
 from pdrom.core.paths import BREAK_EVEN_SIZED, EFFECTS_SIZED, SCALING, File
-from pdrom.core.reads import SourcesOf
+from pdrom.core.reads import Settings, SourcesOf
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.effect_costs import effect_costs
 from pdrom.experiments.kit.local_costs import local_costs
 from pdrom.experiments.kit.measurement import Measurement, Protocol, Variant, measure
@@ -83,7 +82,7 @@ class Scaling(Sized):
     )
 
 
-class Settings(JobSettings):
+class Options(ConfigModel):
     """What the cost on a mesh size depends on, beside the machine."""
 
     scene: SceneConfig
@@ -92,27 +91,19 @@ class Settings(JobSettings):
     solver: Solver
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """Files read: that of the mesh, nothing for a generated one."""
-
-    sources: Annotated[list[str], SourcesOf("scene.mesh")]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written."""
-
-    iterations: Annotated[File, SCALING]
-    breakeven: Annotated[File, BREAK_EVEN_SIZED]
-    effects: Annotated[File, EFFECTS_SIZED]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Cost of {scene} on a mesh with {factor} times the vertices along a side",
+    reads={"sources": SourcesOf("scene.mesh"), "settings": Settings(Options)},
+    writes={"iterations": SCALING, "breakeven": BREAK_EVEN_SIZED, "effects": EFFECTS_SIZED},
+    alone=True,
+)
+def scaling(
+    sources: list[Path], settings: Options, iterations: File, breakeven: File, effects: File
+) -> None:
     """Measure a scene on one mesh: ``factor`` times the vertices along each side."""
     config, solver, sized = settings.scene, settings.solver, settings.scaling
     specs, alone = settings.scaled_methods, settings.scaling.breakeven
-    factor = float(outputs.iterations["factor"])
+    factor = float(iterations["factor"])
     # libraries and kernels are loaded before anything is measured
     _factorised(Scene.build(config, config.mesh.build(Path())), solver)
     config = config.coarsened(factor, 1.0)
@@ -132,13 +123,13 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     ]
     results = measure(variants, sized.warmup, sized.repeats)
     rows = [{"scene": config.name, "threads": 1, **m.labels, **_times(scene, m)} for m in results]
-    write_table(pd.DataFrame(rows, columns=ITERATIONS), outputs.iterations.path)
+    write_table(pd.DataFrame(rows, columns=ITERATIONS), iterations.path)
     costs = effect_costs(scene, system, sized.frames, sized.warmup, sized.repeats)
-    write_table(costs, outputs.effects.path)
+    write_table(costs, effects.path)
     steps = _steps_alone(scene, training.first(alone.training_frames), specs, alone)
     states = training.positions[:: len(training.positions) // STATES][:STATES]
     times = local_costs(scene, steps, states, sized.warmup, alone.repeats)
-    write_table(times.assign(factor=factor), outputs.breakeven.path)
+    write_table(times.assign(factor=factor), breakeven.path)
     log.info("%s: %d vertices done", config.name, scene.mesh.vertices)
 
 
@@ -235,11 +226,3 @@ def _memory() -> float:
     if trim is not None:  # glibc; elsewhere small sizes may fit into free memory
         trim(0)
     return psutil.Process().memory_info().rss / 1e6
-
-
-EXPERIMENT = Experiment(
-    "scaling",
-    "Cost of {scene} on a mesh with {factor} times the vertices along a side",
-    run,
-    alone=True,
-)

@@ -1,18 +1,18 @@
 """How far runs of a scene drift apart that should be the same, and what its effects do in it."""
 
-from dataclasses import dataclass
 from typing import Annotated, Self
 
 import pandas as pd
 from pydantic import Field, model_validator
 
 from pdrom.core.paths import CONTRIBUTIONS, MESH, SENSITIVITY, File
+from pdrom.core.reads import Setting
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.contributions import contributions
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.scenes import scene_of
-from pdrom.experiments.kit.sensitivity import heldout_floor, sensitivity
+from pdrom.experiments.kit.sensitivity import heldout_floor, sensitivities
 from pdrom.model.effects.base import Seed
 from pdrom.model.scene import SceneConfig
 
@@ -42,36 +42,18 @@ class Sensitivity(PerturbedRuns):
     threshold: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1e-3
 
 
-class Settings(JobSettings):
-    """What the perturbed runs of a scene depend on."""
-
-    scene: SceneConfig
-    sensitivity: PerturbedRuns
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """Files read."""
-
-    mesh: Annotated[File, MESH]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written: differences of all seeds, and forces of all effects, frame by frame."""
-
-    table: Annotated[File, SENSITIVITY]
-    contributions: Annotated[File, CONTRIBUTIONS]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Perturbed full-order runs of {scene}",
+    reads={"mesh": MESH, "config": Setting("scene"), "chosen": Setting("sensitivity")},
+    writes={"out": SENSITIVITY, "effects": CONTRIBUTIONS},
+)
+def sensitivity(
+    mesh: File, config: SceneConfig, chosen: PerturbedRuns, out: File, effects: File
+) -> None:
     """Write the differences of a scene's perturbed runs, and of its held-out motion."""
-    chosen, scene = settings.sensitivity, scene_of(settings.scene, inputs.mesh)
-    table = sensitivity(scene, chosen.perturbations, chosen.seeds)
-    motion = scene_of(settings.scene, inputs.mesh, "heldout")
+    scene = scene_of(config, mesh)
+    table = sensitivities(scene, chosen.perturbations, chosen.seeds)
+    motion = scene_of(config, mesh, "heldout")
     heldout = heldout_floor(motion, chosen.reference, chosen.seeds)
-    write_table(pd.concat([table, heldout], ignore_index=True), outputs.table.path)
-    write_table(contributions(scene), outputs.contributions.path)
-
-
-EXPERIMENT = Experiment("sensitivity", "Perturbed full-order runs of {scene}", run)
+    write_table(pd.concat([table, heldout], ignore_index=True), out.path)
+    write_table(contributions(scene), effects.path)

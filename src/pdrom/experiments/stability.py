@@ -10,10 +10,10 @@ import pandas as pd
 from pydantic import Field, model_validator
 
 from pdrom.core.paths import BASIS, MESH, SAMPLING, STABILITY, SUBSPACES, File
-from pdrom.core.reads import Every
+from pdrom.core.reads import Every, Setting
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.scenes import scene_of
 from pdrom.experiments.kit.settings import BlowupExtent, Solver
 from pdrom.experiments.kit.variation import varied
@@ -86,52 +86,50 @@ class Stability(ShortRuns):
         return self.departure
 
 
-class Settings(JobSettings):
-    """What the short runs of a scene depend on."""
-
-    scene: SceneConfig
-    methods: dict[str, MethodSpec]
-    stability: ShortRuns
-    blowup_extent: BlowupExtent
-    solver: Solver
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """Files read."""
-
-    mesh: Annotated[File, MESH]
-    bases: Annotated[list[File], Every(BASIS)]
-    samplings: Annotated[list[File], Every(SAMPLING)]
-    subspaces: Annotated[list[File], Every(SUBSPACES)]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written."""
-
-    table: Annotated[File, STABILITY]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Time step and stiffness of {scene}",
+    reads={
+        "mesh": MESH,
+        "bases": Every(BASIS),
+        "samplings": Every(SAMPLING),
+        "subspaces": Every(SUBSPACES),
+        "config": Setting("scene"),
+        "methods": Setting("methods"),
+        "short": Setting("stability"),
+        "blowup_extent": Setting("blowup_extent"),
+        "solver": Setting("solver"),
+    },
+    writes={"out": STABILITY},
+)
+def stability(
+    mesh: File,
+    bases: list[File],
+    samplings: list[File],
+    subspaces: list[File],
+    config: SceneConfig,
+    methods: dict[str, MethodSpec],
+    short: ShortRuns,
+    blowup_extent: BlowupExtent,
+    solver: Solver,
+    out: File,
+) -> None:
     """Run the full order, every local reduction and the largest subspaces at every setting.
 
     Bases and samplings are those of the scene's own setting: how far do they carry?
     """
-    scene, chosen = scene_of(settings.scene, inputs.mesh), settings.stability
-    reductions = list(_reductions(settings.methods, chosen.ranks, inputs))
-    models = [model for file in inputs.subspaces for model in _largest(load_models(file.path))]
+    scene = scene_of(config, mesh)
+    reductions = list(_reductions(methods, short.ranks, bases, samplings))
+    models = [model for file in subspaces for model in _largest(load_models(file.path))]
     rows = []
-    for h, ratio in _grid(scene.config.time_step, chosen):
-        limits = (chosen.min_frames, chosen.max_frames)
-        config = varied(scene.config, h, ratio, chosen.duration, limits)
-        varied_scene = Scene.build(config, scene.mesh)
-        case = _Case(varied_scene, ratio, settings.solver, settings.blowup_extent)
+    for h, ratio in _grid(scene.config.time_step, short):
+        limits = (short.min_frames, short.max_frames)
+        other = varied(scene.config, h, ratio, short.duration, limits)
+        case = _Case(Scene.build(other, scene.mesh), ratio, solver, blowup_extent)
         rows += case.rows(reductions, models)
-        log.info("h = %g s, stiffness times %g: %d frames", h, ratio, config.frames)
+        log.info("h = %g s, stiffness times %g: %d frames", h, ratio, other.frames)
     table = pd.DataFrame(rows, columns=COLUMNS)
     whole = ["r", "blowup_frame", "k", "frames"]
-    write_table(table.astype(dict.fromkeys(whole, "Int64")), outputs.table.path)
+    write_table(table.astype(dict.fromkeys(whole, "Int64")), out.path)
 
 
 def _grid(own: float, chosen: ShortRuns) -> list[tuple[float, float]]:
@@ -152,12 +150,15 @@ class _Local:
 
 
 def _reductions(
-    methods: dict[str, MethodSpec], ranks: tuple[Rank, ...], inputs: Inputs
+    methods: dict[str, MethodSpec],
+    ranks: tuple[Rank, ...],
+    bases: list[File],
+    samplings: list[File],
 ) -> Iterator[_Local]:
-    for file in inputs.samplings:
+    for file in samplings:
         group, method = file["group"], file["method"]
         spec = methods[method]
-        basis = load_basis(basis_of(file, spec, inputs.bases).path)
+        basis = load_basis(basis_of(file, spec, bases).path)
         for r in resolve_ranks(ranks, basis.rank):
             known = r <= basis.rank
             reduction = load_reduction(basis, file.path, spec, r) if known else None
@@ -222,6 +223,3 @@ class _Case:
             "energy_ratio": self.scale.ratio(outcome.positions),
             "relative_error": outcome.error(self.displacement),
         }
-
-
-EXPERIMENT = Experiment("stability", "Time step and stiffness of {scene}", run)

@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import pandas as pd
@@ -10,9 +9,10 @@ from pydantic import Field
 
 from pdrom.core.errors import SamplingError
 from pdrom.core.paths import HELDOUT, MESH, SENSITIVITY, SUBSPACE_ABLATION, TRAIN, File
+from pdrom.core.reads import Settings
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.motion import Motion, training_positions
 from pdrom.experiments.kit.scenes import RUNS, scene_of
@@ -64,7 +64,7 @@ class AblationFile(Ablation):
     scenes: tuple[str, ...]
 
 
-class Settings(JobSettings):
+class Options(ConfigModel):
     """What the ablation on a scene depends on."""
 
     scene: SceneConfig
@@ -73,26 +73,23 @@ class Settings(JobSettings):
     blowup_extent: BlowupExtent
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """Files read."""
-
-    mesh: Annotated[File, MESH]
-    train: Annotated[File, TRAIN]
-    heldout: Annotated[File, HELDOUT]
-    sensitivity: Annotated[File, SENSITIVITY]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written: a row for every variant."""
-
-    table: Annotated[File, SUBSPACE_ABLATION]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Variants of block DEIM in a position subspace of {scene}",
+    reads={
+        "mesh": MESH,
+        "train": TRAIN,
+        "heldout": HELDOUT,
+        "sensitivity": SENSITIVITY,
+        "settings": Settings(Options),
+    },
+    writes={"out": SUBSPACE_ABLATION},
+)
+def subspace_ablation(
+    mesh: File, train: File, heldout: File, sensitivity: File, settings: Options, out: File
+) -> None:
     """Run every variant with all groups interpolated."""
-    trials = _Trials(settings, inputs)
+    runs = {"train": train, "heldout": heldout}
+    trials = _Trials(settings, mesh, runs, sensitivity)
     motion = trials.motions["train"]
     scene, training = motion.scene, training_positions(motion)
     rows = []
@@ -113,19 +110,20 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
     table = pd.DataFrame(rows, columns=COLUMNS)
     table["finite"] = table["finite"].astype("boolean")
     table = table.astype({"elements_sampled": "Int64", "control_elements": "Int64"})
-    write_table(table, outputs.table.path)
+    write_table(table, out.path)
 
 
 class _Trials:
     """Both motions of a scene with their horizons."""
 
-    def __init__(self, settings: Settings, inputs: Inputs) -> None:
+    def __init__(
+        self, settings: Options, mesh: File, runs: dict[str, File], sensitivity: File
+    ) -> None:
         self._limit = settings.blowup_extent
         self.motions = {
-            name: Motion(scene_of(settings.scene, inputs.mesh, name), getattr(inputs, name))
-            for name in RUNS
+            name: Motion(scene_of(settings.scene, mesh, name), run) for name, run in runs.items()
         }
-        self._ends = {name: settings.horizon.frames(inputs.sensitivity, name) for name in RUNS}
+        self._ends = {name: settings.horizon.frames(sensitivity, name) for name in RUNS}
 
     def full_projections(self, columns: Columns) -> dict[str, Any]:
         """Errors of the runs without interpolation: what the subspace itself leaves."""
@@ -175,8 +173,3 @@ def _safeguard(found: Mapping[str, Interpolation], train: Rerun, heldout: Rerun)
         "fallback_share": train.fallbacks / max(train.frames, 1),
         "heldout_fallback_share": heldout.fallbacks / max(heldout.frames, 1),
     }
-
-
-EXPERIMENT = Experiment(
-    "subspace_ablation", "Variants of block DEIM in a position subspace of {scene}", run
-)

@@ -3,9 +3,8 @@
 import logging
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import chain
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,9 +21,10 @@ from pdrom.core.paths import (
     TRAIN,
     File,
 )
+from pdrom.core.reads import Settings
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.measurement import clocked
 from pdrom.experiments.kit.motion import Motion, training_indices, training_positions
 from pdrom.experiments.kit.scenes import RUNS, scene_of
@@ -93,7 +93,7 @@ class Subspace(SubspaceModels):
     scenes: tuple[SceneName, ...] = ()
 
 
-class Settings(JobSettings):
+class Options(ConfigModel):
     """What the position subspaces of a scene depend on."""
 
     scene: SceneConfig
@@ -101,41 +101,39 @@ class Settings(JobSettings):
     blowup_extent: BlowupExtent
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """Files read."""
-
-    mesh: Annotated[File, MESH]
-    train: Annotated[File, TRAIN]
-    heldout: Annotated[File, HELDOUT]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written: models with their runs, a table of each motion, and what the models took."""
-
-    runs: Annotated[File, SUBSPACES]
-    train: Annotated[File, SUBSPACES_TRAIN]
-    heldout: Annotated[File, SUBSPACES_HELDOUT]
-    seconds: Annotated[File, SUBSPACES_SECONDS]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Position subspaces of {scene}, with full and with sampled projections",
+    reads={"mesh": MESH, "train": TRAIN, "heldout": HELDOUT, "settings": Settings(Options)},
+    writes={
+        "out": SUBSPACES,
+        "train_table": SUBSPACES_TRAIN,
+        "heldout_table": SUBSPACES_HELDOUT,
+        "seconds_table": SUBSPACES_SECONDS,
+    },
+)
+def subspaces(
+    mesh: File,
+    train: File,
+    heldout: File,
+    settings: Options,
+    out: File,
+    train_table: File,
+    heldout_table: File,
+    seconds_table: File,
+) -> None:
     """Build every model (bases, sizes, tolerances) and run both motions with it."""
-    motions = {
-        name: Motion(scene_of(settings.scene, inputs.mesh, name), getattr(inputs, name))
-        for name in RUNS
-    }
+    runs = {"train": train, "heldout": heldout}
+    motions = {k: Motion(scene_of(settings.scene, mesh, k), run) for k, run in runs.items()}
     rows: dict[str, list[dict[str, Any]]] = {name: [] for name in RUNS}
     seconds = []
-    with write_hdf5(outputs.runs.path) as file:
+    with write_hdf5(out.path) as file:
         for name, motion in motions.items():
             file[f"displacement/{name}"] = motion.displacement
             file[f"step/{name}"] = step_norms(motion.reference)
         start = motions["train"]
         file.attrs["extent_norm"] = extent_norm(start.reference, start.scene.mesh.extent)
-        subspaces = clocked(_subspaces(motions["train"], settings.subspace))
-        for of_columns, (base, columns, kind, k, models) in subspaces:
+        made = clocked(_subspaces(motions["train"], settings.subspace))
+        for of_columns, (base, columns, kind, k, models) in made:
             store_columns(file.create_group(f"columns/{base}"), columns)
             spent: dict[str, float] = defaultdict(float)
             for of_model, (method, samples) in clocked(models):
@@ -158,10 +156,9 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
                     store[f"{name}/step_difference"] = apart
                     rows[name].append(_row(motion, labels, model, outcome))
                 log.info("%s %s: error %s", base, method, rows["train"][-1]["relative_error"])
-    for name in RUNS:
-        table = pd.DataFrame(rows[name], columns=COLUMNS)
-        write_table(table, getattr(outputs, name).path)
-    write_table(pd.DataFrame(seconds, columns=SECONDS_COLUMNS), outputs.seconds.path)
+    for name, file in {"train": train_table, "heldout": heldout_table}.items():
+        write_table(pd.DataFrame(rows[name], columns=COLUMNS), file.path)
+    write_table(pd.DataFrame(seconds, columns=SECONDS_COLUMNS), seconds_table.path)
 
 
 def _subspaces(
@@ -233,8 +230,3 @@ def _row(
         "relative_error": outcome.error(motion.displacement),
         "energy_ratio": motion.scale.ratio(outcome.positions),
     }
-
-
-EXPERIMENT = Experiment(
-    "hyper", "Position subspaces of {scene}, with full and with sampled projections", run
-)

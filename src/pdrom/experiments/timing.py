@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any
 
@@ -22,10 +22,11 @@ from pdrom.core.paths import (
     TRAIN,
     File,
 )
-from pdrom.core.reads import Every
+from pdrom.core.reads import Every, Settings
 from pdrom.core.store import open_hdf5, write_table
+from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.iterations import IterationCounts, accelerated, stepper_of
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.effect_costs import effect_costs, left_out
 from pdrom.experiments.kit.local_costs import local_costs
 from pdrom.experiments.kit.measurement import Measurement, Protocol, Variant, measure
@@ -73,7 +74,7 @@ class Timing(Protocol):
     breakeven_repeats: Annotated[int, Field(ge=5)] = 20
 
 
-class Settings(JobSettings):
+class Options(ConfigModel):
     """What the times of a scene depend on, beside the machine."""
 
     scene: SceneConfig
@@ -85,62 +86,71 @@ class Settings(JobSettings):
     threads: Threads
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """Files read."""
-
-    mesh: Annotated[File, MESH]
-    fom: Annotated[File, TRAIN]
-    bases: Annotated[list[File], Every(BASIS)]
-    samplings: Annotated[list[File], Every(SAMPLING)]
-    subspaces: Annotated[list[File], Every(SUBSPACES)]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written: frames, local steps over r, cost of effects, scenes without some of them."""
-
-    frames: Annotated[File, TIMINGS]
-    breakeven: Annotated[File, BREAK_EVEN]
-    effects: Annotated[File, EFFECTS]
-    left_out: Annotated[File, LEFT_OUT]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Timings of {scene}",
+    reads={
+        "mesh": MESH,
+        "fom": TRAIN,
+        "bases": Every(BASIS),
+        "samplings": Every(SAMPLING),
+        "subspaces": Every(SUBSPACES),
+        "settings": Settings(Options),
+    },
+    writes={"out": TIMINGS, "breakeven": BREAK_EVEN, "effects": EFFECTS, "without": LEFT_OUT},
+    alone=True,
+)
+def timing(
+    mesh: File,
+    fom: File,
+    bases: list[File],
+    samplings: list[File],
+    subspaces: list[File],
+    settings: Options,
+    out: File,
+    breakeven: File,
+    effects: File,
+    without: File,
+) -> None:
     """Measure one scene."""
-    scene = scene_of(settings.scene, inputs.mesh, threads=settings.threads)
-    system, timing = scene.system_with(settings.solver), settings.timing
-    frames, name = min(timing.frames, scene.config.frames), scene.config.name
-    variants, alone = _variants(scene, system, frames, settings, inputs)
+    scene = scene_of(settings.scene, mesh, threads=settings.threads)
+    system, asked = scene.system_with(settings.solver), settings.timing
+    frames, name = min(asked.frames, scene.config.frames), scene.config.name
+    variants, alone = _variants(scene, system, frames, settings, samplings, bases, subspaces)
     slow = [v for v in variants if v.labels["implementation"] == "interpreted"]
     quick = [v for v in variants if v.labels["implementation"] != "interpreted"]
     told = partial(log.info, f"{name}: repeat %d of %d")
-    results = measure(quick, timing.warmup, timing.repeats, told)
-    results += measure(slow, 0, timing.repeats)
+    results = measure(quick, asked.warmup, asked.repeats, told)
+    results += measure(slow, 0, asked.repeats)
     table = pd.DataFrame([_row(scene, m) for m in results], columns=COLUMNS)
-    write_table(table, outputs.frames.path)
+    write_table(table, out.path)
     log.info("%s: %d reduced local steps alone", name, len(alone))
-    states = _states(inputs.fom)
-    times = local_costs(scene, alone, states, timing.warmup, timing.breakeven_repeats)
-    write_table(times.assign(factor=1.0), outputs.breakeven.path)
+    states = _states(fom)
+    times = local_costs(scene, alone, states, asked.warmup, asked.breakeven_repeats)
+    write_table(times.assign(factor=1.0), breakeven.path)
     log.info("%s: effects", name)
-    costs = effect_costs(scene, system, frames, timing.warmup, timing.repeats)
-    write_table(costs, outputs.effects.path)
-    without = left_out(scene, costs, frames, timing.warmup, timing.repeats, settings.solver)
-    write_table(without, outputs.left_out.path)
+    costs = effect_costs(scene, system, frames, asked.warmup, asked.repeats)
+    write_table(costs, effects.path)
+    fewer = left_out(scene, costs, frames, asked.warmup, asked.repeats, settings.solver)
+    write_table(fewer, without.path)
 
 
 def _variants(
-    scene: Scene, system: GlobalSystem, frames: int, settings: Settings, inputs: Inputs
+    scene: Scene,
+    system: GlobalSystem,
+    frames: int,
+    settings: Options,
+    samplings: list[File],
+    bases: list[File],
+    subspaces: list[File],
 ) -> tuple[list[Variant], Alone]:
     """Everything whose frames are timed, and the reduced local steps that are timed alone."""
     make = partial(_variant, scene, system, frames)
     variants = _full_order(scene, make, settings.timing)
     variants += _other_counts(scene, system, frames, settings.iterations)
     alone: Alone = {}
-    for sampling in inputs.samplings:
+    for sampling in samplings:
         group, method = sampling["group"], sampling["method"]
-        source = _Source(scene.group(group), sampling, settings.methods[method], inputs.bases)
+        source = _Source(scene.group(group), sampling, settings.methods[method], bases)
         for r in source.sizes(settings.ranks):
             step, labels = source.step(r), {"group": group, "method": method, "r": r}
             steps = replace_group(scene, group, step)
@@ -148,7 +158,7 @@ def _variants(
         if source.spec.rows != "all":
             for r in source.sizes(settings.timing.breakeven):
                 alone[group, method, r] = source.step(r)
-    for file in inputs.subspaces:
+    for file in subspaces:
         for labels, model in load_models(file.path):
             labels = {"group": "all", **labels, "implementation": "compiled"}
             variants.append(Variant(labels, *model.loop(scene), frames))
@@ -240,6 +250,3 @@ def _row(scene: Scene, measurement: Measurement) -> dict[str, Any]:
         "spread_ms": measurement.spread,
         "repeats": measurement.repeats,
     }
-
-
-EXPERIMENT = Experiment("timing", "Timings of {scene}", run, alone=True)

@@ -16,7 +16,7 @@ def tell_expectation(workflow: Any, plan: Plan) -> None:
     """
     dag = workflow.dag
     model = CostModel.of_study(plan.root, plan.results)
-    experiments = {experiment.name: experiment for experiment in plan.jobs.experiments}
+    experiments = plan.experiments
     expected: dict[int, Expected] = {}
     after: dict[Any, float] = {}
     # from the last jobs to the first, so that what follows a job is known before
@@ -26,7 +26,7 @@ def tell_expectation(workflow: Any, plan: Plan) -> None:
         name, labels = job.rule.name, dict(job.wildcards.items())
         kind = kind_of(name, experiments)
         experiment = experiments.get(kind)
-        size = plan.jobs.size(labels) if experiment else None
+        size = plan.size(labels) if experiment else None
         seconds = model.cost(kind, size, labels.get("method") if experiment else name).seconds
         whole = not workflow.local_exec or (experiment is not None and experiment.alone)
         share = 1.0 if whole else 1.0 / workflow.cores

@@ -1,20 +1,20 @@
 """What the rules of the figures need from a study."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from pdrom.core.errors import ConfigurationError, choices
-from pdrom.core.paths import FIGURE, FIGURE_PICTURE, TABLE
-from pdrom.core.reads import Chosen, Every, Published, Setting, TableOf
+from pdrom.core.paths import Place
+from pdrom.core.reads import FileRead, Labels, Setting
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
+from pdrom.pipeline.contents import labels_of
 from pdrom.pipeline.fingerprint import closure, fingerprint
 from pdrom.pipeline.full import is_full
-from pdrom.pipeline.holdings import labels_of
+from pdrom.pipeline.resolve import Job, Resolver, listed
 from pdrom.pipeline.study import Study
 from pdrom.reduction.method import load_methods
-from pdrom.report.drawing import Order
+from pdrom.report.drawing import Order, drawn
 from pdrom.report.figure_numbers import Numbers, figure_numbers
 from pdrom.report.figures.kit.catalogue import declarations, load_choices, modules
 from pdrom.report.figures.kit.declaration import Declaration
@@ -30,27 +30,54 @@ UNNUMBERED = "–"
 
 @dataclass(frozen=True)
 class FigureJob:
-    """One figure: files that it reads and writes, what is drawn, and how it is presented.
+    """One figure: its job, what is drawn, and how it is presented.
 
     label : name, with its numbers in the manuscript and in the preprint
     category, labels : where the report lists it: the preprint's figures by their number there, then
         this study's
     rst : title and caption for the report, in which no sign has a meaning
     tex : title and caption for the manuscript
-    code : fingerprint of the code that draws it
     """
 
-    inputs: list[str]
-    pdf: str
-    png: str
-    log: str
+    job: Job
     order: Order
     label: str
     category: str
     labels: dict[str, str]
     rst: str
     tex: str
-    code: str
+
+    @property
+    def pdf(self) -> str:
+        """File of the PDF."""
+        return self.job.outputs["pdf"]
+
+    @property
+    def png(self) -> str:
+        """File of the PNG."""
+        return self.job.outputs["png"]
+
+
+class _Sources(Resolver):
+    """Files for the scenes, groups and methods that the options of a figure choose."""
+
+    def __init__(self, study: Study, results: str, holdings: Holdings, options: Options) -> None:
+        super().__init__(study, results)
+        self._holdings, self._options = holdings, options
+
+    def files(self, place: Place, labels: Labels) -> list[str]:
+        """Paths of a kind in the chosen experiments."""
+        chosen = self._holdings.experiments(self._options)
+        held = labels_of(self.study, place)
+        return [place.at(self.results, **e) for e in held if (e["scene"], e["group"]) in chosen]
+
+    def chosen(self, place: Place, first: bool) -> list[str]:
+        """Paths of a kind for the chosen experiments and methods, or for the first of each."""
+        return list(self._holdings.files(place, self._options, self.results, first))
+
+    def published(self, name: str) -> list[str]:
+        """Table of the published code, where the options ask for one."""
+        return [str(PUBLISHED / f"{name}.csv")] if self._options.names("published") else []
 
 
 def figure_jobs(study: Study, results: str) -> dict[str, FigureJob]:
@@ -109,7 +136,9 @@ def _job(
     results: str,
 ) -> FigureJob:
     held = holdings.chosen(options)
-    settings = {r.key: _setting(study, r.key) for r in declared.reads if isinstance(r, Setting)}
+    sources = _Sources(study, results, held, options)
+    keys = [read.key for read in declared.reads if isinstance(read, Setting)]
+    settings = {key: sources.value(key, {}) for key in keys}
     title, caption = (filled(text, settings) for text in (declared.title, declared.caption))
     published = bool(options.names("published"))
     order = Order(
@@ -125,18 +154,25 @@ def _job(
     # where elements are drawn on the mesh, the group's class says where they lie
     on_mesh = ELEMENTS in closure(*modules(name))
     classes = [EFFECTS[group] for group in groups if on_mesh]
+    read = [r.paths(sources, {}) for r in declared.reads if isinstance(r, FileRead)]
+    artifact = drawn(name)
+    job = Job(
+        artifact,
+        {},
+        {"files": list(dict.fromkeys(path for paths in read for path in listed(paths)))},
+        {kind: place.at(results) for kind, place in artifact.writes.items()},
+        {"order": order.model_dump(mode="json")},
+        "",
+        fingerprint(artifact.module, *modules(name), *classes),
+    )
     return FigureJob(
-        inputs=list(dict.fromkeys(_inputs(declared, options, held, study, results))),
-        pdf=FIGURE.at(results, name=name),
-        png=FIGURE_PICTURE.at(results, name=name),
-        log=f"{results}/logs/figures/{name}.log",
+        job=job,
         order=order,
         label=numbers.label(name),
         category="Figures of this study" if numbers.preprint is None else "Figures of the preprint",
         labels=_labels(name, numbers, order.title),
         rst=f"**{to_rst(title)}.** {to_rst(caption)}",
         tex=f"{to_tex(title)}. {to_tex(caption)}",
-        code=fingerprint("pdrom.report.drawing", *modules(name), *classes),
     )
 
 
@@ -146,33 +182,6 @@ def _labels(name: str, numbers: Numbers, title: str) -> dict[str, str]:
     if numbers.preprint is None:
         return {"name": name, **own, "title": title}
     return {"preprint": str(numbers.preprint), **own, "name": name, "title": title}
-
-
-def _inputs(
-    declared: Declaration, options: Options, holdings: Holdings, study: Study, results: str
-) -> Iterator[str]:
-    chosen = holdings.experiments(options)
-    for read in declared.reads:
-        match read:
-            case TableOf():
-                yield TABLE.at(results, name=read.name)
-            case Chosen():
-                yield from holdings.files(read.place, options, results, read.first)
-            case Every(place):
-                for labels in labels_of(study, place):
-                    if (labels["scene"], labels["group"]) in chosen:
-                        yield place.at(results, **labels)
-            case Published() if options.names("published"):
-                yield str(PUBLISHED / f"{read.name}.csv")
-
-
-def _setting(study: Study, key: str) -> float:
-    """Value of the configuration by its key."""
-    value: object = study.settings
-    for part in key.split("."):
-        value = getattr(value, part)
-    assert isinstance(value, int | float), f"{key} is no number"
-    return value
 
 
 def _check_names(chosen: dict[str, Options], folder: Path) -> None:

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 from pdrom.core.errors import StorageError
 from pdrom.core.paths import Place
@@ -22,11 +21,11 @@ class Job:
 
 
 class Graph:
-    """Jobs of a plan by what they make; ``manuscript`` is the PDF."""
+    """Jobs of a plan by what they make."""
 
-    def __init__(self, plan: Plan, manuscript: str) -> None:
+    def __init__(self, plan: Plan) -> None:
         self._plan = plan
-        self._made = {file: job for job in self._listed(manuscript) for file in job.outputs}
+        self._made = {file: job for job in self._listed() for file in job.outputs}
         self.maker = cache(self._maker)
 
     def needed(self, targets: Iterable[str]) -> list[Job]:
@@ -46,8 +45,8 @@ class Graph:
             return self._made[path]
         found = [
             (experiment, labels)
-            for experiment in self._plan.jobs.experiments
-            for place in experiment.outputs.values()
+            for experiment in self._plan.experiments.values()
+            for place in experiment.writes.values()
             if (labels := self._labels(place, path)) is not None
         ]
         # `{group}` would match `spring_frames`, too; Snakemake takes the shortest labels
@@ -62,30 +61,16 @@ class Graph:
         return labels if place.at(self._plan.results, **labels) == path else None
 
     def _job(self, experiment: Experiment, labels: dict[str, str]) -> Job:
-        jobs = self._plan.jobs
-        return Job(
-            rule=experiment.name,
-            log=jobs.log(experiment).format(**labels),
-            inputs=_flat(files(labels) for files in jobs.inputs(experiment).values()),
-            outputs=tuple(path.format(**labels) for path in jobs.outputs(experiment).values()),
-        )
+        job = self._plan.job(experiment, labels)
+        log = "_".join(labels[label] for label in experiment.labels)
+        folder = f"{self._plan.results}/logs/{experiment.rule}"
+        log = f"{folder}/{log}.log" if log else f"{folder}.log"
+        return Job(experiment.rule, log, tuple(job.files), tuple(job.outputs.values()))
 
-    def _listed(self, manuscript: str) -> Iterator[Job]:
+    def _listed(self) -> Iterator[Job]:
         """Tables, figures and the manuscript, which the plan lists."""
-        plan, tables = self._plan, self._plan.tables
-        for name in tables:
-            inputs = _flat(tables.inputs(name).values())
-            yield Job(f"{name}_table", tables.log(name), inputs, (tables.path(name),))
-        for name, figure in plan.figure_jobs.items():
-            yield Job(f"figure_{name}", figure.log, _flat(figure.inputs), (figure.pdf, figure.png))
-        paper, logs = plan.paper, f"{plan.results}/logs/paper"
-        numbers = _flat((tables.paths, paper.machine, paper.sources))
-        yield Job("paper_inputs", f"{logs}/inputs.log", numbers, tuple(paper.inputs))
-        pieces = _flat((paper.sources, paper.inputs, plan.figures))
-        yield Job("paper", f"{logs}/main.log", pieces, (manuscript,))
-
-
-def _flat(files: Iterable[Any]) -> tuple[str, ...]:
-    """Paths, of which some come in lists."""
-    listed = (entry if isinstance(entry, list | tuple) else [entry] for entry in files)
-    return tuple(str(path) for entries in listed for path in entries)
+        for kind, jobs in self._plan.fixed.items():
+            for job in jobs:
+                log = f"{self._plan.results}/logs/{kind}/{job.artifact.name}.log"
+                outputs = tuple(job.outputs.values())
+                yield Job(job.artifact.rule, log, tuple(job.files), outputs)

@@ -19,7 +19,6 @@ from pdrom.core.errors import StorageError
 from pdrom.core.store import Condition, Seal, check_file, read_seal, write_text
 from pdrom.core.yamlfile import describe
 from pdrom.pipeline.folders import Folders
-from pdrom.pipeline.holdings import HELD, paths_of
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.scenes import scene_names
 from pdrom.pipeline.targets import PLACES
@@ -107,9 +106,9 @@ def read_manifest(results: str) -> Manifest:
 def own_files(plan: Plan, folders: Folders) -> set[str]:
     """Files that a whole run of a study makes."""
     return {
-        folders.manuscript, paths.MACHINE.at(plan.results), *plan.paper.inputs, *plan.tables.paths,
+        folders.manuscript, *plan.paper.files, *plan.table_paths,
         *plan.figures, *(job.png for job in plan.figure_jobs.values()),
-        *(path for place in HELD for path in paths_of(plan.study, place, plan.results)),
+        *plan.measured,
     }  # fmt: skip
 
 

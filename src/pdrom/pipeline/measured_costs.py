@@ -52,15 +52,15 @@ def kind_of(rule: str, experiments: Container[str]) -> str:
 
 
 def _rows(plan: Plan, manuscript: str) -> Iterator[dict[str, Any]]:
-    experiments = {experiment.name: experiment for experiment in plan.jobs.experiments}
-    for job in Graph(plan, manuscript).needed([manuscript]):
+    experiments = plan.experiments
+    for job in Graph(plan).needed([manuscript]):
         used = usage_of(job.log)
         if used is None:
             log.warning("%s: does not say what the job used", job.log)
             continue
         measured = {"seconds": round(used.wall, 2), "memory_mb": round(used.memory)}
         if job.rule in experiments:
-            place = next(iter(experiments[job.rule].outputs.values()))
+            place = next(iter(experiments[job.rule].writes.values()))
             labels = place.file(job.outputs[0]).labels
             yield {"kind": job.rule, **_size(plan, labels), **measured}
         else:
@@ -69,7 +69,7 @@ def _rows(plan: Plan, manuscript: str) -> Iterator[dict[str, Any]]:
 
 
 def _size(plan: Plan, labels: dict[str, str]) -> dict[str, Any]:
-    size = plan.jobs.size(labels)
+    size = plan.size(labels)
     sizes = {name: round(getattr(size, name)) for name in SIZES} if size else {}
     return {"method": labels.get("method"), **sizes}
 
@@ -77,7 +77,7 @@ def _size(plan: Plan, labels: dict[str, str]) -> dict[str, Any]:
 def main() -> None:
     """Write the measured jobs of the full study."""
     own = Folders()
-    plan = load_plan(read_yaml(Path(DEFAULT)), Path(), (), own.results)
+    plan = load_plan(read_yaml(Path(DEFAULT)), Path(), (), own)
     made = measured_costs(plan, own.manuscript)
     write_tracked(MEASURED, made.to_csv(index=False).encode())
 

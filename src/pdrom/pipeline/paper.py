@@ -1,46 +1,63 @@
 """What the rules of the manuscript need from a study."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pdrom.core.paths import MACHINE, PAPER_INPUT
+from pdrom.core.paths import MACHINE, TABLE
+from pdrom.core.reads import Paths
 from pdrom.model.constraints.base import GroupConfig
+from pdrom.pipeline.figures import FigureJob
+from pdrom.pipeline.fingerprint import digest, fingerprint
 from pdrom.pipeline.full import FULL_STUDY, is_full
+from pdrom.pipeline.resolve import Job, listed
 from pdrom.pipeline.study import Study
-from pdrom.report.paper.build import Facts
+from pdrom.report.paper.build import Facts, paper, paper_inputs
 from pdrom.report.paper.source import source_files
-from pdrom.report.paper.textables import TEX_TABLES
 from pdrom.report.words.text import require_typeset
+from pdrom.tables import declared
 from pdrom.tables.claims import load_claims
 
 Row = dict[str, Any]
+REFERENCES = "paper/references.bib"
 
 
 @dataclass(frozen=True)
-class PaperJob:
-    """The manuscript: its source, the generated files that this reads, and what they state.
+class PaperJobs:
+    """The manuscript: the job of the files that its source reads, and its own."""
 
-    sources : main.tex, then its sections
-    facts : what is stated beside results
-    """
+    inputs: Job
+    manuscript: Job
 
-    sources: list[str]
-    machine: str
-    inputs: list[str]
-    facts: Facts
+    @property
+    def files(self) -> list[str]:
+        """Generated files that its source reads."""
+        return list(self.inputs.outputs.values())
+
+    @property
+    def sources(self) -> list[str]:
+        """Its source: main.tex, then its sections."""
+        return listed(self.manuscript.inputs["source"])
 
 
-def paper_job(study: Study, captions: dict[str, str], configuration: str, results: str) -> PaperJob:
+def paper_jobs(
+    study: Study,
+    figures: Mapping[str, FigureJob],
+    configuration: str,
+    results: str,
+    manuscript: str,
+) -> PaperJobs:
     """The manuscript of a study.
 
     Parameters
     ----------
-    captions : titles and captions of the figures, as TeX, by name
+    figures : by name
     configuration : what the study was read from, for a manuscript that is not of the full one
     results : folder of the results
+    manuscript : file of the PDF
     """
     facts = Facts(
-        captions=captions,
+        captions={name: figure.tex for name, figure in figures.items()},
         part=None if is_full(study) else configuration,
         full_study=FULL_STUDY,
         tables={
@@ -52,10 +69,21 @@ def paper_job(study: Study, captions: dict[str, str], configuration: str, result
             "scenes": [_scene(study, name) for name in study.scenes],
         },
     )
-    tables = [f"{name}.tex" for name in TEX_TABLES]
-    names = ["macros.tex", "figures.tex", "main.bbl", *tables]
-    inputs = [PAPER_INPUT.at(results, name=name) for name in names]
-    return PaperJob(source_files(study.root), MACHINE.at(results), inputs, facts)
+    settings, code = {"facts": facts.model_dump(mode="json")}, fingerprint(paper.module)
+    sources = source_files(study.root)
+    read: dict[str, Paths] = {
+        "source": sources,
+        "references": REFERENCES,
+        "tables": [TABLE.at(results, name=name) for name in declared()],
+        "machine": MACHINE.at(results),
+    }
+    made = {name: place.at(results) for name, place in paper_inputs.writes.items()}
+    content = digest(study.root, *sources, REFERENCES)
+    inputs = Job(paper_inputs, {}, read, made, settings, content, code)
+    pictures = [figure.pdf for figure in figures.values()]
+    read = {"source": sources, "inputs": list(made.values()), "figures": pictures}
+    content = digest(study.root, *sources)
+    return PaperJobs(inputs, Job(paper, {}, read, {"out": manuscript}, settings, content, code))
 
 
 def check_texts(study: Study) -> None:

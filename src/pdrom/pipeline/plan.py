@@ -5,32 +5,40 @@ import sys
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
-from pdrom.core.errors import PdromError
+from pdrom.core.artifact import Artifact
+from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.logs import planning_log
-from pdrom.core.paths import RESULTS
+from pdrom.core.paths import TABLE
+from pdrom.core.reads import Labels
 from pdrom.experiments.hard_cases.expectations import load_expectations
+from pdrom.experiments.kit.declaration import Experiment, experiments
+from pdrom.pipeline.contents import paths_of
+from pdrom.pipeline.costs import Request, Size
 from pdrom.pipeline.figures import FigureJob, figure_jobs
-from pdrom.pipeline.fingerprint import fingerprint
+from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.full import FULL_STUDY
-from pdrom.pipeline.jobs import Jobs, digest
-from pdrom.pipeline.paper import PaperJob, check_texts, paper_job
+from pdrom.pipeline.paper import PaperJobs, check_texts, paper_jobs
+from pdrom.pipeline.resolve import Job, Resolver
 from pdrom.pipeline.scene_artifacts import SceneArtifacts
 from pdrom.pipeline.scenes import require_scenes
 from pdrom.pipeline.study import Study, StudySettings
 from pdrom.pipeline.subspace_scenes import check_subspaces
-from pdrom.pipeline.tables import Tables
-from pdrom.reduction.method import MethodSpec
+from pdrom.pipeline.values import scaled_methods
 from pdrom.report.scenes.catalogue import ARTIFACTS
+from pdrom.tables import declared
 from pdrom.tables.claims import load_claims
+
+OF_STUDY = Folders()
 
 
 def load_plan(
     config: dict[str, Any],
     root: Path,
     files: Sequence[str | Path] = (),
-    results: str = RESULTS,
+    folders: Folders = OF_STUDY,
     quiet: bool = False,
 ) -> "Plan":
     """Plan of a configuration; a faulty one ends the process with one line, before any job.
@@ -38,7 +46,7 @@ def load_plan(
     Parameters
     ----------
     files : where the configuration came from, for the messages
-    results : folder of its results
+    folders : of its results
     quiet : whether warnings are dropped, see `pdrom.core.logs.planning_log`
     """
     names = [os.path.relpath(path, root) for path in files] or [FULL_STUDY]
@@ -46,7 +54,7 @@ def load_plan(
     try:
         others = ", ".join(sorted({*names} - {FULL_STUDY})) or "the command line"
         with planning_log(quiet):
-            plan = Plan(Study.load(config, root, source), results, others)
+            plan = Plan(Study.load(config, root, source), folders, others)
             plan.check()
         return plan
     except PdromError as error:
@@ -57,21 +65,27 @@ class Plan:
     """Everything that depends on the configuration and is needed to write the rules."""
 
     def __init__(
-        self, study: Study, results: str = RESULTS, configuration: str = FULL_STUDY
+        self, study: Study, folders: Folders = OF_STUDY, configuration: str = FULL_STUDY
     ) -> None:
         self.study = study
         self.root = study.root
-        self.results = results
+        self.results = folders.results
+        self.manuscript = folders.manuscript
         self.configuration = configuration
-        self.jobs = Jobs(study, results)
-        self.tables = Tables(study, results)
-        self.of_scene = SceneArtifacts(study, results)
+        self.experiments = experiments()
+        self.tables = declared()
+        self._resolver = Resolver(study, folders.results)
+        self.of_scene = SceneArtifacts(study, folders.results)
         self.scene_artifacts = ARTIFACTS
 
     @property
     def settings(self) -> StudySettings:
         """Checked settings of the study."""
         return self.study.settings
+
+    def job(self, artifact: Artifact, labels: Labels = MappingProxyType({})) -> Job:
+        """The job of an experiment or table with these labels."""
+        return self._resolver.job(artifact, labels)
 
     def check(self) -> None:
         """Read every file of the configuration, so that a fault shows early."""
@@ -82,7 +96,8 @@ class Plan:
         check_subspaces(self.study)
         self.figure_jobs  # noqa: B018 : every figure and text is checked
         check_texts(self.study)
-        self.jobs.check()
+        scaled_methods(self.study, {})
+        self._check_tables()
 
     def _check_scenes(self, folder: Path) -> None:
         settings = self.settings
@@ -97,20 +112,25 @@ class Plan:
         for place, scenes in named.items():
             require_scenes(self.root, scenes, place)
 
-    # Parameters -----------------------------------------------------------------------------
+    def _check_tables(self) -> None:
+        for table in self.tables.values():
+            try:
+                self.job(table)
+            except ConfigurationError as error:
+                raise ConfigurationError(f"table {table.name} reads {error}") from error
 
-    def digest(self, *paths: str) -> str:
-        """See `pdrom.pipeline.jobs.digest`."""
-        return digest(self.root, *paths)
+    # Tables, figures and manuscript ---------------------------------------------------------
 
-    def method_spec(self, method: str) -> dict[str, Any]:
-        """Plain specification of a method."""
-        return self._method(method).model_dump(mode="json")
+    @property
+    def table_paths(self) -> list[str]:
+        """File of every table."""
+        return [TABLE.at(self.results, name=name) for name in self.tables]
 
-    def _method(self, method: str) -> MethodSpec:
-        return self.study.methods[method]
-
-    # Figures and manuscript -----------------------------------------------------------------
+    @property
+    def measured(self) -> list[str]:
+        """Every file that an experiment of the study writes."""
+        places = [place for made in self.experiments.values() for place in made.writes.values()]
+        return [path for place in places for path in paths_of(self.study, place, self.results)]
 
     @cached_property
     def figure_jobs(self) -> dict[str, FigureJob]:
@@ -120,13 +140,23 @@ class Plan:
     @property
     def figures(self) -> list[str]:
         """PDF of every figure."""
-        return [job.pdf for job in self.figure_jobs.values()]
+        return [figure.pdf for figure in self.figure_jobs.values()]
+
+    @property
+    def fixed(self) -> dict[str, list[Job]]:
+        """Jobs of tables, figures and the manuscript by the folder of their logs, in order."""
+        return {
+            "tables": [self.job(table) for table in self.tables.values()],
+            "figures": [figure.job for figure in self.figure_jobs.values()],
+            "paper": [self.paper.inputs, self.paper.manuscript],
+        }
 
     @cached_property
-    def paper(self) -> PaperJob:
+    def paper(self) -> PaperJobs:
         """The manuscript."""
-        captions = {name: job.tex for name, job in self.figure_jobs.items()}
-        return paper_job(self.study, captions, self.configuration, self.results)
+        return paper_jobs(
+            self.study, self.figure_jobs, self.configuration, self.results, self.manuscript
+        )
 
     # Resources ------------------------------------------------------------------------------
 
@@ -135,16 +165,32 @@ class Plan:
         request = self.study.costs.request(kind)
         return {"mem_mb": request.memory_mb, "runtime": request.minutes}
 
+    def resources_of(self, experiment: Experiment) -> dict[str, Any]:
+        """Memory (MB) and minutes that a job asks a cluster for; a whole node to be alone on it."""
+
+        def request(wildcards: Labels) -> Request:
+            labels = self.job(experiment, wildcards).labels
+            return self.study.costs.request(
+                experiment.name, self.size(labels), labels.get("method")
+            )
+
+        asked = {
+            "mem_mb": lambda wildcards: request(wildcards).memory_mb,
+            "runtime": lambda wildcards: request(wildcards).minutes,
+        }
+        return {**asked, "slurm_extra": "--exclusive"} if experiment.alone else asked
+
+    def size(self, labels: Labels) -> Size | None:
+        """Size of a job's scene, which its cost grows with; None without a scene."""
+        if "scene" not in labels:
+            return None
+        size = self.study.size(labels["scene"])
+        return size.refined(float(labels["factor"])) if "factor" in labels else size
+
     def seconds(self, rule: str, labels: Mapping[str, str]) -> float:
         """Expected processor time of a job, by the measured jobs of the full study."""
         cost = self.study.costs.cost
-        if rule in {experiment.name for experiment in self.jobs.experiments}:
-            return cost(rule, self.jobs.size(labels), labels.get("method")).seconds
+        if rule in self.experiments:
+            return cost(rule, self.size(labels), labels.get("method")).seconds
         others = {"table": rule.endswith("_table"), "paper": rule.startswith("paper")}
         return cost(next((kind for kind, held in others.items() if held), "figure")).seconds
-
-    # Code -----------------------------------------------------------------------------------
-
-    def code(self, *modules: str) -> str:
-        """Fingerprint of the code that a job runs; a change of it reruns the job."""
-        return fingerprint(*modules)

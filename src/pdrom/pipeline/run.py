@@ -111,7 +111,7 @@ class Run:
         except PdromError as error:
             say_last(f"pdrom: {error}\n")
         words = apart(plan.study)
-        say_last(summary(self.command, folders, plan.figures, plan.tables.paths, words))
+        say_last(summary(self.command, folders, plan.figures, plan.table_paths, words))
         cancel_timers()
 
     def _record(self, plan: Plan, folders: Folders) -> None:

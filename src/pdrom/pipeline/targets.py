@@ -11,7 +11,6 @@ from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.paths import RESULTS, Place
 from pdrom.pipeline.figure_command import WORD
 from pdrom.pipeline.folders import Folders
-from pdrom.pipeline.holdings import HELD, paths_of
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.scenes import read_scene, scene_names
 from pdrom.report.scenes.catalogue import default_files
@@ -133,14 +132,13 @@ def _suggestion(value: str, allowed: Iterable[str]) -> str:
 def known(plan: Plan) -> Known:
     """What the study of a plan knows."""
     study, names = plan.study, Names(list(plan.figure_jobs), declared())
-    held = [path for place in HELD for path in paths_of(study, place, plan.results)]
 
     def mesh(scene: str) -> str:
         return read_scene(study.root, scene, study.settings.coarsen).mesh.identifier
 
     return Known(
         results=plan.results,
-        files=[*plan.tables.paths, *plan.figures, *held],
+        files=[*plan.table_paths, *plan.figures, *plan.measured],
         names=names,
         labels={
             "scene": lambda labels: {*scene_names(study.root), *study.scenes},

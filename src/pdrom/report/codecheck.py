@@ -7,7 +7,6 @@ knows is left empty; so is an ORCID, which the format asks for, of an author who
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import yaml
 from pybtex.database import parse_file
@@ -33,7 +32,7 @@ HEAD = """\
 _TITLE = re.compile(r"\\title\{([^\\}]*)")
 
 
-def codecheck(tables: Iterable[Table[Any]]) -> str:
+def codecheck(tables: Iterable[Table]) -> str:
     """Content of ``codecheck.yml``, in the folder of the project."""
     title = _TITLE.search(Path("paper/main.tex").read_text(encoding="utf-8"))
     assert title, "the manuscript has no title"

@@ -1,9 +1,13 @@
 """Rule of a figure: results -> PDF and PNG."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, JsonValue
 
+from pdrom.core.artifact import Artifact
+from pdrom.core.paths import FIGURE, FIGURE_PICTURE, File
+from pdrom.core.reads import Given, Setting
 from pdrom.report.figures.kit.catalogue import declaration
 from pdrom.report.figures.kit.holdings import Holdings
 from pdrom.report.figures.kit.results import Results
@@ -36,3 +40,37 @@ def draw(order: Order, results: str, pdf: str, png: str) -> None:
     published = Path(order.published) if order.published else None
     read = Results(results, order.holdings, order.settings, published)
     write_figure(draw_figure(order.name, read, options, order.full), order.title, pdf, png)
+
+
+def figure(files: list[str], order: Order, pdf: File, png: File) -> None:
+    """Draw the figure that ``order`` names; ``files`` are those that it reads."""
+    draw(order, str(Path(pdf.path).parents[1]), pdf.path, png.path)
+
+
+class _Figure(Artifact):
+    """One function draws every figure."""
+
+    @property
+    def rule(self) -> str:
+        """Name of the rule that makes it."""
+        return f"figure_{self.name}"
+
+    @property
+    def address(self) -> str:
+        """Place of `ANY_FIGURE`."""
+        return f"{self.module}:ANY_FIGURE"
+
+
+ANY_FIGURE = _Figure(
+    "figure",
+    "Figure",
+    reads={"files": Given(), "order": Setting("order")},
+    writes={"pdf": FIGURE, "png": FIGURE_PICTURE},
+    function=figure,
+)
+
+
+def drawn(name: str) -> Artifact:
+    """Figure ``name`` as an artifact."""
+    places = {kind: place.where(name=name) for kind, place in ANY_FIGURE.writes.items()}
+    return replace(ANY_FIGURE, name=name, title=f"Figure {name}", writes=places)

@@ -75,10 +75,8 @@ def bundle(arguments: Sequence[str]) -> Status:
 def unfinished(subject: Subject, manifest: Manifest) -> Iterator[str]:
     """Tables, figures and manuscript that are not in the manifest as today's code makes them."""
     plan, folders = subject.plan, subject.folders
-    wanted = {path: plan.tables.params(n)["code"] for n, path in _tables(subject).items()}
-    for job in plan.figure_jobs.values():
-        wanted |= {job.pdf: job.code, job.png: job.code}
-    wanted[folders.manuscript] = plan.code("pdrom.report.paper.build")
+    jobs = [job for jobs in plan.fixed.values() for job in jobs]
+    wanted = {path: job.code for job in jobs for path in job.outputs.values()}
     for path, code in wanted.items():
         entry = manifest.files.get(os.path.relpath(path, folders.results))
         if entry is None or entry.code_sha256 != code:
@@ -114,7 +112,7 @@ def results(subject: Subject, manifest: Manifest) -> Iterator[Member]:
 def paper(subject: Subject) -> Iterator[Member]:
     """The manuscript's source with all that it reads, in one folder."""
     plan = subject.plan
-    files = [Path(path) for path in (*plan.paper.inputs, *plan.figures)]
+    files = [Path(path) for path in (*plan.paper.files, *plan.figures)]
     main, *sections = (Path(path) for path in plan.paper.sources)
     named = {path.name: path for path in (main, *files)}
     named |= {str(path.relative_to(main.parent)): path for path in sections}
@@ -153,8 +151,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _tables(subject: Subject) -> dict[str, str]:
-    tables = subject.plan.tables
-    return {name: tables.path(name) for name in tables}
+    return dict(zip(subject.plan.tables, subject.plan.table_paths, strict=True))
 
 
 def _git(root: Path, *arguments: str) -> bytes:

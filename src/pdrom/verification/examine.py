@@ -14,7 +14,7 @@ from pdrom.core.store import Condition, check_file, read_table
 from pdrom.pipeline.figures import FigureJob
 from pdrom.tables import declared
 from pdrom.tables.claims import is_timed, load_claims
-from pdrom.verification.again import is_derived, made, table_job
+from pdrom.verification.again import is_derived, made
 from pdrom.verification.compare import Comparison
 from pdrom.verification.judge import Judgement, in_words, judge
 from pdrom.verification.lines import Line, Outcome, table_line
@@ -100,12 +100,12 @@ class Examination:
         """
         if not is_derived(name):
             return None
-        job = table_job(self.subject.plan, name)
-        if any(self.condition(path) is not Condition.INTACT for path in _results(job.inputs)):
+        job = self.subject.plan.job(declared()[name])
+        if any(self.condition(path) is not Condition.INTACT for path in _results(job.files)):
             return None
         if name not in self.made_again:
             with made(job) as files:
-                self.made_again[name] = read_table(files[job.outputs[0]])
+                self.made_again[name] = read_table(files[job.outputs["table"]])
         return self.made_again[name]
 
     def table(self, name: str) -> Line:
@@ -194,17 +194,17 @@ class Examination:
             self._figure(name, job, by_name) for name, job in self.subject.plan.figure_jobs.items()
         ]
 
-    def _figure(self, name: str, job: FigureJob, tables: Mapping[str, Line]) -> Line:
-        missing = self._missing("figure", name, [job.pdf, job.png])
+    def _figure(self, name: str, figure: FigureJob, tables: Mapping[str, Line]) -> Line:
+        missing = self._missing("figure", name, [figure.pdf, figure.png])
         if missing is not None:
             return missing
         paths = {TABLE.at(self.subject.results, name=table): table for table in declared()}
-        read = [paths[path] for path in job.inputs if path in paths]
+        read = [paths[path] for path in figure.job.files if path in paths]
         bad = [tables[table] for table in read if tables[table].outcome not in GOOD]
         if bad:
             text = f"reads the table(s) {', '.join(line.name for line in bad)}"
             return Line("figure", name, bad[0].outcome, text)
-        files = [path for path in _results(job.inputs) if path not in paths]
+        files = [path for path in _results(figure.job.files) if path not in paths]
         for path in files:
             if self.condition(path) is not Condition.INTACT:
                 text = f"{path}, which it reads, is not there or damaged"

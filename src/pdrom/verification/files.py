@@ -8,13 +8,15 @@ import os
 import shlex
 import sys
 from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
 
 from pdrom.core.errors import StorageError
 from pdrom.core.paths import MANIFEST
 from pdrom.core.store import Condition, check_file
 from pdrom.pipeline.manifest import Entry, Manifest, asked_for, own_files, read_manifest
-from pdrom.verification.again import Job, differing, jobs
+from pdrom.pipeline.resolve import Job
+from pdrom.verification.again import differing
 from pdrom.verification.status import Status
 from pdrom.verification.subject import Subject
 
@@ -49,7 +51,7 @@ def _compare(subject: Subject, manifest: Manifest) -> Status:
     faults = {path: _fault(path, entry, path in ours) for path, entry in entries.items()}
     faults |= {path: _unlisted(path) for path in sorted(own - set(entries))}
     faults = {path: fault for path, fault in faults.items() if fault}
-    faults |= dict.fromkeys(_other(jobs(plan, folders), set(faults)), OTHER)
+    faults |= dict.fromkeys(_other(chain.from_iterable(plan.fixed.values()), set(faults)), OTHER)
     for path, fault in list(faults.items())[:SHOWN]:
         hint = "" if fault == FOREIGN else f"; make it anew by {anew(subject, path)}"
         _say(f"{path}: {fault}{hint}")
@@ -85,7 +87,7 @@ def _other(made: Iterable[Job], faulty: set[str]) -> list[str]:
     return [
         path
         for job in made
-        if faulty.isdisjoint((*job.inputs, *job.outputs))
+        if faulty.isdisjoint((*job.files, *job.outputs.values()))
         for path in differing(job)
     ]
 

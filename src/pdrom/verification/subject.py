@@ -62,4 +62,4 @@ class Subject:
             config=parse_config(command.settings), configfiles=list(map(Path, command.configfiles))
         )
         update_config(merged, given.overwrite_config)
-        return load_plan(merged, Path(), command.configfiles, self.results, quiet=True)
+        return load_plan(merged, Path(), command.configfiles, self.folders, quiet=True)

@@ -33,7 +33,7 @@ def written(tmp_path_factory):
     mesh = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
     scene = make_scene(*EFFECTS, mesh=mesh, frames=8, held_out={"kick": 0.5})
     path = tmp_path_factory.mktemp("alternatives") / "x1.csv"
-    settings = experiment.Settings(
+    settings = experiment.Options(
         scene=scene.config,
         alternatives=Comparison(
             compared=6,
@@ -46,8 +46,8 @@ def written(tmp_path_factory):
         ),
         blowup_extent=100.0,
     )
-    output = experiment.Outputs(File(str(path), {"scene": "test", "factor": "1"}))
-    experiment.run(settings, experiment.Inputs([]), output)
+    out = File(str(path), {"scene": "test", "factor": "1"})
+    experiment.alternatives(sources=[], settings=settings, out=out)
     return path
 
 

@@ -7,14 +7,7 @@ import pytest
 from builders import make_scene
 from pdrom.core.paths import File
 from pdrom.core.store import read_table, write_hdf5, write_table
-from pdrom.experiments.iterations import (
-    COLUMNS,
-    Inputs,
-    IterationSweep,
-    Outputs,
-    Settings,
-    run,
-)
+from pdrom.experiments.iterations import COLUMNS, IterationSweep, iterations
 from pdrom.experiments.kit.settings import Horizon
 from pdrom.model.mesh.types import save_mesh
 
@@ -45,8 +38,10 @@ def test_the_sweep_approaches_the_limit(tmp_path):
 
     def swept(**changes):
         sweep = asked.model_copy(update=changes)
-        settings = Settings(scene=scene.config, iterations=sweep, horizon=horizon, solver="splu")
-        run(settings, Inputs(mesh, fom, floor), Outputs(output))
+        iterations(
+            mesh=mesh, fom=fom, sensitivity=floor, config=scene.config, sweep=sweep,
+            horizon=horizon, solver="splu", out=output,
+        )  # fmt: skip
         return read_table(output.path, COLUMNS)
 
     everything = swept()

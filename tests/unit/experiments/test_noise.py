@@ -13,14 +13,12 @@ from pdrom.experiments.noise import (
     ALL,
     PLANE,
     VERTEX,
-    Inputs,
     NoiseRuns,
-    Outputs,
-    Settings,
+    Options,
     kinds,
+    noise,
     noise_basis,
     roundoff_field,
-    run,
 )
 from pdrom.model.mesh.types import save_mesh
 from pdrom.pipeline.scenes import Coarsen, load_bound_scene
@@ -63,7 +61,7 @@ def test_the_joint_selection_fails_where_an_axis_carries_nothing(fall, tmp_path)
     sensitivity = tmp_path / "sensitivity.csv"
     write_table(pd.DataFrame({**floor, "relative_difference": 0.0}), sensitivity)
     save_mesh(fall.mesh, tmp_path / "mesh.h5", {})
-    settings = Settings(
+    settings = Options(
         scene=fall.config,
         noise=NoiseRuns(sizes=(2, 5, 99), repetitions=2),
         noise_methods={name: METHODS[name] for name in ("deim-joint", "published")},
@@ -73,7 +71,8 @@ def test_the_joint_selection_fails_where_an_axis_carries_nothing(fall, tmp_path)
     mesh = File(str(tmp_path / "mesh.h5"), {"mesh": "m"})
     output = File(str(tmp_path / "noise.csv"), labels)
     runs = File(str(tmp_path / "noise.h5"), labels)
-    run(settings, Inputs(mesh, File(str(sensitivity), labels)), Outputs(output, runs))
+    floors = File(str(sensitivity), labels)
+    noise(mesh=mesh, sensitivity=floors, settings=settings, out=output, runs=runs)
     table = read_table(Path(output.path))
     assert len(table) == 3 * 2 * 2 * 3
     beyond = table.r == 99

@@ -5,15 +5,14 @@ import pytest
 
 from pdrom.core.paths import File
 from pdrom.core.store import read_table
-from pdrom.experiments.kit.declaration import Nothing
-from pdrom.experiments.offline import Offline, Outputs, Settings, decaying, run
+from pdrom.experiments.offline import Offline, decaying, offline
 
 SMALL = {"rows": 400, "snapshots": 12, "r": 12, "elements": 300, "equations": 40}
 
 
 def test_every_algorithm_has_a_row_and_agrees_with_pymor(tmp_path):
     path = tmp_path / "offline.csv"
-    run(Settings(offline=Offline(**SMALL)), Nothing(), Outputs(File(str(path), {})))
+    offline(sizes=Offline(**SMALL), out=File(str(path), {}))
     table = read_table(path)
     pairs = list(zip(table.task, table.implementation, strict=True))
     assert pairs == [

@@ -32,13 +32,10 @@ def written(tmp_path_factory):
     changes = {"reduce": {"spring": {"train": 5}}, "held_out": {"kick": 0.5}}
     config = SceneConfig.model_validate(scene.config.model_dump(mode="json") | changes)
     path = tmp_path_factory.mktemp("online") / "scene.csv"
-    settings = experiment.Settings(
-        scene=config,
-        online=OnlineModels(bases=("pod", "skinning"), sizes=(3,), tolerances=(0.3, 1e-2)),
-    )
+    asked = OnlineModels(bases=("pod", "skinning"), sizes=(3,), tolerances=(0.3, 1e-2))
     models = path.with_suffix(".h5")
-    output = experiment.Outputs(File(str(path), {"scene": "test"}), File(str(models), {}))
-    experiment.run(settings, experiment.Inputs([]), output)
+    out, stored = File(str(path), {"scene": "test"}), File(str(models), {})
+    experiment.online(sources=[], config=config, asked=asked, out=out, models=stored)
     timed = TimedScene(scene=config, subspaces=Subspaces(path=str(models)))
     request = Request(
         scenes=(timed,), timing=Protocol(frames=3, warmup=1, repeats=1), solver=DEFAULT_SOLVER,

@@ -75,62 +75,63 @@ def study(tmp_path_factory) -> Made:
         reduce={"strain": {"train": 8}},
     ).config
     grid = file("mesh.h5")
-    mesh.run(mesh.Settings(mesh=scene.mesh), mesh.Inputs([]), mesh.Outputs(grid))
+    mesh.mesh(sources=[], config=scene.mesh, out=grid)
     runs = {run: file(f"{run}.h5", run=run) for run in ("train", "heldout")}
     for run in runs.values():
-        settings = fom.Settings(scene=scene, solver="supernodal", threads=1)
-        fom.run(settings, fom.Inputs(grid), fom.Outputs(run))
+        fom.fom(mesh=grid, config=scene, solver="supernodal", threads=1, out=run)
     stored = file("snapshots.h5", group="strain")
-    inputs = snapshots.Inputs(grid, runs["train"], runs["heldout"])
-    snapshots.run(snapshots.Settings(scene=scene), inputs, snapshots.Outputs(stored))
+    snapshots.snapshots(mesh=grid, **runs, config=scene, out=stored)
     bases, samplings = [], []
     for name, spec in METHODS.items():
         bases.append(file(f"pod/{name}.h5", group="strain", basis=spec.basis_id))
-        pod.run(pod.Settings(basis=spec), pod.Inputs(stored), pod.Outputs(bases[-1]))
+        pod.pod(snapshots=stored, spec=spec, out=bases[-1])
         labels = {"group": "strain", "method": name}
-        names = ("sampling.h5", "errors.csv", "runs.h5", "train.csv", "heldout.csv")
-        outputs = reruns.Outputs(*(file(f"{name}/{kind}", **labels) for kind in names))
-        settings = reruns.Settings(
+        names = ("sampling", "errors", "runs", "out", "heldout_table")
+        outputs = {kind: file(f"{name}/{kind}", **labels) for kind in names}
+        settings = reruns.Options(
             scene=scene, method=spec, sweep=Sweep(dense_to=4, step=4), ranks=(4,),
-            heldout_ranks=(), guard=GuardSettings(), companions=(), **LIMITS,
+            heldout_ranks=(), guard=GuardSettings(), **LIMITS,
         )  # fmt: skip
-        reruns.run(settings, reruns.Inputs(grid, *runs.values(), stored, bases[-1], []), outputs)
-        samplings.append(outputs.sampling)
+        reruns.reruns(
+            mesh=grid, fom=runs["train"], heldout=runs["heldout"], snapshots=stored,
+            basis=bases[-1], companions=[], settings=settings, **outputs,
+        )  # fmt: skip
+        samplings.append(outputs["sampling"])
     models = file("models.h5")
     tables = {run: file(f"models_{run}.csv") for run in runs}
     asked = SubspaceModels(
         bases=("pod",), sizes=(2, 4), tolerances=(1e-2,), interpolated_sizes=(),
     )  # fmt: skip
-    subspaces.run(
-        subspaces.Settings(scene=scene, subspace=asked, blowup_extent=100.0),
-        subspaces.Inputs(grid, *runs.values()),
-        subspaces.Outputs(models, *tables.values(), file("seconds.csv")),
+    subspaces.subspaces(
+        mesh=grid,
+        **runs,
+        settings=subspaces.Options(scene=scene, subspace=asked, blowup_extent=100.0),
+        out=models,
+        train_table=tables["train"],
+        heldout_table=tables["heldout"],
+        seconds_table=file("seconds.csv"),
     )
     beside = file("companion.h5")
-    companion.run(
-        companion.Settings(scene=scene, companion=CompanionSpec(modes=4)),
-        companion.Inputs(grid, runs["train"]),
-        companion.Outputs(beside),
-    )
+    spec = CompanionSpec(modes=4)
+    companion.companion(mesh=grid, train=runs["train"], config=scene, spec=spec, out=beside)
     return Made(scene, folder, grid, runs, bases, samplings, models, beside, tables)
 
 
 @pytest.fixture(scope="module")
 def table(study) -> pd.DataFrame:
     output = File(str(study.folder / "stability.csv"), {"scene": "test"})
-    stability.run(
-        stability.Settings(scene=study.scene, methods=METHODS, stability=SHORT, **LIMITS),
-        stability.Inputs(study.mesh, study.bases, study.samplings, [study.subspaces]),
-        stability.Outputs(output),
-    )
+    stability.stability(
+        mesh=study.mesh, bases=study.bases, samplings=study.samplings, subspaces=[study.subspaces],
+        config=study.scene, methods=METHODS, short=SHORT, **LIMITS, out=output,
+    )  # fmt: skip
     return read_table(output.path)
 
 
-def try_guard(folder: Path, trials: tuple[Trial, ...], inputs: guard.Inputs) -> pd.DataFrame:
+def try_guard(folder: Path, trials: tuple[Trial, ...], *files: list[File]) -> pd.DataFrame:
     output = File(str(folder / "guard.csv"), {})
     asked = TriedGuard(margin=1e-6, repeats=1)
-    settings = guard.Settings(trials=trials, guard=asked, **LIMITS)
-    guard.run(settings, inputs, guard.Outputs(output))
+    settings = guard.Options(trials=trials, guard=asked, **LIMITS)
+    guard.guard(*files, settings=settings, out=output)
     return read_table(output.path)
 
 
@@ -180,7 +181,7 @@ def test_guard_compares_its_actions_with_the_full_order(study):
         study.mesh, study.runs["train"], study.bases[index], study.samplings[index],
         study.companion,
     )  # fmt: skip
-    table = try_guard(study.folder, (trial,), guard.Inputs(*([file] for file in files)))
+    table = try_guard(study.folder, (trial,), *([file] for file in files))
     assert table.columns.tolist() == guard.COLUMNS
     full, plain, reported, fallen, told, mended = (row for _, row in table.iterrows())
     assert [full.method, plain.action, reported.action, fallen.action] == [
@@ -202,7 +203,7 @@ def test_guard_compares_its_actions_with_the_full_order(study):
 
 
 def test_guard_without_cases_is_an_empty_table(tmp_path):
-    table = try_guard(tmp_path, (), guard.Inputs([], [], [], [], []))
+    table = try_guard(tmp_path, (), [], [], [], [], [])
     assert table.columns.tolist() == guard.COLUMNS
     assert len(table) == 0
 
@@ -213,9 +214,11 @@ def bound_rows(study: Made, methods: dict[str, MethodSpec] = METHODS) -> pd.Data
     floor = {"scene": "test", "perturbation": "1e-10", "frame": range(16)}
     write_table(pd.DataFrame(floor).assign(relative_difference=1e-9), perturbed.path)
     horizon = Horizon(perturbation=1e-10, threshold=1e-3)
-    asked = bounds.Settings(scene=study.scene, methods=methods, ranks=(2, 4, 30), horizon=horizon)
-    inputs = bounds.Inputs(study.mesh, study.runs["train"], perturbed, study.bases, study.samplings)
-    bounds.run(asked, inputs, bounds.Outputs(output))
+    asked = bounds.Options(scene=study.scene, methods=methods, ranks=(2, 4, 30), horizon=horizon)
+    bounds.bounds(
+        mesh=study.mesh, fom=study.runs["train"], perturbed=perturbed, bases=study.bases,
+        samplings=study.samplings, settings=asked, out=output,
+    )  # fmt: skip
     return read_table(output.path)
 
 

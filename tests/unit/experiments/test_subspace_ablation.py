@@ -91,17 +91,18 @@ def rows(tmp_path_factory) -> pd.DataFrame:
             "mended": InterpolationVariant(states="visited", oversampling=3),
         },
     )
-    experiment.run(
-        experiment.Settings(
+    experiment.subspace_ablation(
+        mesh=file("mesh.h5"),
+        train=file("train.h5"),
+        heldout=file("heldout.h5"),
+        sensitivity=file("sensitivity.csv"),
+        settings=experiment.Options(
             scene=scene.config,
             ablation=variants,
             horizon=Horizon(perturbation=1e-10, threshold=1e-3),
             blowup_extent=5.0,
         ),
-        experiment.Inputs(
-            file("mesh.h5"), file("train.h5"), file("heldout.h5"), file("sensitivity.csv")
-        ),
-        experiment.Outputs(file("rows.csv")),
+        out=file("rows.csv"),
     )
     return read_table(folder / "rows.csv").set_index("variant", drop=False)
 

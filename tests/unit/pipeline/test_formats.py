@@ -7,10 +7,10 @@ from pathlib import Path
 import h5py
 import pytest
 
-from pdrom.core.provenance import RECORD, made_by
+from pdrom.core.provenance import RECORD
 from pdrom.core.yamlfile import read_yaml
-from pdrom.pipeline.jobs import Jobs
-from pdrom.pipeline.plan import load_plan
+from pdrom.pipeline.folders import Folders
+from pdrom.pipeline.plan import Plan, load_plan
 from places import ROOT
 
 SCENE, GROUP, METHOD = "strain_oop", "strain", "block-deim"
@@ -40,15 +40,11 @@ def documented() -> dict[str, dict[str, tuple[str, str, str]]]:
     return found
 
 
-def perform(jobs: Jobs, name: str, labels: dict[str, str]) -> dict[str, str]:
+def perform(plan: Plan, name: str, labels: dict[str, str]) -> dict[str, str]:
     """Run a job here; paths that it wrote by the pattern of the page."""
-    experiment = next(e for e in jobs.experiments if e.name == name)
-    inputs = {key: files(labels) for key, files in jobs.inputs(experiment).items()}
-    outputs = {key: path.format(**labels) for key, path in jobs.outputs(experiment).items()}
-    settings = jobs.params(experiment)["settings"](labels)
-    with made_by(name, settings, "c0de"):
-        experiment.perform(settings, inputs, outputs)
-    return {experiment.outputs[key].pattern: path for key, path in outputs.items()}
+    job = plan.job(plan.experiments[name], labels)
+    job.make(job.outputs)
+    return {job.artifact.writes[key].pattern: path for key, path in job.outputs.items()}
 
 
 @pytest.fixture(scope="module")
@@ -65,14 +61,14 @@ def files(tmp_path_factory):
             "heldout_ranks": ["full"],
             "coarsen": {"resolution": 0.3, "frames": 0.1},
         }
-        plan = load_plan(config, Path(), results=os.fspath(folder), quiet=True)
+        plan = load_plan(config, Path(), folders=Folders(os.fspath(folder)), quiet=True)
         more = {
             "mesh": {"mesh": plan.study.mesh_of(SCENE)},
             "pod": {"basis": plan.study.methods[METHOD].basis_id},
         }
         made = {}
         for name, labels in RULES:
-            made |= perform(plan.jobs, name, {**labels, **more.get(name, {})})
+            made |= perform(plan, name, {**labels, **more.get(name, {})})
     return made, plan.study.bound[SCENE]
 
 

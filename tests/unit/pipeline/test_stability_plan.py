@@ -5,10 +5,11 @@ import pytest
 from pdrom.core import paths
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import read_yaml, validate
-from pdrom.experiments import guard, stability
-from pdrom.experiments.guard import GuardSection
-from pdrom.pipeline.holdings import labels_of
-from pdrom.pipeline.jobs import Jobs
+from pdrom.experiments.guard import GuardSection, guard
+from pdrom.experiments.reruns import reruns
+from pdrom.experiments.stability import stability
+from pdrom.pipeline.contents import labels_of
+from pdrom.pipeline.resolve import Resolver
 from pdrom.pipeline.study import Study, StudySettings
 from pdrom.reduction.local.guard_settings import GuardSettings
 from places import ROOT
@@ -47,10 +48,9 @@ def test_faults_are_named(section, message):
 def test_reruns_depend_on_the_guard_but_not_on_its_cases():
     """A further case must not rerun what was watched."""
     cases = [{"scene": "strain_oop", "method": "deim", "r": 6}]
-    made = Jobs(study(guard={"action": "stop", "margin": 0.5, "cases": cases}), "results")
-    (reruns,) = (e for e in made.experiments if e.name == "reruns")
+    made = Resolver(study(guard={"action": "stop", "margin": 0.5, "cases": cases}), "results")
     labels = {"scene": "strain_oop", "group": "strain", "method": "deim"}
-    plain = made.settings(reruns, labels).model_dump(mode="json")["guard"]
+    plain = made.job(reruns, labels).settings["settings"]["guard"]
     assert plain == GuardSettings(action="stop", margin=0.5).model_dump(mode="json")
 
 
@@ -63,18 +63,17 @@ def test_reruns_depend_on_the_guard_but_not_on_its_cases():
     ],
 )
 def test_reruns_wait_for_the_companion_where_it_gives_the_alarm(asked, companions):
-    made = Jobs(study(guard=asked), "results")
-    (reruns,) = (e for e in made.experiments if e.name == "reruns")
     labels = {"scene": "strain_oop", "group": "strain", "method": "deim"}
-    assert made.inputs(reruns)["companions"](labels) == companions
+    made = Resolver(study(guard=asked), "results").job(reruns, labels)
+    assert made.inputs["companions"] == companions
 
 
 def test_short_runs_are_planned_where_the_study_holds_them():
     asked = {"scenes": ["strain_oop", "bar_release"], "ranks": [6, 20]}
     made = study(stability=asked)
     assert labels_of(made, paths.STABILITY) == [{"scene": "strain_oop"}]
-    settings = Jobs(made, "results").settings(stability.EXPERIMENT, {"scene": "strain_oop"})
-    plain = settings.model_dump(mode="json")["stability"]
+    job = Resolver(made, "results").job(stability, {"scene": "strain_oop"})
+    plain = job.settings["short"]
     assert plain["ranks"] == [6]
     # which scenes have short runs and how they are judged makes no run anew
     assert not {"scenes", "wrong", "left", "departure"} & set(plain)
@@ -88,23 +87,22 @@ def test_cases_are_planned_where_the_study_holds_them():
         {"scene": "spring_oop", "method": "deim", "r": 20},
         {"scene": "spring_oop", "method": "deim", "r": 6},
     ]
-    made = Jobs(study(guard={"cases": cases}), "elsewhere")
-    trials = made.settings(guard.EXPERIMENT, {}).trials
-    found = [(t.scene.name, t.group, t.name, t.r) for t in trials]
+    job = Resolver(study(guard={"cases": cases}), "elsewhere").job(guard, {})
+    trials = job.settings["settings"]["trials"]
+    found = [(t["scene"]["name"], t["group"], t["name"], t["r"]) for t in trials]
     assert found == [("strain_oop", "strain", "gappy", "full"), ("spring_oop", "spring", "deim", 6)]
-    inputs = {name: files({}) for name, files in made.inputs(guard.EXPERIMENT).items()}
-    assert inputs["samplings"] == [
+    assert job.inputs["samplings"] == [
         "elsewhere/sampling/strain_oop/strain/gappy.h5",
         "elsewhere/sampling/spring_oop/spring/deim.h5",
     ]
-    assert [len(files) for files in inputs.values()] == [2] * 5
+    assert [len(files) for files in job.inputs.values()] == [2] * 5
 
 
 def test_nothing_to_plan_is_no_fault():
     made = study()
     assert labels_of(made, paths.STABILITY) == []
-    inputs = Jobs(made, "results").inputs(guard.EXPERIMENT)
-    assert all(files({}) == [] for files in inputs.values())
+    job = Resolver(made, "results").job(guard, {})
+    assert all(files == [] for files in job.inputs.values())
 
 
 @pytest.mark.parametrize("name", ["default", "tiny"])

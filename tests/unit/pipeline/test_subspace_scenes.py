@@ -7,7 +7,8 @@ import yaml
 
 from pdrom.core import paths
 from pdrom.core.errors import ConfigurationError
-from pdrom.pipeline.holdings import HELD, labels_of
+from pdrom.experiments.kit.declaration import experiments
+from pdrom.pipeline.contents import labels_of
 from pdrom.pipeline.study import Study
 from pdrom.pipeline.subspace_scenes import check_subspaces
 from places import ROOT
@@ -48,7 +49,8 @@ def test_everything_else_is_held(root):
     held = study(root)
     without = {
         place
-        for place in HELD
+        for experiment in experiments().values()
+        for place in experiment.writes.values()
         if {"scene": "spring_oop"} in labels_of(held, place)
         and {"scene": "windy"} not in labels_of(held, place)
     }

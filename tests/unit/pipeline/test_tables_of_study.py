@@ -1,4 +1,4 @@
-"""What the rules of the tables get from a study; the list of tables for readers is up to date."""
+"""What the jobs of the tables get from a study; the list of tables for readers is up to date."""
 
 from dataclasses import replace
 
@@ -6,9 +6,10 @@ import pytest
 
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.reads import PerScene, Setting, TableOf
-from pdrom.pipeline import tables as module
+from pdrom.pipeline.folders import Folders
+from pdrom.pipeline.plan import Plan
+from pdrom.pipeline.resolve import Job
 from pdrom.pipeline.study import Study
-from pdrom.pipeline.tables import Tables
 from pdrom.tables import declared
 from pdrom.tables.kit.document import document
 from places import ROOT
@@ -16,8 +17,12 @@ from places import ROOT
 CONFIG = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "block-deim"]}
 
 
-def made(**changes) -> Tables:
-    return Tables(Study.load(CONFIG | changes, ROOT), "out")
+def plan(**changes) -> Plan:
+    return Plan(Study.load(CONFIG | changes, ROOT), Folders("out"))
+
+
+def made(name: str, **changes) -> Job:
+    return plan(**changes).job(declared()[name])
 
 
 def test_the_list_of_tables_is_up_to_date():
@@ -28,26 +33,24 @@ def test_the_list_of_tables_is_up_to_date():
 
 def test_verdicts_are_a_table_like_others():
     assert {"claims", "singular_values", "guard"} <= set(declared())
-    assert list(made()) == sorted(declared())
+    assert list(declared()) == sorted(declared())
 
 
 @pytest.mark.parametrize("name", declared())
 def test_every_table_finds_what_it_reads(name):
-    tables = made()
-    inputs, settings = tables.inputs(name), tables.params(name)["settings"]
-    assert inputs.keys() | settings.keys() == declared()[name].reads.keys()
-    assert not inputs.keys() & settings.keys()
-    assert tables.path(name) == f"out/tables/{name}.csv"
+    job = made(name)
+    assert job.inputs.keys() | job.settings.keys() == declared()[name].reads.keys()
+    assert not job.inputs.keys() & job.settings.keys()
+    assert job.outputs == {"table": f"out/tables/{name}.csv"}
 
 
 def test_inputs_are_files_of_the_study_in_its_order():
-    tables = made()
-    assert tables.inputs("sensitivity") == {
+    assert made("sensitivity").inputs == {
         "parts": ["out/sensitivity/spring_oop.csv", "out/sensitivity/strain_oop.csv"]
     }
-    assert tables.inputs("budget") == {"points": "out/tables/accuracy_cost.csv"}
-    assert tables.inputs("online")["parts"] == []
-    assert tables.inputs("claims")["rules"] == "config/claims.yaml"
+    assert made("budget").inputs == {"points": "out/tables/accuracy_cost.csv"}
+    assert made("online").inputs["parts"] == []
+    assert made("claims").inputs["rules"] == "config/claims.yaml"
 
 
 @pytest.mark.parametrize(
@@ -64,15 +67,16 @@ def test_of_each_experiments_bases_one_is_read(methods, basis):
     held = list(dict.fromkeys(method.basis_id for method in study.methods.values()))
     expected = "none-none-vectorised" if "none-none-vectorised" in held else held[0]
     assert basis in (None, expected)
-    assert Tables(study, "out").inputs("singular_values")["bases"] == [
+    assert made("singular_values", methods=methods).inputs["bases"] == [
         f"out/pod/spring_oop/spring/{expected}.h5",
         f"out/pod/strain_oop/strain/{expected}.h5",
     ]
 
 
 def test_a_setting_is_a_parameter_of_those_who_read_it_only():
-    before, after = made(), made(stability={"wrong": 0.3})
-    changed = {n for n in before if before.params(n) != after.params(n)}
+    before, after = plan(), plan(stability={"wrong": 0.3})
+    tables = declared().values()
+    changed = {t.name for t in tables if before.job(t).settings != after.job(t).settings}
     assert changed == {"stability"}
 
 
@@ -81,14 +85,12 @@ def test_a_setting_is_a_parameter_of_those_who_read_it_only():
     [
         (Setting("stability.wrogn"), "table budget reads the key 'stability.wrogn'.*wrong"),
         (Setting("budgets.more"), "reads the key 'budgets.more'"),
-        (PerScene("time_stap"), "scenes have no key 'time_stap'.*time_step"),
+        (PerScene("time_stap"), "reads the key 'time_stap' of scenes.*time_step"),
         (TableOf("sensitivty"), "reads 'sensitivty'.*sensitivity"),
     ],
 )
-def test_what_does_not_exist_is_named(read, message, monkeypatch):
-    faulty = replace(declared()["budget"], reads={"points": read})
-    monkeypatch.setattr(module, "declared", lambda: {**declared(), "budget": faulty})
-    tables = made()
+def test_what_does_not_exist_is_named(read, message):
+    asked = plan()
+    asked.tables = {"budget": replace(declared()["budget"], reads={"points": read})}
     with pytest.raises(ConfigurationError, match=message):
-        tables.inputs("budget")
-        tables.params("budget")
+        asked.check()

@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from pdrom.core.paths import File
-from pdrom.experiments.scaling import Inputs, Outputs, Settings, Sized, SizedBreakEven, run
+from pdrom.experiments.scaling import Options, Sized, SizedBreakEven
+from pdrom.experiments.scaling import scaling as experiment
 from pdrom.pipeline.scenes import load_scene
 from pdrom.reduction.method import MethodSpec
 from pdrom.tables.break_even import CURVE, breakeven
@@ -51,7 +52,7 @@ def test_no_scene_gives_empty_tables():
 def test_every_size_is_measured(tmp_path, name):
     scene = load_scene(ROOT, name)
     alone = SizedBreakEven(sizes=(2, 3, 1000), training_frames=9, repeats=2)
-    settings = Settings(
+    settings = Options(
         scene=scene,
         scaled_methods={"block-deim": SPEC, "deim-joint": JOINT},
         scaling=Sized(r=4, k=5, training_frames=8, frames=1, repeats=2, breakeven=alone),
@@ -61,7 +62,7 @@ def test_every_size_is_measured(tmp_path, name):
     for factor in (0.3, 0.5):
         paths = {k: str(tmp_path / f"{k}{factor}") for k in ("iterations", "breakeven", "effects")}
         files = {k: File(path, {"factor": f"{factor:g}"}) for k, path in paths.items()}
-        run(settings, Inputs([]), Outputs(**files))
+        experiment(sources=[], settings=settings, **files)
         outputs[factor] = paths
     sizes = [scene.mesh.coarsened(f).build(ROOT).vertices for f in outputs]
     _check_iterations(scaling([File(made["iterations"], {}) for made in outputs.values()]), sizes)

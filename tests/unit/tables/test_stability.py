@@ -44,14 +44,14 @@ def files(tmp_path):
     sweep = pd.DataFrame(rows).drop(columns="experiment")
     sweep = sweep.assign(blowup_frame=None, energy_ratio=1.0, gain=None, k=None)
     written = {}
-    for name, table in (("reruns", local), ("hyper", hyper), ("sweep", sweep)):
+    for name, table in (("reruns", local), ("subspaces", hyper), ("sweep", sweep)):
         written[name] = [File(str(tmp_path / name / "a.csv"), {"scene": "a"})]
         write_table(table, written[name][0].path)
     judged = pd.concat([local.assign(position_basis="full", k=np.nan), hyper])
     errors = [0.05, None, None, 0.01, 0.5]
     judged = judged.assign(relative_error_within_horizon=errors)
     runs = paths.TRAIN.files([str(fom)])
-    return runs, written["reruns"], written["hyper"], written["sweep"], judged
+    return runs, written["reruns"], written["subspaces"], written["sweep"], judged
 
 
 def test_every_run_has_its_row_and_outcome(files):

@@ -208,7 +208,7 @@ def files(tmp_path) -> Files:
         for name in ("deim.csv", "deim_heldout.csv"):
             written(folder / name, RERUN, *rows)
         reruns.append(str(folder / "deim.h5"))
-    folder = tmp_path / "hyper" / "b"
+    folder = tmp_path / "subspaces" / "b"
     folder.mkdir(parents=True)
     models = {("pod", 8, "full"): [0.4] * 4, ("pod", 8, "ecsw-1e-02"): [0.8] * 4}
     with write_hdf5(folder / "models.h5") as file:

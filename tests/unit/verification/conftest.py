@@ -11,7 +11,7 @@ from pdrom.core.paths import TABLE
 from pdrom.core.reads import TableOf
 from pdrom.core.store import read_table, write_hdf5, write_table, write_text
 from pdrom.tables import declared
-from pdrom.verification.again import is_derived, made, table_job
+from pdrom.verification.again import is_derived, made
 from pdrom.verification.examine import Examination
 from pdrom.verification.references import folder_of, read_reference, write_reference
 from pdrom.verification.subject import Subject
@@ -67,14 +67,14 @@ def project(tracked, subject, tmp_path_factory):
             frame = tracked.get(name, table.checked(pd.DataFrame()))
             write_table(timed(table, frame), TABLE.at(RESULTS, name=name))
         for name in derived_tables():
-            with made(table_job(subject.plan, name)) as files:
+            with made(subject.plan.job(declared()[name])) as files:
                 [(path, new)] = files.items()
                 write_table(read_table(new), path)
         for name, table in declared().items():
             frame = table.checked(read_table(TABLE.at(RESULTS, name=name)))
             write_reference(table, frame, folder_of(RESULTS))
         figures = subject.plan.figure_jobs.values()
-        read = {path for job in figures for path in job.inputs if path.startswith("results/")}
+        read = {path for job in figures for path in job.job.files if path.startswith("results/")}
         for path in read | {p for job in figures for p in (job.pdf, job.png)}:
             if not Path(path).exists():
                 make(path)

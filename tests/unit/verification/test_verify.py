@@ -10,7 +10,7 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.core.paths import TABLE
 from pdrom.core.store import read_table, write_table
 from pdrom.tables import declared
-from pdrom.verification.again import made, table_job
+from pdrom.verification.again import made
 from pdrom.verification.command import parser, verify, verify_tables
 from pdrom.verification.lines import Line, Outcome, status_of
 from pdrom.verification.references import folder_of
@@ -43,7 +43,7 @@ def test_expected_results_hold(results, subject):
 def decide_again(subject):
     """The tables of the claims, as the tables at hand give them."""
     for name in CLAIMS:
-        with made(table_job(subject.plan, name)) as files:
+        with made(subject.plan.job(declared()[name])) as files:
             [(path, new)] = files.items()
             write_table(read_table(new), path)
 

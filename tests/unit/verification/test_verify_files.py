@@ -1,19 +1,25 @@
 """`verify --files`: changed, lost, unlisted, foreign files, and others than their inputs give."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
 
+from pdrom.core.artifact import Artifact
 from pdrom.core.errors import StorageError
+from pdrom.core.paths import TABLE, File, Place
 from pdrom.core.provenance import made_by
+from pdrom.core.reads import One
 from pdrom.core.store import atomic_path, write_hdf5, write_table, write_text
 from pdrom.pipeline import manifest
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.manifest import read_manifest, write_manifest
+from pdrom.pipeline.resolve import Job
 from pdrom.verification import again, files
-from pdrom.verification.again import Job, differing
+from pdrom.verification.again import differing
 from pdrom.verification.files import verify_files
 from pdrom.verification.status import Status
 from pdrom.verification.subject import Subject
@@ -24,10 +30,27 @@ OPTIONS = ("--configfile", "my study.yaml")
 SUBJECT = Subject(OPTIONS, Folders())
 
 
-def double(folder):
+def _doubled(table: File, out: File) -> None:
     """A manuscript made from a table."""
-    text = Path(NAMES[0]).read_text().replace("1.5", "3.0")
-    (folder / "main.pdf").write_text(text)
+    Path(out.path).write_text(Path(table.path).read_text().replace("1.5", "3.0"))
+
+
+def _macros(out: File) -> None:
+    Path(out.path).write_text(r"\def\a{0.1}")
+
+
+def _broken(table: File, out: File) -> None:
+    raise KeyError("no such column")
+
+
+TABLES = {"table": One(TABLE)}
+MANUSCRIPT = Artifact("MANUSCRIPT", "", TABLES, {"out": Place("main.pdf")}, _doubled)
+BROKEN = Artifact("BROKEN", "", TABLES, {"out": Place("main.pdf")}, _broken)
+MACROS = Artifact("MACROS", "", {}, {"out": Place("macros.tex")}, _macros)
+
+
+def job_of(artifact: Artifact) -> Job:
+    return Job(artifact, {}, {"table": NAMES[0]}, {"out": NAMES[2]}, {}, "", "")
 
 
 @pytest.fixture(autouse=True)
@@ -40,10 +63,10 @@ def study(tmp_path, monkeypatch):
             file["x"] = [1.0, 2.0]
         write_text("x\n3.0\n2.5\n", NAMES[2])
         write_text(r"\val", NAMES[3])
-    monkeypatch.setitem(vars(SUBJECT), "plan", None)
+    plan = SimpleNamespace(fixed={"paper": [job_of(MANUSCRIPT)]})
+    monkeypatch.setitem(vars(SUBJECT), "plan", plan)
     monkeypatch.setattr(files, "own_files", lambda *_: set(NAMES))
     monkeypatch.setattr(files, "asked_for", lambda paths, *_: [])
-    monkeypatch.setattr(files, "jobs", lambda *_: [Job([NAMES[0]], [NAMES[2]], double)])
     reseal(monkeypatch)
 
 
@@ -104,9 +127,7 @@ def test_a_sealed_file_that_its_inputs_do_not_give_is_noticed(content, monkeypat
 
 
 def test_what_inputs_do_not_give_any_more_is_noticed(monkeypatch):
-    monkeypatch.setattr(
-        files, "jobs", lambda *_: [Job([NAMES[0]], [NAMES[2]], lambda _: {}["no such column"])]
-    )
+    monkeypatch.setattr(SUBJECT.plan, "fixed", {"paper": [job_of(BROKEN)]})
     assert verify_files(SUBJECT) is Status.DIFFERS
 
 
@@ -185,8 +206,7 @@ def test_an_edited_manifest_is_damaged_and_a_lost_one_missing():
 
 def figure_job(subject):
     """The job of a figure that reads one table."""
-    path = subject.plan.figure_jobs["singular_values"].pdf
-    return next(j for j in again.jobs(subject.plan, subject.folders) if path in j.outputs)
+    return subject.plan.figure_jobs["singular_values"].job
 
 
 def test_a_figure_is_drawn_again_to_the_byte(results, subject):
@@ -197,29 +217,30 @@ def test_a_figure_is_drawn_again_to_the_byte(results, subject):
             with atomic_path(path) as temporary:
                 temporary.write_bytes(new.read_bytes())
     assert differing(job) == []
-    for path in job.outputs:
+    for path in job.outputs.values():
         content = Path(path).read_bytes()
         with atomic_path(path) as temporary:
             temporary.write_bytes(content + b"%")
         assert differing(job) == [path]
         with atomic_path(path) as temporary:
             temporary.write_bytes(content)
-    [table] = [path for path in job.inputs if path.startswith("results/")]
+    [table] = [path for path in job.files if path.startswith("results/")]
     write_table(pd.read_csv(table).assign(relative=0.5), table)
-    assert differing(job) == job.outputs
+    assert differing(job) == list(job.outputs.values())
 
 
 def test_every_artifact_that_takes_seconds_is_made_again(subject, monkeypatch):
     monkeypatch.chdir(ROOT)
     plan, folders = subject.plan, subject.folders
-    made = [path for job in again.jobs(plan, folders) for path in job.outputs]
+    made = [path for jobs in plan.fixed.values() for job in jobs for path in job.outputs.values()]
     pictures = [job.png for job in plan.figure_jobs.values()]
-    wanted = [*plan.tables.paths, *plan.figures, *pictures, *plan.paper.inputs, folders.manuscript]
+    wanted = [*plan.table_paths, *plan.figures, *pictures, *plan.paper.files, folders.manuscript]
     assert sorted(made) == sorted(wanted)
 
 
 def test_a_changed_number_of_the_manuscript_is_noticed(tmp_path):
-    job = Job([], ["paper/macros.tex"], lambda f: (f / "macros.tex").write_text(r"\def\a{0.1}"))
+    job = job_of(MACROS)
+    job = replace(job, inputs={}, outputs={"out": "paper/macros.tex"})
     for value, faults in (("0.1", []), ("0.2", ["paper/macros.tex"])):
         write_text(rf"\def\a{{{value}}}", "paper/macros.tex")
         assert differing(job) == faults

@@ -8,19 +8,20 @@ All run the held-out motion; only the reduction has a training motion.
 import logging
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from pdrom.core.paths import ALTERNATIVES, File
-from pdrom.core.reads import SourcesOf
+from pdrom.core.reads import Settings, SourcesOf
 from pdrom.core.store import write_table
+from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.alternatives.candidates import Candidate, candidates
 from pdrom.experiments.alternatives.settings import CONVERGED, Comparison, ImplicitReference
 from pdrom.experiments.alternatives.solvers.continuous import continuous
 from pdrom.experiments.kit.converged import ConvergedStepper
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.measurement import Variant, measure
 from pdrom.experiments.kit.settings import BlowupExtent
 from pdrom.model.constraints.base import GroupConfig
@@ -37,26 +38,12 @@ COLUMNS = [
 ]  # fmt: skip
 
 
-class Settings(JobSettings):
+class Options(ConfigModel):
     """What the comparison on a mesh size depends on, beside the machine."""
 
     scene: SceneConfig
     alternatives: Comparison
     blowup_extent: BlowupExtent
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """Files read: that of the mesh, nothing for a generated one."""
-
-    sources: Annotated[list[str], SourcesOf("scene.mesh")]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written: a row for every stiffness, method and pair of steps."""
-
-    table: Annotated[File, ALTERNATIVES]
 
 
 @dataclass(frozen=True)
@@ -78,15 +65,21 @@ class References:
         }
 
 
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Alternatives to projective dynamics in {scene} with {factor} times the vertices along a side",
+    reads={"sources": SourcesOf("scene.mesh"), "settings": Settings(Options)},
+    writes={"out": ALTERNATIVES},
+    alone=True,
+)
+def alternatives(sources: list[Path], settings: Options, out: File) -> None:
     """Compare all methods on one mesh: ``factor`` times the vertices along each side."""
-    factor = float(outputs.table["factor"])
+    factor = float(out["factor"])
     rows = []
     for stiffness in settings.alternatives.factors(settings.scene.name, factor):
         for row in _rows(sized(settings.scene, factor, stiffness), settings):
             rows.append({"factor": factor, "stiffness": stiffness, **row})
         log.info("%s: stiffness %g done", settings.scene.name, stiffness)
-    write_table(pd.DataFrame(rows, columns=COLUMNS), outputs.table.path)
+    write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
 
 
 def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
@@ -101,7 +94,7 @@ def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
     return finer.model_copy(update={"vertex_mass": mass, "effects": effects})
 
 
-def _rows(config: SceneConfig, settings: Settings) -> list[dict[str, Any]]:
+def _rows(config: SceneConfig, settings: Options) -> list[dict[str, Any]]:
     asked = settings.alternatives
     config = config.model_copy(update={"frames": min(asked.compared, config.frames)})
     training = Scene.build(config, config.mesh.build(Path()))
@@ -165,11 +158,3 @@ def _error(run: np.ndarray | None, reference: np.ndarray | None) -> float | None
         return None
     difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
     return trajectory_error(difference, displacement_norms(reference))
-
-
-EXPERIMENT = Experiment(
-    "alternatives",
-    "Alternatives to projective dynamics in {scene} with {factor} times the vertices along a side",
-    run,
-    alone=True,
-)

@@ -1,7 +1,6 @@
 """Every reduction in the hard cases, and the accuracy of the kernels."""
 
 import logging
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -10,14 +9,14 @@ from pydantic import AfterValidator, Field
 
 from pdrom.core.errors import choices
 from pdrom.core.paths import HARD_CASES, KERNEL_ACCURACY, File
-from pdrom.core.reads import ProjectFile
+from pdrom.core.reads import ProjectFile, Setting
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.hard_cases.accuracy import kernel_accuracy
 from pdrom.experiments.hard_cases.catalogue import CASES, modules_of, reducible_cases
 from pdrom.experiments.hard_cases.expectations import load_expectations, surprise
 from pdrom.experiments.hard_cases.outcomes import rows
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.reduction.method import MethodSpec
 
 log = logging.getLogger(__name__)
@@ -40,40 +39,33 @@ class HardCases(ConfigModel):
     cases: tuple[Annotated[str, AfterValidator(_known)], ...] = ()
     matrices: Annotated[int, Field(ge=1, le=10_000)] = 40
 
-
-class Settings(JobSettings):
-    """What the hard cases depend on: every method there is runs in them."""
-
-    every_method: dict[str, MethodSpec]
-    hard_cases: HardCases
-
     @property
     def modules(self) -> list[str]:
         """Places of the effects of the cases."""
-        return modules_of(self.hard_cases.cases or reducible_cases())
+        return modules_of(self.cases or reducible_cases())
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """Files read."""
-
-    expectations: Annotated[str, ProjectFile("config/hard_cases.yaml")]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written: a row for every case and reduction; a row for every group and class."""
-
-    cases: Annotated[File, HARD_CASES]
-    kernels: Annotated[File, KERNEL_ACCURACY]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Hard cases of every reduction, and accuracy of the kernels",
+    reads={
+        "expectations": ProjectFile("config/hard_cases.yaml"),
+        "every_method": Setting("every_method"),
+        "asked": Setting("hard_cases"),
+    },
+    writes={"cases": HARD_CASES, "kernels": KERNEL_ACCURACY},
+)
+def hard_cases(
+    expectations: Path,
+    every_method: dict[str, MethodSpec],
+    asked: HardCases,
+    cases: File,
+    kernels: File,
+) -> None:
     """Put every reduction through the cases; log what contradicts the expectations."""
-    expected = load_expectations(Path(inputs.expectations))
-    asked, found = settings.hard_cases, []
+    expected = load_expectations(expectations)
+    found = []
     for name in asked.cases or reducible_cases():
-        for row in rows(CASES[name], settings.every_method, expected):
+        for row in rows(CASES[name], every_method, expected):
             found.append(row)
             contradiction = surprise(row["outcome"], name, expected.get(row["method"]))
             if contradiction:
@@ -81,10 +73,5 @@ def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
         log.info("%s: done", name)
     whole = dict.fromkeys(["k", "r", "frames", "blowup_frame"], "Int64")
     table = pd.DataFrame(found, columns=COLUMNS).astype(whole)
-    write_table(table, outputs.cases.path)
-    write_table(pd.DataFrame(kernel_accuracy(asked.matrices)), outputs.kernels.path)
-
-
-EXPERIMENT = Experiment(
-    "hard_cases", "Hard cases of every reduction, and accuracy of the kernels", run
-)
+    write_table(table, cases.path)
+    write_table(pd.DataFrame(kernel_accuracy(asked.matrices)), kernels.path)

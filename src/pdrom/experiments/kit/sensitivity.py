@@ -47,7 +47,7 @@ def heldout_floor(heldout: Scene, size: float, seeds: tuple[int, ...]) -> pd.Dat
     )
 
 
-def sensitivity(
+def sensitivities(
     scene: Scene, perturbations: tuple[float, ...], seeds: tuple[int, ...]
 ) -> pd.DataFrame:
     """Table of `COLUMNS`: perturbed starts, and the scene with something else changed.

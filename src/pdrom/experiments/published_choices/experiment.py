@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -10,9 +9,10 @@ import pandas as pd
 from pydantic import Field
 
 from pdrom.core.paths import MESH, PUBLISHED_CHOICES, File
+from pdrom.core.reads import Setting
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.scenes import scene_of
 from pdrom.experiments.kit.settings import Modes
 from pdrom.experiments.published_choices.choices import Case, Choice, Variant, variants
@@ -49,44 +49,38 @@ class PublishedChoices(PublishedRuns):
     cases: tuple[Case, ...] = ()
 
 
-class Settings(JobSettings):
-    """What the errors of a case depend on."""
-
-    scene: SceneConfig
-    published_choices: PublishedRuns
-    published_experiment: str
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """Files read."""
-
-    mesh: Annotated[File, MESH]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written: a row for every variant, axis and size."""
-
-    table: Annotated[File, PUBLISHED_CHOICES]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Choices of the published code for {group} in {scene}",
+    reads={
+        "mesh": MESH,
+        "config": Setting("scene"),
+        "runs": Setting("published_choices"),
+        "published_experiment": Setting("published_experiment"),
+    },
+    writes={"out": PUBLISHED_CHOICES},
+)
+def published_choices(
+    mesh: File,
+    config: SceneConfig,
+    runs: PublishedRuns,
+    published_experiment: str,
+    out: File,
+) -> None:
     """Simulate, decompose and reconstruct with every variant."""
-    labels = outputs.table.labels
-    scene = scene_of(settings.scene, inputs.mesh)
+    labels = out.labels
+    scene = scene_of(config, mesh)
     rows = []
-    for variant, found, sizes in _variants(scene, labels["group"], settings.published_choices):
+    for variant, found, sizes in _variants(scene, labels["group"], runs):
         for axis, column in zip("xyz", found.T, strict=True):
             head = {
                 **labels,
-                "experiment": settings.published_experiment,
+                "experiment": published_experiment,
                 "direction": variant.direction,
             }
             head |= {"choice": variant.title, "axis": axis}
             rows += [{**head, "r": r, "error": e} for r, e in zip(sizes, column, strict=True)]
         log.info("%s, %s", variant.direction, variant.title)
-    write_table(pd.DataFrame(rows, columns=COLUMNS), outputs.table.path)
+    write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
 
 
 def _variants(
@@ -107,8 +101,3 @@ def _variants(
             decomposed[key] = decompose(snapshots, row_sizes, variant.taken)
         found = errors(decomposed[key], group.rows_per_element, sizes, variant)
         yield variant, found, sizes
-
-
-EXPERIMENT = Experiment(
-    "published_choices", "Choices of the published code for {group} in {scene}", run
-)

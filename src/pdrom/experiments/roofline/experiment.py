@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,13 +9,14 @@ import pandas as pd
 from pydantic import Field
 
 from pdrom.core.paths import MESH, RATES, WORK, File
-from pdrom.core.reads import Every
+from pdrom.core.reads import Every, Settings
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.kit.declaration import Experiment, JobSettings
+from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.scenes import scene_of
 from pdrom.experiments.kit.settings import Count, Repeats, Solver
-from pdrom.experiments.roofline import rates, work
+from pdrom.experiments.roofline import rates as machine
+from pdrom.experiments.roofline import work as counts
 from pdrom.model.scene import Scene, SceneConfig
 
 log = logging.getLogger(__name__)
@@ -37,7 +37,7 @@ class Roofline(ConfigModel):
     frames: Count = 10
 
 
-class Settings(JobSettings):
+class Options(ConfigModel):
     """What rates and work depend on."""
 
     every_scene: dict[str, SceneConfig]
@@ -46,38 +46,28 @@ class Settings(JobSettings):
     solver: Solver
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """Files read."""
-
-    meshes: Annotated[list[File], Every(MESH)]
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files written."""
-
-    rates: Annotated[File, RATES]
-    work: Annotated[File, WORK]
-
-
-def run(settings: Settings, inputs: Inputs, outputs: Outputs) -> None:
+@experiment(
+    "Rates of the machine, and the work of an iteration",
+    reads={"meshes": Every(MESH), "settings": Settings(Options)},
+    writes={"rates": RATES, "work": WORK},
+    alone=True,
+)
+def roofline(meshes: list[File], settings: Options, rates: File, work: File) -> None:
     """Measure the machine, then count."""
     section = settings.roofline
-    found = rates.rates(section.largest_mb * 2**20, 1e-3 * section.ms, section.repeats)
-    write_table(pd.DataFrame(found, columns=rates.COLUMNS), outputs.rates.path)
+    found = machine.rates(section.largest_mb * 2**20, 1e-3 * section.ms, section.repeats)
+    write_table(pd.DataFrame(found, columns=machine.COLUMNS), rates.path)
     log.info("rates measured")
-    meshes = {file["mesh"]: file for file in inputs.meshes}
     rows: list[dict[str, Any]] = []
-    for factor, scene in _scenes(settings, meshes):
+    for factor, scene in _scenes(settings, {file["mesh"]: file for file in meshes}):
         system = scene.system_with(settings.solver)
-        counted = work.work(scene, system, min(section.frames, scene.config.frames))
+        counted = counts.work(scene, system, min(section.frames, scene.config.frames))
         rows += [{**row, "factor": factor} for row in counted]
         log.info("%s: %d vertices counted", scene.config.name, scene.mesh.vertices)
-    write_table(pd.DataFrame(rows, columns=work.COLUMNS), outputs.work.path)
+    write_table(pd.DataFrame(rows, columns=counts.COLUMNS), work.path)
 
 
-def _scenes(settings: Settings, meshes: dict[str, File]) -> Iterator[tuple[float, Scene]]:
+def _scenes(settings: Options, meshes: dict[str, File]) -> Iterator[tuple[float, Scene]]:
     """Every scene on its own mesh, then on those with ``factor`` times the vertices a side."""
     for config in settings.every_scene.values():
         yield OWN_MESH, scene_of(config, meshes[config.mesh.identifier])
@@ -86,8 +76,3 @@ def _scenes(settings: Settings, meshes: dict[str, File]) -> Iterator[tuple[float
             if factor != OWN_MESH:
                 config = settings.every_scene[name].coarsened(factor, 1.0)
                 yield factor, Scene.build(config, config.mesh.build(Path()))
-
-
-EXPERIMENT = Experiment(
-    "roofline", "Rates of the machine, and the work of an iteration", run, alone=True
-)

@@ -1,13 +1,17 @@
 """Rules of the manuscript: tables -> macros, TeX tables, bibliography -> PDF."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from pdrom.core.artifact import Artifact
 from pdrom.core.errors import StorageError
 from pdrom.core.machine import Machine
+from pdrom.core.paths import PAPER_INPUT
+from pdrom.core.reads import Given, Setting
 from pdrom.core.store import read_table, read_text, require_intact, write_text
 from pdrom.core.yamlfile import describe
 from pdrom.report.paper.bibliography import bibliography
@@ -38,10 +42,10 @@ class Facts(BaseModel):
 
 
 def write_inputs(
-    source: str, references: str, tables: list[str], machine: str, facts: Facts, folder: str
+    source: list[str], references: str, tables: list[str], machine: str, facts: Facts, folder: str
 ) -> None:
     """Write macros.tex, figures.tex, the TeX tables and main.bbl into ``folder``."""
-    text = whole_source(Path(source))
+    text = whole_source(Path(source[0]))
     data = {Path(path).stem: read_table(path) for path in tables}
     data |= {name: pd.DataFrame(rows) for name, rows in facts.tables.items()}
     data["machine"] = _machine_table(Path(machine))
@@ -68,9 +72,50 @@ def _machine_table(path: Path) -> pd.DataFrame:
     return pd.DataFrame([{**row, **words}])
 
 
-def build(source: str, figures: list[str], inputs: list[str], output: str) -> None:
+def build(source: list[str], figures: list[str], inputs: list[str], facts: Facts, out: str) -> None:
     """Build the PDF of the manuscript from its figures and what `write_inputs` wrote."""
     results = [Path(path) for path in (*figures, *inputs)]
     for path in results:
         require_intact(path)
-    build_pdf(Path(source), Path(output), sorted({path.parent for path in results}))
+    build_pdf(Path(source[0]), Path(out), sorted({path.parent for path in results}))
+
+
+class _Inputs(Artifact):
+    """Files of one folder."""
+
+    def perform(
+        self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
+    ) -> None:
+        """Write all of them."""
+        folder = Path(next(iter(outputs.values()))).parent
+        self.function(**self.read(settings, inputs), folder=str(folder))
+
+
+class _Manuscript(Artifact):
+    """A file whose place the configuration decides."""
+
+    def perform(
+        self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
+    ) -> None:
+        """Typeset it."""
+        self.function(**self.read(settings, inputs), out=str(outputs["out"]))
+
+
+FILES = ("macros.tex", "figures.tex", "main.bbl", *(f"{name}.tex" for name in TEX_TABLES))
+paper_inputs = _Inputs(
+    "paper_inputs",
+    "Numbers, tables and references of the manuscript",
+    {
+        **dict.fromkeys(("source", "references", "tables", "machine"), Given()),
+        "facts": Setting("facts"),
+    },
+    {Path(name).stem: PAPER_INPUT.where(name=name) for name in FILES},
+    write_inputs,
+)
+paper = _Manuscript(
+    "paper",
+    "Manuscript",
+    {**dict.fromkeys(("source", "figures", "inputs"), Given()), "facts": Setting("facts")},
+    {},
+    build,
+)

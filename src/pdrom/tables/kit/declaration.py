@@ -13,19 +13,20 @@ The function gets what it reads by name: files as a list of `File`, tables as fr
 configuration as plain data. Whatever it returns is brought to the declared columns and types.
 """
 
-import inspect
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Generic, Literal, ParamSpec, Protocol
+from typing import Any, Literal, Protocol
 
 import pandas as pd
 
+from pdrom.core.artifact import Artifact, declare, declared_in
 from pdrom.core.errors import StorageError
+from pdrom.core.paths import TABLE
 from pdrom.core.reads import ProjectFile, Read
+from pdrom.core.store import write_table
 from pdrom.tables.kit.quantities import TALLY, TOLERANCES, Quantity, usual_quantity
 
-P = ParamSpec("P")
 Kind = Literal["text", "integer", "number", "flag"]
 _DTYPES: dict[Kind, str] = {"integer": "Int64", "number": "float64", "flag": "boolean"}
 
@@ -118,27 +119,29 @@ class TimedCells(Protocol):
 
 
 @dataclass(frozen=True)
-class Table(Generic[P]):
+class Table(Artifact):
     """A table of the study; calling it makes it.
 
     timed_cells : where not the column alone says whether a clock has a say in a cell
     """
 
-    name: str
-    title: str
-    columns: tuple[Column, ...]
-    reads: Mapping[str, Read]
-    function: Callable[P, pd.DataFrame]
+    columns: tuple[Column, ...] = ()
     timed_cells: TimedCells | None = None
 
-    def __call__(self, *arguments: P.args, **named: P.kwargs) -> pd.DataFrame:
+    def __call__(self, *arguments: Any, **named: Any) -> pd.DataFrame:
         """Make the table from what it reads, see `checked`."""
         return self.checked(self.function(*arguments, **named))
 
     @property
-    def module(self) -> str:
-        """Module that makes the table."""
-        return self.function.__module__
+    def rule(self) -> str:
+        """Name of the rule that makes it."""
+        return f"{self.name}_table"
+
+    def perform(
+        self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
+    ) -> None:
+        """Make the table in a job and write it."""
+        write_table(self(**self.read(settings, inputs)), Path(outputs["table"]))
 
     @property
     def column_names(self) -> tuple[str, ...]:
@@ -197,7 +200,7 @@ def table(
     columns: Sequence[Column],
     reads: Mapping[str, Read],
     timed_cells: TimedCells | None = None,
-) -> Callable[[Callable[P, pd.DataFrame]], Table[P]]:
+) -> Callable[[Callable[..., pd.DataFrame]], Table]:
     """Declare the function below as the one that makes the table of its name.
 
     Raises
@@ -206,20 +209,28 @@ def table(
         If a column is declared twice, or the function does not take what it reads.
     """
 
-    def declare(function: Callable[P, pd.DataFrame]) -> Table[P]:
-        made = Table(function.__name__, title, tuple(columns), reads, function, timed_cells)
-        _require_consistent(made)
-        return made
+    def decorate(function: Callable[..., pd.DataFrame]) -> Table:
+        name = function.__name__
+        writes = {"table": TABLE.where(name=name)}
+        made = Table(name, title, reads, writes, function, False, tuple(columns), timed_cells)
+        _require_distinct(made)
+        return declare(made)
 
-    return declare
+    return decorate
 
 
-def _require_consistent(made: Table[Any]) -> None:
+def declared(package: str = "pdrom.tables") -> dict[str, Table]:
+    """Return every table of a package by name."""
+    return declared_in(package, Table)
+
+
+def timing_columns() -> dict[str, tuple[str, ...]]:
+    """Return the columns of each table in which two runs on one machine may differ."""
+    return {name: t.timing_columns for name, t in declared().items() if t.timing_columns}
+
+
+def _require_distinct(made: Table) -> None:
     names = made.column_names
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise TypeError(f"table {made.name}: column(s) declared twice: {', '.join(twice)}")
-    try:
-        inspect.signature(made.function).bind(**made.reads)
-    except TypeError as error:
-        raise TypeError(f"table {made.name}: {error}") from error

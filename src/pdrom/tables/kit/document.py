@@ -1,7 +1,6 @@
 """The list of tables for a reader: every table with what it reads and every column."""
 
 from collections.abc import Iterable
-from typing import Any
 
 from pdrom.core.reads import Every, PerScene, Preferred, ProjectFile, Read, Setting, TableOf
 from pdrom.tables.kit.declaration import Column, Table
@@ -18,7 +17,7 @@ on one machine differ, in `claims` only in claims about times. "Compared as" is 
 """
 
 
-def document(tables: Iterable[Table[Any]]) -> str:
+def document(tables: Iterable[Table]) -> str:
     """Markdown of all tables."""
     tables = list(tables)
     names = [f"- [{table.name}](#{table.name}): {table.title}" for table in tables]
@@ -26,7 +25,7 @@ def document(tables: Iterable[Table[Any]]) -> str:
     return "\n".join(parts)
 
 
-def _section(table: Table[Any]) -> str:
+def _section(table: Table) -> str:
     lines = [
         f"## {table.name}",
         "",
@@ -47,7 +46,7 @@ def _row(column: Column) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def _sources(table: Table[Any]) -> list[str]:
+def _sources(table: Table) -> list[str]:
     return list(dict.fromkeys(_source(read) for read in table.reads.values()))
 
 

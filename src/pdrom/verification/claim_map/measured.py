@@ -47,7 +47,7 @@ def claim_map(
     options : those of the command line that name the configuration
     configuration : the same in words
     """
-    graph = Graph(plan, folders.manuscript)
+    graph = Graph(plan)
     logs = {job.log for job in graph.needed([folders.manuscript])}
     usages = {log: used for log in sorted(logs) if (used := usage_of(log)) is not None}
     verdicts, machine = _verdicts(folders.results), _machine(folders.results)

@@ -168,7 +168,7 @@ def _places(numbers: Numbers) -> tuple[str, str]:
     return str(numbers.manuscript or UNKNOWN), str(numbers.preprint or UNKNOWN)
 
 
-def _tolerances(table: Table[Any]) -> str:
+def _tolerances(table: Table) -> str:
     """How exactly a table is expected: the number of columns of each kind."""
     held = Counter(column.quantity for column in table.columns)
     return ", ".join(f"{held[kind]} {kind}" for kind in QUANTITIES if held[kind])

@@ -10,8 +10,8 @@ from pdrom.experiments.hard_cases.expectations import (
     load_expectations,
     surprise,
 )
-from pdrom.experiments.hard_cases.experiment import EXPERIMENT
-from pdrom.pipeline.jobs import Jobs
+from pdrom.experiments.hard_cases.experiment import hard_cases
+from pdrom.pipeline.resolve import Resolver
 from pdrom.pipeline.study import Study
 from places import ROOT
 
@@ -65,6 +65,6 @@ def test_an_unknown_refused_or_slow_case_is_named(name):
 
 def test_every_method_takes_part_not_only_those_of_the_study():
     study = Study.load(read_yaml(ROOT / "config" / "tiny.yaml"), ROOT)
-    asked = Jobs(study, "results").settings(EXPERIMENT, {}).every_method
+    asked = Resolver(study, "results").job(hard_cases, {}).settings["every_method"]
     assert set(asked) == set(read_yaml(ROOT / "config" / "methods.yaml"))
     assert set(asked) > set(study.methods)

@@ -6,14 +6,7 @@ import pandas as pd
 import pytest
 
 from pdrom.core.paths import File
-from pdrom.experiments.hard_cases.experiment import (
-    COLUMNS,
-    HardCases,
-    Inputs,
-    Outputs,
-    Settings,
-    run,
-)
+from pdrom.experiments.hard_cases.experiment import COLUMNS, HardCases, hard_cases
 from pdrom.reduction.method import load_methods
 from places import ROOT
 
@@ -27,8 +20,10 @@ METHODS = {
 def make(folder, expectations=ROOT / "config" / "hard_cases.yaml"):
     paths = [folder / name for name in ("hard_cases.csv", "kernel_accuracy.csv")]
     asked = HardCases(cases=("one_triangle", "flat_bending"), matrices=1)
-    outputs = Outputs(*(File(str(path), {}) for path in paths))
-    run(Settings(every_method=METHODS, hard_cases=asked), Inputs(str(expectations)), outputs)
+    cases, kernels = (File(str(path), {}) for path in paths)
+    hard_cases(
+        expectations=expectations, every_method=METHODS, asked=asked, cases=cases, kernels=kernels
+    )
     return paths
 
 

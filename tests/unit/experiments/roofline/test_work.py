@@ -9,7 +9,8 @@ from pdrom.core.paths import File
 from pdrom.core.store import read_table, write_table
 from pdrom.experiments.kit.effect_costs import effect_costs
 from pdrom.experiments.kit.names import GLOBAL, RIGHT
-from pdrom.experiments.roofline.experiment import Inputs, Outputs, Roofline, Settings, run
+from pdrom.experiments.roofline.experiment import Options, Roofline
+from pdrom.experiments.roofline.experiment import roofline as experiment
 from pdrom.experiments.roofline.work import COLUMNS, VECTOR, work
 from pdrom.model.mesh.types import save_mesh
 from pdrom.tables.kernels import kernels
@@ -57,16 +58,16 @@ def made(tmp_path):
     name = scene.config.name
     mesh = File(str(tmp_path / "mesh.h5"), {"mesh": scene.config.mesh.identifier})
     save_mesh(scene.mesh, mesh.path)
-    outputs = Outputs(File(str(tmp_path / "rates.csv"), {}), File(str(tmp_path / "work.csv"), {}))
+    rates, counts = (File(str(tmp_path / name), {}) for name in ("rates.csv", "work.csv"))
     section = Roofline(largest_mb=1, ms=0.01, repeats=2, frames=1)
     scenes, sizes = {name: scene.config}, {name: (1.0, 1.5)}
-    settings = Settings(every_scene=scenes, sizes=sizes, roofline=section, solver="supernodal")
-    run(settings, Inputs([mesh]), outputs)
+    settings = Options(every_scene=scenes, sizes=sizes, roofline=section, solver="supernodal")
+    experiment(meshes=[mesh], settings=settings, rates=rates, work=counts)
     costs = File(str(tmp_path / "effects.csv"), {"scene": name})
     write_table(effect_costs(scene, scene.system, 1, 0, 2), costs.path)
-    phases = roofline([outputs.rates], [outputs.work], [costs], [])
+    phases = roofline([rates], [counts], [costs], [])
     accuracy = pd.DataFrame({"group": ["spring", "spring"], "worst_over_condition": [1.0, 2.0]})
-    return read_table(outputs.work.path), phases, kernels(phases, accuracy)
+    return read_table(counts.path), phases, kernels(phases, accuracy)
 
 
 def test_phases_are_divided_by_their_bounds(made):

@@ -20,7 +20,7 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.core.paths import FULL_ORDER, SUBSPACES, TIMINGS, VTK
 from pdrom.core.store import check_file, read_table, write_table
 from pdrom.model.scene import SceneConfig
-from pdrom.pipeline.holdings import labels_of
+from pdrom.pipeline.contents import labels_of
 from pdrom.pipeline.scene_command import scene_arguments
 from pdrom.pipeline.study import Study
 from pdrom.report.figures.kit.read import RerunInfo

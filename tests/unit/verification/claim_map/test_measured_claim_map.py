@@ -22,7 +22,7 @@ TINY = ["--configfile", "config/tiny.yaml"]
 def graph(subject: Subject) -> Graph:
     with pytest.MonkeyPatch.context() as patched:
         patched.chdir(ROOT)
-        made = Graph(subject.plan, subject.folders.manuscript)
+        made = Graph(subject.plan)
         made.needed([subject.folders.manuscript])
     return made
 

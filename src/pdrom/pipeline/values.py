@@ -1,4 +1,4 @@
-"""What a job's settings are made of: a value for each name that an experiment may ask for.
+"""Settings that are derived from the configuration for a job, by the names that artifacts read.
 
 A name that is not listed here is a key of the configuration. A setting of the type of a section's
 base class gets the fields of that class only, so that a job depends on nothing else.
@@ -16,18 +16,11 @@ from pdrom.experiments.reruns import OfScene
 from pdrom.experiments.stability import Stability
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import SceneConfig
-from pdrom.pipeline.holdings import labels_of
+from pdrom.pipeline.contents import labels_of
 from pdrom.pipeline.study import Study
 from pdrom.reduction.method import BasisSpec, MethodSpec
 
 Labels = Mapping[str, str]
-
-
-def provide(study: Study, name: str, labels: Labels) -> Any:
-    """Value of a field of a job's settings, for the job with these ``labels``."""
-    if name in PROVIDERS:
-        return PROVIDERS[name](study, labels)
-    return getattr(study.settings, name)
 
 
 def _scene(study: Study, labels: Labels) -> SceneConfig:
@@ -155,7 +148,7 @@ def _projection_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
     return {case.method: study.methods[case.method] for case in _projection_cases(study, labels)}
 
 
-PROVIDERS: dict[str, Callable[[Study, Labels], Any]] = {
+DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "scene": _scene,
     "mesh": _mesh,
     "method": _method,

@@ -1,0 +1,28 @@
+# One rule for each artifact that src/pdrom declares, named as it; experiments, tables (<name>_table), figures
+# (figure_<name>) and the manuscript:
+#   ./reproduce results/figures/<name>.pdf   makes just that figure and what it needs
+for made in rules_of(PLAN, CORES):
+
+    rule:
+        name:
+            made.name
+        input:
+            **made.input,
+        output:
+            **{
+                name: report(path, **made.shown[name]) if name in made.shown else path
+                for name, path in made.output.items()
+            },
+        log:
+            made.log,
+        group:
+            made.group
+        threads: made.threads
+        resources:
+            **made.resources,
+        params:
+            **made.params,
+        message:
+            made.message
+        script:
+            "../scripts/artifact.py"

@@ -1,0 +1,13 @@
+from pdrom.core.artifact import make
+from pdrom.core.logs import job_log
+
+with job_log(snakemake.log[0]):
+    make(
+        snakemake.params.artifact,
+        snakemake.rule,
+        settings=snakemake.params.settings,
+        labels=dict(snakemake.wildcards.items()),
+        code=snakemake.params.code,
+        inputs=dict(snakemake.input.items()),
+        outputs=dict(snakemake.output.items()),
+    )
