@@ -15,6 +15,7 @@ from pydantic import (
 from pdrom.core.errors import ConfigurationError, choices
 
 MAX_BYTES = 1_000_000
+MAX_DEPTH = 100
 M = TypeVar("M", bound=BaseModel)
 
 # Numbers of the physics stay where sums and squares of them neither overflow nor lose every digit.
@@ -41,19 +42,8 @@ class ConfigModel(BaseModel):
         return data
 
 
-class _PlainLoader(yaml.SafeLoader):
-    """Safe loader (no tag runs code) that refuses a key given twice, and aliases.
-
-    A few nested aliases stand for billions of entries.
-    """
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        if self.check_event(yaml.events.AliasEvent):
-            event = self.peek_event()
-            raise yaml.composer.ComposerError(
-                None, None, f"alias '*{event.anchor}' is not allowed", event.start_mark
-            )
-        return super().compose_node(parent, index)
+class _PlainLoader(yaml.CSafeLoader):
+    """Safe loader (no tag runs code) that refuses a key given twice."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen = set()
@@ -69,6 +59,20 @@ class _PlainLoader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
+def _require_plain(text: str) -> None:
+    """Refuse aliases, a few of which stand for billions of entries, and deep nesting."""
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.CSafeLoader):
+        if isinstance(event, yaml.AliasEvent):
+            fault = f"alias '*{event.anchor}' is not allowed"
+            raise yaml.composer.ComposerError(None, None, fault, event.start_mark)
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > MAX_DEPTH:
+            fault = f"nested more than {MAX_DEPTH} levels deep"
+            raise yaml.composer.ComposerError(None, None, fault, event.start_mark)
+
+
 def read_yaml(path: Path) -> Any:
     """Content of a YAML file; ConfigurationError if it is missing or not plain YAML."""
     try:
@@ -77,7 +81,9 @@ def read_yaml(path: Path) -> Any:
         if path.stat().st_size > MAX_BYTES:
             raise ConfigurationError(f"{path}: larger than {MAX_BYTES} bytes")
         # a byte order mark, as some editors write it, is no part of the text
-        return yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_PlainLoader)
+        text = path.read_text(encoding="utf-8-sig")
+        _require_plain(text)
+        return yaml.load(text, Loader=_PlainLoader)
     except (yaml.YAMLError, ValueError, TypeError, RecursionError) as error:
         # ValueError: no UTF-8, or a date that is none; TypeError: a key that cannot be one
         message = " ".join(str(error).replace('in "<unicode string>", ', "in ").split())

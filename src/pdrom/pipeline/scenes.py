@@ -9,6 +9,7 @@ from pydantic import Field
 from pdrom.core.errors import ConfigurationError, PdromError, choices
 from pdrom.core.names import named
 from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
+from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.scene import Scene, SceneConfig
 
 Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
@@ -60,8 +61,11 @@ def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
     """
     try:
         mesh = scene.mesh.build(root)
-        Scene.build(scene.heldout_variant(), mesh)
         bound = Scene.build(scene, mesh)
+        # its groups are those of the scene: what differs is built alone
+        heldout = scene.heldout_variant()
+        other = tuple(e for e in heldout.effects if not isinstance(e, GroupConfig))
+        Scene.build(heldout.model_copy(update={"effects": other}), mesh)
     except PdromError as error:
         raise ConfigurationError(f"{source}: {error}") from error
     bound.log_holds()
