@@ -19,23 +19,26 @@ FEWEST = 3  # sizes
         THREADS,
         text("quantity", "column of the table scaling"),
         timed(number("exponent", "of the power law in the number of vertices")),
-        integer("points", "sizes of the mesh that it is fitted to"),
+        timed(integer("points", "sizes of the mesh that it is fitted to")),
     ),
     reads={"scaling": TableOf("scaling")},
 )
 def scaling_fit(scaling: pd.DataFrame) -> pd.DataFrame:
     """Exponents of power laws in the number of vertices, by least squares on the logarithms.
 
-    Any two points lie on a power law: a quantity with fewer than three sizes has no row.
+    Any two points lie on a power law: a quantity with fewer than three sizes has no row, and one
+    that was too small to be measured on so many has no exponent.
     """
     rows = []
     for labels, part in scaling.groupby(["scene", "method", "threads"], sort=False):
         for quantity in QUANTITIES:
             points = part[["vertices", quantity]].dropna()
-            points = points[points[quantity] > 0.0].astype(float)
             if points.vertices.nunique() < FEWEST:
                 continue
-            exponent, _ = np.polyfit(np.log(points.vertices), np.log(points[quantity]), 1)
+            points = points[points[quantity] > 0.0].astype(float)
             row = dict(zip(("scene", "method", "threads"), labels, strict=True))
-            rows.append({**row, "quantity": quantity, "exponent": exponent, "points": len(points)})
+            row |= {"quantity": quantity, "exponent": None, "points": len(points)}
+            if points.vertices.nunique() >= FEWEST:
+                row["exponent"] = np.polyfit(np.log(points.vertices), np.log(points[quantity]), 1)[0]
+            rows.append(row)
     return pd.DataFrame(rows)
