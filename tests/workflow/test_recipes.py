@@ -18,7 +18,7 @@ from places import ROOT
 # Files that a recipe may touch at most; pages that a command writes from the declarations (a list
 # of tables, one of figures) are not counted.
 MOST = {
-    "A figure": 3,
+    "A figure": 2,
     "A table": 2,
     "A selection": 3,
     "A constraint group": 3,

@@ -16,7 +16,7 @@ from pdrom.pipeline.study import Study
 from pdrom.reduction.method import load_methods
 from pdrom.report.drawing import Order, drawn
 from pdrom.report.figure_numbers import Numbers, figure_numbers
-from pdrom.report.figures.kit.catalogue import declarations, load_choices, modules
+from pdrom.report.figures.kit.catalogue import declarations, load_choices
 from pdrom.report.figures.kit.declaration import Declaration
 from pdrom.report.figures.kit.holdings import GroupHolding, Holdings, MethodHolding, SceneHolding
 from pdrom.report.figures.kit.options import Options
@@ -152,7 +152,7 @@ def _job(
     )
     groups = dict.fromkeys(group for _, group in held.experiments(options))
     # where elements are drawn on the mesh, the group's class says where they lie
-    on_mesh = ELEMENTS in closure(*modules(name))
+    on_mesh = ELEMENTS in closure(declared.module)
     classes = [EFFECTS[group] for group in groups if on_mesh]
     read = [r.paths(sources, {}) for r in declared.reads if isinstance(r, FileRead)]
     artifact = drawn(name)
@@ -163,7 +163,7 @@ def _job(
         {kind: place.at(results) for kind, place in artifact.writes.items()},
         {"order": order.model_dump(mode="json")},
         "",
-        fingerprint(artifact.module, *modules(name), *classes),
+        fingerprint(artifact.module, declared.module, *classes),
     )
     return FigureJob(
         job=job,

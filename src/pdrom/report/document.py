@@ -6,7 +6,7 @@ from pathlib import Path
 from pdrom.core.reads import Chosen, Every, Published, Setting, TableOf
 from pdrom.report.figure_numbers import figure_numbers
 from pdrom.report.figures.kit.catalogue import declarations
-from pdrom.report.figures.kit.declaration import Declaration, FigureRead
+from pdrom.report.figures.kit.declaration import FigureRead
 from pdrom.report.words.markup import to_plain
 
 PAGE = Path("docs/figures.md")
@@ -33,7 +33,7 @@ def figures_page(root: Path = Path()) -> str:
         reads = ", ".join(dict.fromkeys(_words(read) for read in figure.reads))
         parts.append(
             f"## `{name}`{number}\n\n**{_text(figure.title)}.** {_text(figure.caption)}\n\n"
-            f"Keys: {keys}. Reads: {reads}.{_drawing(figure)}\n"
+            f"Keys: {keys}. Reads: {reads}.\n"
         )
     return "\n".join(parts)
 
@@ -56,10 +56,6 @@ def _words(read: FigureRead) -> str:
             return f"`config/reference/published_code/{read.name}.csv`"
         case Setting():
             return f"`{read.key}`"
-
-
-def _drawing(figure: Declaration) -> str:
-    return f" Drawn by `drawings/{figure.drawing}.py`." if figure.drawing else ""
 
 
 if __name__ == "__main__":

@@ -1,6 +1,4 @@
-"""Figures of manuscript and report, one module each: what a figure is, reads and lets choose.
+"""Figures of manuscript and report, one module each; see `pdrom.report.figures.kit.declaration`.
 
-Every module of this package declares one figure, ``FIGURE``, and loads no plotting library. It is
-drawn by the module of `drawings` with the same name unless it names another; `kit` holds what
-figures share.
+Every plan imports them, so that they load no plotting library before one is drawn.
 """

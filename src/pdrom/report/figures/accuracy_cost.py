@@ -1,15 +1,34 @@
 """Accuracy of reduced models against their time per frame, by family and constraint group."""
 
+import numpy as np
+
 from pdrom.core.reads import TableOf
-from pdrom.report.figures.kit.declaration import Declaration
+from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.artists import Axes, Figure
+from pdrom.report.figures.kit.declaration import figure
+from pdrom.report.figures.kit.legends import draw_legend, legend_height
 from pdrom.report.figures.kit.options import Methods, Scenes
+from pdrom.report.figures.kit.results import Results
+from pdrom.report.figures.kit.trade_offs import (
+    TradeOffs,
+    draw_panel,
+    group_title,
+    handles,
+    label_iterations,
+    trade_offs,
+)
+
+RATES = (60, 30)  # frames per second
+LARGE, SMALL = 3.3, 1.75  # inches, heights of panels
+LOWEST = 1e-3  # of the axes: what matters here lies above
+COLUMNS = 4  # of the legend
 
 
 class Options(Scenes, Methods):
-    """What may be chosen; the first scene is drawn large."""
+    """Choices; the first scene is drawn large."""
 
 
-FIGURE = Declaration(
+@figure(
     title="What accuracy costs in time",
     caption=(
         "Error within the horizon against the time per frame of every reduced model, and of the "
@@ -24,3 +43,50 @@ FIGURE = Declaration(
     reads=(TableOf("accuracy_cost"), TableOf("reduced_reruns")),
     options=Options,
 )
+def accuracy_cost(results: Results, options: Options) -> Figure:
+    """Draw the first scene large; below it one scene for each other group, the next in order."""
+    found, scenes = trade_offs(results, options)
+    first, *rest = scenes
+    small = list({group_title(results, scene): scene for scene in reversed(rest)}.values())[::-1]
+    blocks = handles(found, results)
+    heights = [LARGE, *([SMALL] if small else []), legend_height(blocks, COLUMNS)]
+    figure = style.new_figure(sum(heights))
+    parts = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
+    ax = parts[0].subplots()
+    draw_panel(ax, found, first, results, LOWEST, size=4.2)
+    label_iterations(ax, found, first)
+    _draw_rates(ax)
+    ax.set_title(f"{group_title(results, first)}: {style.words(first)}")
+    ax.set(xlabel="time per frame (ms)", ylabel="relative error")
+    if small:
+        _draw_small(parts[1].subplots(1, len(small), sharey=True, squeeze=False)[0], found, small,
+                    results)  # fmt: skip
+    draw_legend(parts[-1], blocks, COLUMNS)
+    return figure
+
+
+def _draw_small(axes: np.ndarray, found: TradeOffs, scenes: list[str], results: Results) -> None:
+    for ax, scene in zip(axes, scenes, strict=True):
+        draw_panel(ax, found, scene, results, LOWEST, size=2.4)
+        ax.set_title(f"{group_title(results, scene)}:\n{style.words(scene)}")
+        ax.set_xlabel("time per frame (ms)")
+    axes[0].set_ylabel("relative error")
+
+
+def _draw_rates(ax: Axes) -> None:
+    """Lines of real time, where the axis reaches them; otherwise they are named at its side."""
+    high = ax.get_xlim()[1]
+    beyond = [rate for rate in RATES if 1e3 / rate >= high]
+    for rate in set(RATES) - set(beyond):
+        ax.axvline(1e3 / rate, color="#8A857A", linewidth=0.8, linestyle="--", zorder=0)
+        _label(ax, 1e3 / rate, f"{rate} fps ")
+    if beyond:
+        names = ", ".join(str(rate) for rate in beyond)
+        _label(ax, high, f"{names} fps \N{RIGHTWARDS ARROW}")
+
+
+def _label(ax: Axes, x: float, text: str) -> None:
+    ax.text(
+        x, 0.99, text, transform=ax.get_xaxis_transform(), fontsize=6.5, va="top", ha="right",
+        color="#6B675F",
+    )  # fmt: skip

@@ -1,25 +1,22 @@
 """Runs of the bars, reduced."""
 
-from pdrom.core.paths import FULL_ORDER, MESH, RERUNS, SENSITIVITY
-from pdrom.core.reads import Chosen, Setting
-from pdrom.report.figures.kit.declaration import Declaration
+from pdrom.report.figures.kit.artists import Figure
+from pdrom.report.figures.kit.declaration import figure
+from pdrom.report.figures.kit.experiment_rows import RUNS, draw_experiments
 from pdrom.report.figures.kit.options import ReducedRuns
+from pdrom.report.figures.kit.results import Results
 
-FIGURE = Declaration(
+
+@figure(
     title="The bar, reduced",
     caption=(
         "Bars with tetrahedral constraints: full order against reduced projections, by basis "
         "size. The grey outline is the full-order run at the same instant; a framed picture is "
         "drawn to the smaller scale given below it."
     ),
-    reads=(
-        Chosen(MESH),
-        Chosen(FULL_ORDER),
-        Chosen(RERUNS),
-        Chosen(SENSITIVITY),
-        Setting("sensitivity.reference"),
-        Setting("sensitivity.threshold"),
-    ),
+    reads=RUNS,
     options=ReducedRuns,
-    drawing="reduced_runs",
 )
+def bar_runs(results: Results, options: ReducedRuns) -> Figure:
+    """Draw full-order runs beside reduced ones, see `draw_experiments`."""
+    return draw_experiments(results, options)

@@ -1,11 +1,18 @@
 """Runs of sheets with bending only, reduced."""
 
-from pdrom.core.paths import FULL_ORDER, MESH, NOISE_RUNS, RERUNS, SENSITIVITY
-from pdrom.core.reads import Chosen, Every, Setting, TableOf
-from pdrom.report.figures.kit.declaration import Declaration
+from pdrom.core.paths import NOISE_RUNS
+from pdrom.core.reads import Every, TableOf
+from pdrom.report.figures.kit.artists import Figure
+from pdrom.report.figures.kit.declaration import figure
+from pdrom.report.figures.kit.experiment_rows import RUNS, draw_experiments, experiment_rows
+from pdrom.report.figures.kit.floor import Floors
+from pdrom.report.figures.kit.noise_rows import COLUMNS, noise_rows
 from pdrom.report.figures.kit.options import ReducedRuns
+from pdrom.report.figures.kit.results import Results
+from pdrom.report.figures.kit.run_rows import NOTHING_RAN, Row
 
-FIGURE = Declaration(
+
+@figure(
     number=5,
     title="Bending only, reduced",
     caption=(
@@ -16,15 +23,20 @@ FIGURE = Declaration(
         "not, or else the first; all are counted below the pictures and in the figure of "
         "reductions on bases of round-off). The curved sheet has projections that matter."
     ),
-    reads=(
-        Chosen(MESH),
-        Chosen(FULL_ORDER),
-        Chosen(RERUNS),
-        Chosen(SENSITIVITY),
-        TableOf("noise"),
-        Every(NOISE_RUNS),
-        Setting("sensitivity.reference"),
-        Setting("sensitivity.threshold"),
-    ),
+    reads=(*RUNS, TableOf("noise"), Every(NOISE_RUNS)),
     options=ReducedRuns,
 )
+def bending_runs(results: Results, options: ReducedRuns) -> Figure:
+    """Draw reduced runs; where all projections are round-off, runs on bases of it, if any."""
+    noise = results.table("noise", COLUMNS)
+
+    def rows_of(
+        results: Results, options: ReducedRuns, floors: Floors, scene: str, group: str
+    ) -> list[Row]:
+        found = experiment_rows(results, options, floors, scene, group)
+        if found[0].note != NOTHING_RAN:
+            return found
+        own = noise[(noise.scene == scene) & (noise.group == group)]
+        return noise_rows(results, options, floors, scene, group, own) or found
+
+    return draw_experiments(results, options, rows_of)

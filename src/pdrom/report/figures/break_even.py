@@ -1,15 +1,23 @@
 """Break-even of reduced local steps against the basis size (claim C9)."""
 
+import pandas as pd
+
 from pdrom.core.reads import TableOf
-from pdrom.report.figures.kit.declaration import Declaration
+from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.artists import Axes, Figure
+from pdrom.report.figures.kit.declaration import figure
+from pdrom.report.figures.kit.multiples import label_outer, small_multiples
 from pdrom.report.figures.kit.options import Columns, Experiments, Methods
+from pdrom.report.figures.kit.results import NothingToDraw, Results
+
+COLUMNS = ["scene", "group", "method", "factor", "threads", "r", "ratio"]
 
 
 class Options(Experiments, Methods, Columns):
-    """What may be chosen."""
+    """Choices."""
 
 
-FIGURE = Declaration(
+@figure(
     title="When a reduced local step stops paying",
     caption=(
         "Time of the reduced local step over that of the full one, both compiled and on one "
@@ -20,3 +28,33 @@ FIGURE = Declaration(
     reads=(TableOf("breakeven"),),
     options=Options,
 )
+def break_even(results: Results, options: Options) -> Figure:
+    """Draw a panel per constraint group, a line per scene and method; above 1 it costs more."""
+    table = results.held_rows(results.table("breakeven", COLUMNS), options)
+    table = table[(table.factor == 1.0) & (table.threads == 1)]
+    if table.empty:
+        raise NothingToDraw("no reduced local step was timed")
+    groups = [g for g in style.group_looks(results.holdings) if (table.group == g).any()]
+    figure, axes = small_multiples(len(groups), options.columns, legend_rows=2, height=1.8)
+    styles = style.method_styles([m for m in results.methods(options) if (table.method == m).any()])
+    for ax, group in zip(axes, groups, strict=True):
+        _draw_group(ax, table[table.group == group], styles)
+        ax.set_title(style.words(group))
+    label_outer(axes, options.columns, "basis vectors r", "reduced over full local step")
+    one = style.handle("break-even", color=style.BLACK, linestyle="--")
+    style.legend(figure, [*style.method_handles(results, styles), one], 3)
+    return figure
+
+
+def _draw_group(ax: Axes, rows: pd.DataFrame, styles: dict[str, tuple[str, str]]) -> None:
+    ax.set_yscale("log")
+    style.grid(ax)
+    ax.axhline(1.0, color=style.BLACK, linestyle="--", linewidth=1.0, zorder=1)
+    for (_, method), curve in rows.groupby(["scene", "method"], sort=False):
+        colour, marker = styles[str(method)]
+        curve = curve.sort_values("r")
+        ax.plot(
+            curve.r, curve.ratio, color=colour, marker=marker, markersize=2.6, linewidth=0.8,
+            alpha=0.75,
+        )  # fmt: skip
+    ax.set_xlim(left=0.0)

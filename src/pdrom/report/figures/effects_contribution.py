@@ -1,11 +1,26 @@
-"""What each effect of a scene does to its run."""
+"""Contribution of each effect of a scene to its run."""
+
+import numpy as np
+import pandas as pd
 
 from pdrom.core.paths import CONTRIBUTIONS
 from pdrom.core.reads import Chosen, TableOf
-from pdrom.report.figures.kit.declaration import Declaration
+from pdrom.core.store import read_table
+from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.artists import Axes, Figure
+from pdrom.report.figures.kit.declaration import figure
 from pdrom.report.figures.kit.options import Scenes
+from pdrom.report.figures.kit.results import Results
 
-FIGURE = Declaration(
+TABLE = ["scene", "effect", "role", "moved", "sensitivity_floor", "above_floor"]
+FRAMES = ["effect", "frame", "force"]
+SHOWN = 3  # scenes whose forces are drawn
+LOW, HIGH = 1e-12, 1e2
+ROUNDOFF = 1e-14  # of the largest force of a scene: what is smaller is not drawn
+OTHERS = ("#8C6D31", "#5A5A5A", "#B03A6B", "#2B2B80", "#3E8E7E", "#A0522D", "#7F7F00")
+
+
+@figure(
     title="What each effect contributes",
     caption=(
         "Left: norm of the force of each effect on the free vertices over the frames of a scene "
@@ -18,3 +33,63 @@ FIGURE = Declaration(
     reads=(TableOf("effects_contribution"), Chosen(CONTRIBUTIONS)),
     options=Scenes,
 )
+def effects_contribution(results: Results, options: Scenes) -> Figure:
+    """Draw the forces of the first scenes over time, and beside them every scene and effect."""
+    table = results.table("effects_contribution", TABLE)
+    scenes = results.scenes_of(table, options, "no contributions of effects")
+    rows = table[table.scene.isin(scenes)]
+    drawn = sorted(scenes, key=lambda scene: -len(results.holdings.scenes[scene].groups))[:SHOWN]
+    colours = _colours(results, rows[rows.moved.notna() | rows.scene.isin(drawn)])
+    figure = style.new_figure(0.24 * len(scenes) + 2.0)
+    left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.15))
+    axes = left.subplots(len(drawn), 1, squeeze=False)[:, 0]
+    for ax, scene in zip(axes, drawn, strict=True):
+        _draw_forces(ax, read_table(results.path(CONTRIBUTIONS, scene), FRAMES), colours)
+        ax.set_title(style.words(scene))
+    axes[-1].set_xlabel("frame")
+    axes[len(axes) // 2].set_ylabel("norm of the force (N)")
+    _draw_moved(right.subplots(), rows, scenes, colours)
+    looks = {style.words(effect): (colour, "o") for effect, colour in colours.items()}
+    style.legend(figure, style.handles(looks, markersize=4.5), 6)
+    return figure
+
+
+def _colours(results: Results, rows: pd.DataFrame) -> dict[str, str]:
+    """Of a group as everywhere else, of the other effects in their order."""
+    looks = {group: colour for group, (colour, _) in style.group_looks(results.holdings).items()}
+    names = list(dict.fromkeys(rows.effect))
+    groups = {name: looks[name] for name in names if name in looks}
+    others = [name for name in names if name not in looks]
+    return groups | {name: OTHERS[i % len(OTHERS)] for i, name in enumerate(others)}
+
+
+def _draw_forces(ax: Axes, frames: pd.DataFrame, colours: dict[str, str]) -> None:
+    least = ROUNDOFF * frames.force.max()
+    for effect, rows in frames.groupby("effect", sort=False):
+        force = rows.force.where(rows.force > least)
+        if len(rows) > 1:
+            ax.plot(rows.frame, force, color=colours[str(effect)], linewidth=1.1)
+        else:
+            ax.plot(rows.frame, force, color=colours[str(effect)], marker="o", markersize=3.5)
+    ax.set_yscale("log")
+    style.grid(ax)
+
+
+def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], colours: dict[str, str]) -> None:
+    for y, scene in enumerate(scenes):
+        own = rows[rows.scene == scene]
+        floor = float(own.sensitivity_floor.iloc[0])
+        ax.barh(y, floor - LOW, left=LOW, color="#DCD8D0", height=0.8, zorder=1)
+        for row in own[own.moved.notna()].itertuples():
+            colour = colours[row.effect]
+            ax.plot(
+                [np.clip(row.moved, LOW, HIGH)], [y], marker="o", markersize=4.5, zorder=3,
+                color=colour, markerfacecolor=colour if row.above_floor else "white",
+                clip_on=False,
+            )  # fmt: skip
+    style.label_rows(ax, [style.words(scene) for scene in scenes])
+    ax.set_xscale("log")
+    ax.set_xlim(LOW, HIGH)
+    ax.tick_params(axis="y", length=0)
+    ax.set_xlabel("drift of the run without the effect")
+    style.grid(ax)

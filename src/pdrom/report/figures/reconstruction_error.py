@@ -1,15 +1,13 @@
 """Reconstruction error of snapshots against the basis size, on the preprint's scenes."""
 
-from pdrom.core.reads import Published, TableOf
-from pdrom.report.figures.kit.declaration import Declaration
-from pdrom.report.figures.kit.options import Beside, Columns, Experiments, Methods, Splits
+from pdrom.report.figures.kit.artists import Figure
+from pdrom.report.figures.kit.declaration import figure
+from pdrom.report.figures.kit.options import Reconstruction
+from pdrom.report.figures.kit.reconstruction import READS, draw_reconstruction
+from pdrom.report.figures.kit.results import Results
 
 
-class Options(Experiments, Methods, Splits, Columns, Beside):
-    """What may be chosen."""
-
-
-FIGURE = Declaration(
+@figure(
     number=8,
     title="Reconstruction error of the preprint's scenes",
     caption=(
@@ -17,9 +15,9 @@ FIGURE = Declaration(
         "the snapshots used (train), the frames between them (test) and another run (held out). "
         "Errors above the axis are drawn on its rim with an arrow head."
     ),
-    reads=(
-        TableOf("reconstruction_error"),
-        Published("reconstruction_error"),
-    ),
-    options=Options,
+    reads=READS,
+    options=Reconstruction,
 )
+def reconstruction_error(results: Results, options: Reconstruction) -> Figure:
+    """Draw errors of reconstructed snapshots, see `draw_reconstruction`."""
+    return draw_reconstruction(results, options)

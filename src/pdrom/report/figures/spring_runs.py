@@ -1,11 +1,13 @@
 """Runs of sheets with springs only, reduced."""
 
-from pdrom.core.paths import FULL_ORDER, MESH, RERUNS, SENSITIVITY
-from pdrom.core.reads import Chosen, Setting
-from pdrom.report.figures.kit.declaration import Declaration
+from pdrom.report.figures.kit.artists import Figure
+from pdrom.report.figures.kit.declaration import figure
+from pdrom.report.figures.kit.experiment_rows import RUNS, draw_experiments
 from pdrom.report.figures.kit.options import ReducedRuns
+from pdrom.report.figures.kit.results import Results
 
-FIGURE = Declaration(
+
+@figure(
     number=6,
     title="Springs only, reduced",
     caption=(
@@ -13,14 +15,9 @@ FIGURE = Declaration(
         "The grey outline is the full-order run at the same instant; a framed picture is drawn to "
         "the smaller scale given below it."
     ),
-    reads=(
-        Chosen(MESH),
-        Chosen(FULL_ORDER),
-        Chosen(RERUNS),
-        Chosen(SENSITIVITY),
-        Setting("sensitivity.reference"),
-        Setting("sensitivity.threshold"),
-    ),
+    reads=RUNS,
     options=ReducedRuns,
-    drawing="reduced_runs",
 )
+def spring_runs(results: Results, options: ReducedRuns) -> Figure:
+    """Draw full-order runs beside reduced ones, see `draw_experiments`."""
+    return draw_experiments(results, options)

@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from pdrom.report.figures.kit import style
@@ -83,12 +82,6 @@ def _draw_runs(ax: Axes, rows: pd.DataFrame, look: tuple[str, str]) -> None:
 
 
 def _legend(figure: Figure, results: SceneResults, styles: dict[str, tuple[str, str]]) -> None:
-    handles = [
-        Line2D([], [], color=colour, marker=marker, label=results.method_title(method))
-        for method, (colour, marker) in styles.items()
-    ]
-    for split in SPLITS:
-        name = style.SPLIT_NAMES[split]
-        handles.append(Line2D([], [], color="#555555", linestyle=style.SPLITS[split], label=name))
-    handles.append(Line2D([], [], color="#555555", label="blew up before the horizon", **CROSS))
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    handles = [*style.method_handles(results, styles), *style.split_handles(SPLITS)]
+    handles.append(style.handle("blew up before the horizon", color="#555555", **CROSS))
+    style.legend(figure, handles, 3)

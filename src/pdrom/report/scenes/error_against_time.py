@@ -4,8 +4,7 @@ from collections.abc import Mapping
 
 from matplotlib.figure import Figure
 
-from pdrom.report.figures.drawings import run_error
-from pdrom.report.figures.run_error import Options
+from pdrom.report.figures.run_error import Options, run_error
 from pdrom.report.scenes.picture import write_picture
 from pdrom.report.scenes.results import SceneResults
 
@@ -19,4 +18,5 @@ def make(results: SceneResults, outputs: Mapping[str, str]) -> None:
 
 def draw(results: SceneResults) -> Figure:
     """A panel per group; see the study's figure of this kind, which draws it."""
-    return run_error.draw(results, Options(scenes=(results.scene,), ranks=SIZES, columns=2))
+    options = Options(scenes=(results.scene,), ranks=SIZES, columns=2)
+    return run_error.function(results, options)

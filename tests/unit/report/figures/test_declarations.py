@@ -3,13 +3,14 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.paths import MESH, RERUNS
 from pdrom.reduction.method import load_methods
-from pdrom.report.figures.kit.catalogue import declaration, declarations, load_choices, modules
+from pdrom.report.figures.kit.catalogue import declaration, declarations, load_choices
 from pdrom.report.figures.kit.holdings import GroupHolding, Holdings, MethodHolding, SceneHolding
 from pdrom.report.figures.kit.options import Scenes
 
@@ -24,10 +25,13 @@ def test_figures_of_the_paper_come_first_in_their_order():
     assert set(numbers[9:]) == {None}
 
 
-def test_every_figure_has_a_drawing():
-    for name in declarations():
-        for module in modules(name):
-            assert (ROOT / "src" / (module.replace(".", "/") + ".py")).is_file()
+@pytest.mark.parametrize("changed", [None, {"name": "rung"}])
+def test_a_module_declares_one_figure_of_its_own_name(monkeypatch, changed):
+    figure = declaration("ladder")
+    wrong = changed and replace(figure, **changed)
+    monkeypatch.setattr(sys.modules[figure.module], "ladder", wrong)
+    with pytest.raises(ConfigurationError, match="ladder: must declare one figure, called ladder"):
+        declarations.__wrapped__()
 
 
 def test_methods_exist(specs):

@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from matplotlib.colors import Normalize, to_rgb
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from pdrom.core.errors import ConfigurationError, StorageError
@@ -15,7 +15,7 @@ from pdrom.reduction.sampling.block import block_elements
 from pdrom.reduction.sampling.deim import deim_entries
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.camera import Camera, Window, bounds, window_of
-from pdrom.report.figures.kit.elements import MAGNITUDE, element_map, signed_entry
+from pdrom.report.figures.kit.elements import element_map, magnitudes, signed_entry
 from pdrom.report.figures.kit.mesh_render import (
     AMBIENT,
     RASTER_ABOVE,
@@ -173,7 +173,7 @@ def test_elements_are_drawn_where_they_lie(group, mesh, kind):
     assert elements.kind == kind
     assert elements.centres(mesh.points).shape == (count, 3)
     ax = Figure().subplots()
-    elements.draw(ax, mesh.points, np.linspace(0, 1, count), Camera(), MAGNITUDE, Normalize(0, 1))
+    elements.draw(ax, mesh.points, np.linspace(0, 1, count), Camera(), magnitudes())
     assert ax.collections
     with pytest.raises(StorageError, match="the mesh has"):
         element_map(group, mesh, count + 1, "file")

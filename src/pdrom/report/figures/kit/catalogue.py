@@ -22,7 +22,7 @@ def declarations() -> dict[str, Declaration]:
     Raises
     ------
     ConfigurationError
-        A module declares no figure, or two figures have the same number.
+        A module does not declare one figure of its own name, or two figures have the same number.
     """
     found = dict(_declared())
     numbers = [d.number for d in found.values() if d.number is not None]
@@ -38,10 +38,12 @@ def _declared() -> Iterator[tuple[str, Declaration]]:
     for module in iter_modules([folder]):
         if module.ispkg:
             continue
-        declared = getattr(import_module(f"{PACKAGE}.{module.name}"), "FIGURE", None)
-        if not isinstance(declared, Declaration):
-            raise ConfigurationError(f"{PACKAGE}.{module.name}: declares no FIGURE")
-        yield module.name, declared
+        place = f"{PACKAGE}.{module.name}"
+        values = vars(import_module(place)).values()
+        found = [v for v in values if isinstance(v, Declaration) and v.module == place]
+        if [declared.name for declared in found] != [module.name]:
+            raise ConfigurationError(f"{place}: must declare one figure, called {module.name}")
+        yield module.name, found[0]
 
 
 def declaration(name: str) -> Declaration:
@@ -50,11 +52,6 @@ def declaration(name: str) -> Declaration:
     if name not in known:
         raise ConfigurationError(f"unknown figure '{name}'{choices(name, known)}")
     return known[name]
-
-
-def modules(name: str) -> tuple[str, str]:
-    """The modules that declare and draw figure ``name``."""
-    return f"{PACKAGE}.{name}", f"{PACKAGE}.drawings.{declaration(name).drawing or name}"
 
 
 def load_choices(path: Path | str) -> dict[str, Options]:

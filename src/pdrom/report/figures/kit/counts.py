@@ -3,25 +3,26 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap
 
 from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.artists import Axes
 
 Cell = tuple[int, int]
-_COLOURS = LinearSegmentedColormap.from_list("counts", ["#FFFFFF", style.VERMILLION])
 
 
 def draw_counts(
     ax: Axes, rows: Sequence[str], columns: Sequence[str], cells: Mapping[tuple[int, int], Cell]
 ) -> None:
     """Draw cells by (row, column): (a, b) with a of b; the more of them the darker."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    colours = LinearSegmentedColormap.from_list("counts", ["#FFFFFF", style.VERMILLION])
     share = np.full((len(rows), len(columns)), np.nan)
     for place, (some, whole) in cells.items():
         share[place] = some / whole
         y, x = place
         ax.text(x, y, f"{some} of {whole}", ha="center", va="center", fontsize=7)
-    ax.imshow(share, cmap=_COLOURS, vmin=0.0, vmax=1.0, aspect="auto")
+    ax.imshow(share, cmap=colours, vmin=0.0, vmax=1.0, aspect="auto")
     ax.set_xticks(range(len(columns)), columns)
     ax.set_yticks(range(len(rows)), rows)
     ax.set_xticks(np.arange(len(columns) + 1) - 0.5, minor=True)

@@ -2,25 +2,37 @@
 
 from dataclasses import dataclass
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
 
 from pdrom.core.errors import StorageError
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.types import Mesh
+from pdrom.report.figures.kit.artists import Axes, Normalize, ScalarMappable
 from pdrom.report.figures.kit.camera import Camera
 from pdrom.report.figures.kit.mesh_render import Surface, draw_lines, draw_surface
 
 NEUTRAL = "#E4E1DA"
-# light to dark, so that zero is the page's white
-MAGNITUDE = LinearSegmentedColormap.from_list(
-    "pdrom_magnitude", mpl.colormaps["magma_r"](np.linspace(0.02, 0.92, 256))
-)
+SIGNED = "RdBu_r"
 
-SIGNED = mpl.colormaps["RdBu_r"]  # of what has a sign
+
+def magnitudes(norm: Normalize | None = None) -> ScalarMappable:
+    """Colours from the page's white to dark, of values from 0 to 1 or as ``norm`` says."""
+    import matplotlib as mpl
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LinearSegmentedColormap, Normalize
+
+    shades = mpl.colormaps["magma_r"](np.linspace(0.02, 0.92, 256))
+    colours = LinearSegmentedColormap.from_list("pdrom_magnitude", shades)
+    return ScalarMappable(norm or Normalize(0.0, 1.0), colours)
+
+
+def signed() -> ScalarMappable:
+    """Colours of values from -1 to 1."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    return ScalarMappable(Normalize(-1.0, 1.0), SIGNED)
 
 
 @dataclass(frozen=True)
@@ -69,20 +81,19 @@ class ElementMap:
         points: np.ndarray,
         values: np.ndarray,
         camera: Camera,
-        cmap: Colormap,
-        norm: Normalize,
+        colours: ScalarMappable,
     ) -> None:
         """Draw the mesh at ``points`` (N, 3) m with ``values`` (e,) of its elements as colour."""
         if self.kind == "edge" and self.surface.open:
             draw_surface(ax, points, self.surface, camera, "#FFFFFF", wire=0.0, contrast=0.15)
-            draw_lines(ax, points[self.cells], camera, cmap(norm(values)))
+            draw_lines(ax, points[self.cells], camera, colours.to_rgba(values))
             return
         if self.kind == "edge":
             values, faces = _edges_to_vertices(self, values), True
         else:
             faces = False
         carried = self.face_values(values) if not faces else values[self.mesh.triangles].mean(1)
-        rgb = cmap(norm(np.nan_to_num(carried)))[:, :3]
+        rgb = colours.to_rgba(np.nan_to_num(carried))[:, :3]
         rgb[~np.isfinite(carried)] = (0.92, 0.91, 0.89)
         draw_surface(ax, points, self.surface, camera, rgb, wire=0.12, contrast=0.35)
 

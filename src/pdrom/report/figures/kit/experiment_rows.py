@@ -1,49 +1,30 @@
-"""Rows of one experiment: its full-order run beside the reduced ones."""
+"""Rows of experiments: a full-order run beside the reduced ones."""
 
 from collections.abc import Callable
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from pdrom.core.paths import FULL_ORDER, MESH, RERUNS
+from pdrom.core.reads import Chosen
 from pdrom.model.mesh.types import load_mesh
 from pdrom.report.figures.kit import style
-from pdrom.report.figures.kit.camera import Camera
-from pdrom.report.figures.kit.floor import Floors
+from pdrom.report.figures.kit.artists import Figure
+from pdrom.report.figures.kit.floor import FLOORS, Floors
 from pdrom.report.figures.kit.options import ReducedRuns
 from pdrom.report.figures.kit.panels import RunPanel, shared_window
 from pdrom.report.figures.kit.read import choose_ranks, positions_at, rerun_infos
 from pdrom.report.figures.kit.results import NothingToDraw, Results, asked
 from pdrom.report.figures.kit.run_rows import NOTHING_RAN, Row, draw_rows, run_panel
 
+RUNS = (Chosen(MESH), Chosen(FULL_ORDER), Chosen(RERUNS), *FLOORS)
 RowsOf = Callable[[Results, ReducedRuns, Floors, str, str], list[Row]]
-
-
-def draw_experiments(results: Results, options: ReducedRuns, rows_of: RowsOf) -> Figure:
-    """The rows of all experiments asked for, below each other.
-
-    Raises
-    ------
-    NothingToDraw
-        The study has no such experiment or method.
-    StorageError
-        A file of the results is missing or damaged.
-    """
-    experiments = results.experiments(options)
-    if not experiments or not results.methods(options):
-        raise NothingToDraw(asked(options))
-    floors = Floors(results)
-    rows: list[Row] = []
-    for scene, group in experiments:
-        rows += rows_of(results, options, floors, scene, group)
-    return draw_rows(rows, Camera(options.azimuth, options.elevation))
 
 
 def experiment_rows(
     results: Results, options: ReducedRuns, floors: Floors, scene: str, group: str
 ) -> list[Row]:
     """A row per method; a single one that says so where no method has anything to reduce."""
-    camera = Camera(options.azimuth, options.elevation)
+    camera = options.camera
     colour = style.surface_colour(style.group_looks(results.holdings)[group][0])
     frames, full = positions_at(results.path(FULL_ORDER, scene), options.frames[-1:])
     frame, mesh = frames[0], load_mesh(results.path(MESH, scene))
@@ -71,3 +52,24 @@ def experiment_rows(
         )
         for method, panels in runs.items()
     ]
+
+
+def draw_experiments(
+    results: Results, options: ReducedRuns, rows_of: RowsOf = experiment_rows
+) -> Figure:
+    """Draw a row per experiment and method: the full-order run, then the reduced ones by size.
+
+    All pictures of an experiment show the same instant, the last one of ``options.frames``,
+    with the same camera; one that does not fit is framed and its scale is given. The grey outline
+    is the full-order run.
+
+    rows_of : rows of one experiment
+    """
+    experiments = results.experiments(options)
+    if not experiments or not results.methods(options):
+        raise NothingToDraw(asked(options))
+    floors = Floors(results)
+    rows: list[Row] = []
+    for scene, group in experiments:
+        rows += rows_of(results, options, floors, scene, group)
+    return draw_rows(rows, options.camera)

@@ -3,10 +3,15 @@
 import numpy as np
 
 from pdrom.core.paths import SENSITIVITY
+from pdrom.core.reads import Chosen, Setting
 from pdrom.core.store import read_table
 from pdrom.experiments.kit.horizon import floor_of, horizon
 from pdrom.report.figures.kit.results import Results
 
+# What a figure that asks for floors reads.
+FLOORS = (
+    Chosen(SENSITIVITY), Setting("sensitivity.reference"), Setting("sensitivity.threshold"),
+)  # fmt: skip
 COLUMNS = ["scene", "perturbation", "frame", "relative_difference"]
 
 

@@ -2,8 +2,7 @@
 
 from collections.abc import Sequence
 
-from matplotlib.artist import Artist
-from matplotlib.figure import SubFigure
+from pdrom.report.figures.kit.artists import Artist, SubFigure
 
 LINE = 0.145  # inches, of a line of text
 _GAP = 0.06  # inches, between rows of blocks

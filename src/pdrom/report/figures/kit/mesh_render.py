@@ -7,10 +7,8 @@ a sheet shows its folds whichever side it turns to the camera.
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import to_rgb
 
+from pdrom.report.figures.kit.artists import Axes, PolyCollection
 from pdrom.report.figures.kit.camera import Camera, Window
 
 AMBIENT = 0.45
@@ -81,6 +79,9 @@ def draw_surface(
     wire : opacity of the wireframe, 0 for none
     contrast : 1 for the full shading, less where colours carry numbers
     """
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import to_rgb
+
     triangles = surface.triangles
     raw = face_normals(points, triangles)
     normals = smooth_normals(points, triangles) if surface.open else raw
@@ -111,6 +112,8 @@ def draw_floor(
 
     Returns whether it was drawn.
     """
+    from matplotlib.collections import PolyCollection
+
     margin = 0.25 * max(window.width, window.height)
     near = camera.project(points * [1.0, 0.0, 1.0])
     if camera.elevation < 3.0 or not window.contains(near).any():
@@ -168,6 +171,8 @@ def draw_outline(
     ax: Axes, points: np.ndarray, edges: np.ndarray, camera: Camera, colour: str = "#4D4D4D"
 ) -> None:
     """Thin outline, the ghost of a shape to compare with."""
+    from matplotlib.collections import LineCollection
+
     lines = LineCollection(camera.project(points)[edges], colors=colour, linewidths=0.6)
     lines.set_zorder(0.5)
     ax.add_collection(lines)
@@ -177,6 +182,8 @@ def draw_lines(
     ax: Axes, segments: np.ndarray, camera: Camera, colours: np.ndarray, width: float = 1.2
 ) -> None:
     """Coloured segments (n, 2, 3) m, painted from far to near."""
+    from matplotlib.collections import LineCollection
+
     order = np.argsort(camera.depth(segments.mean(axis=1)), kind="stable")
     flat = camera.project(segments.reshape(-1, 3)).reshape(-1, 2, 2)
     lines = LineCollection(

@@ -3,12 +3,9 @@
 from collections.abc import Iterable
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.axis import Axis
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.artists import Axes, Axis, Figure, SubFigure
 
 PANEL_HEIGHT = 1.45  # inches
 NEAR = 0.05  # of the axis: markers closer than this share a label
@@ -18,16 +15,29 @@ def small_multiples(
     count: int, columns: int, legend_rows: int = 1, height: float = PANEL_HEIGHT
 ) -> tuple[Figure, list[Axes]]:
     """Figure with ``count`` panels that share the y axis; no empty panel is left over."""
+    rows = rows_of(count, columns)
+    figure = style.new_figure(rows * height + 0.2 * legend_rows + 0.35)
+    return figure, panels(figure, count, columns, sharey=True)
+
+
+def rows_of(count: int, columns: int) -> int:
+    """Number of rows of ``count`` panels."""
+    return -(-count // min(columns, count))
+
+
+def panels(
+    figure: Figure | SubFigure, count: int, columns: int, sharey: bool = False
+) -> list[Axes]:
+    """Panels row by row, the last row perhaps shorter; a shared y axis has numbers on the left."""
     columns = min(columns, count)
-    rows = -(-count // columns)
-    size = (style.WIDTH, rows * height + 0.2 * legend_rows + 0.35)
-    figure = Figure(figsize=size, layout="constrained")
-    axes = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
+    grid = figure.subplots(rows_of(count, columns), columns, squeeze=False, sharey=sharey)
+    axes = list(grid.ravel())
     for ax in axes[count:]:
         ax.remove()
-    for i, ax in enumerate(axes[:count]):
-        ax.tick_params(labelleft=i % columns == 0)
-    return figure, list(axes[:count])
+    if sharey:
+        for i, ax in enumerate(axes[:count]):
+            ax.tick_params(labelleft=i % columns == 0)
+    return axes[:count]
 
 
 def label_outer(axes: list[Axes], columns: int, x: str, y: str) -> None:
@@ -42,10 +52,19 @@ def label_outer(axes: list[Axes], columns: int, x: str, y: str) -> None:
 
 def log_axis(ax: Axes, low: float, high: float) -> None:
     """Logarithmic y axis from ``low`` to ``high`` with few ticks."""
+    from matplotlib.ticker import LogLocator
+
     ax.set_yscale("log")
     ax.set_ylim(low, high)
     ax.yaxis.set_major_locator(LogLocator(base=10.0, numticks=6))
     style.grid(ax)
+
+
+def log_axes(ax: Axes, across: tuple[float, float], along: tuple[float, float]) -> None:
+    """Logarithmic axes with limits ``across`` in x and ``along`` in y."""
+    log_axis(ax, *along)
+    ax.set_xscale("log")
+    ax.set_xlim(*across)
 
 
 def time_axis(ax: Axes, times: np.ndarray) -> None:
@@ -57,8 +76,17 @@ def time_axis(ax: Axes, times: np.ndarray) -> None:
     plain_ticks(ax.xaxis, high - low)
 
 
+def no_minor_labels(ax: Axes) -> None:
+    """No numbers between the powers of ten of a logarithmic x axis."""
+    from matplotlib.ticker import NullFormatter
+
+    ax.xaxis.set_minor_formatter(NullFormatter())
+
+
 def plain_ticks(axis: Axis, decades: float) -> None:
     """Plain numbers on a logarithmic axis that spans ``decades``: two at least."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
     steps = [(0.4, (1, 1.5, 2, 3, 5, 7)), (0.7, (1, 2, 3, 5)), (1.3, (1, 2, 5)), (2.0, (1, 3))]
     subs = next((s for limit, s in steps if decades < limit), (1,))
     axis.set_major_locator(LogLocator(subs=subs))

@@ -8,7 +8,6 @@ import pandas as pd
 from pdrom.core.paths import FULL_ORDER, MESH, NOISE_RUNS
 from pdrom.model.mesh.types import load_mesh
 from pdrom.report.figures.kit import style
-from pdrom.report.figures.kit.camera import Camera
 from pdrom.report.figures.kit.floor import Floors
 from pdrom.report.figures.kit.options import ReducedRuns
 from pdrom.report.figures.kit.panels import RunPanel, shared_window
@@ -37,7 +36,7 @@ def noise_rows(
     ----------
     table : rows of the table ``noise`` of this scene and group
     """
-    camera = Camera(options.azimuth, options.elevation)
+    camera = options.camera
     colour = style.surface_colour(style.group_looks(results.holdings)[group][0])
     frames, full = positions_at(results.path(FULL_ORDER, scene), options.frames[-1:])
     mesh, path = load_mesh(results.path(MESH, scene)), results.path(NOISE_RUNS, scene, group)

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from pdrom.core.yamlfile import ConfigModel
+from pdrom.report.figures.kit.camera import Camera
 
 Rank = Annotated[int, Field(ge=0)] | Literal["full"]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -60,6 +61,11 @@ class View(Options):
     azimuth: Annotated[float, Field(ge=-180.0, le=180.0)] = 30.0
     elevation: Annotated[float, Field(ge=-90.0, le=90.0)] = 20.0
 
+    @property
+    def camera(self) -> Camera:
+        """The camera."""
+        return Camera(self.azimuth, self.elevation)
+
 
 class Columns(Options):
     """Panels side by side."""
@@ -83,6 +89,10 @@ class Beside(Options):
     """Scene -> experiment of the published code whose output is drawn beside ours."""
 
     published: dict[str, str] = Field(default_factory=dict)
+
+
+class Reconstruction(Experiments, Methods, Splits, Columns, Beside):
+    """Errors of reconstructed snapshots."""
 
 
 class ReducedRuns(Experiments, Methods, Ranks, Instants, View):

@@ -4,11 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Rectangle
 
 from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.artists import Axes, Figure
 
 GAP = 0.45  # between blocks, in cells
 LEAST = 2.0  # cells, that a title needs
@@ -87,6 +85,8 @@ def draw_cells(
 
 
 def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
+    from matplotlib.patches import Rectangle
+
     look = LOOKS[str(found.outcome)]
     ax.add_patch(
         Rectangle((x, y), 1.0, 1.0, facecolor=look.face, edgecolor="#BBBBBB", linewidth=0.3)
@@ -99,7 +99,7 @@ def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
 def legend(figure: Figure, present: Sequence[str]) -> None:
     """Legend of the outcomes that occur."""
     handles = [
-        Patch(facecolor=look.face, edgecolor="#BBBBBB", linewidth=0.5, label=_label(look))
+        style.patch(_label(look), facecolor=look.face, edgecolor="#BBBBBB", linewidth=0.5)
         for outcome, look in LOOKS.items()
         if outcome in present
     ]

@@ -2,7 +2,6 @@
 
 import logging
 import os
-from importlib import import_module
 from pathlib import Path
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -12,7 +11,7 @@ from pdrom.core.embedded import PDF_KEY, PNG_KEY
 from pdrom.core.provenance import as_text, provenance
 from pdrom.core.store import atomic_path
 from pdrom.report.figures.kit import style
-from pdrom.report.figures.kit.catalogue import modules
+from pdrom.report.figures.kit.catalogue import declaration
 from pdrom.report.figures.kit.options import Options
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 
@@ -29,10 +28,10 @@ def draw_figure(name: str, results: Results, options: Options, full: bool = True
     ``full`` says that the configuration is that of the full study. Raises ConfigurationError for an
     unknown figure, StorageError for a file that is missing or damaged.
     """
-    drawing = import_module(modules(name)[1])
+    function = declaration(name).function
     with style.look():
         try:
-            return drawing.draw(results, options)
+            return function(results, options)
         except NothingToDraw as nothing:
             log.info("figure %s: %s", name, nothing)
             elsewhere = "" if full else f"\n{FULL_STUDY}"

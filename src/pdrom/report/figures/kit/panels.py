@@ -1,12 +1,12 @@
 """Panels with a run in them: the mesh at one instant, or why there is none."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.patches import Rectangle
 
 from pdrom.model.mesh.types import Mesh
+from pdrom.report.figures.kit.artists import Axes
 from pdrom.report.figures.kit.camera import Camera, Window, bounds, window_of
 from pdrom.report.figures.kit.mesh_render import (
     Colour,
@@ -139,18 +139,20 @@ def _scale(factor: float) -> str:
 
 
 def _mark_failure(ax: Axes) -> None:
-    ax.add_patch(
-        Rectangle(
-            (0, 0), 1, 1, transform=ax.transAxes, facecolor="#FBEDEB", edgecolor="#EBB9B4",
-            hatch="////", linewidth=0.0, zorder=-5, clip_on=False,
-        )
-    )  # fmt: skip
+    look = {"facecolor": "#FBEDEB", "edgecolor": "#EBB9B4", "hatch": "////", "linewidth": 0.0}
+    _cover(ax, zorder=-5, **look)
 
 
 def _frame(ax: Axes) -> None:
     """Thin red frame: this picture has another scale than its neighbours."""
-    style = {"facecolor": "none", "edgecolor": FAILED, "linewidth": 0.6, "clip_on": False}
-    ax.add_patch(Rectangle((0, 0), 1, 1, transform=ax.transAxes, zorder=8, **style))
+    _cover(ax, zorder=8, facecolor="none", edgecolor=FAILED, linewidth=0.6)
+
+
+def _cover(ax: Axes, **look: Any) -> None:
+    """Rectangle over the whole panel."""
+    from matplotlib.patches import Rectangle
+
+    ax.add_patch(Rectangle((0, 0), 1, 1, transform=ax.transAxes, clip_on=False, **look))
 
 
 def _centre_note(ax: Axes, panel: RunPanel) -> None:

@@ -68,6 +68,30 @@ class Results:
         name = scene.replace("_", " ")
         return f"{name}: {group.replace('_', ' ')}" if several else name
 
+    def scenes_of(self, table: pd.DataFrame, options: Options, nothing: str) -> list[str]:
+        """Scenes that are drawn and have a row in ``table``; without any, `NothingToDraw`.
+
+        nothing : its message
+        """
+        scenes = [scene for scene in self.scenes(options) if (table.scene == scene).any()]
+        if not scenes:
+            raise NothingToDraw(nothing)
+        return scenes
+
+    def asked_rows(self, name: str, columns: Sequence[str], options: Options) -> pd.DataFrame:
+        """Rows of a table of the scenes and methods that the options name, or of all."""
+        table = self.table(name, columns)
+        for key, column in (("scenes", "scene"), ("methods", "method")):
+            if names := options.names(key):
+                table = table[table[column].isin(names)]
+        return table
+
+    def held_rows(self, table: pd.DataFrame, options: Options) -> pd.DataFrame:
+        """Rows of the experiments and methods that are drawn."""
+        pairs = pd.MultiIndex.from_frame(table[["scene", "group"]])
+        held = pairs.isin(self.experiments(options))
+        return table[held & table.method.isin(self.methods(options))]
+
     def path(self, place: Place, scene: str, group: str = "", method: str = "") -> str:
         """Path of a result."""
         return self.holdings.path(place, self.folder, scene, group, method)

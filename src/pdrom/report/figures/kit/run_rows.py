@@ -5,21 +5,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from pdrom.model.mesh.types import Mesh
 from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.artists import Figure
 from pdrom.report.figures.kit.camera import Camera, Window
-from pdrom.report.figures.kit.panels import (
-    SLACK,
-    RunPanel,
-    centre_note,
-    draw_run,
-)
-from pdrom.report.figures.kit.read import (
-    RerunInfo,
-    rerun_positions,
-)
+from pdrom.report.figures.kit.panels import SLACK, RunPanel, centre_note, draw_run
+from pdrom.report.figures.kit.read import RerunInfo, rerun_positions
 
 HEIGHT_LIMIT = 9.3  # inches, a page
 LEFT = 1.0  # inches, for the row labels
@@ -99,7 +91,7 @@ def draw_rows(
         shrink * 0.96 * width * row.aspect + ABOVE + BELOW + LINE * row.lines for row in rows
     ]
     height = sum(heights) + footer
-    figure = Figure(figsize=(style.WIDTH, height))
+    figure = style.new_figure(height, None)
     tops = 1.0 - np.concatenate([[0.0], np.cumsum(heights)]) / height
     for row, (top, bottom) in zip(rows, pairwise(tops), strict=True):
         _draw_row(figure, row, camera, columns, top, bottom)

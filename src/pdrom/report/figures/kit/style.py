@@ -1,18 +1,16 @@
 """One look for all figures: fonts, palette, markers, small helpers."""
 
-from collections.abc import Iterable, Iterator
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal
 
-import matplotlib as mpl
-from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-
+from pdrom.report.figures.kit.artists import Artist, Axes, Figure, Line2D, Patch
 from pdrom.report.figures.kit.holdings import Holdings
+from pdrom.report.figures.kit.results import Results
 
 WIDTH = 7.0  # inches, text width of the manuscript
+NOTE = 100  # characters in a line of a figure that only says something
 
 # Okabe and Ito (2008): told apart with every common colour deficiency.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
@@ -89,6 +87,8 @@ RC: dict[str, Any] = {
 @contextmanager
 def look() -> Iterator[None]:
     """Context with this style on top of matplotlib's own defaults, whatever the user has set."""
+    import matplotlib as mpl
+
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(RC)
@@ -110,11 +110,8 @@ def scene_style(index: int) -> tuple[str, str]:
 
 def scene_handles(scenes: Iterable[str]) -> list[Line2D]:
     """Legend entries of scenes in the styles of `scene_style`."""
-    styles = [(scene, *scene_style(i)) for i, scene in enumerate(scenes)]
-    return [
-        Line2D([], [], linestyle="none", marker=marker, color=colour, label=words(scene))
-        for scene, colour, marker in styles
-    ]
+    looks = {words(scene): scene_style(i) for i, scene in enumerate(scenes)}
+    return handles(looks, linestyle="none")
 
 
 def group_looks(holdings: Holdings) -> dict[str, tuple[str, str]]:
@@ -125,6 +122,8 @@ def group_looks(holdings: Holdings) -> dict[str, tuple[str, str]]:
 
 def surface_colour(colour: str) -> tuple[float, float, float]:
     """``colour`` on a shaded surface: lightened, so that the shading has room."""
+    from matplotlib.colors import to_rgb
+
     red, green, blue = (0.72 * c + 0.28 for c in to_rgb(colour))
     return red, green, blue
 
@@ -134,6 +133,58 @@ def words(name: str) -> str:
     return name.replace("_", " ")
 
 
+def new_figure(height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
+    """An empty figure of the manuscript's width, ``height`` inches high."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(WIDTH, height), layout=layout)
+
+
+def handle(label: str, **look: Any) -> Line2D:
+    """Entry of a legend: a line, or a marker, that looks so."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], label=label, **look)
+
+
+def patch(label: str, **look: Any) -> Patch:
+    """Entry of a legend: a rectangle that looks so."""
+    from matplotlib.patches import Patch
+
+    return Patch(label=label, **look)
+
+
+def handles(looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
+    """Entries of a legend by their labels, each with its (colour, marker)."""
+    return [handle(label, color=c, marker=m, **common) for label, (c, m) in looks.items()]
+
+
+def method_handles(
+    results: Results, styles: Mapping[str, tuple[str, str]], **common: Any
+) -> list[Line2D]:
+    """Entries of a legend: methods in their ``styles``."""
+    return [
+        handle(results.method_title(method), color=colour, marker=marker, **common)
+        for method, (colour, marker) in styles.items()
+    ]
+
+
+def split_handles(splits: Iterable[str]) -> list[Line2D]:
+    """Entries of a legend: sets of snapshots by their lines."""
+    return [handle(SPLIT_NAMES[s], color="#555555", linestyle=SPLITS[s]) for s in splits]
+
+
+def legend(figure: Figure, entries: Sequence[Artist], columns: int) -> None:
+    """Draw a legend below all panels."""
+    figure.legend(handles=list(entries), loc="outside lower center", ncols=columns)
+
+
+def label_rows(ax: Axes, labels: Sequence[str]) -> None:
+    """Name rows at 0, 1, 2, ... from the top."""
+    ax.set_yticks(range(len(labels)), labels)
+    ax.set_ylim(len(labels) - 0.4, -0.6)
+
+
 def grid(ax: Axes) -> None:
     """Light grid behind the data."""
     ax.grid(True, which="major")
@@ -141,6 +192,7 @@ def grid(ax: Axes) -> None:
 
 def note(text: str) -> Figure:
     """A figure that only says why there is nothing to draw."""
-    figure = Figure(figsize=(WIDTH, 0.6))
-    figure.text(0.5, 0.5, text, ha="center", va="center", fontsize=9, color="#444444")
+    lines = [line for part in text.split("\n") for line in textwrap.wrap(part, NOTE)]
+    figure = new_figure(0.3 + 0.15 * len(lines), None)
+    figure.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", fontsize=9, color="#444444")
     return figure

@@ -5,15 +5,14 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 
 from pdrom.experiments.kit.names import ANDERSON, FOM
 from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.artists import Axes, Line2D
 from pdrom.report.figures.kit.families import FAMILIES, ITERATIONS, Family, Model, markers
 from pdrom.report.figures.kit.multiples import clipped, label_counts, log_axis, time_axis
 from pdrom.report.figures.kit.options import Options
-from pdrom.report.figures.kit.results import NothingToDraw, Results
+from pdrom.report.figures.kit.results import Results
 from pdrom.tables.accuracy_cost import FEWER, pareto
 
 COLUMNS = [
@@ -68,9 +67,7 @@ def trade_offs(results: Results, options: Options) -> tuple[TradeOffs, list[str]
     shown = (table[TIME] > 0.0) & ~own & ~table.method.isin([FOM, ANDERSON])
     points = _drawn(table[shown], results)
     blown_up = runs[(runs.blowup_frame >= 0) & runs[ERROR].isna() & (runs[TIME] > 0.0)]
-    scenes = [scene for scene in results.scenes(options) if (points.scene == scene).any()]
-    if not scenes:
-        raise NothingToDraw("no reduced model with both an error and a time")
+    scenes = results.scenes_of(points, options, "no reduced model with both an error and a time")
     points = points[points.scene.isin(scenes)]
     names = dict.fromkeys(zip(points.method, points.position_basis, strict=True))
     marker = markers([Model(*name) for name in names if name[0] != FEWER], results)
@@ -165,15 +162,15 @@ def handles(found: TradeOffs, results: Results) -> list[tuple[str, list[Line2D]]
     common = {"linewidth": 1.0, "markersize": 4.0}
     entries = [
         ("full order", [
-            Line2D([], [], color=ITERATIONS.colour, marker="X", label="K iterations", **common),
-            Line2D([], [], label="its time", **OWN),
-            Line2D([], [], label="its own error", **BLIND),
+            style.handle("K iterations", color=ITERATIONS.colour, marker="X", **common),
+            style.handle("its time", **OWN),
+            style.handle("its own error", **BLIND),
         ]),
     ]  # fmt: skip
     for family in FAMILIES[1:]:
         marker = {m.title(results): found.marker[m] for m in found.models(family, results)}
         members = [
-            Line2D([], [], color=family.colour, marker=shape, label=title, **common)
+            style.handle(title, color=family.colour, marker=shape, **common)
             for title, shape in marker.items()
         ]
         if members:

@@ -2,30 +2,25 @@
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
+from pdrom.core.reads import Published, TableOf
 from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.artists import Axes, Figure
 from pdrom.report.figures.kit.multiples import clipped, label_outer, log_axis, small_multiples
+from pdrom.report.figures.kit.options import Reconstruction
 from pdrom.report.figures.kit.results import NothingToDraw, Results, asked
-from pdrom.report.figures.reconstruction_error import Options
 
+READS = (TableOf("reconstruction_error"), Published("reconstruction_error"))
 COLUMNS = ["scene", "group", "method", "r", "split", "relative_error"]
 LOW, HIGH = 1e-7, 1e3  # errors outside are drawn on the limit
 PUBLISHED = "#B5B5B5"
 PUBLISHED_COLUMNS = ["experiment", "group", "split", "num_points", "relative_error_x"]
 
 
-def draw(results: Results, options: Options) -> Figure:
-    """A panel per experiment, a line per method and split; errors outside the axis lie on its rim.
+def draw_reconstruction(results: Results, options: Reconstruction) -> Figure:
+    """Draw a panel per experiment, a line per method and split; errors outside lie on the rim.
 
     An experiment without any error (its projections are round-off) has a panel that says so.
-
-    Raises
-    ------
-    StorageError
-        The table is missing or lacks a column.
     """
     table = results.table("reconstruction_error", COLUMNS)
     pairs = [
@@ -106,14 +101,9 @@ def _draw_published(ax: Axes, table: pd.DataFrame, experiment: str, group: str) 
 def _legend(
     figure: Figure, results: Results, methods: list[str], splits: tuple[str, ...], published: bool
 ) -> None:
-    handles = []
-    for method, (colour, marker) in style.method_styles(methods).items():
-        title = results.method_title(method)
-        handles.append(Line2D([], [], color=colour, marker=marker, label=title))
-    for split in splits:
-        label = style.SPLIT_NAMES[split]
-        handles.append(Line2D([], [], color="#555555", linestyle=style.SPLITS[split], label=label))
+    handles = style.method_handles(results, style.method_styles(methods))
+    handles += style.split_handles(splits)
     if published:
         label = "published code's output (x, y)"
-        handles.append(Line2D([], [], color=PUBLISHED, linewidth=1.0, label=label))
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+        handles.append(style.handle(label, color=PUBLISHED, linewidth=1.0))
+    style.legend(figure, handles, 4)

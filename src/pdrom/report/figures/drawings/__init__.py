@@ -1,1 +1,0 @@
-"""Drawings: ``draw(results, options)`` returns a matplotlib figure."""

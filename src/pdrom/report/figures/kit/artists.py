@@ -1,0 +1,26 @@
+"""Types of matplotlib by which figures are annotated; at run time they stand for nothing.
+
+Every plan imports every figure, and only a job that draws one needs the library: modules of figures
+take its types from here, and import what they call inside the function that calls it.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import Normalize
+    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+else:
+    Artist = Axes = Axis = ScalarMappable = PolyCollection = Normalize = Any
+    Figure = SubFigure = Line2D = Patch = Any
+
+__all__ = [
+    "Artist", "Axes", "Axis", "Figure", "Line2D", "Normalize", "Patch", "PolyCollection",
+    "ScalarMappable", "SubFigure",
+]  # fmt: skip
