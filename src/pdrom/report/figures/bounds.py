@@ -32,11 +32,7 @@ class Options(Experiments, Methods):
         "Left of the dotted line an error shrinks in every iteration. Dashed: the error from "
         "which on a run counts as failed. Arrows on the rim lie outside the axes."
     ),
-    reads=(
-        TableOf("bounds"),
-        TableOf("reduced_reruns"),
-        TableOf("reconstruction_error"),
-    ),
+    reads=(TableOf("bounds"), TableOf("reduced_reruns"), TableOf("reconstruction_error")),
     options=Options,
 )
 def bounds(results: Results, options: Options) -> Figure:

@@ -34,8 +34,7 @@ def claims_sensitivity(results: Results, options: Options) -> Figure:
     if table.empty:
         raise NothingToDraw("no verdict")
     claims = list(dict.fromkeys(table.claim))
-    height = 0.24 * len(claims) + 0.9
-    figure = style.new_figure(height)
+    figure = style.new_figure(0.24 * len(claims) + 0.9)
     panels = figure.subplots(1, len(PANELS), squeeze=False)[0]
     for ax, (part, title) in zip(panels, PANELS.items(), strict=True):
         rows = table[table.part == part]

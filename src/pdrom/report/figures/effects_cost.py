@@ -24,10 +24,7 @@ COLOURS = {OTHERS: style.VERMILLION, RIGHT: style.SKY, GLOBAL: "#3A5A78", REST: 
         "the whole less what these effects cost in it. A bar that ends at the tick pays nothing "
         "for what the scene does not list."
     ),
-    reads=(
-        TableOf("effects_cost"),
-        TableOf("effects_left_out"),
-    ),
+    reads=(TableOf("effects_cost"), TableOf("effects_left_out")),
     options=Scenes,
 )
 def effects_cost(results: Results, options: Scenes) -> Figure:

@@ -42,10 +42,7 @@ MARKERS = {"fom": "o", TWO: "s", "ecsw": ">"}
         "of the mesh or more. Below, the time of assembly and factorisation and the memory that "
         "they take."
     ),
-    reads=(
-        TableOf("scaling"),
-        TableOf("scaling_fit"),
-    ),
+    reads=(TableOf("scaling"), TableOf("scaling_fit")),
     options=Scenes,
 )
 def scaling(results: Results, options: Scenes) -> Figure:

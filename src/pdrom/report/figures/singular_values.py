@@ -30,10 +30,7 @@ class Options(Experiments, Columns, Beside):
         "the round-off of the projections and are noise. Grey lines are the output of the "
         "published code for the scene that comes closest."
     ),
-    reads=(
-        TableOf("singular_values"),
-        Published("singular_values"),
-    ),
+    reads=(TableOf("singular_values"), Published("singular_values")),
     options=Options,
 )
 def singular_values(results: Results, options: Options) -> Figure:

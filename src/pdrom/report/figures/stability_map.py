@@ -1,5 +1,7 @@
 """The stability map: how every reduced run of the study ended."""
 
+from dataclasses import dataclass
+
 import pandas as pd
 
 from pdrom.core.reads import Setting, TableOf
@@ -30,11 +32,7 @@ class Options(Experiments, Methods, Ranks):
         "run; blow-up: numbers that are not finite, or an extent beyond the limit, in the printed "
         "frame. Groups whose projections are round-off are left out."
     ),
-    reads=(
-        TableOf("stability"),
-        Setting("stability.wrong"),
-        Setting("stability.left"),
-    ),
+    reads=(TableOf("stability"), Setting("stability.wrong"), Setting("stability.left")),
     options=Options,
 )
 def stability_map(results: Results, options: Options) -> Figure:
@@ -43,16 +41,13 @@ def stability_map(results: Results, options: Options) -> Figure:
     Runs with unreduced positions come first, then those in position subspaces. Experiments in which
     nothing ran, because their projections are round-off, are left out.
     """
-    table = results.table("stability", COLUMNS)
+    table = results.asked_rows("stability", COLUMNS, options)
     table = table[(table.experiment == "rerun") & (table.group.notna())]
-    if options.methods:
-        table = table[table.method.isin(options.methods)]
-    strips = _local_strips(table, results, options) + _subspace_strips(table, results, options)
+    strips = _local_strips(table, results, options) + _subspace_strips(table)
     if not strips:
         raise NothingToDraw("no reduced run")
     rows = [len(strip.rows) for strip in strips]
-    height = ROW * sum(rows) + 0.5 * len(strips) + 0.55
-    figure = style.new_figure(height)
+    figure = style.new_figure(ROW * sum(rows) + 0.5 * len(strips) + 0.55)
     axes = figure.subplots(len(strips), 1, squeeze=False, height_ratios=rows)[:, 0]
     for ax, strip in zip(axes, strips, strict=True):
         draw_cells(ax, list(strip.rows.values()), strip.blocks, strip.cell)
@@ -62,32 +57,26 @@ def stability_map(results: Results, options: Options) -> Figure:
     return figure
 
 
+@dataclass(frozen=True)
 class _Strip:
     """Blocks side by side over the same rows.
 
     rows : (scene, group) -> label
-    columns : for each block the (scene, group) -> rows of the table, by column
+    lookups : for each block the (scene, group) -> rows of the table, by column
     """
 
-    def __init__(
-        self,
-        rows: dict[tuple[str, str], str],
-        blocks: list[Block],
-        lookups: list[list[dict[tuple[str, str], pd.Series]]],
-        xlabel: str,
-    ) -> None:
-        self.rows, self.blocks, self.xlabel = rows, blocks, xlabel
-        self._keys, self._lookups = list(rows), lookups
+    rows: dict[tuple[str, str], str]
+    blocks: list[Block]
+    lookups: list[list[dict[tuple[str, str], pd.Series]]]
+    xlabel: str
 
     def cell(self, row: int, block: int, column: int) -> pd.Series | None:
         """Row of the table for a cell."""
-        return self._lookups[block][column].get(self._keys[row])
+        return self.lookups[block][column].get(list(self.rows)[row])
 
     def outcomes(self) -> set[str]:
         """Outcomes that occur."""
-        found = [
-            column.get(key) for block in self._lookups for column in block for key in self.rows
-        ]
+        found = [column.get(key) for block in self.lookups for column in block for key in self.rows]
         return {str(cell.outcome) for cell in found if cell is not None}
 
 
@@ -106,10 +95,9 @@ def _local_strips(table: pd.DataFrame, results: Results, options: Options) -> li
     return _wrapped(rows, blocks, lookups, "number of modes r (full: numerical rank)")
 
 
-def _subspace_strips(table: pd.DataFrame, results: Results, options: Options) -> list[_Strip]:
+def _subspace_strips(table: pd.DataFrame) -> list[_Strip]:
     part = table[table.position_basis != "full"]
-    scenes = [s for s in dict.fromkeys(part.scene) if s in (options.scenes or part.scene.unique())]
-    rows = {(scene, "all"): style.words(scene) for scene in scenes}
+    rows = {(scene, "all"): style.words(scene) for scene in dict.fromkeys(part.scene)}
     blocks, lookups = [], []
     for basis, method in dict.fromkeys(zip(part.position_basis, part.method, strict=True)):
         own = part[(part.position_basis == basis) & (part.method == method)]

@@ -57,13 +57,6 @@ SCENES = {
 FLAT = ("bend_fall",)  # scenes whose projections are round-off
 BLOWN_UP = ("spring_twist", "deim-joint", 10)  # scene, method, r of a run that fails
 BLOWUP_FRAME = 4
-TABLES = (
-    "reconstruction_error", "singular_values", "local_share", "accuracy_cost",
-    "ladder", "scaling", "scaling_fit", "stability", "budget", "breakeven", "effects_cost",
-    "effects_left_out", "machine_rates", "roofline", "reduced_reruns", "gain_prediction",
-    "subspace_ablation", "noise", "claims_sensitivity", "alternatives", "bounds",
-    "estimates", "effects_contribution", "repetitions", "published_choices", "published_distance",
-)  # fmt: skip
 
 
 @dataclass
@@ -388,51 +381,45 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for r in (1, 2, 5)
     ]
     distances = [(scene, group, *step, 0.5) for scene, group in pairs for step in steps]
-    columns = {
-        "singular_values": "scene group component singular_value relative above_roundoff",
-        "reconstruction_error": "scene group method r split relative_error gain elements_sampled",
-        "local_share": "scene implementation vertices local_ms assembly_ms global_ms local_share",
-        "accuracy_cost": "scene method position_basis k r iterations relative_error_within_horizon"
-        " ms_per_frame pareto",
-        "ladder": "scene direction rung gain relative_error_within_horizon error_low error_high"
-        " gain_low gain_high",
-        "repetitions": "scene group method r varied error_low error_median error_high gain_low"
-        " gain_median gain_high",
-        "stability": "scene group method position_basis k r experiment outcome blowup_frame h"
-        " stiffness_ratio",
-        "budget": "scene budget_ms reference method position_basis k r iterations"
-        " relative_error_within_horizon",
-        "breakeven": "scene group method factor vertices threads r ratio breakeven_r",
-        "effects_cost": "scene effect ms_per_frame share",
-        "effects_left_out": "scene left_out groups ms_per_frame own_ms",
-        "machine_rates": "quantity working_set level rate low high",
-        "roofline": "scene phase working_set bound_us measured_us limit",
-        "reduced_reruns": "scene group method r position_basis max_extent blowup_frame"
-        " relative_error relative_error_within_horizon ms_per_frame",
-        "gain_prediction": "predictor lower upper runs failed_share threshold",
-        "noise": "scene group noisy_axes method r rank relative_error",
-        "claims_sensitivity": "claim part varied variation verdict_of_rules same",
-        "subspace_ablation": "scene position_basis k r variant gain relative_error_within_horizon"
-        " relative_error_full_projections",
-        "alternatives": "scene vertices stiffness method substeps ms_per_frame error_implicit"
-        " error_continuous",
-        "bounds": "scene group method r bound max_extent slack contraction finite",
-        "estimates": "scene position_basis split relative_error_within_horizon estimate ratio"
-        " within resolved",
-        "effects_contribution": "scene effect role moved sensitivity_floor above_floor",
-        "published_choices": "scene group direction choice axis r error reference",
-        "published_distance": "scene group direction choice distance",
-    }
-    made = (
-        values, errors, times, costs, ladder, repetitions, runs, bought, ratios, shares, removed,
-        rates, phases, reruns, predictions, noise, variations, ablation, others, bounds, estimates,
-        moved, chosen, distances,
-    )  # fmt: skip
-    rows = dict(zip(columns, made, strict=True))
-    for name, header in columns.items():
-        write_table(
-            pd.DataFrame(rows[name], columns=header.split()), TABLE.at(results.folder, name=name)
-        )
+    made = {
+        "singular_values": (values, "scene group component singular_value relative above_roundoff"),
+        "reconstruction_error": (errors, "scene group method r split relative_error gain"
+         " elements_sampled"),
+        "local_share": (times, "scene implementation vertices local_ms assembly_ms global_ms"
+         " local_share"),
+        "accuracy_cost": (costs, "scene method position_basis k r iterations"
+         " relative_error_within_horizon ms_per_frame pareto"),
+        "ladder": (ladder, "scene direction rung gain relative_error_within_horizon error_low"
+         " error_high gain_low gain_high"),
+        "repetitions": (repetitions, "scene group method r varied error_low error_median"
+         " error_high gain_low gain_median gain_high"),
+        "stability": (runs, "scene group method position_basis k r experiment outcome"
+         " blowup_frame h stiffness_ratio"),
+        "budget": (bought, "scene budget_ms reference method position_basis k r iterations"
+         " relative_error_within_horizon"),
+        "breakeven": (ratios, "scene group method factor vertices threads r ratio breakeven_r"),
+        "effects_cost": (shares, "scene effect ms_per_frame share"),
+        "effects_left_out": (removed, "scene left_out groups ms_per_frame own_ms"),
+        "machine_rates": (rates, "quantity working_set level rate low high"),
+        "roofline": (phases, "scene phase working_set bound_us measured_us limit"),
+        "reduced_reruns": (reruns, "scene group method r position_basis max_extent blowup_frame"
+         " relative_error relative_error_within_horizon ms_per_frame"),
+        "gain_prediction": (predictions, "predictor lower upper runs failed_share threshold"),
+        "noise": (noise, "scene group noisy_axes method r rank relative_error"),
+        "claims_sensitivity": (variations, "claim part varied variation verdict_of_rules same"),
+        "subspace_ablation": (ablation, "scene position_basis k r variant gain"
+         " relative_error_within_horizon relative_error_full_projections"),
+        "alternatives": (others, "scene vertices stiffness method substeps ms_per_frame"
+         " error_implicit error_continuous"),
+        "bounds": (bounds, "scene group method r bound max_extent slack contraction finite"),
+        "estimates": (estimates, "scene position_basis split relative_error_within_horizon"
+         " estimate ratio within resolved"),
+        "effects_contribution": (moved, "scene effect role moved sensitivity_floor above_floor"),
+        "published_choices": (chosen, "scene group direction choice axis r error reference"),
+        "published_distance": (distances, "scene group direction choice distance"),
+    }  # fmt: skip
+    for name, (rows, header) in made.items():
+        _write(TABLE.at(results.folder, name=name), header, rows)
     _write_scaling(results, scenes)
     for scene, group in pairs:
         _write_repeated_frames(results, scene, group, methods)
@@ -444,6 +431,12 @@ def _write_tables(results, scenes, methods, rng) -> None:
         _write_contributions(results, scene)
 
 
+def _write(path: str, columns: str, rows: list[tuple]) -> pd.DataFrame:
+    table = pd.DataFrame(rows, columns=columns.split())
+    write_table(table, path)
+    return table
+
+
 def _write_repeated_frames(results, scene, group, methods) -> None:
     """Bands of a tenth to ten times a thousandth, open above in the last frame."""
     rows = [
@@ -452,8 +445,7 @@ def _write_repeated_frames(results, scene, group, methods) -> None:
         for frame in range(1, FRAMES + 1)
     ]
     columns = "scene group method r varied frame error_low error_median error_high"
-    table = pd.DataFrame(rows, columns=columns.split())
-    write_table(table, results.path(REPEATED_FRAMES, scene, group))
+    _write(results.path(REPEATED_FRAMES, scene, group), columns, rows)
 
 
 def _write_noise_runs(results, scene) -> None:
@@ -477,8 +469,7 @@ def _write_contributions(results, scene) -> None:
         for frame in range(FRAMES)
     ]
     rows.append((scene, "kick", "start", 0, 5.0, 1.0))
-    columns = ["scene", "effect", "role", "frame", "force", "energy"]
-    write_table(pd.DataFrame(rows, columns=columns), results.path(CONTRIBUTIONS, scene))
+    _write(results.path(CONTRIBUTIONS, scene), "scene effect role frame force energy", rows)
 
 
 def _write_sensitivity(results, scene) -> None:
@@ -488,8 +479,7 @@ def _write_sensitivity(results, scene) -> None:
         for label in ("1e-10", "1e-08", "solver")
         for frame in range(FRAMES)
     ]
-    columns = ["scene", "perturbation", "frame", "relative_difference"]
-    write_table(pd.DataFrame(rows, columns=columns), results.path(SENSITIVITY, scene))
+    _write(results.path(SENSITIVITY, scene), "scene perturbation frame relative_difference", rows)
 
 
 def _ratio(method, r, threads):
@@ -515,8 +505,7 @@ def _write_scaling(results, scenes) -> None:
             ("ecsw", 1, 1e-2 / n, (np.nan, np.nan)),
         )
     ]
-    table = pd.DataFrame(rows, columns=header.split())
-    write_table(table, TABLE.at(results.folder, name="scaling"))
+    table = _write(TABLE.at(results.folder, name="scaling"), header, rows)
     write_table(scaling_fit(table), TABLE.at(results.folder, name="scaling_fit"))
 
 
