@@ -1,5 +1,6 @@
 """Reading YAML and checking it against a typed model, with messages a user can act on."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
@@ -62,15 +63,18 @@ class _PlainLoader(yaml.CSafeLoader):
 def _require_plain(text: str) -> None:
     """Refuse aliases, a few of which stand for billions of entries, and deep nesting."""
     depth = 0
-    for event in yaml.parse(text, Loader=yaml.CSafeLoader):
+    events: Iterator[Any] = yaml.parse(text, Loader=yaml.CSafeLoader)
+    for event in events:
         if isinstance(event, yaml.AliasEvent):
-            fault = f"alias '*{event.anchor}' is not allowed"
-            raise yaml.composer.ComposerError(None, None, fault, event.start_mark)
+            raise _composer_error(event, f"alias '*{event.anchor}' is not allowed")
         depth += isinstance(event, yaml.CollectionStartEvent)
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > MAX_DEPTH:
-            fault = f"nested more than {MAX_DEPTH} levels deep"
-            raise yaml.composer.ComposerError(None, None, fault, event.start_mark)
+            raise _composer_error(event, f"nested more than {MAX_DEPTH} levels deep")
+
+
+def _composer_error(event: Any, fault: str) -> yaml.YAMLError:
+    return yaml.composer.ComposerError(None, None, fault, event.start_mark)
 
 
 def read_yaml(path: Path) -> Any:

@@ -5,19 +5,18 @@ from pathlib import Path
 
 from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.paths import Place
-from pdrom.core.reads import FileRead, Labels, Setting
+from pdrom.core.reads import Labels, Setting
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
 from pdrom.pipeline.contents import labels_of
 from pdrom.pipeline.fingerprint import closure, fingerprint
 from pdrom.pipeline.full import is_full
-from pdrom.pipeline.resolve import Job, Resolver, listed
+from pdrom.pipeline.resolve import Job, Resolver
 from pdrom.pipeline.study import Study
 from pdrom.reduction.method import load_methods
-from pdrom.report.drawing import Order, drawn
 from pdrom.report.figure_numbers import Numbers, figure_numbers
 from pdrom.report.figures.kit.catalogue import declarations, load_choices
-from pdrom.report.figures.kit.declaration import Declaration
+from pdrom.report.figures.kit.declaration import Declaration, Order
 from pdrom.report.figures.kit.holdings import GroupHolding, Holdings, MethodHolding, SceneHolding
 from pdrom.report.figures.kit.options import Options
 from pdrom.report.words.markup import filled, to_plain, to_rst, to_tex
@@ -137,12 +136,11 @@ def _job(
 ) -> FigureJob:
     held = holdings.chosen(options)
     sources = _Sources(study, results, held, options)
-    keys = [read.key for read in declared.reads if isinstance(read, Setting)]
+    keys = [read.key for read in declared.reads.values() if isinstance(read, Setting)]
     settings = {key: sources.value(key, {}) for key in keys}
     title, caption = (filled(text, settings) for text in (declared.title, declared.caption))
     published = bool(options.names("published"))
     order = Order(
-        name=name,
         title=to_plain(title),
         options=options.model_dump(mode="json"),
         holdings=held,
@@ -154,16 +152,14 @@ def _job(
     # where elements are drawn on the mesh, the group's class says where they lie
     on_mesh = ELEMENTS in closure(declared.module)
     classes = [EFFECTS[group] for group in groups if on_mesh]
-    read = [r.paths(sources, {}) for r in declared.reads if isinstance(r, FileRead)]
-    artifact = drawn(name)
     job = Job(
-        artifact,
+        declared,
         {},
-        {"files": list(dict.fromkeys(path for paths in read for path in listed(paths)))},
-        {kind: place.at(results) for kind, place in artifact.writes.items()},
+        declared.inputs(sources, {}),
+        {kind: place.at(results) for kind, place in declared.writes.items()},
         {"order": order.model_dump(mode="json")},
         "",
-        fingerprint(artifact.module, declared.module, *classes),
+        fingerprint(declared.module, *classes),
     )
     return FigureJob(
         job=job,

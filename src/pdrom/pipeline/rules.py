@@ -90,7 +90,7 @@ def _figure(plan: Plan, figure: FigureJob) -> Rule:
         plan,
         figure.job,
         "figure",
-        figure.job.artifact.title,
+        f"Figure {figure.job.artifact.name}",
         {"png": {**shown, "labels": figure.labels}},
     )
     rule.params["rst"] = figure.rst

@@ -3,10 +3,9 @@
 import re
 from pathlib import Path
 
-from pdrom.core.reads import Chosen, Every, Published, Setting, TableOf
+from pdrom.core.reads import Chosen, Every, Published, Read, Setting, TableOf
 from pdrom.report.figure_numbers import figure_numbers
 from pdrom.report.figures.kit.catalogue import declarations
-from pdrom.report.figures.kit.declaration import FigureRead
 from pdrom.report.words.markup import to_plain
 
 PAGE = Path("docs/figures.md")
@@ -30,7 +29,7 @@ def figures_page(root: Path = Path()) -> str:
     for name, figure in declarations().items():
         number = f" ({numbers[name].words})" if numbers[name].words else ""
         keys = ", ".join(f"`{key}`" for key in figure.options.model_fields)
-        reads = ", ".join(dict.fromkeys(_words(read) for read in figure.reads))
+        reads = ", ".join(dict.fromkeys(_words(read) for read in figure.reads.values()))
         parts.append(
             f"## `{name}`{number}\n\n**{_text(figure.title)}.** {_text(figure.caption)}\n\n"
             f"Keys: {keys}. Reads: {reads}.\n"
@@ -46,7 +45,7 @@ def _text(marked: str) -> str:
     return re.sub(r"@([a-z_.]+)@", r"`\1`", words)
 
 
-def _words(read: FigureRead) -> str:
+def _words(read: Read) -> str:
     match read:
         case TableOf():
             return f"table `{read.name}`"
@@ -56,6 +55,7 @@ def _words(read: FigureRead) -> str:
             return f"`config/reference/published_code/{read.name}.csv`"
         case Setting():
             return f"`{read.key}`"
+    raise TypeError(f"{read}: no figure reads it")
 
 
 if __name__ == "__main__":

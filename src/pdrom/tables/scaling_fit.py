@@ -39,6 +39,7 @@ def scaling_fit(scaling: pd.DataFrame) -> pd.DataFrame:
             row = dict(zip(("scene", "method", "threads"), labels, strict=True))
             row |= {"quantity": quantity, "exponent": None, "points": len(points)}
             if points.vertices.nunique() >= FEWEST:
-                row["exponent"] = np.polyfit(np.log(points.vertices), np.log(points[quantity]), 1)[0]
+                slope, _ = np.polyfit(np.log(points.vertices), np.log(points[quantity]), 1)
+                row["exponent"] = slope
             rows.append(row)
     return pd.DataFrame(rows)

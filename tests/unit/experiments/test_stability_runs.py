@@ -229,7 +229,7 @@ def test_every_reduction_that_exists_has_its_bounds(study):
     assert (rows.bound >= 1.0 + rows.growth * rows.reach * 0.99).all()
     assert (rows.spectral_radius <= rows.contraction * (1.0 + 1e-6)).all()
     for method in METHODS:
-        extents = read_table(str(study.folder / method / "train.csv")).max_extent
+        extents = read_table(str(study.folder / method / "out")).max_extent
         assert extents.max() <= rows[(rows.method == method) & (rows.r == 4)].bound.iloc[0]
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from builders import make_scene
 from pdrom.experiments.kit.contributions import COLUMNS, contributions
-from pdrom.experiments.kit.sensitivity import removable, sensitivity, without
+from pdrom.experiments.kit.sensitivity import removable, sensitivities, without
 from pdrom.model.runs.full_order import trajectory
 
 SPRING = {"effect": "spring", "weight": 1e3}
@@ -75,7 +75,7 @@ def test_every_effect_but_the_only_group_is_left_out_in_turn():
     scene = make_scene(SPRING, bending, GRAVITY, PINS, mesh=mesh, frames=8)
     assert removable(scene.config) == ["spring", "bending", "gravity", "pins"]
     assert removable(make_scene(SPRING, GRAVITY).config) == ["gravity"]
-    made = sensitivity(scene, (1e-10,), (1,))
+    made = sensitivities(scene, (1e-10,), (1,))
     drift = made.groupby("perturbation").relative_difference.max()
     assert drift[without("bending")] < 1e-8 < 1e-2 < drift[without("gravity")]
     assert drift[without("spring")] > 1e-3

@@ -12,7 +12,7 @@ from pdrom.experiments.kit.sensitivity import (
     heldout_floor,
     perturbation_field,
     relative_difference,
-    sensitivity,
+    sensitivities,
 )
 from pdrom.model.runs.full_order import trajectory
 
@@ -69,7 +69,7 @@ def test_perturbation_has_its_size_and_its_seed():
 
 def test_table_has_every_perturbation_seed_variant_and_frame():
     scene = make_scene(SPRING, {"effect": "gravity"}, {"effect": "pins", "select": "top"}, frames=4)
-    table = sensitivity(scene, (1e-10, 1e-6), (1, 2))
+    table = sensitivities(scene, (1e-10, 1e-6), (1, 2))
     assert list(table.columns) == COLUMNS
     labels = table.groupby(["perturbation", "seed"], sort=False).frame.agg(list)
     assert list(labels.index) == [

@@ -33,11 +33,13 @@ PICTURES = ("snapshots_and_modes", "deim_iterations", "cloth_all_grid", "bending
 
 
 def draw(study: Study, name: str, **changes: object) -> Figure:
-    return draw_figure(name, study.results, study.specs[name].model_copy(update=changes))
+    return draw_figure(
+        declaration(name), study.results, study.specs[name].model_copy(update=changes)
+    )
 
 
 def make_figure(name: str, results: Results, options: Options, pdf: Path, png: Path) -> None:
-    write_figure(draw_figure(name, results, options), name, pdf, png)
+    write_figure(draw_figure(declaration(name), results, options), name, pdf, png)
 
 
 def texts(figure: Figure) -> list[str]:
@@ -77,7 +79,7 @@ DRAW_ALL = """
 import json
 import sys
 from pathlib import Path
-from pdrom.report.figures.kit.catalogue import load_choices
+from pdrom.report.figures.kit.catalogue import declaration, load_choices
 from pdrom.report.figures.kit.holdings import Holdings
 from pdrom.report.figures.kit.output import draw_figure, write_figure
 from pdrom.report.figures.kit.results import Results
@@ -85,7 +87,7 @@ from pdrom.report.figures.kit.results import Results
 config, holdings, settings, root, out = sys.argv[1:]
 results = Results(root, Holdings.model_validate_json(holdings), json.loads(settings))
 for name, options in load_choices(config).items():
-    write_figure(draw_figure(name, results, options), name, Path(out, name + ".pdf"), Path(out, name + ".png"))
+    write_figure(draw_figure(declaration(name), results, options), name, Path(out, name + ".pdf"), Path(out, name + ".png"))
 """  # noqa: E501
 
 
@@ -116,7 +118,7 @@ def test_bytes_are_equal_in_another_process(study, tmp_path):
 def inputs(study: Study, name: str) -> list[Path]:
     """Files that a figure declares."""
     options, root, paths = study.specs[name], str(study.root), []
-    for read in declaration(name).reads:
+    for read in declaration(name).reads.values():
         if isinstance(read, TableOf):
             paths.append(TABLE.at(root, name=read.name))
         elif isinstance(read, Chosen):
@@ -129,22 +131,24 @@ def inputs(study: Study, name: str) -> list[Path]:
 
 def test_reads_only_what_it_declares(study, figure_name, tmp_path):
     options, holdings = study.specs[figure_name], study.results.holdings
-    settings = {r.key: SETTINGS[r.key] for r in declaration(figure_name).reads if hasattr(r, "key")}
+    settings = {
+        r.key: SETTINGS[r.key] for r in declaration(figure_name).reads.values() if hasattr(r, "key")
+    }
     for path in inputs(study, figure_name):
         target = tmp_path / path.relative_to(study.root).parent
         target.mkdir(parents=True, exist_ok=True)
         for file in filter(Path.exists, (path, seal_path(path))):
             shutil.copy(file, target)
     chosen = Results(str(tmp_path), holdings.chosen(options), settings)
-    figure = draw_figure(figure_name, chosen, options)
-    whole = draw_figure(figure_name, study.results, options)
+    figure = draw_figure(declaration(figure_name), chosen, options)
+    whole = draw_figure(declaration(figure_name), study.results, options)
     assert texts(figure) == texts(whole) != []
 
 
 def test_a_missing_file_is_named(study, figure_name, tmp_path):
     results = Results(str(tmp_path), study.results.holdings, SETTINGS)
     with pytest.raises(StorageError, match=str(tmp_path)):
-        draw_figure(figure_name, results, study.specs[figure_name])
+        draw_figure(declaration(figure_name), results, study.specs[figure_name])
 
 
 def test_a_failed_run_is_marked_and_never_drawn_with_nan(study):
@@ -287,7 +291,7 @@ def test_published_values_are_drawn_where_they_are_given(study, tmp_path):
         "experiment,group,component,singular_value\nall_three,spring,1,5\nall_three,spring,2,1\n"
     )
     results = Results(str(study.root), study.results.holdings, SETTINGS, tmp_path)
-    figure = draw_figure("singular_values", results, study.specs["singular_values"])
+    figure = draw_figure(declaration("singular_values"), results, study.specs["singular_values"])
     assert "published code's output" in texts(figure)
     without = draw(study, "singular_values")
     assert "published code's output" not in texts(without)

@@ -6,6 +6,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from pdrom.reduction.method import load_methods
+from pdrom.report.figures.kit.catalogue import declaration
 from pdrom.report.figures.kit.families import (
     ENTRIES,
     FAMILIES,
@@ -118,7 +119,7 @@ def test_near_numbers_of_iterations_share_a_label(results):
 
 
 def test_one_scene_is_large_and_each_other_group_has_one(study):
-    figure = draw_figure("accuracy_cost", study.results, study.specs["accuracy_cost"])
+    figure = draw_figure(declaration("accuracy_cost"), study.results, study.specs["accuracy_cost"])
     titles = [ax.get_title() for ax in figure.axes]
     assert titles[0] == "deformation gradient: bar release"
     assert titles[1:] == ["strain:\nstrain oop", "bending:\nbend curved",

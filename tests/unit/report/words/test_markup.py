@@ -62,7 +62,7 @@ def test_any_caption_is_one_paragraph_of_text(text):
 
 def test_captions_of_all_figures_read_well_as_plain_text():
     for name, figure in declarations().items():
-        keys = [read.key for read in figure.reads if hasattr(read, "key")]
+        keys = [read.key for read in figure.reads.values() if hasattr(read, "key")]
         settings = dict.fromkeys(keys, 1e-3)
         for text in (figure.title, figure.caption):
             plain = to_plain(filled(text, settings))

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pdrom.core.artifact import load
 from pdrom.core.errors import StorageError
 from pdrom.core.reads import Setting
 from pdrom.core.store import read_table, write_table
 from pdrom.tables import declared, timing_columns
 from pdrom.tables.kit.declaration import flag, integer, number, table, text, timed
-from pdrom.tables.kit.find import load
 
 COLUMNS = (
     text("name", "a word"),
@@ -148,7 +148,7 @@ def test_every_table_is_declared_in_a_module_that_has_no_other():
     modules = Counter(made.module for made in declared().values())
     assert set(modules.values()) == {1}
     for name, made in declared().items():
-        assert load(made.module) is made
+        assert load(made.address) is made
         assert made.name == name
 
 

@@ -11,12 +11,18 @@ A module of `pdrom.report.figures` holds one figure, a function under its declar
     def rest_shapes(results: Results, options: Scenes) -> Figure: ...
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 
+from pydantic import BaseModel, ConfigDict, JsonValue
+
+from pdrom.core.artifact import Artifact
+from pdrom.core.paths import FIGURE, FIGURE_PICTURE, TABLE
 from pdrom.core.reads import Chosen, Every, Published, Setting, TableOf
 from pdrom.report.figures.kit.artists import Figure
+from pdrom.report.figures.kit.holdings import Holdings
 from pdrom.report.figures.kit.options import Options
 from pdrom.report.figures.kit.results import Results
 
@@ -24,9 +30,29 @@ FigureRead = TableOf | Chosen | Every | Published | Setting
 OptionsT = TypeVar("OptionsT", bound=Options)
 
 
+class Order(BaseModel):
+    """Settings of a drawing: the figure's title and options, and the contents of the configuration.
+
+    published : folder with the published code's output, None where none of it is drawn
+    full : whether the configuration is that of the full study
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    title: str
+    options: dict[str, JsonValue]
+    holdings: Holdings
+    settings: dict[str, float]
+    published: str | None
+    full: bool
+
+
 @dataclass(frozen=True)
-class Declaration:
+class Declaration(Artifact):
     """A figure, named as the function that draws it.
+
+    The function raises `NothingToDraw` where the configuration holds nothing of what the figure
+    shows, StorageError for a file that is missing or damaged or a table that lacks a column.
 
     title, caption : in light mark-up (`pdrom.report.words.markup`); ``{key}`` stands for a setting
         of the configuration that the figure reads
@@ -34,22 +60,38 @@ class Declaration:
         groups that its options choose, where the configuration holds them
     options : what a user may choose in config/figures.yaml, with the defaults
     number : number in the preprint that is reproduced; None for a figure of this study
-    function : draws it; raises `NothingToDraw` where the configuration holds nothing of what it
-        shows, StorageError for a file that is missing or damaged or a table that lacks a column
     """
 
-    name: str
-    title: str
-    caption: str
-    reads: tuple[FigureRead, ...]
-    options: type[Options]
-    number: int | None
-    function: Callable[[Results, Any], Figure]
+    caption: str = ""
+    options: type[Options] = Options
+    number: int | None = None
 
     @property
-    def module(self) -> str:
-        """Module that draws the figure."""
-        return self.function.__module__
+    def rule(self) -> str:
+        """Name of the rule that makes it."""
+        return f"figure_{self.name}"
+
+    def perform(
+        self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
+    ) -> None:
+        """Draw the figure in a job and write both of its files."""
+        # late: a plan needs no plotting library
+        from pdrom.report.figures.kit.output import draw_figure, write_figure
+
+        order = Order.model_validate(settings["order"])
+        published = Path(order.published) if order.published else None
+        read = Results(self._folder(inputs), order.holdings, order.settings, published)
+        drawn = draw_figure(self, read, self.options.model_validate(order.options), order.full)
+        write_figure(drawn, order.title, outputs["pdf"], outputs["png"])
+
+    def _folder(self, inputs: Mapping[str, Any]) -> str:
+        """Folder of the results, which the inputs lie in; empty without any."""
+        for name, read in self.files.items():
+            paths = [inputs[name]] if isinstance(inputs[name], str) else list(inputs[name])
+            place = TABLE if isinstance(read, TableOf) else getattr(read, "place", None)
+            if paths and place is not None:
+                return str(Path(paths[0]).parents[place.pattern.count("/")])
+        return ""
 
 
 def figure(
@@ -64,6 +106,10 @@ def figure(
 
     def declare(function: Callable[[Results, OptionsT], Figure]) -> Declaration:
         name = function.__name__
-        return Declaration(name, title, caption, reads, options, number, function)
+        writes = {"pdf": FIGURE.where(name=name), "png": FIGURE_PICTURE.where(name=name)}
+        named = {f"read{i}": read for i, read in enumerate(reads)}
+        return Declaration(
+            name, title, named, writes, function, caption=caption, options=options, number=number
+        )
 
     return declare

@@ -11,7 +11,7 @@ from pdrom.core.embedded import PDF_KEY, PNG_KEY
 from pdrom.core.provenance import as_text, provenance
 from pdrom.core.store import atomic_path
 from pdrom.report.figures.kit import style
-from pdrom.report.figures.kit.catalogue import declaration
+from pdrom.report.figures.kit.declaration import Declaration
 from pdrom.report.figures.kit.options import Options
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 
@@ -22,18 +22,19 @@ RASTER_DPI = 300  # of rasterised artists inside a PDF
 FULL_STUDY = "the full study (config/default.yaml) draws it"
 
 
-def draw_figure(name: str, results: Results, options: Options, full: bool = True) -> Figure:
-    """Figure ``name``, or a note where the configuration holds nothing of what it shows.
+def draw_figure(
+    declared: Declaration, results: Results, options: Options, full: bool = True
+) -> Figure:
+    """Draw a figure, or a note where the configuration holds nothing of what it shows.
 
-    ``full`` says that the configuration is that of the full study. Raises ConfigurationError for an
-    unknown figure, StorageError for a file that is missing or damaged.
+    ``full`` says that the configuration is that of the full study. Raises StorageError for a
+    file that is missing or damaged.
     """
-    function = declaration(name).function
     with style.look():
         try:
-            return function(results, options)
+            return declared.function(results, options)
         except NothingToDraw as nothing:
-            log.info("figure %s: %s", name, nothing)
+            log.info("figure %s: %s", declared.name, nothing)
             elsewhere = "" if full else f"\n{FULL_STUDY}"
             return style.note(f"no data in this configuration: {nothing}{elsewhere}")
 
