@@ -10,8 +10,8 @@ from places import ROOT
 PACKAGE = ROOT / "src" / "pdrom"
 # A room imports from itself and from rooms left of it.
 ROOMS = (
-    "core", "model", "reduction", "experiments", "tables", "report", "pipeline", "verification",
-    "api", "command",
+    "core", "artifact", "model", "reduction", "experiments", "tables", "report", "pipeline",
+    "verification", "api", "command",
 )  # fmt: skip
 NUMERICS = ROOMS[: ROOMS.index("report")]
 MODULE_LINES, CLASS_LINES = 250, 200

@@ -1,4 +1,4 @@
-from pdrom.core.artifact import make
+from pdrom.artifact.artifact import make
 from pdrom.core.logs import job_log
 
 with job_log(snakemake.log[0]):

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pdrom.artifact.reads import Every, Settings
 from pdrom.core.paths import BASIS, BOUNDS, MESH, SAMPLING, SENSITIVITY, TRAIN, File
-from pdrom.core.reads import Every, Settings
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.boundedness import Compliance, largest_projections, linear_extent

@@ -4,8 +4,8 @@ from typing import Annotated
 
 from pydantic import Field
 
+from pdrom.artifact.reads import Setting
 from pdrom.core.paths import COMPANION, MESH, TRAIN, File
-from pdrom.core.reads import Setting
 from pdrom.core.store import write_hdf5
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.motion import Motion, training_indices, training_positions

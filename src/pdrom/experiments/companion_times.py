@@ -2,8 +2,8 @@
 
 import pandas as pd
 
+from pdrom.artifact.reads import Setting
 from pdrom.core.paths import COMPANION, COMPANION_TIMES, MESH, File
-from pdrom.core.reads import Setting
 from pdrom.core.store import write_table
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.measurement import Protocol, Variant, measure

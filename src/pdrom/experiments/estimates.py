@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 import pandas as pd
 
+from pdrom.artifact.reads import Every, Setting
 from pdrom.core.paths import (
     COMPANION,
     ESTIMATES,
@@ -20,7 +21,6 @@ from pdrom.core.paths import (
     TRAIN,
     File,
 )
-from pdrom.core.reads import Every, Setting
 from pdrom.core.store import open_hdf5, write_table
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.horizon import error_within

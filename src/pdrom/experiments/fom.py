@@ -1,7 +1,7 @@
 """A full-order run, with the snapshots that the scene's reductions need."""
 
+from pdrom.artifact.reads import Setting
 from pdrom.core.paths import FULL_ORDER, MESH, File
-from pdrom.core.reads import Setting
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.scenes import scene_of
 from pdrom.experiments.kit.settings import Solver, Threads

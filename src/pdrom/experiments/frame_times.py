@@ -12,6 +12,7 @@ from time import process_time
 
 import pandas as pd
 
+from pdrom.artifact.reads import EachOf, Settings
 from pdrom.core.names import SceneName
 from pdrom.core.paths import (
     BASIS,
@@ -24,7 +25,6 @@ from pdrom.core.paths import (
     SUBSPACES,
     File,
 )
-from pdrom.core.reads import EachOf, Settings
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import experiment

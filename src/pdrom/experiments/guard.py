@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
+from pdrom.artifact.reads import EachOf, Settings
 from pdrom.core.paths import BASIS, COMPANION, GUARD, MESH, SAMPLING, TRAIN, File
-from pdrom.core.reads import EachOf, Settings
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import experiment

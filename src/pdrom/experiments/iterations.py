@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
+from pdrom.artifact.reads import Setting
 from pdrom.core.paths import ITERATIONS, MESH, SENSITIVITY, TRAIN, File
-from pdrom.core.reads import Setting
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.converged import ConvergedStepper

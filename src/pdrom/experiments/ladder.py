@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
+from pdrom.artifact.reads import Setting
 from pdrom.core.paths import LADDER, MESH, SENSITIVITY, SNAPSHOTS, TRAIN, File
-from pdrom.core.reads import Setting
 from pdrom.core.store import write_table
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.horizon import error_within

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from pdrom.artifact.reads import Setting, SourcesOf
 from pdrom.core.paths import MESH, File
-from pdrom.core.reads import Setting, SourcesOf
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.model.mesh.checks import check_mesh
 from pdrom.model.mesh.config import MeshConfig

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
+from pdrom.artifact.reads import Settings
 from pdrom.core.paths import MESH, NOISE, NOISE_RUNS, SENSITIVITY, File
-from pdrom.core.reads import Settings
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import experiment

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pdrom.artifact.reads import Setting, SourcesOf
 from pdrom.core.paths import ONLINE, ONLINE_MODELS, File
-from pdrom.core.reads import Setting, SourcesOf
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import experiment

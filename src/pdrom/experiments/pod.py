@@ -2,8 +2,8 @@
 
 import logging
 
+from pdrom.artifact.reads import Setting
 from pdrom.core.paths import BASIS, SNAPSHOTS, File
-from pdrom.core.reads import Setting
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.reduction.basis import compute_basis, save_basis
 from pdrom.reduction.method import BasisSpec

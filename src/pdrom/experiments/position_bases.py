@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy import linalg
 
+from pdrom.artifact.reads import Setting
 from pdrom.core.paths import (
     HELDOUT,
     MESH,
@@ -16,7 +17,6 @@ from pdrom.core.paths import (
     TRAIN,
     File,
 )
-from pdrom.core.reads import Setting
 from pdrom.core.store import open_hdf5, write_table
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.horizon import error_within

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
+from pdrom.artifact.reads import Settings
 from pdrom.core.names import SceneName
 from pdrom.core.paths import (
     MESH,
@@ -19,7 +20,6 @@ from pdrom.core.paths import (
     TRAIN,
     File,
 )
-from pdrom.core.reads import Settings
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import experiment

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pandas as pd
 
+from pdrom.artifact.reads import EachOf, Settings
 from pdrom.core.paths import (
     BASIS,
     COMPANION,
@@ -22,7 +23,6 @@ from pdrom.core.paths import (
     TRAIN,
     File,
 )
-from pdrom.core.reads import EachOf, Settings
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import experiment

@@ -14,8 +14,8 @@ import pandas as pd
 import psutil
 from pydantic import Field
 
+from pdrom.artifact.reads import Settings, SourcesOf
 from pdrom.core.paths import BREAK_EVEN_SIZED, EFFECTS_SIZED, SCALING, File
-from pdrom.core.reads import Settings, SourcesOf
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import experiment

@@ -5,8 +5,8 @@ from typing import Annotated, Self
 import pandas as pd
 from pydantic import Field, model_validator
 
+from pdrom.artifact.reads import Setting
 from pdrom.core.paths import CONTRIBUTIONS, MESH, SENSITIVITY, File
-from pdrom.core.reads import Setting
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.contributions import contributions

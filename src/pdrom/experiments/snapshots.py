@@ -1,7 +1,7 @@
 """Two runs -> train, test and held-out snapshots of one group."""
 
+from pdrom.artifact.reads import Setting
 from pdrom.core.paths import HELDOUT, MESH, SNAPSHOTS, TRAIN, File
-from pdrom.core.reads import Setting
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.scenes import scene_of
 from pdrom.model.scene import SceneConfig

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
 
+from pdrom.artifact.reads import Every, Setting
 from pdrom.core.paths import BASIS, MESH, SAMPLING, STABILITY, SUBSPACES, File
-from pdrom.core.reads import Every, Setting
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import experiment

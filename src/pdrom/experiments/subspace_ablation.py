@@ -7,9 +7,9 @@ from typing import Annotated, Any
 import pandas as pd
 from pydantic import Field
 
+from pdrom.artifact.reads import Settings
 from pdrom.core.errors import SamplingError
 from pdrom.core.paths import HELDOUT, MESH, SENSITIVITY, SUBSPACE_ABLATION, TRAIN, File
-from pdrom.core.reads import Settings
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import experiment

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
+from pdrom.artifact.reads import Settings
 from pdrom.core.names import SceneName
 from pdrom.core.paths import (
     HELDOUT,
@@ -21,7 +22,6 @@ from pdrom.core.paths import (
     TRAIN,
     File,
 )
-from pdrom.core.reads import Settings
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import experiment

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
+from pdrom.artifact.reads import Every, Settings
 from pdrom.core.paths import (
     BASIS,
     BREAK_EVEN,
@@ -22,7 +23,6 @@ from pdrom.core.paths import (
     TRAIN,
     File,
 )
-from pdrom.core.reads import Every, Settings
 from pdrom.core.store import open_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.iterations import IterationCounts, accelerated, stepper_of
@@ -121,11 +121,9 @@ def timing(
     told = partial(log.info, f"{name}: repeat %d of %d")
     results = measure(quick, asked.warmup, asked.repeats, told)
     results += measure(slow, 0, asked.repeats)
-    table = pd.DataFrame([_row(scene, m) for m in results], columns=COLUMNS)
-    write_table(table, out.path)
+    write_table(pd.DataFrame([_row(scene, m) for m in results], columns=COLUMNS), out.path)
     log.info("%s: %d reduced local steps alone", name, len(alone))
-    states = _states(fom)
-    times = local_costs(scene, alone, states, asked.warmup, asked.breakeven_repeats)
+    times = local_costs(scene, alone, _states(fom), asked.warmup, asked.breakeven_repeats)
     write_table(times.assign(factor=1.0), breakeven.path)
     log.info("%s: effects", name)
     costs = effect_costs(scene, system, frames, asked.warmup, asked.repeats)

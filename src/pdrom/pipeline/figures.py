@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from pdrom.artifact.reads import Labels, Setting
 from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.paths import Place
-from pdrom.core.reads import Labels, Setting
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
 from pdrom.pipeline.contents import labels_of

@@ -18,7 +18,7 @@ from pdrom.core.registry import Registry
 PACKAGE = "pdrom"
 # Left out of fingerprints: these modules say where files lie, which changes no result; Snakemake
 # compares the paths of a job's files itself. So adding a kind of file makes no job run again.
-LAYOUT = {"pdrom.core.paths", "pdrom.core.reads"}
+LAYOUT = {"pdrom.core.paths", "pdrom.artifact.reads"}
 
 
 def fingerprint(*places: str) -> str:

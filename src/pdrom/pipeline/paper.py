@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pdrom.artifact.reads import Paths
 from pdrom.core.paths import MACHINE, TABLE
-from pdrom.core.reads import Paths
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.pipeline.figures import FigureJob
 from pdrom.pipeline.fingerprint import digest, fingerprint

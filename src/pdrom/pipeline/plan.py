@@ -8,11 +8,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from pdrom.core.artifact import Artifact
+from pdrom.artifact.artifact import Artifact
+from pdrom.artifact.reads import Labels
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.logs import planning_log
 from pdrom.core.paths import TABLE
-from pdrom.core.reads import Labels
 from pdrom.experiments.hard_cases.expectations import load_expectations
 from pdrom.experiments.kit.declaration import Experiment, experiments
 from pdrom.pipeline.contents import paths_of

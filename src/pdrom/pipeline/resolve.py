@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pdrom.core.artifact import Artifact, make, modules_in
+from pdrom.artifact.artifact import Artifact, make, modules_in
+from pdrom.artifact.reads import Labels, Paths
 from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.paths import TABLE, Place
-from pdrom.core.reads import Labels, Paths
 from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.contents import labels_of
 from pdrom.pipeline.fingerprint import digest, fingerprint
@@ -53,7 +53,7 @@ class Job:
 
 
 class Resolver:
-    """Files and settings of a study, see `pdrom.core.reads.Sources`.
+    """Files and settings of a study, see `pdrom.artifact.reads.Sources`.
 
     results : folder of the results
     """

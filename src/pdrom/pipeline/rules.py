@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from pdrom.core.artifact import Artifact
+from pdrom.artifact.artifact import Artifact
 from pdrom.experiments.kit.declaration import Experiment
 from pdrom.pipeline.figures import FigureJob
 from pdrom.pipeline.plan import Plan

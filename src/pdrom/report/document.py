@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from pdrom.core.reads import Chosen, Every, Published, Read, Setting, TableOf
+from pdrom.artifact.reads import Chosen, Every, Published, Read, Setting, TableOf
 from pdrom.report.figure_numbers import figure_numbers
 from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.words.markup import to_plain

@@ -19,9 +19,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
+from pdrom.artifact.reads import Every, PerScene, TableOf
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every, PerScene, TableOf
 from pdrom.experiments.kit.names import ANDERSON, FOM
 from pdrom.tables.kit.declaration import flag, integer, table, timed
 from pdrom.tables.kit.one_time import timings_in_one_time

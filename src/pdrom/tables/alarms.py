@@ -5,9 +5,9 @@ from typing import Any
 
 import pandas as pd
 
+from pdrom.artifact.reads import Every, Setting, TableOf
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every, Setting, TableOf
 from pdrom.tables.gain_prediction import FAILED
 from pdrom.tables.kit.declaration import compared, integer, number, table, text
 from pdrom.tables.kit.parts import joined

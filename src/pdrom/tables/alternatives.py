@@ -2,9 +2,9 @@
 
 import pandas as pd
 
+from pdrom.artifact.reads import Every
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every
 from pdrom.experiments.alternatives.settings import CONVERGED, REDUCED
 from pdrom.tables.kit.declaration import compared, flag, integer, number, table, text
 from pdrom.tables.kit.parts import joined

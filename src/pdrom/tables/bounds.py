@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 
+from pdrom.artifact.reads import Every, TableOf
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every, TableOf
 from pdrom.tables.kit.declaration import compared, number, table
 from pdrom.tables.kit.parts import joined
 from pdrom.tables.kit.vocabulary import ERROR_WITHIN, FINITE, GROUP, MAX_EXTENT, METHOD, SCENE, R

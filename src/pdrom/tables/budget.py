@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from pdrom.core.reads import Setting, TableOf
+from pdrom.artifact.reads import Setting, TableOf
 from pdrom.tables.accuracy_cost import CONVERGED, OWN, reference_of
 from pdrom.tables.kit.declaration import compared, integer, number, table, text, timed
 from pdrom.tables.kit.vocabulary import (

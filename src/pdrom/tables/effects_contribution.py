@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 
+from pdrom.artifact.reads import Every, Setting, TableOf
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every, Setting, TableOf
 from pdrom.experiments.kit.horizon import floor_of, horizons
 from pdrom.experiments.kit.sensitivity import without
 from pdrom.tables.kit.declaration import compared, flag, integer, number, table, text, timed

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from pdrom.core.reads import TableOf
+from pdrom.artifact.reads import TableOf
 from pdrom.tables.gain_prediction import best_threshold, failures_ordered, judged_runs
 from pdrom.tables.kit.declaration import compared, integer, number, table, text
 from pdrom.tables.kit.gains import ORTHOGONAL, reruns_with_gain

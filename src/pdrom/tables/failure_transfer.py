@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from pdrom.core.reads import TableOf
+from pdrom.artifact.reads import TableOf
 from pdrom.tables.failure_predictors import EVERY, PREDICTORS, WITHIN, predicted_runs
 from pdrom.tables.gain_prediction import best_threshold, failures_ordered
 from pdrom.tables.kit.declaration import compared, integer, number, table, text

@@ -2,9 +2,9 @@
 
 import pandas as pd
 
+from pdrom.artifact.reads import Every
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every
 from pdrom.experiments.kit.fresh_process import CONTROL, FULL
 from pdrom.tables.kit.declaration import flag, integer, number, table, timed
 from pdrom.tables.kit.intervals import confirmed_digits, median_interval

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from pdrom.core.reads import TableOf
+from pdrom.artifact.reads import TableOf
 from pdrom.tables.gain_prediction import judged_runs
 from pdrom.tables.kit.declaration import compared, integer, number, table, text
 

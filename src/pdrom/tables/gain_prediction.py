@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from pdrom.core.reads import TableOf
+from pdrom.artifact.reads import TableOf
 from pdrom.tables.kit.declaration import compared, integer, number, table, text
 from pdrom.tables.kit.gains import ORTHOGONAL, reruns_with_gain
 

@@ -2,9 +2,9 @@
 
 import pandas as pd
 
+from pdrom.artifact.reads import Every
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every
 from pdrom.tables.kit.declaration import compared, flag, number, table, text
 from pdrom.tables.kit.parts import joined
 from pdrom.tables.kit.vocabulary import BLOWUP_FRAME, FINITE, FRAMES, GAIN, METHOD, K, R

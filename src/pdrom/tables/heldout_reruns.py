@@ -2,9 +2,9 @@
 
 import pandas as pd
 
+from pdrom.artifact.reads import Every, Setting, TableOf
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every, Setting, TableOf
 from pdrom.experiments.kit.horizon import HELDOUT
 from pdrom.tables.kit.declaration import table
 from pdrom.tables.kit.reruns import COLUMNS, MEASURES, judged_reruns

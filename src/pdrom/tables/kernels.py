@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from pdrom.core.reads import TableOf
+from pdrom.artifact.reads import TableOf
 from pdrom.experiments.kit.names import GLOBAL, RIGHT
 from pdrom.tables.kit.declaration import compared, number, table, text, timed
 from pdrom.tables.kit.vocabulary import ELEMENTS, ROUNDING, SCENE, VERTICES

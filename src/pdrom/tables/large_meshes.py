@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from pdrom.core.reads import ProjectFile
+from pdrom.artifact.reads import ProjectFile
 from pdrom.tables.kit.declaration import table, text
 from pdrom.tables.winners import winners
 

@@ -2,9 +2,9 @@
 
 import pandas as pd
 
+from pdrom.artifact.reads import Every, TableOf
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every, TableOf
 from pdrom.tables.kit.declaration import number, table, text, timed
 from pdrom.tables.kit.one_time import timings_in_one_time
 from pdrom.tables.kit.vocabulary import GLOBAL_MS, LOCAL_MS, LOCAL_SHARE, SCENE, VERTICES

@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-from pdrom.core.reads import Setting, TableOf
+from pdrom.artifact.reads import Setting, TableOf
 from pdrom.tables.kit.declaration import compared, flag, number, table
 from pdrom.tables.kit.reruns import KEYS
 from pdrom.tables.kit.vocabulary import (

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from pdrom.artifact.reads import Every, ProjectFile
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every, ProjectFile
 from pdrom.core.store import read_table
 from pdrom.tables.kit.declaration import compared, number, table, text
 from pdrom.tables.kit.parts import joined

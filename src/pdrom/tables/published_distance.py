@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from pdrom.core.reads import TableOf
+from pdrom.artifact.reads import TableOf
 from pdrom.tables.kit.declaration import compared, integer, number, table
 from pdrom.tables.kit.vocabulary import GROUP, SCENE
 from pdrom.tables.published_choices import CHOICE, DIRECTION

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from pdrom.core.reads import TableOf
+from pdrom.artifact.reads import TableOf
 from pdrom.tables.alternatives import STIFFNESS
 from pdrom.tables.kit.declaration import integer, number, table, timed
 from pdrom.tables.kit.vocabulary import SCENE

@@ -2,9 +2,9 @@
 
 import pandas as pd
 
+from pdrom.artifact.reads import Every
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every
 from pdrom.core.store import read_table
 from pdrom.experiments.roofline.bound import bounds
 from pdrom.tables.break_even import OWN_MESH

@@ -2,9 +2,9 @@
 
 import pandas as pd
 
+from pdrom.artifact.reads import Preferred
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Preferred
 from pdrom.reduction.basis import load_basis
 from pdrom.tables.kit.declaration import flag, integer, number, table
 from pdrom.tables.kit.vocabulary import GROUP, SCENE

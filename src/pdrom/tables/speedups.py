@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 import pandas as pd
 
+from pdrom.artifact.reads import Every, TableOf
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every, TableOf
 from pdrom.experiments.kit.fresh_process import FULL, REDUCED
 from pdrom.tables.kit.declaration import compared, flag, integer, number, table, text, timed
 from pdrom.tables.kit.intervals import in_words, median_interval

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pdrom.artifact.reads import Every, PerScene, Setting, TableOf
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.core.reads import Every, PerScene, Setting, TableOf
 from pdrom.core.store import open_hdf5
 from pdrom.tables.kit.declaration import compared, number, table, text
 from pdrom.tables.kit.parts import joined

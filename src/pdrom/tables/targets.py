@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from pdrom.core.reads import TableOf
+from pdrom.artifact.reads import TableOf
 from pdrom.tables.kit.declaration import compared, flag, number, table
 from pdrom.tables.kit.gains import ORTHOGONAL, reruns_with_gain
 from pdrom.tables.kit.vocabulary import ELEMENTS_SAMPLED, GAIN, GROUP, METHOD, SCENE, R

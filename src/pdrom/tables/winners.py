@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from pdrom.core.reads import Setting, TableOf
+from pdrom.artifact.reads import Setting, TableOf
 from pdrom.experiments.alternatives.settings import REDUCED
 from pdrom.tables.alternatives import ITERATIONS, STIFFNESS, SUBSTEPS
 from pdrom.tables.kit.declaration import compared, number, table, text, timed

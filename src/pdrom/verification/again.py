@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from pdrom.artifact.reads import Every
 from pdrom.core.errors import PdromError, StorageError
-from pdrom.core.reads import Every
 from pdrom.pipeline.resolve import Job
 from pdrom.tables import declared
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from pdrom.core.reads import ProjectFile
+from pdrom.artifact.reads import ProjectFile
 from pdrom.tables.kit.declaration import Column, Table
 from pdrom.tables.kit.quantities import Quantity
 from pdrom.verification.distance import distance

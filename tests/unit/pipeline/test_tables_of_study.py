@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
+from pdrom.artifact.reads import PerScene, Setting, TableOf
 from pdrom.core.errors import ConfigurationError
-from pdrom.core.reads import PerScene, Setting, TableOf
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.resolve import Job

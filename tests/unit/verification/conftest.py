@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pdrom.artifact.reads import TableOf
 from pdrom.core.paths import TABLE
-from pdrom.core.reads import TableOf
 from pdrom.core.store import read_table, write_hdf5, write_table, write_text
 from pdrom.tables import declared
 from pdrom.verification.again import is_derived, made

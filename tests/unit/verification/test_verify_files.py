@@ -8,11 +8,11 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
-from pdrom.core.artifact import Artifact
+from pdrom.artifact.artifact import Artifact
+from pdrom.artifact.reads import One
 from pdrom.core.errors import StorageError
 from pdrom.core.paths import TABLE, File, Place
 from pdrom.core.provenance import made_by
-from pdrom.core.reads import One
 from pdrom.core.store import atomic_path, write_hdf5, write_table, write_text
 from pdrom.pipeline import manifest
 from pdrom.pipeline.folders import Folders

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pdrom.artifact.reads import Settings, SourcesOf
 from pdrom.core.paths import ALTERNATIVES, File
-from pdrom.core.reads import Settings, SourcesOf
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.alternatives.candidates import Candidate, candidates

@@ -7,9 +7,9 @@ from typing import Annotated
 import pandas as pd
 from pydantic import AfterValidator, Field
 
+from pdrom.artifact.reads import ProjectFile, Setting
 from pdrom.core.errors import choices
 from pdrom.core.paths import HARD_CASES, KERNEL_ACCURACY, File
-from pdrom.core.reads import ProjectFile, Setting
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.hard_cases.accuracy import kernel_accuracy

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from pdrom.core.artifact import Artifact, declare, declared_in, normal
+from pdrom.artifact.artifact import Artifact, declare, declared_in, normal
+from pdrom.artifact.reads import Read
 from pdrom.core.paths import Place
-from pdrom.core.reads import Read
 
 
 class Experiment(Artifact):

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import pandas as pd
 from pydantic import Field
 
+from pdrom.artifact.reads import Every, Settings
 from pdrom.core.paths import MESH, RATES, WORK, File
-from pdrom.core.reads import Every, Settings
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import experiment

@@ -1,6 +1,6 @@
 """Accuracy of reduced models against their time per frame, scene by scene."""
 
-from pdrom.core.reads import TableOf
+from pdrom.artifact.reads import TableOf
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.artists import Figure
 from pdrom.report.figures.kit.declaration import figure

@@ -1,7 +1,7 @@
 """Runs of sheets with bending only, reduced."""
 
+from pdrom.artifact.reads import Every, TableOf
 from pdrom.core.paths import NOISE_RUNS
-from pdrom.core.reads import Every, TableOf
 from pdrom.report.figures.kit.artists import Figure
 from pdrom.report.figures.kit.declaration import figure
 from pdrom.report.figures.kit.experiment_rows import RUNS, draw_experiments, experiment_rows

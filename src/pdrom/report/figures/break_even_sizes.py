@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from pdrom.core.reads import TableOf
+from pdrom.artifact.reads import TableOf
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.artists import Axes, Figure
 from pdrom.report.figures.kit.declaration import figure

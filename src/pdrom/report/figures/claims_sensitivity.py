@@ -1,6 +1,6 @@
 """Verdicts that change with their rules."""
 
-from pdrom.core.reads import TableOf
+from pdrom.artifact.reads import TableOf
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.artists import Figure
 from pdrom.report.figures.kit.counts import draw_counts

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from pdrom.artifact.reads import Chosen
 from pdrom.core.paths import MESH, SAMPLING, SNAPSHOTS
-from pdrom.core.reads import Chosen
 from pdrom.core.store import open_hdf5
 from pdrom.model.mesh.types import load_mesh
 from pdrom.report.figures.kit import style

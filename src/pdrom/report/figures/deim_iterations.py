@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from pdrom.artifact.reads import Chosen
 from pdrom.core.paths import BASIS, MESH, SAMPLING
-from pdrom.core.reads import Chosen
 from pdrom.model.mesh.types import load_mesh
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.artists import Axes, Figure

@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
+from pdrom.artifact.reads import Chosen, TableOf
 from pdrom.core.paths import CONTRIBUTIONS
-from pdrom.core.reads import Chosen, TableOf
 from pdrom.core.store import read_table
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.artists import Axes, Figure

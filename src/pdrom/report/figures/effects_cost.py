@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from pdrom.core.reads import TableOf
+from pdrom.artifact.reads import TableOf
 from pdrom.experiments.kit.names import GLOBAL, REST, RIGHT
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.artists import Axes, Figure

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from pdrom.core.reads import Setting, TableOf
+from pdrom.artifact.reads import Setting, TableOf
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.artists import Axes, Figure
 from pdrom.report.figures.kit.declaration import figure

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from pdrom.core.reads import TableOf
+from pdrom.artifact.reads import TableOf
 from pdrom.experiments.kit.names import GLOBAL, RIGHT
 from pdrom.experiments.roofline.bound import MEMORY, READ
 from pdrom.report.figures.kit import style

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from pdrom.artifact.reads import Chosen
 from pdrom.core.paths import BASIS, FULL_ORDER, MESH, SNAPSHOTS
-from pdrom.core.reads import Chosen
 from pdrom.model.mesh.types import load_mesh
 from pdrom.reduction.snapshots import SnapshotSet, load_snapshots
 from pdrom.report.figures.kit import style

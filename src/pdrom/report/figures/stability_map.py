@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from pdrom.core.reads import Setting, TableOf
+from pdrom.artifact.reads import Setting, TableOf
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.artists import Figure
 from pdrom.report.figures.kit.declaration import figure

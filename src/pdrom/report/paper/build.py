@@ -7,11 +7,11 @@ from typing import Any
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from pdrom.core.artifact import Artifact
+from pdrom.artifact.artifact import Artifact
+from pdrom.artifact.reads import Given, Setting
 from pdrom.core.errors import StorageError
 from pdrom.core.machine import Machine
 from pdrom.core.paths import PAPER_INPUT
-from pdrom.core.reads import Given, Setting
 from pdrom.core.store import read_table, read_text, require_intact, write_text
 from pdrom.core.yamlfile import describe
 from pdrom.report.paper.bibliography import bibliography

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from pdrom.core.reads import ProjectFile, TableOf
+from pdrom.artifact.reads import ProjectFile, TableOf
 from pdrom.tables.claims import METRICS, VERDICTS, claims_rows, load_claims, timed_columns
 from pdrom.tables.kit.declaration import compared, text, timed
 from pdrom.tables.kit.declaration import table as declare

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from pdrom.core.reads import ProjectFile, TableOf
+from pdrom.artifact.reads import ProjectFile, TableOf
 from pdrom.tables.claims import METRICS, VERDICTS, load_claims, timed_columns
 from pdrom.tables.claims.sensitivity import PARTS, VARIED, sensitivity_rows
 from pdrom.tables.kit.declaration import compared, flag, table, text, timed

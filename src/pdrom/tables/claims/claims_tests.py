@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from pdrom.core.reads import ProjectFile, TableOf
+from pdrom.artifact.reads import ProjectFile, TableOf
 from pdrom.tables.claims import FOUND, METRICS, VERDICTS, is_timed, load_claims, outcome_rows
 from pdrom.tables.claims.sensitivity import PARTS
 from pdrom.tables.kit.declaration import compared, flag, integer, number, table, text, timed

@@ -20,10 +20,10 @@ from typing import Any, Literal, Protocol
 
 import pandas as pd
 
-from pdrom.core.artifact import Artifact, declare, declared_in
+from pdrom.artifact.artifact import Artifact, declare, declared_in
+from pdrom.artifact.reads import ProjectFile, Read
 from pdrom.core.errors import StorageError
 from pdrom.core.paths import TABLE
-from pdrom.core.reads import ProjectFile, Read
 from pdrom.core.store import write_table
 from pdrom.tables.kit.quantities import TALLY, TOLERANCES, Quantity, usual_quantity
 

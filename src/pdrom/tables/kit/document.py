@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from pdrom.core.reads import Every, PerScene, Preferred, ProjectFile, Read, Setting, TableOf
+from pdrom.artifact.reads import Every, PerScene, Preferred, ProjectFile, Read, Setting, TableOf
 from pdrom.tables.kit.declaration import Column, Table
 
 HEAD = """# Tables of the study

@@ -13,9 +13,9 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from pdrom.artifact.reads import Chosen, Every, TableOf
 from pdrom.core.errors import StorageError
 from pdrom.core.paths import MESH, RERUNS, TABLE
-from pdrom.core.reads import Chosen, Every, TableOf
 from pdrom.core.store import seal_path
 from pdrom.core.store.block import write_block
 from pdrom.model.mesh.generators import cloth

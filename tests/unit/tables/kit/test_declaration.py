@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pdrom.core.artifact import load
+from pdrom.artifact.artifact import load
+from pdrom.artifact.reads import Setting
 from pdrom.core.errors import StorageError
-from pdrom.core.reads import Setting
 from pdrom.core.store import read_table, write_table
 from pdrom.tables import declared, timing_columns
 from pdrom.tables.kit.declaration import flag, integer, number, table, text, timed
@@ -103,7 +103,7 @@ def test_missing_columns_are_named():
 
 def test_a_function_must_take_what_it_reads():
     declare = table(title="", columns=COLUMNS, reads={"rows": Setting("a"), "other": Setting("b")})
-    with pytest.raises(TypeError, match=r"table lonely: .*other"):
+    with pytest.raises(TypeError, match=r"lonely_table: .*other"):
 
         @declare
         def lonely(rows):

@@ -18,9 +18,9 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, JsonValue
 
-from pdrom.core.artifact import Artifact
+from pdrom.artifact.artifact import Artifact
+from pdrom.artifact.reads import Chosen, Every, Published, Setting, TableOf
 from pdrom.core.paths import FIGURE, FIGURE_PICTURE, TABLE
-from pdrom.core.reads import Chosen, Every, Published, Setting, TableOf
 from pdrom.report.figures.kit.artists import Figure
 from pdrom.report.figures.kit.holdings import Holdings
 from pdrom.report.figures.kit.options import Options

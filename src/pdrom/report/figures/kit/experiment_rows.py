@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pdrom.artifact.reads import Chosen
 from pdrom.core.paths import FULL_ORDER, MESH, RERUNS
-from pdrom.core.reads import Chosen
 from pdrom.model.mesh.types import load_mesh
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.artists import Figure

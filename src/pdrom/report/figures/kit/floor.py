@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from pdrom.artifact.reads import Chosen, Setting
 from pdrom.core.paths import SENSITIVITY
-from pdrom.core.reads import Chosen, Setting
 from pdrom.core.store import read_table
 from pdrom.experiments.kit.horizon import floor_of, horizon
 from pdrom.report.figures.kit.results import Results

@@ -7,11 +7,11 @@ from pathlib import Path
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from pdrom.artifact.artifact import Artifact
 from pdrom.core.embedded import PDF_KEY, PNG_KEY
 from pdrom.core.provenance import as_text, provenance
 from pdrom.core.store import atomic_path
 from pdrom.report.figures.kit import style
-from pdrom.report.figures.kit.declaration import Declaration
 from pdrom.report.figures.kit.options import Options
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 
@@ -23,7 +23,7 @@ FULL_STUDY = "the full study (config/default.yaml) draws it"
 
 
 def draw_figure(
-    declared: Declaration, results: Results, options: Options, full: bool = True
+    declared: Artifact, results: Results, options: Options, full: bool = True
 ) -> Figure:
     """Draw a figure, or a note where the configuration holds nothing of what it shows.
 
@@ -32,7 +32,8 @@ def draw_figure(
     """
     with style.look():
         try:
-            return declared.function(results, options)
+            drawn: Figure = declared.function(results, options)
+            return drawn
         except NothingToDraw as nothing:
             log.info("figure %s: %s", declared.name, nothing)
             elsewhere = "" if full else f"\n{FULL_STUDY}"

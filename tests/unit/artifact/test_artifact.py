@@ -8,9 +8,8 @@ import pandas as pd
 import pytest
 from pydantic import ValidationError
 
-from pdrom.core.artifact import Artifact, declare, declared_in, load, make, modules_in, normal
-from pdrom.core.paths import File, Place
-from pdrom.core.reads import (
+from pdrom.artifact.artifact import Artifact, declare, declared_in, load, make, modules_in, normal
+from pdrom.artifact.reads import (
     Chosen,
     EachOf,
     Every,
@@ -22,6 +21,7 @@ from pdrom.core.reads import (
     SourcesOf,
     TableOf,
 )
+from pdrom.core.paths import File, Place
 from pdrom.core.store import read_table, seal_path, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import Experiment, experiment, experiments

@@ -23,9 +23,9 @@ from typing import Any, TypeVar, get_type_hints
 
 from pydantic import BaseModel, TypeAdapter
 
+from pdrom.artifact.reads import FileRead, Labels, One, Paths, Read, SettingRead, Sources
 from pdrom.core.paths import Place
 from pdrom.core.provenance import made_by
-from pdrom.core.reads import FileRead, Labels, One, Paths, Read, SettingRead, Sources
 
 A = TypeVar("A", bound="Artifact")
 

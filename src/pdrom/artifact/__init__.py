@@ -1,0 +1,1 @@
+"""Grammar of artifacts: what the study makes, by a function under a declaration of its reads."""
