@@ -36,6 +36,14 @@ def compiled(function=None, **options):
     return njit(cache=True, error_model="numpy", **options)(function)
 
 
+def template(function):
+    """Compile a function that takes functions, into each function that calls it.
+
+    It is not kept: numba names a function among the arguments by a number of the process.
+    """
+    return njit(error_model="numpy", forceinline=True)(function)
+
+
 class Callback:
     """A function that other compiled code calls by its address; compiled at the first question.
 

@@ -8,9 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from pdrom.model.compiled.rows import doubles
 from pdrom.model.constraints import products
-from pdrom.model.constraints.gradient_kernel import carray, gradient_kernel
+from pdrom.model.constraints.gradient_kernel import gradient_kernel
 from pdrom.model.constraints.lanes import (
     LANES,
     SMALLEST,
@@ -22,35 +21,22 @@ from pdrom.model.constraints.lanes import (
     mix,
     save,
     scaled,
-    take,
 )
 from pdrom.model.constraints.local_kernel import local_kernel
-from pdrom.model.constraints.simplex import (
-    SIZE,
-    F,
-    P,
-    arguments,
-    copy_rows,
-    energy,
-    gather_edges,
-    samples,
-    scatter,
-    start_energy,
-    store_projections,
+from pdrom.model.constraints.simplex import SIZE, F, P
+from pdrom.model.constraints.singular_values import (
+    StrainConfig,
+    accumulate,
+    project,
+    project_gradients,
 )
 from pdrom.model.constraints.svd3 import jacobi_rotation, orthonormal_pair
-from pdrom.model.constraints.triangle_strain import (
-    GEOMETRY,
-    StrainConfig,
-    TriangleStrain,
-    forces,
-    gradients,
-)
+from pdrom.model.constraints.triangle_strain import TriangleStrain, forces, gradients
 
 # numbers of a lane after those of every simplex: the columns of U, the rotation V, the values
 U, COSINE, SINE = SIZE, SIZE + 6, SIZE + 7
 VALUES = SIZE + 8
-ALL = VALUES + products.SIZE
+WORK = VALUES + products.SIZE
 
 
 @lane_function
@@ -89,48 +75,18 @@ def _nearest(work, low, high):
 
 
 @local_kernel
-def _project(y_place, p_place, record, part):
-    y, _, corners, geometry, allowed, work, _, _ = arguments(
-        y_place, p_place, record, part, 3, GEOMETRY
-    )
-    elements, taken, taken_geometry = samples(record, 3, GEOMETRY)
-    p = doubles(p_place, 3 * 2 * len(elements))
-    low, high = allowed[0], allowed[1]
-    for start in range(0, len(elements), LANES):
-        take(corners, 3, elements, start, taken)
-        take(geometry, GEOMETRY, elements, start, taken_geometry)
-        gather_edges(y, taken, 0, 2, work)
-        gradients(work, taken_geometry, 0)
-        _nearest(work, low, high)
-        store_projections(work, 2, start, p)
-    return 0.0
+def _project(y, p, record, part):
+    return project(y, p, record, part, 2, gradients, _nearest)
 
 
 @local_kernel
-def _accumulate(y_place, rhs_place, record, part):
-    y, rhs, corners, geometry, allowed, work, first, last = arguments(
-        y_place, rhs_place, record, part, 3, GEOMETRY
-    )
-    low, high = allowed[0], allowed[1]
-    start_energy(work)
-    for block in range(first, last):
-        gather_edges(y, corners, block, 2, work)
-        gradients(work, geometry, block)
-        _nearest(work, low, high)
-        forces(work, geometry, block)
-        scatter(work, corners, block, 2, rhs)
-    return energy(work)
+def _accumulate(y, rhs, record, part):
+    return accumulate(y, rhs, record, part, 2, gradients, _nearest, forces)
 
 
 @gradient_kernel
-def _project_gradients(d_pointer, range_pointer, p_pointer, m):
-    d, p = carray(d_pointer, (2 * m, 3)), carray(p_pointer, (6 * m,))
-    allowed = carray(range_pointer, (2,))
-    work = np.zeros(ALL * LANES)
-    for start in range(0, m, LANES):
-        copy_rows(d, 2, start, work, F)
-        _nearest(work, allowed[0], allowed[1])
-        store_projections(work, 2, start, p)
+def _project_gradients(d, allowed, p, m):
+    project_gradients(d, allowed, p, m, 2, WORK, _nearest)
 
 
 class TriangleArea(TriangleStrain):
@@ -141,16 +97,11 @@ class TriangleArea(TriangleStrain):
 
         effect: Literal["area"] = "area"
 
-    work_size = ALL
+    work_size = WORK
     project_kernel = _project
     accumulate_kernel = _accumulate
+    gradient_kernel = _project_gradients
     manifold = "size"
 
-    @property
-    def gradient_kernel(self):
-        return _project_gradients
-
-    def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
-        u, sigma, vt = np.linalg.svd(d, full_matrices=False)
-        nearest = products.reference_nearest(sigma, self.config.minimum, self.config.maximum)
-        return (u * nearest[:, None, :]) @ vt
+    def _reference_values(self, sigma: np.ndarray) -> np.ndarray:
+        return products.reference_nearest(sigma, *self.allowed)

@@ -62,6 +62,7 @@ class VertexBending(ConstraintGroup):
     split_from = 4096
     frame_lagged = True
     manifold = "half sphere"
+    gradient_kernel = project_gradients
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
@@ -165,10 +166,6 @@ class VertexBending(ConstraintGroup):
             (self.elements, 0),
             lambda block: self.S.indices[self.S.indptr[block * LANES] :],
         )
-
-    @property
-    def gradient_kernel(self):
-        return project_gradients
 
     def kernel_parameters(self) -> np.ndarray:
         return self._manifold

@@ -2,11 +2,8 @@
 
 from typing import Literal
 
-import numpy as np
-
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.constraints.tetrahedron import TetrahedronGroup
-from pdrom.model.mesh.types import Mesh
 
 
 class DeformationGradient(TetrahedronGroup):
@@ -17,7 +14,4 @@ class DeformationGradient(TetrahedronGroup):
 
         effect: Literal["deformation_gradient"] = "deformation_gradient"
 
-    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
-        super().__init__(config, mesh, masses)
-        self.minimum = self.maximum = 1.0
-        self._set_up(mesh)
+    allowed = (1.0, 1.0)

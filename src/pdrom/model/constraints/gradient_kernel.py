@@ -6,7 +6,7 @@ subspace call it through its address, so that one compiled loop serves every mix
 """
 
 from llvmlite import ir
-from numba import carray, types
+from numba import types
 from numba.extending import intrinsic
 
 from pdrom.model.compiled.functions import Callback
@@ -42,6 +42,3 @@ def call(typing_context, address, d, parameters, p, m):
         return context.get_dummy_value()
 
     return types.void(*integers), generate
-
-
-__all__ = ["call", "carray", "gradient_kernel"]

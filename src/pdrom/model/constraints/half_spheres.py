@@ -1,10 +1,11 @@
 """Kernels of vertex bending: the nearest point of a half sphere to the curvature vector."""
 
 import numpy as np
+from numba import carray
 
 from pdrom.model.compiled import arithmetic, rows
 from pdrom.model.compiled.rows import WIDTH, at
-from pdrom.model.constraints.gradient_kernel import carray, gradient_kernel
+from pdrom.model.constraints.gradient_kernel import gradient_kernel
 from pdrom.model.constraints.lanes import (
     LANES,
     SMALLEST,

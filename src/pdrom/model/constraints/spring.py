@@ -3,6 +3,7 @@
 from typing import Literal
 
 import numpy as np
+from numba import carray
 
 from pdrom.model.compiled import arithmetic, rows
 from pdrom.model.compiled.arithmetic import (
@@ -20,7 +21,7 @@ from pdrom.model.compiled.arithmetic import (
 )
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.constraints.base import GroupConfig, directions
-from pdrom.model.constraints.gradient_kernel import carray, gradient_kernel
+from pdrom.model.constraints.gradient_kernel import gradient_kernel
 from pdrom.model.constraints.lanes import LANES, SMALLEST, lane_function, pack, take
 from pdrom.model.constraints.local_kernel import local_kernel
 from pdrom.model.constraints.simplex import (
@@ -176,6 +177,7 @@ class EdgeSpring(SimplexGroup):
     split_from = 8192
     project_kernel = _project
     accumulate_kernel = _accumulate
+    gradient_kernel = _project_gradients
     manifold = "length"
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
@@ -197,10 +199,6 @@ class EdgeSpring(SimplexGroup):
 
     def _own_arrays(self) -> tuple[np.ndarray, ...]:
         return self._rest, self._taken_rest
-
-    @property
-    def gradient_kernel(self):
-        return _project_gradients
 
     def kernel_parameters(self) -> np.ndarray:
         return np.concatenate([self._geometry, self._rest])

@@ -8,33 +8,24 @@ from typing import Literal
 
 import numpy as np
 
-from pdrom.model.compiled.rows import doubles
 from pdrom.model.constraints import products, svd3
-from pdrom.model.constraints.gradient_kernel import carray, gradient_kernel
-from pdrom.model.constraints.lanes import LANES, cross, dot, lane_function, load, save, take
+from pdrom.model.constraints.gradient_kernel import gradient_kernel
+from pdrom.model.constraints.lanes import LANES, cross, dot, lane_function, load, save
 from pdrom.model.constraints.local_kernel import local_kernel
-from pdrom.model.constraints.simplex import (
-    SIZE,
-    F,
-    P,
-    arguments,
-    copy_rows,
-    energy,
-    gather_edges,
-    samples,
-    scatter,
-    start_energy,
-    store_projections,
+from pdrom.model.constraints.simplex import SIZE, F, P
+from pdrom.model.constraints.singular_values import (
+    StrainConfig,
+    accumulate,
+    project,
+    project_gradients,
 )
-from pdrom.model.constraints.tetrahedron import GEOMETRY, TetrahedronGroup, forces, gradients
-from pdrom.model.constraints.triangle_strain import StrainConfig
-from pdrom.model.mesh.types import Mesh
+from pdrom.model.constraints.tetrahedron import TetrahedronGroup, forces, gradients
 
 # where the working arrays of svd3 and products and the marks of finished lanes begin
 SVD = SIZE
 VALUES = SVD + svd3.FACTORS
 FOUND = VALUES + products.SIZE
-ALL = FOUND + 1
+WORK = FOUND + 1
 
 
 @lane_function
@@ -68,48 +59,18 @@ def _nearest(work, low, high):
 
 
 @local_kernel
-def _project(y_place, p_place, record, part):
-    y, _, corners, geometry, allowed, work, _, _ = arguments(
-        y_place, p_place, record, part, 4, GEOMETRY
-    )
-    elements, taken, taken_geometry = samples(record, 4, GEOMETRY)
-    p = doubles(p_place, 3 * 3 * len(elements))
-    low, high = allowed[0], allowed[1]
-    for start in range(0, len(elements), LANES):
-        take(corners, 4, elements, start, taken)
-        take(geometry, GEOMETRY, elements, start, taken_geometry)
-        gather_edges(y, taken, 0, 3, work)
-        gradients(work, taken_geometry, 0)
-        _nearest(work, low, high)
-        store_projections(work, 3, start, p)
-    return 0.0
+def _project(y, p, record, part):
+    return project(y, p, record, part, 3, gradients, _nearest)
 
 
 @local_kernel
-def _accumulate(y_place, rhs_place, record, part):
-    y, rhs, corners, geometry, allowed, work, first, last = arguments(
-        y_place, rhs_place, record, part, 4, GEOMETRY
-    )
-    low, high = allowed[0], allowed[1]
-    start_energy(work)
-    for block in range(first, last):
-        gather_edges(y, corners, block, 3, work)
-        gradients(work, geometry, block)
-        _nearest(work, low, high)
-        forces(work, geometry, block)
-        scatter(work, corners, block, 3, rhs)
-    return energy(work)
+def _accumulate(y, rhs, record, part):
+    return accumulate(y, rhs, record, part, 3, gradients, _nearest, forces)
 
 
 @gradient_kernel
-def _project_gradients(d_pointer, range_pointer, p_pointer, m):
-    d, p = carray(d_pointer, (3 * m, 3)), carray(p_pointer, (9 * m,))
-    allowed = carray(range_pointer, (2,))
-    work = np.zeros(ALL * LANES)
-    for start in range(0, m, LANES):
-        copy_rows(d, 3, start, work, F)
-        _nearest(work, allowed[0], allowed[1])
-        store_projections(work, 3, start, p)
+def _project_gradients(d, allowed, p, m):
+    project_gradients(d, allowed, p, m, 3, WORK, _nearest)
 
 
 class TetrahedronVolume(TetrahedronGroup):
@@ -123,25 +84,11 @@ class TetrahedronVolume(TetrahedronGroup):
 
         effect: Literal["volume"] = "volume"
 
-    work_size = ALL
+    work_size = WORK
     project_kernel = _project
     accumulate_kernel = _accumulate
+    gradient_kernel = _project_gradients
     manifold = "size"
 
-    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
-        super().__init__(config, mesh, masses)
-        self.minimum, self.maximum = config.minimum, config.maximum
-        self._set_up(mesh)
-
-    @property
-    def gradient_kernel(self):
-        return _project_gradients
-
-    def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
-        u, sigma, vt = np.linalg.svd(d)
-        # the smallest singular value carries the sign of the determinant
-        turned = np.sign(np.linalg.det(u) * np.linalg.det(vt))
-        sigma[:, 2] *= turned
-        u[:, :, 2] *= turned[:, None]
-        nearest = products.reference_nearest(sigma, self.minimum, self.maximum)
-        return (u * nearest[:, None, :]) @ vt
+    def _reference_values(self, sigma: np.ndarray) -> np.ndarray:
+        return products.reference_nearest(sigma, *self.allowed)

@@ -145,8 +145,8 @@ def test_projected_tetrahedra_are_right_side_out(group, seed, squeeze):
     p = constraint.project(y).reshape(-1, 3, 3)
     sigma = np.linalg.svd(p, compute_uv=False)
     assert (np.linalg.det(p) > 0.0).all()
-    assert (sigma >= constraint.minimum - 1e-10).all()
-    assert (sigma <= constraint.maximum + 1e-10).all()
+    assert (sigma >= constraint.allowed[0] - 1e-10).all()
+    assert (sigma <= constraint.allowed[1] + 1e-10).all()
 
 
 @settings(max_examples=60, deadline=None)

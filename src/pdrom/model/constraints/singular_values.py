@@ -1,0 +1,135 @@
+"""Groups on triangles and tetrahedra that project F by its singular values.
+
+S q = F^T of an element is projected on the matrices whose singular values, or whose product of
+them, lie in a range. Groups differ in three compiled functions:
+
+gradients(work, geometry, block) : S q of a block from its edges
+nearest(work, low, high) : projections of a block
+forces(work, geometry, block) : weighted forces S^T W p on the corners, and w |S q - p|^2
+
+The passes over elements are here; each group calls them with its functions from kernels of its own,
+because numba keeps no closure and no function of functions on disk, only what calls them.
+"""
+
+from typing import Annotated, Self
+
+import numpy as np
+from numba import carray
+from pydantic import Field, model_validator
+
+from pdrom.model.compiled.functions import template
+from pdrom.model.compiled.rows import doubles
+from pdrom.model.constraints.base import GroupConfig
+from pdrom.model.constraints.lanes import LANES, take
+from pdrom.model.constraints.simplex import (
+    F,
+    SimplexGroup,
+    arguments,
+    copy_rows,
+    energy,
+    gather_edges,
+    samples,
+    scatter,
+    start_energy,
+    store_projections,
+)
+from pdrom.model.mesh.types import Mesh
+
+
+@template
+def project(y_place, p_place, record, part, rows, gradients, nearest):
+    """Write the projections of some elements of ``rows`` rows, see `local_kernel`."""
+    corners, numbers = rows + 1, 1 + rows * rows
+    y, _, packed, geometry, allowed, work, _, _ = arguments(
+        y_place, p_place, record, part, corners, numbers
+    )
+    elements, taken, taken_geometry = samples(record, corners, numbers)
+    p = doubles(p_place, 3 * rows * len(elements))
+    low, high = allowed[0], allowed[1]
+    for start in range(0, len(elements), LANES):
+        take(packed, corners, elements, start, taken)
+        take(geometry, numbers, elements, start, taken_geometry)
+        gather_edges(y, taken, 0, rows, work)
+        gradients(work, taken_geometry, 0)
+        nearest(work, low, high)
+        store_projections(work, rows, start, p)
+    return 0.0
+
+
+@template
+def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, forces):
+    """Add S^T W p of a part's blocks of elements of ``rows`` rows; their energy."""
+    y, rhs, corners, geometry, allowed, work, first, last = arguments(
+        y_place, rhs_place, record, part, rows + 1, 1 + rows * rows
+    )
+    low, high = allowed[0], allowed[1]
+    start_energy(work)
+    for block in range(first, last):
+        gather_edges(y, corners, block, rows, work)
+        gradients(work, geometry, block)
+        nearest(work, low, high)
+        forces(work, geometry, block)
+        scatter(work, corners, block, rows, rhs)
+    return energy(work)
+
+
+@template
+def project_gradients(d_pointer, range_pointer, p_pointer, m, rows, work_size, nearest):
+    """Write the projections of m elements from S q, with ``work_size`` numbers a lane."""
+    d, p = carray(d_pointer, (rows * m, 3)), carray(p_pointer, (3 * rows * m,))
+    allowed = carray(range_pointer, (2,))
+    work = np.zeros(work_size * LANES)
+    for start in range(0, m, LANES):
+        copy_rows(d, rows, start, work, F)
+        nearest(work, allowed[0], allowed[1])
+        store_projections(work, rows, start, p)
+
+
+class StrainConfig(GroupConfig):
+    """Allowed singular values [``minimum``, ``maximum``]; ``minimum`` > 0."""
+
+    minimum: Annotated[float, Field(gt=0.0, le=1.0)] = 0.99
+    maximum: Annotated[float, Field(ge=1.0, le=1e3)] = 1.01
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.minimum > self.maximum:
+            raise ValueError(f"minimum = {self.minimum} exceeds maximum = {self.maximum}")
+        return self
+
+
+class SingularValueGroup(SimplexGroup):
+    """A group whose kernels are made of `project`, `accumulate` and `project_gradients`."""
+
+    manifold = "clamped"
+
+    @property
+    def allowed(self) -> tuple[float, float]:
+        """Ends of the range."""
+        return self.config.minimum, self.config.maximum
+
+    def _set_up(self, mesh: Mesh, inverse: np.ndarray) -> None:
+        """Set the operator from the inverse rest edge matrices D^-1 (e, p, p)."""
+        # F = [q_1 - q_0, ..., q_p - q_0] D^-1, hence F^T = D^-T [q_1 - q_0; ...; q_p - q_0]
+        transposed = inverse.transpose(0, 2, 1)
+        self.operator = np.concatenate([-transposed.sum(axis=2, keepdims=True), transposed], axis=2)
+        self._assemble(mesh.vertices)
+
+    def _constants(self) -> tuple[float, ...]:
+        return self.allowed
+
+    def kernel_parameters(self) -> np.ndarray:
+        return np.array(self.allowed)
+
+    def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
+        u, sigma, vt = np.linalg.svd(d, full_matrices=False)
+        if self.rows_per_element == 3:
+            # the smallest singular value carries the sign of the determinant
+            turned = np.sign(np.linalg.det(u) * np.linalg.det(vt))
+            sigma[:, 2] *= turned
+            u[:, :, 2] *= turned[:, None]
+        return (u * self._reference_values(sigma)[:, None, :]) @ vt
+
+    def _reference_values(self, sigma: np.ndarray) -> np.ndarray:
+        """Singular values (e, p) of the projections; these are signed for tetrahedra."""
+        return np.clip(sigma, *self.allowed)
