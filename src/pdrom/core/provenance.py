@@ -57,11 +57,6 @@ def made_by(name: str, configuration: Any, code: str = "") -> Iterator[None]:
         _AT_WORK.reset(previous)
 
 
-def configuration_hash(configuration: Any) -> str:
-    """SHA-256 of the canonical JSON of a configuration."""
-    return hashlib.sha256(_canonical(configuration).encode()).hexdigest()
-
-
 @cache
 def library_versions() -> dict[str, str]:
     """Versions of the numerical libraries; "absent" for one that is not installed."""

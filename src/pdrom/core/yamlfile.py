@@ -2,27 +2,16 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_args
+from typing import Any, TypeVar, get_args
 
 import yaml
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    ValidationError,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from pdrom.core.errors import ConfigurationError, choices
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 100
 M = TypeVar("M", bound=BaseModel)
-
-# Numbers of the physics stay where sums and squares of them neither overflow nor lose every digit.
-MIN_LENGTH, MAX_LENGTH = 1e-6, 1e6
-Length = Annotated[float, Field(ge=-MAX_LENGTH, le=MAX_LENGTH)]
-PositiveLength = Annotated[float, Field(ge=MIN_LENGTH, le=MAX_LENGTH)]
 
 
 class ConfigModel(BaseModel):

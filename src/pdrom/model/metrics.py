@@ -30,14 +30,19 @@ def relative_errors(p: np.ndarray, p_hat: np.ndarray, roundoff: float) -> list[f
     ]
 
 
-def shape_differences(positions: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Norm of what a rigid motion cannot explain, frame by frame: min || R q + t - q_ref ||_F (F,).
+def shape_residuals(positions: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vectors R q + t - q_ref of each frame, which no rigid motion explains, in units of a scale.
 
     R is the best rotation, never a reflection (Kabsch 1976), t joins the centroids.
 
     Parameters
     ----------
-    positions, reference : (F, N, 3), finite
+    positions, reference : (F, N, 3) m, finite
+
+    Returns
+    -------
+    residuals, scale
+        (F, N, 3) and (F,) m; apart, because squares in metres may overflow.
     """
     # the same scale for both: products of a run that has grown out of bounds would overflow
     largest = np.abs(positions).max(initial=0.0, axis=(1, 2), keepdims=True)
@@ -47,7 +52,18 @@ def shape_differences(positions: np.ndarray, reference: np.ndarray) -> np.ndarra
     b = b - b.mean(axis=1, keepdims=True)
     u, _, vt = np.linalg.svd(np.einsum("fni,fnj->fij", a, b))
     u[..., -1] *= np.sign(np.linalg.det(u @ vt))[:, None]
-    return np.linalg.norm(a @ u @ vt - b, axis=(1, 2)) * scale[:, 0, 0]
+    return a @ u @ vt - b, scale[:, 0, 0]
+
+
+def shape_differences(positions: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Frobenius norm of the `shape_residuals` of each frame, (F,) m.
+
+    Parameters
+    ----------
+    positions, reference : (F, N, 3) m, finite
+    """
+    residuals, scale = shape_residuals(positions, reference)
+    return np.linalg.norm(residuals, axis=(1, 2)) * scale
 
 
 def trajectory_error(difference: np.ndarray, displacement: np.ndarray) -> float | None:

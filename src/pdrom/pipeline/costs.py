@@ -162,16 +162,6 @@ class CostModel:
             memory_mb=math.ceil(memory / STEP_MB) * STEP_MB,
         )
 
-    def quotients(self) -> pd.Series:
-        """Measured over predicted seconds of every measured job, by kind."""
-        kinds, values = [], []
-        for job in self.measured.itertuples():
-            size = _size(job) if job.elements == job.elements else None
-            predicted = self._kinds[job.kind].cost(size, job.method)
-            kinds.append(job.kind)
-            values.append(job.seconds / predicted.seconds)
-        return pd.Series(values, index=kinds, name="quotient")
-
 
 def _size(job: object) -> Size:
     return Size(*(getattr(job, name) for name in ("elements", "vertices", "frames", "iterations")))

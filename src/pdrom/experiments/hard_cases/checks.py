@@ -9,6 +9,7 @@ from pdrom.experiments.hard_cases.case import HardCase
 from pdrom.experiments.hard_cases.record import Record
 from pdrom.experiments.hard_cases.roundoff import EPS, OPERATIONS
 from pdrom.experiments.hard_cases.runs import full_order
+from pdrom.model.metrics import shape_residuals
 from pdrom.model.scene import Scene
 
 Check = Callable[[HardCase, Scene, Record], str]
@@ -89,16 +90,9 @@ def determinism(case: HardCase, scene: Scene, run: Record) -> str:
 
 def recovers(case: HardCase, scene: Scene, run: Record) -> str:
     """The run ends in the rest shape, up to a rigid motion."""
-    error = shape_error(scene.mesh.points, run.positions[-1]) / scene.mesh.extent
+    residuals, scale = shape_residuals(scene.mesh.points[None], run.positions[-1:])
+    error = scale[0] * float(np.linalg.norm(residuals, axis=2).max()) / scene.mesh.extent
     return "" if error <= RECOVERED else f"ends {error:.2g} extents from its rest shape"
-
-
-def shape_error(rest: np.ndarray, points: np.ndarray) -> float:
-    """Largest distance of a vertex from ``rest`` after the best rigid motion (Kabsch 1976), m."""
-    a, b = rest - rest.mean(axis=0), points - points.mean(axis=0)
-    u, _, vt = np.linalg.svd(a.T @ b)
-    turn = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
-    return float(np.linalg.norm(a @ turn - b, axis=1).max())
 
 
 def still(case: HardCase, scene: Scene, run: Record) -> str:

@@ -23,7 +23,8 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import Field
 
-from pdrom.core.yamlfile import ConfigModel, Length
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.model.mesh.lengths import Length
 from pdrom.model.mesh.types import Mesh
 
 # A vertex no deeper than this part of the extent touches an obstacle and is not inside.

@@ -4,9 +4,9 @@ from typing import Literal
 
 import numpy as np
 
-from pdrom.core.yamlfile import Length
 from pdrom.model.effects.base import Contact, EffectConfig
 from pdrom.model.effects.bodies import square
+from pdrom.model.mesh.lengths import Length
 from pdrom.model.mesh.types import Mesh
 
 

@@ -6,9 +6,9 @@ import numpy as np
 from pydantic import Field
 
 from pdrom.core.errors import SceneError
-from pdrom.core.yamlfile import Length
 from pdrom.model.effects.base import Boundary, EffectConfig, FrameNumber
 from pdrom.model.effects.hold import AXES
+from pdrom.model.mesh.lengths import Length
 from pdrom.model.mesh.select import farthest_points, select_vertices
 from pdrom.model.mesh.selection import Selection
 from pdrom.model.mesh.types import Mesh

@@ -7,8 +7,8 @@ from numba import njit
 from pydantic import Field
 from scipy.spatial import cKDTree
 
-from pdrom.core.yamlfile import MAX_LENGTH, MIN_LENGTH
 from pdrom.model.effects.base import Contact, EffectConfig
+from pdrom.model.mesh.lengths import MAX_LENGTH, MIN_LENGTH
 from pdrom.model.mesh.types import Mesh
 
 # Searches for close pairs in a frame, and sweeps over the pairs of each search, at most.

@@ -4,10 +4,10 @@ from typing import Literal
 
 import numpy as np
 
-from pdrom.core.yamlfile import PositiveLength
 from pdrom.model.effects.base import Vector
 from pdrom.model.effects.bodies import ball
 from pdrom.model.effects.obstacle import Obstacle, ObstacleConfig
+from pdrom.model.mesh.lengths import PositiveLength
 from pdrom.model.mesh.types import Mesh
 
 UP = np.array([0.0, 1.0, 0.0])

@@ -4,7 +4,7 @@ import numpy as np
 
 from pdrom.core.errors import DegenerateElementError, MeshError
 from pdrom.core.store import require_finite
-from pdrom.core.yamlfile import MAX_LENGTH, MIN_LENGTH
+from pdrom.model.mesh.lengths import MAX_LENGTH, MIN_LENGTH
 from pdrom.model.mesh.types import Mesh
 
 # An element is degenerate when its measure is below this fraction of its longest edge's power.

@@ -11,11 +11,11 @@ from pydantic import Field, field_validator, model_validator
 
 from pdrom.core.errors import MeshError
 from pdrom.core.names import check_lengths
-from pdrom.core.yamlfile import Length, PositiveLength
 from pdrom.model.mesh.checks import check_mesh, check_range
 from pdrom.model.mesh.files import read_mesh_file
 from pdrom.model.mesh.generators import Plane, bar, cloth
 from pdrom.model.mesh.given import GivenMesh
+from pdrom.model.mesh.lengths import Length, PositiveLength
 from pdrom.model.mesh.limits import MAX_VERTICES
 from pdrom.model.mesh.mesh_model import MeshModel
 from pdrom.model.mesh.orientation import turned_alike

@@ -5,7 +5,8 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from pdrom.core.yamlfile import ConfigModel, Length, PositiveLength
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.model.mesh.lengths import Length, PositiveLength
 
 Point = tuple[Length, Length, Length]
 Index = Annotated[int, Field(ge=0, le=1_000_000)]

@@ -5,8 +5,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pdrom.core.yamlfile import Length, PositiveLength
 from pdrom.model.mesh.generators import Plane
+from pdrom.model.mesh.lengths import Length, PositiveLength
 from pdrom.model.mesh.limits import MAX_VERTICES
 from pdrom.model.mesh.mesh_model import MeshModel
 from pdrom.model.mesh.shapes import disc, shell, solid

@@ -20,18 +20,6 @@ from pdrom.reduction.sampling.selection import Selection
 DEPENDENT = 1e-12
 
 
-def s_measure(a: np.ndarray) -> float:
-    """S(A) = (sqrt(det A^T A) / prod_j |A_j|)^(1/r) of A (m, r), columns A_j; in [0, 1].
-
-    1 if and only if the columns are orthogonal, 0 if they depend on each other.
-    """
-    norms = np.linalg.norm(a, axis=0)
-    if a.shape[0] < a.shape[1] or not norms.all():
-        return 0.0
-    logarithm = np.linalg.slogdet((a / norms).T @ (a / norms))[1]
-    return float(min(np.exp(0.5 * logarithm / a.shape[1]), 1.0))
-
-
 def s_opt(v: np.ndarray, size: int, count: int | None = None) -> np.ndarray:
     """Greedy maximisation of the S-measure: ``count`` elements (default r, at most e), int64.
 

@@ -101,14 +101,6 @@ def pack_positions(positions: np.ndarray) -> dict[str, Any]:
     }
 
 
-def unpack_positions(packed: dict[str, Any]) -> np.ndarray:
-    """The positions (F, N, 3) that the page draws."""
-    data = zlib.decompress(base64.b64decode(packed["changes"]))
-    changes = np.frombuffer(data, "<u2").reshape(packed["frames"], packed["vertices"], 3)
-    levels = np.cumsum(changes, axis=0, dtype=np.int64) % (LEVELS + 1)
-    return np.array(packed["low"]) + np.array(packed["step"]) * levels
-
-
 def _text(values: np.ndarray) -> str:
     return base64.b64encode(zlib.compress(np.ascontiguousarray(values).tobytes(), 9)).decode()
 

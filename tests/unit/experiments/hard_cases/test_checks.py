@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from builders import random_rotation
 from pdrom.experiments.hard_cases.catalogue import CASES
-from pdrom.experiments.hard_cases.checks import CHECKS, faults, shape_error
+from pdrom.experiments.hard_cases.checks import CHECKS, faults
 from pdrom.experiments.hard_cases.record import record
 from pdrom.experiments.hard_cases.roundoff import Roundoff
 from pdrom.experiments.hard_cases.runs import full_order
@@ -84,10 +83,3 @@ def test_the_allowance_tells_a_wrong_projection_from_rounding(scene, error, rise
     loop = scene.stepper(local_steps=[TooStrong(scene.groups[0], 1.0 + error)])
     found = record(scene, loop, scene.initial_state(), Roundoff(scene, loop))
     assert (found.excess.max() > 0.0) == rises
-
-
-def test_shape_error_ignores_rigid_motions(rng):
-    rest = rng.standard_normal((20, 3))
-    moved = rest @ random_rotation(rng).T + [1.0, 2.0, 3.0]
-    assert shape_error(rest, moved) < 1e-12
-    assert shape_error(rest, moved * [1.0, 1.0, -1.0]) > 0.1

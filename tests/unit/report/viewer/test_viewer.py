@@ -1,10 +1,13 @@
 """The viewer: positions survive packing, the page is one file, and it works in a real browser."""
 
+import base64
 import io
 import json
 import shutil
+import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +26,6 @@ from pdrom.report.viewer.pack import (
     pack_positions,
     pack_scene,
     shown_region,
-    unpack_positions,
 )
 from pdrom.report.viewer.page import write_page
 from pdrom.report.viewer.runs import ViewedRun, ViewedScene
@@ -38,6 +40,14 @@ OPTIONS = [
     "--enable-unsafe-swiftshader",
 ]
 LIMIT = 120_000  # ms after which a page that does not answer has failed
+
+
+def unpack_positions(packed: dict[str, Any]) -> np.ndarray:
+    """The positions (F, N, 3) that the page draws."""
+    data = zlib.decompress(base64.b64decode(packed["changes"]))
+    changes = np.frombuffer(data, "<u2").reshape(packed["frames"], packed["vertices"], 3)
+    levels = np.cumsum(changes, axis=0, dtype=np.int64) % (LEVELS + 1)
+    return np.array(packed["low"]) + np.array(packed["step"]) * levels
 
 
 @given(st.integers(1, 4), st.integers(1, 5), st.floats(1e-6, 1e6), st.integers(0, 2**32 - 1))
