@@ -15,6 +15,9 @@ ROOMS = (
 )  # fmt: skip
 NUMERICS = ROOMS[: ROOMS.index("report")]
 MODULE_LINES, CLASS_LINES = 250, 200
+# Rooms whose docstrings begin with a noun or a verb, not with one of these words.
+WORDED = ("core", "model", "reduction", "experiments")
+BEGINNINGS = ("What ", "The same ", "That of ", "Of ")
 # Words with which a docstring says why a module is longer.
 REASON = "one module because"
 
@@ -158,4 +161,17 @@ def test_sizes() -> None:
                 size = (node.end_lineno or 0) - node.lineno + 1
                 if size > CLASS_LINES:
                     wrong.append(f"{name}.{node.name}: {size} lines")
+    assert wrong == []
+
+
+def test_docstrings_begin_with_a_noun_or_a_verb() -> None:
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    wrong = [
+        f"{name}: {docstring.splitlines()[0]}"
+        for name in MODULES
+        if room(name) in WORDED
+        for node in ast.walk(tree(name))
+        if isinstance(node, documented)
+        and (docstring := ast.get_docstring(node) or "").startswith(BEGINNINGS)
+    ]
     assert wrong == []

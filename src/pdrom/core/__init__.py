@@ -1,1 +1,1 @@
-"""What every room uses: errors, storage, configuration files, registries, logs."""
+"""Common ground of all rooms: errors, storage, configuration files, registries, logs."""

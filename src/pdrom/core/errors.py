@@ -44,7 +44,7 @@ class SnapshotError(PdromError):
 
 
 class RankError(PdromError):
-    """More basis vectors were asked for than the snapshots hold above round-off."""
+    """More basis vectors were requested than the snapshots hold above round-off."""
 
 
 class SamplingError(PdromError):

@@ -34,7 +34,8 @@ def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
 
     A `PdromError` (a user's mistake) ends the job with one line on stderr; any other exception
     keeps its traceback in the log and one line on stderr that says where to look. Lack of memory or
-    of space on the disk is said in words. The last line of a job that ends well says what it used.
+    of space on the disk is reported in words. The last line of a job that ends well reports its
+    usage.
 
     Damaged results that the job reads are set aside (`pdrom.core.aside`).
     """
@@ -74,7 +75,7 @@ def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
 def planning_log(quiet: bool) -> Iterator[None]:
     """Show the package's warnings on stderr, or drop them if ``quiet``.
 
-    Every job plans again in a process of its own: what the main process said is enough.
+    Every job plans again in a process of its own: what the main process logged is enough.
     """
     logger = logging.getLogger("pdrom")
     handler = logging.NullHandler() if quiet else logging.StreamHandler()

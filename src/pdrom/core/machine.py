@@ -25,7 +25,7 @@ class Kernels(_Record):
 
     file : name of the shared library
     kind : "blas" or "openmp"
-    architecture : processor that its kernels are written for; None where it does not say
+    architecture : processor that its kernels are written for; None where it does not report it
     """
 
     file: str

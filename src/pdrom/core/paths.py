@@ -42,7 +42,7 @@ class Place:
         return f"{results}/{self.pattern}"
 
     def where(self, **labels: str) -> "Place":
-        """The same kind with some labels fixed."""
+        """Fix some of the labels."""
         return Place(self.pattern.format_map(_Fixed(labels)))
 
     @property

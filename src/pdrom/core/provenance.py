@@ -1,6 +1,6 @@
 """Where a result comes from: what made it, with which settings, code and libraries.
 
-A job says once what it is (`made_by`). Whatever `pdrom.core.store` writes meanwhile carries that:
+A job states once what it is (`made_by`). Whatever `pdrom.core.store` writes meanwhile carries that:
 every file in its seal, HDF5 files, figures and the manuscript inside as well. Nothing in it differs
 between two equal runs: no date, no folder, and no commit, since a commit that changes a word of the
 documentation makes no other result.
@@ -20,7 +20,7 @@ from typing import Any
 from pdrom import __version__
 
 LIBRARIES = ("numpy", "scipy", "numba", "h5py", "pandas", "matplotlib", "snakemake")
-# Keys of a record, in the order in which it is told.
+# Keys of a record, in the order in which they are written.
 RECORD = (
     "made_by",
     "configuration_sha256",
@@ -33,9 +33,9 @@ RECORD = (
 
 @dataclass(frozen=True)
 class Job:
-    """What is at work: a rule of the workflow, or a function of the package.
+    """A piece of work: a rule of the workflow, or a function of the package.
 
-    configuration : canonical JSON of all that it was told
+    configuration : canonical JSON of all its settings
     code : fingerprint of the code that it runs; empty outside of the workflow
     """
 
@@ -49,7 +49,7 @@ _AT_WORK: ContextVar[Job | None] = ContextVar("job", default=None)
 
 @contextmanager
 def made_by(name: str, configuration: Any, code: str = "") -> Iterator[None]:
-    """What is written meanwhile is made by the job ``name``."""
+    """Record the job ``name`` in all files that are written meanwhile."""
     previous = _AT_WORK.set(Job(name, _canonical(configuration), code))
     try:
         yield
@@ -70,7 +70,7 @@ def library_versions() -> dict[str, str]:
 
 
 def provenance() -> dict[str, str]:
-    """What made a file that is written now; the part about the job only where there is one."""
+    """Record of a file that is written now; the part about the job only where there is one."""
     job = _AT_WORK.get()
     made = {}
     if job is not None:
@@ -88,8 +88,8 @@ def provenance() -> dict[str, str]:
 def attributes() -> dict[str, str]:
     """`provenance` for a file that can also hold the whole configuration (HDF5)."""
     job = _AT_WORK.get()
-    told = {"configuration": job.configuration} if job is not None else {}
-    return {**told, **provenance(), "units": "SI (m, s, kg)"}
+    settings = {"configuration": job.configuration} if job is not None else {}
+    return {**settings, **provenance(), "units": "SI (m, s, kg)"}
 
 
 def as_text(record: Mapping[str, str]) -> str:

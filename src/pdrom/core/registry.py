@@ -1,7 +1,7 @@
 """Names that are loaded on demand.
 
 A registry maps a name of the configuration to ``"package.module:attribute"``. Nothing is imported
-before it is asked for: what a scene does not list is not even loaded.
+before it is needed: what a scene does not list is not even loaded.
 """
 
 from collections.abc import Iterator, Mapping

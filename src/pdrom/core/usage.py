@@ -1,4 +1,4 @@
-"""What a job used, measured in its own process: a line of its log, written and read here.
+"""Resources of a job, measured in its own process: a line of its log, written and read here.
 
 Snakemake's ``benchmark:`` samples every half minute, longer than most jobs run.
 """
@@ -59,7 +59,7 @@ class Meter:
 
 
 def usage_of(log: str | Path) -> Usage | None:
-    """What the job used that wrote a log; None where it did not end well, or there is no log."""
+    """Resources of the job that wrote a log; None where it did not end well, or there is no log."""
     try:
         lines = Path(log).read_text(encoding="utf-8", errors="replace").splitlines()
     except FileNotFoundError:

@@ -29,7 +29,7 @@ def energies(scene: Scene, positions: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class EnergyScale:
-    """What the energy of reduced runs is compared with.
+    """Reference for the energy of reduced runs.
 
     The potential of the forces is counted from the least one that the full-order run reaches, so
     that its total energy is never negative.

@@ -1,4 +1,4 @@
-"""What holds vertices or stops them: contradictions are refused, numbers and doubts are logged."""
+"""Checks of what holds vertices or stops them: contradictions are refused, doubts are logged."""
 
 import logging
 from collections.abc import Sequence

@@ -130,7 +130,7 @@ class Scene:
         return f"Scene('{self.config.name}', {size}: {effects})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy, also a pickled one, is built anew: compiled kernels cannot be pickled."""
+        """A copy, also a pickled one, is built again: compiled kernels cannot be pickled."""
         return Scene.build, (self.config, self.mesh, self.groups[0].threads, self.masses)
 
     @classmethod
@@ -228,7 +228,7 @@ class Scene:
         )
 
     def acceleration(self) -> Anderson | None:
-        """Acceleration of the iterations, None if the scene asks for none."""
+        """Acceleration of the iterations, None if the scene has none."""
         window = self.config.anderson_window
         return Anderson(window) if window else None
 

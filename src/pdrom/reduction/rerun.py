@@ -67,7 +67,7 @@ def compare(
 
     Parameters
     ----------
-    stopped : asked after every frame whether the run ends there
+    stopped : called after every frame: whether the run ends there
     """
     coordinates = [run.state.positions]
     positions = [run.positions(run.state.positions)]

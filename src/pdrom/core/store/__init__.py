@@ -4,7 +4,7 @@ A result is written to a temporary file beside its target and renamed when compl
 interrupted job never leaves a half-written file and never damages an older one. An HDF5 file has
 its checksum inside (`block`), every other result in a hidden file beside it (`seal`); whoever reads
 the result compares (`condition`). A job of the workflow sets a damaged one aside: the next run
-finds it missing and makes it anew. Nobody else moves a file that it reads.
+finds it missing and makes it again. Nobody else moves a file that it reads.
 """
 
 from pdrom.core.store.atomic import atomic_path, require_place

@@ -53,7 +53,7 @@ def atomic_path(path: str | os.PathLike[str], sealed: bool = True) -> Iterator[P
 
 
 def require_place(path: str | os.PathLike[str]) -> None:
-    """Whoever computes for long what a file is to hold asks this first.
+    """Refuse a place that cannot be written, before a long computation of what goes there.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def _rename(temporary: Path, seal: Path, target: Path) -> None:
     """Give both files their names, the seal first.
 
     A process killed in between leaves no file, or an older one that its seal does not fit: both are
-    made anew. In the other order it would leave a good file without a seal. Where the second name
+    made again. In the other order it would leave a good file without a seal. Where the second name
     is refused, the older file keeps its own seal.
     """
     place = seal_path(target)

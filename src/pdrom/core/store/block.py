@@ -1,8 +1,8 @@
 """The seal inside an HDF5 file: its first bytes, which HDF5 leaves to its users (the user block).
 
-A line that says what it is, the seal (`pdrom.core.store.seal`) of all bytes behind the block, and
-zeros. So a copy of the file, wherever it lies, says itself whether it is whole, before HDF5 reads
-any of it; every reader of HDF5 skips the block.
+A line that names the format, the seal (`pdrom.core.store.seal`) of all bytes behind the block, and
+zeros. So a copy of the file, wherever it lies, shows by itself whether it is whole, before HDF5
+reads any of it; every reader of HDF5 skips the block.
 """
 
 from pathlib import Path
@@ -20,8 +20,8 @@ def is_hdf5(path: Path) -> bool:
     """Whether a file is HDF5, by its name or its beginning, with a block or without."""
     with open(path, "rb") as handle:
         head = handle.read(SIZE + len(_SIGNATURE))
-    told = path.suffix in SUFFIXES or head.startswith((_SIGNATURE, _LINE))
-    return told or head[SIZE:] == _SIGNATURE
+    named = path.suffix in SUFFIXES or head.startswith((_SIGNATURE, _LINE))
+    return named or head[SIZE:] == _SIGNATURE
 
 
 def write_block(path: Path) -> None:

@@ -21,7 +21,7 @@ UNCHECKED = "--unchecked (in Python unchecked=True) reads it if it is sound"
 
 
 class Condition(StrEnum):
-    """What a file and its seal say of each other."""
+    """Result of comparing a file with its seal."""
 
     INTACT = "intact"
     DAMAGED = "damaged"
@@ -39,7 +39,7 @@ def read_seal(path: str | os.PathLike[str]) -> Seal | None:
 
 
 def provenance_of(path: str | os.PathLike[str]) -> dict[str, str]:
-    """What made a file, as its seal says; nothing where that does not say it."""
+    """Provenance of a file from its seal; empty where the seal holds none."""
     seal = read_seal(path)
     return json.loads(seal.provenance) if seal and seal.provenance else {}
 
@@ -69,7 +69,7 @@ def check_file(path: str | os.PathLike[str]) -> Condition:
 
 
 def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> None:
-    """Whoever reads a result asks this first.
+    """Refuse a result that is not what was written; every reader calls this first.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> Non
     StorageError
         The file is missing or may not be read; or it is damaged or has no seal. In a job of the
         workflow it was then set aside as ``*.damaged``, so that the next run finds it missing and
-        makes it anew; everywhere else it stays where it is.
+        makes it again; everywhere else it stays where it is.
     """
     path = Path(path)
     condition = check_file(path)

@@ -19,7 +19,7 @@ _SHORT = 16  # hexadecimal digits of the checksum of a comment
 
 @dataclass(frozen=True)
 class Seal:
-    """What stands in a seal: digest and name of the file, provenance as JSON or nothing."""
+    """Content of a seal: digest and name of the file, provenance as JSON or nothing."""
 
     digest: str
     name: str

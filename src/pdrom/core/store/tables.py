@@ -26,7 +26,7 @@ def read_table(
 ) -> pd.DataFrame:
     """Read a CSV table; StorageError if it is missing, damaged or lacks one of ``columns``.
 
-    ``result`` says that a run wrote the table, with a seal; other tables have none.
+    ``result`` marks a table that a run wrote, with a seal; other tables have none.
     """
     if result:
         require_intact(path)

@@ -1,1 +1,1 @@
-"""What one could take in place of projective dynamics, on the axes of error and time."""
+"""Alternatives to projective dynamics, on the axes of error and time."""

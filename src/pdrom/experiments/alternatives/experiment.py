@@ -50,7 +50,7 @@ class Options(ConfigModel):
 class References:
     """Runs (F + 1, N, 3) that errors are taken against, and the error of the second one.
 
-    ``implicit`` is None where a frame did not converge, or nobody asked.
+    ``implicit`` is None where a frame did not converge, or where it would cost too much.
     """
 
     implicit: np.ndarray | None
@@ -99,8 +99,8 @@ def _rows(config: SceneConfig, settings: Options) -> list[dict[str, Any]]:
     config = config.model_copy(update={"frames": min(asked.compared, config.frames)})
     training = Scene.build(config, config.mesh.build(Path()))
     scene = Scene.build(config.heldout_variant(), training.mesh)
-    against = references(scene, asked)
-    found = list(candidates(scene, training, asked))
+    against = references(scene, section)
+    found = list(candidates(scene, training, section))
     common = {
         "scene": config.name,
         "vertices": scene.mesh.vertices,
@@ -115,15 +115,15 @@ def _rows(config: SceneConfig, settings: Options) -> list[dict[str, Any]]:
         made = {"finite": reached is not None, **against.errors(reached)}
         rows.append({**common, **candidate.labels, **made})
     # what the runs compiled and factorised is there when the clock starts
-    times = measure([_variant(c, asked.frames) for c in found], asked.warmup, asked.repeats)
+    times = measure([_variant(c, section.frames) for c in found], section.warmup, section.repeats)
     for row, candidate, time in zip(rows[1:], found, times, strict=True):
         row["ms_per_frame"] = candidate.steps * time.frame
     return rows
 
 
-def references(scene: Scene, asked: Comparison) -> References:
+def references(scene: Scene, section: Comparison) -> References:
     """Both references of a scene's own motion."""
-    wanted = asked.continuous
+    wanted = section.continuous
     limit = wanted.limit // scene.mesh.vertices
     exact = continuous(scene, scene.config.frames, wanted.tolerance, wanted.substeps, limit)
     name = scene.config.name
@@ -131,20 +131,20 @@ def references(scene: Scene, asked: Comparison) -> References:
     if not exact.within(wanted.tolerance):
         log.warning("%s: motion in continuous time is known to %.1e only", name, exact.error)
     implicit = None
-    if asked.affords(CONVERGED, scene.mesh.vertices):
-        implicit = _converged(scene, asked.implicit)
+    if section.affords(CONVERGED, scene.mesh.vertices):
+        implicit = _converged(scene, section.implicit)
     return References(implicit, exact.positions, exact.error)
 
 
-def _converged(scene: Scene, asked: ImplicitReference) -> np.ndarray | None:
-    best = ConvergedStepper(scene, scene.system, asked.tolerance, asked.limit)
+def _converged(scene: Scene, section: ImplicitReference) -> np.ndarray | None:
+    best = ConvergedStepper(scene, scene.system, section.tolerance, section.limit)
     state = scene.initial_state()
     positions = [state.positions]
     for frame in range(scene.config.frames):
         state, _ = best.step(state, frame)
         positions.append(state.positions)
     if not best.converged:
-        log.warning("%s: no convergence in %d evaluations", scene.config.name, asked.limit)
+        log.warning("%s: no convergence in %d evaluations", scene.config.name, section.limit)
         return None
     return np.stack(positions)
 

@@ -70,15 +70,15 @@ def matrix_error(group: ConstraintGroup, d: np.ndarray, unique: bool) -> tuple[f
 def _outside(p: np.ndarray, low: float, high: float, size: bool) -> float:
     """How far singular values of p, or their product, lie outside [low, high].
 
-    A wrong orientation counts fully. The product of what is long and thin is told only as exactly
+    A wrong orientation counts fully. The product of what is long and thin is known only as exactly
     as its smallest value.
     """
     sigma = np.linalg.svd(p, compute_uv=False)
     if len(p) == 3 and np.linalg.det(p) < 0.0:
         return 1.0
     measured = np.array([sigma.prod()]) if size else sigma
-    told = sigma[0] / sigma[-1] if size else 1.0
-    return float(np.max(np.maximum(low - measured, measured - high), initial=0.0)) / told
+    stretch = sigma[0] / sigma[-1] if size else 1.0
+    return float(np.max(np.maximum(low - measured, measured - high), initial=0.0)) / stretch
 
 
 def spring_error(group: ConstraintGroup, d: np.ndarray) -> tuple[float, float]:

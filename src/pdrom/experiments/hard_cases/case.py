@@ -1,4 +1,4 @@
-"""What a hard case is."""
+"""A hard case: a scene, what must hold in it, and its bounds."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

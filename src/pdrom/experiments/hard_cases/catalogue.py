@@ -172,7 +172,7 @@ def _states() -> list[HardCase]:
 
 
 def _sizes() -> list[HardCase]:
-    """Volumes and areas that are to be kept: states that say nothing about the shape."""
+    """Volumes and areas that are to be kept: states that leave the shape open."""
     lying = mapped((1, 0, 5), (0, 1, 0), (0, 0, 1))
     # what only keeps its size may be drawn out as long as its momentum carries it
     loose, cases = 40.0, []

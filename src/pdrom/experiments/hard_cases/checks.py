@@ -1,4 +1,4 @@
-"""What must hold in a run, each a named check that returns what is wrong ("" if nothing is)."""
+"""Named checks of a run; each returns what is wrong ("" if nothing is)."""
 
 from collections.abc import Callable
 
@@ -127,7 +127,7 @@ def refused(case: HardCase) -> str:
 
 
 def faults(case: HardCase) -> list[str]:
-    """What does not hold in the full-order run of ``case``, empty if all does."""
+    """List what does not hold in the full-order run of ``case``, empty if all does."""
     if case.holds == ("refused",):
         return [fault for fault in [refused(case)] if fault]
     scene = case.scene()

@@ -48,7 +48,7 @@ def load_expectations(path: Path) -> dict[str, Expectation]:
 
 
 def surprise(outcome: str, case: str, expected: Expectation | None) -> str:
-    """What contradicts the expectation, "" if nothing does."""
+    """Contradiction to the expectation, "" if there is none."""
     failed = outcome in FAILURES
     must = expected is not None and case in expected.fails
     may = expected is not None and case in expected.may_fail

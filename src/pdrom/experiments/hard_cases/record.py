@@ -15,7 +15,7 @@ Positions = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Record:
-    """What a run did, frame by frame; it ends before the first frame that is not finite.
+    """Course of a run, frame by frame; it ends before the first frame that is not finite.
 
     positions, velocities : (F + 1, N, 3) m and m/s, the start first
     rise : (F,) largest rise of the objective from one iteration to the next over the frame's first

@@ -43,7 +43,7 @@ BASES = {"pod": ("full", "ecsw", "hrpd", *INTERPOLATIONS), "skinning": ("full", 
 def _samples(
     sampling: str, scene: Scene, columns: Columns, positions: np.ndarray, start: State
 ) -> Mapping[str, Samples | Interpolation]:
-    """What a position subspace samples of each group, from a run's ``positions`` (n, N, 3) m."""
+    """Samples of each group in a position subspace, from a run's ``positions`` (n, N, 3) m."""
     if sampling == "full":
         return {}
     if sampling == "ecsw":

@@ -12,7 +12,7 @@ computed differs in two ways (u = eps, c a small constant for the length of the 
   d <= c u cond(A) |z|, where the scaling of the columns does not count.
 
 lambda_min is bounded by the smallest mass over h^2, as if nothing were held: where masses are
-round-off beside the weights and pins alone make the system solvable, the bound says little.
+round-off beside the weights and pins alone make the system solvable, the bound means little.
 """
 
 from dataclasses import dataclass
@@ -80,7 +80,7 @@ class Roundoff:
         b = columns.B
         matrix = b.T @ (self.scene.masses[:, None] * b) / self.loop.time_step**2
         matrix = matrix + sum(step.matrix for step in self.loop.local_steps)
-        # coordinates may have different sizes, which says nothing about the condition: columns are
+        # coordinates may have different sizes, which does not change the condition: columns are
         # scaled to length one
         scale = np.sqrt(np.diag(matrix))
         eigenvalues = np.linalg.eigvalsh(matrix / np.outer(scale, scale))

@@ -33,7 +33,7 @@ DECOMPOSED: frozenset[Choice] = SIMULATION | {"frames", "weighting"}
 
 
 class PublishedRuns(ConfigModel):
-    """What is compared.
+    """Choices and sizes that are compared.
 
     sizes : numbers of modes, ascending
     draws : how often the signs of the modes are drawn, and as often the rows among equal ones
@@ -84,14 +84,14 @@ def published_choices(
 
 
 def _variants(
-    scene: Scene, name: str, asked: PublishedRuns
+    scene: Scene, name: str, section: PublishedRuns
 ) -> Iterator[tuple[Variant, np.ndarray, list[int]]]:
     """Every variant with its errors (len(sizes), 3) and the sizes that its snapshots allow."""
     group, count = scene.group(name), scene.config.reduce[name].train
-    sizes = [r for r in asked.sizes if r <= count] or [count]
+    sizes = [r for r in section.sizes if r <= count] or [count]
     runs: dict[frozenset[Choice], tuple[np.ndarray, np.ndarray]] = {}
     decomposed: dict[frozenset[Choice], Decomposed] = {}
-    for variant in variants(applicable(scene, group), asked.draws):
+    for variant in variants(applicable(scene, group), section.draws):
         simulated, key = variant.taken & SIMULATION, variant.taken & DECOMPOSED
         if simulated not in runs:
             runs[simulated] = projections(scene, name, simulated)

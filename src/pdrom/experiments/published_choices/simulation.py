@@ -135,7 +135,7 @@ def turned(group: ConstraintGroup, y: np.ndarray) -> np.ndarray:
 
 
 def _look(group: ConstraintGroup, taken: Set[Choice]) -> Look:
-    """What is stored of an iterate."""
+    """Function of an iterate whose values are stored."""
     if "plane" in taken:
         return _in_rest_plane(group)
     return partial(turned, group) if "turns" in taken else group.project

@@ -1,1 +1,1 @@
-"""What the machine allows, and what an iteration asks of it (Williams et al. 2009)."""
+"""Rates of the machine, and the work of an iteration (Williams et al. 2009)."""

@@ -18,7 +18,7 @@ def counting(function: Callback) -> Counted:
 
 
 def operations(kernel: LocalKernel, y: np.ndarray) -> Operations:
-    """What one pass over all units executes at the positions y (N, 3)."""
+    """Operations that one pass over all units executes at the positions y (N, 3)."""
     counted = counting(kernel.function)
     counted.reset()
     places = rows.flat(y)

@@ -64,12 +64,12 @@ class Counted(Callback):
         return self._address
 
     def reset(self) -> None:
-        """Begin anew."""
+        """Set all counts to zero."""
         self._ran[:] = 0
 
     @property
     def operations(self) -> Operations:
-        """What was executed since `reset`."""
+        """Operations executed since `reset`."""
         return Operations(*(float(total) for total in self._ran @ self._contents))
 
 

@@ -1,4 +1,4 @@
-"""What one iteration of the full-order run reads, writes and computes, phase by phase.
+"""Work of one iteration of the full-order run: what each phase reads, writes and computes.
 
 Bytes are those of the arrays themselves, each counted once a phase: a vertex that several elements
 share stays in the nearest cache. Operations of a local kernel are counted while it runs

@@ -12,7 +12,7 @@ _clock_gettime = types.ExternalFunction("clock_gettime", types.int32(types.int32
 
 
 def clock() -> np.ndarray:
-    """What `now` works with."""
+    """Memory that `now` works with."""
     return np.zeros(2, np.int64)
 
 

@@ -11,7 +11,7 @@ KERNELS = ("compiled", "constraints", "dynamics")  # folders whose functions oth
 
 @cache
 def _checksum(folders: tuple[str, ...]) -> str:
-    """Of the sources in some folders of the model."""
+    """Checksum of the sources in some folders of the model."""
     model = Path(__file__).parents[1]
     sources = sorted(path for folder in folders for path in model.glob(f"{folder}/*.py"))
     return f"{crc32(b''.join(path.read_bytes() for path in sources)):08x}"
@@ -29,7 +29,7 @@ def _mark(function):
 
 
 def compiled(function=None, **options):
-    """Compile and keep a function: without division checks, without fast-math unless asked for."""
+    """Compile and keep a function: without division checks, without fast-math by default."""
     if function is None:
         return lambda wrapped: compiled(wrapped, **options)
     _mark(function)

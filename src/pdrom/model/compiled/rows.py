@@ -97,7 +97,7 @@ def shares(values: np.ndarray, rows: np.ndarray) -> bool:
 
 @compiled
 def _same_start(a, b):
-    """Whether two arrays begin at the same address; NumPy takes longer to say where they do."""
+    """Whether two arrays begin at the same address; NumPy takes longer to compare them."""
     return a.ctypes.data == b.ctypes.data
 
 

@@ -31,7 +31,7 @@ Weight = Annotated[float, Field(gt=0.0, le=1e16, allow_inf_nan=False)]
 
 
 class WeightFactor(ConfigModel):
-    """What the weight of the elements inside a selection (all their vertices) is multiplied by."""
+    """Factor on the weight of the elements inside a selection (with all their vertices)."""
 
     select: Selection
     factor: Weight

@@ -1,4 +1,4 @@
-"""The same local step in slower implementations, to measure what claim C1 depends on.
+"""Slower implementations of the local step, to measure what claim C1 depends on.
 
 Each does what the compiled kernels of a group do, in another way; results agree to round-off.
 """

@@ -21,7 +21,7 @@ from pdrom.model.constraints.second_thread import both
 # Entries of every record: number of vertices, and the units of part k are those from FIRST + k to
 # FIRST + k + 1. What a kernel has of its own begins at OWN.
 VERTICES, FIRST, OWN = 0, 1, 4
-# What a kernel is asked for: one of the two parts, or what both need beforehand.
+# Requests to a kernel: one of the two parts, or what both need beforehand.
 PARTS, PREPARE = (0, 1), 2
 
 _SIGNATURE = types.float64(types.intp, types.intp, types.intp, types.intp)
@@ -62,7 +62,7 @@ def add_part(addresses, records, part, y, rhs):
 class LocalKernel:
     """A compiled local step with its data.
 
-    function : made by `local_kernel`; it is compiled when its address is first asked for
+    function : made by `local_kernel`; it is compiled when its address is first needed
     record : its numbers; the ``arrays`` that they point to live as long as the kernel
     prepares : whether it wants to be called with `PREPARE`
     touched : range of vertices that the second part adds to; empty if there is one part
@@ -115,7 +115,7 @@ def _call(address, y, out, record):
 
 
 def projections(sampler: LocalKernel, y: np.ndarray, count: int) -> np.ndarray:
-    """What a sampler writes for the positions y (N, 3): (count, 3)."""
+    """Projections (count, 3) that a sampler writes for the positions y (N, 3)."""
     p, places = np.empty((count, 3)), rows.flat(y)
     _call(sampler.address, places.ctypes.data, p.ctypes.data, sampler.record.ctypes.data)
     return p
@@ -163,7 +163,7 @@ class LocalPass:
         return sum(energies)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray, threads: int) -> float:
-        """The same for arrays (N, 3), which need not be views of rows of four."""
+        """Do `add` for arrays (N, 3), which need not be views of padded rows."""
         right = rows.flat(rhs)
         if rows.shares(rhs, right):
             return self.add(rows.flat(y), right, threads)

@@ -96,7 +96,7 @@ class _SecondThread:
             self._await(count)
             try:
                 self._result = self._work()
-            except BaseException as error:  # raised in the thread that asked
+            except BaseException as error:  # raised in the calling thread
                 self._result = error
             publish(self._done, count)
 
@@ -104,7 +104,7 @@ class _SecondThread:
         """Return when there is work number ``count``.
 
         Awake, it goes on looking for as long as the caller takes to leave the interpreter: a thread
-        that asks for the interpreter's lock while another has it is put to sleep.
+        that requests the interpreter's lock while another has it is put to sleep.
 
         The flag is set before the last look, and the caller reads it after giving work, so that
         one of the two sees the other.
@@ -120,7 +120,7 @@ class _SecondThread:
 
 @intrinsic
 def _load(_context, _address):
-    """The int64 at an address, read anew each time, with what was written before it."""
+    """The int64 at an address, read again each time, with what was written before it."""
 
     def generate(_target, builder, _signature, arguments):
         pointer = builder.inttoptr(arguments[0], ir.IntType(64).as_pointer())

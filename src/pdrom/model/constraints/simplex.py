@@ -102,7 +102,7 @@ class SimplexGroup(StencilGroup):
 
 @lane_function
 def arguments(y, rhs, record, part, corners, numbers):
-    """What a kernel on simplices with so many corners and numbers an element works with.
+    """Unpack the record of a kernel whose elements have so many corners and numbers.
 
     (y, rhs, corners, geometry, constants, work, first block, last block)
     """
@@ -124,7 +124,7 @@ def arguments(y, rhs, record, part, corners, numbers):
 
 @lane_function
 def samples(record, corners, numbers):
-    """What a kernel that projects some elements works with besides.
+    """Unpack what a kernel that projects some elements needs besides `arguments`.
 
     (elements, corners and geometry of a block of them), see `pdrom.model.constraints.lanes.take`
     """

@@ -1,4 +1,4 @@
-"""What the two tetrahedron groups share: the operator S q = F^T and the fused kernels."""
+"""Base of the groups on tetrahedra: the operator S q = F^T and the clamping kernels."""
 
 import numpy as np
 

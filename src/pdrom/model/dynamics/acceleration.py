@@ -52,7 +52,7 @@ def _weights(gram, projection, count):
 
 @compiled
 def forget(history):
-    """Begin anew, with another frame or substep."""
+    """Forget all iterates: another frame or substep begins."""
     history[6][DIFFERENCES] = -1
     history[7][0] = np.inf
 
@@ -99,7 +99,7 @@ def combine(history, image):
 
 
 def _history(window: int, n: int) -> tuple[np.ndarray, ...]:
-    """What is kept of a frame's iterates of n numbers.
+    """Memory for a frame's iterates of n numbers.
 
     The accepted iterate, and the residual and image of the one before (n,); ``window`` differences
     of residuals and of images (window, n), the Gram matrix of the former; `DIFFERENCES` so far and

@@ -67,17 +67,17 @@ class CompiledIterations:
 
         Parameters
         ----------
-        objective : (K,) receives the objective at the iterates; empty if nobody asks
+        objective : (K,) receives the objective at the iterates; empty if it is not tracked
         y, base : (N, 3) views of rows of four: iterate, (M/h^2) s
         s : (N, 3) prediction
         seconds : (4,) times of the local and of the global steps are added to entries 1 and 2
         """
         count = len(which)
         history = NO_HISTORY if self._acceleration is None else self._acceleration.history
-        asked = len(objective) > 0 or self._acceleration is not None
+        tracked = len(objective) > 0 or self._acceleration is not None
         right = rows.empty(WIDTH * len(y))
         iterate, start = rows.flat(y), rows.flat(base)
-        prediction = rows.flat(s) if asked else start
+        prediction = rows.flat(s) if tracked else start
         factor = elimination.factor
         threads = 1
         if self._pass.parts == 2:

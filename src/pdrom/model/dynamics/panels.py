@@ -62,12 +62,12 @@ class Panels:
 
     @property
     def bytes(self) -> int:
-        """What one sweep reads."""
+        """Bytes that one sweep reads."""
         return sum(array.nbytes for array in self.arrays)
 
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
-        """What `pdrom.model.dynamics.sweeps.sweep` takes."""
+        """Arrays in the order in which `pdrom.model.dynamics.sweeps.sweep` takes them."""
         return self.first, self.row_start, self.value_start, self.rows, self.values
 
 

@@ -85,7 +85,7 @@ class SuperLUSolver(SparseSolver):
 
 
 class ColumnOrderedSolver(SuperLUSolver):
-    """The same with another order of summation, to see what the order changes."""
+    """SuperLU with another order of summation, to see what the order changes."""
 
     ordering = "COLAMD"
 

@@ -22,7 +22,7 @@ class Solve(Protocol):
 
 
 class Space(ABC):
-    """What the step loop asks of its coordinates. Arrays are (n, 3) with n coordinates."""
+    """Interface of the step loop to its coordinates. Arrays are (n, 3) with n coordinates."""
 
     def predict(self, positions: np.ndarray, velocities: np.ndarray, h: float) -> np.ndarray:
         """Inertial prediction s = q + h v + h^2 a."""

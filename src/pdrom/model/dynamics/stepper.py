@@ -58,7 +58,7 @@ class State:
 
 @dataclass(frozen=True)
 class FrameReport:
-    """What a frame did.
+    """Objective and times of a frame.
 
     objective : (K,) value of 1/(2 h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) at the K local iterates
         (at a refused one the value of the last accepted), nan where a local step does not know its

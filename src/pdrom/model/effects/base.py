@@ -1,11 +1,11 @@
-"""What an effect is.
+"""Roles of effects, and the base classes of each role.
 
 A scene is a mesh and a list of effects. Each effect is one class with one typed configuration,
 registered under the name that the configuration uses. It plays exactly one role, and the step loop
-asks each role only for the effects that the scene lists:
+calls in each role only the effects that the scene lists:
 
 =============  ===================================================  =========================
-role           question of the step loop                            examples
+role           what it gives the step loop                          examples
 =============  ===================================================  =========================
 `Start`        initial velocity                                     kick
 `Force`        acceleration of the frame                            gravity, wind

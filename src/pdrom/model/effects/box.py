@@ -13,7 +13,7 @@ from pdrom.model.mesh.types import Mesh
 
 
 class Box(Obstacle):
-    """Vertices stay out of a box; `Obstacle` says how. It may be as thin as a plate."""
+    """Vertices stay out of a box; see `Obstacle`. It may be as thin as a plate."""
 
     class Config(ObstacleConfig):
         """Corners ``lower`` and ``upper`` in metres."""
@@ -41,7 +41,7 @@ class Box(Obstacle):
         return np.hstack([points - self._lower, self._upper - points])
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Of the nearest face; of equally near ones the first."""
+        """Normals (n, 3) of the nearest face; of equally near ones the first."""
         face = self._to_faces(points).argmin(axis=1)
         return _axis_vectors(face % 3, np.where(face < 3, -1.0, 1.0))
 

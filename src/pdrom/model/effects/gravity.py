@@ -9,7 +9,7 @@ from pdrom.model.mesh.types import Mesh
 
 
 class Gravity(Force):
-    """The same acceleration for every vertex."""
+    """An equal acceleration for every vertex."""
 
     class Config(EffectConfig):
         """``acceleration`` in m/s^2."""

@@ -1,4 +1,4 @@
-"""What plane, sphere and box share: vertices stop at a convex body, with Coulomb friction."""
+"""Base of plane, sphere and box: vertices stop at a convex body, with Coulomb friction."""
 
 from abc import abstractmethod
 from typing import Annotated

@@ -13,7 +13,7 @@ from pdrom.model.mesh.types import Mesh
 
 
 class Plane(Obstacle):
-    """Vertices stay on the side of a plane that its normal points to; `Obstacle` says how."""
+    """Vertices stay on the side of a plane that its normal points to; see `Obstacle`."""
 
     class Config(ObstacleConfig):
         """``point`` on the plane in metres, ``normal`` of any length."""

@@ -104,7 +104,7 @@ def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
             length = np.sqrt(ex * ex + ey * ey + ez * ez)
             gap = thickness - distance
             if length > 0.0 and dx * ex + dy * ey + dz * ez <= 0.0:
-                # it passed, or lies where no side can be told: back to the side it came from
+                # it passed, or lies where no side can be determined: back to the side it came from
                 along = (dx * ex + dy * ey + dz * ez) / length
                 dx, dy, dz, distance, gap = ex, ey, ez, length, thickness - along
             elif distance == 0.0:

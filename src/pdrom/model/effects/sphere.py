@@ -14,7 +14,7 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 class Sphere(Obstacle):
-    """Vertices stay out of a ball; `Obstacle` says how."""
+    """Vertices stay out of a ball; see `Obstacle`."""
 
     class Config(ObstacleConfig):
         """``centre`` and ``radius`` in metres."""
@@ -34,7 +34,7 @@ class Sphere(Obstacle):
         return self.config.radius - np.linalg.norm(points - self._centre, axis=1)
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Of the centre itself, upwards."""
+        """Normals (n, 3), at the centre itself upwards."""
         arm = points - self._centre
         length = np.linalg.norm(arm, axis=1)[:, None]
         return np.where(length > 0.0, arm / np.where(length > 0.0, length, 1.0), UP)

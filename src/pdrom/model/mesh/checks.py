@@ -1,4 +1,4 @@
-"""What a mesh must satisfy before anything is computed on it."""
+"""Conditions on a mesh, checked before anything is computed on it."""
 
 import numpy as np
 

@@ -133,6 +133,6 @@ def _fault(ended: subprocess.CompletedProcess[bytes], limits: MeshLimits) -> str
         return f"not a readable mesh in {time}: cut off, or very large; {ADVICE}"
     if status < 0:
         return f"the reader was ended by signal {-status} ({signal.strsignal(-status)})"
-    said = ended.stderr.decode(errors="replace").split("\n")
-    last = next((line for line in reversed(said) if line.strip()), "without a word")
+    lines = ended.stderr.decode(errors="replace").split("\n")
+    last = next((line for line in reversed(lines) if line.strip()), "without a word")
     return f"the reader failed with status {status}: {last[:200]}"

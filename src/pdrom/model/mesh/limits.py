@@ -1,4 +1,4 @@
-"""What reading a mesh file may cost."""
+"""Limits on the cost of reading a mesh file."""
 
 import math
 import os

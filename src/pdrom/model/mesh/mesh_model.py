@@ -1,4 +1,4 @@
-"""What the configurations of all kinds of meshes share."""
+"""Base of the configurations of all kinds of meshes."""
 
 import hashlib
 import json
@@ -11,7 +11,7 @@ class MeshModel(ConfigModel):
 
     @property
     def label(self) -> str:
-        """What messages call the mesh."""
+        """Name of the mesh in messages and file names."""
         raise NotImplementedError(f"{type(self).__name__} has no label")
 
     @property

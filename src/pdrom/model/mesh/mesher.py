@@ -12,7 +12,7 @@ import numpy as np
 
 # degrees; Triangle is proven to end up to 20.7 and ends up to 33 in practice
 SMALLEST_ANGLE = 30.0
-# edges of a triangle are at most so much longer than asked for, where their images count
+# edges of a triangle are at most so much longer than requested, where their images count
 LONGEST = 1.25
 # largest area of a triangle over that of the equilateral one, where they do not
 LARGEST = 1.2

@@ -8,7 +8,7 @@ usage: reader.py FILE FORMATS SECONDS MEMORY VERTICES CELLS
 
 ``FORMATS`` are names of readers, joined by commas; how the file begins chooses between them. What
 comes out is points (N, 3) float64 and cells (E, 3 or 4) int64 as two arrays of NumPy's format .npy,
-or, with the exit status `REFUSED`, a sentence that says what is wrong.
+or, with the exit status `REFUSED`, a sentence that states what is wrong.
 """
 
 import io

@@ -43,7 +43,7 @@ class _Unstructured(MeshModel):
         return self
 
     def coarsened(self, factor: float) -> Self:
-        """The same shape with edges 1 / ``factor`` times as long."""
+        """Make the edges 1 / ``factor`` times as long."""
         longest = self.extent / FEWEST_EDGES
         return self.model_copy(update={"edge": min(self.edge / factor, longest)})
 

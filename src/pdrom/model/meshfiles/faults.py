@@ -1,4 +1,4 @@
-"""What is wrong with a mesh file, and the checks that readers share."""
+"""Faults of mesh files, and the checks that readers share."""
 
 import re
 from collections.abc import Iterable
@@ -63,7 +63,7 @@ def whole(array: np.ndarray, what: str) -> np.ndarray:
 def check_last_number(content: bytes, vertices: int) -> None:
     """`CutError` if a text ends in a number that may be the beginning of a longer one.
 
-    Nothing but the end of the line tells ``12`` from the first digits of ``123``. An index that
+    Only the end of the line distinguishes ``12`` from the first digits of ``123``. An index that
     could not be longer, as there are not so many ``vertices``, is taken.
     """
     last = _LAST_NUMBER.search(content[-64:])
@@ -78,7 +78,7 @@ def check_last_number(content: bytes, vertices: int) -> None:
 
 
 def reason(error: BaseException) -> str:
-    """What went wrong, on one short line."""
+    """Message of an error, on one short line."""
     text = " ".join(str(error).split())[:200]
     if isinstance(error, UnreadableError):
         return text

@@ -1,4 +1,4 @@
-"""What is asked of a file before meshio reads it, and while it does.
+"""Checks of a file before meshio reads it, and while it does.
 
 meshio trusts its input. Where it would read another mesh than the file holds, the file is refused
 here; where it takes the end of a file for the end of its mesh, the end is looked at first.
@@ -17,7 +17,7 @@ from pdrom.model.meshfiles.faults import CutError, UnreadableError, check_last_n
 
 # Bytes that are read at once by who reads piece by piece; reads behind the end before it is a loop.
 PIECE, PATIENCE = 4096, 100
-# What a whole file holds, of formats that mark their end; others say how much they hold.
+# What a whole file holds, of formats that mark their end; others state how much they hold.
 ENDS = {
     "ansys": rb"\)\s*\Z",
     "gmsh": rb"^\$End\w+\s*\Z",
@@ -122,7 +122,7 @@ def ends_noticed() -> Iterator[None]:
     """Let a reader fail when the file ends too early, where it would loop or take less.
 
     While it holds, files that are opened notice reads behind their end, and ``numpy.fromfile``
-    raises `CutError` for fewer numbers than it was asked for.
+    raises `CutError` for fewer numbers than were requested.
     """
     opened, fromfile = builtins.open, np.fromfile
     ends: list[int] = []
@@ -135,9 +135,9 @@ def ends_noticed() -> Iterator[None]:
 
     def whole(file: Any, *more: Any, **named: Any) -> np.ndarray:
         array = fromfile(file, *more, **named)
-        asked = named.get("count", more[1] if len(more) > 1 else -1)
-        if len(array) < asked:
-            raise CutError(f"{asked} numbers that follow each other, {len(array)} are there")
+        count = named.get("count", more[1] if len(more) > 1 else -1)
+        if len(array) < count:
+            raise CutError(f"{count} numbers that follow each other, {len(array)} are there")
         return array
 
     builtins.open, np.fromfile = noticing, whole  # type: ignore[assignment]

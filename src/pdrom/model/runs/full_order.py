@@ -43,7 +43,7 @@ def run(
     with_mesh: bool = False,
     on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
 ) -> None:
-    """Run a scene and write positions, velocities, objective, timings and the asked snapshots.
+    """Run a scene and write positions, velocities, objective, timings and the requested snapshots.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def _create_series(file: h5py.File, scene: Scene) -> dict[str, h5py.Dataset]:
 
 
 class _SnapshotRecorder:
-    """Stores p of the asked groups and frames; a frame without snapshots costs nothing."""
+    """Stores p of the requested groups and frames; a frame without snapshots costs nothing."""
 
     def __init__(
         self, file: h5py.File, scene: Scene, snapshot_frames: Mapping[str, np.ndarray]

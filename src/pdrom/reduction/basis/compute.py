@@ -105,7 +105,7 @@ def _row_scale(row_mass: np.ndarray, spec: BasisSpec) -> np.ndarray:
 
 
 def _offset(matrix: np.ndarray, spec: BasisSpec) -> np.ndarray:
-    """What is subtracted from every snapshot, (3 e p,)."""
+    """Vector (3 e p,) that is subtracted from every snapshot."""
     if spec.centring == "affine":
         return matrix.mean(axis=1)
     if spec.centring == "mean-in-modes":

@@ -1,4 +1,4 @@
-"""What a guard asks about a reduced run, frame by frame."""
+"""Interface of a run-time monitor: alarms of a reduced run, frame by frame."""
 
 from abc import ABC, abstractmethod
 
@@ -17,9 +17,9 @@ class Alarm(ABC):
 
     @abstractmethod
     def accept(self, state: State) -> None:
-        """The run goes on from ``state``, the end of the frame asked about or of its repetition."""
+        """Go on from ``state``, the end of the frame that was judged or of its repetition."""
 
     @property
     @abstractmethod
     def estimate(self) -> float | None:
-        """Estimated error of the run over its accepted frames; None if nobody estimates it."""
+        """Estimated error of the run over its accepted frames; None if it is not estimated."""

@@ -1,12 +1,12 @@
-"""What an iteration with reduced projections does to a small error.
+"""Contraction of a small error by an iteration with reduced projections.
 
 A local/global iteration maps an error d of the iterate to T d, T = A^-1 S^T W R J S, with the
 matrix A = M/h^2 + S^T W S of the free vertices, the derivative J of the projections and the linear
-part R of their reduction (R = V (P^T V)^+ P^T; the identity in the full order). Two numbers say
-what it does: the contraction number |T|_A = |A^-1/2 S^T W R J S A^-1/2|_2, which is how much one
+part R of their reduction (R = V (P^T V)^+ P^T; the identity in the full order). Two numbers
+describe it: the contraction number |T|_A = |A^-1/2 S^T W R J S A^-1/2|_2, which is how much one
 iteration may enlarge an error in the energy of its quadratic objective, and the spectral radius of
-T, which decides in the long run. T has the rank of the reduction, so that both are numbers of
-r x r matrices.
+T, which decides in the long run. T has the rank of the reduction, so that both are numbers of r x r
+matrices.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,5 @@
-"""The alarm that the estimated error of a run is too large: its distance to a companion."""
+"""The alarm that the estimated error of a run is too large: its distance to an auxiliary
+model, the companion."""
 
 import numpy as np
 

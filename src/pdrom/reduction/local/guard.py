@@ -12,7 +12,7 @@ log = logging.getLogger(__name__)
 
 @dataclass
 class GuardRecord:
-    """What a guard saw in a run.
+    """Record of a guard: its alarms in a run, and what it did.
 
     frame, group, reason : of the first frame that gave an alarm (None: no frame did)
     count : frames that gave one

@@ -13,7 +13,7 @@ Margin = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
 class GuardSettings(ConfigModel):
-    """What a reduced run does in case of an alarm, and what gives the alarm.
+    """Alarm of a reduced run, and the reaction to it.
 
     action : "none" watches nothing, "report" logs and counts, "stop" ends the run, "fall-back"
         repeats the frame with full projections

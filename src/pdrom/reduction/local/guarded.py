@@ -1,4 +1,4 @@
-"""A run with one group reduced, watched by a guard as the settings say."""
+"""A run with one group reduced, watched by a guard (run-time monitor)."""
 
 from dataclasses import dataclass
 
@@ -23,11 +23,11 @@ from pdrom.reduction.subspace.model import SubspaceModel
 
 @dataclass(frozen=True)
 class Trained:
-    """What a guard knows of the training run.
+    """Facts about the training run that a guard needs.
 
     extent : longest side of its bounding box, m
     motion : see `pdrom.reduction.rerun.mean_motion`, m
-    companion : trained on it; only the estimate needs one
+    companion : auxiliary model trained on it; only the estimate needs one
     """
 
     extent: float
@@ -36,7 +36,7 @@ class Trained:
 
     @classmethod
     def on(cls, reference: np.ndarray, companion: SubspaceModel | None = None) -> "Trained":
-        """Of the training run's positions ``reference``, (F + 1, N, 3) m."""
+        """Take them from the training run's positions ``reference``, (F + 1, N, 3) m."""
         return cls(largest_extent(reference), mean_motion(reference), companion)
 
 
@@ -48,12 +48,19 @@ def guarded(
     settings: GuardSettings,
     trained: Trained,
 ) -> tuple[Advance, GuardRecord]:
-    """What does the frames of a run of ``scene`` with ``group`` reduced, and what its guard saw.
+    """Return the step function of a guarded run and the guard's record.
+
+    Parameters
+    ----------
+    scene, system : the run's scene and its global system
+    group, reduction : name of the reduced group, and its reduction
+    settings : alarm and reaction
+    trained : facts about the training run
 
     Raises
     ------
     ConfigurationError
-        The estimate is to give the alarm, and there is no companion.
+        The estimate is to give the alarm, and there is no auxiliary model.
     """
 
     def loop(step: LocalStep, watched: bool = False) -> Stepper:

@@ -1,4 +1,5 @@
-"""Compiled part of the reduced local step: coefficients from sampled entries, and their lift.
+"""Compiled part of the reduced local step: coefficients from sampled entries, and their
+reconstruction ("lift").
 
 Coefficients come in sets: one that all axes share, or one an axis. A column of the lift adds the
 coefficients of its set to one axis of the right-hand side.
@@ -37,7 +38,7 @@ AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 
 
 @dataclass(frozen=True)
 class Lift:
-    """What a reduced local step holds, for r modes, N vertices and c columns.
+    """Arrays of a reduced local step, for r modes, N vertices and c columns.
 
     starts : (sets + 1,) where the sampled entries of each set begin
     positions : sampled entries of each set among the numbers of the sampled elements

@@ -21,7 +21,7 @@ CANCELLATION = 1e-12
 
 
 class TrainedRange(Alarm):
-    """Limits of the trained range, as the settings say.
+    """Limits of the trained range, from the settings.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ class GrowingFit:
         return self._factor[:k, :k]
 
     def coefficients(self, k: int) -> np.ndarray:
-        """c (k,) of mode k; of several solutions, as far as can be told, the shortest."""
+        """c (k,) of mode k; of several solutions, up to round-off, the shortest."""
         factor, target = self.triangle(k), self._factor[:k, k]
         if linalg.lapack.dtrcon(factor)[0] > k * np.finfo(float).eps:
             return linalg.solve_triangular(factor, target, check_finite=False)

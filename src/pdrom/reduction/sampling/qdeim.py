@@ -32,7 +32,7 @@ def qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
 
 
 class _Left:
-    """What is left of all groups, known by bounds on their norms.
+    """Remainders of all groups, known by bounds on their norms.
 
     Norms only fall. So a pivot among the groups with the largest bounds is the pivot of all while
     its norm exceeds the bounds of the others, and the others need not be touched until it does not:

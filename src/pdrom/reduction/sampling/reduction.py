@@ -59,7 +59,7 @@ class Reduction:
         return self.sampling.elements
 
     def limited(self, coefficients: np.ndarray) -> np.ndarray:
-        """Coefficients (..., r) in the range of the training snapshots, if the method asks for it.
+        """Coefficients (..., r) in the range of the training snapshots, if the method limits them.
 
         Each one is clipped: for orthonormal modes the nearest admissible point to V c. It brings c
         nearer to every admissible c*, so that it cannot hurt where the true ones are in range;

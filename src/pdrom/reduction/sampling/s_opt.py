@@ -114,7 +114,7 @@ class _Sampled:
         return self._argmax(self._log_determinants() - norms)
 
     def best_with(self, mode: int) -> int:
-        """The same when ``mode`` joins the columns."""
+        """Element with the largest S-measure when ``mode`` joins the columns."""
         if not self._picked:
             return int(np.argmax(self._squares[:, mode]))
         z, q = self._residual()

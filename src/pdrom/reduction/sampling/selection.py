@@ -1,4 +1,4 @@
-"""What a selection is: an order in which blocks of rows of a basis are sampled."""
+"""Interface of selections: orders in which blocks of rows of a basis are sampled."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence

@@ -9,7 +9,7 @@ from pdrom.core.errors import SamplingError
 
 @dataclass(frozen=True)
 class Sampling:
-    """What a method evaluates online.
+    """Entries and elements that a method evaluates online.
 
     entries : indices into the vectorised projection (length 3 e p), in order of selection; for
         "joint" rows the x entry of each row stands for the row

@@ -1,4 +1,4 @@
-"""A companion: a finer model that runs beside reduced runs and estimates their errors.
+"""A companion: an auxiliary, finer model that runs beside reduced runs and estimates their errors.
 
 The distance of a run to the companion stands for its distance to the full order (a hierarchical
 estimate, Bank and Weiser 1985). If the companion's own error is at most theta < 1 times that of the
@@ -46,7 +46,7 @@ def companion_model(
 
 
 def companion_frames(scene: Scene, model: SubspaceModel) -> Iterator[np.ndarray]:
-    """Positions (N, 3) m of the companion, the initial ones first, each computed when asked for.
+    """Positions (N, 3) m of the companion, the initial ones first, each computed when needed.
 
     They end with the run, or before the first frame that is not finite.
     """
@@ -103,7 +103,7 @@ class RunningEstimate:
         return self._ratio(self._squares, self._frames) if self._frames else None
 
     def after(self, positions: np.ndarray, companion: np.ndarray) -> float:
-        """What the estimate would be after one more frame, whose ends are (N, 3) m each."""
+        """Estimate after one more frame, whose ends are (N, 3) m each."""
         return self._ratio(self._squares + _square(positions, companion), self._frames + 1)
 
     def add(self, positions: np.ndarray, companion: np.ndarray) -> None:

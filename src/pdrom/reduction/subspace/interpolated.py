@@ -33,7 +33,7 @@ def interpolate(
 
 
 class Training:
-    """The states and bases of `InterpolationSpec`, each made once, when it is asked for.
+    """The states and bases of `InterpolationSpec`, each made once, when it is needed.
 
     Parameters
     ----------

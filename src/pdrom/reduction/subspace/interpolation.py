@@ -20,7 +20,7 @@ _ARRAYS = (
 
 @dataclass(frozen=True)
 class Interpolation:
-    """What one group needs online, in a subspace of K coordinates.
+    """Arrays that one group needs online, in a subspace of K coordinates.
 
     elements : (m,) sampled elements, ascending; none where the projections are constant
     operator : (r, n) from sampled values to coefficients; n is m p where the axes share one
@@ -48,7 +48,7 @@ class Interpolation:
 
     @classmethod
     def of_constant(cls, stiffness: np.ndarray, offset: np.ndarray) -> "Interpolation":
-        """For projections that are constant (zero, say) up to round-off: no element is needed."""
+        """For projections that are constant (e.g. zero) up to round-off: no element is needed."""
         none = np.empty(0, dtype=np.int64)
         empty = np.empty((len(stiffness), 0))
         return cls(none, np.empty((0, 0)), empty, offset, stiffness, gain=1.0)

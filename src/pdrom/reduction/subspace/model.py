@@ -25,7 +25,7 @@ ECSW = "ecsw"
 
 
 def ecsw_name(tolerance: float) -> str:
-    """What tables call a model with energy-conserving samples."""
+    """Name in tables of a model with energy-conserving samples."""
     return f"{ECSW}-{tolerance:.0e}"
 
 

@@ -18,7 +18,7 @@ from pdrom.model.effects.base import Boundary, Contact, Effect, held_vertices
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.columns import Columns
 
-# Vertices that are asked whether something was hit, at most.
+# Vertices at which contacts are looked for, at most.
 PROBES = 200
 
 
@@ -52,7 +52,7 @@ class DenseElimination:
         return self._inverse @ (rhs[self.free] - self._load)
 
     def lift(self, rows: np.ndarray) -> np.ndarray:
-        """What a unit force on each of ``rows`` (m, K) adds to the free coordinates, (m, K')."""
+        """Response (m, K') of the free coordinates to a unit force on each of ``rows`` (m, K)."""
         return rows[:, self.free] @ self._inverse
 
 

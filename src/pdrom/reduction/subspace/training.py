@@ -37,7 +37,7 @@ class TrainingFrame:
 
     start : (K, 3) coordinates at its beginning, which frame-lagged data are frozen at
     pairs : (n, 2, K, 3) coordinates before and after its iterations
-    measure : (K', K) with |measure r| the size of a residual r of the equations in the asked norm:
+    measure : (K', K) with |measure r| the size of a residual r of the equations in the chosen norm:
         |measure r|^2 = r^T A^-1 r, J, or |M^1/2 x|^2 of the run's response x, kg m^2; held
         coordinates have no equation
     """

@@ -1,1 +1,1 @@
-"""What one could take in place of projective dynamics for the same energy and the same scenes."""
+"""Alternatives to projective dynamics for the same energy and the same scenes."""

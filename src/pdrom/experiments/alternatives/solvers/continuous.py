@@ -49,10 +49,11 @@ def continuous(
 
 
 def _remaining(change: float, last: float) -> float:
-    """What is left after a ``change`` by halving the step, when the one before changed ``last``.
+    """Richardson estimate of the remaining error from two halvings.
 
-    A third of it where changes fall to a quarter, as with a method of second order; all of it
-    where they do not fall to a half, because the motion is not smooth or not yet resolved.
+    A third of the last ``change`` where changes fall to a quarter, as with a method of second
+    order; all of it where they do not fall to a half, because the motion is not smooth or not yet
+    resolved.
     """
     ratio = last / change if change > 0.0 and np.isfinite(last) else 1.0
     return change / min(max(ratio - 1.0, 1.0), 3.0)

@@ -52,7 +52,7 @@ class Elements:
 
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
-        """What compiled code takes: rows, corners, operator, weights, low, high, fallback."""
+        """Arrays for compiled code: rows, corners, operator, weights, low, high, fallback."""
         return (
             self.rows, self.corners, self.operator, self.weights, self.low, self.high,
             self.fallback,
@@ -112,7 +112,7 @@ def _colours(rows, corners, vertices):
 
 
 def workspace() -> tuple[np.ndarray, ...]:
-    """What `decompose_element` works with: D, u, v, sigma."""
+    """Arrays that `decompose_element` works with: D, u, v, sigma."""
     return np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3)
 
 

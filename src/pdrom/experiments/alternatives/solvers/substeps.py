@@ -49,8 +49,8 @@ class Alternative(Stepper):
     Raises
     ------
     SceneError
-        A force that depends on the motion (it would have to be asked in every substep), or a group
-        that the method does not take.
+        A force that depends on the motion (it would have to be evaluated in every substep), or a
+        group that the method does not take.
     """
 
     name: ClassVar[str]
