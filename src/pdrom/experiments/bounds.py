@@ -1,4 +1,4 @@
-"""What is known of reduced projections before a run: how far they carry, and if they contract."""
+"""Bounds on reduced projections before a run: how far they carry, and whether they contract."""
 
 import logging
 from collections.abc import Iterator

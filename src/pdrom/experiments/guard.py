@@ -1,4 +1,4 @@
-"""What a guard at run time costs, by its alarm, and what falling back buys."""
+"""Cost of a guard at run time, by its alarm, and the gain of falling back."""
 
 import logging
 from time import perf_counter

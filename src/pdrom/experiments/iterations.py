@@ -1,4 +1,4 @@
-"""What the number of iterations K costs in accuracy, against the limit K -> infinity."""
+"""Error of K iterations against the limit K -> infinity."""
 
 import logging
 from typing import Annotated

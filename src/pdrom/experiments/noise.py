@@ -106,7 +106,7 @@ def irregular(runs: Runs) -> bool:
 
 
 def kinds(scene: Scene) -> tuple[str, ...]:
-    """What round-off may reach: all axes; of a flat mesh, too, those of its plane alone, and these
+    """Axes that round-off may reach: all; of a flat mesh, too, those of its plane alone, and these
     with the axis across it at a single vertex."""
     return (ALL, PLANE, VERTEX) if np.ptp(scene.mesh.points, axis=0).min() == 0.0 else (ALL,)
 

@@ -137,7 +137,7 @@ class _Trials:
     def outcome(
         self, columns: Columns, trained: Training, spec: InterpolationSpec
     ) -> dict[str, Any]:
-        """What a variant did; a refused one has not run, and its cells are empty."""
+        """Outcome of a variant; a refused one has not run, and its cells are empty."""
         try:
             found = interpolate(self.motions["train"].scene, columns, trained, spec)
         except SamplingError as error:

@@ -1,1 +1,1 @@
-"""What experiments share: settings, measurement, runs that only experiments make."""
+"""Helpers of experiments: settings, measurement, runs that only experiments make."""

@@ -71,7 +71,7 @@ def held_sets(scene: Scene) -> list[np.ndarray]:
 
 
 def kept_velocity(scene: Scene) -> np.ndarray:
-    """What a frame leaves of a velocity, D = 1 - h c, (N,); ValueError for a force without rate."""
+    """Part of a velocity left by a frame, D = 1 - h c, (N,); ValueError for a force that has none."""
     rates = np.zeros(scene.mesh.vertices)
     for force in scene.forces:
         if force.rate is None:
@@ -82,7 +82,7 @@ def kept_velocity(scene: Scene) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Compliance:
-    """What the stiffness and the masses of a scene make of forces, see the module.
+    """Response of the stiffness and the masses of a scene to forces, see the module.
 
     inverse : (N, N) m/N, a generalised inverse of K: the sum of x x^T / omega^2 over the modes x,
         |x|_M = 1, omega > 0, with the held vertices eliminated if they are always the same ones;

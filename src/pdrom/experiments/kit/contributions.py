@@ -1,4 +1,4 @@
-"""What each effect of a scene does in its full-order run: the force it exerts, the energy it holds.
+"""Force and energy of each effect of a scene in its full-order run.
 
 Effects with the same name count as one. Forces are those at the end of a frame, on the vertices
 that nothing holds: S^T W (p - S q) of a group, M a of a force, M d / h^2 of a contact that moves
@@ -28,7 +28,7 @@ class _Watched:
         self.moved = np.zeros(())
 
     def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
-        """What the contact does."""
+        """Apply the contact and record what it moves."""
         wanted = positions.copy()
         self._contact.apply(positions, before, held)
         self.moved = positions - wanted

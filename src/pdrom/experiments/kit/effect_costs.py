@@ -1,4 +1,4 @@
-"""What each effect of a scene costs in a frame, and what a scene without it saves.
+"""Time of each effect of a scene in a frame, and the time that a scene without it saves.
 
 Effects are timed by stand-ins around them, so that a normal run holds no timer at all.
 """
@@ -60,7 +60,7 @@ class Timed:
 
     @property
     def kernel_seconds(self) -> float:
-        """Of it, inside the compiled loop."""
+        """Part of `seconds` that is spent inside the compiled loop."""
         return float(self._kernel.sum())
 
     def reset(self) -> None:
@@ -138,7 +138,7 @@ def _elements(scene: Scene, name: str) -> int:
 
 
 def left_out_sets(scene: Scene) -> list[tuple[str, ...]]:
-    """What is left out in turn: nothing, every effect alone, all groups but one.
+    """Effects to leave out in turn: none, every effect alone, all groups but one.
 
     Empty for a scene with a single group: without it there is nothing to project.
     """

@@ -70,7 +70,7 @@ class TimedScene(ConfigModel):
 
 
 class Request(ConfigModel):
-    """What a process times, in the random order that ``seed`` gives."""
+    """Request to a process: loops to time, in the random order that ``seed`` gives."""
 
     scenes: tuple[TimedScene, ...]
     timing: Protocol
@@ -101,7 +101,7 @@ def in_fresh_process(request: Request, folder: Path) -> pd.DataFrame:
 
 
 def timed(request: Request) -> pd.DataFrame:
-    """The same in this process."""
+    """Time the loops in this process."""
     variants = [variant for scene in request.scenes for variant in _variants(scene, request)]
     order = np.random.default_rng(request.seed).permutation(len(variants))
     timing = request.timing

@@ -1,4 +1,4 @@
-"""What a function sees in the last local iterate of every frame of a full-order run."""
+"""Values of a function at the last local iterate of every frame of a full-order run."""
 
 from collections.abc import Callable
 

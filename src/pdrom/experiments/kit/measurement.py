@@ -31,7 +31,7 @@ class Protocol(ConfigModel):
 
 @dataclass(frozen=True)
 class Variant:
-    """What is timed: labels for the table, the loop with its first state, and how many frames.
+    """A loop to time: labels for the table, the loop with its first state, and how many frames.
 
     ``share`` is the part of a frame's iterations that the loop does; the times of the phases that
     repeat with the iterations are divided by it.

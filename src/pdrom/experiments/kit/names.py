@@ -1,4 +1,4 @@
-"""What the column ``method`` of tables says of runs without any reduction."""
+"""Names of runs without any reduction in the column ``method`` of tables."""
 
 FOM = "fom"  # the full-order run with its own or another number of iterations
 ANDERSON = "fom-anderson"  # the same with accelerated iterations

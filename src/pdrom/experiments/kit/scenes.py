@@ -1,4 +1,4 @@
-"""What several experiments need: the scene of a run bound to its mesh file, and that run."""
+"""Scene of a run bound to its mesh file, and that run, for several experiments."""
 
 import numpy as np
 

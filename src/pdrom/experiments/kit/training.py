@@ -20,7 +20,7 @@ class Training:
     roundoff: np.ndarray
 
     def first(self, frames: int) -> "Training":
-        """The same of the first frames only."""
+        """Keep the first frames only."""
         return Training(self.positions[:frames], self.projections[:frames], self.roundoff[:frames])
 
 
