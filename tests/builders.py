@@ -14,6 +14,11 @@ GROUPS = {
     "volume": {"kind": "bar", "nx": 5, "ny": 3, "nz": 3},
     "area": {"kind": "cloth", "rows": 6, "columns": 5},
 }
+OBSTACLES = {
+    "plane": {"point": [0.1, 0.2, 0.3], "normal": [1, 2, -2]},
+    "sphere": {"centre": [0.1, 0.2, 0.3], "radius": 0.7},
+    "box": {"lower": [-0.4, -0.5, -0.6], "upper": [0.7, 0.6, 0.5]},
+}
 
 
 def make_scene(

@@ -71,7 +71,7 @@ def held_sets(scene: Scene) -> list[np.ndarray]:
 
 
 def kept_velocity(scene: Scene) -> np.ndarray:
-    """Part of a velocity left by a frame, D = 1 - h c, (N,); ValueError for a force that has none."""
+    """Velocity left by a frame over it, D = 1 - h c, (N,); ValueError for a force that has none."""
     rates = np.zeros(scene.mesh.vertices)
     for force in scene.forces:
         if force.rate is None:

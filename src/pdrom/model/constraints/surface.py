@@ -14,14 +14,13 @@ from pdrom.model.constraints.lanes import (
     lane_function,
     scaled,
 )
+from pdrom.model.mesh.measures import boundary_edges
 
 
 def interior_vertices(triangles: np.ndarray, vertices: int) -> np.ndarray:
     """Vertices (n,) on no boundary edge, ascending."""
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
     inside = np.ones(vertices, dtype=bool)
-    inside[unique[count == 1]] = False
+    inside[boundary_edges(triangles)] = False
     return np.flatnonzero(inside)
 
 

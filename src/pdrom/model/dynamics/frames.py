@@ -38,3 +38,15 @@ def end(y, before, time_step):
             positions[i, axis] = y[WIDTH * i + axis]
             velocities[i, axis] = (positions[i, axis] - before[i, axis]) / time_step
     return positions, velocities
+
+
+@compiled(nogil=True)
+def inertia_energy(y, s, inertia):
+    """1/2 |(M/h^2)^1/2 (y - s)|^2 of rows of four, flat."""
+    energy = 0.0
+    for i in range(len(inertia)):
+        square = 0.0
+        for axis in range(3):
+            square += (y[WIDTH * i + axis] - s[WIDTH * i + axis]) ** 2
+        energy += inertia[i] * square
+    return 0.5 * energy

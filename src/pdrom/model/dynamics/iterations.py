@@ -16,6 +16,7 @@ from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.constraints.local_kernel import PARTS, PREPARE, LocalPass, add_part
 from pdrom.model.constraints.second_thread import LINE, both, publish, wait_for
 from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, combine, refuse
+from pdrom.model.dynamics.frames import inertia_energy
 from pdrom.model.dynamics.sweeps import sweep
 from pdrom.model.dynamics.system import Elimination
 
@@ -149,7 +150,7 @@ def _iterate(
         seconds[1] += between - before
         value = np.nan
         if len(objective) or window:
-            value = energy + _inertia_energy(y, s, inertia)
+            value = energy + inertia_energy(y, s, inertia)
         if len(objective):
             objective[k] = value
             between = now(watch)
@@ -163,15 +164,3 @@ def _iterate(
                 combine(history, y)
         seconds[2] += now(watch) - between
     return 0.0
-
-
-@compiled(nogil=True)
-def _inertia_energy(y, s, inertia):
-    """1/(2 h^2) |M^1/2 (y - s)|^2."""
-    energy = 0.0
-    for v in range(len(inertia)):
-        square = 0.0
-        for axis in range(3):
-            square += (y[WIDTH * v + axis] - s[WIDTH * v + axis]) ** 2
-        energy += inertia[v] * square
-    return 0.5 * energy

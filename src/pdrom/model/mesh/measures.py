@@ -1,4 +1,4 @@
-"""How much of a mesh belongs to a vertex."""
+"""Measures of a mesh around its vertices, and its boundary."""
 
 import numpy as np
 
@@ -24,3 +24,10 @@ def vertex_measures(mesh: Mesh) -> np.ndarray:
     if len(mesh.tetrahedra):
         return barycentric_volumes(mesh.points, mesh.tetrahedra)
     return barycentric_areas(mesh.points, mesh.triangles)
+
+
+def boundary_edges(triangles: np.ndarray) -> np.ndarray:
+    """Edges (n, 2) that belong to one of the ``triangles`` (T, 3) only, sorted."""
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    return unique[count == 1]

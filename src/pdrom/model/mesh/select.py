@@ -10,6 +10,7 @@ from scipy.sparse import csgraph
 
 from pdrom.core.errors import SceneError
 from pdrom.model.mesh import selection as kinds
+from pdrom.model.mesh.measures import boundary_edges
 from pdrom.model.mesh.types import Mesh
 
 # side name -> (axis, +1 for the maximal side, -1 for the minimal one)
@@ -92,10 +93,7 @@ def _nearest(mesh: Mesh, nearest: kinds.Nearest) -> np.ndarray:
 
 
 def _boundary_loop(mesh: Mesh, loop: kinds.BoundaryLoop) -> np.ndarray:
-    triangles = mesh.triangles
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
-    border = unique[count == 1]
+    border = boundary_edges(mesh.triangles)
     lengths = np.linalg.norm(mesh.points[border[:, 0]] - mesh.points[border[:, 1]], axis=1)
     # half of an edge for each of its ends
     shares = np.bincount(border.ravel(), np.repeat(lengths / 2.0, 2), minlength=mesh.vertices)

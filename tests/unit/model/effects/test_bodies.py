@@ -5,26 +5,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from builders import make_scene
+from builders import OBSTACLES, make_scene
 from pdrom.model.effects.bodies import ball, cuboid
 from pdrom.model.effects.entries import effect_config
 from pdrom.model.mesh.measures import barycentric_areas
 from strategies import SEEDS
 
 LOW, HIGH = np.array([-0.5, 1.0, -0.5]), np.array([0.7, 2.0, 0.5])
-OBSTACLES = {
-    "floor": {"height": 0.3},
-    "plane": {"point": [0.1, 0.2, 0.3], "normal": [1, 2, -2]},
-    "sphere": {"centre": [0.1, 0.2, 0.3], "radius": 0.7},
-    "box": {"lower": [-0.4, -0.5, -0.6], "upper": [0.7, 0.6, 0.5]},
-}
+BODIES = {"floor": {"height": 0.3}, **OBSTACLES}
 
 
 def body(name):
-    return effect_config({"effect": name, **OBSTACLES[name]}, 0).body(LOW, HIGH)
+    return effect_config({"effect": name, **BODIES[name]}, 0).body(LOW, HIGH)
 
 
-@pytest.mark.parametrize("name", [n for n in OBSTACLES if n != "floor"])
+@pytest.mark.parametrize("name", OBSTACLES)
 def test_corners_are_on_the_surface_that_keeps_vertices_out(name):
     (obstacle,) = make_scene(
         {"effect": "spring", "weight": 1.0}, {"effect": name, **OBSTACLES[name]}

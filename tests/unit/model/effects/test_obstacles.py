@@ -6,16 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from builders import make_scene
+from builders import OBSTACLES, make_scene
 from pdrom.model.runs.full_order import trajectory
 from strategies import SEEDS
 
 SPRING = {"effect": "spring", "weight": 1.0}
-OBSTACLES = {
-    "plane": {"point": [0.1, 0.2, 0.3], "normal": [1, 2, -2]},
-    "sphere": {"centre": [0.1, 0.2, 0.3], "radius": 0.7},
-    "box": {"lower": [-0.4, -0.5, -0.6], "upper": [0.7, 0.6, 0.5]},
-}
 H = 0.016
 
 

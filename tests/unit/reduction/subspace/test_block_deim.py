@@ -13,6 +13,7 @@ from pdrom.reduction.snapshots import training_frames
 from pdrom.reduction.subspace.block_deim import block_deim, train_basis
 from pdrom.reduction.subspace.interpolated import Training, interpolate
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns
+from pdrom.reduction.subspace.rerun import rerun_model
 from pdrom.reduction.subspace.space import coordinates
 from pdrom.reduction.subspace.specs import InterpolationSpec
 
@@ -32,13 +33,8 @@ def pulled():
 
 
 def run_error(scene, run, columns, found) -> float:
-    model = SubspaceModel("pod", columns, found)
-    loop, state = model.loop(scene)
-    off = 0.0
-    for frame in range(scene.config.frames):
-        state, _ = loop.step(state, frame)
-        off += np.linalg.norm(model.positions(state.positions) - run[frame + 1]) ** 2
-    return float(np.sqrt(off) / np.linalg.norm(run - run[0]))
+    difference = rerun_model(scene, SubspaceModel("pod", columns, found), run).difference
+    return float(np.linalg.norm(difference) / np.linalg.norm(run - run[0]))
 
 
 def test_what_mends_it(pulled):

@@ -15,6 +15,7 @@ from pdrom.reduction.subspace.columns import build_columns
 from pdrom.reduction.subspace.ecsw import ecsw_elements, training_equations
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
+from pdrom.reduction.subspace.rerun import rerun_model
 from pdrom.reduction.subspace.space import ReducedSpace, coordinates
 from pdrom.reduction.subspace.training import TrainingFrame, training_run
 
@@ -148,13 +149,8 @@ def test_a_finer_tolerance_gives_a_better_run(pulled):
     motion = np.linalg.norm(run - run[0])
 
     def error(samples) -> float:
-        model = SubspaceModel("pod", columns, samples)
-        loop, state = model.loop(scene)
-        off = 0.0
-        for frame in range(scene.config.frames):
-            state, _ = loop.step(state, frame)
-            off += np.linalg.norm(model.positions(state.positions) - run[frame + 1]) ** 2
-        return np.sqrt(off) / motion
+        found = rerun_model(scene, SubspaceModel("pod", columns, samples), run)
+        return np.linalg.norm(found.difference) / motion
 
     full = error({})
     fine, coarse = map(error, sample_elements(scene, columns, np.arange(12), [1e-3, 0.5]))

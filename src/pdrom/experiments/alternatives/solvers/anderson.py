@@ -6,17 +6,11 @@ See `pdrom.model.dynamics.acceleration`; here a frame may have substeps.
 import numpy as np
 
 from pdrom.experiments.alternatives.solvers.potential import add_projections
-from pdrom.experiments.alternatives.solvers.substeps import (
-    Alternative,
-    Substeps,
-    begin,
-    end,
-    inertia_energy,
-)
+from pdrom.experiments.alternatives.solvers.substeps import Alternative, Substeps, begin, end
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.dynamics.acceleration import Anderson, combine, forget, refuse
-from pdrom.model.dynamics.frames import weighted
+from pdrom.model.dynamics.frames import inertia_energy, weighted
 from pdrom.model.dynamics.sweeps import sweep
 from pdrom.model.scene import Scene
 

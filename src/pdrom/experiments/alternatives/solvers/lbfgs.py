@@ -8,17 +8,11 @@ local/global iteration itself. Steps are shortened until the objective falls eno
 import numpy as np
 
 from pdrom.experiments.alternatives.solvers.potential import add_projections, multiply, rows_of
-from pdrom.experiments.alternatives.solvers.substeps import (
-    Alternative,
-    Substeps,
-    begin,
-    end,
-    inertia_energy,
-)
+from pdrom.experiments.alternatives.solvers.substeps import Alternative, Substeps, begin, end
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.compiled.vectors import add_multiple, dot
-from pdrom.model.dynamics.frames import weighted
+from pdrom.model.dynamics.frames import inertia_energy, weighted
 from pdrom.model.dynamics.sweeps import sweep
 from pdrom.model.scene import Scene
 

@@ -16,16 +16,11 @@ from pdrom.core.errors import SolverError
 from pdrom.experiments.alternatives.solvers.clamping import MODES, hessian
 from pdrom.experiments.alternatives.solvers.elements import Elements, decompose_element, workspace
 from pdrom.experiments.alternatives.solvers.potential import add_projections, multiply
-from pdrom.experiments.alternatives.solvers.substeps import (
-    Alternative,
-    Substeps,
-    begin,
-    end,
-    inertia_energy,
-)
+from pdrom.experiments.alternatives.solvers.substeps import Alternative, Substeps, begin, end
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.constraints.lanes import lane_function
+from pdrom.model.dynamics.frames import inertia_energy
 from pdrom.model.scene import Scene
 
 SUFFICIENT = 1e-4  # Armijo's constant

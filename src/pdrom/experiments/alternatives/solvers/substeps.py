@@ -176,15 +176,3 @@ def end(y, before, step, v):
     """Velocities from the positions at both ends of a substep."""
     for k in range(len(y)):
         v[k] = (y[k] - before[k]) / step
-
-
-@compiled(nogil=True)
-def inertia_energy(y, s, inertia):
-    """1/2 |(M/h^2)^1/2 (y - s)|^2 of rows of four, flat."""
-    energy = 0.0
-    for i in range(len(inertia)):
-        square = 0.0
-        for axis in range(3):
-            square += (y[WIDTH * i + axis] - s[WIDTH * i + axis]) ** 2
-        energy += inertia[i] * square
-    return 0.5 * energy
