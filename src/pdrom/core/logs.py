@@ -26,7 +26,7 @@ class _LogFile(logging.FileHandler):
 
 
 @contextmanager
-def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
+def job_log(path: str) -> Iterator[logging.Logger]:
     """Send the package's log to ``path`` while a job runs, and keep libraries to one thread.
 
     Snakemake gives the libraries of a job as many threads as the job claims, and one that measures
@@ -49,7 +49,7 @@ def job_log(path: str, level: int = logging.INFO) -> Iterator[logging.Logger]:
     handler.setFormatter(logging.Formatter(FORMAT))
     previous = logger.level
     logger.addHandler(handler)
-    logger.setLevel(level)
+    logger.setLevel(logging.INFO)
     try:
         with threadpool_limits(limits=1), damaged_set_aside():
             yield logger

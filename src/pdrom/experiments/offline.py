@@ -19,7 +19,7 @@ from pdrom.model.effects.base import Seed
 from pdrom.reduction.basis.pod import pod
 from pdrom.reduction.sampling.deim import deim_entries
 from pdrom.reduction.sampling.qdeim import qdeim_elements
-from pdrom.reduction.subspace.nnls import nnls_early_stop
+from pdrom.reduction.subspace.nnls import nnls_path
 
 log = logging.getLogger(__name__)
 
@@ -109,7 +109,7 @@ def _tasks(sizes: Offline) -> Iterator[tuple[dict[str, Any], Task, Task | None]]
     target = columns.sum(axis=1)
     size = {"rows": sizes.equations, "columns": sizes.elements}
     tolerance = sizes.tolerance
-    yield {"task": "nnls", **size}, lambda: nnls_early_stop(columns, target, tolerance)[0], None
+    yield {"task": "nnls", **size}, lambda: nnls_path(columns, target, [tolerance])[0][0], None
 
 
 def decaying(generator: np.random.Generator, n: int, m: int, rate: float = 1e-8) -> np.ndarray:

@@ -66,9 +66,8 @@ def test_unlisted_groups_are_never_evaluated():
     for group in scene.groups:
         own, calls[group.name] = group.local_kernel, np.zeros(1)
         group.local_kernel = LocalKernel.of(
-            _counted, scene.mesh.vertices, 1, False, [calls[group.name], own.record],
-            [own.address], lambda unit: np.arange(1),
-        )  # fmt: skip
+            _counted, scene.mesh.vertices, 1, [calls[group.name], own.record], [own.address]
+        )
     trajectory(scene)
     assert calls == {"spring": 12, "strain": 12}
     assert scene.forces == scene.boundaries == scene.contacts == scene.starts == []

@@ -117,9 +117,8 @@ class VertexBending(ConstraintGroup):
             project_vertices,
             self.S.shape[1],
             blocks(self.elements),
-            False,
-            self._arrays(elements),
-            (self.elements, len(elements)),
+            arrays=self._arrays(elements),
+            numbers=(self.elements, len(elements)),
         )
 
     def _arrays(self, elements: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -161,11 +160,14 @@ class VertexBending(ConstraintGroup):
             accumulate_vertices,
             self.S.shape[1],
             blocks(self.elements),
-            self.elements >= self.split_from,
-            self._arrays(np.empty(0, np.int64)),
-            (self.elements, 0),
-            lambda block: self.S.indices[self.S.indptr[block * LANES] :],
+            arrays=self._arrays(np.empty(0, np.int64)),
+            numbers=(self.elements, 0),
+            touched=self._touched if self.elements >= self.split_from else None,
         )
+
+    def _touched(self, block: int) -> np.ndarray:
+        """Vertices of a block and all later ones."""
+        return self.S.indices[self.S.indptr[block * LANES] :]
 
     def kernel_parameters(self) -> np.ndarray:
         return self._manifold

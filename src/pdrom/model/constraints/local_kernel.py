@@ -85,22 +85,22 @@ class LocalKernel:
         function: Callback,
         vertices: int,
         units: int,
-        split: bool,
         arrays: Sequence[np.ndarray],
         numbers: Sequence[int],
         touched: Callable[[int], np.ndarray] | None = None,
         prepares: bool = False,
     ) -> "LocalKernel":
-        """Kernel for ``units`` units, in two parts if ``split``.
+        """Kernel for ``units`` units.
 
         Parameters
         ----------
         arrays, numbers : entries of the record from `OWN` on: the numbers, then the addresses
-        touched : function of a first unit: vertices of this and all later units; without it
-            there is one part
+        touched : function of a first unit: vertices of this and all later units, for a kernel in
+            two parts; without it there is one
+        prepares : whether it wants to be called with `PREPARE`
         """
         middle, second = units, range(0)
-        if split and units > 1 and touched is not None:
+        if touched is not None and units > 1:
             middle = units // 2
             later = touched(middle)
             second = range(int(later.min()), int(later.max()) + 1)

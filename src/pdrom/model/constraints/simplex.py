@@ -61,10 +61,9 @@ class SimplexGroup(StencilGroup):
             self.accumulate_kernel,
             vertices,
             blocks(e),
-            e >= self.split_from,
-            self._arrays(np.empty(0, np.int64)),
-            (self._work.shape[1], 0),
-            lambda block: visited[block * LANES :],
+            arrays=self._arrays(np.empty(0, np.int64)),
+            numbers=(self._work.shape[1], 0),
+            touched=(lambda block: visited[block * LANES :]) if e >= self.split_from else None,
         )
 
     def _visited(self, values: np.ndarray) -> np.ndarray:
@@ -77,10 +76,12 @@ class SimplexGroup(StencilGroup):
 
     def sampler(self, elements: np.ndarray) -> LocalKernel:
         places = elements if self._order is None else np.argsort(self._order)[elements]
-        vertices, arrays = self.S.shape[1], self._arrays(places)
-        numbers = (self._work.shape[1], len(elements))
         return LocalKernel.of(
-            self.project_kernel, vertices, blocks(self.elements), False, arrays, numbers
+            self.project_kernel,
+            self.S.shape[1],
+            blocks(self.elements),
+            arrays=self._arrays(places),
+            numbers=(self._work.shape[1], len(elements)),
         )
 
     def _arrays(self, elements: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -86,11 +86,10 @@ class Lift:
         return LocalKernel.of(
             _accumulate,
             vertices,
-            vertices,
-            self.split,
-            arrays,
-            numbers,
-            lambda first: np.arange(first, vertices),
+            units=vertices,
+            arrays=arrays,
+            numbers=numbers,
+            touched=(lambda first: np.arange(first, vertices)) if self.split else None,
             prepares=True,
         )
 

@@ -20,12 +20,12 @@ from pdrom.reduction.sampling.selection import Selection
 DEPENDENT = 1e-12
 
 
-def s_opt(v: np.ndarray, size: int, count: int | None = None) -> np.ndarray:
-    """Greedy maximisation of the S-measure: ``count`` elements (default r, at most e), int64.
+def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
+    """Greedy maximisation of the S-measure S(A) = (sqrt(det A^T A) / prod_j |A_j|)^(1/r).
 
-    Step k <= r maximises S of the first k modes at k elements, every further step that of all r;
-    the first r elements are nested in r. The first step, where S is 1 for every element, takes the
-    largest norm of the first mode, as classical DEIM does.
+    One element a mode (all e if e < r), nested in r: step k maximises S of the first k modes at k
+    elements. The first step, where S is 1 for every element, takes the largest norm of the first
+    mode, as classical DEIM does.
 
     Parameters
     ----------
@@ -37,12 +37,6 @@ def s_opt(v: np.ndarray, size: int, count: int | None = None) -> np.ndarray:
     SamplingError
         A mode depends on the earlier ones at whatever elements could be taken.
     """
-    path = s_opt_path(v, size)
-    return extend(v, size, path, v.shape[1] if count is None else count)
-
-
-def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
-    """One element a mode (all e if e < r), nested in r; parameters and errors as `s_opt`."""
     state = _Sampled(v, size)
     for mode in range(min(v.shape[1], state.total)):
         state.add(state.best_with(mode), mode)

@@ -18,6 +18,9 @@ from pdrom.reduction.basis.pod import fix_signs, pod
 # Columns that add less than this (relative) to the span are dropped.
 DEPENDENT = 1e-9
 
+# An atom's own motion, beside its affine one, is represented down to this part of it.
+OWN_MOTION = 1e-3
+
 # Motion below this fraction of the positions is round-off.
 ROUNDOFF = 100.0 * np.finfo(float).eps
 
@@ -71,12 +74,11 @@ def build_columns(
     masses: np.ndarray,
     atoms: Sequence[np.ndarray],
     trajectory: np.ndarray,
-    tolerance: float = 1e-3,
 ) -> Columns:
     """Space of ``modes`` (N, k) on the free vertices and of the atoms' own columns.
 
     An atom gets its affine columns and, where its vertices move otherwise in ``trajectory``
-    (n, N, 3), POD modes of that motion down to ``tolerance`` of it.
+    (n, N, 3), POD modes of that motion down to `OWN_MOTION` of it.
     """
     n = len(points)
     held = np.zeros(n, dtype=bool)
@@ -86,7 +88,7 @@ def build_columns(
     weight = np.sqrt(masses[free_vertices])[:, None]
     raw = np.hstack([affine_columns(points), modes])[free_vertices]
     blocks = [(free_vertices, orthonormal(weight * raw) / weight)]
-    blocks += [(a, _atom_columns(a, points, trajectory, modes.shape[1], tolerance)) for a in atoms]
+    blocks += [(a, _atom_columns(a, points, trajectory, modes.shape[1])) for a in atoms]
     total = sum(block.shape[1] for _, block in blocks)
     b = np.zeros((n, total))
     ranges, start = [], 0
@@ -99,14 +101,15 @@ def build_columns(
 
 
 def _atom_columns(
-    atom: np.ndarray, points: np.ndarray, trajectory: np.ndarray, most: int, tolerance: float
+    atom: np.ndarray, points: np.ndarray, trajectory: np.ndarray, most: int
 ) -> np.ndarray:
     affine = orthonormal(affine_columns(points[atom]))
     motion = (trajectory[:, atom] - points[atom]).transpose(1, 0, 2).reshape(len(atom), -1)
     rest = motion - affine @ (affine.T @ motion)
     modes, sigma = pod(rest)
     scale = max(float(np.linalg.norm(motion)), np.finfo(float).eps * np.linalg.norm(points[atom]))
-    count = min(int(np.count_nonzero(sigma > tolerance * scale)), most, len(atom) - affine.shape[1])
+    found = int(np.count_nonzero(sigma > OWN_MOTION * scale))
+    count = min(found, most, len(atom) - affine.shape[1])
     return np.hstack([affine, modes[:, :count]])
 
 

@@ -32,7 +32,6 @@ def ecsw_elements(
     columns: Columns,
     training: Sequence[TrainingFrame],
     tolerances: Sequence[float],
-    most: int | None = None,
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Sampled elements (m,) and their factors xi > 0 (m,) for each tolerance.
 
@@ -47,7 +46,7 @@ def ecsw_elements(
     while True:
         eligible = _eligible(group.elements, count)
         rows, total = training_equations(group, columns, training, eligible)
-        solutions = nnls_path(rows, total, tolerances, most)
+        solutions = nnls_path(rows, total, tolerances)
         if count >= min(group.elements, MOST) or _met(rows, total, solutions, tolerances):
             return [(eligible[support], factors) for support, factors in solutions]
         count *= 2

@@ -17,18 +17,8 @@ CLOSE = 0.7
 BLOCK = 0.2
 
 
-def nnls_early_stop(
-    g: np.ndarray, b: np.ndarray, tolerance: float, most: int | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Non-negative x with || G x - b || <= tolerance || b ||, few entries positive.
-
-    `nnls_path` with one tolerance; for tolerance 0 it is plain NNLS.
-    """
-    return nnls_path(g, b, [tolerance], most)[0]
-
-
 def nnls_path(
-    g: np.ndarray, b: np.ndarray, tolerances: Sequence[float], most: int | None = None
+    g: np.ndarray, b: np.ndarray, tolerances: Sequence[float]
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Non-negative x with || G x - b || <= tolerance || b || for each of several tolerances.
 
@@ -45,7 +35,7 @@ def nnls_path(
     ----------
     g : (m, e) columns, one per element; in Fortran order a pass reads memory in order
     b : (m,)
-    most : largest support; default min(m, e)
+    tolerances : relative residuals; for 0 it is plain NNLS
 
     Returns
     -------
@@ -53,8 +43,7 @@ def nnls_path(
     (n,), and their values (n,). Where a tolerance cannot be reached it is the best x found.
     """
     norms = np.linalg.norm(g, axis=0)
-    most = min(g.shape) if most is None else min(most, *g.shape)
-    search = _Search(g, norms, b, most)
+    search = _Search(g, norms, b)
     found: dict[float, tuple[np.ndarray, np.ndarray]] = {}
     for tolerance in sorted(set(tolerances), reverse=True):
         search.reach(tolerance)
@@ -72,10 +61,10 @@ def nnls_path(
 class _Search:
     """The outer loop: which columns join."""
 
-    def __init__(self, g: np.ndarray, norms: np.ndarray, b: np.ndarray, most: int) -> None:
-        self._g, self._norms, self._most = g, norms, most
+    def __init__(self, g: np.ndarray, norms: np.ndarray, b: np.ndarray) -> None:
+        self._g, self._norms, self._most = g, norms, min(g.shape)
         self._size = float(np.linalg.norm(b))
-        self._state = _ActiveSet(g, norms, b, most)
+        self._state = _ActiveSet(g, norms, b, self._most)
         self._banned = norms == 0.0
         self._safe = np.where(self._banned, 1.0, norms)
         self._alone = False

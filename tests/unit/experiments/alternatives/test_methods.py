@@ -6,9 +6,9 @@ import pytest
 from builders import GROUPS, make_scene
 from pdrom.core.errors import ConfigurationError, SceneError
 from pdrom.experiments.alternatives.solvers.methods import METHODS, alternative
-from pdrom.experiments.alternatives.solvers.substeps import inertia_energy
 from pdrom.experiments.kit.converged import ConvergedStepper
 from pdrom.model.compiled.rows import as_vertices, flat
+from pdrom.model.dynamics.frames import inertia_energy
 from pdrom.model.dynamics.stepper import State
 
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pdrom.core.errors import SamplingError
-from pdrom.reduction.sampling.s_opt import extend, s_opt, s_opt_path
+from pdrom.reduction.sampling.s_opt import extend, s_opt_path
 
 SIZES = st.tuples(
     st.integers(2, 20), st.sampled_from([1, 3, 6]), st.integers(1, 9), st.integers(0, 2**32 - 1)
@@ -25,6 +25,11 @@ def modes(size: tuple[int, int, int, int], kind: str = "orthonormal") -> np.ndar
     if kind == "dependent":
         return v[:, :1] + 1e-3 * v
     return np.linalg.qr(v)[0]
+
+
+def s_opt(v: np.ndarray, size: int, count: int | None = None) -> np.ndarray:
+    """One element a mode, then further ones up to ``count``."""
+    return extend(v, size, s_opt_path(v, size), v.shape[1] if count is None else count)
 
 
 def s_measure(a: np.ndarray) -> float:

@@ -212,4 +212,3 @@ def test_the_choice_is_repeatable(pulled):
     one, two = (ecsw_elements(scene.groups[0], columns, training, [1e-2])[0] for _ in range(2))
     np.testing.assert_array_equal(one[0], two[0])
     np.testing.assert_array_equal(one[1], two[1])
-    assert len(ecsw_elements(scene.groups[0], columns, training, [0.0], most=5)[0][0]) == 5
