@@ -71,7 +71,7 @@ def held_sets(scene: Scene) -> list[np.ndarray]:
 
 
 def kept_velocity(scene: Scene) -> np.ndarray:
-    """Velocity left by a frame over it, D = 1 - h c, (N,); ValueError for a force that has none."""
+    """Factor of a frame on a velocity, D = 1 - h c, (N,); ValueError for a force without rate."""
     rates = np.zeros(scene.mesh.vertices)
     for force in scene.forces:
         if force.rate is None:
