@@ -20,8 +20,6 @@ for name, job in PLAN.figure_jobs.items():
             job.log,
         group:
             "report"
-        resources:
-            **PLAN.resources("figure"),
         params:
             order=job.order.model_dump(mode="json"),
             rst=job.rst,

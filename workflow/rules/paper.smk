@@ -11,8 +11,6 @@ rule paper_inputs:
         f"{PLAN.results}/logs/paper/inputs.log",
     group:
         "report"
-    resources:
-        **PLAN.resources("paper"),
     params:
         facts=PLAN.paper.facts.model_dump(mode="json"),
         content=PLAN.digest(*PLAN.paper.sources, "paper/references.bib"),
@@ -34,8 +32,6 @@ rule paper:
         f"{PLAN.results}/logs/paper/main.log",
     group:
         "report"
-    resources:
-        **PLAN.resources("paper"),
     params:
         facts=PLAN.paper.facts.model_dump(mode="json"),
         content=PLAN.digest(*PLAN.paper.sources),

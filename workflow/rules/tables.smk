@@ -16,8 +16,6 @@ for table in PLAN.tables:
             PLAN.tables.log(table),
         group:
             "report"
-        resources:
-            **PLAN.resources("table"),
         params:
             **PLAN.tables.params(table),
         message:

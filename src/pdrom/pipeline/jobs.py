@@ -11,7 +11,6 @@ from typing import Any
 from pdrom.core.paths import Place
 from pdrom.core.reads import EachOf, Every, ProjectFile, SourcesOf
 from pdrom.experiments.kit.declaration import Experiment, JobSettings, Source, experiments
-from pdrom.pipeline.costs import Request, Size
 from pdrom.pipeline.fingerprint import fingerprint
 from pdrom.pipeline.holdings import labels_of
 from pdrom.pipeline.providers import provide, scaled_methods
@@ -87,25 +86,8 @@ class Jobs:
         return self._study.settings.threads if "threads" in experiment.settings.model_fields else 1
 
     def resources(self, experiment: Experiment) -> dict[str, Any]:
-        """Memory (MB) and minutes that a job asks a cluster for; a whole node to be alone on it."""
-
-        def request(job: _Job) -> Request:
-            return self._study.costs.request(
-                experiment.name, self.size(job.labels), job.labels.get("method")
-            )
-
-        asked = {
-            "mem_mb": self._of(experiment, lambda job: request(job).memory_mb),
-            "runtime": self._of(experiment, lambda job: request(job).minutes),
-        }
-        return {**asked, "slurm_extra": "--exclusive"} if experiment.alone else asked
-
-    def size(self, labels: Labels) -> Size | None:
-        """Size of a job's scene, which its cost grows with; None without a scene."""
-        if "scene" not in labels:
-            return None
-        size = self._study.size(labels["scene"])
-        return size.refined(float(labels["factor"])) if "factor" in labels else size
+        """A whole node of a cluster for a job that is to be alone; see also the profile."""
+        return {"slurm_extra": "--exclusive"} if experiment.alone else {}
 
     def group(self, experiment: Experiment) -> str | None:
         """Group of jobs of which a cluster runs those that hang together as one batch.

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -127,21 +127,6 @@ class Plan:
         """The manuscript."""
         captions = {name: job.tex for name, job in self.figure_jobs.items()}
         return paper_job(self.study, captions, self.configuration, self.results)
-
-    # Resources ------------------------------------------------------------------------------
-
-    def resources(self, kind: str) -> dict[str, Any]:
-        """Memory (MB) and minutes that a job without a scene asks a cluster for."""
-        request = self.study.costs.request(kind)
-        return {"mem_mb": request.memory_mb, "runtime": request.minutes}
-
-    def seconds(self, rule: str, labels: Mapping[str, str]) -> float:
-        """Expected processor time of a job, by the measured jobs of the full study."""
-        cost = self.study.costs.cost
-        if rule in {experiment.name for experiment in self.jobs.experiments}:
-            return cost(rule, self.jobs.size(labels), labels.get("method")).seconds
-        others = {"table": rule.endswith("_table"), "paper": rule.startswith("paper")}
-        return cost(next((kind for kind, held in others.items() if held), "figure")).seconds
 
     # Code -----------------------------------------------------------------------------------
 

@@ -4,7 +4,7 @@ import atexit
 import logging
 import sys
 from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from snakemake_interface_logger_plugins.common import LogEvent
 
@@ -32,11 +32,11 @@ class Preview(logging.Handler):
 
     Parameters
     ----------
-    seconds : expected processor time of a job, by its rule and its labels
+    seconds : expected processor time of a job, given its log
     cores : how many there are; a job that is alone claims all of them
     """
 
-    def __init__(self, seconds: Callable[[str, Mapping[str, str]], float], cores: int) -> None:
+    def __init__(self, seconds: Callable[[str], float], cores: int) -> None:
         super().__init__(logging.INFO)
         self._of_job, self._cores = seconds, cores
         self._jobs: Counter[str] = Counter()
@@ -51,8 +51,8 @@ class Preview(logging.Handler):
             return
         self._jobs[record.rule_name] += 1
         self._reasons[record.rule_name] |= shortened(record.reason)
-        if record.output:  # what only names targets takes no time
-            seconds = self._of_job(record.rule_name, record.wildcards)
+        if record.log:  # what only names targets has none
+            seconds = self._of_job(str(record.log[0]))
             self._processor += seconds
             self._wall += seconds * min(record.threads, self._cores) / self._cores
 
@@ -80,7 +80,7 @@ def shortened(reason: str) -> set[str]:
     return {REASONS[text] for text in own}
 
 
-def preview(seconds: Callable[[str, Mapping[str, str]], float], cores: int) -> None:
+def preview(seconds: Callable[[str], float], cores: int) -> None:
     """Have this process say at its end what its dry run has planned, see `Preview`."""
     planned = Preview(seconds, cores)
     logging.getLogger("snakemake.logging").addHandler(planned)

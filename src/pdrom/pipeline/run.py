@@ -9,11 +9,10 @@ from typing import Any
 
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.paths import CRATE
-from pdrom.pipeline import slurm_executor
 from pdrom.pipeline.cluster import EXECUTOR, JOBSTEP, check_nodes
 from pdrom.pipeline.commandline import CommandLine, options
 from pdrom.pipeline.dates import settle_dates
-from pdrom.pipeline.expectation import tell_expectation
+from pdrom.pipeline.expectation import expected_seconds, tell_expectation
 from pdrom.pipeline.failures import Failures, listen
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.full import apart
@@ -54,8 +53,6 @@ class Run:
                 hold()
                 settle_dates(DATED)
                 remember(command)
-                if command.executor == EXECUTOR:
-                    slurm_executor.install(EXECUTOR, slurm_executor.patient)
         except PdromError as error:
             sys.exit(f"pdrom: {error}")
         return cls(command, listen())
@@ -71,7 +68,7 @@ class Run:
         except PdromError as error:
             sys.exit(f"pdrom: {error}")
         if self.command.plans:
-            preview(plan.seconds, cores)
+            preview(expected_seconds(plan), cores)
 
     def _check_report(self, folders: Folders) -> None:
         asked = self.command.report and not self.command.targets
@@ -140,8 +137,6 @@ def start_batch(workflow: Any) -> None:
     """
     if workflow.remote_exec and JOBSTEP not in sys.argv:
         start_server()
-    elif workflow.remote_exec:
-        slurm_executor.install(JOBSTEP, slurm_executor.waiting)
 
 
 def say_compilation(cache: str) -> None:

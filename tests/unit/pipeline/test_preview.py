@@ -5,12 +5,7 @@ import logging
 import pytest
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from pdrom.core.yamlfile import read_yaml
-from pdrom.pipeline.costs import CostModel
-from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.preview import Preview, shortened
-from pdrom.pipeline.study import Study
-from places import ROOT
 
 
 @pytest.mark.parametrize(
@@ -29,11 +24,11 @@ def test_reasons_are_told_without_the_files(reason, words):
     assert shortened(reason) == words
 
 
-def job(rule, reason, output=("a",), threads=1, **labels):
+def job(rule, reason, *logs, threads=1):
     return logging.makeLogRecord(
         {
             "event": LogEvent.JOB_INFO, "rule_name": rule, "reason": reason, "threads": threads,
-            "output": list(output), "wildcards": labels,
+            "log": logs,
         }
     )  # fmt: skip
 
@@ -42,12 +37,12 @@ END = logging.makeLogRecord({"msg": "This was a dry-run (flag -n). The order of 
 
 
 def test_jobs_are_counted_by_rule_and_their_times_added():
-    seconds = {"fom": 600.0, "timing": 1200.0}
-    preview = Preview(lambda rule, labels: seconds[rule] * float(labels["scale"]), cores=2)
-    preview.emit(job("fom", "Missing output files: a", scale=1.0))
-    preview.emit(job("fom", "Params have changed since last execution: {}", scale=3.0))
-    preview.emit(job("timing", "Missing output files: a", threads=8, scale=1.0))
-    preview.emit(job("all", "Input files updated by another job: a", output=()))
+    seconds = {"fom/a.log": 600.0, "fom/b.log": 1800.0, "timing.log": 1200.0}
+    preview = Preview(seconds.__getitem__, cores=2)
+    preview.emit(job("fom", "Missing output files: a", "fom/a.log"))
+    preview.emit(job("fom", "Params have changed since last execution: {}", "fom/b.log"))
+    preview.emit(job("timing", "Missing output files: a", "timing.log", threads=8))
+    preview.emit(job("all", "Input files updated by another job: a"))
     assert preview.text() == ""
     preview.emit(END)
     assert preview.text().splitlines() == [
@@ -59,17 +54,6 @@ def test_jobs_are_counted_by_rule_and_their_times_added():
 
 
 def test_what_has_nothing_to_do_says_no_more():
-    preview = Preview(lambda rule, labels: 1.0, cores=1)
+    preview = Preview(lambda log: 1.0, cores=1)
     preview.emit(logging.makeLogRecord({"msg": "Nothing to be done"}))
     assert preview.text() == ""
-
-
-def test_a_job_takes_what_jobs_of_its_kind_were_measured_to_take(monkeypatch):
-    monkeypatch.chdir(ROOT)
-    tiny = read_yaml(ROOT / "config" / "default.yaml") | read_yaml(ROOT / "config" / "tiny.yaml")
-    plan, costs = Plan(Study.load(tiny | {"scenes": ["spring_oop"]})), CostModel.load(ROOT)
-    run = {"scene": "spring_oop", "run": "train"}
-    assert plan.seconds("fom", run) == costs.cost("fom", plan.study.size("spring_oop")).seconds
-    assert plan.seconds("budget_table", {}) == costs.cost("table").seconds
-    assert plan.seconds("figure_budget", {}) == costs.cost("figure").seconds
-    assert plan.seconds("paper_inputs", {}) == costs.cost("paper").seconds
