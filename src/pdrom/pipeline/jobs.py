@@ -3,15 +3,13 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from hashlib import sha256
 from operator import attrgetter
-from pathlib import Path
 from typing import Any
 
 from pdrom.core.paths import Place
 from pdrom.core.reads import EachOf, Every, ProjectFile, SourcesOf
 from pdrom.experiments.kit.declaration import Experiment, JobSettings, Source, experiments
-from pdrom.pipeline.fingerprint import fingerprint
+from pdrom.pipeline.fingerprint import digest, fingerprint
 from pdrom.pipeline.holdings import labels_of
 from pdrom.pipeline.providers import provide, scaled_methods
 from pdrom.pipeline.study import Study
@@ -162,17 +160,6 @@ class Jobs:
         if modules not in self._prints:
             self._prints[modules] = fingerprint(*modules)
         return self._prints[modules]
-
-
-def digest(root: Path, *names: str) -> str:
-    """Checksum of files that people edit, 16 hexadecimal digits.
-
-    Snakemake compares dates of files, which a copy, an archive or a wrong clock may set back; as a
-    parameter of a rule, the content itself decides.
-    """
-    files = [root / name for name in names]
-    content = b"".join(sha256(f.read_bytes()).digest() for f in files if f.is_file())
-    return sha256(content).hexdigest()[:16]
 
 
 def _listed(files: str | list[str]) -> list[str]:

@@ -12,9 +12,9 @@ from pdrom.core.logs import planning_log
 from pdrom.core.paths import RESULTS
 from pdrom.experiments.hard_cases.expectations import load_expectations
 from pdrom.pipeline.figures import FigureJob, figure_jobs
-from pdrom.pipeline.fingerprint import fingerprint
+from pdrom.pipeline.fingerprint import digest, fingerprint
 from pdrom.pipeline.full import FULL_STUDY
-from pdrom.pipeline.jobs import Jobs, digest
+from pdrom.pipeline.jobs import Jobs
 from pdrom.pipeline.paper import PaperJob, check_texts, paper_job
 from pdrom.pipeline.scene_artifacts import SceneArtifacts
 from pdrom.pipeline.scenes import require_scenes
@@ -100,7 +100,7 @@ class Plan:
     # Parameters -----------------------------------------------------------------------------
 
     def digest(self, *paths: str) -> str:
-        """See `pdrom.pipeline.jobs.digest`."""
+        """See `pdrom.pipeline.fingerprint.digest`."""
         return digest(self.root, *paths)
 
     def method_spec(self, method: str) -> dict[str, Any]:

@@ -7,9 +7,8 @@ from typing import Any
 
 from pdrom.core.paths import SUBSPACES, TIMINGS, VIEWER
 from pdrom.pipeline.figures import holdings_of
-from pdrom.pipeline.fingerprint import fingerprint
+from pdrom.pipeline.fingerprint import digest, fingerprint
 from pdrom.pipeline.holdings import paths_of
-from pdrom.pipeline.jobs import digest
 from pdrom.pipeline.scenes import require_scenes
 from pdrom.pipeline.study import Study
 from pdrom.report.scenes.catalogue import ARTIFACTS, PAGE, SceneArtifact, module

@@ -37,12 +37,12 @@ from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.pipeline.scenes import (
     Coarsen,
+    Variants,
     bind,
     load_bound_scene,
     read_scene,
     scene_names,
 )
-from pdrom.pipeline.variants import Variants
 from pdrom.reduction.local.ranks import Rank
 from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
 from pdrom.report.viewer.settings import Viewer

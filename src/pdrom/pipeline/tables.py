@@ -9,9 +9,8 @@ from pdrom.core import paths
 from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.reads import Every, PerScene, Preferred, ProjectFile, Read, Setting, TableOf
 from pdrom.model.scene import SceneConfig
-from pdrom.pipeline.fingerprint import fingerprint
+from pdrom.pipeline.fingerprint import digest, fingerprint
 from pdrom.pipeline.holdings import paths_of, preferred_paths
-from pdrom.pipeline.jobs import digest
 from pdrom.pipeline.study import Study
 from pdrom.report.codecheck import FILE as CODECHECK
 from pdrom.report.codecheck import codecheck

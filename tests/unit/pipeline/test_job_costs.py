@@ -10,11 +10,12 @@ import yaml
 from pdrom.core.errors import PdromError
 from pdrom.core.usage import Usage
 from pdrom.experiments.kit.declaration import experiments
-from pdrom.pipeline.expectation import COLUMNS, MEASURED, expected_seconds, measured_costs
+from pdrom.pipeline.expectation import expected_seconds
 from pdrom.pipeline.scenes import Coarsen
+from pdrom.pipeline.tracked import COLUMNS, COSTS, main, measured_costs
 from places import ROOT
 
-TABLE = pd.read_csv(ROOT / MEASURED).set_index("kind")
+TABLE = pd.read_csv(ROOT / COSTS).set_index("kind")
 PROFILE = yaml.safe_load((ROOT / "workflow/profiles/slurm/config.yaml").read_text("utf-8"))
 # What a job needs beside its own: two processes of Snakemake, each of which makes the plan, and the
 # process that jobs are forked from.
@@ -78,6 +79,11 @@ def test_costs_are_read_from_the_logs_of_two_runs(tmp_path):
         ["fom", 4.0, 0.5, 4.0, 250],
         ["guard", 7.0, 0.25, 8.0, 200],
     ]
+
+
+def test_what_git_does_not_keep_is_not_written():
+    with pytest.raises(PdromError, match=r"'cost': unknown .*did you mean 'costs'"):
+        main(["cost"])
 
 
 def test_without_a_run_it_says_so(tmp_path):

@@ -11,9 +11,8 @@ from pdrom.core.machine import Machine
 from pdrom.core.paths import MACHINE, RESULTS, TABLE, Place
 from pdrom.core.store import Condition, check_file, read_table, write_table
 from pdrom.core.usage import MB, Usage, usage_of
-from pdrom.pipeline.commandline import CommandLine
+from pdrom.pipeline.commandline import CommandLine, recall
 from pdrom.pipeline.folders import DEFAULT, Folders
-from pdrom.pipeline.last_run import recall
 from pdrom.pipeline.plan import Plan
 from pdrom.verification.claim_map.entries import Entry, entries
 

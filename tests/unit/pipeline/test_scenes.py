@@ -11,10 +11,9 @@ from pdrom.core.paths import LABELS
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.pipeline.plan import Plan
-from pdrom.pipeline.scenes import read_scene
+from pdrom.pipeline.scenes import Variants, read_scene
 from pdrom.pipeline.study import Study
 from pdrom.pipeline.targets import known
-from pdrom.pipeline.variants import Variants
 from places import ROOT
 
 SECTION = Variants(
