@@ -14,7 +14,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from pdrom.core.errors import PdromError, StorageError
-from pdrom.core.provenance import made_by
 from pdrom.core.reads import Every, Preferred
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.plan import Plan
@@ -101,8 +100,7 @@ def _make_table(plan: Plan, name: str, folder: Path) -> None:
 def _draw(plan: Plan, name: str, folder: Path) -> None:
     job = plan.figure_jobs[name]
     pdf, png = (str(folder / Path(path).name) for path in (job.pdf, job.png))
-    with made_by(f"figure_{name}", job.order.model_dump(mode="json"), job.code):
-        draw(job.order, plan.results, pdf, png)
+    draw(job.order, plan.results, pdf, png)
 
 
 def _write_inputs(plan: Plan, folder: Path) -> None:
@@ -112,7 +110,5 @@ def _write_inputs(plan: Plan, folder: Path) -> None:
 
 
 def _build(plan: Plan, manuscript: str, folder: Path) -> None:
-    paper, code = plan.paper, plan.code("pdrom.report.paper.build")
     output = str(folder / Path(manuscript).name)
-    with made_by("paper", paper.facts.model_dump(mode="json"), code):
-        build(paper.sources[0], plan.figures, paper.inputs, output)
+    build(plan.paper.sources[0], plan.figures, plan.paper.inputs, output)
