@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 
 from pdrom.core.yamlfile import read_yaml
-from pdrom.pipeline.configfiles import check_files
+from pdrom.pipeline.commandline import check_files
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.study import Study
 from places import CONFIG, ROOT

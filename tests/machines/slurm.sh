@@ -4,8 +4,9 @@
 # usage (as root): tests/machines/slurm.sh RESULTS [FOLDER]
 #
 # RESULTS is the folder of the tiny study made without SLURM (.../results/studies/tiny). HEAD is cloned into FOLDER (else a temporary one) and
-# run there by the profile of the project. While the first command runs, one of its jobs is cancelled: the run has to say so.
-# The same command goes on from there, and the controller is restarted under it. Tables (without what a clock says) and runs must
+# run there by the profile of the project. While the first command runs, one of its jobs is cancelled: the run, which may not
+# submit it again, has to say so. The same command goes on from there, with the profile's patch of the executor: another job is
+# cancelled, which has to be submitted again, and the controller is restarted. Tables (without what a clock says) and runs must
 # then be those of RESULTS, bit by bit; and jobs that no node can take must be refused. At last a controller without accounting
 # is away for longer than the executor asks: a run has to come to its end all the same.
 set -euo pipefail
@@ -40,6 +41,12 @@ wait_for_job() { # PROCESS LOG
         sleep 1
     done
 }
+cancel() {
+    local victim
+    victim=$(squeue --noheader --states=RUNNING --format=%i | tail -n 1)
+    scancel "$victim"
+    echo "cancelled job $victim"
+}
 restart() { # SECONDS
     "$service" stop-controller
     echo "the controller is gone for $1 s"
@@ -56,20 +63,20 @@ grep "it would wait for ever" too_many.log || fail "the refusal is missing: $(ta
 rm too_many.log
 
 step "a run, one job of which is cancelled"
-"${command[@]}" >"$folder/.cache/first.log" 2>&1 &
+"${command[@]}" --retries 0 >"$folder/.cache/first.log" 2>&1 &
 run=$!
 wait_for_job "$run" "$folder/.cache/first.log"
-victim=$(squeue --noheader --states=RUNNING --format=%i | tail -n 1)
-scancel "$victim"
-echo "cancelled job $victim"
+cancel
 if wait "$run"; then fail "the run did not notice"; fi
 tail -n 6 "$folder/.cache/first.log"
 grep -q "cancelled" "$folder/.cache/first.log" || fail "the run does not say that a job was cancelled"
 
-step "the same command, and a controller that is restarted"
+step "the same command, a job that is cancelled, and a controller that is restarted"
+patch -p1 -d .venv/lib/python3.*/site-packages <workflow/profiles/slurm/executor.patch
 "${command[@]}" >"$folder/.cache/second.log" 2>&1 &
 run=$!
 wait_for_job "$run" "$folder/.cache/second.log"
+cancel
 restart 20
 wait "$run" || fail "the run failed: $(tail -n 20 "$folder/.cache/second.log")"
 tail -n 8 "$folder/.cache/second.log"

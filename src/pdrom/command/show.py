@@ -68,13 +68,12 @@ def _hdf5(path: Path, whole: bool) -> Iterator[str]:
 
 
 def _provenance(path: Path) -> Iterator[str]:
-    """What made the file, by its seal, which is compared with the file, else by what is in it."""
-    from pdrom.core.embedded import embedded
+    """What made the file, by its seal, which is compared with the file."""
     from pdrom.core.provenance import RECORD
     from pdrom.core.store import provenance_of
 
-    record = provenance_of(path) or embedded(path)
-    yield "provenance:" if record else "provenance: unknown (no seal, and nothing inside says it)"
+    record = provenance_of(path)
+    yield "provenance:" if record else "provenance: unknown (no seal says it)"
     yield from (f"  {name}: {record[name]}" for name in RECORD if name in record)
 
 

@@ -154,3 +154,5 @@ SCENE_VIEWER = Place("scenes/{scene}/viewer.html")
 VIEWER = Place("viewer/index.html")
 SCENE_TABLE = Place("scenes/{scene}/{name}.csv")
 SCENE_RUNS = Place("scenes/{scene}/runs.csv")
+
+PLACES = tuple(place for place in vars().copy().values() if isinstance(place, Place))

@@ -1,5 +1,11 @@
-"""What a command line asks of Snakemake: configuration, targets, whether jobs will run."""
+"""The command line: configuration, targets, whether jobs will run; the one of the last run.
 
+The configuration files are checked before Snakemake reads them. It would take the last of two equal
+keys without a word, run code that a file asks for (``__use_yte__``), and show a traceback for a
+file that is no text.
+"""
+
+import json
 import shlex
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -8,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from pdrom.core.errors import ConfigurationError
+from pdrom.core.yamlfile import read_yaml, shown
 
 # Options with which Snakemake prints or draws something and runs no job.
 LOOKS_ONLY = (
@@ -19,6 +26,8 @@ LOOKS_ONLY = (
 # Options whose own output is not to be replaced by one line a job.
 OWN_OUTPUT = ("logger", "quiet", "verbose", "printshellcmds", "debug_dag")
 YAML = (".yaml", ".yml", ".json")
+TEMPLATE_KEY = "__use_yte__"
+RECORD = Path(".snakemake/last_run.json")
 
 
 @dataclass(frozen=True)
@@ -136,3 +145,41 @@ def _reports(found: dict[str, Any]) -> bool:
 
 def _report(found: dict[str, Any]) -> str | None:
     return str(found["report"]) if found["report"] and _reports(found) else None
+
+
+def check_files(paths: Iterable[str | Path]) -> None:
+    """Read every file; ConfigurationError for one that is no plain mapping of keys."""
+    for path in map(Path, paths):
+        content = read_yaml(path)
+        if not isinstance(content, dict):
+            found = "nothing" if content is None else shown(content, 60)
+            raise ConfigurationError(f"{path}: a mapping of keys is required, found {found}")
+        if TEMPLATE_KEY in content:
+            raise ConfigurationError(f"{path}: {TEMPLATE_KEY}: templates are not allowed")
+
+
+def check_or_exit(*paths: str | Path) -> None:
+    """`check_files`; a fault ends the process with one line."""
+    try:
+        check_files(paths)
+    except ConfigurationError as error:
+        sys.exit(f"pdrom: {error}")
+
+
+def remember(command: CommandLine) -> None:
+    """Note which configuration runs."""
+    # late: it loads NumPy, which the environment is to be settled before
+    from pdrom.core.store import atomic_path
+
+    text = json.dumps({"configfiles": command.configfiles, "settings": command.settings})
+    with atomic_path(RECORD) as path:
+        path.write_text(text + "\n", encoding="utf-8")
+
+
+def recall() -> list[str]:
+    """Options that name the configuration of the last run; none of the default one or of no run."""
+    try:
+        record = json.loads(RECORD.read_text(encoding="utf-8"))
+        return options(map(str, record["configfiles"]), map(str, record["settings"]))
+    except (OSError, ValueError, KeyError, TypeError):
+        return []

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 
 from pdrom.core import paths
 from pdrom.core.paths import Place
+from pdrom.pipeline.scenes import not_taken
 from pdrom.pipeline.study import Study
-from pdrom.pipeline.subspace_scenes import not_taken
 
 Labels = dict[str, str]
 Factors = dict[str, tuple[float, ...]]

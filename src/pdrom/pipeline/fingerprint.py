@@ -1,7 +1,9 @@
 """Fingerprints of code: what a workflow step runs, comments and docstrings left aside.
 
 Snakemake notices a change of a rule's parameters but not of a module that its script imports. A
-rule therefore carries the fingerprint of the modules it uses as a parameter.
+rule therefore carries the fingerprint of the modules it uses as a parameter. A script it runs again
+when the script is younger than its results, as all are after a wrong clock or a copy: the code of a
+script is a parameter of its rule as well.
 """
 
 import ast
@@ -9,7 +11,7 @@ import hashlib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import pdrom
 from pdrom.core.errors import ConfigurationError
@@ -19,6 +21,7 @@ PACKAGE = "pdrom"
 # Left out of fingerprints: these modules say where files lie, which changes no result; Snakemake
 # compares the paths of a job's files itself. So adding a kind of file makes no job run again.
 LAYOUT = {"pdrom.core.paths", "pdrom.artifact.reads"}
+SCRIPTS = Path("workflow/scripts")
 
 
 def fingerprint(*places: str) -> str:
@@ -43,17 +46,6 @@ def fingerprint(*places: str) -> str:
     for name in closure(*places):
         digest.update(f"{name} {_read(name).digest}\n".encode())
     return digest.hexdigest()
-
-
-def digest(root: Path, *names: str) -> str:
-    """Checksum of files that people edit, 16 hexadecimal digits.
-
-    Snakemake compares dates of files, which a copy, an archive or a wrong clock may set back; as a
-    parameter of a rule, the content itself decides.
-    """
-    files = [root / name for name in names]
-    content = b"".join(hashlib.sha256(f.read_bytes()).digest() for f in files if f.is_file())
-    return hashlib.sha256(content).hexdigest()[:16]
 
 
 def closure(*places: str) -> list[str]:
@@ -175,3 +167,35 @@ def _is_string(statement: ast.stmt) -> bool:
         and isinstance(statement.value, ast.Constant)
         and isinstance(statement.value.value, str)
     )
+
+
+def digest(root: Path, *names: str) -> str:
+    """Checksum of files that people edit, 16 hexadecimal digits.
+
+    Snakemake compares dates of files, which a copy, an archive or a wrong clock may set back; as a
+    parameter of a rule, the content itself decides.
+    """
+    files = [root / name for name in names]
+    content = b"".join(hashlib.sha256(f.read_bytes()).digest() for f in files if f.is_file())
+    return hashlib.sha256(content).hexdigest()[:16]
+
+
+def track_scripts(workflow: Any) -> None:
+    """Give the rules of Snakemake's workflow their scripts as parameters, in place of dates."""
+    for rule in workflow.rules:
+        if rule.script:
+            rule.set_params(script=_script(SCRIPTS / Path(rule.script).name))
+    # the settings that it is computed from come after the rules were read
+    type(workflow).rerun_triggers = property(_triggers)
+
+
+def _triggers(workflow: Any) -> frozenset[Any]:
+    # late: a plan is made without Snakemake, too
+    from snakemake.settings.types import RerunTrigger
+
+    return frozenset(workflow.dag_settings.rerun_triggers) - {RerunTrigger.CODE}
+
+
+def _script(path: Path) -> str:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()[:16]

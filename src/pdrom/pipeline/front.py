@@ -15,12 +15,10 @@ from typing import NoReturn
 from pdrom.core.errors import PdromError
 from pdrom.core.logs import INTERRUPTED
 from pdrom.pipeline.cluster import install_executor
-from pdrom.pipeline.commandline import CommandLine
-from pdrom.pipeline.configfiles import check_files
+from pdrom.pipeline.commandline import CommandLine, check_files, recall
 from pdrom.pipeline.environment import settle
 from pdrom.pipeline.folders import Folders, folders
-from pdrom.pipeline.last_run import recall
-from pdrom.pipeline.stopping import end_at_sigterm
+from pdrom.pipeline.running import end_at_sigterm
 
 # Snakemake's default scheduler solves an integer program for each choice among the jobs; they are
 # short, so that this takes longer than it saves. After every choice it starts a timer, as long as

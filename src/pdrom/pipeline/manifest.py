@@ -21,7 +21,6 @@ from pdrom.core.yamlfile import describe
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.scenes import scene_names
-from pdrom.pipeline.targets import PLACES
 
 LARGE = ".h5"
 _ENVIRONMENT = ("pdrom_version", "python_version", "library_versions")
@@ -137,7 +136,7 @@ def _visible(results: str) -> Iterator[str]:
 
 def _is_target(path: str, results: str, scenes: set[str], methods: set[str]) -> bool:
     """Whether a target may name the file: something of a scene that there is."""
-    for place in PLACES:
+    for place in paths.PLACES:
         try:
             labels = place.file(path).labels
         except StorageError:

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -14,9 +14,8 @@ from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.logs import planning_log
 from pdrom.core.paths import TABLE
 from pdrom.experiments.hard_cases.expectations import load_expectations
-from pdrom.experiments.kit.declaration import Experiment, experiments
+from pdrom.experiments.kit.declaration import experiments
 from pdrom.pipeline.contents import paths_of
-from pdrom.pipeline.costs import Request, Size
 from pdrom.pipeline.figures import FigureJob, figure_jobs
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.full import FULL_STUDY
@@ -157,40 +156,3 @@ class Plan:
         return paper_jobs(
             self.study, self.figure_jobs, self.configuration, self.results, self.manuscript
         )
-
-    # Resources ------------------------------------------------------------------------------
-
-    def resources(self, kind: str) -> dict[str, Any]:
-        """Memory (MB) and minutes that a job without a scene asks a cluster for."""
-        request = self.study.costs.request(kind)
-        return {"mem_mb": request.memory_mb, "runtime": request.minutes}
-
-    def resources_of(self, experiment: Experiment) -> dict[str, Any]:
-        """Memory (MB) and minutes that a job asks a cluster for; a whole node to be alone on it."""
-
-        def request(wildcards: Labels) -> Request:
-            labels = self.job(experiment, wildcards).labels
-            return self.study.costs.request(
-                experiment.name, self.size(labels), labels.get("method")
-            )
-
-        asked = {
-            "mem_mb": lambda wildcards: request(wildcards).memory_mb,
-            "runtime": lambda wildcards: request(wildcards).minutes,
-        }
-        return {**asked, "slurm_extra": "--exclusive"} if experiment.alone else asked
-
-    def size(self, labels: Labels) -> Size | None:
-        """Size of a job's scene, which its cost grows with; None without a scene."""
-        if "scene" not in labels:
-            return None
-        size = self.study.size(labels["scene"])
-        return size.refined(float(labels["factor"])) if "factor" in labels else size
-
-    def seconds(self, rule: str, labels: Mapping[str, str]) -> float:
-        """Expected processor time of a job, by the measured jobs of the full study."""
-        cost = self.study.costs.cost
-        if rule in self.experiments:
-            return cost(rule, self.size(labels), labels.get("method")).seconds
-        others = {"table": rule.endswith("_table"), "paper": rule.startswith("paper")}
-        return cost(next((kind for kind, held in others.items() if held), "figure")).seconds

@@ -66,7 +66,8 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> Rule:
         # scenes have no job in common but their meshes, so that each is a batch on a cluster
         group=None if experiment.alone or "scene" not in experiment.labels else "scene",
         threads=_threads(plan, experiment, cores),
-        resources=plan.resources_of(experiment),
+        # a job that is to be alone gets a whole node of a cluster
+        resources={"slurm_extra": "--exclusive"} if experiment.alone else {},
         params={
             "artifact": experiment.address,
             "settings": of(lambda job: job.settings),
@@ -107,7 +108,7 @@ def _fixed(plan: Plan, job: Job, kind: str, message: str, shown: dict[str, dict[
         log=f"{plan.results}/logs/{KINDS[kind]}/{artifact.name}.log",
         group="report",
         threads=1,
-        resources=plan.resources(kind),
+        resources={},
         params={
             "artifact": artifact.address,
             "settings": job.settings,

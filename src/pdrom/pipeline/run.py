@@ -9,22 +9,24 @@ from typing import Any
 
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.paths import CRATE
-from pdrom.pipeline import slurm_executor
 from pdrom.pipeline.cluster import EXECUTOR, JOBSTEP, check_nodes
-from pdrom.pipeline.commandline import CommandLine, options
-from pdrom.pipeline.dates import settle_dates
-from pdrom.pipeline.expectation import tell_expectation
+from pdrom.pipeline.commandline import CommandLine, options, recall, remember
+from pdrom.pipeline.expectation import expected_seconds, tell_expectation
 from pdrom.pipeline.failures import Failures, listen
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.full import apart
-from pdrom.pipeline.last_run import recall, remember
 from pdrom.pipeline.manifest import write_manifest
 from pdrom.pipeline.plan import Plan
-from pdrom.pipeline.preview import preview
-from pdrom.pipeline.running import FOLDER, hold, remove_stale_locks
-from pdrom.pipeline.scheduler import cancel_timers
-from pdrom.pipeline.stopping import end_at_sigterm, stop_at_sigterm
-from pdrom.pipeline.summary import configuration, summary
+from pdrom.pipeline.running import (
+    FOLDER,
+    cancel_timers,
+    end_at_sigterm,
+    hold,
+    remove_stale_locks,
+    settle_dates,
+    stop_at_sigterm,
+)
+from pdrom.pipeline.summary import configuration, preview, summary
 from pdrom.pipeline.targets import Rule, known
 from pdrom.pipeline.warm import hold_pipe, start_server
 
@@ -54,8 +56,6 @@ class Run:
                 hold()
                 settle_dates(DATED)
                 remember(command)
-                if command.executor == EXECUTOR:
-                    slurm_executor.install(EXECUTOR, slurm_executor.patient)
         except PdromError as error:
             sys.exit(f"pdrom: {error}")
         return cls(command, listen())
@@ -71,7 +71,7 @@ class Run:
         except PdromError as error:
             sys.exit(f"pdrom: {error}")
         if self.command.plans:
-            preview(plan.seconds, cores)
+            preview(expected_seconds(plan), cores)
 
     def _check_report(self, folders: Folders) -> None:
         asked = self.command.report and not self.command.targets
@@ -140,8 +140,6 @@ def start_batch(workflow: Any) -> None:
     """
     if workflow.remote_exec and JOBSTEP not in sys.argv:
         start_server()
-    elif workflow.remote_exec:
-        slurm_executor.install(JOBSTEP, slurm_executor.waiting)
 
 
 def say_compilation(cache: str) -> None:

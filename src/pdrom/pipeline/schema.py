@@ -1,11 +1,17 @@
-"""JSON schemas of scene and study files, by which editors complete keys and mark faults.
+"""JSON schemas of scene and study files, by which editors complete keys and mark faults; defaults.
 
-``.venv/bin/python -m pdrom.pipeline.schema`` writes them into `config/schema`.
+``.venv/bin/python -m pdrom.pipeline.schema`` writes the schemas into `config/schema`, ``... schema
+defaults`` lists what a configuration may leave out, as YAML.
 """
 
 import json
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+import yaml
+from pydantic import BaseModel
 
 from pdrom.model.effects import EFFECTS
 from pdrom.model.scene import SceneConfig
@@ -45,7 +51,29 @@ def schemas() -> dict[str, str]:
     return {name: json.dumps(schema, indent=1) + "\n" for name, schema in made.items()}
 
 
-if __name__ == "__main__":
+def defaults() -> dict[str, Any]:
+    """Plain default of every key that has one."""
+    fields = StudySettings.model_fields
+    values = {name: field.default for name, field in fields.items() if not field.is_required()}
+    return {name: _plain(value) for name, value in values.items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, BaseModel):
+        return value.model_dump(mode="json", by_alias=True)
+    return list(value) if isinstance(value, tuple) else value
+
+
+def main(words: Sequence[str]) -> None:
+    """List the defaults, if the words ask for them; else write the schemas."""
+    if list(words) == ["defaults"]:
+        listed = yaml.safe_dump(defaults(), sort_keys=False, default_flow_style=None, width=100)
+        sys.stdout.write(listed)
+        return
     FOLDER.mkdir(exist_ok=True)
     for name, content in schemas().items():
         (FOLDER / name).write_text(content, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -35,15 +35,14 @@ from pdrom.experiments.timing import Timing
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.pipeline.costs import CostModel, Size
 from pdrom.pipeline.scenes import (
     Coarsen,
+    Variants,
     bind,
     load_bound_scene,
     read_scene,
     scene_names,
 )
-from pdrom.pipeline.variants import Variants
 from pdrom.reduction.local.ranks import Rank
 from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
 from pdrom.report.viewer.settings import Viewer
@@ -118,7 +117,6 @@ class Study:
         for config in settings.variants.of(partial(read_scene, root, coarsen=settings.coarsen)):
             self.bound[config.name] = bind(root, config, "variants")
         self.scenes: dict[str, SceneConfig] = {n: s.config for n, s in self.bound.items()}
-        self._sizes = {name: Size.of(scene) for name, scene in self.bound.items()}
         self.online: dict[str, SceneConfig] = {
             name: self._loaded(name) for name in settings.online.scenes
         }
@@ -175,19 +173,7 @@ class Study:
 
     def _loaded(self, name: str) -> SceneConfig:
         """Configuration of a scene that the study does not keep bound to its mesh."""
-        bound = load_bound_scene(self.root, name, self.settings.coarsen)
-        self._sizes[name] = Size.of(bound)
-        return bound.config
-
-    def size(self, name: str) -> Size:
-        """What the cost of a scene's jobs grows with; ConfigurationError for an unknown scene."""
-        self.scene(name)
-        return self._sizes[name]
-
-    @cached_property
-    def costs(self) -> CostModel:
-        """Predicted costs of jobs."""
-        return CostModel.load(self.root)
+        return load_bound_scene(self.root, name, self.settings.coarsen).config
 
     def only(self, scene: str) -> "Study":
         """The same study of one scene, which need not be held."""

@@ -3,16 +3,10 @@
 import logging
 
 from pdrom.core.errors import ConfigurationError
-from pdrom.model.effects import EFFECTS
-from pdrom.model.scene import SceneConfig
+from pdrom.pipeline.scenes import not_taken
 from pdrom.pipeline.study import Study
 
 log = logging.getLogger(__name__)
-
-
-def not_taken(config: SceneConfig) -> list[str]:
-    """Effects of a scene that no position subspace takes."""
-    return [e.effect for e in config.effects if not EFFECTS.load(e.effect).in_subspace]
 
 
 def check_subspaces(study: Study) -> None:

@@ -18,7 +18,6 @@ from pdrom.tables import declared
 
 SCENE = re.compile(rf"{RESULTS}/scenes/([a-z][a-z0-9_]*)/?")
 FIGURE = re.compile(rf"{WORD} (\w+)")
-PLACES = [place for place in vars(paths).values() if isinstance(place, Place)]
 
 
 class Rule(Protocol):
@@ -92,7 +91,7 @@ class Known:
             self._check_labels(target)
 
     def _check_labels(self, target: str) -> None:
-        for place in PLACES:
+        for place in paths.PLACES:
             labels = self._labels(place, target)
             for label, value in labels.items():
                 allowed = list(self.labels[label](labels)) if label in self.labels else [value]

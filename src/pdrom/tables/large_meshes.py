@@ -27,6 +27,6 @@ def large_meshes(recorded: Path) -> pd.DataFrame:
 
     Parameters
     ----------
-    recorded : file that `pdrom.pipeline.recorded_meshes` writes
+    recorded : file that `pdrom.pipeline.tracked` writes
     """
     return pd.read_csv(recorded)

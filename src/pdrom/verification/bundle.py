@@ -24,12 +24,10 @@ from pathlib import Path, PurePosixPath
 
 from pdrom import __version__
 from pdrom.core import paths
-from pdrom.core.embedded import tex_of
 from pdrom.core.errors import ConfigurationError, PdromError
-from pdrom.core.store import atomic_path, provenance_of
+from pdrom.core.store import atomic_path
 from pdrom.pipeline.crate import COPIES, published
 from pdrom.pipeline.manifest import Manifest, read_manifest
-from pdrom.report.paper.tex import PROVENANCE
 from pdrom.verification.files import verify_files
 from pdrom.verification.status import Status
 from pdrom.verification.subject import Subject
@@ -118,8 +116,6 @@ def paper(subject: Subject) -> Iterator[Member]:
     named |= {str(path.relative_to(main.parent)): path for path in sections}
     for name, path in named.items():
         yield Member(f"published/paper/source/{name}", path.read_bytes())
-    made = tex_of(provenance_of(subject.folders.manuscript))
-    yield Member(f"published/paper/source/{PROVENANCE}", made.encode())
 
 
 def write_archive(members: Sequence[Member], target: Path) -> int:

@@ -11,10 +11,8 @@ from snakemake.settings.types import ConfigSettings
 from snakemake.utils import update_config
 
 from pdrom.core.yamlfile import read_yaml
-from pdrom.pipeline.commandline import CommandLine
-from pdrom.pipeline.configfiles import check_files
+from pdrom.pipeline.commandline import CommandLine, check_files, recall
 from pdrom.pipeline.folders import DEFAULT, Folders, folders
-from pdrom.pipeline.last_run import recall
 from pdrom.pipeline.plan import Plan, load_plan
 
 

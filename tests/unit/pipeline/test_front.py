@@ -3,9 +3,8 @@
 import pytest
 
 from pdrom.core.errors import ConfigurationError
-from pdrom.pipeline.commandline import CommandLine
+from pdrom.pipeline.commandline import RECORD, CommandLine, recall, remember
 from pdrom.pipeline.front import LINES, OPTIONS, completed
-from pdrom.pipeline.last_run import RECORD, recall, remember
 from pdrom.report.figure_numbers import figure_numbers
 from places import ROOT
 

@@ -1,77 +1,102 @@
-"""Costs of jobs: the fit to the measured ones, and what follows from it."""
+"""Expected times of jobs, what the logs of a run say of them, and what a cluster is asked for."""
 
-import numpy as np
+from pathlib import Path
+from types import SimpleNamespace
+
 import pandas as pd
 import pytest
+import yaml
 
-from pdrom.core.errors import StorageError
-from pdrom.pipeline.costs import ABOVE_MB, COLUMNS, ROOM, CostModel, Size
+from pdrom.core.errors import PdromError
+from pdrom.core.usage import Usage
+from pdrom.experiments.kit.declaration import experiments
+from pdrom.pipeline.expectation import expected_seconds
+from pdrom.pipeline.scenes import Coarsen
+from pdrom.pipeline.tracked import COLUMNS, COSTS, main, measured_costs
 from places import ROOT
 
-SIZES = [Size(2e3, 4e2, 100, 10), Size(8e3, 16e2, 50, 10), Size(5e4, 1e4, 60, 5)]
+TABLE = pd.read_csv(ROOT / COSTS).set_index("kind")
+PROFILE = yaml.safe_load((ROOT / "workflow/profiles/slurm/config.yaml").read_text("utf-8"))
+# What a job needs beside its own: two processes of Snakemake, each of which makes the plan, and the
+# process that jobs are forked from.
+ABOVE_S, ABOVE_MB = 60.0, 1000
+# Factor for slower machines.
+ROOM = 2.0
 
 
-@pytest.fixture(scope="module")
-def model() -> CostModel:
-    return CostModel.load(ROOT)
+def plan(**coarsen: float) -> SimpleNamespace:
+    """A plan, as far as it is asked."""
+    return SimpleNamespace(
+        root=ROOT,
+        results="results/studies/logs",
+        settings=SimpleNamespace(coarsen=Coarsen(**coarsen)),
+    )
 
 
-def made(kind: str) -> CostModel:
-    """Jobs of 2 s + 3 s a million projections and 200 MB + 10 MB a million positions."""
-    rows = []
-    for method, factor in (("cheap", 1.0), ("dear", 4.0)):
-        for size in SIZES:
-            seconds = factor * (2.0 + 3.0 * size.projections)
-            memory = 200.0 + 10.0 * size.positions
-            sizes = (size.elements, size.vertices, size.frames, size.iterations)
-            rows.append([kind, method, *sizes, seconds, memory])
-    return CostModel(pd.DataFrame(rows, columns=COLUMNS))
+def say(results: Path, log: str, processor: float, wall: float = 0.0, memory: float = 0.0) -> None:
+    """Write the log of a job that has ended well."""
+    path = results / "logs" / log
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f"date INFO pdrom: {Usage(wall, processor, memory)}\n", encoding="utf-8")
 
 
-def size_of(job: object) -> Size | None:
-    """Size of a measured job; None for one that has no scene."""
-    known = job.elements == job.elements
-    return Size(job.elements, job.vertices, job.frames, job.iterations) if known else None
+@pytest.mark.parametrize(
+    ("log", "kind"),
+    [
+        ("fom/sheet_train.log", "fom"),
+        ("hard_cases.log", "hard_cases"),
+        ("tables/budget.log", "tables"),
+    ],
+)
+def test_a_job_takes_what_jobs_of_its_kind_took_on_meshes_like_its_own(log, kind):
+    place = f"results/studies/logs/logs/{log}"
+    assert expected_seconds(plan())(place) == TABLE.seconds[kind]
+    coarse = expected_seconds(plan(resolution=0.5))
+    assert coarse(place) == TABLE.coarse_seconds[kind]
 
 
-@pytest.mark.parametrize("size", [*SIZES, Size(1e5, 2e4, 200, 10)])
-@pytest.mark.parametrize(("method", "factor"), [("cheap", 1.0), ("dear", 4.0), ("unknown", 4.0)])
-def test_a_law_of_the_models_form_is_found(size: Size, method: str, factor: float) -> None:
-    cost = made("runs").cost("runs", size, method)
-    assert cost.seconds == pytest.approx(factor * (2.0 + 3.0 * size.projections), rel=1e-6)
-    assert cost.memory_mb == pytest.approx(200.0 + 10.0 * size.positions, rel=1e-6)
+def test_a_kind_that_was_not_measured_takes_the_median():
+    found = expected_seconds(plan())("results/studies/logs/logs/never_seen/a.log")
+    assert found == TABLE.seconds.median()
 
 
-def test_half_of_the_measured_jobs_are_predicted_within_a_quarter(model: CostModel) -> None:
-    """The error that docs/cluster.md states; jobs that compiled a kernel took much longer."""
-    jobs = model.measured
-    expected = [model.cost(j.kind, size_of(j), j.method).seconds for j in jobs.itertuples()]
-    off = np.exp(np.abs(np.log(jobs.seconds / expected)))
-    assert len(off) > 500
-    assert off.median() < 1.25
-    assert off.quantile(0.9) < 2.7
+def test_every_experiment_was_measured_and_takes_time():
+    assert {experiment.name for experiment in experiments("pdrom.experiments")} <= set(TABLE.index)
+    assert (TABLE > 0.0).all().drop("longest_s").all()
 
 
-def test_no_measured_job_would_have_run_out_of_time_or_memory(model: CostModel) -> None:
-    for job in model.measured.itertuples():
-        request = model.request(job.kind, size_of(job), job.method)
-        assert 60.0 * request.minutes >= 0.999 * ROOM * job.seconds
-        if job.memory_mb == job.memory_mb:
-            assert request.memory_mb >= ABOVE_MB + 0.999 * ROOM * job.memory_mb
+def test_costs_are_read_from_the_logs_of_two_runs(tmp_path):
+    full, coarse = tmp_path / "full", tmp_path / "coarse"
+    say(full, "fom/a.log", 3.0, wall=4.0, memory=210.0)
+    say(full, "fom/b.log", 5.0, wall=3.0, memory=250.4)
+    say(full, "guard.log", 7.0, wall=8.0, memory=200.0)
+    say(coarse, "fom/a.log", 0.5)
+    say(coarse, "guard.log", 0.25)
+    (full / "logs" / "fom" / "failed.log").write_text("ERROR pdrom: no\n", encoding="utf-8")
+    table = measured_costs(str(full), str(coarse))
+    assert list(table.columns) == COLUMNS
+    assert table.to_numpy().tolist() == [
+        ["fom", 4.0, 0.5, 4.0, 250],
+        ["guard", 7.0, 0.25, 8.0, 200],
+    ]
 
 
-def test_what_was_not_measured_counts_as_the_dearest(model: CostModel) -> None:
-    kinds = set(model.measured.kind)
-    unknown = model.cost("never_seen", SIZES[0])
-    assert unknown.seconds == max(model.cost(kind, SIZES[0]).seconds for kind in kinds)
+def test_what_git_does_not_keep_is_not_written():
+    with pytest.raises(PdromError, match=r"'cost': unknown .*did you mean 'costs'"):
+        main(["cost"])
 
 
-def test_a_finer_mesh_has_more_of_all_by_its_dimension() -> None:
-    sheet, solid = Size(10, 20, 3, 4, dimension=2), Size(10, 20, 3, 4, dimension=3)
-    assert sheet.refined(2.0) == Size(40, 80, 3, 4, dimension=2)
-    assert solid.refined(2.0) == Size(80, 160, 3, 4, dimension=3)
+def test_without_a_run_it_says_so(tmp_path):
+    with pytest.raises(PdromError, match="run the study first"):
+        measured_costs(str(tmp_path), str(tmp_path))
 
 
-def test_a_project_without_measured_jobs_is_named(tmp_path) -> None:
-    with pytest.raises(StorageError, match="job_costs"):
-        CostModel.load(tmp_path)
+@pytest.mark.parametrize("kind", TABLE.index)
+@pytest.mark.parametrize("attempt", [1, 2])
+def test_the_profile_asks_for_more_than_any_measured_job_needed(kind, attempt):
+    """What the workflow calls by another name than the kind has the default request."""
+    asked = PROFILE["default-resources"] | PROFILE["set-resources"].get(kind, {})
+    memory, minutes = (eval(asked[key], {"attempt": attempt}) for key in ("mem_mb", "runtime"))
+    assert memory >= attempt * (ABOVE_MB + TABLE.memory_mb[kind])
+    assert 60.0 * minutes >= attempt * (ABOVE_S + ROOM * TABLE.longest_s[kind])
+    assert set(PROFILE["set-resources"]) <= set(TABLE.index)

@@ -6,7 +6,7 @@ import pandas as pd
 
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import read_yaml
-from pdrom.pipeline.recorded_meshes import STUDY, recorded_meshes
+from pdrom.pipeline.tracked import LARGE, recorded_meshes
 from pdrom.tables.large_meshes import RECORDED, large_meshes
 from pdrom.tables.winners import winners
 from places import ROOT
@@ -38,7 +38,7 @@ def test_a_record_names_machine_and_day_and_changes_no_number(tmp_path: Path) ->
 
 def test_the_kept_record_is_what_the_study_asks_for() -> None:
     table = large_meshes.checked(large_meshes(ROOT / RECORDED))
-    side = read_yaml(ROOT / STUDY)["alternatives"]["scenes"]["spring_oop"]
+    side = read_yaml(ROOT / LARGE)["alternatives"]["scenes"]["spring_oop"]
     meshes = table[table.scene == "spring_oop"].vertices.unique()
     assert meshes.tolist() == [round(400 * factor**2) for factor in side]
     assert table.groupby(["vertices", "reference", "limit"]).size().max() == 1

@@ -1,13 +1,25 @@
-"""The lock of a folder: one holder, none that is stale, Snakemake's own lock files healed."""
+"""A run is alone in its folder, with dates that Snakemake takes; it ends at once, and wholly."""
 
 import os
 import signal
 import subprocess
 import sys
+import threading
+import time
 
 import pytest
+from snakemake.scheduling import job_scheduler
 
-from pdrom.pipeline.running import LOCK, SNAKEMAKE_LOCKS, AtWorkError, hold, remove_stale_locks
+from pdrom.core.logs import INTERRUPTED
+from pdrom.pipeline.running import (
+    LOCK,
+    SNAKEMAKE_LOCKS,
+    AtWorkError,
+    cancel_timers,
+    hold,
+    remove_stale_locks,
+    settle_dates,
+)
 
 HOLDER = """
 import sys, time
@@ -81,3 +93,116 @@ def test_a_folder_that_cannot_be_written_is_named(folder):
     (folder / ".snakemake").write_text("a file where the folder should be")
     with pytest.raises(AtWorkError, match=r"run\.lock: cannot be written"):
         hold()
+
+
+DAY = 86_400 * 10**9
+
+
+def test_future_dates_come_before_now_in_their_order(tmp_path):
+    start = time.time_ns()
+    offsets = {"old": -DAY, "late": 3 * DAY, "early": DAY, "twin": DAY, "deep/later": 4 * DAY}
+    for name, offset in offsets.items():
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(name)
+        os.utime(path, ns=(start, start + offset))
+    assert settle_dates([tmp_path, tmp_path / "none"]) == 4
+    dates = {name: (tmp_path / name).stat().st_mtime_ns for name in offsets}
+    assert dates["old"] == start - DAY
+    assert dates["old"] < dates["early"] == dates["twin"] < dates["late"] < dates["deep/later"]
+    assert dates["deep/later"] <= time.time_ns()
+    assert settle_dates([tmp_path]) == 0
+
+
+PLANS = """
+import signal
+from pdrom.pipeline.running import end_at_sigterm
+end_at_sigterm()
+print("ready", flush=True)
+signal.pause()
+"""
+
+# A run with a job in a shell, as Snakemake waits for it; it prints how the job ended.
+RUNS = """
+import os, subprocess, sys
+from pdrom.pipeline import running
+running.PATIENCE = float(sys.argv[1])
+running.stop_at_sigterm(lambda: os.write(1, b"noted\\n"))
+job = subprocess.Popen(["sh", "-c", sys.argv[2]], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+ready = job.stdout.readline()
+try:
+    os.write(1, ready)
+    job.wait()
+except KeyboardInterrupt:
+    print(job.wait(), flush=True)
+"""
+
+
+def sigterm(*command: str) -> tuple[int, str, str]:
+    """Exit status, output and errors of a program that gets SIGTERM once it is ready."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", *command],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True,
+    )  # fmt: skip
+    assert process.stdout.readline() == "ready\n"
+    process.send_signal(signal.SIGTERM)
+    out, errors = process.communicate()
+    return process.returncode, out, errors
+
+
+def test_a_plan_ends_with_one_line():
+    assert sigterm(PLANS) == (INTERRUPTED, "", "pdrom: ended by SIGTERM\n")
+
+
+@pytest.mark.parametrize(
+    ("patience", "job", "ending"),
+    [
+        ("1e6", "echo ready; read nothing", -signal.SIGTERM),
+        ("0", "trap '' TERM; echo ready; read nothing", -signal.SIGKILL),
+    ],
+    ids=["ends by it", "does not listen"],
+)
+def test_a_run_ends_its_jobs(patience, job, ending):
+    said = "pdrom: SIGTERM: ending the jobs that run\n"
+    assert sigterm(RUNS, patience, job) == (0, f"noted\n{ending:d}\n", said)
+
+
+def test_a_run_whose_reader_is_gone_ends_too():
+    """Nothing can be said, and the job is ended all the same."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", RUNS, "1e6", "echo ready; read nothing"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True,
+    )  # fmt: skip
+    assert process.stdout.readline() == "ready\n"
+    process.stderr.close()
+    process.send_signal(signal.SIGTERM)
+    assert process.stdout.read() == f"noted\n{-signal.SIGTERM:d}\n"
+    process.wait()
+
+
+class _Scheduler:
+    """Stands for Snakemake's scheduler, whose own method starts the timers."""
+
+    def __init__(self) -> None:
+        self._open_jobs = threading.Semaphore(0)
+
+
+def test_only_the_timers_of_the_rate_limit_are_cancelled():
+    scheduler = _Scheduler()
+    before = set(threading.enumerate())
+    for _ in range(3):
+        job_scheduler.JobScheduler._schedule_reevalutation(scheduler, 60.0)
+    limits = set(threading.enumerate()) - before
+    fired = threading.Event()
+    other = threading.Timer(60.0, fired.set)
+    other.start()
+    cancel_timers()
+    for timer in limits:
+        timer.join(timeout=10.0)
+        assert not timer.is_alive()
+    assert len(limits) == 3
+    assert not scheduler._open_jobs.acquire(blocking=False)
+    assert not other.finished.is_set()
+    other.cancel()
+    other.join(timeout=10.0)
+    assert not fired.is_set()

@@ -1,8 +1,10 @@
-"""The schemas for editors: in step with the models, valid, named in the files that they are of."""
+"""Schemas and defaults of scene and study files."""
 
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlparse
 
 import pytest
@@ -11,9 +13,10 @@ from jsonschema import Draft202012Validator
 
 from pdrom.command.main import run
 from pdrom.command.new import template
-from pdrom.core.yamlfile import read_yaml
+from pdrom.core.yamlfile import read_yaml, validate
 from pdrom.model.effects import EFFECTS
-from pdrom.pipeline.schema import scene_schema, schemas, study_schema
+from pdrom.pipeline.schema import defaults, scene_schema, schemas, study_schema
+from pdrom.pipeline.study import StudySettings
 from places import CONFIG, ROOT
 
 LINE = re.compile(r"# yaml-language-server: \$schema=(\S+)")
@@ -77,3 +80,33 @@ def test_a_new_scene_names_the_schema_wherever_it_lies(tmp_path, monkeypatch):
     assert run(["new", "sheet"]) == 0
     assert named(folder / "sheet.yaml") == ROOT / "config" / "schema" / "scene.json"
     assert faults(folder / "sheet.yaml") == []
+
+
+def given(content: dict[str, Any], known: Any) -> Iterator[tuple[str, Any, Any]]:
+    """(key, value, default) of every value that a configuration gives, inside sections too."""
+    for key, value in content.items():
+        default = known.get(key) if isinstance(known, dict) else None
+        if isinstance(value, dict) and isinstance(default, dict) and default:
+            for inner, *rest in given(value, default):
+                yield f"{key}.{inner}", *rest
+        else:
+            yield key, value, default
+
+
+def test_the_study_repeats_no_default() -> None:
+    content = read_yaml(CONFIG / "default.yaml")
+    repeated = [key for key, value, default in given(content, defaults()) if value == default]
+    assert repeated == []
+
+
+def test_defaults_are_a_valid_configuration() -> None:
+    study = {"scenes": ["spring_oop"], "methods": ["pod"]}
+    assert validate(StudySettings, defaults() | study, "defaults") == validate(
+        StudySettings, study, "nothing"
+    )
+
+
+@pytest.mark.parametrize(("key", "value"), [("sweep", 10), ("timing", 10), ("stability", 120)])
+def test_what_the_study_was_made_with(key: str, value: int) -> None:
+    """Values that the code once had differently from the file."""
+    assert value in defaults()[key].values()

@@ -335,10 +335,8 @@ def test_only_the_same_user_is_answered(monkeypatch):
     ids=["here", "hands the batch on", "runs the batch"],
 )
 def test_a_batch_on_a_node_has_a_server(monkeypatch, remote, arguments, starts):
-    started, waits = [], []
+    started = []
     monkeypatch.setattr(running, "start_server", lambda: started.append(1))
-    monkeypatch.setattr(running.slurm_executor, "install", lambda name, _kind: waits.append(name))
     monkeypatch.setattr(sys, "argv", ["snakemake", *arguments])
     running.start_batch(SimpleNamespace(remote_exec=remote))
     assert len(started) == starts
-    assert waits == [name for name in arguments if name == "slurm-jobstep"]

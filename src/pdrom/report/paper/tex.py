@@ -11,15 +11,12 @@ import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 
-from pdrom.core.embedded import tex_of
 from pdrom.core.errors import PaperError
-from pdrom.core.provenance import provenance
 from pdrom.core.store import atomic_path
 
 log = logging.getLogger(__name__)
 
 MAX_RUNS = 5
-PROVENANCE = "provenance.tex"  # main.tex reads it where it is
 _PACKAGE = re.compile(r"\\usepackage(?:\[[^\]]*\])?\{([^}]*)\}")
 _TINYTEX = {"linux": "x86_64-linux", "darwin": "universal-darwin"}
 
@@ -95,7 +92,6 @@ def build_pdf(source: Path, output: Path, search: list[Path]) -> None:
         log.info("TeX: %s", pdflatex.name)
         job = scratch / "job"
         job.mkdir()
-        (job / PROVENANCE).write_text(tex_of(provenance()), encoding="utf-8")
         environment = _environment([source.parent, *search])
         previous = ""
         for _ in range(MAX_RUNS):

@@ -1,7 +1,7 @@
 """What each entry of the claim map takes, measured by the jobs of a run: results/claim_map.csv."""
 
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +11,8 @@ from pdrom.core.machine import Machine
 from pdrom.core.paths import MACHINE, RESULTS, TABLE, Place
 from pdrom.core.store import Condition, check_file, read_table, write_table
 from pdrom.core.usage import MB, Usage, usage_of
-from pdrom.pipeline.commandline import CommandLine
+from pdrom.pipeline.commandline import CommandLine, recall
 from pdrom.pipeline.folders import DEFAULT, Folders
-from pdrom.pipeline.graph import Graph
-from pdrom.pipeline.last_run import recall
 from pdrom.pipeline.plan import Plan
 from pdrom.verification.claim_map.entries import Entry, entries
 
@@ -25,16 +23,16 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def write_after(command: CommandLine, plan: Plan, folders: Folders) -> None:
+def write_after(command: CommandLine, dag: Any, plan: Plan, folders: Folders) -> None:
     """Write the map of a run that has made everything; one with targets leaves it as it is."""
     if not command.targets:
         configuration = " ".join([*command.configfiles, *command.settings]) or DEFAULT
-        made = claim_map(plan, folders, recall(), configuration)
+        made = claim_map(dag, plan, folders, recall(), configuration)
         write_table(made, MAP.at(folders.results))
 
 
 def claim_map(
-    plan: Plan, folders: Folders, options: Sequence[str], configuration: str
+    dag: Any, plan: Plan, folders: Folders, options: Sequence[str], configuration: str
 ) -> pd.DataFrame:
     """One row per entry.
 
@@ -44,12 +42,12 @@ def claim_map(
 
     Parameters
     ----------
+    dag : Snakemake's graph of all jobs of the study
     options : those of the command line that name the configuration
     configuration : the same in words
     """
-    graph = Graph(plan)
-    logs = {job.log for job in graph.needed([folders.manuscript])}
-    usages = {log: used for log in sorted(logs) if (used := usage_of(log)) is not None}
+    makers = {str(file): job for job in dag.jobs for file in job.output}
+    used = {job: usage_of(job.log[0]) for job in makers.values()}
     verdicts, machine = _verdicts(folders.results), _machine(folders.results)
     rows = [
         {
@@ -58,7 +56,7 @@ def claim_map(
             "rule": entry.rule,
             "target": " ".join(files := _files(entry, folders)),
             "command": shlex.join(["./reproduce", *entry.words, *options]),
-            **_costs(graph, usages, files),
+            **_costs({makers[file] for file in files}, dag, used),
             **(verdicts.get(entry.name, {}) if entry.kind == "claim" else {}),
             "configuration": configuration,
             "machine": machine,
@@ -73,15 +71,15 @@ def _files(entry: Entry, folders: Folders) -> list[str]:
     return [own.get(f, folders.results + f.removeprefix(RESULTS)) for f in entry.files]
 
 
-def _costs(graph: Graph, usages: Mapping[str, Usage], files: Iterable[str]) -> dict[str, Any]:
-    own = [job for job in map(graph.maker, files) if job is not None]
-    needed = graph.needed(files)
+def _costs(own: set[Any], dag: Any, used: Mapping[Any, Usage | None]) -> dict[str, Any]:
+    """What Snakemake's jobs and all that they need have used, see `claim_map`."""
+    needed = list(dag.bfs(dag.dependencies, *own))
     return {
         "jobs": len(needed),
-        "minutes": _minutes([usages.get(job.log) for job in needed]),
-        "minutes_alone": _minutes([usages.get(job.log) for job in own]),
-        "memory": _memory([usages.get(job.log) for job in needed]),
-        "disk": sum(_size(file) for job in needed for file in job.outputs) / MB,
+        "minutes": _minutes([used[job] for job in needed]),
+        "minutes_alone": _minutes([used[job] for job in own]),
+        "memory": _memory([used[job] for job in needed]),
+        "disk": sum(_size(file) for job in needed for file in job.output) / MB,
     }
 
 

@@ -8,8 +8,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from pdrom.artifact.artifact import Artifact
-from pdrom.core.embedded import PDF_KEY, PNG_KEY
-from pdrom.core.provenance import as_text, provenance
 from pdrom.core.store import atomic_path
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.options import Options
@@ -45,16 +43,12 @@ def write_figure(
 ) -> None:
     """Write ``figure`` as PDF (embedded TrueType fonts, no dates) and as its PNG twin.
 
-    Both carry their provenance (`pdrom.core.embedded`). Either file appears only when complete.
+    Either file appears only when complete.
     """
     FigureCanvasAgg(figure)
-    made = as_text(provenance())
     document = {"Title": title, "Creator": "pdrom", "CreationDate": None, "ModDate": None}
     with style.look():
         with atomic_path(Path(pdf)) as temporary:
-            figure.savefig(
-                temporary, format="pdf", dpi=RASTER_DPI, metadata=document | {PDF_KEY: made}
-            )
+            figure.savefig(temporary, format="pdf", dpi=RASTER_DPI, metadata=document)
         with atomic_path(Path(png)) as temporary:
-            picture = {"Title": title, PNG_KEY: made}
-            figure.savefig(temporary, format="png", dpi=PNG_DPI, metadata=picture)
+            figure.savefig(temporary, format="png", dpi=PNG_DPI, metadata={"Title": title})

@@ -11,10 +11,9 @@ from pdrom.core.paths import LABELS
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.pipeline.plan import Plan
-from pdrom.pipeline.scenes import read_scene
+from pdrom.pipeline.scenes import Variants, read_scene
 from pdrom.pipeline.study import Study
 from pdrom.pipeline.targets import known
-from pdrom.pipeline.variants import Variants
 from places import ROOT
 
 SECTION = Variants(
@@ -60,9 +59,8 @@ def test_a_study_holds_its_variants_beside_its_scenes() -> None:
     config = {"scenes": ["strain_oop"], "methods": ["deim"], "variants": SECTION.model_dump()}
     study = Study.load({**config, "coarsen": {"resolution": 0.3, "frames": 0.1}}, ROOT)
     assert len(study.scenes) == 1 + 8
-    assert (
-        study.size("spring_oop_m1p5_w1_s1").vertices > study.size("spring_oop_m0p5_w1_s1").vertices
-    )
+    fine, coarse = (study.bound[f"spring_oop_m{m}_w1_s1"].mesh for m in ("1p5", "0p5"))
+    assert fine.vertices > coarse.vertices
 
 
 def test_files_of_variants_are_targets() -> None:
