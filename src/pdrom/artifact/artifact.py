@@ -32,7 +32,7 @@ A = TypeVar("A", bound="Artifact")
 
 @dataclass(frozen=True)
 class Artifact:
-    """What the study makes by one function.
+    """Product of the study, made by one function.
 
     name : that of the function
     title : printed by a run, with labels in braces

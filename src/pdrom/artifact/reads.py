@@ -1,4 +1,4 @@
-"""What an artifact reads.
+"""Reads of an artifact: files and settings.
 
 A declaration holds no path: it names kinds of files, other tables and keys of the configuration.
 The pipeline finds them (`Sources`); the function of the artifact gets their content by name.

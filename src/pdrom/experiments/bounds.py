@@ -38,7 +38,7 @@ TANGENTS = (0.25, 0.75)
 
 
 class Options(ConfigModel):
-    """What the bounds of a scene depend on."""
+    """Settings of the bounds of a scene."""
 
     scene: SceneConfig
     methods: dict[str, MethodSpec]

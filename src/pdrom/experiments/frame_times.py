@@ -106,7 +106,7 @@ class NamedScene(ConfigModel):
 
 
 class Options(ConfigModel):
-    """What the times depend on, beside the machine."""
+    """Settings of the times."""
 
     frame_times: Processes
     timed_scenes: tuple[NamedScene, ...]

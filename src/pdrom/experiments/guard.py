@@ -82,7 +82,7 @@ class Trial(ConfigModel):
 
 
 class Options(ConfigModel):
-    """What the trials of the guard depend on."""
+    """Settings of the trials of the guard."""
 
     trials: tuple[Trial, ...]
     guard: TriedGuard

@@ -59,7 +59,7 @@ class Noise(NoiseRuns):
 
 
 class Options(ConfigModel):
-    """What the runs of a scene depend on."""
+    """Settings of the runs of a scene."""
 
     scene: SceneConfig
     noise: NoiseRuns

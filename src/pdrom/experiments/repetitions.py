@@ -65,7 +65,7 @@ class Repeated(ConfigModel):
 
 
 class Options(ConfigModel):
-    """What the repetitions in a scene depend on."""
+    """Settings of the repetitions in a scene."""
 
     scene: SceneConfig
     repetitions: Repetitions

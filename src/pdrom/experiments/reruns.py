@@ -62,7 +62,7 @@ class OfScene(ConfigModel):
 
 
 class Options(ConfigModel):
-    """What samplings and reruns by one method depend on."""
+    """Settings of samplings and reruns by one method."""
 
     scene: SceneConfig
     method: MethodSpec

@@ -83,7 +83,7 @@ class Scaling(Sized):
 
 
 class Options(ConfigModel):
-    """What the cost on a mesh size depends on, beside the machine."""
+    """Settings of the costs on a mesh size."""
 
     scene: SceneConfig
     scaled_methods: dict[str, MethodSpec]

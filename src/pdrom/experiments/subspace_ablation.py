@@ -65,7 +65,7 @@ class AblationFile(Ablation):
 
 
 class Options(ConfigModel):
-    """What the ablation on a scene depends on."""
+    """Settings of the ablation on a scene."""
 
     scene: SceneConfig
     ablation: Ablation

@@ -94,7 +94,7 @@ class Subspace(SubspaceModels):
 
 
 class Options(ConfigModel):
-    """What the position subspaces of a scene depend on."""
+    """Settings of the position subspaces of a scene."""
 
     scene: SceneConfig
     subspace: SubspaceModels

@@ -75,7 +75,7 @@ class Timing(Protocol):
 
 
 class Options(ConfigModel):
-    """What the times of a scene depend on, beside the machine."""
+    """Settings of the times of a scene."""
 
     scene: SceneConfig
     methods: dict[str, MethodSpec]

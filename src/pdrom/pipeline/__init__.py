@@ -1,1 +1,1 @@
-"""What a configuration holds, where results lie, and what has to run."""
+"""Plan of a configuration: its contents, where results lie, and what has to run."""

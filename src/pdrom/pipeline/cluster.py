@@ -33,7 +33,7 @@ class ClusterError(PdromError):
 
 @dataclass(frozen=True)
 class Node:
-    """What a job can get at most; ``minutes`` is None where the partition has no limit."""
+    """Limits of a node; ``minutes`` is None where the partition has no limit."""
 
     partition: str
     default: bool
@@ -56,7 +56,7 @@ class Node:
 
 @dataclass(frozen=True)
 class Demand:
-    """What a job asks for; ``partition`` is None for the default one."""
+    """Request of a job; ``partition`` is None for the default one."""
 
     job: str
     partition: str | None

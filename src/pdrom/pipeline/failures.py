@@ -1,4 +1,4 @@
-"""What the user reads when a run fails: every failed job with its cause, in the last lines."""
+"""Report of a failed run: every failed job with its cause, in the last lines."""
 
 import logging
 import re

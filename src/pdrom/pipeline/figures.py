@@ -1,4 +1,4 @@
-"""What the rules of the figures need from a study."""
+"""Jobs of the figures."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -102,7 +102,7 @@ def figure_jobs(study: Study, results: str) -> dict[str, FigureJob]:
 
 
 def holdings_of(study: Study) -> Holdings:
-    """What a study holds of the things that figures draw."""
+    """Collect the scenes, methods and groups of a study that figures draw."""
     groups = [name for name in EFFECTS if issubclass(EFFECTS.load(name), ConstraintGroup)]
     held = {group for scene in study.scenes.values() for group in scene.groups}
     return Holdings(

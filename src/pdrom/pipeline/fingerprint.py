@@ -89,7 +89,7 @@ def _locate(module: str) -> Path | None:
 
 @dataclass(frozen=True)
 class _Module:
-    """What a file says: modules of the package that it imports, and the hash of its code."""
+    """Content of a file: modules of the package that it imports, and the hash of its code."""
 
     imports: tuple[str, ...]
     digest: str

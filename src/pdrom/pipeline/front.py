@@ -74,7 +74,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
 
 
 def files_of(targets: Sequence[str], own: Folders) -> dict[str, list[str]]:
-    """What is to be made for each target, see `Names.files`."""
+    """Files to make for each target, see `Names.files`."""
     # late: it loads the whole package
     from pdrom.pipeline.targets import Names
     from pdrom.report.figures.kit.catalogue import declarations

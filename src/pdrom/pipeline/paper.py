@@ -1,4 +1,4 @@
-"""What the rules of the manuscript need from a study."""
+"""Jobs of the manuscript."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -13,7 +13,7 @@ OLDEST, NEWEST = (3, 11), (3, 13)
 
 @dataclass(frozen=True)
 class Machine:
-    """What wheels are chosen by: ``libc`` is "glibc" or "" (musl, or no Linux)."""
+    """Machine for the choice of wheels: ``libc`` is "glibc" or "" (musl, or no Linux)."""
 
     system: str
     processor: str

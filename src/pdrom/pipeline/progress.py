@@ -1,4 +1,4 @@
-"""What a run shows while it goes on: one line a job, with counts and the time that is left."""
+"""Progress of a run: one line a job, with counts and the time that is left."""
 
 import logging
 import sys
@@ -21,7 +21,7 @@ REST = 0.1
 
 @dataclass(frozen=True)
 class Expected:
-    """What a job is expected to take, on the machine where jobs were measured.
+    """Expected time of a job on the machine where jobs were measured.
 
     seconds : of the job
     share : of this machine that it claims, 1 where there is no limit

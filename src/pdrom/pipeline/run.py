@@ -1,4 +1,4 @@
-"""What every run does first and last, whether ``./reproduce`` or ``snakemake`` started it."""
+"""First and last steps of every run, whether ``./reproduce`` or ``snakemake`` started it."""
 
 import atexit
 import os

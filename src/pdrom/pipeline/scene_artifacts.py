@@ -1,4 +1,4 @@
-"""What the rules of a single scene's artifacts need from a study."""
+"""Rules of a single scene's artifacts."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ MAKER = "pdrom.report.scenes.job"
 
 @dataclass(frozen=True)
 class ViewerJob:
-    """What the rule of the viewer reads, is told, writes and depends on."""
+    """Job of the viewer."""
 
     inputs: list[str]
     orders: list[dict[str, Any]]
@@ -55,7 +55,7 @@ class SceneArtifacts:
         return of_wildcards
 
     def params(self, name: str) -> dict[str, Any]:
-        """What an artifact depends on, beside the dates of its files."""
+        """Parameters of an artifact."""
         return {
             "order": lambda wildcards: self._order(name, wildcards.scene),
             "content": digest(self._study.root, *ARTIFACTS[name].sources),

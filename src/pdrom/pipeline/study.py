@@ -176,7 +176,7 @@ class Study:
         return load_bound_scene(self.root, name, self.settings.coarsen).config
 
     def only(self, scene: str) -> "Study":
-        """The same study of one scene, which need not be held."""
+        """Return a study of one scene, which need not be held."""
         single = copy(self)
         single.scenes = {scene: self.scene(scene)}
         return single
@@ -218,7 +218,7 @@ class Study:
         return self.methods[name]
 
     def basis(self, identifier: str) -> BasisSpec:
-        """What the first method that uses the basis says of it; ConfigurationError if none does."""
+        """Specification of a basis by its first method; ConfigurationError if none uses it."""
         for method in self.methods.values():
             if method.basis_id == identifier:
                 return BasisSpec(**{key: getattr(method, key) for key in BasisSpec.model_fields})

@@ -21,7 +21,7 @@ FIGURE = re.compile(rf"{WORD} (\w+)")
 
 
 class Rule(Protocol):
-    """What is asked of a rule of Snakemake."""
+    """Interface of a rule of Snakemake."""
 
     name: str
 
@@ -42,7 +42,7 @@ class Names:
     tables: Collection[str]
 
     def files(self, target: str, folders: Folders) -> list[str]:
-        """What is to be made for a target; itself unless it is a name.
+        """Files to make for a target; itself unless it is a name.
 
         A file below ``results`` is the study's own, wherever that has its results; the folder of a
         scene stands for what is made of it by default, ``figure NAME`` for that figure alone.
@@ -68,7 +68,7 @@ def _own(target: str, folders: Folders) -> str:
 
 @dataclass(frozen=True)
 class Known:
-    """What a study knows, to judge a target by.
+    """Names and files of a study, to judge a target by.
 
     files : files of the study, for suggestions
     labels : what a label of a file may be (scene, group ...), by the labels before it
@@ -129,7 +129,7 @@ def _suggestion(value: str, allowed: Iterable[str]) -> str:
 
 
 def known(plan: Plan) -> Known:
-    """What the study of a plan knows."""
+    """Collect the names and files of a plan's study."""
     study, names = plan.study, Names(list(plan.figure_jobs), declared())
 
     def mesh(scene: str) -> str:

@@ -36,7 +36,7 @@ def _method(study: Study, labels: Labels) -> MethodSpec:
 
 
 def _basis(study: Study, labels: Labels) -> BasisSpec:
-    """What the first method that uses the basis says of it."""
+    """Specification of a basis by the first method that uses it."""
     return study.basis(labels["basis"])
 
 
@@ -138,7 +138,7 @@ def _noise_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
 
 
 def _published_experiment(study: Study, labels: Labels) -> str:
-    """What the stored output of the published code calls the scene."""
+    """Name of the scene in the stored output of the published code."""
     cases = study.settings.published_choices.cases
     named = {(case.scene, case.group): case.experiment for case in cases}
     return named[labels["scene"], labels["group"]]

@@ -1,1 +1,1 @@
-"""What people read: figures, manuscript and verdicts."""
+"""Figures, manuscript and viewers for readers."""

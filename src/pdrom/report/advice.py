@@ -1,4 +1,4 @@
-"""What to leave out of a scene, and what to take for an error and a time: words from tables.
+"""Advice from tables: what to leave out of a scene, and what to take for an error and a time.
 
 Nothing is computed here but comparisons; every number is one that was measured.
 """
@@ -17,7 +17,7 @@ FULL = "full"
 
 
 def on_effects(contributions: pd.DataFrame) -> Iterator[str]:
-    """What each effect of a scene does, those below the floor first.
+    """Describe each effect of a scene, those below the floor first.
 
     Parameters
     ----------

@@ -120,7 +120,7 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
 
 
 def reference_of(points: pd.DataFrame) -> pd.Series:
-    """What the error of each row of the table is taken against: `CONVERGED` or `OWN`."""
+    """Reference of the error of each row of the table: `CONVERGED` or `OWN`."""
     return points.method.isin([FOM, ANDERSON]).map({True: CONVERGED, False: OWN})
 
 

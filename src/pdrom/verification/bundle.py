@@ -84,7 +84,7 @@ def unfinished(subject: Subject, manifest: Manifest) -> Iterator[str]:
 
 
 def sources(root: Path) -> Iterator[Member]:
-    """What git tracks, as it is in the last commit."""
+    """Files that git tracks, as in the last commit."""
     changed = _git(root, "status", "--porcelain", "--untracked-files=no").decode()
     if changed:
         files = ", ".join(line[3:] for line in changed.splitlines())

@@ -32,7 +32,7 @@ GOOD = (Outcome.REPRODUCED, Outcome.NOT_COMPARABLE)
 
 @dataclass
 class Examination:
-    """What is there, what is expected, and what differs."""
+    """Examination of what is there, what is expected, and what differs."""
 
     subject: Subject
     conditions: dict[str, Condition | None] = field(default_factory=dict)
@@ -79,7 +79,7 @@ class Examination:
 
     @cached_property
     def context(self) -> Context:
-        """What the expected tables say about each other's rows."""
+        """Context of rows by the expected tables."""
         tables = {name: reference.frame for name, reference in self.expected.items()}
         try:
             return Context.of(tables, self.found(RUNS))

@@ -69,7 +69,7 @@ def _normal(results: str, name: str) -> str:
 
 
 def _fault(path: str, entry: Entry, ours: bool) -> str:
-    """What is wrong with a file of the manifest; empty if nothing is."""
+    """Fault of a file of the manifest; empty if there is none."""
     if not ours:
         return FOREIGN
     if not Path(path).is_file():

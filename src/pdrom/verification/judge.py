@@ -49,7 +49,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Judgement:
-    """What came of the comparison of a table.
+    """Judgement of a table.
 
     differences : worst first
     compared : cells that were compared
@@ -157,7 +157,7 @@ def in_words(value: object) -> str:
 
 
 def row_in_words(table: Table, frame: pd.DataFrame, row: int) -> str:
-    """What names a row: its words and sizes."""
+    """Name of a row: its words and sizes."""
     names = [c.name for c in table.columns if names_row(c) or c.quantity == "value"]
     cells = [(name, frame[name].iloc[row]) for name in names]
     named = [f"{name} {in_words(value)}" for name, value in cells if not pd.isna(value)]

@@ -12,7 +12,7 @@ NAMED, ON_PAGE = 1, 20
 
 
 class Outcome(StrEnum):
-    """What came of one thing."""
+    """Outcome of one comparison."""
 
     REPRODUCED = "reproduced"
     DIFFERS = "differs"

@@ -45,7 +45,7 @@ def folder_of(results: str) -> Path:
 
 
 def compact(table: Table, frame: pd.DataFrame) -> pd.DataFrame:
-    """What is kept of a table."""
+    """Return the part of a table that is kept."""
     columns = kept(table)
     return pd.DataFrame({n: _rounded(c, frame[n]) for n, c in columns.items()}, index=frame.index)
 

@@ -24,7 +24,7 @@ FITTED = "ecsw"
 
 @dataclass(frozen=True)
 class Context:
-    """What rows of some expected tables say about those of others.
+    """Context of rows: facts from other expected tables.
 
     chaotic : scenes with frames beyond their horizon, where rounding errors decide
     modes : number of modes above round-off by scene and group
@@ -40,7 +40,7 @@ class Context:
 
     @classmethod
     def of(cls, tables: Mapping[str, pd.DataFrame], found: pd.DataFrame | None = None) -> "Context":
-        """What some tables say, by their names, and the table of the runs that was found."""
+        """Context from tables by their names, and the table of the runs that was found."""
         ended = _ended(tables.get(RUNS)), _ended(found)
         return cls(_chaotic(tables), _modes(tables), _gains(tables), ended)
 

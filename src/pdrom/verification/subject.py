@@ -1,4 +1,4 @@
-"""What is verified: the results of one configuration, that of the last run unless one is named."""
+"""Subject of verification: the results of one configuration, that of the last run by default."""
 
 import shlex
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ class Subject:
 
     @classmethod
     def of(cls, configfiles: Sequence[str], settings: Sequence[str]) -> "Subject":
-        """Of this configuration, else of that of the last run.
+        """Subject of this configuration, else of that of the last run.
 
         Raises
         ------
@@ -47,7 +47,7 @@ class Subject:
         return self.folders.results
 
     def command(self, *targets: str) -> str:
-        """What makes some targets of this configuration, or all of it."""
+        """Command that makes some targets of this configuration, or all of it."""
         ends = ["--", *targets] if targets and self.options else targets
         return shlex.join(["./reproduce", *self.options, *ends])
 

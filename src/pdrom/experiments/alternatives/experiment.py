@@ -39,7 +39,7 @@ COLUMNS = [
 
 
 class Options(ConfigModel):
-    """What the comparison on a mesh size depends on, beside the machine."""
+    """Settings of the comparison on a mesh size."""
 
     scene: SceneConfig
     alternatives: Comparison

@@ -38,7 +38,7 @@ class Roofline(ConfigModel):
 
 
 class Options(ConfigModel):
-    """What rates and work depend on."""
+    """Settings of rates and work."""
 
     every_scene: dict[str, SceneConfig]
     sizes: dict[str, tuple[float, ...]]

@@ -8,7 +8,7 @@ LARGEST = 1 << 24  # bytes of a request; systems allow environments less
 
 
 class Request:
-    """What a client has sent until now of folder, script and environment, and its three streams.
+    """Request of a client as received so far: folder, script, environment, and three streams.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a frame's time buys: the smallest error for a few budgets."""
+"""Smallest error for a few budgets of time a frame."""
 
 from typing import Any
 

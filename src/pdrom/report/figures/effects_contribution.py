@@ -55,7 +55,7 @@ def effects_contribution(results: Results, options: Scenes) -> Figure:
 
 
 def _colours(results: Results, rows: pd.DataFrame) -> dict[str, str]:
-    """Of a group as everywhere else, of the other effects in their order."""
+    """Colours: those of a group as everywhere else, of the other effects in their order."""
     looks = {group: colour for group, (colour, _) in style.group_looks(results.holdings).items()}
     names = list(dict.fromkeys(rows.effect))
     groups = {name: looks[name] for name in names if name in looks}

@@ -23,7 +23,7 @@ ROW = 0.15  # inches
 
 @dataclass(frozen=True)
 class _Model:
-    """What a row of the picture stands for."""
+    """Model of a row of the picture."""
 
     method: str
     position_basis: str

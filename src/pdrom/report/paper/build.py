@@ -25,7 +25,7 @@ from pdrom.report.words.text import replaced
 
 
 class Facts(BaseModel):
-    """What the manuscript states beside results.
+    """Facts that the manuscript states beside results.
 
     captions : titles and captions of the figures, as TeX, by name
     part : what the study was read from where it is not the full one, else None

@@ -78,7 +78,7 @@ def _across(text: str) -> str:
 
 
 def _test(row: Any) -> list[str]:
-    """What is compared, with which limit, how many rows satisfy it, and the range of the values."""
+    """Describe a test: its limit, how many rows satisfy it, and the range of the values."""
     what = escape(row.what) if row.decides else rf"\textcolor{{okgrey}}{{{escape(row.what)}}}"
     spread = (row.least, row.median, row.most)
     values = ["--" if pd.isna(value) else format_number(value) for value in spread]

@@ -52,7 +52,7 @@ def sentences(source: str) -> list[Sentence]:
 
 
 def decisions(source: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
-    """What becomes of every block: shown, noted (left out with a note) or dropped."""
+    """Decide for every block: shown, noted (left out with a note) or dropped."""
     made, noted = [], set()
     for sentence in sentences(source):
         if all(is_held(key, tables) for key in keys_of(sentence.text)):

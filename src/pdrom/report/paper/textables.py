@@ -145,7 +145,7 @@ def _full_order(table: pd.DataFrame) -> pd.Series:
 
 
 def guard(tables: Tables) -> str:
-    """What watching costs and what falling back buys."""
+    """Cost of watching, and gain of falling back."""
     rows = []
     for row in tables["guard"].itertuples():
         full = row.method == "full"

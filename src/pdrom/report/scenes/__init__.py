@@ -1,1 +1,1 @@
-"""What is made of a single scene, in the study or outside it, beside the study's own artifacts."""
+"""Artifacts of a single scene, in the study or outside it, beside the study's own."""

@@ -117,6 +117,6 @@ def module(name: str) -> str:
 
 
 def default_files(results: str, scene: str) -> list[str]:
-    """What ``./reproduce scene NAME`` makes."""
+    """Files that ``./reproduce scene NAME`` makes."""
     made = [a for a in ARTIFACTS.values() if a.by_default]
     return [file for artifact in made for file in artifact.files(results, scene)]

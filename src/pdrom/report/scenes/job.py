@@ -13,7 +13,7 @@ from pdrom.report.scenes.results import SceneResults
 
 
 class SceneOrder(BaseModel):
-    """What a job is told to make, for which scene, and what the configuration holds of it.
+    """Order of an artifact of one scene, with the contents of the configuration.
 
     folder : where the results lie
     ranks : basis sizes, where not every one is shown
@@ -36,7 +36,7 @@ class SceneOrder(BaseModel):
 
     @property
     def results(self) -> SceneResults:
-        """What the artifact reads."""
+        """Results that the artifact reads."""
         return SceneResults(
             self.scene,
             self.folder,

@@ -33,7 +33,7 @@ def make(results: SceneResults, outputs: Mapping[str, str]) -> None:
 def point_data(
     positions: np.ndarray, velocity: np.ndarray, runs: list[LoadedRun], frame: int
 ) -> dict[str, np.ndarray]:
-    """What each vertex carries in a frame, (N, 3) float32 each.
+    """Data of each vertex in a frame, (N, 3) float32 each.
 
     Velocity (m/s) and displacement from the start (m) of the full-order run; for each reduced run
     the vector from the full order to it (m), by which ParaView warps the one into the other, NaN

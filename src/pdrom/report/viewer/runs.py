@@ -1,4 +1,4 @@
-"""What a viewer's page shows: scenes with their full-order and reduced runs."""
+"""Content of a viewer's page: scenes with their full-order and reduced runs."""
 
 from dataclasses import dataclass, field
 

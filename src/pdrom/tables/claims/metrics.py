@@ -1,4 +1,4 @@
-"""What claims are decided by: a number for each chosen row of a table, with the row's labels."""
+"""Metrics of claims: a number for each chosen row of a table, with the row's labels."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -78,7 +78,7 @@ def _local_ratio(column: str, tables: Tables, where: dict, accuracy: float) -> p
 
 @dataclass(frozen=True)
 class Metric:
-    """What a test compares: values from some columns of one table.
+    """Metric of a test: values from some columns of one table.
 
     values : from tables, ``where`` and ``accuracy`` to a row of labels and a `VALUE` for each
     labels : columns that rows may be chosen by, beside those of the table

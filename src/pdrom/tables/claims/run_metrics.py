@@ -1,4 +1,4 @@
-"""What claims about reduced runs are decided by: a number for each chosen run, with its labels."""
+"""Metrics of claims about reduced runs: a number for each chosen run, with its labels."""
 
 import numpy as np
 import pandas as pd
@@ -82,7 +82,7 @@ def trend_p_value(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
 
 
 def repeated_trend_p_value(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
-    """The same of the medians over repetitions, which leave out what one run owes to chance."""
+    """p-value of the trend of medians over repetitions, which exclude a single run's chance."""
     return _page(filtered(tables["repetitions"], where), "error_median")
 
 

@@ -101,7 +101,7 @@ def _within(test: TestRule, margin: float) -> TestRule:
 
 
 def _of_split(test: TestRule, split: str) -> TestRule:
-    """The same test over another split of the snapshots, where it is about one."""
+    """Repeat the test over another split of the snapshots, where it is about one."""
     if "split" not in test.where:
         return test
     return test.model_copy(update={"where": {**test.where, "split": (split,)}})

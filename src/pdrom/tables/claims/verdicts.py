@@ -53,7 +53,7 @@ def is_timed(test: TestRule) -> bool:
 
 
 def values_of(test: TestRule, tables: Tables) -> pd.DataFrame:
-    """What a test compares: labels and a value for each row."""
+    """Labels and a value for each row that a test compares."""
     return METRICS[test.metric].values(tables, dict(test.where), test.accuracy)
 
 

@@ -1,1 +1,1 @@
-"""What tables share: how they are declared, found and made, and columns that several have."""
+"""Tools of the tables: their declaration, and columns that several of them have."""

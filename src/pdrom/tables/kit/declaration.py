@@ -1,4 +1,4 @@
-"""What a table says of itself: title, columns, what it reads, and the function that makes it.
+"""Declaration of a table: title, columns, reads, and the function that makes it.
 
 A module of this package holds one table, a function under its declaration::
 

@@ -41,7 +41,7 @@ class Entry:
 
     @property
     def key(self) -> tuple[str, str]:
-        """What tells it from the others."""
+        """Key that distinguishes it from the others."""
         return self.kind, self.name
 
 

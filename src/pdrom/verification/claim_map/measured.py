@@ -1,4 +1,4 @@
-"""What each entry of the claim map takes, measured by the jobs of a run: results/claim_map.csv."""
+"""Costs of each entry of the claim map, measured by the jobs of a run: results/claim_map.csv."""
 
 import shlex
 from collections.abc import Mapping, Sequence
@@ -72,7 +72,7 @@ def _files(entry: Entry, folders: Folders) -> list[str]:
 
 
 def _costs(own: set[Any], dag: Any, used: Mapping[Any, Usage | None]) -> dict[str, Any]:
-    """What Snakemake's jobs and all that they need have used, see `claim_map`."""
+    """Costs of Snakemake's jobs and of all that they need, see `claim_map`."""
     needed = list(dag.bfs(dag.dependencies, *own))
     return {
         "jobs": len(needed),

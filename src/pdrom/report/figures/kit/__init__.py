@@ -1,1 +1,1 @@
-"""What figures share: how they are declared, what they read, and tools that draw."""
+"""Tools of the figures: their declaration, what they read, and what draws."""

@@ -1,4 +1,4 @@
-"""What a figure says of itself: title, caption, what it reads, and the function that draws it.
+"""Declaration of a figure: title, caption, reads, and the function that draws it.
 
 A module of `pdrom.report.figures` holds one figure, a function under its declaration::
 

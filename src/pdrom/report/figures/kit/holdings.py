@@ -1,4 +1,4 @@
-"""What a configuration holds of the things that figures draw; plain data for a job."""
+"""Contents of a configuration that figures draw; plain data for a job."""
 
 from collections.abc import Iterator
 from typing import Self

@@ -1,4 +1,4 @@
-"""What a user may choose of a figure: the keys that figures share."""
+"""Options of figures: the keys that several of them share."""
 
 from typing import Annotated, Literal
 

@@ -65,7 +65,7 @@ def iterations(
 
 
 def _measured(residual: np.ndarray, rows_per_element: int, rows: str) -> np.ndarray:
-    """What is compared between elements (e,), of a residual (3 e p,)."""
+    """Size of a residual (3 e p,) by elements (e,)."""
     length = {"scalar": 1, "joint": 3, "element": 3 * rows_per_element}[rows]
     norms = np.linalg.norm(residual.reshape(-1, length), axis=1)
     return norms.reshape(-1, 3 * rows_per_element // length).max(axis=1)

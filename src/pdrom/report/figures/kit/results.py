@@ -1,4 +1,4 @@
-"""What the drawing of a figure reads."""
+"""Results that the drawing of a figure reads."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
