@@ -16,7 +16,17 @@ ROOMS = (
 NUMERICS = ROOMS[: ROOMS.index("report")]
 MODULE_LINES, CLASS_LINES = 250, 200
 # Rooms whose docstrings begin with a noun or a verb, not with one of these words.
-WORDED = ("core", "model", "reduction", "experiments")
+WORDED = (
+    "core",
+    "artifact",
+    "model",
+    "reduction",
+    "experiments",
+    "tables",
+    "report",
+    "pipeline",
+    "verification",
+)
 BEGINNINGS = ("What ", "The same ", "That of ", "Of ")
 # Words with which a docstring says why a module is longer.
 REASON = "one module because"

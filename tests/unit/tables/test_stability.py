@@ -35,7 +35,7 @@ def files(tmp_path):
             {"scene": "a", "group": "spring", "method": "deim", "r": 20, "frames": 0},
         ]
     )
-    hyper = pd.DataFrame(
+    inside = pd.DataFrame(
         [RERUN | {"group": "all", "method": "full", "position_basis": "pod", "k": k, "r": 50}
          for k in (10, 20)]
     ).drop(columns=["gain", "guard_frame", "guard_reason", "guard_count"])  # fmt: skip
@@ -44,10 +44,10 @@ def files(tmp_path):
     sweep = pd.DataFrame(rows).drop(columns="experiment")
     sweep = sweep.assign(blowup_frame=None, energy_ratio=1.0, gain=None, k=None)
     written = {}
-    for name, table in (("reruns", local), ("subspaces", hyper), ("sweep", sweep)):
+    for name, table in (("reruns", local), ("subspaces", inside), ("sweep", sweep)):
         written[name] = [File(str(tmp_path / name / "a.csv"), {"scene": "a"})]
         write_table(table, written[name][0].path)
-    judged = pd.concat([local.assign(position_basis="full", k=np.nan), hyper])
+    judged = pd.concat([local.assign(position_basis="full", k=np.nan), inside])
     errors = [0.05, None, None, 0.01, 0.5]
     judged = judged.assign(relative_error_within_horizon=errors)
     runs = paths.TRAIN.files([str(fom)])

@@ -95,9 +95,8 @@ def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
 
 
 def _rows(config: SceneConfig, settings: Options) -> list[dict[str, Any]]:
-    asked = settings.alternatives
-    config = config.model_copy(update={"frames": min(asked.compared, config.frames)})
     section = settings.alternatives
+    config = config.model_copy(update={"frames": min(section.compared, config.frames)})
     training = Scene.build(config, config.mesh.build(Path()))
     scene = Scene.build(config.heldout_variant(), training.mesh)
     against = references(scene, section)

@@ -279,7 +279,7 @@ def test_forces_that_cannot_be_reduced_are_refused():
 
 
 def test_models_survive_a_file(tmp_path):
-    """The layout of rule hyper."""
+    """The layout of rule subspaces."""
     from pdrom.reduction.subspace.store import store_columns, store_model
 
     scene = SCENES["handles"]()
