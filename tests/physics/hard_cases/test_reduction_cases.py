@@ -45,7 +45,7 @@ def test_outcome_is_as_expected(name, reduction):
 
 @pytest.mark.parametrize(
     ("name", "reduction"),
-    zip(cycle(["scrambled_sheet", "bar_plane_rotation"]), REDUCTIONS, strict=False),
+    list(zip(cycle(["scrambled_sheet", "bar_plane_rotation"]), REDUCTIONS, strict=False)),
 )
 def test_two_runs_give_the_same_bits(name, reduction):
     first, again = (reduced_run(training(name), reduction, METHODS, 1e3).run for _ in range(2))
