@@ -1,21 +1,12 @@
-"""Hypothesis strategies for hard matrices and hard meshes."""
+"""Hypothesis strategies for hard meshes."""
 
 import numpy as np
 from hypothesis import strategies as st
 
-from pdrom.experiments.hard_cases.matrices import CLASSES, MatrixClass
 from pdrom.model.mesh.generators import bar, boundary, cloth
 from pdrom.model.mesh.types import Mesh
 
 SEEDS = st.integers(0, 2**32 - 1)
-
-
-@st.composite
-def hard_matrices(draw, rows: int, unique: bool | None = None) -> tuple[MatrixClass, np.ndarray]:
-    """A class of `pdrom.experiments.hard_cases.matrices` and a matrix (rows, 3) of it."""
-    kinds = [k for k in CLASSES if rows in k.rows and unique in (None, k.unique)]
-    kind = draw(st.sampled_from(kinds))
-    return kind, kind.make(np.random.default_rng(draw(SEEDS)), rows)
 
 
 @st.composite

@@ -1,11 +1,10 @@
 """Mutated configurations: accepted, or refused with a named error; never anything else.
 
 Every example runs with little memory to spare, so that a needless allocation shows as a failure.
-``PDROM_FUZZ_EXAMPLES=1000 ./reproduce test tests/bad_input`` looks longer.
+``PDROM_EXAMPLES=1000 ./reproduce test tests/bad_input`` looks longer.
 """
 
 import copy
-import os
 import resource
 import shutil
 from collections.abc import Callable, Iterator
@@ -30,7 +29,6 @@ from bad_input.project import (
 )
 from pdrom.core.errors import PdromError
 
-EXAMPLES = int(os.environ.get("PDROM_FUZZ_EXAMPLES", "25"))
 SPARE_BYTES = 2_000_000_000
 FILES = ("methods", "figures", "claims", "ladder")
 # One of everything that a scene may list, so that every key can be hit.
@@ -144,7 +142,7 @@ def accepted_or_named(root: Path, overrides: dict | None = None) -> None:
     assert len(message) < 2500
 
 
-FUZZ = settings(max_examples=EXAMPLES, suppress_health_check=list(HealthCheck))
+FUZZ = settings(suppress_health_check=list(HealthCheck))
 
 
 @FUZZ

@@ -14,6 +14,17 @@ PARTS = ("Snakefile", "config", *PAPER, "src", "workflow")
 
 
 @dataclass(frozen=True)
+class Made:
+    """A file of a plan: the rule and the log of its job, what a finished job read, its state."""
+
+    file: str
+    rule: str
+    log: str
+    inputs: tuple[str, ...]
+    plan: str
+
+
+@dataclass(frozen=True)
 class Checkout:
     """A clean copy of the parts of the repository that the workflow reads."""
 
@@ -33,7 +44,6 @@ class Checkout:
             env={
                 **os.environ,
                 "PYTHONPATH": str(self.folder / "src"),
-                "PYTHONDONTWRITEBYTECODE": "1",
                 "XDG_CACHE_HOME": str(self.folder / ".cache"),
             },
             stdin=subprocess.DEVNULL,
@@ -43,12 +53,16 @@ class Checkout:
             check=False,
         )
 
-    def planned(self, *arguments: str) -> set[str]:
-        """Files that a run would make, by Snakemake's own summary of the plan."""
-        done = self.looks("--summary", *arguments)
+    def summary(self, *arguments: str) -> list[Made]:
+        """Rows of Snakemake's summary of the plan."""
+        done = self.looks("--detailed-summary", *arguments)
         assert done.returncode == 0, done.stderr
         rows = [line.split("\t") for line in done.stdout.splitlines() if "\t" in line]
-        return {row[0] for row in rows[1:] if row[-1] == "update pending"}
+        return [Made(r[0], r[2], r[3], tuple(r[4].split(",")), r[-1]) for r in rows[1:]]
+
+    def planned(self, *arguments: str) -> set[str]:
+        """Files that a run would make."""
+        return {made.file for made in self.summary(*arguments) if made.plan == "update pending"}
 
     def count_as_finished(self, *arguments: str) -> None:
         """Put empty files in the place of results.
@@ -69,6 +83,28 @@ class Checkout:
         text = file.read_text(encoding="utf-8")
         assert old in text, f"{path} has no {old!r}"
         file.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+    def register(self, registry: str, entry: str, module: str, code: str) -> None:
+        """Add a module and name ``entry`` (a name and a class of it) first in a registry."""
+        name, attribute = entry.split(":")
+        path = self.folder / "src" / Path(*module.split(".")).with_suffix(".py")
+        path.write_text(code, encoding="utf-8")
+        self.edit(registry, "    {\n", f'    {{\n        "{name}": "{module}:{attribute}",\n')
+
+    def files(self, *parts: str) -> list[Path]:
+        """Files, and those below folders."""
+        paths = [self.folder / part for part in parts]
+        found = [p for path in paths for p in (path, *path.rglob("*"))]
+        return [path for path in found if path.is_file()]
+
+
+def only_line(output: str) -> str:
+    """The one line, the last, that says what is wrong; no job was counted."""
+    assert "Traceback" not in output
+    assert "Job stats" not in output
+    (line,) = [line for line in output.splitlines() if line.startswith("pdrom: ")]
+    assert output.strip().splitlines()[-1] == line
+    return line
 
 
 def copy_repository(folder: Path) -> Checkout:

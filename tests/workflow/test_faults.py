@@ -66,8 +66,12 @@ def no_leftovers(sandbox: Sandbox) -> bool:
 # Killed jobs and runs -------------------------------------------------------------------------
 
 
-def test_a_killed_job_is_named_and_made_again(undisturbed: Sandbox, sandbox: Sandbox) -> None:
-    sandbox.path(TABLE).unlink()
+def test_a_lost_row_and_a_killed_job_are_named_and_made_again(
+    undisturbed: Sandbox, sandbox: Sandbox
+) -> None:
+    """The first run finds the row missing, the second one loses the job that reads it."""
+    lose_a_row(sandbox.path(f"{SAMPLING}.csv"))
+    find_damage(sandbox, f"{SAMPLING}.csv", [TABLE])
     status, output = sandbox.run(TABLE, fault="kill:reconstruction_error")
     assert status != 0
     expected = f"job reconstruction_error_table failed while making {TABLE}: killed (SIGKILL)"
@@ -351,10 +355,8 @@ def lose_the_seal(path: Path) -> None:
     seal_path(path).unlink()
 
 
-def damage_and_rerun(
-    sandbox: Sandbox, damaged: str, missing: list[str], target: str = TABLE
-) -> None:
-    """The run that reads the damaged file names it and sets it aside, the next one mends it."""
+def find_damage(sandbox: Sandbox, damaged: str, missing: list[str], target: str = TABLE) -> None:
+    """Run what reads the damaged file: it is named and set aside."""
     for name in missing:
         sandbox.path(name).unlink()
     status, output = sandbox.run(target)
@@ -362,7 +364,6 @@ def damage_and_rerun(
     assert f"{damaged}: damaged, its c" in last_lines(output)
     assert f"set aside as {Path(damaged).name}.damaged, the next run" in last_lines(output)
     sandbox.path(f"{damaged}.damaged").unlink()
-    sandbox.finish(target)
 
 
 # what lies between a damaged file and the table, or nothing would be read again
@@ -372,13 +373,6 @@ BETWEEN = {
     BASIS: [f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE],
     f"{SAMPLING}.csv": [TABLE],
 }
-
-
-def test_a_lost_row_of_a_table(undisturbed: Sandbox, sandbox: Sandbox) -> None:
-    name = f"{SAMPLING}.csv"
-    lose_a_row(sandbox.path(name))
-    damage_and_rerun(sandbox, name, BETWEEN[name])
-    assert sandbox.results() == undisturbed.results()
 
 
 @slow
@@ -399,7 +393,8 @@ def test_a_damaged_result(
     name: str, damage: Callable[[Path], None], undisturbed: Sandbox, sandbox: Sandbox
 ) -> None:
     damage(sandbox.path(name))
-    damage_and_rerun(sandbox, name, BETWEEN[name])
+    find_damage(sandbox, name, BETWEEN[name])
+    sandbox.finish(TABLE)
     assert sandbox.results() == undisturbed.results()
 
 
@@ -418,7 +413,8 @@ def test_what_the_manuscript_is_made_from(
 ) -> None:
     sandbox = finished_study.copy(tmp_path / "run")
     flip_a_bit(sandbox.path(name))
-    damage_and_rerun(sandbox, name, sorted({missing, MICRO_MANUSCRIPT}), MICRO_MANUSCRIPT)
+    find_damage(sandbox, name, sorted({missing, MICRO_MANUSCRIPT}), MICRO_MANUSCRIPT)
+    sandbox.finish(MICRO_MANUSCRIPT)
     assert sandbox.results() == finished_study.results()
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -20,7 +20,6 @@ def test_known_errors():
     assert relative_errors(p, p_hat, 0.0) == pytest.approx([total, 0.6, 0.4, 0.0])
 
 
-@settings(deadline=None)
 @given(SEEDS)
 def test_agrees_with_norms_of_matrices(seed):
     rng = np.random.default_rng(seed)
@@ -30,7 +29,6 @@ def test_agrees_with_norms_of_matrices(seed):
     assert relative_errors(p, p_hat, 0.0) == pytest.approx([total, *axes])
 
 
-@settings(deadline=None)
 @given(SEEDS, st.floats(1e-6, 1e6))
 def test_relative_errors_have_no_unit(seed, unit):
     rng = np.random.default_rng(seed)
@@ -86,7 +84,6 @@ def test_a_run_at_rest_has_no_trajectory_error(frames):
     assert trajectory_error(np.ones(frames), np.zeros(frames)) is None
 
 
-@settings(max_examples=25)
 @given(SEEDS)
 def test_a_rigid_motion_leaves_the_shape(seed):
     """Its error is round-off; that of SciPy's best rotation is met otherwise."""

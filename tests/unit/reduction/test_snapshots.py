@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from builders import make_scene
@@ -22,7 +22,6 @@ from pdrom.reduction.snapshots import (
 FRAMES = st.integers(4, 500)
 
 
-@settings(deadline=None)
 @given(frames=FRAMES, data=st.data())
 def test_training_and_test_frames_are_disjoint_and_spread(frames, data):
     count = data.draw(st.integers(2, (frames + 1) // 2))

@@ -172,7 +172,7 @@ def test_the_seal_tells_the_provenance_and_counts_without_it(result):
 
 
 @given(data=st.data())
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_changed_bit_in_the_file_and_one_in_the_seal_are_noticed(result, data):
     content, seal = result.read_bytes(), seal_of(result)
     bit = data.draw(st.integers(0, 8 * len(content) - 1))

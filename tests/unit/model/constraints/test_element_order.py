@@ -25,7 +25,7 @@ def test_grids_keep_their_order(cells, vertices):
     assert visiting_order(cells, vertices) is None
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_shuffled_mesh_gets_neighbours_into_blocks(seed):
     mesh = cloth(20, 20)

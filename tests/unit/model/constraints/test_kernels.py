@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 
@@ -109,7 +109,6 @@ def test_some_elements_equal_all_elements(group_scene, rng):
 
 
 @pytest.mark.parametrize("group", ["strain", "tetrahedron_strain", "deformation_gradient"])
-@settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), scale=st.floats(-6, 6))
 def test_nearest_point_of_the_manifold(group, seed, scale):
     """No random member of the manifold is closer to F than its projection."""
@@ -131,32 +130,6 @@ def test_nearest_point_of_the_manifold(group, seed, scale):
             member = u @ np.diag(rng.uniform(low, high, 2)) @ vt
         other = np.linalg.norm(f - member, axis=(1, 2))
         assert (distance <= other * (1 + 1e-12) + 1e-12).all()
-
-
-@pytest.mark.parametrize("group", ["tetrahedron_strain", "deformation_gradient"])
-@settings(max_examples=60, deadline=None)
-@given(seed=st.integers(0, 2**32 - 1), squeeze=st.floats(-18, 0))
-def test_projected_tetrahedra_are_right_side_out(group, seed, squeeze):
-    """det p > 0 and singular values in range, also for flat and inverted tetrahedra."""
-    rng = np.random.default_rng(seed)
-    scene = _SCENES[group]
-    constraint = scene.groups[0]
-    y = rng.standard_normal(scene.mesh.points.shape) * [1.0, 1.0, 10.0**squeeze]
-    p = constraint.project(y).reshape(-1, 3, 3)
-    sigma = np.linalg.svd(p, compute_uv=False)
-    assert (np.linalg.det(p) > 0.0).all()
-    assert (sigma >= constraint.allowed[0] - 1e-10).all()
-    assert (sigma <= constraint.allowed[1] + 1e-10).all()
-
-
-@settings(max_examples=60, deadline=None)
-@given(seed=st.integers(0, 2**32 - 1), squeeze=st.floats(-18, 0))
-def test_projected_triangles_are_in_range(seed, squeeze):
-    rng = np.random.default_rng(seed)
-    scene = _SCENES["strain"]
-    y = rng.standard_normal(scene.mesh.points.shape) * [1.0, 10.0**squeeze, 0.0]
-    sigma = np.linalg.svd(scene.groups[0].project(y).reshape(-1, 2, 3), compute_uv=False)
-    assert (np.abs(sigma - 1.0) <= 0.01 + 1e-10).all()
 
 
 _SCENES = {

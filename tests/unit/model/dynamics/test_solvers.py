@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import sparse
 
@@ -24,7 +24,6 @@ def spd(n: int, seed: int) -> sparse.csr_array:
 
 
 @pytest.mark.parametrize("name", NAMES)
-@settings(max_examples=25, deadline=None)
 @given(n=st.integers(1, 60), seed=st.integers(0, 2**31))
 def test_solves_like_the_dense_matrix(name, n, seed):
     matrix = spd(n, seed)

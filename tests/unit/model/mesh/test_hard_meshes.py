@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from pdrom.core.errors import DegenerateElementError
 from pdrom.experiments.hard_cases.case import build
@@ -20,7 +20,6 @@ def one_cell(corners: np.ndarray) -> Mesh:
     return Mesh(corners, EMPTY[:, :3], indices)
 
 
-@settings(max_examples=100, deadline=None)
 @given(corners=cells(3, 0.0) | cells(4, 0.0))
 def test_degenerate_cells_are_refused(corners):
     """Collinear and coplanar up to rounding of the corners."""
@@ -28,20 +27,17 @@ def test_degenerate_cells_are_refused(corners):
         check_mesh(one_cell(corners), "mesh")
 
 
-@settings(max_examples=100, deadline=None)
 @given(corners=cells(3, 1e-9) | cells(4, 1e-9))
 def test_slivers_are_not_refused(corners):
     check_mesh(one_cell(corners), "mesh")
 
 
-@settings(max_examples=100, deadline=None)
 @given(corners=cells(4, 0.5))
 def test_size_has_no_say(corners):
     for size in (1e-100, 1e100):
         check_mesh(one_cell(size * corners), "mesh")
 
 
-@settings(max_examples=25, deadline=None)
 @given(mesh=wild_meshes("sheet"))
 @pytest.mark.parametrize("effect", ["spring", "strain", "bending"])
 def test_wild_sheets_rest_in_themselves(effect, mesh):
@@ -49,7 +45,6 @@ def test_wild_sheets_rest_in_themselves(effect, mesh):
     _rests(build(mesh, {"effect": effect, "weight": 1.0}, frames=1))
 
 
-@settings(max_examples=25, deadline=None)
 @given(mesh=wild_meshes("bar"))
 @pytest.mark.parametrize("effect", ["spring", "tetrahedron_strain", "deformation_gradient"])
 def test_wild_bars_rest_in_themselves(effect, mesh):

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from pdrom.core.errors import DegenerateElementError, MeshError, SceneError, StorageError
-from pdrom.model.mesh.checks import check_mesh
+from pdrom.core.errors import SceneError, StorageError
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.select import farthest_points, select_vertices
-from pdrom.model.mesh.types import Mesh, load_mesh, save_mesh
+from pdrom.model.mesh.types import load_mesh, save_mesh
 
 
 def test_cloth_has_the_counts_of_the_study():
@@ -60,41 +59,6 @@ def test_truncated_file_is_named(tmp_path):
     path.write_bytes(path.read_bytes()[:1000])
     with pytest.raises(StorageError, match=r"mesh\.h5"):
         load_mesh(path)
-
-
-SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-CELLS = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
-
-
-def _changed(index, value):
-    points = SQUARE.copy()
-    points[index] = value
-    return points
-
-
-@pytest.mark.parametrize(
-    ("points", "cells", "error", "message"),
-    [
-        (_changed((1, 0), np.nan), CELLS, MeshError, r"entry \(1, 0\) is nan"),
-        (_changed((1, 0), np.inf), CELLS, MeshError, r"entry \(1, 0\) is inf"),
-        (np.vstack([SQUARE, [5, 5, 5]]), CELLS, MeshError, "1 vertices in no element"),
-        (np.vstack([SQUARE, SQUARE[:1]]), np.vstack([CELLS, [4, 1, 3]]), MeshError, "repeats"),
-        (SQUARE, np.array([[0, 1, 2], [0, 2, 7]]), MeshError, "allowed: 0 to 3"),
-        (SQUARE, np.array([[0, 1, 2], [0, 3, 3]]), DegenerateElementError, "twice"),
-        (_changed(2, [2, 0, 0]), CELLS[:, :], DegenerateElementError, "zero area"),
-        (SQUARE, np.empty((0, 3), dtype=np.int32), MeshError, "no triangles"),
-        (SQUARE, np.vstack([CELLS, [2, 0, 1]]), MeshError, r"2 \[2, 0, 1\] repeats triangle 0"),
-        (SQUARE, np.vstack([CELLS, [1, 0, 2]]), MeshError, r"2 \[1, 0, 2\] repeats triangle 0"),
-    ],
-)
-def test_faults_are_named(points, cells, error, message):
-    with pytest.raises(error, match=message):
-        check_mesh(Mesh(points, cells), "square")
-
-
-def test_flat_tetrahedron_is_named():
-    with pytest.raises(DegenerateElementError, match="zero volume"):
-        check_mesh(Mesh(SQUARE, CELLS, np.array([[0, 1, 2, 3]], dtype=np.int32)), "flat")
 
 
 def test_sides_of_a_sheet():

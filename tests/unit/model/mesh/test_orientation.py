@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pdrom.core.errors import MeshError
@@ -15,7 +15,6 @@ CLOSED = bar(3, 3, 4).triangles
 BOTH = np.concatenate([SHEET, CLOSED + SHEET.max() + 1])
 
 
-@settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 0.4))
 @pytest.mark.parametrize("triangles", [SHEET, CLOSED, BOTH], ids=["sheet", "closed", "two parts"])
 def test_the_fewer_ones_are_turned(triangles, seed, share):

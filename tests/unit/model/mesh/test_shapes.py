@@ -34,7 +34,7 @@ def euler(mesh: Mesh) -> int:
     return mesh.vertices - len(mesh.edges()) + len(mesh.triangles)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(edge=st.floats(0.03, 0.12), hole=st.sampled_from([0.0, 0.2, 0.6]), size=st.floats(0.1, 10))
 def test_a_disc_has_its_area_and_its_rims(edge, hole, size):
     mesh = check_mesh(disc(edge * size, hole, "xz", size, 3.0), "disc")

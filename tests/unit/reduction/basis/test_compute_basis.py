@@ -5,7 +5,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import linalg
 
@@ -43,7 +43,6 @@ def spec(request: pytest.FixtureRequest) -> BasisSpec:
     return request.param
 
 
-@settings(max_examples=20, deadline=None)
 @given(seed=SEEDS)
 @pytest.mark.parametrize("any_spec", SPECS, ids=lambda s: s.basis_id)
 def test_modes_are_orthonormal_in_their_inner_product(any_spec, seed):
@@ -62,7 +61,6 @@ def test_modes_are_orthonormal_in_their_inner_product(any_spec, seed):
         assert np.abs(sum(grams) - np.eye(basis.rank)).max() < 1e-12
 
 
-@settings(max_examples=20, deadline=None)
 @given(seed=SEEDS)
 @pytest.mark.parametrize(
     "any_spec", [s for s in SPECS if s.centring != "mean-in-modes"], ids=lambda s: s.basis_id
@@ -190,7 +188,6 @@ def test_zero_snapshots_have_no_basis(spec):
     assert basis.active_axes == (False, False, False)
 
 
-@settings(max_examples=50, deadline=None)
 @given(seed=SEEDS, n=st.integers(2, 40), exponent=st.integers(-8, 8))
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("weighting", WEIGHTINGS)

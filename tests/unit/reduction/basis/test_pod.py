@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pymor.algorithms.pod import pod as pymor_pod
 from pymor.vectorarrays.numpy import NumpyVectorSpace
@@ -19,7 +19,6 @@ def matrix_of(shape: tuple[int, int, int]) -> np.ndarray:
     return rng.standard_normal((n, m)) * 10.0 ** rng.uniform(-6, 6, m)
 
 
-@settings(deadline=None)
 @given(SHAPES)
 def test_modes_are_orthonormal_and_input_is_kept(shape):
     matrix = matrix_of(shape)
@@ -31,7 +30,6 @@ def test_modes_are_orthonormal_and_input_is_kept(shape):
     assert (np.diff(sigma) <= 0.0).all()
 
 
-@settings(deadline=None)
 @given(SHAPES)
 def test_singular_values_are_those_of_a_dense_svd(shape):
     matrix = matrix_of(shape)
@@ -39,7 +37,6 @@ def test_singular_values_are_those_of_a_dense_svd(shape):
     np.testing.assert_allclose(pod(matrix)[1], reference, rtol=0.0, atol=1e-14 * reference[0])
 
 
-@settings(deadline=None)
 @given(SHAPES)
 def test_all_modes_reproduce_the_matrix(shape):
     matrix = matrix_of(shape)
@@ -68,7 +65,6 @@ def test_agrees_with_pymor(rng):
     np.testing.assert_allclose(u, fix_signs(modes.to_numpy()), atol=1e-9)
 
 
-@settings(deadline=None)
 @given(SHAPES)
 def test_entry_of_largest_magnitude_is_positive(shape):
     u = pod(matrix_of(shape))[0]
@@ -81,7 +77,6 @@ def test_first_of_tied_entries_decides_the_sign():
     np.testing.assert_array_equal(fix_signs(u), u * [-1.0, 1.0])
 
 
-@settings(deadline=None)
 @given(SHAPES, st.integers(0, 2**32 - 1))
 def test_signs_do_not_depend_on_those_of_the_input(shape, seed):
     matrix = matrix_of(shape)

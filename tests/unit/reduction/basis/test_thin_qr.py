@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import linalg
 
@@ -33,7 +33,6 @@ def check(matrix: np.ndarray) -> None:
     assert (error <= 1e-13 * np.linalg.norm(matrix, axis=0)).all()
 
 
-@settings(deadline=None)
 @given(SHAPES)
 def test_is_a_factorisation_with_orthonormal_columns(shape):
     check(tall(shape))

@@ -83,7 +83,7 @@ def case() -> Case:
     return Case(scene, reference, reduction, Trained.on(reference, companion))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(share=st.floats(0.0, 1.2))
 def test_an_alarm_is_given_where_the_estimate_exceeds_the_threshold(case, share):
     plain, _ = case.run(action="none")

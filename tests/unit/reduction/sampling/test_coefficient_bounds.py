@@ -31,7 +31,6 @@ def coefficients(reduction: Reduction, p: np.ndarray) -> np.ndarray:
     return (reduction.reconstruct(p).reshape(len(p), -1) - reduction.basis.mean) @ reduction.v
 
 
-@settings(max_examples=20)
 @given(SEEDS, st.floats(0.0, 1.0))
 def test_range_is_that_of_the_training_coefficients_with_its_margin(seed, margin):
     p, _, bounded = reductions(seed, margin=margin)
@@ -65,7 +64,6 @@ def test_clipping_is_the_projection_on_the_box(seed):
         np.testing.assert_allclose(c, lsq_linear(free.v, b, limits, tol=1e-12).x, atol=1e-5)
 
 
-@settings(max_examples=20)
 @given(SEEDS)
 def test_it_cannot_hurt_where_the_best_coefficients_are_in_range(seed):
     """Training snapshots with noise at the sampled entries only."""

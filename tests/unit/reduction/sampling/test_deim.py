@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
-from pymor.algorithms.ei import deim as pymor_deim
 from pymor.algorithms.ei import qdeim as pymor_qdeim
 from pymor.vectorarrays.numpy import NumpyVectorSpace
 from scipy import linalg
@@ -22,29 +21,6 @@ def orthonormal(size: tuple[int, int, int]) -> np.ndarray:
     return np.linalg.qr(rng.standard_normal((n, min(n, r))))[0]
 
 
-def decaying(n: int = 400, m: int = 40) -> np.ndarray:
-    """POD modes of 1 / sqrt((x - a)^2 + 0.01) (after Chaturantabut and Sorensen 2010, sec. 4)."""
-    x, a = np.linspace(0, 1, n)[:, None], np.linspace(0, 1, m)
-    return np.linalg.svd(1.0 / np.sqrt((x - a) ** 2 + 0.01), full_matrices=False)[0][:, :20]
-
-
-def pymor_entries(v: np.ndarray) -> np.ndarray:
-    """Entries of pyMOR's DEIM on a given basis."""
-    return pymor_deim(NumpyVectorSpace(len(v)).from_numpy(v.copy()), pod=False)[0]
-
-
-@settings(deadline=None)
-@given(SIZES)
-def test_picks_the_entries_of_pymor(size):
-    v = orthonormal(size)
-    np.testing.assert_array_equal(deim_entries(v), pymor_entries(v))
-
-
-def test_picks_the_entries_of_pymor_for_a_decaying_basis():
-    v = decaying()
-    np.testing.assert_array_equal(deim_entries(v), pymor_entries(v))
-
-
 def greedy_loop(v: np.ndarray) -> list[int]:
     """The algorithm as it is published, mode by mode, with the factors that decide ties."""
     weights = tie_weights(len(v))
@@ -58,14 +34,12 @@ def greedy_loop(v: np.ndarray) -> list[int]:
     return entries
 
 
-@settings(deadline=None)
 @given(SIZES)
 def test_picks_the_entries_of_the_greedy_loop(size):
     v = orthonormal(size)
     assert deim_entries(v).tolist() == greedy_loop(v)
 
 
-@settings(deadline=None)
 @given(SIZES, st.integers(0, 2**32 - 1), st.floats(0.0, 1e-13))
 def test_of_mirrored_entries_the_first_is_taken_whatever_round_off_says(size, seed, noise):
     """Both halves hold the same numbers, up to signs and a noise, as a symmetric motion's do."""
@@ -87,7 +61,6 @@ def test_equal_magnitudes_go_to_the_first_entry():
     assert deim_entries(v).tolist() == [49]
 
 
-@settings(deadline=None)
 @given(SIZES, st.integers(1, 4), st.integers(0, 2**32 - 1))
 def test_dependent_modes_get_distinct_entries_and_change_none_before(size, copies, seed):
     """Zero modes and combinations of earlier ones, exact and rounded."""
@@ -100,7 +73,6 @@ def test_dependent_modes_get_distinct_entries_and_change_none_before(size, copie
     assert deim_entries(np.zeros((3, 2))).tolist() == [0, 1]
 
 
-@settings(deadline=None)
 @given(SIZES)
 def test_selection_is_nested_distinct_and_keeps_its_input(size):
     v = orthonormal(size)
@@ -112,7 +84,6 @@ def test_selection_is_nested_distinct_and_keeps_its_input(size):
         np.testing.assert_array_equal(deim_entries(v[:, :r]), entries[:r])
 
 
-@settings(deadline=None)
 @given(SIZES)
 def test_system_is_regular_and_follows_the_growth_bound(size):
     """|| (P^T V)^-1 || <= (1 + sqrt(2 n))^(r-1) / || v_1 ||_inf (lemma 3.2)."""
@@ -122,7 +93,6 @@ def test_system_is_regular_and_follows_the_growth_bound(size):
     assert gain <= (1.0 + np.sqrt(2.0 * n)) ** (r - 1) / np.abs(v[:, 0]).max() * (1.0 + 1e-10)
 
 
-@settings(deadline=None)
 @given(SIZES, st.integers(0, 2**32 - 1))
 def test_permuted_rows_are_picked_in_the_same_order(size, seed):
     v = orthonormal(size)
@@ -130,7 +100,6 @@ def test_permuted_rows_are_picked_in_the_same_order(size, seed):
     np.testing.assert_array_equal(order[deim_entries(v[order])], deim_entries(v))
 
 
-@settings(deadline=None)
 @given(SIZES, st.integers(0, 2**32 - 1))
 def test_signs_of_the_modes_do_not_matter(size, seed):
     v = orthonormal(size)
@@ -145,7 +114,6 @@ def test_known_selection():
     np.testing.assert_array_equal(deim_entries(np.eye(4)[:, [3, 1]]), [3, 1])
 
 
-@settings(deadline=None)
 @given(SIZES)
 def test_qdeim_takes_the_pivots_of_a_permuted_triangular_factorisation(size):
     """The pivots are distinct and give V^T P = Q R with |R_kk| >= the norm of what is left."""
@@ -160,7 +128,6 @@ def test_qdeim_takes_the_pivots_of_a_permuted_triangular_factorisation(size):
         assert abs(factor[k, k]) == pytest.approx(left, rel=1e-8)
 
 
-@settings(deadline=None)
 @given(SIZES)
 def test_qdeim_does_not_depend_on_the_basis_of_the_space(size):
     """Drmac and Gugercin 2016: V Q with orthogonal Q gives the same norms, hence the same pivots.
@@ -173,7 +140,6 @@ def test_qdeim_does_not_depend_on_the_basis_of_the_space(size):
     np.testing.assert_array_equal(qdeim_elements(v @ q, 1), qdeim_elements(v, 1))
 
 
-@settings(deadline=None)
 @given(SIZES)
 def test_qdeim_of_entries_picks_those_of_pymor(size):
     v = orthonormal(size)

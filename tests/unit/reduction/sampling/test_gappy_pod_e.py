@@ -5,7 +5,7 @@ import itertools
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pdrom.core.errors import SamplingError
@@ -52,7 +52,6 @@ def test_single_rows_follow_the_published_loop(seed):
     assert oversample(v, 1, qdeim_elements(v, 1), 25).tolist() == published_loop(v, 25)
 
 
-@settings(deadline=None)
 @given(SIZES)
 def test_growth_is_a_lower_bound_and_exact_for_one_mode(size):
     """Against dense eigenvalues of G + B^T B; at most |B u|^2, which r = 1 attains."""
@@ -98,7 +97,6 @@ def test_growth_is_sharper_than_with_the_norm_of_the_block(rng):
     assert np.median(sharp / loose) > 1.5
 
 
-@settings(deadline=None)
 @given(SIZES)
 def test_each_element_has_the_largest_bound_and_none_raises_the_gain(size):
     v = modes(size)
@@ -120,7 +118,6 @@ def test_each_element_has_the_largest_bound_and_none_raises_the_gain(size):
         assert bound[path[k]] >= bound.max() * (1.0 - 1e-6) - 1e-12
 
 
-@settings(deadline=None)
 @given(SIZES, st.floats(1.01, 50.0))
 def test_bounded_gain_is_met_with_no_element_too_many(size, bound):
     """Orthonormal modes have gain 1 at all elements, so that every bound can be met."""

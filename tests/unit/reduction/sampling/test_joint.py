@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pdrom.reduction.sampling.deim import deim_entries
@@ -35,7 +35,6 @@ def by_definition(v: np.ndarray) -> list[int]:
     return picked
 
 
-@settings(deadline=None)
 @given(SIZES)
 def test_follows_the_definition(size):
     v = modes(size)
@@ -47,7 +46,6 @@ def test_follows_the_definition(size):
         np.testing.assert_array_equal(joint_rows(v[:, :r], ALL, False), rows[:r])
 
 
-@settings(deadline=None)
 @given(SIZES)
 def test_one_active_axis_is_classical_deim_on_it(size):
     rows, r, seed = size

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -77,7 +77,6 @@ def test_the_presets_are_those_of_the_study():
     assert len(EVERY) > 50
 
 
-@settings(max_examples=50)
 @given(seed=SEEDS, name=st.sampled_from(list(PROJECTIONS)))
 def test_what_is_in_the_span_is_reproduced(name, seed):
     spec = PROJECTIONS[name]
@@ -88,7 +87,6 @@ def test_what_is_in_the_span_is_reproduced(name, seed):
     np.testing.assert_allclose(reduction.reconstruct(inside), inside, atol=tolerance)
 
 
-@settings(max_examples=50)
 @given(seed=SEEDS, name=st.sampled_from(list(EVERY)))
 def test_reconstruction_stays_in_the_space_and_keeps_its_input(name, seed):
     spec = EVERY[name]
@@ -103,7 +101,6 @@ def test_reconstruction_stays_in_the_space_and_keeps_its_input(name, seed):
     np.testing.assert_allclose(result, inside, atol=1e-10 * np.abs(result).max())
 
 
-@settings(max_examples=50)
 @given(seed=SEEDS, name=st.sampled_from(list(UNWEIGHTED)))
 def test_error_is_at_most_gain_times_that_of_the_best_approximation(name, seed):
     """|| p - p^ || <= gain || (I - V V^T)(p - mean) || for data outside the training set."""
@@ -118,7 +115,6 @@ def test_error_is_at_most_gain_times_that_of_the_best_approximation(name, seed):
     assert (np.linalg.norm(error, axis=(1, 2)) <= bound * (1.0 + 1e-10)).all()
 
 
-@settings(max_examples=50)
 @given(seed=SEEDS, name=st.sampled_from([n for n in UNWEIGHTED if UNWEIGHTED[n].rows != "all"]))
 def test_gain_is_the_norm_of_the_pseudo_inverse_and_attained(name, seed):
     """Some sampled values are amplified by the gain: it is no mere bound."""
@@ -133,7 +129,6 @@ def test_gain_is_the_norm_of_the_pseudo_inverse_and_attained(name, seed):
     assert reduction.gain >= 1.0 - 1e-12
 
 
-@settings(max_examples=20, deadline=None)
 @given(seed=SEEDS)
 @pytest.mark.parametrize("rows", ["scalar", "element"])
 def test_error_with_mass_weighting_has_its_factor_in_the_mass_norm(rows, seed):
@@ -271,7 +266,7 @@ def test_shared_coefficients_give_zero_in_a_flat_axis():
 # Selection ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", EVERY)
+@given(name=st.sampled_from(list(EVERY)))
 def test_path_holds_the_selection_of_every_rank(name):
     spec = EVERY[name]
     p, mass = data(19)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pdrom.core.errors import SamplingError
@@ -22,7 +22,6 @@ def test_whole_elements_have_all_their_entries():
     assert sampling.elements.tolist() == [3, 1]
 
 
-@settings(deadline=None)
 @given(st.integers(1, 3), st.lists(st.integers(0, 19), min_size=1, unique=True))
 def test_element_entries_lead_back_to_their_elements(rows, elements):
     sampling = Sampling.of_elements(np.array(elements), rows, 20)

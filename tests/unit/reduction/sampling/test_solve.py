@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pdrom.reduction.sampling.solve import norm_and_condition, solution_operator
@@ -18,7 +18,6 @@ def full_rank(rows: int, columns: int, seed: int) -> np.ndarray:
     return u * rng.uniform(0.1, 1.0, columns) @ w.T
 
 
-@settings(deadline=None)
 @given(st.integers(1, 12), SEEDS)
 def test_square_is_the_inverse(r, seed):
     a = full_rank(r, r, seed)
@@ -28,14 +27,12 @@ def test_square_is_the_inverse(r, seed):
     np.testing.assert_allclose(operator, np.linalg.inv(a), atol=1e-11)
 
 
-@settings(deadline=None)
 @given(st.integers(1, 12), st.integers(0, 20), SEEDS)
 def test_qr_is_the_pseudo_inverse(r, extra, seed):
     a = full_rank(r + extra, r, seed)
     np.testing.assert_allclose(solution_operator(a, "qr", 1e-8), np.linalg.pinv(a), atol=1e-11)
 
 
-@settings(deadline=None)
 @given(st.integers(1, 12), st.integers(0, 20), SEEDS)
 def test_tikhonov_minimises_its_functional(r, extra, seed):
     """c minimises |A c - b|^2 + t |c|^2: least squares of the system [A; sqrt(t) I]."""

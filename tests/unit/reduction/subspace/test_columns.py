@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from builders import make_scene, random_rotation
@@ -58,7 +58,6 @@ def test_atoms_of_overlapping_pins_by_hand():
     assert atoms([], 10) == []
 
 
-@settings(max_examples=40, deadline=None)
 @given(n=st.integers(1, 12), m=st.integers(1, 12), rank=st.integers(0, 12), seed=st.integers(0, 99))
 def test_orthonormal_keeps_the_span(n, m, rank, seed):
     rng = np.random.default_rng(seed)

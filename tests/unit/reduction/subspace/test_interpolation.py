@@ -5,7 +5,7 @@ import pytest
 from meshless import assert_reads_nothing_of_the_mesh
 from test_subspace_run import GRAVITY, PINS, SCENES, SPRING, run_model, whole_space
 
-from builders import make_scene, random_rotation
+from builders import GROUPS, make_scene, random_rotation
 from pdrom.core.store import open_hdf5, write_hdf5
 from pdrom.model.constraints.lanes import LANES
 from pdrom.model.runs.full_order import trajectory
@@ -18,6 +18,7 @@ from pdrom.reduction.subspace.model import SubspaceModel, make_columns
 from pdrom.reduction.subspace.space import coordinates
 from pdrom.reduction.subspace.specs import HrpdSpec, InterpolationSpec
 
+FEW = {"kind": "bar", "nx": 3, "ny": 2, "nz": 2}
 EVERYTHING = {"modes": 10_000, "oversampling": 100}
 GAPPY = InterpolationSpec(modes=8, states="visited", oversampling=3, margin=0.1)
 HRPD = HrpdSpec(dimension=8, samples=20)
@@ -59,9 +60,15 @@ def interpolations_of(scene, columns, training, method):
     ],
     ids=str,
 )
-def test_the_whole_space_from_all_elements_is_the_full_projection(group_scene, rng, changes):
-    """Random states in number enough span every projection; nothing is left to interpolate."""
-    scene, group = group_scene, group_scene.groups[0]
+@pytest.mark.parametrize("name", GROUPS)
+def test_the_whole_space_from_all_elements_is_the_full_projection(name, rng, changes):
+    """Random states in number enough span every projection; nothing is left to interpolate.
+
+    The bar has few elements: the basis is as large as all projections together.
+    """
+    mesh = GROUPS[name] if GROUPS[name]["kind"] == "cloth" else FEW
+    scene = make_scene({"effect": name, "weight": 1e4}, mesh=mesh)
+    (group,) = scene.groups
     points = scene.mesh.points
     count = 3 * group.elements * group.rows_per_element + 5
     states = [(points, points + rng.standard_normal(points.shape)) for _ in range(count)]

@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
@@ -21,7 +21,6 @@ def dense(support, values, size) -> np.ndarray:
     return x
 
 
-@settings(max_examples=80, deadline=None)
 @given(
     m=st.integers(1, 25), e=st.integers(1, 25), seed=st.integers(0, 2**31), scale=st.floats(-6, 6)
 )
@@ -38,7 +37,6 @@ def test_without_tolerance_it_is_the_method_of_lawson_and_hanson(m, e, seed, sca
     np.testing.assert_allclose(g @ x, g @ best, atol=1e-5 * np.linalg.norm(b))
 
 
-@settings(max_examples=30, deadline=None)
 @given(m=st.integers(2, 6), e=st.integers(1, 6), seed=st.integers(0, 2**31))
 def test_no_other_support_is_better(m, e, seed):
     """Least squares on every subset of columns whose solution is not negative."""
@@ -92,7 +90,6 @@ def test_a_path_meets_each_of_its_tolerances():
         np.testing.assert_array_equal(one, two)
 
 
-@settings(max_examples=30, deadline=None)
 @given(n=st.integers(1, 12), data=st.data())
 def test_a_removed_row_leaves_the_factor_of_the_rest(n, data):
     removed = data.draw(st.integers(0, n - 1))
