@@ -1,16 +1,13 @@
-"""A small project whose scene lies outside the study, with all results that its artifacts read."""
+"""A small project whose scene lies outside the study, with all results that are drawn of it."""
 
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 
 from bad_input.project import SMALL_SCENE, make_project
 from pdrom.core.yamlfile import read_yaml
 from pdrom.experiments.kit.declaration import Experiment
 from pdrom.pipeline.jobs import Jobs
-from pdrom.pipeline.scene_artifacts import SceneArtifacts
 from pdrom.pipeline.study import Study
-from pdrom.report.scenes.job import SceneOrder
 
 SCENE = "own"
 NEEDED = (
@@ -44,18 +41,12 @@ def small_study(root: Path) -> Study:
 
 
 def run_jobs(study: Study, results: str) -> None:
-    """Every job that the scene's artifacts need, in this process, as the workflow runs them."""
+    """Every job whose files are drawn, in this process, as the workflow runs them."""
     jobs = Jobs(study, results)
     known = {experiment.name: experiment for experiment in jobs.experiments}
     for name in NEEDED:
         for labels in _labels(study, name):
             _run(jobs, known[name], labels)
-
-
-def order(study: Study, results: str, artifact: str) -> SceneOrder:
-    """What the job of an artifact is told."""
-    params = SceneArtifacts(study, results).params(artifact)
-    return SceneOrder.model_validate(params["order"](SimpleNamespace(scene=SCENE)))
 
 
 def _labels(study: Study, name: str) -> Iterator[dict[str, str]]:

@@ -142,18 +142,6 @@ def test_a_scene_outside_the_study_is_run_for_its_own_file(clean: Checkout) -> N
     assert run == target
 
 
-def test_the_artifacts_of_a_scene_need_that_scene_alone(clean: Checkout) -> None:
-    planned = clean.planned(
-        "results/scenes/spring_oop/runs.csv", "results/scenes/bar140/frames.pdf"
-    )
-    assert {_stage(path) for path in planned} == {
-        "meshes", "fom", "sensitivity", "contributions", "snapshots", "pod", "reruns", "sampling",
-        "hyper", "timings", "breakeven", "effects", "left_out", "scenes", "seconds",
-    }  # fmt: skip
-    others = {path for path in planned if _stage(path) != "meshes"}
-    assert {path.split("/")[2].removesuffix(".csv") for path in others} == {"spring_oop", "bar140"}
-
-
 @pytest.mark.parametrize(
     ("target", "words"),
     [

@@ -16,13 +16,11 @@ from pdrom.pipeline.fingerprint import fingerprint
 from pdrom.pipeline.full import FULL_STUDY
 from pdrom.pipeline.jobs import Jobs, digest
 from pdrom.pipeline.paper import PaperJob, check_texts, paper_job
-from pdrom.pipeline.scene_artifacts import SceneArtifacts
 from pdrom.pipeline.scenes import require_scenes
 from pdrom.pipeline.study import Study, StudySettings
 from pdrom.pipeline.subspace_scenes import check_subspaces
 from pdrom.pipeline.tables import Tables
 from pdrom.reduction.method import MethodSpec
-from pdrom.report.scenes.catalogue import ARTIFACTS
 from pdrom.tables.claims import load_claims
 
 
@@ -65,8 +63,6 @@ class Plan:
         self.configuration = configuration
         self.jobs = Jobs(study, results)
         self.tables = Tables(study, results)
-        self.of_scene = SceneArtifacts(study, results)
-        self.scene_artifacts = ARTIFACTS
 
     @property
     def settings(self) -> StudySettings:

@@ -13,6 +13,8 @@ from pdrom.core.store import Condition, check_file, read_table
 from pdrom.pipeline.commandline import CommandLine
 from pdrom.pipeline.folders import Folders
 
+LISTED = 8  # targets, by their names
+
 
 def processor_seconds() -> float:
     """Processor time of this process and of all that it has started, until now."""
@@ -45,7 +47,9 @@ def summary(
     wall = time.time() - psutil.Process().create_time()
     lines = [f"configuration: {configuration(command)}"]
     if command.targets:
-        lines.append(f"made: {', '.join(command.targets)}")
+        more = len(command.targets) - LISTED
+        others = [f"and {more} more"] if more > 0 else []
+        lines.append(f"made: {', '.join([*command.targets[:LISTED], *others])}")
     else:
         lines += _verdicts(folders, apart)
         lines.append(f"manuscript: {folders.manuscript}")

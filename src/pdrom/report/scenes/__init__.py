@@ -1,1 +1,1 @@
-"""What is made of a single scene, in the study or outside it, beside the study's own artifacts."""
+"""Pictures, films, tables and files of a single scene, of the pipeline's results or of own runs."""

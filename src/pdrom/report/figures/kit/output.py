@@ -40,20 +40,25 @@ def draw_figure(name: str, results: Results, options: Options, full: bool = True
 
 
 def write_figure(
-    figure: Figure, title: str, pdf: str | os.PathLike[str], png: str | os.PathLike[str]
+    figure: Figure,
+    title: str,
+    pdf: str | os.PathLike[str],
+    png: str | os.PathLike[str],
+    sealed: bool = True,
 ) -> None:
     """Write ``figure`` as PDF (embedded TrueType fonts, no dates) and as its PNG twin.
 
     Both carry their provenance (`pdrom.core.embedded`). Either file appears only when complete.
+    ``sealed`` as in `pdrom.core.store.atomic_path`.
     """
     FigureCanvasAgg(figure)
     made = as_text(provenance())
     document = {"Title": title, "Creator": "pdrom", "CreationDate": None, "ModDate": None}
     with style.look():
-        with atomic_path(Path(pdf)) as temporary:
+        with atomic_path(Path(pdf), sealed) as temporary:
             figure.savefig(
                 temporary, format="pdf", dpi=RASTER_DPI, metadata=document | {PDF_KEY: made}
             )
-        with atomic_path(Path(png)) as temporary:
+        with atomic_path(Path(png), sealed) as temporary:
             picture = {"Title": title, PNG_KEY: made}
             figure.savefig(temporary, format="png", dpi=PNG_DPI, metadata=picture)
