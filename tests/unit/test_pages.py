@@ -78,7 +78,7 @@ def commands() -> list[str]:
     texts = [path.read_text("utf-8").replace("\\\n", " ") for path in files]
     found = {line.split("  ")[0].strip() for text in texts for line in COMMAND.findall(text)}
     # names in capitals stand for others; a plugin of the executor need not be installed
-    left_out = re.compile(r"test|run |--help|--executor|--profile|.*[A-Z]{4}")
+    left_out = re.compile(r"test|run |pages|docs|release|--help|--executor|--profile|.*[A-Z]{4}")
     return sorted(command for command in found if command and not left_out.match(command))
 
 

@@ -36,6 +36,7 @@ HANDED_ON = {
     "test": "pytest",
     "verify": "pdrom.verification",
     "bundle": "pdrom.verification.bundle",
+    "pages": "pdrom.verification.pages",
 }
 
 

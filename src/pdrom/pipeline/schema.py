@@ -1,7 +1,4 @@
-"""JSON schemas of scene and study files, by which editors complete keys and mark faults.
-
-``.venv/bin/python -m pdrom.pipeline.schema`` writes them into `config/schema`.
-"""
+"""JSON schemas of scene and study files, by which editors complete keys and mark faults."""
 
 import json
 from pathlib import Path
@@ -39,13 +36,7 @@ def study_schema() -> dict[str, Any]:
     return {"$schema": DIALECT, **schema}
 
 
-def schemas() -> dict[str, str]:
-    """Content of each file of the folder, by its name."""
+def schemas() -> dict[Path, str]:
+    """Content of each schema by its place in the project."""
     made = {"scene.json": scene_schema(), "study.json": study_schema()}
-    return {name: json.dumps(schema, indent=1) + "\n" for name, schema in made.items()}
-
-
-if __name__ == "__main__":
-    FOLDER.mkdir(exist_ok=True)
-    for name, content in schemas().items():
-        (FOLDER / name).write_text(content, encoding="utf-8")
+    return {FOLDER / name: json.dumps(schema, indent=1) + "\n" for name, schema in made.items()}

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 from pdrom.core import paths
@@ -13,10 +12,7 @@ from pdrom.pipeline.fingerprint import fingerprint
 from pdrom.pipeline.holdings import paths_of, preferred_paths
 from pdrom.pipeline.jobs import digest
 from pdrom.pipeline.study import Study
-from pdrom.report.codecheck import FILE as CODECHECK
-from pdrom.report.codecheck import codecheck
 from pdrom.tables import declared
-from pdrom.tables.kit.document import document
 
 
 class Tables:
@@ -120,8 +116,3 @@ class Tables:
     @cached_property
     def _plain_scenes(self) -> dict[str, dict[str, Any]]:
         return {name: scene.model_dump(mode="json") for name, scene in self._study.scenes.items()}
-
-
-if __name__ == "__main__":
-    Path("docs/tables.md").write_text(document(declared().values()), encoding="utf-8")
-    CODECHECK.write_text(codecheck(declared().values()), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""What the rules of the tables get from a study; the list of tables for readers is up to date."""
+"""What the rules of the tables get from a study."""
 
 from dataclasses import replace
 
@@ -10,7 +10,6 @@ from pdrom.pipeline import tables as module
 from pdrom.pipeline.study import Study
 from pdrom.pipeline.tables import Tables
 from pdrom.tables import declared
-from pdrom.tables.kit.document import document
 from places import ROOT
 
 CONFIG = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "block-deim"]}
@@ -18,12 +17,6 @@ CONFIG = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "block-dei
 
 def made(**changes) -> Tables:
     return Tables(Study.load(CONFIG | changes, ROOT), "out")
-
-
-def test_the_list_of_tables_is_up_to_date():
-    """Else: python -m pdrom.pipeline.tables"""
-    written = (ROOT / "docs" / "tables.md").read_text(encoding="utf-8")
-    assert written == document(declared().values())
 
 
 def test_verdicts_are_a_table_like_others():
