@@ -36,6 +36,8 @@ HANDED_ON = {
     "test": "pytest",
     "verify": "pdrom.verification",
     "bundle": "pdrom.verification.bundle",
+    "docs": "pdrom.pipeline.site",
+    "release": "pdrom.verification.release",
     "pages": "pdrom.verification.pages",
 }
 
