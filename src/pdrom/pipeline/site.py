@@ -1,6 +1,6 @@
 """``./reproduce docs``: the pages for readers as a site with search, in the folder ``site``.
 
-README and what it links to, page by page, are copied with their folders, so that links hold; MkDocs,
+README and the pages that it leads to are copied with their folders, so that links hold; MkDocs,
 which is no part of the environment, is installed beside it from `requirements-docs.lock`.
 """
 
