@@ -38,7 +38,7 @@ HANDED_ON = {
     "bundle": "pdrom.verification.bundle",
     "docs": "pdrom.pipeline.site",
     "release": "pdrom.verification.release",
-    "pages": "pdrom.verification.pages",
+    "pages": "pdrom.verification.pages.written",
 }
 
 
@@ -138,9 +138,10 @@ def main() -> None:
             from pdrom.pipeline.scene_command import scene_order
 
             order = scene_order(words)
+            pdrom = [sys.executable, "-m", "pdrom"]  # here, as the workflow sets another one
             _run(order.arguments)
             if order.draws:
-                sys.exit(subprocess.run([sys.executable, "-m", "pdrom", *order.drawing]).returncode)
+                sys.exit(subprocess.run([*pdrom, *order.drawing], check=False).returncode)
         else:
             _run(words)
     except PdromError as error:

@@ -7,7 +7,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from pdrom.report.figures.kit.catalogue import declarations
-from pdrom.verification import pages as module
+from pdrom.verification.pages import written as module
 from places import ROOT
 
 
