@@ -1,16 +1,13 @@
-"""A small project whose scene lies outside the study, with all results that its artifacts read."""
+"""A small project whose scene lies outside the study, with all results that are drawn of it."""
 
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 
 from bad_input.project import SMALL_SCENE, make_project
 from pdrom.core.yamlfile import read_yaml
 from pdrom.experiments.kit.declaration import experiments
 from pdrom.pipeline.resolve import Resolver
-from pdrom.pipeline.scene_artifacts import SceneArtifacts
 from pdrom.pipeline.study import Study
-from pdrom.report.scenes.job import SceneOrder
 
 SCENE = "own"
 NEEDED = (
@@ -49,12 +46,6 @@ def run_jobs(study: Study, results: str) -> None:
         for labels in _labels(study, name):
             job = resolver.job(experiments()[name], labels)
             job.make(job.outputs)
-
-
-def order(study: Study, results: str, artifact: str) -> SceneOrder:
-    """What the job of an artifact is told."""
-    params = SceneArtifacts(study, results).params(artifact)
-    return SceneOrder.model_validate(params["order"](SimpleNamespace(scene=SCENE)))
 
 
 def _labels(study: Study, name: str) -> Iterator[dict[str, str]]:

@@ -7,11 +7,13 @@ from pathlib import Path
 import pytest
 import yaml
 
+from pdrom.command.main import parser as pdrom_parser
 from pdrom.core.paths import RESULTS
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.selection import KINDS
 from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.front import completed
+from pdrom.pipeline.scene_command import scene_order
 from pdrom.pipeline.study import StudySettings
 from pdrom.reduction.method import MethodSpec
 from pdrom.report.figures.kit.outcomes import LOOKS
@@ -76,7 +78,7 @@ def commands() -> list[str]:
     texts = [path.read_text("utf-8").replace("\\\n", " ") for path in files]
     found = {line.split("  ")[0].strip() for text in texts for line in COMMAND.findall(text)}
     # names in capitals stand for others; a plugin of the executor need not be installed
-    left_out = re.compile(r"test|run |--help|--executor|--profile|.*[A-Z]{4}")
+    left_out = re.compile(r"test|run |pages|docs|release|--help|--executor|--profile|.*[A-Z]{4}")
     return sorted(command for command in found if command and not left_out.match(command))
 
 
@@ -87,7 +89,14 @@ def test_commands_are_understood(command: str, monkeypatch: pytest.MonkeyPatch) 
     words = command.replace("my_sheet", "spring_oop").replace("mine.yaml", "tiny.yaml")
     first, *others = shlex.split(words)
     parsers = {"verify": verify_parser, "bundle": bundle_parser}
-    assert parsers[first]().parse_args(others) if first in parsers else completed([first, *others])
+    if first in parsers:
+        assert parsers[first]().parse_args(others)
+    elif first in ("scene", "viewer"):
+        order = scene_order([first, *others])
+        assert completed(order.arguments)
+        assert pdrom_parser().parse_args(order.drawing).perform
+    else:
+        assert completed([first, *others])
 
 
 def test_the_scene_the_study_and_the_method_that_are_added_are_valid() -> None:

@@ -132,7 +132,7 @@ def _reduced(scene: Scene, file: h5py.File) -> ReducedRun:
 
 
 def _seen(told: Mapping[str, Any]) -> GuardRecord:
-    """What the guard saw; nothing in a file without one."""
+    """Record of the guard; nothing in a file without one."""
     if "guard_count" not in told:
         return GuardRecord.unwatched()
     frame, reason = told.get("guard_frame"), told.get("guard_reason")

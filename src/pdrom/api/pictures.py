@@ -1,14 +1,17 @@
 """Pictures of runs, and a page to look at them."""
 
 import os
+from functools import partial
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 
 from pdrom.api.arguments import file_path, require
 from pdrom.api.records import FullRun, ReducedRun
 from pdrom.core.errors import SceneError
 from pdrom.core.store import require_place
+from pdrom.reduction.rerun import displacement_norms
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.multiples import clipped, log_axis
 from pdrom.report.viewer.page import write_page
@@ -73,6 +76,16 @@ def view(path: str | os.PathLike[str], *runs: FullRun | ReducedRun) -> None:
         would be too large, or cannot be written.
     """
     require_place(file_path(path))
+    write_page(viewed_scenes(*runs), path)
+
+
+def viewed_scenes(*runs: FullRun | ReducedRun) -> list[ViewedScene]:
+    """Scenes as pictures and pages show them, each with its runs; errors as `view` raises them.
+
+    Parameters
+    ----------
+    runs : full-order and reduced runs; those with equal scenes become one scene
+    """
     if not runs:
         raise SceneError("view: at least one run is required")
     for run in runs:
@@ -86,11 +99,12 @@ def view(path: str | os.PathLike[str], *runs: FullRun | ReducedRun) -> None:
             raise SceneError(f"view: two different scenes are called '{name}'")
         if isinstance(run, ReducedRun):
             reduced.append(run)
-    write_page([_viewed(full, reduced) for full, reduced in scenes.values()], path)
+    return [_viewed(full, reduced) for full, reduced in scenes.values()]
 
 
 def _viewed(full: FullRun, reduced: list[ReducedRun]) -> ViewedScene:
     config = full.scene.config
+    ordered = sorted(reduced, key=lambda run: run.r)
     return ViewedScene(
         name=config.name,
         title=config.title,
@@ -102,13 +116,37 @@ def _viewed(full: FullRun, reduced: list[ReducedRun]) -> ViewedScene:
             ViewedRun(
                 group=run.group,
                 method=run.method,
+                title=run.method,
                 r=run.r,
-                positions=run.outcome.positions,
+                read=partial(np.asarray, run.outcome.positions),
                 error=run.error,
                 blowup_frame=run.outcome.blowup_frame,
                 ms=run.ms if np.isfinite(run.ms) else None,
             )
-            for run in reduced
+            for run in ordered
         ),
         effects=config.effects,
+        tables={"runs": partial(_table, ordered)},
     )
+
+
+def _table(runs: list[ReducedRun]) -> pd.DataFrame:
+    """A row of each run; errors are those of the whole run, as no horizon is known."""
+    rows = [
+        {
+            "scene": run.full.scene.config.name,
+            "group": run.group,
+            "method": run.method,
+            "position_basis": "full",
+            "r": run.r,
+            "frames": run.outcome.frames,
+            "blowup_frame": run.outcome.blowup_frame,
+            "relative_error_within_horizon": run.outcome.error(
+                displacement_norms(run.full.positions)
+            ),
+            "ms_per_frame": run.ms,
+            "gain": run.gain,
+        }
+        for run in runs
+    ]
+    return pd.DataFrame(rows)

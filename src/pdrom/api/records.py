@@ -1,4 +1,4 @@
-"""What `run` and `reduce` return."""
+"""Records that `run` and `reduce` return."""
 
 from dataclasses import dataclass, field
 
@@ -72,7 +72,7 @@ class ReducedRun:
 
     @property
     def title(self) -> str:
-        """What is reduced, how and to which size."""
+        """Group, method and size of the reduction."""
         return f"{self.group.replace('_', ' ')}, {self.method}, r = {self.r}"
 
 

@@ -162,7 +162,7 @@ def reduce(
 
 
 def _trained(full: FullRun, group: str, guard: GuardSettings) -> Trained:
-    """What the guard knows of the full-order run."""
+    """Training run of the guard."""
     companion: SubspaceModel | None = None
     if guard.action != "none" and guard.alarm == "estimate":
         frames = _training_frames(full.scene, group)

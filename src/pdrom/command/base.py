@@ -1,4 +1,4 @@
-"""What a command says of itself."""
+"""Declaration of a command."""
 
 import argparse
 from collections.abc import Callable, Sequence

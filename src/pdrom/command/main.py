@@ -18,7 +18,7 @@ from pdrom.core.project import checkout
 from pdrom.core.store.oserrors import reason
 from pdrom.pipeline.environment import settle
 
-COMMANDS = ("new", "run", "reduce", "show", "view", "advise")
+COMMANDS = ("new", "run", "reduce", "show", "draw", "view", "advise")
 CODES = """exit codes: 0 done; 1 faulty input, or a file that cannot be read or written;
 2 the command was not understood; 3 a reduced run blew up (its file is written all the
 same); 4 nothing measured fits the wishes (advise); 130 interrupted"""
@@ -81,7 +81,7 @@ def _asked(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _drop_output() -> None:
-    """What is left of the output goes nowhere: the end of the process would fail at it again."""
+    """Drop the rest of the output, at which the end of the process would fail again."""
     with suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

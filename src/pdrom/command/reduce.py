@@ -86,7 +86,7 @@ def perform(arguments: argparse.Namespace) -> Status:
 
 
 def _check_outputs(arguments: argparse.Namespace, out: str) -> None:
-    """What cannot be written is found before anything runs."""
+    """Refuse outputs that cannot be written, before anything runs."""
     from pdrom.core.errors import ConfigurationError, choices
 
     read = [arguments.scene, *([arguments.run] if arguments.run else [])]
@@ -144,7 +144,7 @@ def _error(reduced: "ReducedRun") -> str:
 
 
 def _seen(reduced: "ReducedRun") -> str:
-    """What the guard saw, if there was one."""
+    """Record of the guard, if there was one."""
     seen = reduced.seen
     if not seen.watched:
         return ""

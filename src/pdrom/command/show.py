@@ -68,7 +68,7 @@ def _hdf5(path: Path, whole: bool) -> Iterator[str]:
 
 
 def _provenance(path: Path) -> Iterator[str]:
-    """What made the file, by its seal, which is compared with the file."""
+    """Provenance of the file by its seal, which is compared with the file."""
     from pdrom.core.provenance import RECORD
     from pdrom.core.store import provenance_of
 

@@ -5,27 +5,25 @@ import sys
 import webbrowser
 from pathlib import Path
 
-from pdrom.command.base import Command, Status, declare_unchecked, require_output
+from pdrom.command.base import Command, Status, require_output
+from pdrom.command.results import declare_results, files_of, viewed
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """The runs, and the page to write."""
-    parser.add_argument(
-        "results", metavar="RESULT", nargs="+", help="files of pdrom run and pdrom reduce"
-    )
+    declare_results(parser)
     parser.add_argument("--out", metavar="FILE", help="page to write; the first RESULT as .html")
     parser.add_argument("--open", action="store_true", help="open it in the browser")
-    declare_unchecked(parser)
 
 
 def perform(arguments: argparse.Namespace) -> Status:
     """Write the page and say where it is."""
-    from pdrom.api import load, view
+    from pdrom.report.viewer.page import write_page
 
     first = Path(arguments.results[0])
     out = Path(arguments.out or first.parent / f"{first.stem}.html")
-    require_output(out, arguments.results)
-    view(out, *(load(result, arguments.unchecked) for result in arguments.results))
+    require_output(out, files_of(arguments.results))
+    write_page(viewed(arguments), out)
     size = out.stat().st_size / 1e6
     sys.stdout.write(f"{out}: {size:.1f} MB; a browser opens it without a network\n")
     if arguments.open and not webbrowser.open(out.resolve().as_uri()):

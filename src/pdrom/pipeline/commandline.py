@@ -158,6 +158,33 @@ def check_files(paths: Iterable[str | Path]) -> None:
             raise ConfigurationError(f"{path}: {TEMPLATE_KEY}: templates are not allowed")
 
 
+def merged(default: Path, configfiles: Iterable[str], settings: Iterable[str]) -> dict[str, Any]:
+    """The whole configuration, as Snakemake merges it.
+
+    Parameters
+    ----------
+    default : file of the full study
+    configfiles : files of ``--configfile``, in order
+    settings : ``key=value`` pairs of ``--config``
+
+    Raises
+    ------
+    ConfigurationError
+        A file is missing or no mapping.
+    """
+    # late: Snakemake's jobs import this module, too
+    from snakemake.cli import parse_config
+    from snakemake.settings.types import ConfigSettings
+    from snakemake.utils import update_config
+
+    files = list(map(Path, configfiles))
+    check_files([default, *files])
+    whole = dict(read_yaml(default))
+    given = ConfigSettings(config=parse_config(tuple(settings)), configfiles=files)
+    update_config(whole, given.overwrite_config)
+    return whole
+
+
 def check_or_exit(*paths: str | Path) -> None:
     """`check_files`; a fault ends the process with one line."""
     try:

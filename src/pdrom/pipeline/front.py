@@ -1,13 +1,14 @@
 """``./reproduce ARGS...``: Snakemake with this project's options, names and words.
 
 ``python -m pdrom.pipeline.front`` does what the console command ``snakemake`` does, after the
-arguments were completed and the configuration files were checked. ``scene`` as the first argument
-names what is made of one scene, ``figure`` figures by their number in the manuscript or in the
-preprint; ``verify`` compares what was made with what is expected, ``test`` hands the others to
-pytest, and ``run`` starts a program of the environment.
+arguments were completed and the configuration files were checked. ``figure`` as the first argument
+names figures by their number in the manuscript or in the preprint; ``scene`` and ``viewer`` run the
+jobs of scenes and have ``pdrom`` draw what they made; ``verify`` compares what was made with what
+is expected, ``test`` hands the others to pytest, and ``run`` starts a program of the environment.
 """
 
 import os
+import subprocess
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
@@ -33,6 +34,9 @@ HANDED_ON = {
     "test": "pytest",
     "verify": "pdrom.verification",
     "bundle": "pdrom.verification.bundle",
+    "docs": "pdrom.pipeline.site",
+    "release": "pdrom.verification.release",
+    "pages": "pdrom.verification.pages.written",
 }
 
 
@@ -43,16 +47,12 @@ def completed(arguments: Sequence[str]) -> list[str]:
     ------
     ConfigurationError
         A configuration file is missing or no mapping; a target was taken for an option's value;
-        there is no such scene or figure.
+        there is no such figure.
     ClusterError
         The executor that the command asks for cannot be installed.
     """
-    if arguments[:1] == ["scene"]:
+    if arguments[:1] == ["figure"]:
         # late: it loads the whole package
-        from pdrom.pipeline.scene_command import scene_arguments
-
-        arguments = scene_arguments(arguments[1:])
-    elif arguments[:1] == ["figure"]:
         from pdrom.pipeline.figure_command import figure_arguments
 
         arguments = figure_arguments(arguments[1:])
@@ -107,6 +107,19 @@ def _start(command: Sequence[str]) -> NoReturn:
         sys.exit(f"pdrom: run: {command[0]}: {error.strerror}")
 
 
+def _run(arguments: Sequence[str]) -> None:
+    """Run Snakemake; a failure ends the process with its status."""
+    from snakemake.cli import main as snakemake
+
+    arguments = completed(arguments)
+    sys.argv = ["snakemake", *arguments]
+    try:
+        snakemake(arguments)
+    except SystemExit as ended:
+        if ended.code:
+            raise
+
+
 def main() -> None:
     """Run Snakemake or the tests; end the process with their status."""
     settle()
@@ -116,12 +129,19 @@ def main() -> None:
     if sys.argv[1:2] == ["run"]:
         _start(sys.argv[2:])
     end_at_sigterm()
-    from snakemake.cli import main as snakemake
-
     try:
-        arguments = completed(sys.argv[1:])
-        sys.argv = ["snakemake", *arguments]
-        snakemake(arguments)
+        words = sys.argv[1:]
+        if words[:1] in (["scene"], ["viewer"]):
+            # late: it loads the whole package
+            from pdrom.pipeline.scene_command import scene_order
+
+            order = scene_order(words)
+            pdrom = [sys.executable, "-m", "pdrom"]  # here, as the workflow sets another one
+            _run(order.arguments)
+            if order.draws:
+                sys.exit(subprocess.run([*pdrom, *order.drawing], check=False).returncode)
+        else:
+            _run(words)
     except PdromError as error:
         sys.exit(f"pdrom: {error}")
     except KeyboardInterrupt:

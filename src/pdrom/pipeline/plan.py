@@ -21,12 +21,10 @@ from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.full import FULL_STUDY
 from pdrom.pipeline.paper import PaperJobs, check_texts, paper_jobs
 from pdrom.pipeline.resolve import Job, Resolver
-from pdrom.pipeline.scene_artifacts import SceneArtifacts
 from pdrom.pipeline.scenes import require_scenes
 from pdrom.pipeline.study import Study, StudySettings
 from pdrom.pipeline.subspace_scenes import check_subspaces
 from pdrom.pipeline.values import scaled_methods
-from pdrom.report.scenes.catalogue import ARTIFACTS
 from pdrom.tables import declared
 from pdrom.tables.claims import load_claims
 
@@ -74,8 +72,6 @@ class Plan:
         self.experiments = experiments()
         self.tables = declared()
         self._resolver = Resolver(study, folders.results)
-        self.of_scene = SceneArtifacts(study, folders.results)
-        self.scene_artifacts = ARTIFACTS
 
     @property
     def settings(self) -> StudySettings:

@@ -1,12 +1,10 @@
 """JSON schemas of scene and study files, by which editors complete keys and mark faults; defaults.
 
-``.venv/bin/python -m pdrom.pipeline.schema`` writes the schemas into `config/schema`, ``... schema
-defaults`` lists what a configuration may leave out, as YAML.
+``.venv/bin/python -m pdrom.pipeline.schema`` lists what a configuration may leave out, as YAML.
 """
 
 import json
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,10 +43,10 @@ def study_schema() -> dict[str, Any]:
     return {"$schema": DIALECT, **schema}
 
 
-def schemas() -> dict[str, str]:
-    """Content of each file of the folder, by its name."""
+def schemas() -> dict[Path, str]:
+    """Content of each schema by its place in the project."""
     made = {"scene.json": scene_schema(), "study.json": study_schema()}
-    return {name: json.dumps(schema, indent=1) + "\n" for name, schema in made.items()}
+    return {FOLDER / name: json.dumps(schema, indent=1) + "\n" for name, schema in made.items()}
 
 
 def defaults() -> dict[str, Any]:
@@ -64,16 +62,6 @@ def _plain(value: Any) -> Any:
     return list(value) if isinstance(value, tuple) else value
 
 
-def main(words: Sequence[str]) -> None:
-    """List the defaults, if the words ask for them; else write the schemas."""
-    if list(words) == ["defaults"]:
-        listed = yaml.safe_dump(defaults(), sort_keys=False, default_flow_style=None, width=100)
-        sys.stdout.write(listed)
-        return
-    FOLDER.mkdir(exist_ok=True)
-    for name, content in schemas().items():
-        (FOLDER / name).write_text(content, encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    listed = yaml.safe_dump(defaults(), sort_keys=False, default_flow_style=None, width=100)
+    sys.stdout.write(listed)

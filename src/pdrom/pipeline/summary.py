@@ -35,6 +35,8 @@ REASONS = {
 }
 END = "This was a dry-run"
 
+LISTED = 8  # targets, by their names
+
 
 def processor_seconds() -> float:
     """Processor time of this process and of all that it has started, until now."""
@@ -67,7 +69,9 @@ def summary(
     wall = time.time() - psutil.Process().create_time()
     lines = [f"configuration: {configuration(command)}"]
     if command.targets:
-        lines.append(f"made: {', '.join(command.targets)}")
+        more = len(command.targets) - LISTED
+        others = [f"and {more} more"] if more > 0 else []
+        lines.append(f"made: {', '.join([*command.targets[:LISTED], *others])}")
     else:
         lines += _verdicts(folders, apart)
         lines.append(f"manuscript: {folders.manuscript}")

@@ -13,10 +13,8 @@ from pdrom.pipeline.figure_command import WORD
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.scenes import read_scene, scene_names
-from pdrom.report.scenes.catalogue import default_files
 from pdrom.tables import declared
 
-SCENE = re.compile(rf"{RESULTS}/scenes/([a-z][a-z0-9_]*)/?")
 FIGURE = re.compile(rf"{WORD} (\w+)")
 
 
@@ -44,15 +42,12 @@ class Names:
     def files(self, target: str, folders: Folders) -> list[str]:
         """Files to make for a target; itself unless it is a name.
 
-        A file below ``results`` is the study's own, wherever that has its results; the folder of a
-        scene stands for what is made of it by default, ``figure NAME`` for that figure alone.
+        A file below ``results`` is the study's own, wherever that has its results; ``figure NAME``
+        stands for that figure alone.
         """
         figure = FIGURE.fullmatch(target)
         if figure and figure[1] in self.figures:
             return [paths.FIGURE.at(folders.results, name=figure[1])]
-        of_scene = SCENE.fullmatch(target)
-        if of_scene:
-            return default_files(folders.results, of_scene[1])
         found = [paths.FIGURE.at(folders.results, name=target)] if target in self.figures else []
         if target in self.tables:
             found.append(paths.TABLE.at(folders.results, name=target))

@@ -25,7 +25,7 @@ BIBLIOGRAPHY, PREPRINT = Path("paper/references.bib"), "Monem25DEIM"
 ORCID = "https://orcid.org/"  # how CITATION.cff begins one
 HEAD = """\
 ---
-# Written by: .venv/bin/python -m pdrom.pipeline.tables
+# Written by: ./reproduce pages
 # A codechecker runs ./reproduce, compares the files below (./reproduce verify),
 # and fills in what is empty.
 """

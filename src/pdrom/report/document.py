@@ -1,4 +1,4 @@
-"""The list of figures for readers: ``python -m pdrom.report.document`` writes docs/figures.md."""
+"""The list of figures for readers, docs/figures.md."""
 
 import re
 from pathlib import Path
@@ -8,12 +8,10 @@ from pdrom.report.figure_numbers import figure_numbers
 from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.words.markup import to_plain
 
-PAGE = Path("docs/figures.md")
 HEAD = """\
 # Figures
 
-Made from the declarations in `src/pdrom/report/figures` by
-`.venv/bin/python -m pdrom.report.document`; a test compares the two.
+Made from the declarations in `src/pdrom/report/figures` by `./reproduce pages`.
 
 A figure is drawn to `results/figures/NAME.pdf` and `.png` by `./reproduce figure NAME`; in place of
 the name stands its number in `main.pdf`, as in `figure 10`, or that of the figure of the preprint
@@ -56,7 +54,3 @@ def _words(read: Read) -> str:
         case Setting():
             return f"`{read.key}`"
     raise TypeError(f"{read}: no figure reads it")
-
-
-if __name__ == "__main__":
-    PAGE.write_text(figures_page(), encoding="utf-8")

@@ -85,11 +85,11 @@ def unfinished(subject: Subject, manifest: Manifest) -> Iterator[str]:
 
 def sources(root: Path) -> Iterator[Member]:
     """Files that git tracks, as in the last commit."""
-    changed = _git(root, "status", "--porcelain", "--untracked-files=no").decode()
+    changed = git(root, "status", "--porcelain", "--untracked-files=no").decode()
     if changed:
         files = ", ".join(line[3:] for line in changed.splitlines())
         raise ConfigurationError(f"bundle: changes that are in no commit: {files}; commit them")
-    for name in _git(root, "ls-files", "-z").decode().split("\0"):
+    for name in git(root, "ls-files", "-z").decode().split("\0"):
         path = root / name
         if name and path.is_file():
             yield Member(name, path.read_bytes(), os.access(path, os.X_OK))
@@ -150,7 +150,8 @@ def _tables(subject: Subject) -> dict[str, str]:
     return dict(zip(subject.plan.tables, subject.plan.table_paths, strict=True))
 
 
-def _git(root: Path, *arguments: str) -> bytes:
+def git(root: Path, *arguments: str) -> bytes:
+    """Output of a command of git; ConfigurationError if there is no git or no clone."""
     try:
         done = subprocess.run(["git", *arguments], cwd=root, capture_output=True, check=True)
     except (OSError, subprocess.CalledProcessError) as error:

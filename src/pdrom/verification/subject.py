@@ -6,12 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from snakemake.cli import parse_config
-from snakemake.settings.types import ConfigSettings
-from snakemake.utils import update_config
-
-from pdrom.core.yamlfile import read_yaml
-from pdrom.pipeline.commandline import CommandLine, check_files, recall
+from pdrom.pipeline.commandline import CommandLine, check_files, merged, recall
 from pdrom.pipeline.folders import DEFAULT, Folders, folders
 from pdrom.pipeline.plan import Plan, load_plan
 
@@ -55,9 +50,5 @@ class Subject:
     def plan(self) -> Plan:
         """Plan of the configuration, as Snakemake merges it."""
         command = CommandLine.parse(self.options)
-        merged = dict(read_yaml(Path(DEFAULT)))
-        given = ConfigSettings(
-            config=parse_config(command.settings), configfiles=list(map(Path, command.configfiles))
-        )
-        update_config(merged, given.overwrite_config)
-        return load_plan(merged, Path(), command.configfiles, self.folders, quiet=True)
+        whole = merged(Path(DEFAULT), command.configfiles, command.settings)
+        return load_plan(whole, Path(), command.configfiles, self.folders, quiet=True)

@@ -11,7 +11,6 @@ from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.resolve import Job
 from pdrom.pipeline.study import Study
 from pdrom.tables import declared
-from pdrom.tables.kit.document import document
 from places import ROOT
 
 CONFIG = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "block-deim"]}
@@ -23,12 +22,6 @@ def plan(**changes) -> Plan:
 
 def made(name: str, **changes) -> Job:
     return plan(**changes).job(declared()[name])
-
-
-def test_the_list_of_tables_is_up_to_date():
-    """Else: python -m pdrom.pipeline.tables"""
-    written = (ROOT / "docs" / "tables.md").read_text(encoding="utf-8")
-    assert written == document(declared().values())
 
 
 def test_verdicts_are_a_table_like_others():

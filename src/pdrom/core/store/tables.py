@@ -15,9 +15,12 @@ from pdrom.core.store.oserrors import reason
 FLOAT_FORMAT = "%.10g"
 
 
-def write_table(table: pd.DataFrame, path: str | os.PathLike[str]) -> None:
-    """Write a table as CSV: fixed float format, an empty cell where there is no value."""
-    with atomic_path(path) as temporary:
+def write_table(table: pd.DataFrame, path: str | os.PathLike[str], sealed: bool = True) -> None:
+    """Write a table as CSV: fixed float format, an empty cell where there is no value.
+
+    ``sealed`` as in `atomic_path`.
+    """
+    with atomic_path(path, sealed) as temporary:
         table.to_csv(temporary, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
 
 

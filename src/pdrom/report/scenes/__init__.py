@@ -1,1 +1,1 @@
-"""Artifacts of a single scene, in the study or outside it, beside the study's own."""
+"""Pictures, films, tables and files of a single scene, of the pipeline's results or of own runs."""

@@ -1,75 +1,57 @@
 """Four frames of a scene: the full-order run, and below it each reduced run."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
-import numpy as np
 from matplotlib.figure import Figure
 
-from pdrom.core.paths import FULL_ORDER, MESH, RERUNS
-from pdrom.model.mesh.types import load_mesh
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.camera import Camera
-from pdrom.report.figures.kit.floor import Floors
 from pdrom.report.figures.kit.panels import RunPanel, shared_window
-from pdrom.report.figures.kit.read import RerunInfo, positions_at, rerun_errors, rerun_infos
-from pdrom.report.figures.kit.run_rows import Row, draw_rows, run_panel
-from pdrom.report.scenes.picture import write_picture
-from pdrom.report.scenes.results import SceneResults
-from pdrom.report.scenes.sizes import shown
+from pdrom.report.figures.kit.read import frame_numbers
+from pdrom.report.figures.kit.run_rows import Row, draw_rows
+from pdrom.report.scenes.picture import panel_of, shown_runs, title_of, write_picture
+from pdrom.report.viewer.runs import ViewedRun, ViewedScene
 
 INSTANTS = (0.25, 0.5, 0.75, 1.0)  # of the run
 CAMERA = Camera(30.0, 20.0)
 NO_LIMIT = 100.0  # inches: the picture need not fit on a page
 
 
-def make(results: SceneResults, outputs: Mapping[str, str]) -> None:
+def frames(scene: ViewedScene, pdf: Path, png: Path) -> None:
     """Write the picture."""
-    write_picture(draw, results, "frames", outputs)
+    write_picture(_draw, scene, "frames", pdf, png)
 
 
-def draw(results: SceneResults) -> Figure:
-    """One row per run; the grey outline in the rows of reduced runs is the full-order run.
-
-    Raises
-    ------
-    StorageError
-        A file of the results is missing or damaged.
-    """
-    scene, floors = results.scene, Floors(results)
-    frames, full = positions_at(results.path(FULL_ORDER, scene), INSTANTS)
-    instants = [floors.instant(scene, frame) for frame in frames]
+def _draw(scene: ViewedScene) -> Figure:
+    """One row per run; the grey outline in the rows of reduced runs is the full-order run."""
+    numbers = frame_numbers(INSTANTS, len(scene.positions) - 1)
+    full = scene.positions[numbers].astype(float)
     reference = [
-        RunPanel(when, style.FULL_ORDER, q, reference=True).seen_by(CAMERA)
-        for when, q in zip(instants, full, strict=True)
+        RunPanel(_instant(scene, frame), style.FULL_ORDER, q, reference=True).seen_by(CAMERA)
+        for frame, q in zip(numbers, full, strict=True)
     ]
-    reduced = {
-        f"{style.words(group)}\n{results.method_title(method)}\nr = {info.r}": (
-            _panels(results, group, method, info, frames)
-        )
-        for group, method in results.reductions
-        if (info := shown(rerun_infos(results.path(RERUNS, scene, group, method)))) is not None
-    }
-    every = [reference, *reduced.values()]
+    labels = [f"{style.words(scene.name)}\nfull order"]
+    labels += [title_of(scene, run) for run in shown_runs(scene)]
+    every = [reference, *([_panel(run, f) for f in numbers] for run in shown_runs(scene))]
     windows = [
         shared_window(CAMERA, q, [panels[i] for panels in every]) for i, q in enumerate(full)
     ]
-    mesh = load_mesh(results.path(MESH, scene))
-    rows = [Row(f"{style.words(scene)}\nfull order", mesh, reference, windows, full)]
-    rows += [Row(label, mesh, panels, windows, full) for label, panels in reduced.items()]
+    rows = [
+        Row(label, scene.mesh, panels, windows, full)
+        for label, panels in zip(labels, every, strict=True)
+    ]
     return draw_rows(rows, CAMERA, NO_LIMIT)
 
 
-def _panels(
-    results: SceneResults, group: str, method: str, info: RerunInfo, frames: Sequence[int]
-) -> list[RunPanel]:
-    path = results.path(RERUNS, results.scene, group, method)
-    colour = style.surface_colour(style.group_looks(results.holdings)[group][0])
-    errors = rerun_errors(path, info)
-    panels = []
-    for frame in frames:
-        panel = run_panel(path, info, frame, colour, "").seen_by(CAMERA)
-        if not panel.failure and frame and np.isfinite(errors[frame - 1]):
-            panel = replace(panel, remark=f"relative error {errors[frame - 1]:.1g}")
-        panels.append(panel)
-    return panels
+def _instant(scene: ViewedScene, frame: int) -> str:
+    """Label of a frame; one past the scene's horizon says so: there no run can be judged."""
+    past = scene.horizon is not None and frame > scene.horizon
+    return f"frame {frame}, past horizon" if past else f"frame {frame}"
+
+
+def _panel(run: ViewedRun, frame: int) -> RunPanel:
+    panel, last = panel_of(run, frame).seen_by(CAMERA), len(run.positions) - 1
+    drawn = f"drawn: frame {last}" if last else "drawn: initial state"
+    remark = drawn if panel.failure else f"relative error {run.error[frame - 1]:.1g}"
+    return replace(panel, remark=remark if frame else None)

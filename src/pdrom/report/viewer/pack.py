@@ -38,7 +38,7 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
         "ms": scene.ms,
         "floor": _numbers(scene.floor),
         "horizon": scene.horizon,
-        "runs": [_pack_run(run, stride, used) for run in scene.runs],
+        "runs": [_pack_run(run, stride, used) for run in scene.runs if run.on_page],
     }
 
 
@@ -73,7 +73,7 @@ def _pack_body(body: Mesh) -> dict[str, Any]:
 def _pack_run(run: ViewedRun, stride: int, used: np.ndarray) -> dict[str, Any]:
     return {
         "group": run.group,
-        "method": run.method,
+        "method": run.title,
         "r": run.r,
         "positions": pack_positions(run.positions[::stride, used]),
         "error": _numbers(run.error),

@@ -7,7 +7,7 @@ from pdrom.tables.kit.declaration import Column, Table
 
 HEAD = """# Tables of the study
 
-Written by `python -m pdrom.pipeline.tables` from the declarations; not to be edited by hand.
+Written by `./reproduce pages` from the declarations; not to be edited by hand.
 
 CSV, one row per observation, SI units unless a unit says otherwise, an empty cell where there is no
 value. In a column marked "timed" a clock (or the memory in use) has a say: only there may two runs

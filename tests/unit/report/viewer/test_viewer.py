@@ -80,8 +80,9 @@ def viewed(
     bent[..., 1] += 1.5 * t * np.abs(mesh.points[:, 0])
     error = np.linspace(1e-3, 1.0, frames)
     half = frames // 2
-    near = ViewedRun("spring", "near", 6, full + 0.01, error, None, 0.5)
-    far = ViewedRun("spring", "far", 6, bent[: half + 1], error[:half], half, None)
+    near = ViewedRun("spring", "near", "near", 6, lambda: full + 0.01, error, None, 0.5)
+    end = half + 1
+    far = ViewedRun("spring", "far", "far", 6, lambda: bent[:end], error[:half], half, None)
     floor = np.geomspace(1e-9, 1e-2, frames)
     return ViewedScene(
         name, "A <sheet> <!--<script> </script>", mesh, 0.02, full, 1.0, floor, 9,

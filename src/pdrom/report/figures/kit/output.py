@@ -39,16 +39,20 @@ def draw_figure(
 
 
 def write_figure(
-    figure: Figure, title: str, pdf: str | os.PathLike[str], png: str | os.PathLike[str]
+    figure: Figure,
+    title: str,
+    pdf: str | os.PathLike[str],
+    png: str | os.PathLike[str],
+    sealed: bool = True,
 ) -> None:
     """Write ``figure`` as PDF (embedded TrueType fonts, no dates) and as its PNG twin.
 
-    Either file appears only when complete.
+    Either file appears only when complete. ``sealed`` as in `pdrom.core.store.atomic_path`.
     """
     FigureCanvasAgg(figure)
     document = {"Title": title, "Creator": "pdrom", "CreationDate": None, "ModDate": None}
     with style.look():
-        with atomic_path(Path(pdf)) as temporary:
+        with atomic_path(Path(pdf), sealed) as temporary:
             figure.savefig(temporary, format="pdf", dpi=RASTER_DPI, metadata=document)
-        with atomic_path(Path(png)) as temporary:
+        with atomic_path(Path(png), sealed) as temporary:
             figure.savefig(temporary, format="png", dpi=PNG_DPI, metadata={"Title": title})

@@ -1,0 +1,17 @@
+"""Tables of a scene: its reduced runs, and what ``pdrom advise`` reads."""
+
+from pathlib import Path
+
+from pdrom.core.store import write_table
+from pdrom.report.viewer.runs import ViewedScene
+
+
+def runs(scene: ViewedScene, table: Path) -> None:
+    """Write errors, failures and samples; without a row where nothing is reduced."""
+    write_table(scene.tables["runs"](), table, sealed=False)
+
+
+def advice(scene: ViewedScene, effects: Path, costs: Path) -> None:
+    """Write what each effect does, and errors and times of every setting."""
+    write_table(scene.tables["effects_contribution"](), effects)
+    write_table(scene.tables["accuracy_cost"](), costs)

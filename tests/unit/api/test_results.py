@@ -1,0 +1,163 @@
+"""What runs are saved, read, drawn and shown as: nothing is lost, and faults are named."""
+
+import shutil
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from pdrom import api
+from pdrom.api.pictures import viewed_scenes
+from pdrom.core.errors import ConfigurationError, PdromError, SceneError, StorageError
+
+EFFECTS = [
+    {"effect": "gravity"},
+    {"effect": "pins", "select": "left"},
+    {"effect": "spring", "weight": 1e5},
+    {"effect": "strain", "weight": 1e5},
+]
+MESH = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
+
+
+def scene(frames: int = 8, **keys):
+    """A small sheet of two groups."""
+    return api.build_scene(mesh=MESH, frames=frames, effects=EFFECTS, **keys)
+
+
+@pytest.fixture(scope="module")
+def full() -> api.FullRun:
+    return api.run(scene())
+
+
+@pytest.fixture(scope="module")
+def reduced(full: api.FullRun) -> api.ReducedRun:
+    return api.reduce(full, "spring", "block-deim", 2)
+
+
+def test_each_frame_is_told_once_and_in_order():
+    seen = []
+    made = api.run(scene(), on_frame=lambda frame, report: seen.append(frame))
+    assert seen == list(range(8))
+    assert len(made.positions) == 9
+
+
+def test_two_runs_of_a_scene_are_the_same(full):
+    again = api.run(scene())
+    assert np.array_equal(again.positions, full.positions)
+    for name, own in full.snapshots.items():
+        assert np.array_equal(again.snapshots[name].p, own.p)
+
+
+@pytest.mark.parametrize("group", ["spring", "strain"])
+def test_the_modes_of_a_group_are_orthonormal_and_best(full, group):
+    """More modes leave a smaller rest of the snapshots, and all of them none."""
+    made, p = api.basis(full, group), full.snapshots[group].p
+    v = made.V
+    assert v.T @ v == pytest.approx(np.eye(v.shape[1]), abs=1e-10)
+    centred = p.reshape(len(p), -1) - made.mean
+    rests = [
+        np.linalg.norm(centred - centred @ v[:, :r] @ v[:, :r].T) for r in range(made.rank + 1)
+    ]
+    assert np.all(np.diff(rests) <= 1e-12 * rests[0])
+    assert rests[-1] < 1e-6 * rests[0]
+
+
+@pytest.mark.parametrize("method", list(api.methods()))
+def test_every_method_runs_to_its_end_or_says_where_it_blew_up(full, method):
+    made = api.reduce(full, "spring", method, 2)
+    outcome = made.outcome
+    assert np.isfinite(outcome.positions).all()
+    assert len(made.error) == outcome.frames
+    assert outcome.finite == (outcome.blowup_frame is None)
+    assert outcome.frames == 8 or not outcome.finite
+    assert made.gain >= 1.0 - 1e-9
+    assert made.ms > 0.0
+
+
+@pytest.mark.parametrize("action", ["stop", "fall-back"])
+def test_a_guard_that_always_gives_an_alarm_leaves_no_error(full, action):
+    """The first frame ends the run, or every frame is one of the full order."""
+    guard = api.GuardSettings(action=action, alarm="estimate", threshold=0.0)
+    made = api.reduce(full, "spring", "block-deim", 1, guard=guard)
+    if action == "stop":
+        assert made.seen.stopped
+        assert made.outcome.frames < 8
+    else:
+        assert made.seen.fallback_frames == 8
+        assert np.all(made.error == 0.0)
+
+
+def test_what_was_saved_is_saved_alike_again(reduced, tmp_path):
+    """Positions are kept in single precision: a second time nothing changes."""
+    api.save(reduced, tmp_path / "one.h5")
+    one = api.load(tmp_path / "one.h5")
+    api.save(one, tmp_path / "two.h5")
+    two = api.load(tmp_path / "two.h5")
+    assert np.array_equal(one.outcome.positions, two.outcome.positions)
+    assert np.array_equal(one.full.positions, two.full.positions)
+    assert (one.title, one.gain, one.ms, one.seen) == (two.title, two.gain, two.ms, two.seen)
+    assert [path.name for path in sorted(tmp_path.iterdir())] == ["one.h5", "two.h5"]
+
+
+def test_a_saved_run_has_no_snapshots_and_says_so(reduced, tmp_path):
+    api.save(reduced, tmp_path / "one.h5")
+    read = api.load(tmp_path / "one.h5")
+    with pytest.raises(PdromError, match="stored no snapshots"):
+        api.basis(read.full, "spring")
+
+
+@settings(
+    max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(where=st.floats(0.0, 1.0, exclude_max=True), bit=st.integers(0, 7))
+def test_no_flipped_bit_of_a_file_is_read(reduced, tmp_path, where, bit):
+    path, damaged = tmp_path / "one.h5", tmp_path / "damaged.h5"
+    if not path.exists():
+        api.save(reduced, path)
+    content = bytearray(path.read_bytes())
+    content[int(where * len(content))] ^= 1 << bit
+    damaged.write_bytes(content)
+    with pytest.raises(StorageError, match=r"damaged\.h5"):
+        api.load(damaged, unchecked=True)
+    assert damaged.read_bytes() == content
+
+
+def test_a_file_of_something_else_is_no_run(tmp_path):
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["numbers"] = [1.0]
+    before = shutil.copy(tmp_path / "other.h5", tmp_path / "copy.h5")
+    for unchecked in (False, True):
+        with pytest.raises(StorageError, match=r"other\.h5"):
+            api.load(tmp_path / "other.h5", unchecked)
+    assert before.read_bytes() == (tmp_path / "other.h5").read_bytes()
+
+
+def test_a_picture_has_a_line_for_each_run_and_a_cross_for_a_blow_up(reduced):
+    blown = replace(reduced, outcome=replace(reduced.outcome, blowup_frame=7))
+    (axes,) = api.plot(reduced, blown).axes
+    named = [line for line in axes.lines if not line.get_label().startswith("_")]
+    assert [line.get_label() for line in named] == [reduced.title] * 2
+    assert len(axes.lines) == 3
+    time, error = named[0].get_data()
+    assert time == pytest.approx(0.016 * np.arange(1, 9))
+    assert error == pytest.approx(np.clip(reduced.error, 1e-7, 1e3))
+
+
+def test_runs_of_one_scene_are_shown_together_by_size(full, reduced):
+    smaller = api.reduce(full, "spring", "block-deim", 1)
+    (shown,) = viewed_scenes(reduced, smaller, full)
+    assert [run.r for run in shown.sizes("spring", "block-deim")] == [1, 2]
+    assert shown.groups == ["spring"]
+    assert np.array_equal(shown.positions, full.positions)
+    other = api.run(scene(name="other"))
+    assert [one.name for one in viewed_scenes(full, other)] == ["scene", "other"]
+
+
+@pytest.mark.parametrize("faulty", [(), ("text",), (None,)])
+def test_what_is_no_run_is_not_shown(faulty, tmp_path):
+    with pytest.raises((SceneError, ConfigurationError), match="view"):
+        api.view(tmp_path / "page.html", *faulty)
+    assert list(tmp_path.iterdir()) == []
