@@ -54,7 +54,8 @@ def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
     """A copy whose micro study counts as finished."""
     checkout = copy_repository(tmp_path_factory.mktemp("finished"))
     (checkout.folder / MICRO_FILE).write_text(yaml.safe_dump(MICRO), encoding="utf-8")
-    checkout.count_as_finished(*MICRO_ARGUMENTS, "--", *TARGETS)
+    checkout.count_as_finished(*MICRO_ARGUMENTS)
+    checkout.count_as_finished(*MICRO_ARGUMENTS, "--", OUTSIDE)
     return checkout
 
 
@@ -192,10 +193,10 @@ def test_no_text_and_no_date_reruns_anything(finished: Checkout) -> None:
 
     All sources are younger than the results, then all results are younger than now.
     """
-    spring, script = "src/pdrom/model/constraints/spring.py", "workflow/scripts/experiment.py"
+    spring, script = "src/pdrom/model/constraints/spring.py", "workflow/scripts/artifact.py"
     finished.edit(spring, '"""Edge springs:', '"""Springs along edges:')
     finished.edit(spring, "    # scaled: ", "    # divided: ")
-    finished.edit(script, "settings = ", "# what it depends on\nsettings = ")
+    finished.edit(script, "    make(", "    # the job\n    make(")
     finished.edit("src/pdrom/model/effects/poke.py", "phase == 0", "phase <= 0")
     finished.register(*EFFECT)
     finished.register(*SELECTION)
@@ -206,9 +207,9 @@ def test_no_text_and_no_date_reruns_anything(finished: Checkout) -> None:
         assert finished.planned("--cores", "3", *MICRO_ARGUMENTS) == set()
 
 
-def test_an_edited_script_reruns_what_it_makes(finished: Checkout) -> None:
-    finished.edit("workflow/scripts/paper.py", "list(snakemake.input.figures)", "[]")
-    assert finished.planned(*MICRO_ARGUMENTS) == {MICRO_MANUSCRIPT}
+def test_the_edited_script_reruns_every_job(finished: Checkout, plan: dict[str, Made]) -> None:
+    finished.edit("workflow/scripts/artifact.py", "code=snakemake", "code='' or snakemake")
+    assert finished.planned(*MICRO_ARGUMENTS) == needed(plan, MICRO_MANUSCRIPT)
 
 
 def test_a_kernel_reruns_the_scenes_that_use_it_and_what_follows(finished: Checkout) -> None:

@@ -91,7 +91,7 @@ def test_only_packages_of_both_tex_systems():
 
 def test_every_key_names_a_column_of_a_table():
     study = Study.load(read_yaml(ROOT / "config" / "default.yaml"), ROOT)
-    facts = Plan(study).paper.facts.tables
+    facts = Plan(study).paper.manuscript.settings["facts"]["tables"]
     columns = {name: set(table.column_names) for name, table in declared().items()}
     columns |= {name: set(rows[0]) for name, rows in facts.items()}
     for key in keys_of(SOURCE):

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+import snakemake.cli  # noqa: F401 : before the graph, which cannot be imported first
 from snakemake.dag import DAG
 
 from pdrom.core.usage import Usage
