@@ -16,7 +16,7 @@ for made in rules_of(PLAN, CORES):
         log:
             made.log,
         group:
-            made.group
+            made.group if GROUPED else None
         threads: made.threads
         resources:
             **made.resources,

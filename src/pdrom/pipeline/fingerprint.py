@@ -8,9 +8,12 @@ script is a parameter of its rule as well.
 
 import ast
 import hashlib
+import re
 from dataclasses import dataclass
 from functools import cache
+from opcode import opmap
 from pathlib import Path
+from types import CodeType
 from typing import Any, cast
 
 import pdrom
@@ -22,6 +25,12 @@ PACKAGE = "pdrom"
 # compares the paths of a job's files itself. So adding a kind of file makes no job run again.
 LAYOUT = {"pdrom.core.paths", "pdrom.artifact.reads"}
 SCRIPTS = Path("workflow/scripts")
+_REGISTRY = Registry.__name__
+# ``from NAME import (NAMES)``, ``from NAME import NAMES`` or ``import NAME``, inside functions too;
+# an example in a docstring would count, which makes a job depend on more than it uses
+_IMPORT = re.compile(
+    rf"^[ ]*(?:from ({PACKAGE}[\w.]*) import (?:\(([^)]*)\)|(.*))|import ({PACKAGE}[\w.]*))", re.M
+)
 
 
 def fingerprint(*places: str) -> str:
@@ -97,20 +106,19 @@ class _Module:
 
 @cache
 def _read(module: str) -> _Module:
-    tree = ast.parse(_source(module).read_text(encoding="utf-8"))
-    nodes = list(ast.walk(tree))
-    return _Module(_imports(nodes, module), _digest(tree, nodes, module))
+    source = _source(module).read_text(encoding="utf-8")
+    return _Module(_imports(source, module), digest_of_source(source, module))
 
 
-def _imports(nodes: list[ast.AST], module: str) -> tuple[str, ...]:
+def _imports(source: str, module: str) -> tuple[str, ...]:
     """Modules of the package that a file imports, with the packages above them."""
     found: set[str] = set()
-    for node in nodes:
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            found.add(node.module)
-            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    for name, enclosed, names, plain in _IMPORT.findall(source):
+        if plain:
+            found.add(plain)
+        else:
+            listed = re.sub("#.*", "", enclosed or names).split(",")
+            found |= {name, *(f"{name}.{entry.split()[0]}" for entry in listed if entry.strip())}
     parents = {parent for name in found for parent in _packages_above(name)}
     known = {name for name in found | parents if _locate(name) is not None}
     # the package's own __init__ holds the version only
@@ -125,28 +133,53 @@ def _packages_above(name: str) -> list[str]:
 def digest_of_source(source: str, module: str = "") -> str:
     """Hash of source text without comments, layout, docstrings and names of other modules' code.
 
-    The latter are the entries of a registry that lie outside of ``module``.
+    The latter are the entries of a registry that lie outside of ``module``. The compiler leaves out
+    what does not count (assertions, too), far faster than a walk over the syntax tree.
     """
-    tree = ast.parse(source)
-    return _digest(tree, list(ast.walk(tree)), module)
+    program = _without_others(ast.parse(source), module) if _REGISTRY in source else source
+    code = compile(program, "", "exec", dont_inherit=True, optimize=2)
+    return hashlib.sha256(_text(code).encode()).hexdigest()
 
 
-def _digest(tree: ast.Module, nodes: list[ast.AST], module: str) -> str:
-    """See `digest_of_source`; what does not count is taken out of the tree."""
-    for node in nodes:
+def _text(code: CodeType) -> str:
+    """Everything of compiled code but where its lines stand."""
+    return repr(
+        (
+            code.co_name,
+            code.co_flags,
+            (code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount),
+            _instructions(code.co_code),
+            code.co_exceptiontable,
+            (code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars),
+            [_constant(value) for value in code.co_consts],
+        )
+    )
+
+
+def _instructions(code: bytes) -> bytes:
+    """Instructions of two bytes; one that does nothing stands for a docstring."""
+    pairs = zip(code[::2], code[1::2], strict=True)
+    return bytes(byte for pair in pairs if pair[0] != opmap["NOP"] for byte in pair)
+
+
+def _constant(value: object) -> object:
+    if isinstance(value, CodeType):
+        return _text(value)
+    # the order of a set changes from process to process
+    return sorted(map(repr, value)) if isinstance(value, frozenset) else value
+
+
+def _without_others(tree: ast.Module, module: str) -> ast.Module:
+    """The tree without entries of registries that are code of other modules."""
+    for node in ast.walk(tree):
         if isinstance(node, ast.Call) and _is_registry(node):
             _drop_others(cast(ast.Dict, node.args[1]), module)
-        body = getattr(node, "body", None)
-        if isinstance(body, list):
-            # a string that stands alone does nothing: docstrings, also those of attributes
-            kept = [s for s in body if not _is_string(s)]
-            setattr(node, "body", kept or [ast.Pass()])  # noqa: B010 (many kinds of nodes have one)
-    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
+    return tree
 
 
 def _is_registry(call: ast.Call) -> bool:
     """``Registry(kind, {name: place, ...})``."""
-    named = isinstance(call.func, ast.Name) and call.func.id == Registry.__name__
+    named = isinstance(call.func, ast.Name) and call.func.id == _REGISTRY
     return named and len(call.args) == 2 and isinstance(call.args[1], ast.Dict)
 
 
@@ -159,14 +192,6 @@ def _drop_others(entries: ast.Dict, module: str) -> None:
         or value.value.partition(":")[0] == module
     ]
     entries.keys, entries.values = [key for key, _ in kept], [value for _, value in kept]
-
-
-def _is_string(statement: ast.stmt) -> bool:
-    return (
-        isinstance(statement, ast.Expr)
-        and isinstance(statement.value, ast.Constant)
-        and isinstance(statement.value.value, str)
-    )
 
 
 def digest(root: Path, *names: str) -> str:
@@ -197,5 +222,4 @@ def _triggers(workflow: Any) -> frozenset[Any]:
 
 
 def _script(path: Path) -> str:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()[:16]
+    return digest_of_source(path.read_text(encoding="utf-8"))[:16]
