@@ -32,8 +32,8 @@ SPLIT_FROM = 1 << 17  # entries of a lift (N, r) from which its rows are in two 
 # Entries of the record: the numbers of modes, sets, columns and sampled numbers, address and record
 # of the sampler; then the places of the arrays of `Lift` in their order, and that of a clock.
 MODES, SETS, COLUMNS, SAMPLED, SAMPLER, SAMPLER_RECORD = range(OWN, OWN + 6)
-STARTS, POSITIONS, OPERATORS, SHIFTS, LIMITS, COEFFICIENTS = range(OWN + 6, OWN + 12)
-AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 12, OWN + 20)
+STARTS, POSITIONS, PACKED, OPERATORS, SHIFTS, LIMITS, COEFFICIENTS = range(OWN + 6, OWN + 13)
+AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 13, OWN + 21)
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,7 @@ class Lift:
 
     starts : (sets + 1,) where the sampled entries of each set begin
     positions : sampled entries of each set among the numbers of the sampled elements
+    packed : room for those of one set
     operators : (r, m) of each set, flat, one after the other
     shifts : (sets, r) what is taken from operator times entries: the part of the mean
     limits : (2, r) least and largest coefficients
@@ -54,6 +55,7 @@ class Lift:
 
     starts: np.ndarray
     positions: np.ndarray
+    packed: np.ndarray
     operators: np.ndarray
     shifts: np.ndarray
     limits: np.ndarray
@@ -95,16 +97,19 @@ class Lift:
 
 
 @compiled(nogil=True, fastmath=REORDERED)
-def coefficients(sampled, starts, positions, operators, shifts, limits, result):
+def coefficients(sampled, starts, positions, packed, operators, shifts, limits, result):
     """Write the coefficients of all sets that belong to the numbers of the sampled elements."""
     sets, modes = shifts.shape
     for k in range(sets):
         first, last = starts[k], starts[k + 1]
+        # side by side, so that a product for each mode reads whole vectors
+        for j in range(last - first):
+            packed[j] = at(sampled, at(positions, first + j))
         for i in range(modes):
             begin = first * modes + i * (last - first)
             total = -shifts[k, i]
             for j in range(last - first):
-                total += at(operators, begin + j) * at(sampled, at(positions, first + j))
+                total += at(operators, begin + j) * at(packed, j)
             # not a number stays one
             if total < limits[0, i]:
                 total = limits[0, i]
@@ -144,6 +149,7 @@ def _accumulate(y, rhs_place, record, part):
             rows.doubles(projections, entries[SAMPLED]),
             starts,
             rows.indices(entries[POSITIONS], count),
+            rows.doubles(entries[PACKED], count),
             rows.doubles(entries[OPERATORS], count * modes),
             rows.doubles(entries[SHIFTS], sets * modes).reshape((sets, modes)),
             rows.doubles(entries[LIMITS], 2 * modes).reshape((2, modes)),

@@ -62,8 +62,8 @@ class ReducedLocalStep:
         """Set the coefficients from what `sample` gives; the systems are inverted."""
         data = self._lift
         coefficients(
-            sampled, data.starts, data.positions, data.operators, data.shifts, data.limits,
-            data.coefficients,
+            sampled, data.starts, data.positions, data.packed, data.operators, data.shifts,
+            data.limits, data.coefficients,
         )  # fmt: skip
 
     def lift(self, rhs: np.ndarray) -> None:
@@ -115,6 +115,7 @@ def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
     return Lift(
         starts=np.cumsum([0, *(len(block.entries) for block in blocks)], dtype=np.int64),
         positions=_joined([place(block.entries) for block in blocks], np.int64),
+        packed=np.empty(sum(len(block.entries) for block in blocks)),
         operators=_joined([block.operator.ravel() for block in blocks], np.float64),
         shifts=np.array([b.operator @ mean[b.entries] for b in blocks]).reshape(-1, r),
         limits=np.ascontiguousarray(limits),
