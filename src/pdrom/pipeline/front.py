@@ -22,10 +22,8 @@ from pdrom.pipeline.folders import Folders, folders
 from pdrom.pipeline.running import end_at_sigterm
 
 # Snakemake's default scheduler solves an integer program for each choice among the jobs; they are
-# short, so that this takes longer than it saves. After every choice it starts a timer, as long as
-# the span of its rate limit, to choose again: at the default span these choices take a third of a
-# core towards the end of a run.
-OPTIONS = ("--scheduler", "greedy", "--max-jobs-per-timespan", "1000/20s", "--rerun-incomplete")
+# short, so that this takes longer than it saves.
+OPTIONS = ("--scheduler", "greedy", "--rerun-incomplete")
 
 LINES = ("--logger", "pdrom")
 

@@ -19,7 +19,6 @@ from pdrom.pipeline.manifest import write_manifest
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.running import (
     FOLDER,
-    cancel_timers,
     end_at_sigterm,
     hold,
     remove_stale_locks,
@@ -89,6 +88,10 @@ class Run:
 
     def start(self, workflow: Any, plan: Plan) -> None:
         """Before the first job: the process that jobs are forked from, or a look at the cluster."""
+        # Jobs start without a limit of their rate. For one, Snakemake starts a timer after every
+        # choice among the jobs, to choose again, and each such choice starts another one: towards
+        # the end of a run they take a third of a core, and the process waits for the last one.
+        workflow.scheduler.job_rate_limiter = None
         stop_at_sigterm(self.failures.note_sigterm)
         say_compilation(os.environ.get("NUMBA_CACHE_DIR", ""))
         tell_expectation(workflow, plan)
@@ -112,7 +115,6 @@ class Run:
             say_last(f"pdrom: {error}\n")
         words = apart(plan.study)
         say_last(summary(self.command, folders, plan.figures, plan.table_paths, words))
-        cancel_timers()
 
     def _record(self, plan: Plan, folders: Folders) -> None:
         """Write what there is now; a run that changed nothing leaves the account of an older."""
@@ -126,7 +128,6 @@ class Run:
 
     def fail(self) -> None:
         """End a run that failed or was interrupted: it says why."""
-        cancel_timers()
         text, status = self.failures.end()
         say_last(text)
         sys.exit(status)

@@ -34,7 +34,6 @@ SNAKEMAKE_LOCKS = FOLDER / "locks"
 STEP_NS = 10_000
 # Seconds after which a job is killed that SIGTERM did not end.
 PATIENCE = 5.0
-SCHEDULER = "snakemake.scheduling.job_scheduler"
 
 
 class AtWorkError(PdromError):
@@ -140,18 +139,3 @@ def _end_jobs() -> None:
                 if os.getsid(process.pid) == os.getsid(0):
                     process.send_signal(signal.SIGKILL if late else signal.SIGTERM)
         time.sleep(0.5)
-
-
-def cancel_timers() -> None:
-    """Cancel the timers of Snakemake's rate limit, which would make it choose jobs once more.
-
-    Snakemake starts such a timer after every choice, and the process would not end before the last
-    one has run out. Timers that anything else has started go on.
-    """
-    for thread in threading.enumerate():
-        if isinstance(thread, threading.Timer) and _module(thread) == SCHEDULER:
-            thread.cancel()
-
-
-def _module(timer: threading.Timer) -> str:
-    return getattr(timer.function, "__module__", "")
