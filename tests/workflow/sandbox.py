@@ -149,7 +149,7 @@ def _cksum(content: bytes) -> str:
 
 
 def _timed(path: Path) -> bool:
-    """Whether a clock has a say; the manifest has checksums of files in which it has."""
+    """Whether a file depends on timing, as the manifest does by the checksums in it."""
     apart = "logs" in path.parts or path.name == MANIFEST.pattern
     return path.parts[-2] in TIMED_FOLDERS or path.stem in TIMED_FIGURES or apart
 

@@ -48,7 +48,7 @@ class Comparison:
         return self.context.loose(self.table, column, self.e)
 
     def compared(self, column: Column) -> np.ndarray:
-        """Cells of a column that are compared: no clock has a say in them."""
+        """Cells of a column that are compared: those that do not depend on timing."""
         return np.array([column.name not in names for names in self._timed], dtype=bool)
 
     def beyond(self, column: Column, wider: float = 0.0) -> np.ndarray:

@@ -34,7 +34,7 @@ class Outcome:
 
 
 def timed_columns(rule: ClaimRule) -> set[str]:
-    """Columns of a claim's row in which a clock has a say: two runs may differ there."""
+    """Columns of a claim's row that depend on timing: two runs may differ there."""
     found: set[str] = set()
     for part, suffix in (("published", ""), ("beyond", "_beyond")):
         tests: Sequence[TestRule] = getattr(rule, part)
@@ -48,7 +48,7 @@ def timed_columns(rule: ClaimRule) -> set[str]:
 
 
 def is_timed(test: TestRule) -> bool:
-    """Whether a clock has a say in what a test compares."""
+    """Whether what a test compares depends on timing."""
     return test.timed
 
 

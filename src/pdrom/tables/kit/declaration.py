@@ -36,7 +36,7 @@ class Column:
     """A column; any cell may be empty.
 
     unit : empty for text, counts and what has no dimension
-    timed : a clock (or the memory in use) has a say in it, so that two runs may differ
+    timed : it depends on timing (or on the memory in use), so that two runs may differ
     declared : its quantity, where the type and the name do not tell it
     tolerance : its own, where that of its quantity is not the right one; of words and truth values
         the share of the rows that may be others
@@ -122,7 +122,7 @@ class TimedCells(Protocol):
 class Table(Artifact):
     """A table of the study; calling it makes it.
 
-    timed_cells : where not the column alone says whether a clock has a say in a cell
+    timed_cells : columns of each row that depend on timing, where that differs from row to row
     """
 
     columns: tuple[Column, ...] = ()
@@ -175,7 +175,7 @@ class Table(Artifact):
             raise StorageError(f"{place} is no {column.kind} ({error})") from error
 
     def without_times(self, table: pd.DataFrame, root: Path) -> pd.DataFrame:
-        """``table``, as text, with every cell emptied in which a clock has a say.
+        """``table``, as text, with every cell emptied that depends on timing.
 
         Parameters
         ----------

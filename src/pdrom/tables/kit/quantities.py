@@ -12,7 +12,7 @@ QUANTITIES: dict[Quantity, str] = {
     "value": "well-conditioned numbers, and numbers of samples: relative",
     "error": "how runs and approximations end: relative, words and frames equal",
     "share": "shares, correlations and numbers of runs over many: absolute",
-    "timed": "what a clock, a compiler or a cache has a say in: not judged",
+    "timed": "what depends on timing, a compiler or a cache: not judged",
     "skipped": "rounding errors, and words about other columns: not compared",
 }
 # How far one cell may be off, where its column says nothing else.
