@@ -29,7 +29,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--r", metavar="R", type=_size, default=20, help="number of modes (20)")
     parser.add_argument(
-        "--run", metavar="FILE", help="full-order run by pdrom run; it is made anew without it"
+        "--run", metavar="FILE", help="full-order run by pdrom run; made first if it is left out"
     )
     parser.add_argument(
         "--out", metavar="FILE", help="file to write (HDF5); SCENE_G_M_R.h5 without it"

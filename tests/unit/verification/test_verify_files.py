@@ -114,7 +114,7 @@ def test_a_changed_digit_is_noticed_and_its_command_named(name, capsys):
     assert verify_files(SUBJECT) is Status.DIFFERS
     said = capsys.readouterr().out
     command = f"./reproduce --configfile 'my study.yaml' --force -- {name}"
-    assert f"{name}: damaged (its checksum differs); make it anew by {command}\n" in said
+    assert f"{name}: damaged (its checksum differs); make it again by {command}\n" in said
     assert "3 of 4 files" in said
 
 
@@ -123,7 +123,7 @@ def test_a_sealed_file_that_its_inputs_do_not_give_is_noticed(content, monkeypat
     write_text(content, NAMES[2])
     reseal(monkeypatch)
     assert verify_files(SUBJECT) is Status.DIFFERS
-    assert f"{NAMES[2]}: not what its inputs give; make it anew by" in capsys.readouterr().out
+    assert f"{NAMES[2]}: not what its inputs give; make it again by" in capsys.readouterr().out
 
 
 def test_what_inputs_do_not_give_any_more_is_noticed(monkeypatch):
@@ -135,7 +135,7 @@ def test_what_inputs_do_not_give_any_more_is_noticed(monkeypatch):
 def test_an_entry_that_was_taken_out_is_noticed(name, capsys):
     rewrite(lambda entries: entries.pop(f"../{name}".replace("../results/", "")))
     assert verify_files(SUBJECT) is Status.DIFFERS
-    assert f"{name}: not in the manifest; make it anew by" in capsys.readouterr().out
+    assert f"{name}: not in the manifest; make it again by" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", ["../../secret", "/etc/hostname", "../paper/main.tex", "notes.md"])
@@ -159,7 +159,7 @@ def test_a_seal_that_does_not_fit_is_noticed():
 def test_a_lost_file_has_a_code_of_its_own(capsys):
     Path(NAMES[0]).unlink()
     assert verify_files(SUBJECT) is Status.MISSING
-    assert f"{NAMES[0]}: not there; make it anew by" in capsys.readouterr().out
+    assert f"{NAMES[0]}: not there; make it again by" in capsys.readouterr().out
 
 
 def test_a_file_that_was_removed_and_left_out_of_the_manifest_is_missing(monkeypatch):

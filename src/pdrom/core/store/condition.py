@@ -112,5 +112,5 @@ def _set_aside(path: Path, fault: str) -> StorageError:
         os.replace(path, aside)
         seal_path(path).unlink(missing_ok=True)
     except OSError:
-        return StorageError(f"{path}: {damage}; delete it, the next run makes it anew")
-    return StorageError(f"{path}: {damage}; set aside as {aside.name}, the next run makes it anew")
+        return StorageError(f"{path}: {damage}; delete it, the next run makes it again")
+    return StorageError(f"{path}: {damage}; set aside as {aside.name}, the next run makes it again")

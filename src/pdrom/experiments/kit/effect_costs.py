@@ -64,7 +64,7 @@ class Timed:
         return float(self._kernel.sum())
 
     def reset(self) -> None:
-        """Begin anew."""
+        """Begin again."""
         self._asked = 0.0
         self._kernel[:] = 0.0
 

@@ -60,7 +60,7 @@ class Subspaces(ConfigModel):
 class TimedScene(ConfigModel):
     """A scene, timed in full order, once more as a control, and with its reductions.
 
-    mesh : file of the mesh; it is made anew if there is none
+    mesh : file of the mesh; it is made if there is none
     """
 
     scene: SceneConfig

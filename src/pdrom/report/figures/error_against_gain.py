@@ -30,7 +30,7 @@ class Options(Experiments, Methods):
         "not fail at the same size), over all scenes and sizes. Dashed: the error from which on a "
         "run counts as failed; dotted: the gain that separates failed runs from others with the "
         "fewest mistakes. Arrows on the rim lie outside the axes. Crosses: range and median over "
-        "runs, in some scenes, that are trained on as many frames drawn anew. Right: how many of "
+        "runs, in some scenes, that are trained on as many resampled frames. Right: how many of "
         "them failed, by decade of the gain."
     ),
     reads=(

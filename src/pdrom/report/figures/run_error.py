@@ -35,7 +35,7 @@ class Options(Experiments, Methods, Ranks, Columns):
         "Relative error of reduced runs frame by frame. The shaded area is the sensitivity floor "
         "of the scene and the dotted line its horizon: errors to the right of it cannot be told "
         "from chaos. Bands in the colour of a method, in some scenes and up to the horizon, hold "
-        "the same runs trained on as many frames drawn anew."
+        "the same runs trained on as many resampled frames."
     ),
     reads=(Chosen(RERUNS), TableOf("repetitions"), Every(REPEATED_FRAMES), *FLOORS),
     options=Options,
