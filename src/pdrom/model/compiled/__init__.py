@@ -1,1 +1,1 @@
-"""Compiled functions of the model: how they are kept, and padded vectors."""
+"""Compiled functions of the model: how they are kept, and vectors of four numbers."""

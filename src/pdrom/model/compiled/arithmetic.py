@@ -1,4 +1,4 @@
-"""Arithmetic of padded vectors: all lanes at once, or whole rows with a number.
+"""Arithmetic of rows of four numbers: all lanes at once, or whole rows with a number.
 
 Nothing is reordered and no intermediate result kept, so that a lane gives the same bits in every
 company; a product and a sum are rounded once where the processor can.

@@ -1,4 +1,4 @@
-"""Vertices as padded vectors (x, y, z, 0), so that compiled code moves one with a single instruction.
+"""Vertices as rows of four numbers, so that compiled code moves one with a single instruction.
 
 The step loop keeps positions and right-hand sides as (N, 4) with a last column of zeros; outside
 they are (N, 3) views of these. Compiled code sees the flat array and holds a row in a register of
@@ -57,12 +57,12 @@ def copied(numbers):
 
 
 def vertices(count: int) -> np.ndarray:
-    """Zeros (count, 3), a view of padded vectors."""
+    """Zeros (count, 3), a view of rows of four."""
     return unflat(zeros(WIDTH * count))
 
 
 def as_vertices(values: np.ndarray) -> np.ndarray:
-    """A copy of the values (N, 3) as a view of padded vectors."""
+    """A copy of the values (N, 3) as a view of rows of four."""
     copy = vertices(len(values))
     copy[...] = values
     return copy
@@ -86,7 +86,7 @@ def flat(values: np.ndarray) -> np.ndarray:
 
 
 def unflat(rows: np.ndarray) -> np.ndarray:
-    """Flat padded vectors as a view (N, 3), the opposite of `flat`."""
+    """Flat rows of four as a view (N, 3), the opposite of `flat`."""
     return rows.reshape(-1, WIDTH)[:, :3]
 
 

@@ -155,5 +155,5 @@ class Anderson:
 
 
 def _numbers(y: np.ndarray) -> np.ndarray:
-    """All numbers of y, not copied: of a view of padded vectors with their zeros."""
+    """All numbers of y, not copied: of a view of rows of four with their zeros."""
     return y.reshape(-1) if y.flags.c_contiguous else flat(y)

@@ -8,7 +8,7 @@ from pdrom.model.compiled.rows import WIDTH
 
 @compiled(nogil=True)
 def predict(positions, velocities, acceleration, time_step):
-    """q + h v + h^2 a as padded vectors, flat; ``acceleration`` is (N, 3), or (1, 3) for all."""
+    """q + h v + h^2 a as rows of four, flat; ``acceleration`` is (N, 3), or (1, 3) for all."""
     s, square = np.empty(WIDTH * len(positions)), time_step**2
     for i in range(len(positions)):
         own = i if len(acceleration) > 1 else 0
@@ -21,7 +21,7 @@ def predict(positions, velocities, acceleration, time_step):
 
 @compiled(nogil=True)
 def weighted(inertia, s):
-    """(M/h^2) s as padded vectors, flat as s is."""
+    """(M/h^2) s as rows of four, flat as s is."""
     result = np.empty(len(s))
     for i in range(len(inertia)):
         for lane in range(WIDTH):
@@ -31,7 +31,7 @@ def weighted(inertia, s):
 
 @compiled(nogil=True)
 def end(y, before, time_step):
-    """Positions and velocities (N, 3) at the end of a frame, from padded vectors, flat."""
+    """Positions and velocities (N, 3) at the end of a frame, from rows of four, flat."""
     positions, velocities = np.empty_like(before), np.empty_like(before)
     for i in range(len(before)):
         for axis in range(3):
@@ -42,7 +42,7 @@ def end(y, before, time_step):
 
 @compiled(nogil=True)
 def inertia_energy(y, s, inertia):
-    """1/2 |(M/h^2)^1/2 (y - s)|^2 of padded vectors, flat."""
+    """1/2 |(M/h^2)^1/2 (y - s)|^2 of rows of four, flat."""
     energy = 0.0
     for i in range(len(inertia)):
         square = 0.0

@@ -69,7 +69,7 @@ class CompiledIterations:
         Parameters
         ----------
         objective : (K,) receives the objective at the iterates; empty if it is not tracked
-        y, base : (N, 3) views of padded vectors: iterate, (M/h^2) s
+        y, base : (N, 3) views of rows of four: iterate, (M/h^2) s
         s : (N, 3) prediction
         seconds : (4,) times of the local and of the global steps are added to entries 1 and 2
         """

@@ -162,7 +162,7 @@ def sweep(panels, vertices, loads, x, rhs, y):
     vertices : (n,) row of ``rhs`` and ``y`` of each unknown, in the order of the factor
     loads : (4 n,) rows that are taken from the right-hand side, in that order
     x : (4 n,) working array
-    rhs, y : padded vectors, flat
+    rhs, y : rows of four, flat
     """
     first, row_start, value_start, rows, values = panels
     for i in range(len(vertices)):
