@@ -131,8 +131,8 @@ class Sandbox:
     def results(self) -> dict[str, str]:
         """Digest of every result, all of them intact; what a clock measured is left out."""
         files = [p for p in self.path("results").rglob("[!.]*") if p.is_file()]
-        sealed = [p for p in files if p.suffix != ".log"]
-        assert {check_file(p) for p in sealed} == {"intact"}
+        with_checksum = [p for p in files if p.suffix != ".log"]
+        assert {check_file(p) for p in with_checksum} == {"intact"}
         names = {str(p.relative_to(self.folder)): p for p in files}
         kept = {name: path for name, path in sorted(names.items()) if not _timed(path)}
         return {name: _digest(path, self.folder) for name, path in kept.items()}

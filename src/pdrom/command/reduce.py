@@ -79,7 +79,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     save(reduced, out)
     if arguments.plot:
         picture = plot(reduced)
-        with atomic_path(arguments.plot, sealed=False) as path:
+        with atomic_path(arguments.plot, with_checksum=False) as path:
             picture.savefig(path, dpi=200)
     sys.stdout.write(f"{out}: {_told(reduced)}\n")
     return Status.DONE if reduced.outcome.finite else Status.BLEW_UP

@@ -68,12 +68,12 @@ def _hdf5(path: Path, whole: bool) -> Iterator[str]:
 
 
 def _provenance(path: Path) -> Iterator[str]:
-    """Provenance of the file by its seal, which is compared with the file."""
+    """Provenance of the file by its checksum, which is compared with the file."""
     from pdrom.core.provenance import RECORD
     from pdrom.core.store import provenance_of
 
     record = provenance_of(path)
-    yield "provenance:" if record else "provenance: unknown (no seal says it)"
+    yield "provenance:" if record else "provenance: unknown (no checksum says it)"
     yield from (f"  {name}: {record[name]}" for name in RECORD if name in record)
 
 

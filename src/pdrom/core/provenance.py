@@ -1,7 +1,7 @@
 """Where a result comes from: what made it, with which settings, code and libraries.
 
 A job states once what it is (`made_by`). Whatever `pdrom.core.store` writes meanwhile carries that:
-every file in its seal, HDF5 files inside as well. Nothing in it differs
+every file in its checksum, HDF5 files inside as well. Nothing in it differs
 between two equal runs: no date, no folder, and no commit, since a commit that changes a word of the
 documentation makes no other result.
 """
@@ -93,7 +93,7 @@ def attributes() -> dict[str, str]:
 
 
 def as_text(record: Mapping[str, str]) -> str:
-    """A record in one line, as a seal holds it."""
+    """A record in one line, as a checksum holds it."""
     return json.dumps(dict(record), sort_keys=True)
 
 

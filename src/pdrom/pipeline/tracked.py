@@ -34,7 +34,7 @@ LARGE = "config/alternatives.yaml"
 
 def write_tracked(path: Path, content: bytes) -> None:
     """Write a file that git keeps: whole or not at all, without a checksum beside it."""
-    with atomic_path(path, sealed=False) as temporary:
+    with atomic_path(path, with_checksum=False) as temporary:
         temporary.write_bytes(content)
 
 

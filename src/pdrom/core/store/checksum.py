@@ -1,9 +1,9 @@
-"""Seals: the checksum of a result, and what made it.
+"""Checksums of results, with what made the result.
 
-An HDF5 file has its seal inside (`pdrom.core.store.block`). Beside every other result lies a hidden
-file: the seal of ``t.csv`` is ``.t.csv.blake2b``, in the format of the program ``b2sum``: the
-BLAKE2b digest of the file's bytes and the file's name. The line before it is a comment to that
-program; it holds the provenance (`pdrom.core.provenance`) with a checksum of its own.
+An HDF5 file has its checksum inside (`pdrom.core.store.block`). Beside every other result lies a
+hidden checksum file: that of ``t.csv`` is ``.t.csv.blake2b``, in the format of the program
+``b2sum``: the BLAKE2b digest of the file's bytes and the file's name. The line before it is a
+comment to that program; it holds the provenance (`pdrom.core.provenance`) with a digest of its own.
 """
 
 import hashlib
@@ -13,13 +13,13 @@ from pathlib import Path
 
 from pdrom.core.provenance import as_text, provenance
 
-SEAL_SUFFIX = ".blake2b"
+CHECKSUM_SUFFIX = ".blake2b"
 _SHORT = 16  # hexadecimal digits of the checksum of a comment
 
 
 @dataclass(frozen=True)
-class Seal:
-    """Content of a seal: digest and name of the file, provenance as JSON or nothing."""
+class Checksum:
+    """Content of a checksum file: digest and name of the result, provenance as JSON or nothing."""
 
     digest: str
     name: str
@@ -27,15 +27,15 @@ class Seal:
 
     @property
     def content(self) -> bytes:
-        """Bytes of the seal."""
+        """Bytes of the checksum file."""
         text = self.provenance.encode()
         short = hashlib.blake2b(text).hexdigest()[:_SHORT]
         comment = f"# {short} ".encode() + text + b"\n" if text else b""
         return comment + f"{self.digest}  {self.name}\n".encode()
 
     @classmethod
-    def parse(cls, content: bytes) -> "Seal":
-        """The seal of these bytes; of damaged ones, a seal whose content is another."""
+    def parse(cls, content: bytes) -> "Checksum":
+        """Checksum read from these bytes; of damaged bytes, one whose content is another."""
         first, _, rest = content.partition(b"\n")
         commented = first.startswith(b"# ")
         words = (rest if commented else content).decode(errors="replace").split()
@@ -43,9 +43,9 @@ class Seal:
         return cls(words[0] if words else "", words[-1] if words else "", text)
 
 
-def seal_path(path: str | os.PathLike[str]) -> Path:
-    """Where the seal of ``path`` lies, unless it is inside."""
-    return Path(path).with_name(f".{Path(path).name}{SEAL_SUFFIX}")
+def checksum_path(path: str | os.PathLike[str]) -> Path:
+    """Path of the checksum file of ``path``, for files without a checksum inside."""
+    return Path(path).with_name(f".{Path(path).name}{CHECKSUM_SUFFIX}")
 
 
 def digest_of(path: Path, start: int = 0) -> str:
@@ -55,6 +55,6 @@ def digest_of(path: Path, start: int = 0) -> str:
         return hashlib.file_digest(handle, "blake2b").hexdigest()
 
 
-def new_seal(digest: str, name: str) -> Seal:
-    """The seal of a file that is made now."""
-    return Seal(digest, name, as_text(provenance()))
+def new_checksum(digest: str, name: str) -> Checksum:
+    """The checksum of a file that is made now."""
+    return Checksum(digest, name, as_text(provenance()))
