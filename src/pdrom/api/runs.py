@@ -123,8 +123,8 @@ def reduce(
     method : name in config/methods.yaml, or a specification
     r : number of modes, from 1 to the rank of the basis
     basis_of_group : of the group, by `basis` for the same method; made of ``full`` without it
-    guard : what watches the run, and what follows from an alarm; a companion that estimates its
-        error is trained on ``full``
+    guard : what watches the run, and what follows from an alarm; an auxiliary model that estimates
+        its error is trained on ``full``
 
     Returns
     -------
@@ -140,7 +140,8 @@ def reduce(
     RankError
         The snapshots have fewer than r modes above round-off.
     NotReducibleError
-        A companion is asked for, and the scene has an effect that no position subspace takes.
+        An auxiliary model is asked for, and the scene has an effect that no position subspace
+        takes.
     """
     scene, spec = require(FullRun, full, "full", FULL_RUN).scene, method_spec(method)
     r, chosen = modes(r), scene.group(require(str, group, "group", GROUP))

@@ -72,7 +72,7 @@ def guarded(
     full = scene.stepper(system, track_objective=False)
     if settings.alarm == "estimate":
         if trained.companion is None:
-            raise ConfigurationError("guard.alarm = 'estimate': a companion is required")
+            raise ConfigurationError("guard.alarm = 'estimate': an auxiliary model is required")
         estimate = EstimateAlarm(
             scene, group, trained.companion, trained.motion, settings.threshold
         )

@@ -1,12 +1,12 @@
 """A companion: an auxiliary, finer model that runs beside reduced runs and estimates their errors.
 
-The distance of a run to the companion stands for its distance to the full order (a hierarchical
-estimate, Bank and Weiser 1985). If the companion's own error is at most theta < 1 times that of the
-run, saturation, then by the triangle inequality the estimate lies between 1 - theta and 1 + theta
-times the error. The companion has the run's own scene and its forces, contacts and handles, the
-snapshot modes and as many skinning modes, which a motion that the training did not hold needs, and
-sampled elements of its own. It does not depend on the run: one companion serves all runs of a
-motion, and none of them needs the full order.
+The distance of a run to the auxiliary model stands for its distance to the full order (a
+hierarchical estimate, Bank and Weiser 1985). If the auxiliary model's own error is at most theta <
+1 times that of the run, saturation, then by the triangle inequality the estimate lies between 1 -
+theta and 1 + theta times the error. The auxiliary model has the run's own scene and its forces,
+contacts and handles, the snapshot modes and as many skinning modes, which a motion that the
+training did not hold needs, and sampled elements of its own. It does not depend on the run: one
+auxiliary model serves all runs of a motion, and none of them needs the full order.
 """
 
 from collections.abc import Iterator
@@ -32,7 +32,7 @@ class CompanionSpec(ConfigModel):
 def companion_model(
     scene: Scene, training: np.ndarray, frames: np.ndarray, spec: CompanionSpec
 ) -> SubspaceModel:
-    """Companion of all runs of a scene.
+    """Auxiliary model of all runs of a scene.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def companion_model(
 
 
 def companion_frames(scene: Scene, model: SubspaceModel) -> Iterator[np.ndarray]:
-    """Positions (N, 3) m of the companion, the initial ones first, each computed when needed.
+    """Positions (N, 3) m of the auxiliary model, the initial ones first, each computed when needed.
 
     They end with the run, or before the first frame that is not finite.
     """
@@ -66,7 +66,7 @@ def companion_run(scene: Scene, model: SubspaceModel) -> np.ndarray:
 def estimate(positions: np.ndarray, companion: np.ndarray, end: int) -> float | None:
     """Estimated relative error of a run over its frames before ``end``.
 
-    || Q - Q' ||_F / || Q' - Q'_0 ||_F with the companion Q'; None where it does not move, or
+    || Q - Q' ||_F / || Q' - Q'_0 ||_F with the auxiliary model Q'; None where it does not move, or
     neither has a frame.
 
     Parameters
