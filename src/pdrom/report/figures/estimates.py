@@ -29,8 +29,8 @@ SPLITS = {"train": "training motions", "heldout": "held-out motions"}
         "only the auxiliary model's run is used. Between the dashed lines the estimate is within a "
         "factor of three. Open dots are not resolved: the estimate is at most one and a half times "
         "the auxiliary model's own error on the training motion, so that the error is only known "
-        "to be small. Dotted: {guard.threshold}, above which a guard takes it as an alarm. What lies "
-        "outside is drawn on the rim."
+        "to be small. Dotted: {guard.threshold}, above which a guard takes it as an alarm. What "
+        "lies outside is drawn on the rim."
     ),
     reads=(TableOf("estimates"), Setting("guard.threshold")),
     options=Scenes,
