@@ -15,9 +15,9 @@ from pdrom.reduction.sampling.reduction import Block, Reduction
 class ReducedLocalStep:
     """Evaluates sampled elements of a group and lifts their coefficients to the right-hand side.
 
-    Precomputed: the offset S^T W mean (N, 3), the lift S^T W V for each coefficient block, and the
-    solution operators. Online: the projections of the sampled elements, a small dense product for
-    c, and the dense lift, shared by the group's threads.
+    Precomputed: the offset S^T W mean (N, 3), the reconstruction S^T W V for each coefficient
+    block, and the solution operators. Online: the projections of the sampled elements, a small
+    dense product for c, and the dense reconstruction, shared by the group's threads.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class ReducedLocalStep:
 
     @property
     def lift_seconds(self) -> float:
-        """Time of the lift so far; two threads do its parts at once."""
+        """Time of the reconstruction so far; two threads do its parts at once."""
         seconds = self._lift.seconds
         return float(seconds.max() if self.threads == 2 else seconds.sum())
 

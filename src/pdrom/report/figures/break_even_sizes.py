@@ -24,7 +24,8 @@ class Options(Scenes, Methods, Columns):
     title="Break-even on finer meshes",
     caption=(
         "Smallest $r$ from which the reduced local step costs as much as the full one, over the "
-        "number of vertices, with the full step and the lift on one thread and on two. The first "
+        "number of vertices, with the full step and the reconstruction on one thread and on two. "
+        "The first "
         "mesh is the scene's own; its basis is that of the study, those of the finer ones come "
         "from the first frames of a run."
     ),
