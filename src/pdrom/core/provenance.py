@@ -49,7 +49,13 @@ _AT_WORK: ContextVar[Job | None] = ContextVar("job", default=None)
 
 @contextmanager
 def made_by(name: str, configuration: Any, code: str = "") -> Iterator[None]:
-    """Record the job ``name`` in all files that are written meanwhile."""
+    """Record the job ``name`` in all files that are written meanwhile.
+
+    Parameters
+    ----------
+    configuration : settings of the job, hashed as JSON
+    code : fingerprint of the code that it runs
+    """
     previous = _AT_WORK.set(Job(name, _canonical(configuration), code))
     try:
         yield

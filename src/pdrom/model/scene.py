@@ -90,7 +90,13 @@ class SceneConfig(_Model):
         return sorted({EFFECTS[e.effect] for e in self.effects})
 
     def coarsened(self, resolution: float, frames: float) -> Self:
-        """The scene on a coarser mesh and with fewer frames; schedules shrink alike."""
+        """The scene on a coarser mesh and with fewer frames; schedules shrink alike.
+
+        Parameters
+        ----------
+        resolution : vertices along a side over those of the scene
+        frames : number of frames over that of the scene
+        """
         count = max(4, round(self.frames * frames))
         even = (count + 1) // 2
         plans = {
@@ -217,7 +223,13 @@ class Scene:
         local_steps: Sequence[LocalStep] | None = None,
         track_objective: bool = True,
     ) -> Stepper:
-        """Step loop of the scene; ``local_steps`` replaces the full projections of all groups."""
+        """Step loop of the scene; ``local_steps`` replaces the full projections of all groups.
+
+        Parameters
+        ----------
+        system : factored system of the global step, made if left out
+        track_objective : whether reports have the objective of each iteration
+        """
         return Stepper(
             self.space(system or self.system),
             self.config.time_step,
@@ -233,7 +245,7 @@ class Scene:
         return Anderson(window) if window else None
 
     def space(self, system: GlobalSystem) -> VertexSpace:
-        """Vertex positions as the coordinates of the step loop."""
+        """Vertex positions as the coordinates of the step loop, with its global ``system``."""
         return VertexSpace(system, self.forces, self.boundaries, self.contacts)
 
 

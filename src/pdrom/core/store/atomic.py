@@ -53,7 +53,7 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
 
 
 def require_place(path: str | os.PathLike[str]) -> None:
-    """Refuse a place that cannot be written, before a long computation of what goes there.
+    """Refuse a ``path`` that cannot be written, before a long computation of what goes there.
 
     Raises
     ------

@@ -17,7 +17,7 @@ NAME = "-"  # of what `tail -c +2049 FILE | b2sum` reads
 
 
 def is_hdf5(path: Path) -> bool:
-    """Whether a file is HDF5, by its name or its beginning, with a block or without."""
+    """Whether the file ``path`` is HDF5, by its name or its beginning, with a block or without."""
     with open(path, "rb") as handle:
         head = handle.read(SIZE + len(_SIGNATURE))
     named = path.suffix in SUFFIXES or head.startswith((_SIGNATURE, _LINE))
@@ -25,7 +25,7 @@ def is_hdf5(path: Path) -> bool:
 
 
 def write_block(path: Path) -> None:
-    """Checksum a complete HDF5 file that begins with ``SIZE`` bytes of no meaning."""
+    """Checksum a complete HDF5 file ``path`` that begins with ``SIZE`` bytes of no meaning."""
     content = _LINE + new_checksum(digest_of(path, start=SIZE), NAME).content
     if len(content) > SIZE:
         raise ValueError(f"{path}: a checksum of {len(content)} bytes, allowed: at most {SIZE}")
@@ -34,7 +34,7 @@ def write_block(path: Path) -> None:
 
 
 def read_block(path: Path) -> bytes | None:
-    """The checksum's bytes in the block of an HDF5 file, b"" if damaged; None without a block."""
+    """Checksum's bytes in the HDF5 file ``path``, b"" if damaged; None without a block."""
     with open(path, "rb") as handle:
         block = handle.read(SIZE)
     if block.startswith(_SIGNATURE):

@@ -49,12 +49,12 @@ def checksum_path(path: str | os.PathLike[str]) -> Path:
 
 
 def digest_of(path: Path, start: int = 0) -> str:
-    """BLAKE2b digest of the bytes of a file from ``start`` on, hexadecimal."""
+    """BLAKE2b digest of the bytes of the file ``path`` from ``start`` on, hexadecimal."""
     with open(path, "rb") as handle:
         handle.seek(start)
         return hashlib.file_digest(handle, "blake2b").hexdigest()
 
 
 def new_checksum(digest: str, name: str) -> Checksum:
-    """The checksum of a file that is made now."""
+    """Checksum of a file ``name`` that is made now, with the ``digest`` of its bytes."""
     return Checksum(digest, name, as_text(provenance()))

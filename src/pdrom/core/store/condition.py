@@ -29,7 +29,7 @@ class Condition(StrEnum):
 
 
 def read_checksum(path: str | os.PathLike[str]) -> Checksum | None:
-    """The checksum of a file; None where there is none or it is damaged itself."""
+    """Checksum of the file ``path``; None where there is none or it is damaged itself."""
     path = Path(path)
     content = _checksum_bytes(path) if path.is_file() else None
     if content is None:
@@ -39,13 +39,13 @@ def read_checksum(path: str | os.PathLike[str]) -> Checksum | None:
 
 
 def provenance_of(path: str | os.PathLike[str]) -> dict[str, str]:
-    """Provenance of a file, kept with its checksum; empty where there is none."""
+    """Provenance of the file ``path``, kept with its checksum; empty where there is none."""
     checksum = read_checksum(path)
     return json.loads(checksum.provenance) if checksum and checksum.provenance else {}
 
 
 def check_file(path: str | os.PathLike[str]) -> Condition:
-    """Whether the bytes of a result of any kind are those that were written; changes nothing.
+    """Whether the bytes of the result ``path`` of any kind are as written; changes nothing.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def check_file(path: str | os.PathLike[str]) -> Condition:
 
 
 def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> None:
-    """Refuse a result that is not what was written; every reader calls this first.
+    """Refuse a result ``path`` that is not what was written; every reader calls this first.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from pdrom.core.store.oserrors import reason
 
 @contextmanager
 def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
-    """Yield a new HDF5 file that takes its name only when complete, with provenance and checksum.
+    """Yield a new HDF5 file; it takes its name ``path`` when complete, with a checksum.
 
     No time stamps are inside.
     """
@@ -70,7 +70,7 @@ class _Sink:
 
 @contextmanager
 def open_hdf5(path: str | os.PathLike[str], unchecked: bool = False) -> Iterator[h5py.File]:
-    """Open an HDF5 file of the results for reading.
+    """Open the HDF5 file ``path`` of the results for reading.
 
     Its checksum is compared before HDF5 sees the file, so that damage is no error of HDF5.
 

@@ -18,7 +18,7 @@ FLOAT_FORMAT = "%.10g"
 def write_table(
     table: pd.DataFrame, path: str | os.PathLike[str], with_checksum: bool = True
 ) -> None:
-    """Write a table as CSV: fixed float format, an empty cell where there is no value.
+    """Write a table as CSV to ``path``: fixed float format, an empty cell where there is no value.
 
     ``with_checksum`` as in `atomic_path`.
     """
@@ -29,7 +29,7 @@ def write_table(
 def read_table(
     path: str | os.PathLike[str], columns: Sequence[str] | None = None, result: bool = True
 ) -> pd.DataFrame:
-    """Read a CSV table; StorageError if it is missing, damaged or lacks one of ``columns``.
+    """Read the CSV table ``path``; StorageError if missing, damaged or without one of ``columns``.
 
     ``result`` marks a table that a run wrote, with a checksum; other tables have none.
     """

@@ -56,7 +56,7 @@ class ClothMesh(MeshModel):
         return self.model_copy(update=sizes)
 
     def build(self, root: Path) -> Mesh:
-        """Generate the mesh."""
+        """Generate the mesh; nothing is read below ``root``."""
         return cloth(self.rows, self.columns, self.plane, self.extent, self.lift, self.wave)
 
     @property
@@ -86,7 +86,7 @@ class BarMesh(MeshModel):
         return self.model_copy(update=sizes)
 
     def build(self, root: Path) -> Mesh:
-        """Generate the mesh."""
+        """Generate the mesh; nothing is read below ``root``."""
         return bar(self.nx, self.ny, self.nz, self.extent, self.lift)
 
     @property
@@ -113,11 +113,11 @@ class MeshFile(MeshModel):
         return value
 
     def coarsened(self, factor: float) -> Self:
-        """A mesh file has one resolution."""
+        """The mesh itself, whatever ``factor``: a mesh file has one resolution."""
         return self
 
     def build(self, root: Path) -> Mesh:
-        """Read the mesh; triangles that face the other way than their neighbours are turned over.
+        """Read the mesh file below ``root``, all triangles turned the same way round.
 
         Raises
         ------
@@ -149,7 +149,7 @@ class MeshFile(MeshModel):
         return [self.path]
 
     def file(self, root: Path) -> Path:
-        """The mesh file; MeshError if a link leads out of the project's folder."""
+        """The mesh file below ``root``; MeshError if a link leads out of the project's folder."""
         path = root / self.path
         try:
             inside = path.resolve().is_relative_to(root.resolve())

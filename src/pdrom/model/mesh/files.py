@@ -55,7 +55,7 @@ ADVICE = f"{VARIABLE}=2 in the environment doubles the limits"
 
 
 def read_mesh_file(path: Path) -> Mesh:
-    """Read triangles or tetrahedra from a file of one of `FORMATS`.
+    """Read triangles or tetrahedra from the file ``path`` of one of `FORMATS`.
 
     Raises
     ------

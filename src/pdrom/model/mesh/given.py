@@ -36,11 +36,11 @@ class GivenMesh(MeshModel):
         return cls(kind="given", blake2b=digest.hexdigest())
 
     def coarsened(self, factor: float) -> Self:
-        """Given arrays have one resolution."""
+        """The arrays themselves, whatever ``factor``: they have one resolution."""
         return self
 
     def build(self, root: Path) -> Mesh:
-        """MeshError: there are no arrays in a configuration."""
+        """MeshError, whatever ``root``: there are no arrays in a configuration."""
         raise MeshError("mesh.kind = 'given': its arrays come from Python (pdrom.api.build_scene)")
 
     @property
@@ -54,6 +54,10 @@ def given_mesh(points: Any, cells: Any, name: str) -> Mesh:
 
     Triangles that face the other way than their neighbours, and corners of tetrahedra, are put
     into order. What else a mesh has to satisfy is checked when a scene is built.
+
+    Parameters
+    ----------
+    cells : (T, 3) or (E, 4), counted from 0
 
     Raises
     ------

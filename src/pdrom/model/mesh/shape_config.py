@@ -59,7 +59,7 @@ class DiscMesh(_Unstructured):
         return 1.4 * edges**2
 
     def build(self, root: Path) -> Mesh:
-        """Generate the mesh."""
+        """Generate the mesh; nothing is read below ``root``."""
         return disc(self.edge, self.hole, self.plane, self.extent, self.lift)
 
     @property
@@ -78,7 +78,7 @@ class ShellMesh(_Unstructured):
         return 5.5 * edges**2
 
     def build(self, root: Path) -> Mesh:
-        """Generate the mesh."""
+        """Generate the mesh; nothing is read below ``root``."""
         return shell(self.shape, self.edge, self.extent, self.lift)
 
     @property
@@ -97,7 +97,7 @@ class SolidMesh(_Unstructured):
         return 1.5 * edges**3
 
     def build(self, root: Path) -> Mesh:
-        """Generate the mesh."""
+        """Generate the mesh; nothing is read below ``root``."""
         return solid(self.shape, self.edge, self.extent, self.lift)
 
     @property

@@ -46,13 +46,18 @@ def disc(edge: float, hole: float, plane: Plane, extent: float, lift: float) -> 
 
 
 def shell(shape: str, edge: float, extent: float, lift: float) -> Mesh:
-    """Closed surface called ``shape`` (a key of `SURFACES`), oriented outwards."""
+    """Closed surface ``shape`` (a key of `SURFACES`), oriented outwards.
+
+    Parameters
+    ----------
+    edge, extent, lift : length of edges, longest side, height above the ground, m
+    """
     points, triangles = SURFACES[shape](edge / extent)
     return Mesh(_placed(points, extent, lift), triangles)
 
 
 def solid(shape: str, edge: float, extent: float, lift: float) -> Mesh:
-    """Tetrahedra inside the closed surface called ``shape``."""
+    """Tetrahedra inside the closed surface ``shape``; ``edge``, ``extent``, ``lift`` as `shell`."""
     surface, triangles = SURFACES[shape](edge / extent)
     points, tetrahedra = fill(surface, triangles, edge / extent)
     tetrahedra = orient(points, tetrahedra)

@@ -20,6 +20,7 @@ class EstimateAlarm(Alarm):
     ----------
     scene : of the run
     group : the reduced group
+    companion : auxiliary model of the scene
     motion : of the training run, see `RunningEstimate`
     """
 

@@ -36,7 +36,12 @@ class Trained:
 
     @classmethod
     def on(cls, reference: np.ndarray, companion: SubspaceModel | None = None) -> "Trained":
-        """Take them from the training run's positions ``reference``, (F + 1, N, 3) m."""
+        """Take them from the training run's positions ``reference``, (F + 1, N, 3) m.
+
+        Parameters
+        ----------
+        companion : auxiliary model that estimates the error
+        """
         return cls(largest_extent(reference), mean_motion(reference), companion)
 
 
@@ -101,6 +106,7 @@ def guarded_rerun(
     ----------
     reference, blowup_extent : see `pdrom.reduction.local.rerun.rerun`
     settings, trained : see `guarded`
+    system : factored system of the scene's global step
     """
     advance, record = guarded(scene, system, group, reduction, settings, trained)
     start, frames, unit = scene.initial_state(), scene.config.frames, scene.mesh.extent

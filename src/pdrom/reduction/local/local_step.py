@@ -25,6 +25,7 @@ class ReducedLocalStep:
     """
 
     def __init__(self, group: ConstraintGroup, reduction: Reduction) -> None:
+        """Precompute what ``reduction`` of ``group`` needs online."""
         self.name = group.name
         self._group = group
         self._elements = np.ascontiguousarray(reduction.elements, dtype=np.int64)
@@ -43,7 +44,7 @@ class ReducedLocalStep:
         return self._group.threads
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Freeze frame-lagged data of the sampled elements only."""
+        """Freeze frame-lagged data of the sampled elements at positions ``q`` (N, 3) m."""
         self._group.begin_frame(q, None if self._everything else self._elements)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
@@ -55,11 +56,11 @@ class ReducedLocalStep:
         return float("nan")
 
     def sample(self, y: np.ndarray) -> np.ndarray:
-        """Projections of the sampled elements, as one vector."""
+        """Projections of the sampled elements at ``y`` (N, 3) m, as one vector."""
         return self._group.project_elements(y, self._elements).ravel()
 
     def solve(self, sampled: np.ndarray) -> None:
-        """Set the coefficients from what `sample` gives; the systems are inverted."""
+        """Set the coefficients from ``sampled`` (`sample`); the systems are inverted already."""
         data = self._lift
         coefficients(
             sampled, data.starts, data.positions, data.operators, data.shifts, data.limits,

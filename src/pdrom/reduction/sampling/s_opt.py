@@ -48,6 +48,11 @@ def extend(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np.nda
 
     Ends with all e elements if there are fewer. Raises SamplingError if the modes depend on each
     other at the elements to start with.
+
+    Parameters
+    ----------
+    v : (rows, r) basis
+    size : rows of a block
     """
     count = min(count, len(v) // size)
     if count <= len(elements):

@@ -19,7 +19,7 @@ def select(basis: Basis, spec: MethodSpec, r: int) -> Sampling:
 
 
 def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[int, Sampling]:
-    """Samplings for several r; greedy selections are nested and made once for the largest.
+    """Samplings of ``basis`` by ``spec`` for several ``ranks``, nested where they are greedy.
 
     Raises
     ------

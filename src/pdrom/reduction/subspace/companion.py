@@ -37,6 +37,7 @@ def companion_model(
     Parameters
     ----------
     training : (n, N, 3) m, full-order positions after the training ``frames`` (n,), ascending
+    spec : modes, tolerance of the sampling, number of frames
     """
     kind = "pod+skinning"
     columns = make_columns(scene, training, kind, spec.modes)
@@ -46,7 +47,7 @@ def companion_model(
 
 
 def companion_frames(scene: Scene, model: SubspaceModel) -> Iterator[np.ndarray]:
-    """Positions (N, 3) m of the auxiliary model, the initial ones first, each computed when needed.
+    """Positions (N, 3) m of the auxiliary model in ``scene``, initial ones first, when needed.
 
     They end with the run, or before the first frame that is not finite.
     """
@@ -59,7 +60,7 @@ def companion_frames(scene: Scene, model: SubspaceModel) -> Iterator[np.ndarray]
 
 
 def companion_run(scene: Scene, model: SubspaceModel) -> np.ndarray:
-    """`companion_frames` of the whole run, (F' + 1, N, 3) m."""
+    """`companion_frames` of the whole run of ``scene`` with ``model``, (F' + 1, N, 3) m."""
     return np.stack(list(companion_frames(scene, model)))
 
 
@@ -103,11 +104,11 @@ class RunningEstimate:
         return self._ratio(self._squares, self._frames) if self._frames else None
 
     def after(self, positions: np.ndarray, companion: np.ndarray) -> float:
-        """Estimate after one more frame, whose ends are (N, 3) m each."""
+        """Estimate after one more frame that ends at ``positions`` and ``companion`` (N, 3) m."""
         return self._ratio(self._squares + _square(positions, companion), self._frames + 1)
 
     def add(self, positions: np.ndarray, companion: np.ndarray) -> None:
-        """Take in one more frame."""
+        """Take in one more frame that ends at ``positions`` and ``companion`` (N, 3) m."""
         self._squares += _square(positions, companion)
         self._frames += 1
 
@@ -128,6 +129,7 @@ def largest_estimate(
     Parameters
     ----------
     positions, companion : (F + 1, N, 3) m, the initial ones first
+    motion : root mean square displacement of the training run, m
     """
     running, largest = RunningEstimate(motion), None
     for own, other in zip(positions[1 : end + 1], companion[1:], strict=False):

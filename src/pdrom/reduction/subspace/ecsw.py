@@ -41,6 +41,7 @@ def ecsw_elements(
     Parameters
     ----------
     tolerances : relative residuals tau of the training equations at which NNLS stops
+    columns : position subspace
     """
     count = CANDIDATES
     while True:
