@@ -68,7 +68,7 @@ def methods() -> dict[str, MethodSpec]:
 
 def fitting_basis(made: Any, group: ConstraintGroup, spec: MethodSpec) -> Basis:
     """``made`` if it is a basis of the group's projections that the method ``spec`` can use."""
-    basis = require(Basis, made, "basis_of_group", "pdrom.api.basis makes one")
+    basis = require(Basis, made, "basis_of_group", source="pdrom.api.basis makes one")
     found, needed = ((each.elements, each.rows_per_element) for each in (basis, group))
     if found != needed:
         raise ConfigurationError(

@@ -35,7 +35,7 @@ def save(reduced: ReducedRun, path: str | os.PathLike[str]) -> None:
     ConfigurationError, StorageError
         No reduced run; the file cannot be written.
     """
-    require(ReducedRun, reduced, "reduced", "pdrom.api.reduce makes one")
+    require(ReducedRun, reduced, "reduced", source="pdrom.api.reduce makes one")
     path = file_path(path)
     config = reduced.full.scene.config.model_dump(mode="json")
     labels = {"group": reduced.group, "method": reduced.method, "r": reduced.r}

@@ -75,7 +75,7 @@ def perform(arguments: argparse.Namespace) -> Status:
             raise StorageError(f"{arguments.run}: a run of another scene than {arguments.scene}")
     else:
         full = run(scene, on_frame=Progress(scene.config.name, scene.config.frames))
-    reduced = reduce(full, arguments.group, arguments.method, arguments.r, guard=guard)
+    reduced = reduce(full, arguments.group, arguments.method, r=arguments.r, guard=guard)
     save(reduced, out)
     if arguments.plot:
         picture = plot(reduced)

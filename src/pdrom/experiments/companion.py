@@ -41,7 +41,7 @@ def companion(mesh: File, train: File, config: SceneConfig, spec: CompanionSpec,
     """Make the auxiliary model."""
     motion = Motion(scene_of(config, mesh), train)
     frames, training = training_indices(motion.scene), training_positions(motion)
-    model = companion_model(motion.scene, training, frames, spec)
+    model = companion_model(motion.scene, training, frames, spec=spec)
     labels = {"method": "ecsw", "position_basis": model.position_basis, "base": "companion"}
     with write_hdf5(out.path) as file:
         store_columns(file.create_group("columns/companion"), model.columns)

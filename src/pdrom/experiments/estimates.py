@@ -94,7 +94,7 @@ def estimates(
                     "split": split,
                     "relative_error_within_horizon": error,
                     "estimate": estimate(found.positions, beside, end),
-                    "largest_estimate": largest_estimate(found.positions, beside, unit, end),
+                    "largest_estimate": largest_estimate(found.positions, beside, unit, end=end),
                     "companion_error": own,
                 }
             )

@@ -126,7 +126,7 @@ def _variants(asked: TimedScene, request: Request) -> Iterator[Variant]:
     for role in (FULL, CONTROL):
         yield variant({"role": role}, list(scene.groups))
     for own in asked.projections:
-        reduction = load_reduction(load_basis(own.basis), own.sampling, own.spec, own.r)
+        reduction = load_reduction(load_basis(own.basis), own.sampling, own.spec, r=own.r)
         step = ReducedLocalStep(scene.group(own.group), reduction)
         labels: dict[str, Any] = {"role": REDUCED, "position_basis": "full"}
         labels |= own.model_dump(include={"group", "method", "r"})

@@ -28,7 +28,7 @@ def check_mesh(mesh: Mesh, name: str) -> Mesh:
     if len(cells) == 0:
         raise MeshError(f"{name}: no triangles and no tetrahedra")
     require_finite(f"{name}: points", mesh.points, MeshError)
-    check_indices(cells, mesh.vertices, kind, name)
+    check_indices(cells, mesh.vertices, kind, name=name)
     _check_neighbours(cells, kind, name)
     _check_vertices(mesh, cells, name)
     _check_measures(mesh, cells, kind, name)

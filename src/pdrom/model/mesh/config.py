@@ -57,7 +57,9 @@ class ClothMesh(MeshModel):
 
     def build(self, root: Path) -> Mesh:
         """Generate the mesh; nothing is read below ``root``."""
-        return cloth(self.rows, self.columns, self.plane, self.extent, self.lift, self.wave)
+        return cloth(
+            self.rows, self.columns, self.plane, extent=self.extent, lift=self.lift, wave=self.wave
+        )
 
     @property
     def label(self) -> str:
@@ -87,7 +89,7 @@ class BarMesh(MeshModel):
 
     def build(self, root: Path) -> Mesh:
         """Generate the mesh; nothing is read below ``root``."""
-        return bar(self.nx, self.ny, self.nz, self.extent, self.lift)
+        return bar(self.nx, self.ny, self.nz, extent=self.extent, lift=self.lift)
 
     @property
     def label(self) -> str:

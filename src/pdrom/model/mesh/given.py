@@ -70,10 +70,10 @@ def given_mesh(points: Any, cells: Any, name: str) -> Mesh:
         raise MeshError(f"{name}: {len(points)} points and {len(cells)} cells, both are required")
     check_range(points, 1.0, name)
     if cells.shape[1] == 4:
-        check_indices(cells, len(points), "tetrahedron", name)
+        check_indices(cells, len(points), "tetrahedron", name=name)
         tetrahedra = orient(points, cells)
         return Mesh(points, boundary(tetrahedra), tetrahedra)
-    check_indices(cells, len(points), "triangle", name)
+    check_indices(cells, len(points), "triangle", name=name)
     turned = turned_alike(cells, name)
     triangles = np.where(turned[:, None], cells[:, ::-1], cells)
     return Mesh(points, triangles.astype(np.int32))

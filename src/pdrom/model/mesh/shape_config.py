@@ -60,7 +60,7 @@ class DiscMesh(_Unstructured):
 
     def build(self, root: Path) -> Mesh:
         """Generate the mesh; nothing is read below ``root``."""
-        return disc(self.edge, self.hole, self.plane, self.extent, self.lift)
+        return disc(self.edge, self.hole, self.plane, extent=self.extent, lift=self.lift)
 
     @property
     def label(self) -> str:
@@ -79,7 +79,7 @@ class ShellMesh(_Unstructured):
 
     def build(self, root: Path) -> Mesh:
         """Generate the mesh; nothing is read below ``root``."""
-        return shell(self.shape, self.edge, self.extent, self.lift)
+        return shell(self.shape, self.edge, self.extent, lift=self.lift)
 
     @property
     def label(self) -> str:
@@ -98,7 +98,7 @@ class SolidMesh(_Unstructured):
 
     def build(self, root: Path) -> Mesh:
         """Generate the mesh; nothing is read below ``root``."""
-        return solid(self.shape, self.edge, self.extent, self.lift)
+        return solid(self.shape, self.edge, self.extent, lift=self.lift)
 
     @property
     def label(self) -> str:

@@ -79,7 +79,7 @@ def guarded(
         if trained.companion is None:
             raise ConfigurationError("guard.alarm = 'estimate': an auxiliary model is required")
         estimate = EstimateAlarm(
-            scene, group, trained.companion, trained.motion, settings.threshold
+            scene, group, trained.companion, motion=trained.motion, threshold=settings.threshold
         )
         reduced = loop(ReducedLocalStep(chosen, reduction))
         guard = Guard(settings.action, estimate, reduced, full)
@@ -108,7 +108,9 @@ def guarded_rerun(
     settings, trained : see `guarded`
     system : factored system of the scene's global step
     """
-    advance, record = guarded(scene, system, group, reduction, settings, trained)
+    advance, record = guarded(
+        scene, system, group, reduction=reduction, settings=settings, trained=trained
+    )
     start, frames, unit = scene.initial_state(), scene.config.frames, scene.mesh.extent
     run = BoundedRun(advance, start, frames, blowup_extent, unit)
     return compare(run, reference, lambda: record.stopped), record

@@ -19,7 +19,7 @@ def load_reduction(
     with open_hdf5(sampling) as file:
         store = file[f"r{r:04d}"]
         stored = Sampling(store["entries"][...], store["elements"][...])
-    return Reduction(basis, stored, method, r)
+    return Reduction(basis, stored, method, r=r)
 
 
 def basis_of(sampling: File, method: MethodSpec, bases: Sequence[File]) -> File:

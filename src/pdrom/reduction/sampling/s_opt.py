@@ -71,7 +71,7 @@ class SOpt(Selection):
         return {r: path[:r] for r in ranks}
 
     def extend(self, v: np.ndarray, size: int, chosen: np.ndarray, count: int) -> np.ndarray:
-        return extend(v, size, chosen, count)
+        return extend(v, size, chosen, count=count)
 
 
 class _Sampled:

@@ -59,7 +59,7 @@ def _sampled_blocks(
         if spec.oversampling > 1:
             start = selection.extend(v[:, :r], size, start, spec.oversampling * r)
         if spec.gain_bound is not None:
-            start = bound_gain(v[:, :r], size, start, spec.gain_bound)
+            start = bound_gain(v[:, :r], size, start, bound=spec.gain_bound)
         chosen[r] = start
     return chosen
 

@@ -32,4 +32,4 @@ class Selection(ABC):
         v : (rows, r) basis
         size : rows of a block
         """
-        return oversample(v, size, chosen, count)
+        return oversample(v, size, chosen, count=count)

@@ -47,7 +47,7 @@ def break_even_sizes(results: Results, options: Options) -> Figure:
         ax.set_title(style.words(scene))
         ax.set_xlim(0.8 * points.vertices.min(), 1.25 * points.vertices.max())
     axes[0].set_ylim(bottom=0.0)
-    label_outer(axes, options.columns, "vertices", "break-even size r")
+    label_outer(axes, options.columns, "vertices", y="break-even size r")
     _legend(figure, results, styles)
     return figure
 

@@ -68,7 +68,7 @@ def error_against_gain(results: Results, options: Options) -> Figure:
 
 def _draw_method(ax: Axes, runs: pd.DataFrame, colour: str, marker: str) -> None:
     x, y = runs.gain.to_numpy(float), runs.error.to_numpy(float)
-    rim_arrows(ax, x, y, colour, GAINS, ERRORS)
+    rim_arrows(ax, x, y, colour=colour, across=GAINS, along=ERRORS)
     ax.plot(
         clipped(x, *GAINS), clipped(y, *ERRORS), linestyle="none", color=colour, marker=marker,
         markersize=3.2, alpha=0.7, markeredgewidth=0.0, clip_on=False,

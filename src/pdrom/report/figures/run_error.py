@@ -66,7 +66,7 @@ def run_error(results: Results, options: Options) -> Figure:
             _draw_runs(ax, results.path(RERUNS, scene, group, method), runs, options.ranks, method)
         ax.set_title(results.experiment_title(scene, group))
         ax.set_xlim(0, None)
-    label_outer(axes, options.columns, "frame", "relative error")
+    label_outer(axes, options.columns, "frame", y="relative error")
     _legend(figure, results, methods, options.ranks, bool(bands))
     return figure
 

@@ -93,7 +93,14 @@ def pictures(scene: ViewedScene, dpi: int) -> Iterator[np.ndarray]:
             for ax, panel in zip(axes, panels, strict=False):
                 ax.clear()
                 outline = None if panel.reference else full
-                draw_run(ax, scene.mesh, panel.seen_by(CAMERA), CAMERA, window, outline)
+                draw_run(
+                    ax,
+                    scene.mesh,
+                    panel.seen_by(CAMERA),
+                    camera=CAMERA,
+                    window=window,
+                    ghost=outline,
+                )
             canvas.draw()
             picture = np.asarray(canvas.buffer_rgba())[..., :3]
             high, wide = (2 * (side // 2) for side in picture.shape[:2])

@@ -48,4 +48,4 @@ def timings_in_one_time(timings: Sequence[File], times: pd.DataFrame) -> pd.Data
         return rows
     own = rows[rows.method.isna() & (rows.implementation == "compiled")]
     own = own.set_index("scene").ms_per_frame
-    return in_one_time(rows, own, times, [name for name in PHASES if name in rows])
+    return in_one_time(rows, own, times, columns=[name for name in PHASES if name in rows])
