@@ -25,8 +25,8 @@ class GuardSettings(guard_settings.GuardSettings):
         try:
             super().__init__(**keys)
         except ValidationError as error:
-            told = describe(error, guard_settings.GuardSettings)
-            raise ConfigurationError(f"GuardSettings: {told}") from error
+            reported = describe(error, guard_settings.GuardSettings)
+            raise ConfigurationError(f"GuardSettings: {reported}") from error
 
 
 def require(kind: type[T] | tuple[type[T], ...], value: Any, name: str, source: str) -> T:

@@ -66,8 +66,8 @@ def run(
         require_place(file_path(out))
     frames = {group: _training_frames(scene, group) for group in scene.config.groups}
     config = scene.config.model_dump(mode="json")
-    told = {"scene": config, "run": "train", "solver": DEFAULT_SOLVER}
-    with made_by("pdrom.api.run", told), _place(out) as path:
+    reported = {"scene": config, "run": "train", "solver": DEFAULT_SOLVER}
+    with made_by("pdrom.api.run", reported), _place(out) as path:
         run_full_order(scene, path, frames, with_mesh=True, on_frame=on_frame)
         with open_hdf5(path) as file:
             return full_run(scene, file)

@@ -127,11 +127,11 @@ def _told(reduced: "ReducedRun") -> str:
 
     outcome, full = reduced.outcome, reduced.full
     if not outcome.finite:
-        told = f"blew up at frame {outcome.blowup_frame} (gain {reduced.gain:.3g})"
+        reported = f"blew up at frame {outcome.blowup_frame} (gain {reduced.gain:.3g})"
     else:
         speed = f"{reduced.ms:.2f} ms a frame (full order {np.median(full.ms):.2f})"
-        told = f"{_error(reduced)}, gain {reduced.gain:.3g}, {speed}"
-    return f"{reduced.title}: {told}{_seen(reduced)}"
+        reported = f"{_error(reduced)}, gain {reduced.gain:.3g}, {speed}"
+    return f"{reduced.title}: {reported}{_seen(reduced)}"
 
 
 def _error(reduced: "ReducedRun") -> str:
@@ -148,11 +148,11 @@ def _seen(reduced: "ReducedRun") -> str:
     seen = reduced.seen
     if not seen.watched:
         return ""
-    told = "; no alarm"
+    reported = "; no alarm"
     if seen.frame is not None:
-        told = f"; alarms in {seen.count} frames, first in {seen.frame} ({seen.reason})"
-        told += f", {seen.fallback_frames} repeated" if seen.fallback_frames else ""
-    return told if seen.estimate is None else f"{told}; estimated error {seen.estimate:.2g}"
+        reported = f"; alarms in {seen.count} frames, first in {seen.frame} ({seen.reason})"
+        reported += f", {seen.fallback_frames} repeated" if seen.fallback_frames else ""
+    return reported if seen.estimate is None else f"{reported}; estimated error {seen.estimate:.2g}"
 
 
 COMMAND = Command(

@@ -84,8 +84,8 @@ def _item(name: str, item: Any) -> Iterator[str]:
         unit = item.attrs.get("unit", "")
         shape = " x ".join(map(str, item.shape)) or "one value"
         more = [f"{k}: {_short(v)}" for k, v in item.attrs.items() if k != "unit"]
-        told = ", ".join(filter(None, [f"{shape} {item.dtype}", unit and f"in {unit}", *more]))
-        yield f"  {name}: {told}"
+        reported = ", ".join(filter(None, [f"{shape} {item.dtype}", unit and f"in {unit}", *more]))
+        yield f"  {name}: {reported}"
     elif item.attrs:
         yield f"  {name}/: {', '.join(f'{k} = {_short(v)}' for k, v in item.attrs.items())}"
 

@@ -118,8 +118,8 @@ def timing(
     variants, alone = _variants(scene, system, frames, settings, samplings, bases, subspaces)
     slow = [v for v in variants if v.labels["implementation"] == "interpreted"]
     quick = [v for v in variants if v.labels["implementation"] != "interpreted"]
-    told = partial(log.info, f"{name}: repeat %d of %d")
-    results = measure(quick, asked.warmup, asked.repeats, progress=told)
+    reported = partial(log.info, f"{name}: repeat %d of %d")
+    results = measure(quick, asked.warmup, asked.repeats, progress=reported)
     results += measure(slow, 0, asked.repeats)
     write_table(pd.DataFrame([_row(scene, m) for m in results], columns=COLUMNS), out.path)
     log.info("%s: %d reduced local steps alone", name, len(alone))
@@ -176,7 +176,7 @@ class _Source:
             self._stored = {int(key[1:]) for key in stored if key.startswith("r")}
 
     def sizes(self, asked: Sequence[Rank]) -> list[int]:
-        """The asked sizes that the basis can have and the file holds."""
+        """Requested sizes that the basis can have and the file holds."""
         return [r for r in resolve_ranks(asked, self._space.rank) if r in self._stored]
 
     def step(self, r: int) -> ReducedLocalStep:

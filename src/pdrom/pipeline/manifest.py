@@ -45,13 +45,13 @@ class Entry(_Record):
     environment: str | None = None
 
     def fits(self, path: Path) -> bool:
-        """Whether a file has the bytes that the entry tells of."""
+        """Whether a file has the bytes that the entry records."""
         if self.sha256:
             with open(path, "rb") as handle:
                 return hashlib.file_digest(handle, "sha256").hexdigest() == self.sha256
         checksum = read_checksum(path)
-        told = checksum is not None and checksum.digest == self.blake2b
-        return told and check_file(path) is Condition.INTACT
+        reported = checksum is not None and checksum.digest == self.blake2b
+        return reported and check_file(path) is Condition.INTACT
 
 
 class Manifest(_Record):

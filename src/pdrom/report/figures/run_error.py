@@ -103,7 +103,7 @@ def _draw_floor(ax: Axes, floor: np.ndarray, end: int | None) -> None:
 def _ran(
     results: Results, scene: str, group: str, method: str, options: Options
 ) -> list[RerunInfo]:
-    """Reduced runs of the asked sizes; without those whose size exceeds the numerical rank."""
+    """Reduced runs of the requested sizes; without those whose size exceeds the numerical rank."""
     infos = choose_ranks(rerun_infos(results.path(RERUNS, scene, group, method)), options.ranks)
     return [info for info in infos if not info.marked]
 

@@ -37,7 +37,7 @@ class Column:
 
     unit : empty for text, counts and what has no dimension
     timed : it depends on timing (or on the memory in use), so that two runs may differ
-    declared : its quantity, where the type and the name do not tell it
+    declared : its quantity, where that does not follow from type and name
     tolerance : its own, where that of its quantity is not the right one; of words and truth values
         the share of the rows that may be others
     """

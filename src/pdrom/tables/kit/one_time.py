@@ -1,4 +1,4 @@
-"""Times of jobs, told in the one time that each full-order run has (table frame_times).
+"""Times of jobs, as multiples of the one time that each full-order run has (table frame_times).
 
 A job times its own full-order run beside its variants, but the machine runs at another speed in
 another job, and so one run would have several times. Ratios within a job do not mind: the job's
