@@ -64,6 +64,10 @@ def bar(
     Vertex (i, j, k) has index ``(i * ny + j) * nz + k``. Neighbouring cells mirror each other so
     that their face diagonals meet; ``exchanged`` gives each cell the pattern of its neighbours.
     Centred, longest side ``extent`` metres, lifted along y.
+
+    Parameters
+    ----------
+    lift : m along y
     """
     counts = np.array([nx, ny, nz])
     spacing = extent / (counts.max() - 1)

@@ -145,7 +145,7 @@ class ClaimRule(_Model):
 
 
 def load_claims(path: Path) -> dict[str, ClaimRule]:
-    """Claims by identifier; ConfigurationError for any fault."""
+    """Claims of the file ``path`` by identifier; ConfigurationError for any fault."""
     content = read_yaml(path)
     if not isinstance(content, dict) or not content:
         raise ConfigurationError(f"{path}: a mapping of claims is required")

@@ -65,7 +65,7 @@ class Column:
         return TOLERANCES.get(self.quantity, 0.0) if self.kind == "number" else 0.0
 
     def cast(self, values: pd.Series) -> pd.Series:
-        """Values with the type of the column; ValueError or TypeError if they do not fit."""
+        """``values`` with the type of the column; ValueError or TypeError if they do not fit."""
         if self.kind == "text":
             return values
         if self.kind == "flag":
@@ -83,22 +83,27 @@ def _flags(values: pd.Series) -> pd.Series:
 
 
 def text(name: str, meaning: str) -> Column:
-    """A column of words."""
+    """Column ``name`` of words.
+
+    Parameters
+    ----------
+    meaning : for readers, in a few words
+    """
     return Column(name, "text", meaning)
 
 
 def integer(name: str, meaning: str) -> Column:
-    """A column of counts, sizes or indices."""
+    """Column ``name`` of counts, sizes or indices; ``meaning`` as in `text`."""
     return Column(name, "integer", meaning)
 
 
 def flag(name: str, meaning: str) -> Column:
-    """A column of True and False."""
+    """Column ``name`` of True and False; ``meaning`` as in `text`."""
     return Column(name, "flag", meaning)
 
 
 def number(name: str, meaning: str, unit: str = "") -> Column:
-    """A column of floating-point numbers."""
+    """Column ``name`` of floating-point numbers in ``unit``; ``meaning`` as in `text`."""
     return Column(name, "number", meaning, unit)
 
 
@@ -202,6 +207,12 @@ def table(
     timed_cells: TimedCells | None = None,
 ) -> Callable[[Callable[..., pd.DataFrame]], Table]:
     """Declare the function below as the one that makes the table of its name.
+
+    Parameters
+    ----------
+    title : for readers
+    columns : in their order
+    timed_cells : see `Table`
 
     Raises
     ------

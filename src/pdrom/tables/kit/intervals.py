@@ -42,7 +42,7 @@ def confirmed_digits(low: float, high: float) -> int:
 
 
 def in_words(low: float, high: float, digits: int) -> str:
-    """An interval as text: both ends with two digits, one digit of the middle, or nothing."""
+    """Interval ``low`` to ``high`` as text: two ``digits``, its middle with one, or nothing."""
     if digits == 0:
         return "not confirmed by its control"
     if digits == 1:

@@ -42,7 +42,7 @@ def in_one_time(
 
 
 def timings_in_one_time(timings: Sequence[File], times: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the timing jobs of all scenes, see `in_one_time`."""
+    """Rows of the ``timings`` of all scenes in ``times``, see `in_one_time`."""
     rows = joined(timings)
     if rows.empty:
         return rows

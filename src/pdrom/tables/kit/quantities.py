@@ -22,7 +22,7 @@ TALLY = 2.0
 
 
 def usual_quantity(kind: str, name: str, timed: bool) -> Quantity:
-    """Kind of a column that does not declare it: by its type, and words in its name."""
+    """Kind of a column that declares none: by its type (``kind``, ``timed``) and ``name``."""
     if timed:
         return "timed"
     if kind != "number":
