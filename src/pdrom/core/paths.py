@@ -38,7 +38,7 @@ class Place:
         return f"{results}/{self.pattern.format(**labels)}"
 
     def rule(self, results: str) -> str:
-        """Path with its labels left in braces, as a rule of the workflow writes it."""
+        """Path below ``results`` with labels left in braces, as rules of the workflow have it."""
         return f"{results}/{self.pattern}"
 
     def where(self, **labels: str) -> "Place":
@@ -58,7 +58,7 @@ class Place:
         return File(path, found.groupdict())
 
     def files(self, paths: Iterable[str]) -> "list[File]":
-        """`file` of each path, in order."""
+        """`file` of each of ``paths``, in order."""
         return [self.file(path) for path in paths]
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Estimated errors of all runs of a scene: their distances to the companion."""
+"""Estimated errors of all runs of a scene: their distances to the auxiliary model."""
 
 import logging
 from collections.abc import Iterator
@@ -77,7 +77,7 @@ def estimates(
     horizon: Horizon,
     out: File,
 ) -> None:
-    """Run both motions with the companion and compare all their runs with it."""
+    """Run both motions with the auxiliary model and compare all their runs with it."""
     ((_, companion),) = load_models(model.path)
     unit = mean_motion(positions_of(train))
     rows: list[dict[str, Any]] = []
@@ -94,11 +94,11 @@ def estimates(
                     "split": split,
                     "relative_error_within_horizon": error,
                     "estimate": estimate(found.positions, beside, end),
-                    "largest_estimate": largest_estimate(found.positions, beside, unit, end),
+                    "largest_estimate": largest_estimate(found.positions, beside, unit, end=end),
                     "companion_error": own,
                 }
             )
-        log.info("%s: companion's own error %s", split, own)
+        log.info("%s: own error of the auxiliary model %s", split, own)
     whole = {"k": "Int64", "r": "Int64"}
     write_table(pd.DataFrame(rows, columns=COLUMNS).astype(whole), out.path)
 

@@ -23,7 +23,7 @@ from pdrom.reduction.snapshots import stored_frames, test_frames
 def fom(mesh: File, config: SceneConfig, solver: Solver, threads: Threads, out: File) -> None:
     """Simulate one of a scene's runs; the held-out one stores the odd frames only."""
     motion = out["run"]
-    scene = scene_of(config, mesh, motion, threads)
+    scene = scene_of(config, mesh, motion, threads=threads)
     frames = scene.config.frames
     wanted = {
         group: test_frames(frames) if motion == "heldout" else stored_frames(frames, plan.train)

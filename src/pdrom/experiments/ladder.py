@@ -97,7 +97,15 @@ def ladder(
     group, system = scene.group(labels["group"]), scene.system
     repeater = None
     if labels["scene"] in ladder.repeated:
-        repeater = Repeater(scene, group.name, data, reference, end, ladder, blowup_extent)
+        repeater = Repeater(
+            scene,
+            group.name,
+            data,
+            reference=reference,
+            end=end,
+            asked=ladder,
+            blowup_extent=blowup_extent,
+        )
     bases: dict[tuple[str, int | None], Basis] = {}
     rows = []
     for direction, method, seed in ladder.rungs():
@@ -108,7 +116,7 @@ def ladder(
         reduction = _reduce(bases[key], method, ladder.r)
         if reduction is not None:
             steps = replace_group(scene, group.name, ReducedLocalStep(group, reduction))
-            outcome = rerun(scene, system, steps, reference, blowup_extent)
+            outcome = rerun(scene, system, steps, reference=reference, blowup_extent=blowup_extent)
             row |= {"r": reduction.r, **_measures(reduction, data)}
             row |= _ran(outcome, displacement, end)
             if repeater is not None and seed is None:
@@ -127,14 +135,19 @@ def _name(method: MethodSpec, seed: int | None) -> str:
 def _basis(data: SnapshotSet, method: MethodSpec, seed: int | None) -> Basis:
     signs = None if seed is None else np.random.default_rng(seed)
     return compute_basis(
-        data.train, data.row_mass, data.roundoff, data.rows_per_element, method, signs
+        data.train,
+        data.row_mass,
+        data.roundoff,
+        rows_per_element=data.rows_per_element,
+        spec=method,
+        signs=signs,
     )
 
 
 def _reduce(basis: Basis, method: MethodSpec, r: int) -> Reduction | None:
     """Reduction of a rung; None where the group is round-off."""
     size = min(r, basis.rank)
-    return Reduction(basis, select(basis, method, size), method, size) if size else None
+    return Reduction(basis, select(basis, method, size), method, r=size) if size else None
 
 
 def _measures(reduction: Reduction, data: SnapshotSet) -> dict[str, Any]:

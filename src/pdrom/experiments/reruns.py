@@ -112,7 +112,15 @@ def reruns(
     One job does both: starting another process takes longer than the sampling.
     """
     space, data = load_basis(basis.path), load_snapshots(snapshots.path)
-    sample(space, data, settings.method, settings.sweep, settings.ranks, sampling, errors)
+    sample(
+        space,
+        data,
+        settings.method,
+        sweep=settings.sweep,
+        ranks=settings.ranks,
+        sampling=sampling,
+        errors=errors,
+    )
     labels = runs.labels
     models = [model for file in companions for _, model in load_models(file.path)]
     trained = Trained.on(positions_of(fom), models[0] if models else None)
@@ -165,10 +173,10 @@ class _Case:
                 log.warning("r = %d exceeds the numerical rank %d: not run", r, self.basis.rank)
                 rows.append({**self.labels, "r": r, "frames": 0})
                 continue
-            reduction = load_reduction(self.basis, self.sampling, settings.method, r)
+            reduction = load_reduction(self.basis, self.sampling, settings.method, r=r)
             outcome, seen = guarded_rerun(
-                self.scene, system, self.labels["group"], reduction, reference,
-                settings.blowup_extent, settings.guard, self.trained,
+                self.scene, system, self.labels["group"], reduction=reduction, reference=reference,
+                blowup_extent=settings.blowup_extent, settings=settings.guard, trained=self.trained,
             )  # fmt: skip
             energy = scale.ratio(outcome.positions)
             _store(store, outcome, displacement, seen)

@@ -94,7 +94,7 @@ def subspace_ablation(
     scene, training = motion.scene, training_positions(motion)
     rows = []
     for k in settings.ablation.sizes:
-        columns = make_columns(scene, training, POSITION_BASIS, k)
+        columns = make_columns(scene, training, POSITION_BASIS, k=k)
         trained = Training(scene, columns, training)
         row = {
             "scene": scene.config.name,
@@ -139,7 +139,7 @@ class _Trials:
     ) -> dict[str, Any]:
         """Outcome of a variant; a refused one has not run, and its cells are empty."""
         try:
-            found = interpolate(self.motions["train"].scene, columns, trained, spec)
+            found = interpolate(self.motions["train"].scene, columns, trained, spec=spec)
         except SamplingError as error:
             log.info("refused: %s", error)
             return {}

@@ -169,7 +169,7 @@ def _subspaces(
     spaces = _sampled_spaces(scene, settings.hrpd)
     for kind in settings.bases:
         for k in settings.sizes:
-            columns = make_columns(scene, training, kind, k)
+            columns = make_columns(scene, training, kind, k=k)
             models = _samplings(scene, columns, kind, settings)
             if k in settings.interpolated_sizes:
                 more = _interpolations(scene, columns, training, kind, settings, spaces)
@@ -185,7 +185,7 @@ def _samplings(
     if kind == "pod":
         tolerances = settings.tolerances
         frames = training_indices(scene)
-        found = sample_elements(scene, columns, frames, tolerances, norm=settings.norm)
+        found = sample_elements(scene, columns, frames, tolerances=tolerances, norm=settings.norm)
         for tolerance, samples in zip(tolerances, found, strict=True):
             yield ecsw_name(tolerance), samples
 
@@ -211,7 +211,7 @@ def _interpolations(
     if kind == "pod":
         states = Training(scene, columns, training)
         for method, spec in settings.interpolations.items():
-            yield method, interpolate(scene, columns, states, spec)
+            yield method, interpolate(scene, columns, states, spec=spec)
 
 
 def _row(

@@ -24,7 +24,7 @@ class HeldOut(ConfigModel):
     seed: Seed = 1
 
     def variant(self, effects: Sequence[EffectConfig]) -> tuple[EffectConfig, ...]:
-        """Effects of the held-out trajectory, made from those of the training one."""
+        """Effects of the held-out trajectory, made from ``effects``, those of the training one."""
         changed = [effect.with_frames_scaled(self.frames_factor) for effect in effects]
         if self.reverse:
             changed = [effect.reversed() for effect in changed]

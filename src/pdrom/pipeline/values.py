@@ -74,7 +74,7 @@ def _trials(study: Study, labels: Labels) -> tuple[Trial, ...]:
 
 
 def _companions(study: Study, labels: Labels) -> tuple[OfScene, ...]:
-    """The companion that a job's guard estimates errors with, if it does."""
+    """The auxiliary model that a job's guard estimates errors with, if it does."""
     guard = study.settings.guard
     estimates = guard.action != "none" and guard.alarm == "estimate"
     return (OfScene(scene=labels["scene"]),) if estimates else ()

@@ -137,7 +137,7 @@ class MethodSpec(BasisSpec):
 
 
 def load_methods(path: Path) -> dict[str, MethodSpec]:
-    """Methods of config/methods.yaml by name; ConfigurationError for any fault."""
+    """Methods of the file ``path`` (methods.yaml) by name; ConfigurationError for any fault."""
     content = read_yaml(path)
     if not isinstance(content, dict) or not content:
         raise ConfigurationError(f"{path}: a mapping of method names is required")

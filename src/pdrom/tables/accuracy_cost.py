@@ -120,12 +120,12 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
 
 
 def reference_of(points: pd.DataFrame) -> pd.Series:
-    """Reference of the error of each row of the table: `CONVERGED` or `OWN`."""
+    """Reference of the error of each row of ``points``: `CONVERGED` or `OWN`."""
     return points.method.isin([FOM, ANDERSON]).map({True: CONVERGED, False: OWN})
 
 
 def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
-    """Whether no other point is at least as good in both and better in one."""
+    """Whether no other point is as good in ``error`` and ``cost`` and better in one of them."""
     return [
         not any((e <= a) & (c <= b) & ((e < a) | (c < b)) for e, c in zip(error, cost, strict=True))
         for a, b in zip(error, cost, strict=True)

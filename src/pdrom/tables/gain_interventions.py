@@ -37,7 +37,7 @@ _CELL = ["scene", "group", "r"]
         compared(
             "share",
             number(
-                "error_ratio_low", "2.5 % quantile of this median, scenes drawn anew (bootstrap)"
+                "error_ratio_low", "2.5 % quantile of this median, scenes resampled (bootstrap)"
             ),
         ),
         compared("share", number("error_ratio_high", "97.5 % quantile")),

@@ -32,5 +32,12 @@ def heldout_reruns(
 ) -> pd.DataFrame:
     """Runs judged by the horizon of their own motion, see `judged_reruns`."""
     return judged_reruns(
-        runs, rows, subspaces, subspace_rows, sensitivity, HELDOUT, threshold, "heldout"
+        runs,
+        rows,
+        subspaces,
+        subspace_rows=subspace_rows,
+        sensitivity=sensitivity,
+        perturbation=HELDOUT,
+        threshold=threshold,
+        motion="heldout",
     )

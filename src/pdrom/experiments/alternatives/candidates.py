@@ -61,7 +61,7 @@ def candidates(scene: Scene, training: Scene, settings: Comparison) -> Iterator[
                 systems[substeps] = GlobalSystem(scene.masses, step, scene.groups)
             system = systems[substeps]
             labels = {"method": method, "substeps": substeps, "iterations": iterations}
-            loop = alternative(method, scene, substeps, iterations, system)
+            loop = alternative(method, scene, substeps, iterations=iterations, system=system)
             yield Candidate(labels, loop, start)
 
 
@@ -73,7 +73,7 @@ def _reduced(
         return
     seen = trajectory(training, track_objective=False)[1:]
     for k in settings.modes:
-        columns = make_columns(training, seen, "pod", k)
+        columns = make_columns(training, seen, "pod", k=k)
         samples: dict[int, dict[str, Samples]] = {}
         for substeps, iterations in pairs:
             if substeps not in samples:
@@ -93,7 +93,7 @@ def _reduced(
 def _samples(training: Scene, columns: Columns, substeps: int, tau: float) -> dict[str, Samples]:
     own = substepped(training, substeps, training.config.iterations)
     ends = np.arange(substeps - 1, own.config.frames, substeps)
-    (found,) = sample_elements(own, columns, ends, [tau])
+    (found,) = sample_elements(own, columns, ends, tolerances=[tau])
     return found
 
 

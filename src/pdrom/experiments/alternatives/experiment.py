@@ -125,7 +125,9 @@ def references(scene: Scene, section: Comparison) -> References:
     """Both references of a scene's own motion."""
     wanted = section.continuous
     limit = wanted.limit // scene.mesh.vertices
-    exact = continuous(scene, scene.config.frames, wanted.tolerance, wanted.substeps, limit)
+    exact = continuous(
+        scene, scene.config.frames, wanted.tolerance, substeps=wanted.substeps, limit=limit
+    )
     name = scene.config.name
     log.info("%s: %d explicit steps a frame, error %.1e", name, exact.substeps, exact.error)
     if not exact.within(wanted.tolerance):
@@ -137,7 +139,7 @@ def references(scene: Scene, section: Comparison) -> References:
 
 
 def _converged(scene: Scene, section: ImplicitReference) -> np.ndarray | None:
-    best = ConvergedStepper(scene, scene.system, section.tolerance, section.limit)
+    best = ConvergedStepper(scene, scene.system, section.tolerance, limit=section.limit)
     state = scene.initial_state()
     positions = [state.positions]
     for frame in range(scene.config.frames):

@@ -144,7 +144,9 @@ class ConvergedStepper(Stepper):
             elimination.solve(rhs, target)
             return energy + self.space.inertia_energy(y - s), target
 
-        end = minimise(evaluate, self.space.system.matrix, s, self._tolerance, self.iterations)
+        end = minimise(
+            evaluate, self.space.system.matrix, s, tolerance=self._tolerance, limit=self.iterations
+        )
         self.changes.append(end.change)
         self.evaluations.append(end.evaluations)
         if on_last_iterate is not None:

@@ -82,7 +82,7 @@ def removable(config: SceneConfig) -> list[str]:
 
 
 def _fresh(scene: Scene, **changes: object) -> Scene:
-    """The scene bound anew with changes of its configuration."""
+    """The scene bound again with changes of its configuration."""
     return Scene.build(scene.config.model_copy(update=changes), scene.mesh)
 
 

@@ -88,7 +88,13 @@ def _project_gradients(d, allowed, p, m):
 
 
 def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Inverse rest edge matrices D^-1 (T, 2, 2) in a frame of each triangle, and areas (T,) m^2."""
+    """Inverse rest edge matrices D^-1 (T, 2, 2) in a frame of each triangle, and areas (T,) m^2.
+
+    Parameters
+    ----------
+    points : (N, 3) m
+    triangles : (T, 3)
+    """
     first = points[triangles[:, 1]] - points[triangles[:, 0]]
     second = points[triangles[:, 2]] - points[triangles[:, 0]]
     length = np.linalg.norm(first, axis=1)

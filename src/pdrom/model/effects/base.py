@@ -55,7 +55,7 @@ class EffectConfig(ConfigModel):
         return self.model_copy(update=changes)
 
     def check_step(self, time_step: float) -> None:
-        """Raise ValueError if the effect is unstable with this time step (s)."""
+        """Raise ValueError if the effect is unstable with a step of ``time_step`` s."""
 
     def reversed(self) -> Self:
         """The motion in the opposite direction; an effect that does not move stays as it is."""
@@ -85,6 +85,7 @@ class Effect(ABC):
     """Whether a position subspace takes the effect; one that it does not take is refused there."""
 
     def __init__(self, config: EffectConfig, mesh: Mesh, masses: np.ndarray) -> None:
+        """Bind ``config`` to a mesh whose vertices have ``masses`` (N,) kg."""
         self.config: Any = config
         self.name: str = config.effect
 
@@ -112,10 +113,13 @@ class Force(Effect):
 
     @abstractmethod
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
-        """Acceleration of the frame, (3,) or (N, 3) m/s^2."""
+        """Acceleration, (3,) or (N, 3) m/s^2, at ``positions`` m and ``velocities`` m/s (N, 3)."""
 
     def potential(self, positions: np.ndarray, masses: np.ndarray) -> float:
-        """Potential energy in joule up to a constant; a force that has none (damping) adds none."""
+        """Potential energy, J, at ``positions`` (N, 3) m of ``masses`` (N,) kg, up to a constant.
+
+        A force that has no potential (damping) adds none.
+        """
         return 0.0
 
 
@@ -168,6 +172,10 @@ def held_targets(
     """The vertices that are held in ``frame``, as `held_vertices`, and their targets (n, 3) m.
 
     ``positions`` (N, 3) m are those at the frame's beginning.
+
+    Parameters
+    ----------
+    boundaries : holds of the scene
     """
     active = [b for b in boundaries if b.active(frame)]
     if not active:
@@ -190,6 +198,10 @@ class Contact(Effect):
         """`correct` all vertices but those ``held`` (n,), in place.
 
         A contact that shares a correction between vertices overrides this.
+
+        Parameters
+        ----------
+        positions, before : (N, 3) m at the end and at the beginning of the frame
         """
         targets = positions[held]
         self.correct(positions, before)

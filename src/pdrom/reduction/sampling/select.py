@@ -19,7 +19,7 @@ def select(basis: Basis, spec: MethodSpec, r: int) -> Sampling:
 
 
 def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[int, Sampling]:
-    """Samplings for several r; greedy selections are nested and made once for the largest.
+    """Samplings of ``basis`` by ``spec`` for several ``ranks``, nested where they are greedy.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def _sampled_blocks(
         if spec.oversampling > 1:
             start = selection.extend(v[:, :r], size, start, spec.oversampling * r)
         if spec.gain_bound is not None:
-            start = bound_gain(v[:, :r], size, start, spec.gain_bound)
+            start = bound_gain(v[:, :r], size, start, bound=spec.gain_bound)
         chosen[r] = start
     return chosen
 

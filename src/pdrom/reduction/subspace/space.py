@@ -39,12 +39,12 @@ class DenseElimination:
         self._load = np.zeros((len(self.free), 3))
 
     def set_targets(self, targets: np.ndarray) -> None:
-        """Values (m, 3) of the fixed coordinates."""
+        """Set the values ``targets`` (m, 3) of the fixed coordinates."""
         self.targets = targets
         self._load = self._coupling @ targets
 
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
-        """Overwrite the free coordinates of ``y``."""
+        """Overwrite the free coordinates of ``y`` (K, 3) by the solution for ``rhs`` (K, 3)."""
         y[self.free] = self.solved(rhs)
 
     def solved(self, rhs: np.ndarray) -> np.ndarray:
@@ -126,7 +126,7 @@ def _require_reducible(effects: Sequence[Effect]) -> None:
 
 
 def coordinates(columns: Columns, masses: np.ndarray, field: np.ndarray) -> np.ndarray:
-    """Mass-orthogonal projection of a field (N, 3) on the subspace, (K, 3)."""
+    """Mass-orthogonal projection of ``field`` (N, 3) on the span of ``columns``, (K, 3)."""
     return _mass_solve(columns, masses, columns.B.T @ (masses[:, None] * field))
 
 
@@ -142,7 +142,7 @@ def _mass_solve(columns: Columns, masses: np.ndarray, rhs: np.ndarray) -> np.nda
 
 
 def reduced_state(scene: Scene, columns: Columns) -> State:
-    """Initial state of the scene in coordinates; the rest shape is in the space exactly."""
+    """Initial state of ``scene`` in coordinates of ``columns``; its rest shape is exact."""
     state = scene.initial_state()
     return State(
         coordinates(columns, scene.masses, state.positions),

@@ -61,7 +61,7 @@ def alternatives(results: Results, options: Scenes) -> Figure:
     axes = panels(figure, 2 * len(cases), 2 * beside, sharey=True)
     for (labels, case), *pair in zip(cases, axes[::2], axes[1::2], strict=True):
         _draw_case(pair, labels, case)
-    label_outer(axes, 2 * beside, "ms a frame", "relative error")
+    label_outer(axes, 2 * beside, "ms a frame", y="relative error")
     drawn = {label: look for m, (label, *look) in LOOKS.items() if (table.method == m).any()}
     style.legend(figure, style.handles(drawn, markersize=4), 4)
     return figure

@@ -20,7 +20,7 @@ def _full_rank_only(table: pd.DataFrame, where: dict) -> tuple[pd.DataFrame, dic
 
 
 def _reruns(tables: Tables, where: dict) -> pd.DataFrame:
-    """Reruns; only those whose positions are not reduced, unless ``where`` says otherwise.
+    """Reruns; only those whose positions are not reduced, unless ``where`` selects others.
 
     A method may have the same name with full and with reduced positions.
     """

@@ -11,7 +11,7 @@ TWO_DIGITS, ONE_DIGIT = 1.05, 1.5
 
 
 def median_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
-    """Median, and the 2.5 % and 97.5 % quantiles of medians of values drawn anew (bootstrap).
+    """Median, and the 2.5 % and 97.5 % quantiles of medians of resampled values (bootstrap).
 
     The quantiles of fewer than two values are the value.
     """
@@ -42,7 +42,7 @@ def confirmed_digits(low: float, high: float) -> int:
 
 
 def in_words(low: float, high: float, digits: int) -> str:
-    """An interval as text: both ends with two digits, one digit of the middle, or nothing."""
+    """Interval ``low`` to ``high`` as text: two ``digits``, its middle with one, or nothing."""
     if digits == 0:
         return "not confirmed by its control"
     if digits == 1:
