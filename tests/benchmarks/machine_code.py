@@ -35,8 +35,11 @@ def counts(kernel: str) -> tuple[int, ...]:
 
 def main(targets: tuple[str, ...]) -> None:
     """Print a table of all kernels and targets; each target has a process of its own."""
-    print("| kernel | target | instructions | on vectors | spilled vectors | gathers |")
-    print("|---|---|---|---|---|---|")
+    sys.stdout.write(
+        "| kernel | target | instructions | on vectors | spilled vectors | gathers |\n"
+    )
+    sys.stdout.write("|---|---|---|---|---|---|\n")
+    sys.stdout.flush()
     for target in targets:
         environment = {**os.environ, "NUMBA_CPU_NAME": target, "NUMBA_CPU_FEATURES": ""}
         command = [sys.executable, __file__, "--counts"]
@@ -47,6 +50,6 @@ if __name__ == "__main__":
     if sys.argv[1:] == ["--counts"]:
         for name in KERNELS:
             row = (name, os.environ["NUMBA_CPU_NAME"], *counts(name))
-            print("|", " | ".join(map(str, row)), "|", flush=True)
+            sys.stdout.write(f"| {' | '.join(map(str, row))} |\n")
     else:
         main(tuple(sys.argv[1:]) or TARGETS)
