@@ -27,10 +27,7 @@ def simulate(
     perturbation : (N, 3) m, added to the first positions
     """
     loop = scene.stepper(**stepper)
-    state = scene.initial_state(perturbation)
-    for frame in range(scene.config.frames):
-        state, report = loop.step(state, frame)
-        yield state, report
+    yield from loop.run(scene.initial_state(perturbation), range(scene.config.frames))
 
 
 def trajectory(scene: Scene, perturbation: np.ndarray | None = None, **stepper: Any) -> np.ndarray:

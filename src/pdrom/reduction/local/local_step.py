@@ -43,6 +43,11 @@ class ReducedLocalStep:
         """Threads of the group."""
         return self._group.threads
 
+    @property
+    def frame_lagged(self) -> bool:
+        """Whether ``begin_frame`` freezes anything."""
+        return self._group.frame_lagged
+
     def begin_frame(self, q: np.ndarray) -> None:
         """Freeze frame-lagged data of the sampled elements at positions ``q`` (N, 3) m."""
         self._group.begin_frame(q, None if self._everything else self._elements)
