@@ -4,12 +4,15 @@ The scene is a sheet of springs, held at its left side, that falls for eight fra
 """
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from bad_input.project import make_project
+from pdrom import api
+from pdrom.command import main
 from pdrom.core import paths
 from pdrom.core.paths import Place
 from pdrom.core.store import open_hdf5, read_table
@@ -295,3 +298,39 @@ def test_everything_is_timed_once_and_phases_fit_into_their_frame(table):
     effects = table(paths.EFFECTS)
     assert effects.effect.tolist()[:3] == ["spring", "gravity", "pins"]
     assert effects.share.sum() == pytest.approx(1.0)
+
+
+def test_the_package_and_the_command_give_the_runs_of_the_study(at, array, table, tmp_path, capsys):
+    config = Path(at(paths.MACHINE)).parents[1] / "config"
+    full = api.run(api.load_scene(config / "scenes" / f"{SCENE}.yaml"))
+    assert np.array_equal(full.positions, array(paths.TRAIN, "positions"))
+    reduced = api.reduce(full, GROUP, METHOD, 2)
+    row = table(paths.RERUNS_TRAIN).set_index("r").loc[2]
+    moved = norms(full.positions[1:] - full.positions[0])
+    assert reduced.outcome.error(moved) == pytest.approx(row.relative_error, rel=1e-9)
+    assert reduced.gain == pytest.approx(row.gain, rel=1e-9)
+    asked = ["--group", GROUP, "--method", METHOD, "--r", "2", "--out", str(tmp_path / "run.h5")]
+    assert main.run(["reduce", str(config / "scenes" / f"{SCENE}.yaml"), *asked]) == 0
+    told = f"relative error {row.relative_error:.2g}, gain {row.gain:.3g}, "
+    assert told in capsys.readouterr().out
+    stored = api.load(at(paths.TRAIN))
+    assert np.array_equal(stored.positions, full.positions)
+    assert np.array_equal(stored.snapshots[GROUP].p[::2], full.snapshots[GROUP].p)
+
+
+def test_every_result_is_shown_with_all_that_it_holds(at, capsys):
+    results = Path(at(paths.MACHINE)).parent
+    files = [*results.rglob("*.csv"), *results.rglob("*.h5")]
+    assert len(files) > len(JOBS)
+    for path in files:
+        assert main.run(["show", str(path)]) == 0
+        told = capsys.readouterr().out
+        assert told.startswith(f"{path}: {path.stat().st_size:,} bytes, intact\n")
+        if path.suffix == ".csv":
+            names = path.read_text("utf-8").partition("\n")[0].split(",")
+        else:
+            with open_hdf5(path) as file:
+                names = [*file, *file.attrs["configuration"].split('"')[1:2]]
+        assert all(f"  {name}" in told for name in names), path
+        assert "provenance:\n" in told
+        assert "config: small (A small sheet)" in told or "fom" not in path.parts
