@@ -43,7 +43,8 @@ def test_a_test_without_rows_is_undecided(outcomes):
 def test_the_tests_that_decide_give_the_verdicts(tables, outcomes):
     for row in claims_rows(RULES, tables).itertuples():
         for part, verdict in (("published", row.verdict), ("beyond", row.verdict_beyond)):
-            mine = outcomes.query("claim == @row.claim and part == @part and decides")
+            mine = outcomes[(outcomes.claim == row.claim) & (outcomes.part == part)]
+            mine = mine[mine.decides]
             assert combined(list(mine.verdict)) == verdict
 
 
