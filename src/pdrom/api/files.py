@@ -153,8 +153,9 @@ def _seen(reported: Mapping[str, Any]) -> GuardRecord:
 
 def _scene(file: h5py.File, path: Path) -> Scene:
     """The scene of a run; its mesh from the file, where it was stored."""
-    config = json.loads(file.attrs["configuration"])["scene"]
-    scene = validate(SceneConfig, config, str(path))
+    settings = json.loads(file.attrs["configuration"])
+    # the pipeline's job names its setting `config`
+    scene = validate(SceneConfig, settings.get("config") or settings["scene"], str(path))
     if "mesh" in file:
         return Scene.build(scene, stored_mesh(file["mesh"]))
     return bound(scene, Path(), str(path))

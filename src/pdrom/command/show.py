@@ -99,7 +99,7 @@ def _configuration(configuration: Any, whole: bool) -> Iterator[str]:
         yield from (f"  {line}" for line in text.splitlines())
         return
     for name, value in configuration.items():
-        if name == "scene" and isinstance(value, dict):
+        if isinstance(value, dict) and {"name", "title"} <= value.keys():  # a scene
             value = f"{value['name']} ({value['title']})"
         yield f"  {name}: {_short(value)}"
 
