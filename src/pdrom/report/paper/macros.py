@@ -4,8 +4,9 @@ The source names a number by where it stands in a table::
 
     \val{reduced_reruns|scene=bar_release|method=block-deim|r=20|relative_error_within_horizon}
 
-(table, any number of column=value filters, the column; optionally ``max``, ``min``, ``median`` or
-``count`` of the rows that match). The keys are found in the source, resolved here, and written as
+(table, any number of column=value or column!=value filters, the column; optionally ``max``,
+``min``, ``median``, ``count`` or ``distinct``, the number of different values, of the rows that
+match). The keys are found in the source, resolved here, and written as
 one TeX macro each. No number is typed, and none is generated that the text does not use.
 """
 
@@ -22,6 +23,7 @@ from pdrom.report.words.text import escape
 
 _KEY = re.compile(r"\\val\{([^{}]*)\}")
 MISSING = "n/a"
+_COUNTS = ("count", "distinct")
 # Columns that say what was run; the others say what came out.
 _LABELS = ("scene", "group", "method", "position_basis", "variant", "direction", "experiment")
 AGGREGATES: dict[str, Callable[[pd.Series], Any]] = {
@@ -29,6 +31,7 @@ AGGREGATES: dict[str, Callable[[pd.Series], Any]] = {
     "min": lambda column: column.min(),
     "median": lambda column: column.median(),
     "count": lambda column: len(column),
+    "distinct": lambda column: column.nunique(),
 }
 
 
@@ -68,8 +71,8 @@ def resolve(key: str, tables: Mapping[str, pd.DataFrame]) -> str:
     parsed = _parse(key, tables)
     rows = _matching(tables[parsed.table], parsed.filters)
     cells = rows[parsed.column].dropna()
-    if parsed.aggregate == "count":
-        return str(len(cells)) if is_held(key, tables) else MISSING
+    if parsed.aggregate in _COUNTS:
+        return str(AGGREGATES[parsed.aggregate](cells)) if is_held(key, tables) else MISSING
     if parsed.aggregate is not None:
         return format_number(AGGREGATES[parsed.aggregate](cells)) if len(cells) else MISSING
     if len(rows) > 1:
@@ -84,7 +87,7 @@ def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
     """
     parsed = _parse(key, tables)
     filters = parsed.filters
-    if parsed.aggregate == "count":
+    if parsed.aggregate in _COUNTS:
         filters = {field: value for field, value in filters.items() if field in _LABELS}
     return len(_matching(tables[parsed.table], filters)) > 0
 
@@ -108,15 +111,15 @@ def _parse(key: str, tables: Mapping[str, pd.DataFrame]) -> _Key:
         raise PaperError(f"\\val{{{key}}}: names no column of table '{name}'")
     *filters, column = parts
     pairs = {field: value for field, _, value in (entry.partition("=") for entry in filters)}
-    for field in (*pairs, column):
+    for field in (*(name.removesuffix("!") for name in pairs), column):
         _require(field, tables[name], key)
     return _Key(name, pairs, column, aggregate)
 
 
 def _matching(rows: pd.DataFrame, filters: Mapping[str, str]) -> pd.DataFrame:
     for field, value in filters.items():
-        matches = rows[field].map(lambda cell, value=value: _same(cell, value))
-        rows = rows[matches.astype(bool)]
+        matches = rows[field.removesuffix("!")].map(lambda cell, value=value: _same(cell, value))
+        rows = rows[matches.astype(bool) != field.endswith("!")]
     return rows
 
 
