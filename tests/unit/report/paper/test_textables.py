@@ -378,7 +378,7 @@ def test_horizon_of_a_calm_scene_is_its_run():
     first, second = rows(scene_table(TABLES))
     assert first.endswith(r"& 400 & 722 & 10 & run \\")
     assert second.endswith(r"& 9 & 12 & 20 & 7 \\")
-    assert r"triangle\_strain (1e+07)" in first
+    assert r"triangle strain ($10^{7}$)" in first
 
 
 def test_hard_cases_show_failures_only():
