@@ -78,7 +78,7 @@ def test_a_sampled_run_stays_within_the_bound_of_the_subspace():
     h, B = scene.config.time_step, columns.B
     stretch = np.sqrt(factors * 1e6)[:, None] * (scene.group("spring").S @ B)[elements]
     mass, stiffness = B.T @ (scene.masses[:, None] * B), stretch.T @ stretch
-    squares, modes = eigh(stiffness, mass)
+    squares = eigh(stiffness, mass, eigvals_only=True)
     angles = np.arctan(h * np.sqrt(squares[squares > 1e-9 * squares[-1]]))
     m = np.arange(20_000)[:, None]
     answers = np.sin(angles) * np.cos(angles) ** m * np.abs(np.sin((m + 1) * angles))
@@ -144,7 +144,7 @@ def test_gain_bounds_the_error_of_a_regularised_solve(seed, r, t):
 
 @given(SEEDS, st.integers(1, 5), st.floats(1e-8, 1.0))
 def test_gain_bounds_the_error_of_a_regularised_solve_by_axis(seed, r, t):
-    """A basis that is orthonormal axis by axis, as that of `published`: the bound of each adds up."""
+    """A basis that is orthonormal axis by axis, as of `published`: their bounds add up."""
     rng = np.random.default_rng(seed)
     v, p = np.empty((45, r)), rng.standard_normal(45)
     for a in range(3):

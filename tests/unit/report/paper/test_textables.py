@@ -332,6 +332,12 @@ def test_exponents_of_one_thread():
     assert rows(exponents(TABLES)) == [r"\texttt{bar\_a} & 3 & 1.2 & -- & -- & -- & 0.12 \\"]
 
 
+def test_errors_that_a_reduction_does_not_reach_are_left_out():
+    assert rows(TEX_TABLES["tab_pays"](TABLES)) == [
+        r"\texttt{s\_one} & implicit & 0.10 & 400 to 10000 & 400 & 1600 & 17 \\"
+    ]
+
+
 def test_speedups_that_lose_say_so():
     deim, ecsw = rows(TEX_TABLES["tab_speedups"](TABLES))
     assert "0.50 (loses)" in deim
