@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.linalg import eigh
 
 from builders import make_scene
 from pdrom.model.dynamics.stepper import State
@@ -65,6 +66,34 @@ def test_what_is_not_sampled_moves_on_uniformly():
     assert len(kernel) > 1
 
 
+def test_a_sampled_run_stays_within_the_bound_of_the_subspace():
+    """The theorem in z: |e_n| <= alpha beta in the norm of B^T K_xi B, e to projections of zero."""
+    mesh = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
+    kick = {"effect": "kick", "speed": 3.0, "seed": 3}
+    scene = make_scene(kick, {"effect": "spring", "weight": 1e6}, mesh=mesh, frames=60)
+    columns = make_columns(scene, trajectory(scene)[1:], "pod", 8)
+    elements, factors = np.arange(0, 40, 5), np.linspace(1.0, 9.0, 8)
+    model = SubspaceModel("pod", columns, {"spring": Samples(elements, factors)})
+    loop, state = model.loop(scene)
+    h, B = scene.config.time_step, columns.B
+    stretch = np.sqrt(factors * 1e6)[:, None] * (scene.group("spring").S @ B)[elements]
+    mass, stiffness = B.T @ (scene.masses[:, None] * B), stretch.T @ stretch
+    squares = eigh(stiffness, mass, eigvals_only=True)
+    angles = np.arctan(h * np.sqrt(squares[squares > 1e-9 * squares[-1]]))
+    m = np.arange(20_000)[:, None]
+    answers = np.sin(angles) * np.cos(angles) ** m * np.abs(np.sin((m + 1) * angles))
+    rest = scene.group("spring").S @ scene.mesh.points
+    beta = np.sqrt(np.sum(factors * 1e6 * np.sum(rest[elements] ** 2, axis=1)))
+    bound = answers.max(axis=1).sum() * beta
+    linear, before = state.positions.copy(), state.positions - h * state.velocities
+    system, largest = mass / h**2 + stiffness, 0.0
+    for frame in range(scene.config.frames):
+        state, _ = loop.step(state, frame)
+        linear, before = np.linalg.solve(system, mass @ (2 * linear - before) / h**2), linear
+        largest = max(largest, np.linalg.norm(stretch @ (state.positions - linear)))
+    assert 0.05 * bound < largest <= bound
+
+
 # What the gain bounds, in each variant.
 
 
@@ -110,6 +139,25 @@ def test_gain_bounds_the_error_of_a_regularised_solve(seed, r, t):
     sigma = np.linalg.svd(block.matrix, compute_uv=False)[-1]
     bias = t / (sigma**2 + t) * np.linalg.norm(inside)
     best = np.linalg.norm(p - v @ inside)
+    assert error <= (np.sqrt(1.0 + made.gain**2) * best + bias) * (1 + 1e-9)
+
+
+@given(SEEDS, st.integers(1, 5), st.floats(1e-8, 1.0))
+def test_gain_bounds_the_error_of_a_regularised_solve_by_axis(seed, r, t):
+    """A basis that is orthonormal axis by axis, as of `published`: their bounds add up."""
+    rng = np.random.default_rng(seed)
+    v, p = np.empty((45, r)), rng.standard_normal(45)
+    for a in range(3):
+        v[a::3] = _orthonormal(rng, 15, r)
+    method = MethodSpec(
+        title="x", rows="element", coefficients="per-axis", solve="tikhonov", tikhonov=t
+    )
+    made = _reduction(v, rng.permutation(15)[: r + 2], method, separate=True)
+    error = np.linalg.norm(p - made.reconstruct(p.reshape(1, 15, 3)).ravel())
+    inside = [v[a::3].T @ p[a::3] for a in range(3)]
+    best = np.linalg.norm([np.linalg.norm(p[a::3] - v[a::3] @ c) for a, c in enumerate(inside)])
+    sigma = min(np.linalg.svd(block.matrix, compute_uv=False)[-1] for block in made.blocks)
+    bias = t / (sigma**2 + t) * np.linalg.norm(inside)
     assert error <= (np.sqrt(1.0 + made.gain**2) * best + bias) * (1 + 1e-9)
 
 

@@ -7,7 +7,7 @@ from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.experiments.kit.fresh_process import CONTROL, FULL
 from pdrom.tables.kit.declaration import flag, integer, number, table, timed
-from pdrom.tables.kit.intervals import confirmed_digits, median_interval
+from pdrom.tables.kit.intervals import confirmed, median_interval
 from pdrom.tables.kit.parts import joined
 from pdrom.tables.kit.vocabulary import MS_PER_FRAME, SCENE, VERTICES
 
@@ -30,7 +30,7 @@ TWIN = "_twin"
         timed(number("twin_ratio", "time of the scene's twin, the same frames, over this one")),
         timed(number("twin_low", "2.5 % quantile of this median")),
         timed(number("twin_high", "97.5 % quantile")),
-        timed(integer("digits", "of a speed-up in this scene that the control confirms")),
+        timed(flag("confirmed", "the quantiles lie within a half of one: speed-ups are given")),
     ),
     reads={"parts": Every(paths.FRAME_TIMES)},
 )
@@ -49,7 +49,7 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
         row = {"scene": scene, "vertices": vertices[scene], "processes": len(full)}
         row |= _named(("ms_per_frame", "low_ms", "high_ms"), full[scene])
         row |= _named(_ratio("control"), control[scene] / full[scene])
-        row["digits"] = confirmed_digits(row["control_low"], row["control_high"])
+        row["confirmed"] = confirmed(row["control_low"], row["control_high"])
         row["control_agrees"] = row["control_low"] <= 1.0 <= row["control_high"]
         if f"{scene}{TWIN}" in full:
             row |= _named(_ratio("twin"), full[f"{scene}{TWIN}"] / full[scene])

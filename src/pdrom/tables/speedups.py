@@ -29,6 +29,7 @@ _MODEL = ["scene", "position_basis", "k", "method"]
 _REDUCTION = ["scene", "group", "method", "r"]
 _LABELS = ["scene", "group", "method", "position_basis", "k", "r"]
 _ERROR = "relative_error_within_horizon"
+UNCONFIRMED = "not confirmed by its control"
 
 
 @table(
@@ -47,7 +48,7 @@ _ERROR = "relative_error_within_horizon"
         SPEEDUP,
         SPEEDUP_LOW,
         SPEEDUP_HIGH,
-        timed(text("shown", "the quantiles with as many digits as the control confirms")),
+        timed(text("shown", "the median and its quantiles, where the control confirms the times")),
         timed(flag("loses", "dearer than the full order: the upper quantile is below one")),
         timed(number("training_s", "time of the training run", "s")),
         timed(number("reduction_s", "processor time of basis and sampling", "s")),
@@ -113,7 +114,7 @@ def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
     times : table frame_times
     """
     full = rows[rows.role == FULL].set_index(["scene", "process"]).ms_per_frame
-    digits = times.set_index("scene").digits
+    trusted = times.set_index("scene").confirmed
     reduced = rows[rows.role == REDUCED]
     for labels, own in reduced.groupby(_LABELS, sort=False, dropna=False):
         own = own.set_index(["scene", "process"]).ms_per_frame
@@ -130,7 +131,7 @@ def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
             "speedup": ratio,
             "speedup_low": low,
             "speedup_high": high,
-            "shown": in_words(low, high, int(digits[scene])),
+            "shown": in_words(ratio, low, high) if trusted[scene] else UNCONFIRMED,
             "loses": high < 1.0,
         }
 

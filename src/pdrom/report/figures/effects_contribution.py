@@ -18,6 +18,8 @@ SHOWN = 3  # scenes whose forces are drawn
 LOW, HIGH = 1e-12, 1e2
 ROUNDOFF = 1e-14  # of the largest force of a scene: what is smaller is not drawn
 OTHERS = ("#8C6D31", "#5A5A5A", "#B03A6B", "#2B2B80", "#3E8E7E", "#A0522D", "#7F7F00")
+MARKERS = "*dph8H|"  # none of a group, so that looks differ without colours, too
+Looks = dict[str, tuple[str, str]]
 
 
 @figure(
@@ -39,51 +41,54 @@ def effects_contribution(results: Results, options: Scenes) -> Figure:
     scenes = results.scenes_of(table, options, "no contributions of effects")
     rows = table[table.scene.isin(scenes)]
     drawn = sorted(scenes, key=lambda scene: -len(results.holdings.scenes[scene].groups))[:SHOWN]
-    colours = _colours(results, rows[rows.moved.notna() | rows.scene.isin(drawn)])
+    looks = _looks(results, rows[rows.moved.notna() | rows.scene.isin(drawn)])
     figure = style.new_figure(0.24 * len(scenes) + 2.0)
     left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.15))
     axes = left.subplots(len(drawn), 1, squeeze=False)[:, 0]
     for ax, scene in zip(axes, drawn, strict=True):
-        _draw_forces(ax, read_table(results.path(CONTRIBUTIONS, scene), FRAMES), colours)
+        _draw_forces(ax, read_table(results.path(CONTRIBUTIONS, scene), FRAMES), looks)
         ax.set_title(style.words(scene))
     axes[-1].set_xlabel("frame")
     axes[len(axes) // 2].set_ylabel("norm of the force (N)")
-    _draw_moved(right.subplots(), rows, scenes, colours)
-    looks = {style.words(effect): (colour, "o") for effect, colour in colours.items()}
-    style.legend(figure, style.handles(looks, markersize=4.5), 6)
+    _draw_moved(right.subplots(), rows, scenes, looks)
+    named = {style.words(effect): look for effect, look in looks.items()}
+    style.legend(figure, style.handles(named, markersize=4.5), 6)
     return figure
 
 
-def _colours(results: Results, rows: pd.DataFrame) -> dict[str, str]:
-    """Colours: those of a group as everywhere else, of the other effects in their order."""
-    looks = {group: colour for group, (colour, _) in style.group_looks(results.holdings).items()}
-    names = list(dict.fromkeys(rows.effect))
-    groups = {name: looks[name] for name in names if name in looks}
-    others = [name for name in names if name not in looks]
-    return groups | {name: OTHERS[i % len(OTHERS)] for i, name in enumerate(others)}
+def _looks(results: Results, rows: pd.DataFrame) -> Looks:
+    """Colours and markers: those of a group as everywhere else, of other effects in their order."""
+    known = style.group_looks(results.holdings)
+    others = [effect for effect in dict.fromkeys(rows.effect) if effect not in known]
+    groups = {effect: known[effect] for effect in dict.fromkeys(rows.effect) if effect in known}
+    return groups | {
+        effect: (OTHERS[i % len(OTHERS)], MARKERS[i % len(MARKERS)])
+        for i, effect in enumerate(others)
+    }
 
 
-def _draw_forces(ax: Axes, frames: pd.DataFrame, colours: dict[str, str]) -> None:
+def _draw_forces(ax: Axes, frames: pd.DataFrame, looks: Looks) -> None:
     least = ROUNDOFF * frames.force.max()
     for effect, rows in frames.groupby("effect", sort=False):
         force = rows.force.where(rows.force > least)
+        colour, marker = looks[str(effect)]
         if len(rows) > 1:
-            ax.plot(rows.frame, force, color=colours[str(effect)], linewidth=1.1)
+            ax.plot(rows.frame, force, color=colour, linewidth=1.1)
         else:
-            ax.plot(rows.frame, force, color=colours[str(effect)], marker="o", markersize=3.5)
+            ax.plot(rows.frame, force, color=colour, marker=marker, markersize=3.5)
     ax.set_yscale("log")
     style.grid(ax)
 
 
-def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], colours: dict[str, str]) -> None:
+def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], looks: Looks) -> None:
     for y, scene in enumerate(scenes):
         own = rows[rows.scene == scene]
         floor = float(own.sensitivity_floor.iloc[0])
         ax.barh(y, floor - LOW, left=LOW, color="#DCD8D0", height=0.8, zorder=1)
         for row in own[own.moved.notna()].itertuples():
-            colour = colours[row.effect]
+            colour, marker = looks[row.effect]
             ax.plot(
-                [np.clip(row.moved, LOW, HIGH)], [y], marker="o", markersize=4.5, zorder=3,
+                [np.clip(row.moved, LOW, HIGH)], [y], marker=marker, markersize=4.5, zorder=3,
                 color=colour, markerfacecolor=colour if row.above_floor else "white",
                 clip_on=False,
             )  # fmt: skip

@@ -28,7 +28,7 @@ SHARES = (1.0, 0.5, 0.2, 0.1)
         "finer ones, against its bound: the longest of the times for bytes, for sums and products, "
         "and for divisions and roots. Filled markers are bound by bytes, hollow ones by "
         "arithmetic. "
-        "No point can lie below the diagonal but for the spread of the measurement."
+        "Points below the diagonal are due to the spread of the measurement."
     ),
     reads=(TableOf("machine_rates"), TableOf("roofline")),
     options=Scenes,

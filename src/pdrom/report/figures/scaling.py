@@ -69,7 +69,7 @@ def scaling(results: Results, options: Scenes) -> Figure:
         low, high = np.log10(axis.get_view_interval())
         plain_ticks(axis, high - low)
     times[0].set_ylabel("time of an iteration (ms)")
-    offline[0].set_ylabel("before the first frame")
+    offline[0].set_ylabel("before the first frame\n(ms or MB)")
     _legend(figure, results, list(dict.fromkeys(table.method)))
     return figure
 

@@ -45,8 +45,8 @@ def positions(tables: Tables) -> str:
         largest = runs[runs.k == runs.k.max()]
         rows.append([name(scene), *_of_subspaces(largest, tables["heldout_reruns"])])
     header = [
-        "scene", "all", "held out", "sampled", "held out", "elements", "speed-up", "interpolated",
-        "hrpd", "skinning, all",
+        "scene", "all", "all, held out", "sampled", "sampled, held out", "elements", "speed-up",
+        "gappy", "hrpd", "skinning, all",
     ]  # fmt: skip
     return tabular(header, rows, "l" + "r" * 9)
 

@@ -60,7 +60,7 @@ def hard_reductions(tables: Tables) -> str:
         "why it fails",
     ]  # fmt: skip
     left = r">{\raggedright\arraybackslash}"
-    return tabular(header, rows, rf"lrrrrrr{left}p{{5.2cm}}")
+    return longtable(header, rows, rf"lrrrrrr{left}p{{5.2cm}}")
 
 
 def kernel_accuracy(tables: Tables) -> str:

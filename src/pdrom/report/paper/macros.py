@@ -4,13 +4,14 @@ The source names a number by where it stands in a table::
 
     \val{reduced_reruns|scene=bar_release|method=block-deim|r=20|relative_error_within_horizon}
 
-(table, any number of column=value filters, the column; optionally ``max``, ``min``, ``median`` or
-``count`` of the rows that match). The keys are found in the source, resolved here, and written as
+(table, any number of filters, the column; optionally ``max``, ``min``, ``median``, ``count`` or
+``distinct``, the number of different values, of the rows that match). A filter is column=value,
+column!=value, or column<=number. The keys are found in the source, resolved here, and written as
 one TeX macro each. No number is typed, and none is generated that the text does not use.
 """
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +22,10 @@ from pdrom.core.errors import PaperError
 from pdrom.report.words.text import escape
 
 _KEY = re.compile(r"\\val\{([^{}]*)\}")
+_FILTER = re.compile(r"(.*?)(=|!=|<=)(.*)")
+Filter = tuple[str, str, str]  # column, sign, value
 MISSING = "n/a"
+_COUNTS = ("count", "distinct")
 # Columns that say what was run; the others say what came out.
 _LABELS = ("scene", "group", "method", "position_basis", "variant", "direction", "experiment")
 AGGREGATES: dict[str, Callable[[pd.Series], Any]] = {
@@ -29,6 +33,7 @@ AGGREGATES: dict[str, Callable[[pd.Series], Any]] = {
     "min": lambda column: column.min(),
     "median": lambda column: column.median(),
     "count": lambda column: len(column),
+    "distinct": lambda column: column.nunique(),
 }
 
 
@@ -68,8 +73,8 @@ def resolve(key: str, tables: Mapping[str, pd.DataFrame]) -> str:
     parsed = _parse(key, tables)
     rows = _matching(tables[parsed.table], parsed.filters)
     cells = rows[parsed.column].dropna()
-    if parsed.aggregate == "count":
-        return str(len(cells)) if is_held(key, tables) else MISSING
+    if parsed.aggregate in _COUNTS:
+        return str(AGGREGATES[parsed.aggregate](cells)) if is_held(key, tables) else MISSING
     if parsed.aggregate is not None:
         return format_number(AGGREGATES[parsed.aggregate](cells)) if len(cells) else MISSING
     if len(rows) > 1:
@@ -84,8 +89,8 @@ def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
     """
     parsed = _parse(key, tables)
     filters = parsed.filters
-    if parsed.aggregate == "count":
-        filters = {field: value for field, value in filters.items() if field in _LABELS}
+    if parsed.aggregate in _COUNTS:
+        filters = [entry for entry in filters if entry[0] in _LABELS]
     return len(_matching(tables[parsed.table], filters)) > 0
 
 
@@ -94,7 +99,7 @@ class _Key:
     """A key in its parts."""
 
     table: str
-    filters: dict[str, str]
+    filters: list[Filter]
     column: str
     aggregate: str | None
 
@@ -107,16 +112,23 @@ def _parse(key: str, tables: Mapping[str, pd.DataFrame]) -> _Key:
     if not parts or "=" in parts[-1]:
         raise PaperError(f"\\val{{{key}}}: names no column of table '{name}'")
     *filters, column = parts
-    pairs = {field: value for field, _, value in (entry.partition("=") for entry in filters)}
-    for field in (*pairs, column):
+    found = [_filter(entry) for entry in filters]
+    for field in (*(field for field, _, _ in found), column):
         _require(field, tables[name], key)
-    return _Key(name, pairs, column, aggregate)
+    return _Key(name, found, column, aggregate)
 
 
-def _matching(rows: pd.DataFrame, filters: Mapping[str, str]) -> pd.DataFrame:
-    for field, value in filters.items():
+def _filter(entry: str) -> Filter:
+    parts = _FILTER.fullmatch(entry)
+    return (parts[1], parts[2], parts[3]) if parts else (entry, "=", "")
+
+
+def _matching(rows: pd.DataFrame, filters: Sequence[Filter]) -> pd.DataFrame:
+    for field, sign, value in filters:
         matches = rows[field].map(lambda cell, value=value: _same(cell, value))
-        rows = rows[matches.astype(bool)]
+        if sign == "<=":
+            matches = pd.to_numeric(rows[field]) <= float(value)
+        rows = rows[matches.astype(bool) != (sign == "!=")]
     return rows
 
 

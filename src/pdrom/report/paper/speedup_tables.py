@@ -55,7 +55,7 @@ def payoff(tables: Tables) -> str:
 
 
 def pays(tables: Tables) -> str:
-    """From what mesh size on a reduction is faster than others, for each error."""
+    """From what mesh size on a reduction is faster than others, for each error that it reaches."""
     rows = [
         [
             name(row.scene) + ("" if row.stiffness == 1.0 else rf" $\times {row.stiffness:g}$"),
@@ -69,6 +69,7 @@ def pays(tables: Tables) -> str:
             _number(row.speedup),
         ]
         for row in tables["reduction_pays"].itertuples()
+        if not pd.isna(row.speedup)
     ]
     header = ["scene", "against", "error", "vertices", "plain", "all", "speed-up"]
     return tabular(header, rows, "lllrrrr")

@@ -83,7 +83,7 @@ def build_pdf(source: Path, output: Path, search: list[Path]) -> None:
     Raises
     ------
     PaperError
-        With the first TeX error, or naming undefined references and citations.
+        With the first TeX error, undefined references and citations, or a box that leaves the page.
     """
     text = source.read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory(prefix="pdrom-tex-") as folder:
@@ -137,6 +137,7 @@ def _check_log(path: Path, source: Path) -> None:
     undefined = re.findall(r"(?:Reference|Citation) `([^']*)'[^\n]*undefined", text)
     if undefined:
         raise PaperError(f"{source}: undefined references: {', '.join(sorted(set(undefined)))}")
-    for line in text.splitlines():
-        if line.startswith("Overfull \\hbox"):
-            log.info("%s", line)
+    # TeX goes on where a box sticks out, and prints over the margin or off the page
+    overfull = [line for line in text.splitlines() if line.startswith("Overfull")]
+    if overfull:
+        raise PaperError(f"{source}: {len(overfull)} boxes do not fit: {'; '.join(overfull)}")

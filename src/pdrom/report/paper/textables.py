@@ -1,5 +1,6 @@
 """Tables of the manuscript as TeX, generated from the tables of the study."""
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -23,12 +24,18 @@ def scenes(tables: Tables) -> str:
     for row in tables["scenes"].itertuples():
         end = int(horizon[row.scene]) if row.scene in horizon else None
         shown = "run" if end == row.frames else str(end)
-        groups = escape(row.groups)
+        groups = _powers(escape(row.groups.replace("_", " ")))
         rows.append(
             [name(row.scene), groups, str(row.vertices), str(row.elements), str(row.frames), shown]
         )
     header = ["scene", "groups (weight)", "vertices", "elements", "frames", "horizon"]
     return longtable(header, rows, r"l>{\raggedright\arraybackslash}p{5.2cm}rrrr")
+
+
+def _powers(text: str) -> str:
+    """Numbers such as 1e+06 in ``text`` as powers of ten."""
+    plain = re.sub(r"([\d.]+)e\+?(-?)0*(\d+)", r"$\1\\cdot 10^{\2\3}$", text)
+    return plain.replace(r"$1\cdot 10", "$10")
 
 
 def methods(tables: Tables) -> str:

@@ -1,13 +1,13 @@
-"""Medians with their intervals, and how many digits of a time its control confirms."""
+"""Medians with their intervals, and whether a control confirms a time."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 RESAMPLES, SEED, LEVEL = 2000, 1, 0.95
-# The control compares a run with itself. Two digits claim to be right to a twentieth, one digit to
-# a half; fixed on 2026-11-22, before any control had been measured.
-TWO_DIGITS, ONE_DIGIT = 1.05, 1.5
+# The control compares a run with itself; where it differs by more than half, a time says nothing.
+# Fixed on 2026-11-22, before any control had been measured.
+CONFIRMED = 1.5
 
 
 def median_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
@@ -28,30 +28,22 @@ def median_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float,
     return float(np.median(x)), float(found.low), float(found.high)
 
 
-def confirmed_digits(low: float, high: float) -> int:
-    """Digits (0, 1, 2) of a ratio of times that a control confirms.
+def confirmed(low: float, high: float) -> bool:
+    """Whether a control confirms a ratio of times.
 
     Parameters
     ----------
     low, high : interval of the time of a run over that of the same run
     """
-    for digits, limit in ((2, TWO_DIGITS), (1, ONE_DIGIT)):
-        if 1.0 / limit <= low and high <= limit:
-            return digits
-    return 0
+    return low >= 1.0 / CONFIRMED and high <= CONFIRMED
 
 
-def in_words(low: float, high: float, digits: int) -> str:
-    """Interval ``low`` to ``high`` as text: two ``digits``, its middle with one, or nothing."""
-    if digits == 0:
-        return "not confirmed by its control"
-    if digits == 1:
-        return f"about {_rounded(np.sqrt(low * high), 1)}"
-    ends = _rounded(low, 2), _rounded(high, 2)
-    return ends[0] if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"
+def in_words(median: float, low: float, high: float) -> str:
+    """A median and its interval as text."""
+    return f"{_rounded(median)} ({_rounded(low)} to {_rounded(high)})"
 
 
-def _rounded(value: float, digits: int) -> str:
-    """``value`` with so many significant digits, not in powers of ten."""
-    place = digits - 1 - int(np.floor(np.log10(abs(value))))
+def _rounded(value: float) -> str:
+    """``value`` with two significant digits, not in powers of ten."""
+    place = 1 - int(np.floor(np.log10(abs(value))))
     return f"{round(value, place):.{max(0, place)}f}"

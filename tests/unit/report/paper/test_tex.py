@@ -72,6 +72,9 @@ def test_other_text_gives_other_bytes(built, tmp_path):
         (r"\documentclass{article}", r"\documentclass{article}\usepackage{no-such-package}",
          r"no-such-package.sty' not found|needed packages"),
         (r"\end{document}", "", r"main\.tex"),
+        ("Section", r"\rule{2\textwidth}{1pt} Section", r"1 boxes do not fit: Overfull \\hbox"),
+        ("Section", r"\parbox{1cm}{\rule{1cm}{2\textheight}} Section",
+         r"1 boxes do not fit: Overfull \\vbox"),
     ],
 )  # fmt: skip
 def test_faults_are_one_line_and_leave_the_old_pdf(tmp_path, old, new, message):
