@@ -50,7 +50,7 @@ def export_scene(scene: Scene) -> dict[str, Any]:
         "floors": floors,
         "probes": PROBES,
         "holds": [
-            {"from": b.config.start, "until": b.config.until, "vertices": b.vertices.tolist()}
+            {"name": b.side or b.name, "from": b.config.start, "until": b.config.until, "vertices": b.vertices.tolist()}
             for b in scene.boundaries
         ],
         "groups": {group.name: _export_group(group) for group in scene.groups},

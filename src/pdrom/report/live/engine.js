@@ -47,33 +47,45 @@ const pdromEngine = (() => {
 
   // ---- small linear algebra ----
 
-  // (m, n) times (n, 3)
+  // (m, n) times (n, 3); four rows together read x once
   function times(a, x, n, out) {
-    for (let i = 0, at = 0; i < out.length; i += 3) {
-      let u = 0, v = 0, w = 0;
-      for (let k = 0; k < 3 * n; k += 3, at++) {
-        const value = a[at];
-        u += value * x[k];
-        v += value * x[k + 1];
-        w += value * x[k + 2];
+    const m = out.length / 3, whole = m - m % 4;
+    for (let i = 0; i < whole; i += 4) {
+      let a0 = 0, a1 = 0, a2 = 0, b0 = 0, b1 = 0, b2 = 0, c0 = 0, c1 = 0, c2 = 0, d0 = 0, d1 = 0, d2 = 0;
+      for (let k = 0, at = i * n, from = 0; k < n; k++, at++, from += 3) {
+        const u = x[from], v = x[from + 1], w = x[from + 2], p = a[at], q = a[at + n], r = a[at + 2 * n], s = a[at + 3 * n];
+        a0 += p * u; a1 += p * v; a2 += p * w;
+        b0 += q * u; b1 += q * v; b2 += q * w;
+        c0 += r * u; c1 += r * v; c2 += r * w;
+        d0 += s * u; d1 += s * v; d2 += s * w;
       }
-      out[i] = u;
-      out[i + 1] = v;
-      out[i + 2] = w;
+      const to = 3 * i;
+      out[to] = a0; out[to + 1] = a1; out[to + 2] = a2; out[to + 3] = b0; out[to + 4] = b1; out[to + 5] = b2;
+      out[to + 6] = c0; out[to + 7] = c1; out[to + 8] = c2; out[to + 9] = d0; out[to + 10] = d1; out[to + 11] = d2;
+    }
+    for (let i = whole; i < m; i++) for (let axis = 0; axis < 3; axis++) {
+      let total = 0;
+      for (let k = 0; k < n; k++) total += a[i * n + k] * x[3 * k + axis];
+      out[3 * i + axis] = total;
     }
     return out;
   }
 
-  // adds the transpose of (m, n) times (m, 3) to (n, 3)
+  // adds the transpose of (m, n) times (m, 3) to (n, 3), four rows together
   function addTransposed(a, x, n, out) {
-    for (let i = 0, at = 0; i < x.length; i += 3) {
-      const u = x[i], v = x[i + 1], w = x[i + 2];
-      for (let k = 0; k < 3 * n; k += 3, at++) {
-        const value = a[at];
-        out[k] += value * u;
-        out[k + 1] += value * v;
-        out[k + 2] += value * w;
+    const m = x.length / 3, whole = m - m % 4;
+    for (let i = 0; i < whole; i += 4) {
+      const f = 3 * i, a0 = x[f], a1 = x[f + 1], a2 = x[f + 2], b0 = x[f + 3], b1 = x[f + 4], b2 = x[f + 5];
+      const c0 = x[f + 6], c1 = x[f + 7], c2 = x[f + 8], d0 = x[f + 9], d1 = x[f + 10], d2 = x[f + 11];
+      for (let k = 0, at = i * n, to = 0; k < n; k++, at++, to += 3) {
+        const p = a[at], q = a[at + n], r = a[at + 2 * n], s = a[at + 3 * n];
+        out[to] += p * a0 + q * b0 + r * c0 + s * d0;
+        out[to + 1] += p * a1 + q * b1 + r * c1 + s * d1;
+        out[to + 2] += p * a2 + q * b2 + r * c2 + s * d2;
       }
+    }
+    for (let i = whole; i < m; i++) for (let k = 0; k < n; k++) for (let axis = 0; axis < 3; axis++) {
+      out[3 * k + axis] += a[i * n + k] * x[3 * i + axis];
     }
     return out;
   }
