@@ -50,7 +50,12 @@ def export_scene(scene: Scene) -> dict[str, Any]:
         "floors": floors,
         "probes": PROBES,
         "holds": [
-            {"name": b.side or b.name, "from": b.config.start, "until": b.config.until, "vertices": b.vertices.tolist()}
+            {
+                "name": b.side or b.name,
+                "from": b.config.start,
+                "until": b.config.until,
+                "vertices": b.vertices.tolist(),
+            }
             for b in scene.boundaries
         ],
         "groups": {group.name: _export_group(group) for group in scene.groups},
@@ -59,7 +64,10 @@ def export_scene(scene: Scene) -> dict[str, Any]:
 
 def _require_known(scene: Scene) -> None:
     for effect, known in (
-        *((group, isinstance(group, StencilGroup) and group.manifold in MANIFOLDS) for group in scene.groups),
+        *(
+            (group, isinstance(group, StencilGroup) and group.manifold in MANIFOLDS)
+            for group in scene.groups
+        ),
         *((contact, isinstance(contact, Floor)) for contact in scene.contacts),
         *((boundary, isinstance(boundary, Pins)) for boundary in scene.boundaries),
     ):

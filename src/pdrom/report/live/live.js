@@ -5,8 +5,8 @@
   const SPEED = 0.03; // a handle moves at most this part of the scene's size a frame
   const REACH = 26; // CSS pixels from a handle's vertex within which a pointer takes it
   const KEY_STEP = 0.04; // of the scene's size
-  const ROOM = 1.15; // of the picture about the shape at rest
-  const LAG = 0.06; // part of its way to the shape that the camera goes in a frame
+  const ROOM = 1.35; // of the picture about the shape at rest
+  const LAG = 0.1; // part of its way to the shape that the camera goes in a frame
   const SAMPLE = 400; // vertices that the size of the shape is looked at, at most
   const TOLD = 200; // ms between two updates of the numbers
   const METHODS = { elements: "whole elements", joint: "joint rows" };

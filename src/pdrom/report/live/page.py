@@ -14,7 +14,13 @@ HEAD = re.compile(r'pdromLive\(\{"format":1,"scene":("\w+"),"title":("(?:[^"\\]|
 
 
 def _write(
-    models: list[File], html: Path, style: Path, engine: Path, drawing: Path, script: Path, out: File
+    models: list[File],
+    html: Path,
+    style: Path,
+    engine: Path,
+    drawing: Path,
+    script: Path,
+    out: File,
 ) -> None:
     """Write the page; it loads the models of a scene when a reader chooses it.
 
