@@ -145,6 +145,8 @@ TABLE = Place("tables/{name}.csv")
 FIGURE = Place("figures/{name}.pdf")
 FIGURE_PICTURE = Place("figures/{name}.png")
 PAPER_INPUT = Place("paper/{name}")
+LIVE_MODEL = Place("article/live/{scene}.js")
+LIVE_PAGE = Place("article/live.html")
 SCENE_TABLE = Place("scenes/{scene}/{name}.csv")
 SCENE_RUNS = Place("scenes/{scene}/runs.csv")
 

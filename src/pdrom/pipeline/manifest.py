@@ -107,7 +107,7 @@ def own_files(plan: Plan, folders: Folders) -> set[str]:
     return {
         folders.manuscript, *plan.paper.files, *plan.table_paths,
         *plan.figures, *(job.png for job in plan.figure_jobs.values()),
-        *plan.measured,
+        *plan.measured, *plan.page.outputs.values(),
     }  # fmt: skip
 
 

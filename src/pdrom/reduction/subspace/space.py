@@ -67,6 +67,7 @@ class ReducedSpace(Space):
     ----------
     matrix : (K, K) system matrix A: inertia and stiffness
     inertia_matrix : (K, K) B^T M B / h^2
+    forces : constant coordinates (K, 3) and rate (number or (K, K)) of each force
     """
 
     def __init__(self, scene: Scene, columns: Columns, matrices: Sequence[np.ndarray]) -> None:
@@ -76,14 +77,14 @@ class ReducedSpace(Space):
         mass = columns.B.T @ (scene.masses[:, None] * columns.B)
         self.matrix = mass / h**2 + sum(matrices, np.zeros_like(mass))
         self.inertia_matrix = mass / h**2
-        self._forces = [_reduce_force(f, columns, mass, scene) for f in scene.forces]
+        self.forces = [_reduce_force(f, columns, mass, scene) for f in scene.forces]
         self._boundaries = [_ReducedBoundary(b, columns) for b in scene.boundaries]
         self._contacts = [_ReducedContact(c, columns, scene) for c in scene.contacts]
         self._cache: dict[bytes, DenseElimination] = {}
 
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
         total = np.zeros_like(positions)
-        for constant, rate in self._forces:
+        for constant, rate in self.forces:
             total += constant
             total += rate @ velocities if np.ndim(rate) else rate * velocities
         return total
@@ -201,13 +202,17 @@ class _ReducedBoundary:
         return indices, rows, np.linalg.pinv(rows)
 
 
+def probe_vertices(n: int) -> np.ndarray:
+    """Vertices of a mesh of n at which contacts are looked for, ascending."""
+    return np.unique(np.linspace(0, n - 1, min(PROBES, n)).round().astype(np.int64))
+
+
 class _ReducedContact:
     """A contact, looked for at probe vertices and, where one is hit, resolved at all vertices."""
 
     def __init__(self, contact: Contact, columns: Columns, scene: Scene) -> None:
         self._contact = contact
-        n = scene.mesh.vertices
-        self._vertices = np.unique(np.linspace(0, n - 1, min(PROBES, n)).round().astype(np.int64))
+        self._vertices = probe_vertices(scene.mesh.vertices)
         self._probes = np.ascontiguousarray(columns.B[self._vertices])
         self._columns = columns
         weighted = columns.B * scene.masses[:, None]
