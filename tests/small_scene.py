@@ -6,6 +6,7 @@ from pathlib import Path
 from bad_input.project import SMALL_SCENE, make_project
 from pdrom.core.yamlfile import read_yaml
 from pdrom.experiments.kit.declaration import experiments
+from pdrom.model.held_out import MOTIONS
 from pdrom.pipeline.resolve import Resolver
 from pdrom.pipeline.study import Study
 
@@ -54,7 +55,7 @@ def _labels(study: Study, name: str) -> Iterator[dict[str, str]]:
         case "mesh":
             yield {"mesh": study.mesh_of(SCENE)}
         case "fom":
-            yield from ({"scene": SCENE, "run": run} for run in ("train", "heldout"))
+            yield from ({"scene": SCENE, "run": run} for run in ("train", *MOTIONS))
         case "sensitivity" | "iterations" | "subspaces" | "timing":
             yield {"scene": SCENE}
         case "snapshots":
