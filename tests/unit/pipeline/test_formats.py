@@ -9,6 +9,7 @@ import pytest
 
 from pdrom.core.provenance import RECORD
 from pdrom.core.yamlfile import read_yaml
+from pdrom.model.held_out import MOTIONS
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.plan import Plan, load_plan
 from places import ROOT
@@ -18,7 +19,7 @@ SCENE, GROUP, METHOD = "strain_oop", "strain", "block-deim"
 RULES = [
     ("mesh", {}),
     ("fom", {"scene": SCENE, "run": "train"}),
-    ("fom", {"scene": SCENE, "run": "heldout"}),
+    *(("fom", {"scene": SCENE, "run": motion}) for motion in MOTIONS),
     ("snapshots", {"scene": SCENE, "group": GROUP}),
     ("pod", {"scene": SCENE, "group": GROUP}),
     ("reruns", {"scene": SCENE, "group": GROUP, "method": METHOD}),
