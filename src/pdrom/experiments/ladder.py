@@ -62,7 +62,8 @@ class Ladder(Repetitions):
         ----------
         p : rows of an element
         """
-        rows = [("up", method, None, self.r) for method in self.up]
+        rows: list[tuple[str, MethodSpec, int | None, int]] = []
+        rows += [("up", method, None, self.r) for method in self.up]
         rows += [("down", method, None, self.r) for method in self.down]
         rows += [("signs", self.up[0], seed, self.r) for seed in range(1, self.signs + 1)]
         square = [_as_many_entries(method, p) for method in self.square]

@@ -111,8 +111,8 @@ def _steps(
         rows = name.startswith("whole elements")
         chosen = square[square.rows_per_element > 1] if rows else square
         yield name, before, after, _pairs(chosen, before, after)
-    for name, methods in KINDS.items():
-        pairs = pd.concat([_pairs(runs, *two) for two in combinations(methods, 2)])
+    for name, kind in KINDS.items():
+        pairs = pd.concat([_pairs(runs, *two) for two in combinations(kind, 2)])
         rising = pairs.gain > 1.0
         falling = pairs.assign(
             gain=pairs.gain.where(~rising, 1.0 / pairs.gain),

@@ -1,6 +1,6 @@
 """Section ``alternatives``: methods, their steps, and what they are compared with."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field
 
@@ -11,8 +11,8 @@ from pdrom.experiments.kit.measurement import Protocol
 from pdrom.experiments.kit.settings import Count, Modes, Repeats, Tolerance
 
 REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # the others are full-order ones
-OWN = "own iterations"  # frames that a reduction may be trained on, beside converged ones
-CONVERGED = "converged"  # the implicit step itself, however long it takes
+OWN: Final = "own iterations"  # frames that a reduction may be trained on, beside converged ones
+CONVERGED: Final = "converged"  # the implicit step itself, however long it takes
 
 Trained = Literal["own iterations", "converged"]
 Factors = Annotated[tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...], Field(min_length=1)]
