@@ -25,7 +25,7 @@ from pdrom.core.store import open_hdf5, write_table
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.motion import Motion
-from pdrom.experiments.kit.scenes import RUNS, positions_of, scene_of
+from pdrom.experiments.kit.scenes import SPLITS, positions_of, scene_of
 from pdrom.experiments.kit.settings import Horizon
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.rerun import displacement_norms, mean_motion
@@ -81,7 +81,7 @@ def estimates(
     ((_, companion),) = load_models(model.path)
     unit = mean_motion(positions_of(train))
     rows: list[dict[str, Any]] = []
-    for split, run in zip(RUNS, (train, heldout), strict=True):
+    for split, run in zip(SPLITS, (train, heldout), strict=True):
         motion = Motion(scene_of(config, mesh, split), run)
         beside = companion_run(motion.scene, companion)
         end = horizon.frames(perturbed, split)

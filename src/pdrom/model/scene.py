@@ -19,7 +19,7 @@ from pdrom.model.dynamics.system import DEFAULT_SOLVER, GlobalSystem
 from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import Boundary, Contact, EffectConfig, Force, Start
 from pdrom.model.effects.entries import EffectConfigs, bind
-from pdrom.model.held_out import HeldOut
+from pdrom.model.held_out import FIRST, HeldOut, HeldOutMotion
 from pdrom.model.holding import check_holds, log_contacts, log_holds, log_obstructed
 from pdrom.model.masses import Mass, MassConfig, vertex_masses
 from pdrom.model.mesh.checks import check_mesh
@@ -106,9 +106,9 @@ class SceneConfig(_Model):
             }
         )
 
-    def heldout_variant(self) -> Self:
-        """The scene of the held-out trajectory (see `HeldOut`)."""
-        return self.model_copy(update={"effects": self.held_out.variant(self.effects)})
+    def heldout_variant(self, motion: HeldOutMotion = FIRST) -> Self:
+        """The scene of a held-out trajectory (see `HeldOut`)."""
+        return self.model_copy(update={"effects": self.held_out.variant(self.effects, motion)})
 
 
 @dataclass(frozen=True)

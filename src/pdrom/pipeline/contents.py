@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 
 from pdrom.core import paths
 from pdrom.core.paths import Place
+from pdrom.model.held_out import MOTIONS
 from pdrom.pipeline.scenes import not_taken
 from pdrom.pipeline.study import Study
 
@@ -40,7 +41,7 @@ def _all(study: Study, place: Place) -> Iterator[Labels]:
                 yield {label: known[label] for label in names}
     else:
         for scene in study.scenes:
-            for run in ("train", "heldout"):
+            for run in ("train", *MOTIONS):
                 known = {"scene": scene, "run": run}
                 yield {label: known[label] for label in names}
 

@@ -41,10 +41,10 @@ def ladder(results: Results, options: Scenes) -> Figure:
     the right rim.
     """
     table = results.asked_rows("ladder", COLUMNS, options)
-    table = table[table.gain.notna()]
+    table = table[table.gain.notna() & (table.direction != "square")]
     if table.empty:
         raise NothingToDraw("no scene that climbs the ladder")
-    climbed = table[table.direction != "signs"]
+    climbed = table[table.direction.isin(["up", "down"])]
     rungs = list(dict.fromkeys(zip(climbed.direction, climbed.rung, strict=True)))
     scenes = list(dict.fromkeys(table.scene))
     figure = style.new_figure(0.26 * len(rungs) + 1.3)

@@ -24,6 +24,7 @@ from pdrom.tables.claims import (
     claims_rows,
     load_claims,
     timed_columns,
+    values_of,
 )
 from pdrom.tables.claims import evaluate as evaluated
 from pdrom.tables.claims.claims import claims
@@ -67,8 +68,10 @@ def tables() -> dict[str, pd.DataFrame]:
         ],
     )  # fmt: skip
     reruns["speedup"] = 2.0 / reruns.local_ms
+    twice = reruns.assign(relative_error_within_horizon=2.0 * reruns.relative_error_within_horizon)
     return {
         "reduced_reruns": reruns,
+        "heldout_reruns": pd.concat([reruns, twice, twice]).assign(horizon_frame=9),
         "breakeven": pd.DataFrame(
             {
                 "scene": ["a", "a", "b"],
@@ -519,6 +522,17 @@ def test_without_data_nothing_is_decided():
     rows = claims_rows(RULES, empty)
     assert rows.claim.tolist() == list(RULES)
     assert (rows[["verdict", "verdict_beyond"]] == UNDECIDED).all(axis=None)
+
+
+def test_held_out_motions_decide_by_their_median():
+    where = {"position_basis": ["full"]}
+    names = ("rerun_error", "heldout_rerun_error")
+    own, unseen = (values_of(rule(name, where=where), tables()) for name in names)
+    assert unseen.value.tolist() == (2.0 * own.value).tolist()
+    assert unseen.method.tolist() == own.method.tolist()
+    none = tables()
+    none["heldout_reruns"] = none["heldout_reruns"].assign(horizon_frame=0)
+    assert values_of(rule("heldout_rerun_error"), none).empty
 
 
 # Which cells a clock decides ----------------------------------------------------------------------
