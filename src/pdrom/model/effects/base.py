@@ -203,7 +203,7 @@ def held_path(
     active = [b for b in boundaries if b.active(frames.start)]
     held = [b.held(frames.start) for b in active]
     current = [positions[v] for v in held]
-    single = len(active) == 1 and bool((np.diff(held[0]) > 0).all())
+    single = len(active) == 1 and bool((held[0][1:] > held[0][:-1]).all())
     vertices, first = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     if single:
         vertices = held[0]

@@ -6,6 +6,8 @@ probe vertices.
 """
 
 from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy import linalg
@@ -14,7 +16,14 @@ from pdrom.core.errors import NotReducibleError, SolverError
 from pdrom.model.dynamics.space import Solve, Space
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.dynamics.system import require_accurate
-from pdrom.model.effects.base import Boundary, Contact, Effect, held_vertices
+from pdrom.model.effects.base import (
+    Boundary,
+    Contact,
+    Effect,
+    held_path,
+    held_targets,
+    held_vertices,
+)
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.columns import Columns
 
@@ -51,6 +60,15 @@ class DenseElimination:
         """Free coordinates that belong to ``rhs`` (K, 3)."""
         return self._inverse @ (rhs[self.free] - self._load)
 
+    def response(self, inertia: np.ndarray) -> np.ndarray:
+        """Free coordinates (K', K) to all of s, the fixed ones of which are at their targets.
+
+        This is the solve for ``inertia`` s, (K, K) M/h^2, with the load of the targets.
+        """
+        result = self._inverse @ inertia[self.free]
+        result[:, self.fixed] -= self._inverse @ self._coupling
+        return result
+
     def lift(self, rows: np.ndarray) -> np.ndarray:
         """Response (m, K') of the free coordinates to a unit force on each of ``rows`` (m, K)."""
         return rows[:, self.free] @ self._inverse
@@ -78,7 +96,8 @@ class ReducedSpace(Space):
         self.matrix = mass / h**2 + sum(matrices, np.zeros_like(mass))
         self.inertia_matrix = mass / h**2
         self.forces = [_reduce_force(f, columns, mass, scene) for f in scene.forces]
-        self._boundaries = [_ReducedBoundary(b, columns) for b in scene.boundaries]
+        # they answer as boundaries do, of coordinates in place of vertices
+        self._boundaries: Any = [_ReducedBoundary(b, columns) for b in scene.boundaries]
         self._contacts = [_ReducedContact(c, columns, scene) for c in scene.contacts]
         self._cache: dict[bytes, DenseElimination] = {}
 
@@ -89,19 +108,39 @@ class ReducedSpace(Space):
             total += rate @ velocities if np.ndim(rate) else rate * velocities
         return total
 
-    def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        active = [b for b in self._boundaries if b.boundary.active(frame)]
-        if not active:
-            return np.empty(0, dtype=np.int64), np.empty((0, 3))
-        parts = [b.targets(frame, positions) for b in active]
-        indices, first = np.unique(np.concatenate([i for i, _ in parts]), return_index=True)
-        return indices, np.concatenate([t for _, t in parts])[first]
+    @cached_property
+    def affine(self) -> tuple[np.ndarray, float, np.ndarray]:
+        """Acceleration by all forces as constant (K, 3), rate and rates (K, K) or none, (0, 0)."""
+        constant, rate, rates = np.zeros((len(self.matrix), 3)), 0.0, np.zeros((0, 0))
+        for own, factor in self.forces:
+            constant += own
+            if np.ndim(factor) == 0:
+                rate += float(factor)
+            else:
+                rates = rates + factor if len(rates) else np.array(factor)
+        return constant, rate, rates
 
-    def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
+    @property
+    def has_contacts(self) -> bool:
+        """Whether coordinates are corrected at the end of a frame."""
+        return bool(self._contacts)
+
+    def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return held_targets(self._boundaries, frame, positions)
+
+    def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates that are held in the first ``frames``, and their values (n, m, 3)."""
+        return held_path(self._boundaries, frames, positions)
+
+    def elimination(self, fixed: np.ndarray) -> DenseElimination:
+        """The factored system without the ``fixed`` coordinates."""
         key = fixed.tobytes()
         if key not in self._cache:
             self._cache[key] = DenseElimination(self.matrix, fixed)
-        elimination = self._cache[key]
+        return self._cache[key]
+
+    def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
+        elimination = self.elimination(fixed)
         elimination.set_targets(targets)
         return elimination
 
@@ -179,16 +218,25 @@ class _ReducedBoundary:
 
     def __init__(self, boundary: Boundary, columns: Columns) -> None:
         self.boundary = boundary
+        self.active, self.takes_hold = boundary.active, boundary.takes_hold
         self._parts: dict[bytes, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
         self._columns = columns
 
-    def targets(self, frame: int, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def held(self, frame: int) -> np.ndarray:
+        """Coordinates of the atoms that are held in ``frame``, ascending."""
+        return self._of(frame)[0]
+
+    def path(self, frames: range, current: np.ndarray) -> np.ndarray:
+        """Values (n, m, 3) of these coordinates, which are ``current`` at first, see `Boundary`."""
+        _, rows, inverse = self._of(frames.start)
+        return inverse @ self.boundary.path(frames, rows @ current)
+
+    def _of(self, frame: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         vertices = self.boundary.held(frame)
         key = vertices.tobytes()
         if key not in self._parts:
             self._parts[key] = self._prepare(vertices)
-        indices, rows, inverse = self._parts[key]
-        return indices, inverse @ self.boundary.targets(frame, rows @ z[indices])
+        return self._parts[key]
 
     def _prepare(self, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         held = set(vertices.tolist())
