@@ -94,10 +94,11 @@ class Reduction:
 
         For orthonormal V: || p - p^ || <= gain || (I - V V^T)(p - mean) || (Chaturantabut and
         Sorensen 2010, lemma 3.2). It holds for separate axes too, where the parts V_a of V have
-        norm at most 1, but not for the Tikhonov solve, which is no projection: its gain is the
-        norm of its operator. With mass weighting V is orthonormal in the mass inner product and
-        the factor of the error in that norm is || (P^T V)^+ P^T M^(-1/2) ||_2 instead; the gain
-        stays the amplification of sampled values, as for the other methods.
+        norm at most 1. The Tikhonov solve is no projection: its gain is the norm of its operator,
+        its factor sqrt(1 + gain^2), and a bias is added. With mass weighting V is orthonormal in
+        the mass inner product and the factor of the error in that norm is
+        || (P^T V)^+ P^T M^(-1/2) ||_2 instead; the gain stays the amplification of sampled values,
+        as for the other methods.
         """
         return self._norms[0]
 
