@@ -1,26 +1,19 @@
-"""A small project whose scene lies outside the study, with all results that are drawn of it."""
+"""A small project with a scene outside the study, and jobs of a scene that run in this process."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 from bad_input.project import SMALL_SCENE, make_project
 from pdrom.core.yamlfile import read_yaml
 from pdrom.experiments.kit.declaration import experiments
+from pdrom.pipeline.contents import labels_of
 from pdrom.pipeline.resolve import Resolver
 from pdrom.pipeline.study import Study
 
 SCENE = "own"
 NEEDED = (
-    "mesh",
-    "fom",
-    "sensitivity",
-    "iterations",
-    "snapshots",
-    "pod",
-    "reruns",
-    "subspaces",
-    "timing",
-)
+    "mesh", "fom", "sensitivity", "iterations", "snapshots", "pod", "reruns", "subspaces", "timing",
+)  # fmt: skip
 CHANGES = {
     "ranks": [2, "full"],
     "sensitivity": {"perturbations": [1e-10], "seeds": [1]},
@@ -39,30 +32,12 @@ def small_study(root: Path) -> Study:
     return Study.load({**config, **CHANGES}, root)
 
 
-def run_jobs(study: Study, results: str) -> None:
-    """Every job that the scene's artifacts need, in this process, as the workflow runs them."""
+def run_jobs(study: Study, results: str, names: Iterable[str], scene: str) -> None:
+    """Every job of these experiments for a scene, in this process, as the workflow runs them."""
     resolver = Resolver(study, results)
-    for name in NEEDED:
-        for labels in _labels(study, name):
-            job = resolver.job(experiments()[name], labels)
+    for name in names:
+        made = experiments()[name]
+        kind = max(made.writes.values(), key=lambda place: len(place.labels))
+        for labels in labels_of(study.only(scene), kind):
+            job = resolver.job(made, labels)
             job.make(job.outputs)
-
-
-def _labels(study: Study, name: str) -> Iterator[dict[str, str]]:
-    only = study.only(SCENE)
-    match name:
-        case "mesh":
-            yield {"mesh": study.mesh_of(SCENE)}
-        case "fom":
-            yield from ({"scene": SCENE, "run": run} for run in ("train", "heldout"))
-        case "sensitivity" | "iterations" | "subspaces" | "timing":
-            yield {"scene": SCENE}
-        case "snapshots":
-            yield from ({"scene": s, "group": g} for s, g in only.experiments)
-        case "pod":
-            bases = {method.basis_id for method in study.methods.values()}
-            found = [(s, g, b) for s, g in only.experiments for b in sorted(bases)]
-            yield from ({"scene": s, "group": g, "basis": b} for s, g, b in found)
-        case "reruns":
-            found = [(s, g, m) for s, g in only.experiments for m in study.methods]
-            yield from ({"scene": s, "group": g, "method": m} for s, g, m in found)

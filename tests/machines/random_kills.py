@@ -48,11 +48,13 @@ def kind(process: psutil.Process) -> str:
     """One of the kinds, or nothing for a shell between two of them."""
     try:
         words = " ".join(process.cmdline())
-        if "warm/client.py" in words:
+        if "fork_server/client.py" in words:
             return "client" if " -I -S " in words and "bash" not in words else ""
-        if "warm.server" in words:
-            return "job" if "warm.server" in " ".join(process.parent().cmdline()) else "server"
-        if "warm/alone.py" in words:
+        if "fork_server.server" in words:
+            return (
+                "job" if "fork_server.server" in " ".join(process.parent().cmdline()) else "server"
+            )
+        if "fork_server/alone.py" in words:
             return "job"
         return "front" if "pdrom.pipeline.front" in words else ""
     except (psutil.Error, AttributeError):  # it has ended meanwhile

@@ -23,7 +23,7 @@ FREE: list[dict] = []
 
 
 class _Drawn:
-    """Projections drawn anew in every iteration, on the sphere of each element."""
+    """Other random projections in every iteration, on the sphere of each element."""
 
     def __init__(self, scene: Scene, scale: float) -> None:
         (self._group,) = scene.groups

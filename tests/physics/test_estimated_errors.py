@@ -23,13 +23,13 @@ FRAMES, THRESHOLD = 30, 0.015
 
 @dataclass(frozen=True)
 class Swing:
-    """A sheet that swings, its springs reduced, and a companion that is not exact either."""
+    """A sheet that swings, its springs reduced, and an auxiliary model that is not exact either."""
 
     scene: Scene
     reference: np.ndarray
     trained: Trained
     own: np.ndarray
-    """|| Q' - Q_fom ||_F of each frame of the companion Q', m"""
+    """|| Q' - Q_fom ||_F of each frame of the auxiliary model Q', m"""
 
     def run(self, method: str, action: Action) -> tuple[Rerun, GuardRecord]:
         group, spec = self.scene.groups[0], load_methods(CONFIG / "methods.yaml")[method]

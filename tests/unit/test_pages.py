@@ -61,6 +61,15 @@ def test_paths_of_the_project_exist(page: Path) -> None:
     assert [p for p in PATH.findall(text) if p not in made and not (ROOT / p).exists()] == []
 
 
+def test_a_line_of_prose_holds_one_sentence() -> None:
+    """So that a diff shows the sentence that changed; initials and ``...`` end none."""
+    other = re.compile(r"```.*?```|^(?:\||#|\d+\. ).*?$", re.DOTALL | re.MULTILINE)
+    two = re.compile(r"(?<!\b[A-Z])(?<!\.\.)[.!?][)*\"]* +[*(\"\[]*[A-Z`]")
+    pages = [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
+    lines = [line for page in pages for line in other.sub("", page.read_text("utf-8")).splitlines()]
+    assert [line for line in lines if two.search(line)] == []
+
+
 def test_every_page_is_listed() -> None:
     listed = LINK.findall((ROOT / "docs" / "README.md").read_text("utf-8"))
     pages = {page.name for page in (ROOT / "docs").glob("*.md")} - {"README.md"}

@@ -131,8 +131,8 @@ class Sandbox:
     def results(self) -> dict[str, str]:
         """Digest of every result, all of them intact; what a clock measured is left out."""
         files = [p for p in self.path("results").rglob("[!.]*") if p.is_file()]
-        sealed = [p for p in files if p.suffix != ".log"]
-        assert {check_file(p) for p in sealed} == {"intact"}
+        with_checksum = [p for p in files if p.suffix != ".log"]
+        assert {check_file(p) for p in with_checksum} == {"intact"}
         names = {str(p.relative_to(self.folder)): p for p in files}
         kept = {name: path for name, path in sorted(names.items()) if not _timed(path)}
         return {name: _digest(path, self.folder) for name, path in kept.items()}
@@ -149,7 +149,7 @@ def _cksum(content: bytes) -> str:
 
 
 def _timed(path: Path) -> bool:
-    """Whether a clock has a say; the manifest has checksums of files in which it has."""
+    """Whether a file depends on timing, as the manifest does by the checksums in it."""
     apart = "logs" in path.parts or path.name == MANIFEST.pattern
     return path.parts[-2] in TIMED_FOLDERS or path.stem in TIMED_FIGURES or apart
 

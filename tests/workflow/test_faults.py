@@ -20,7 +20,7 @@ from pathlib import Path
 import pytest
 from sandbox import Sandbox, kill_all, wait_for
 
-from pdrom.core.store import seal_path
+from pdrom.core.store import checksum_path
 from places import MICRO_MANUSCRIPT, MICRO_RESULTS
 
 TABLE = f"{MICRO_RESULTS}/tables/reconstruction_error.csv"
@@ -319,8 +319,8 @@ def flip_a_bit(path: Path) -> None:
            + old[len(old) // 2 + 1 :])  # fmt: skip
 
 
-def flip_bits_of_file_and_seal(path: Path) -> None:
-    """Change one bit of each; an HDF5 file begins with its seal."""
+def flip_bits_of_file_and_checksum(path: Path) -> None:
+    """Change one bit of each; an HDF5 file begins with its checksum."""
     flip_a_bit(path)
     change(path, lambda old: old[:200] + bytes([old[200] ^ 4]) + old[201:])
 
@@ -350,9 +350,9 @@ def lose_a_row(path: Path) -> None:
     change(path, lambda old: b"".join(r for i, r in enumerate(old.splitlines(True)) if i != 2))
 
 
-def lose_the_seal(path: Path) -> None:
+def lose_the_checksum(path: Path) -> None:
     """As a copy of the file alone, or a job that was killed at the wrong moment."""
-    seal_path(path).unlink()
+    checksum_path(path).unlink()
 
 
 def find_damage(sandbox: Sandbox, damaged: str, missing: list[str], target: str = TABLE) -> None:
@@ -382,11 +382,11 @@ BETWEEN = {
         (RUN, zero_last_sector),
         (RUN, zero_last_page),
         (SNAPSHOTS, flip_a_bit),
-        (BASIS, flip_bits_of_file_and_seal),
+        (BASIS, flip_bits_of_file_and_checksum),
         (BASIS, truncate),
         (f"{SAMPLING}.csv", cut_at_a_line_end),
         (f"{SAMPLING}.csv", flip_a_bit),
-        (f"{SAMPLING}.csv", lose_the_seal),
+        (f"{SAMPLING}.csv", lose_the_checksum),
     ],
 )
 def test_a_damaged_result(

@@ -295,7 +295,7 @@ def test_registering_a_selection_reruns_the_methods_that_use_it(finished: Checko
 
 
 def test_a_selection_reruns_the_methods_that_use_it(finished: Checkout) -> None:
-    """In the full order and in other methods it has no say."""
+    """The full order and other methods do not depend on it."""
     greedy = "src/pdrom/reduction/sampling/pivoted_qr.py"
     finished.edit(greedy, "for r in ranks}", "for r in sorted(ranks)}")
     planned = finished.planned(*MICRO_ARGUMENTS)

@@ -25,12 +25,12 @@ class GuardSettings(guard_settings.GuardSettings):
         try:
             super().__init__(**keys)
         except ValidationError as error:
-            told = describe(error, guard_settings.GuardSettings)
-            raise ConfigurationError(f"GuardSettings: {told}") from error
+            reported = describe(error, guard_settings.GuardSettings)
+            raise ConfigurationError(f"GuardSettings: {reported}") from error
 
 
 def require(kind: type[T] | tuple[type[T], ...], value: Any, name: str, source: str) -> T:
-    """``value`` if it is a ``kind``; ``source`` is where one comes from."""
+    """``value`` if it is a ``kind``; errors call it ``name`` and say its ``source``."""
     if isinstance(value, kind):
         return value
     kinds = " or ".join(k.__name__ for k in (kind if isinstance(kind, tuple) else (kind,)))
@@ -45,7 +45,7 @@ def file_path(path: Any) -> Path:
 
 
 def modes(r: Any) -> int:
-    """Number of modes as an int; which numbers a basis allows is checked where they are taken."""
+    """Number of modes ``r`` as an int; which are allowed is checked where they are taken."""
     if isinstance(r, bool) or not isinstance(r, Integral):
         raise ConfigurationError(f"r = {shown(r, 60)}: a whole number of modes is required")
     return int(r)
@@ -67,8 +67,8 @@ def methods() -> dict[str, MethodSpec]:
 
 
 def fitting_basis(made: Any, group: ConstraintGroup, spec: MethodSpec) -> Basis:
-    """``made`` if it is a basis of the group's projections that the method can use."""
-    basis = require(Basis, made, "basis_of_group", "pdrom.api.basis makes one")
+    """``made`` if it is a basis of the group's projections that the method ``spec`` can use."""
+    basis = require(Basis, made, "basis_of_group", source="pdrom.api.basis makes one")
     found, needed = ((each.elements, each.rows_per_element) for each in (basis, group))
     if found != needed:
         raise ConfigurationError(

@@ -35,7 +35,7 @@ def save(reduced: ReducedRun, path: str | os.PathLike[str]) -> None:
     ConfigurationError, StorageError
         No reduced run; the file cannot be written.
     """
-    require(ReducedRun, reduced, "reduced", "pdrom.api.reduce makes one")
+    require(ReducedRun, reduced, "reduced", source="pdrom.api.reduce makes one")
     path = file_path(path)
     config = reduced.full.scene.config.model_dump(mode="json")
     labels = {"group": reduced.group, "method": reduced.method, "r": reduced.r}
@@ -43,7 +43,11 @@ def save(reduced: ReducedRun, path: str | os.PathLike[str]) -> None:
     with made_by("pdrom.api.save", {"scene": config, **labels}), write_hdf5(path) as file:
         file.attrs.update(labels | {"gain": reduced.gain, "ms_per_frame": reduced.ms})
         file.attrs["blowup_frame"] = -1 if outcome.blowup_frame is None else outcome.blowup_frame
-        seen = {key: told for key, told in reduced.seen.columns().items() if told is not None}
+        seen = {
+            key: reported
+            for key, reported in reduced.seen.columns().items()
+            if reported is not None
+        }
         file.attrs.update({**seen, "guard_stopped": reduced.seen.stopped})
         store_mesh(reduced.full.scene.mesh, file.create_group("mesh"))
         _store(file, "reduced", outcome.positions.astype(np.float32), "m")
@@ -131,26 +135,27 @@ def _reduced(scene: Scene, file: h5py.File) -> ReducedRun:
     return ReducedRun(full, group, method, r, gain, outcome, ms, _seen(file.attrs))
 
 
-def _seen(told: Mapping[str, Any]) -> GuardRecord:
+def _seen(reported: Mapping[str, Any]) -> GuardRecord:
     """Record of the guard; nothing in a file without one."""
-    if "guard_count" not in told:
+    if "guard_count" not in reported:
         return GuardRecord.unwatched()
-    frame, reason = told.get("guard_frame"), told.get("guard_reason")
-    estimate = told.get("guard_estimate")
+    frame, reason = reported.get("guard_frame"), reported.get("guard_reason")
+    estimate = reported.get("guard_estimate")
     return GuardRecord(
         frame=None if frame is None else int(frame),
         reason=None if reason is None else str(reason),
-        count=int(told["guard_count"]),
-        fallback_frames=int(told["fallback_frames"]),
+        count=int(reported["guard_count"]),
+        fallback_frames=int(reported["fallback_frames"]),
         estimate=None if estimate is None else float(estimate),
-        stopped=bool(told["guard_stopped"]),
+        stopped=bool(reported["guard_stopped"]),
     )
 
 
 def _scene(file: h5py.File, path: Path) -> Scene:
     """The scene of a run; its mesh from the file, where it was stored."""
-    config = json.loads(file.attrs["configuration"])["scene"]
-    scene = validate(SceneConfig, config, str(path))
+    settings = json.loads(file.attrs["configuration"])
+    # the pipeline's job names its setting `config`
+    scene = validate(SceneConfig, settings.get("config") or settings["scene"], str(path))
     if "mesh" in file:
         return Scene.build(scene, stored_mesh(file["mesh"]))
     return bound(scene, Path(), str(path))

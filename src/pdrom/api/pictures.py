@@ -41,7 +41,7 @@ def plot(*runs: ReducedRun) -> Figure:
     if not runs:
         raise SceneError("plot: at least one run is required")
     for run in runs:
-        require(ReducedRun, run, "plot", "pdrom.api.reduce makes one, load reads one")
+        require(ReducedRun, run, "plot", source="pdrom.api.reduce makes one, load reads one")
     with style.look():
         figure = Figure(figsize=(style.WIDTH, 3.0), layout="constrained")
         ax = figure.subplots()
@@ -89,7 +89,7 @@ def viewed_scenes(*runs: FullRun | ReducedRun) -> list[ViewedScene]:
     if not runs:
         raise SceneError("view: at least one run is required")
     for run in runs:
-        require((FullRun, ReducedRun), run, "view", "pdrom.api.run and reduce make one")
+        require((FullRun, ReducedRun), run, "view", source="pdrom.api.run and reduce make one")
     scenes: dict[str, tuple[FullRun, list[ReducedRun]]] = {}
     for run in runs:
         full = run.full if isinstance(run, ReducedRun) else run

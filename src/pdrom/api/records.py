@@ -77,7 +77,7 @@ class ReducedRun:
 
 
 def full_run(scene: Scene, file: h5py.File) -> FullRun:
-    """A run as it lies in a file."""
+    """Full-order run of ``scene`` from the open HDF5 ``file``."""
     stored = file.get("snapshots", {})
     return FullRun(
         scene,

@@ -61,13 +61,13 @@ def run(
     ConfigurationError, StorageError
         No scene; ``out`` cannot be written, which is found before anything runs.
     """
-    require(Scene, scene, "scene", "build_scene and load_scene make one")
+    require(Scene, scene, "scene", source="build_scene and load_scene make one")
     if out is not None:
         require_place(file_path(out))
     frames = {group: _training_frames(scene, group) for group in scene.config.groups}
     config = scene.config.model_dump(mode="json")
-    told = {"scene": config, "run": "train", "solver": DEFAULT_SOLVER}
-    with made_by("pdrom.api.run", told), _place(out) as path:
+    reported = {"scene": config, "run": "train", "solver": DEFAULT_SOLVER}
+    with made_by("pdrom.api.run", reported), _place(out) as path:
         run_full_order(scene, path, frames, with_mesh=True, on_frame=on_frame)
         with open_hdf5(path) as file:
             return full_run(scene, file)
@@ -94,14 +94,16 @@ def basis(full: FullRun, group: str, method: str | MethodSpec = "pod") -> Basis:
     ConfigurationError, SceneError, SnapshotError
         No run, no such method, no such group, or its snapshots are too few or not finite.
     """
-    require(FullRun, full, "full", FULL_RUN)
-    chosen = full.scene.group(require(str, group, "group", GROUP))
+    require(FullRun, full, "full", source=FULL_RUN)
+    chosen = full.scene.group(require(str, group, "group", source=GROUP))
     spec = method_spec(method)
     if group not in full.snapshots:
         raise SnapshotError(f"group '{group}': the run stored no snapshots of it")
     data, masses = full.snapshots[group], row_masses(chosen, full.scene.masses)
     roundoff = float(np.linalg.norm(data.roundoff))
-    return compute_basis(data.p, masses, roundoff, chosen.rows_per_element, spec)
+    return compute_basis(
+        data.p, masses, roundoff, rows_per_element=chosen.rows_per_element, spec=spec
+    )
 
 
 def reduce(
@@ -123,8 +125,8 @@ def reduce(
     method : name in config/methods.yaml, or a specification
     r : number of modes, from 1 to the rank of the basis
     basis_of_group : of the group, by `basis` for the same method; made of ``full`` without it
-    guard : what watches the run, and what follows from an alarm; a companion that estimates its
-        error is trained on ``full``
+    guard : what watches the run, and what follows from an alarm; an auxiliary model that estimates
+        its error is trained on ``full``
 
     Returns
     -------
@@ -140,18 +142,21 @@ def reduce(
     RankError
         The snapshots have fewer than r modes above round-off.
     NotReducibleError
-        A companion is asked for, and the scene has an effect that no position subspace takes.
+        An auxiliary model is asked for, and the scene has an effect that no position subspace
+        takes.
     """
-    scene, spec = require(FullRun, full, "full", FULL_RUN).scene, method_spec(method)
-    r, chosen = modes(r), scene.group(require(str, group, "group", GROUP))
-    require(GuardSettings, guard, "guard", "as in GuardSettings(action='stop')")
+    scene, spec = require(FullRun, full, "full", source=FULL_RUN).scene, method_spec(method)
+    r, chosen = modes(r), scene.group(require(str, group, "group", source=GROUP))
+    require(GuardSettings, guard, "guard", source="as in GuardSettings(action='stop')")
     if basis_of_group is None:
         made = basis(full, group, spec)
     else:
         made = fitting_basis(basis_of_group, chosen, spec)
-    reduction = Reduction(made, select(made, spec, r), spec, r)
+    reduction = Reduction(made, select(made, spec, r), spec, r=r)
     trained = _trained(full, group, guard)
-    advance, seen = guarded(scene, scene.system, group, reduction, guard, trained)
+    advance, seen = guarded(
+        scene, scene.system, group, reduction=reduction, settings=guard, trained=trained
+    )
     seconds: list[float] = []
     start, frames, unit = scene.initial_state(), scene.config.frames, scene.mesh.extent
     frame_by_frame = BoundedRun(_clocked(advance, seconds), start, frames, BLOWUP_EXTENT, unit)
@@ -167,7 +172,7 @@ def _trained(full: FullRun, group: str, guard: GuardSettings) -> Trained:
     if guard.action != "none" and guard.alarm == "estimate":
         frames = _training_frames(full.scene, group)
         training = full.positions[1:][frames]
-        companion = companion_model(full.scene, training, frames, CompanionSpec())
+        companion = companion_model(full.scene, training, frames, spec=CompanionSpec())
     return Trained.on(full.positions, companion)
 
 

@@ -68,7 +68,7 @@ def build_scene(folder: str | os.PathLike[str] = ".", mesh: Any = None, **keys: 
 
 
 def bound(config: SceneConfig, folder: Path, source: str) -> Scene:
-    """``config`` with its mesh; ConfigurationError, which ``source`` opens, for any fault."""
+    """``config`` with its mesh, files below ``folder``; errors open with ``source``."""
     try:
         return Scene.build(config, config.mesh.build(folder))
     except PdromError as error:

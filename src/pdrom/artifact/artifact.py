@@ -85,11 +85,11 @@ class Artifact:
         return self.function(*arguments, **named)
 
     def inputs(self, sources: Sources, labels: Labels) -> dict[str, Paths]:
-        """Paths that a job with these labels reads, by name."""
+        """Paths among ``sources`` that a job with these ``labels`` reads, by name."""
         return {name: read.paths(sources, labels) for name, read in self.files.items()}
 
     def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
-        """Typed settings of a job with these labels, by name.
+        """Typed settings from ``sources`` of a job with these ``labels``, by name.
 
         Raises
         ------
@@ -104,13 +104,13 @@ class Artifact:
         return found
 
     def plain(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """Settings as plain data; of a section as much as the function's annotation asks for."""
+        """``settings`` as plain data; of a section as much as the function is annotated for."""
         return {k: self.types[k].dump_python(v, mode="json") for k, v in settings.items()}
 
     def perform(
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
     ) -> None:
-        """Run a job from plain settings and paths, as the workflow knows them.
+        """Run a job from plain ``settings`` and paths by name, ``inputs`` and ``outputs``.
 
         Raises
         ------
@@ -121,7 +121,7 @@ class Artifact:
         self.function(**self.read(settings, inputs), **made)
 
     def read(self, settings: Mapping[str, Any], inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """Arguments of the function: the content of files, and typed settings."""
+        """Arguments of the function: content of the files ``inputs``, and typed ``settings``."""
         content = {name: read.content(inputs[name]) for name, read in self.files.items()}
         return content | {k: t.validate_python(settings[k]) for k, t in self.types.items()}
 
@@ -144,6 +144,7 @@ def make(
     labels : those of the job
     code : fingerprint of the code that it runs
     inputs, outputs : paths by name
+    rule : name of the workflow's rule, recorded in what is written
     """
     with made_by(rule, {**settings, "labels": dict(labels)}, code):
         load(address).perform(settings, inputs, outputs)
@@ -165,7 +166,7 @@ def declare(made: A, *parameters: str) -> A:
 
 
 def normal(reads: Mapping[str, Read | Place]) -> dict[str, Read]:
-    """Reads, where a place alone stands for the file of the job."""
+    """``reads``, where a place alone stands for the file of the job."""
     return {k: One(read) if isinstance(read, Place) else read for k, read in reads.items()}
 
 

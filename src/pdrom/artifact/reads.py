@@ -20,35 +20,40 @@ class Sources(Protocol):
     """Answers of a study about its files and settings, for a job with some labels."""
 
     def file(self, place: Place, labels: Labels) -> str:
-        """Return the file of a kind that belongs to a job."""
+        """Return the file of a kind (``place``) that belongs to a job with these ``labels``."""
         ...
 
     def files(self, place: Place, labels: Labels) -> list[str]:
-        """Return every file of a kind whose labels agree with those of a job."""
+        """Return every file of a kind (``place``) that agrees with the ``labels`` of a job."""
         ...
 
     def first(self, place: Place, label: str, value: str) -> list[str]:
-        """Return a file for each set of other labels, see `Preferred`."""
+        """Return a file of ``place`` for each set of other labels, see `Preferred`.
+
+        Parameters
+        ----------
+        label, value : the preferred value of a label
+        """
         ...
 
     def chosen(self, place: Place, first: bool) -> list[str]:
-        """Return the files of a kind that a figure's options choose, see `Chosen`."""
+        """Return the files of ``place`` that a figure's options choose, or the ``first`` only."""
         ...
 
     def table(self, name: str) -> str:
-        """Return the file of a table."""
+        """Return the file of the table ``name``."""
         ...
 
     def published(self, name: str) -> list[str]:
-        """Return the published code's table where the options ask for it, see `Published`."""
+        """Return the published code's table ``name`` where the options request it."""
         ...
 
     def value(self, key: str, labels: Labels) -> Any:
-        """Return a value of the configuration, or one that is derived from it for the job."""
+        """Return the value of ``key`` in the configuration, or derived for a job's ``labels``."""
         ...
 
     def per_scene(self, key: str) -> dict[str, Any]:
-        """Return a value of every scene's configuration by the scene's name."""
+        """Return the value of ``key`` in every scene's configuration, by the scene's name."""
         ...
 
 
@@ -58,11 +63,11 @@ class FileRead:
     edited = False  # by people, so that the content decides and not the date
 
     def paths(self, sources: Sources, labels: Labels) -> Paths:
-        """Return the path, or all paths, for a job with these labels."""
+        """Return the path, or all paths, among ``sources`` for a job with these ``labels``."""
         raise NotImplementedError
 
     def content(self, paths: Any) -> Any:
-        """Return what the function of the artifact gets."""
+        """Return what the function of the artifact gets for ``paths``."""
         raise NotImplementedError
 
 
@@ -70,7 +75,7 @@ class SettingRead:
     """Something that is read from the configuration."""
 
     def value(self, sources: Sources, labels: Labels) -> Any:
-        """Return the value for a job with these labels."""
+        """Return the value from ``sources`` for a job with these ``labels``."""
         raise NotImplementedError
 
 

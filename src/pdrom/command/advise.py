@@ -57,7 +57,7 @@ def perform(arguments: argparse.Namespace) -> Status:
 
 
 def _name(asked: str) -> str:
-    """Name of a scene; a scene's file is read, so that its faults are told."""
+    """Name of a scene; a scene's file is read, so that its faults are reported."""
     from pdrom.core.yamlfile import read_yaml, validate
     from pdrom.model.scene import SceneConfig
 

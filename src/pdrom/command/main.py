@@ -55,7 +55,7 @@ def run(arguments: Sequence[str]) -> int:
             asked = _asked(arguments)
             return int(asked.perform(asked))
         finally:
-            sys.stdout.flush()  # here, not at the end of the process, a failure can be told
+            sys.stdout.flush()  # here, not at the end of the process, a failure can be reported
     except PdromError as error:
         return _fail(str(error))
     except MemoryError:

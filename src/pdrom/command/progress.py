@@ -37,7 +37,7 @@ class Progress:
         # the first frame may compile kernels, which no other does
         each = (now - self._first) / (done - 1) if done > 1 else now - self._started
         left = each * (self._frames - done)
-        text = line(self._name, done, self._frames, 1e3 * float(report.seconds.sum()), left)
+        text = line(self._name, done, self._frames, ms=1e3 * float(report.seconds.sum()), left=left)
         self._stream.write(f"\r{text}  " if self._terminal else f"{text}\n")
         if self._terminal and done == self._frames:
             self._stream.write("\n")

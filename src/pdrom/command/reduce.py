@@ -29,7 +29,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--r", metavar="R", type=_size, default=20, help="number of modes (20)")
     parser.add_argument(
-        "--run", metavar="FILE", help="full-order run by pdrom run; it is made anew without it"
+        "--run", metavar="FILE", help="full-order run by pdrom run; made first if it is left out"
     )
     parser.add_argument(
         "--out", metavar="FILE", help="file to write (HDF5); SCENE_G_M_R.h5 without it"
@@ -75,11 +75,11 @@ def perform(arguments: argparse.Namespace) -> Status:
             raise StorageError(f"{arguments.run}: a run of another scene than {arguments.scene}")
     else:
         full = run(scene, on_frame=Progress(scene.config.name, scene.config.frames))
-    reduced = reduce(full, arguments.group, arguments.method, arguments.r, guard=guard)
+    reduced = reduce(full, arguments.group, arguments.method, r=arguments.r, guard=guard)
     save(reduced, out)
     if arguments.plot:
         picture = plot(reduced)
-        with atomic_path(arguments.plot, sealed=False) as path:
+        with atomic_path(arguments.plot, with_checksum=False) as path:
             picture.savefig(path, dpi=200)
     sys.stdout.write(f"{out}: {_told(reduced)}\n")
     return Status.DONE if reduced.outcome.finite else Status.BLEW_UP
@@ -127,11 +127,11 @@ def _told(reduced: "ReducedRun") -> str:
 
     outcome, full = reduced.outcome, reduced.full
     if not outcome.finite:
-        told = f"blew up at frame {outcome.blowup_frame} (gain {reduced.gain:.3g})"
+        reported = f"blew up at frame {outcome.blowup_frame} (gain {reduced.gain:.3g})"
     else:
         speed = f"{reduced.ms:.2f} ms a frame (full order {np.median(full.ms):.2f})"
-        told = f"{_error(reduced)}, gain {reduced.gain:.3g}, {speed}"
-    return f"{reduced.title}: {told}{_seen(reduced)}"
+        reported = f"{_error(reduced)}, gain {reduced.gain:.3g}, {speed}"
+    return f"{reduced.title}: {reported}{_seen(reduced)}"
 
 
 def _error(reduced: "ReducedRun") -> str:
@@ -148,11 +148,11 @@ def _seen(reduced: "ReducedRun") -> str:
     seen = reduced.seen
     if not seen.watched:
         return ""
-    told = "; no alarm"
+    reported = "; no alarm"
     if seen.frame is not None:
-        told = f"; alarms in {seen.count} frames, first in {seen.frame} ({seen.reason})"
-        told += f", {seen.fallback_frames} repeated" if seen.fallback_frames else ""
-    return told if seen.estimate is None else f"{told}; estimated error {seen.estimate:.2g}"
+        reported = f"; alarms in {seen.count} frames, first in {seen.frame} ({seen.reason})"
+        reported += f", {seen.fallback_frames} repeated" if seen.fallback_frames else ""
+    return reported if seen.estimate is None else f"{reported}; estimated error {seen.estimate:.2g}"
 
 
 COMMAND = Command(

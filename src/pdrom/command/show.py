@@ -68,12 +68,12 @@ def _hdf5(path: Path, whole: bool) -> Iterator[str]:
 
 
 def _provenance(path: Path) -> Iterator[str]:
-    """Provenance of the file by its seal, which is compared with the file."""
+    """Provenance of the file by its checksum, which is compared with the file."""
     from pdrom.core.provenance import RECORD
     from pdrom.core.store import provenance_of
 
     record = provenance_of(path)
-    yield "provenance:" if record else "provenance: unknown (no seal says it)"
+    yield "provenance:" if record else "provenance: unknown (no checksum says it)"
     yield from (f"  {name}: {record[name]}" for name in RECORD if name in record)
 
 
@@ -84,8 +84,8 @@ def _item(name: str, item: Any) -> Iterator[str]:
         unit = item.attrs.get("unit", "")
         shape = " x ".join(map(str, item.shape)) or "one value"
         more = [f"{k}: {_short(v)}" for k, v in item.attrs.items() if k != "unit"]
-        told = ", ".join(filter(None, [f"{shape} {item.dtype}", unit and f"in {unit}", *more]))
-        yield f"  {name}: {told}"
+        reported = ", ".join(filter(None, [f"{shape} {item.dtype}", unit and f"in {unit}", *more]))
+        yield f"  {name}: {reported}"
     elif item.attrs:
         yield f"  {name}/: {', '.join(f'{k} = {_short(v)}' for k, v in item.attrs.items())}"
 
@@ -99,7 +99,7 @@ def _configuration(configuration: Any, whole: bool) -> Iterator[str]:
         yield from (f"  {line}" for line in text.splitlines())
         return
     for name, value in configuration.items():
-        if name == "scene" and isinstance(value, dict):
+        if isinstance(value, dict) and {"name", "title"} <= value.keys():  # a scene
             value = f"{value['name']} ({value['title']})"
         yield f"  {name}: {_short(value)}"
 

@@ -7,7 +7,7 @@ import numpy as np
 
 
 def brief(record: Any) -> str:
-    """A dataclass as its name and fields; an array is shown by its shape and type.
+    """The dataclass ``record`` as its name and fields; an array is shown by its shape and type.
 
     A class takes it as its ``__repr__``.
     """

@@ -5,7 +5,7 @@ from difflib import get_close_matches
 
 
 def choices(value: object, allowed: Iterable[object]) -> str:
-    """The end of a message: what is allowed, and the name that was probably meant."""
+    """End of a message about ``value``: what is allowed, and the name that was probably meant."""
     names = [str(name) for name in allowed]
     close = get_close_matches(str(value), names, n=1)
     return f" (allowed: {', '.join(names)})" + (f", did you mean '{close[0]}'?" if close else "")

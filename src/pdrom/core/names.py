@@ -31,12 +31,12 @@ def check_lengths(path: str) -> None:
 
 
 def name_of(stem: str) -> str:
-    """A scene's name, as near to the name of its file (without the ending) as is allowed."""
+    """A scene's name from ``stem``, its file's name without the ending, as far as allowed."""
     return re.sub(r"[^a-z0-9_]+", "_", stem.lower()).lstrip("_0123456789")[:64] or "scene"
 
 
 def named(keys: Any, stem: str) -> Any:
-    """``keys`` of a scene's file with a name and a title, made from the file's name."""
+    """``keys`` of a scene's file with a name and a title, made from the file's name ``stem``."""
     if not isinstance(keys, dict):
         return keys
     name = keys.get("name", name_of(stem))

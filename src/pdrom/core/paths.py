@@ -18,7 +18,7 @@ RESULTS = "results"
 LABELS = {
     "mesh": r"[A-Za-z0-9_.-]+",
     "scene": r"[a-z][a-z0-9_]*",
-    "run": r"train|heldout",
+    "run": r"train|heldout|kick|stiffness",
     "group": r"[a-z_]+",
     "basis": r"[a-z0-9-]+",
     "method": r"[a-z0-9-]+",
@@ -38,7 +38,7 @@ class Place:
         return f"{results}/{self.pattern.format(**labels)}"
 
     def rule(self, results: str) -> str:
-        """Path with its labels left in braces, as a rule of the workflow writes it."""
+        """Path below ``results`` with labels left in braces, as rules of the workflow have it."""
         return f"{results}/{self.pattern}"
 
     def where(self, **labels: str) -> "Place":
@@ -58,7 +58,7 @@ class Place:
         return File(path, found.groupdict())
 
     def files(self, paths: Iterable[str]) -> "list[File]":
-        """`file` of each path, in order."""
+        """`file` of each of ``paths``, in order."""
         return [self.file(path) for path in paths]
 
     @cached_property
@@ -145,6 +145,8 @@ TABLE = Place("tables/{name}.csv")
 FIGURE = Place("figures/{name}.pdf")
 FIGURE_PICTURE = Place("figures/{name}.png")
 PAPER_INPUT = Place("paper/{name}")
+LIVE_MODEL = Place("article/live/{scene}.js")
+LIVE_PAGE = Place("article/live.html")
 SCENE_TABLE = Place("scenes/{scene}/{name}.csv")
 SCENE_RUNS = Place("scenes/{scene}/runs.csv")
 

@@ -17,7 +17,7 @@ def checkout() -> Path | None:
 
 
 def config_file(name: str) -> Path:
-    """File of ``config``: that of the checkout, which people edit, else the package's own."""
+    """File ``name`` of ``config``: of the checkout, which people edit, or of the package."""
     root = checkout() or Path(str(files("pdrom")))
     return root / "config" / name
 

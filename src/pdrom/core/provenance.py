@@ -1,7 +1,7 @@
 """Where a result comes from: what made it, with which settings, code and libraries.
 
 A job states once what it is (`made_by`). Whatever `pdrom.core.store` writes meanwhile carries that:
-every file in its seal, HDF5 files inside as well. Nothing in it differs
+every file in its checksum, HDF5 files inside as well. Nothing in it differs
 between two equal runs: no date, no folder, and no commit, since a commit that changes a word of the
 documentation makes no other result.
 """
@@ -49,7 +49,13 @@ _AT_WORK: ContextVar[Job | None] = ContextVar("job", default=None)
 
 @contextmanager
 def made_by(name: str, configuration: Any, code: str = "") -> Iterator[None]:
-    """Record the job ``name`` in all files that are written meanwhile."""
+    """Record the job ``name`` in all files that are written meanwhile.
+
+    Parameters
+    ----------
+    configuration : settings of the job, hashed as JSON
+    code : fingerprint of the code that it runs
+    """
     previous = _AT_WORK.set(Job(name, _canonical(configuration), code))
     try:
         yield
@@ -93,7 +99,7 @@ def attributes() -> dict[str, str]:
 
 
 def as_text(record: Mapping[str, str]) -> str:
-    """A record in one line, as a seal holds it."""
+    """A record in one line, as a checksum holds it."""
     return json.dumps(dict(record), sort_keys=True)
 
 

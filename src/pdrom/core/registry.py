@@ -15,6 +15,7 @@ class Registry(Mapping[str, str]):
     """Read-only map from a name to the place of its implementation."""
 
     def __init__(self, kind: str, entries: Mapping[str, str]) -> None:
+        """Take ``entries``, "module:Class" by name; ``kind`` names them in messages."""
         self.kind = kind
         self._entries = dict(entries)
 

@@ -67,7 +67,7 @@ def _composer_error(event: Any, fault: str) -> yaml.YAMLError:
 
 
 def read_yaml(path: Path) -> Any:
-    """Content of a YAML file; ConfigurationError if it is missing or not plain YAML."""
+    """Content of the YAML file ``path``; ConfigurationError if missing or not plain YAML."""
     try:
         if not path.is_file():
             raise ConfigurationError(f"{path}: no such configuration file")
@@ -86,7 +86,7 @@ def read_yaml(path: Path) -> Any:
 
 
 def validate(model: type[M], data: Any, source: str) -> M:
-    """``data`` as an instance of ``model``; ConfigurationError naming file, key and value."""
+    """``data`` of a file ``source`` as a ``model``; ConfigurationError names key and value."""
     if not isinstance(data, dict):
         found = "nothing" if data is None else shown(data, 60)
         raise ConfigurationError(f"{source}: a mapping of keys is required, found {found}")
@@ -97,7 +97,7 @@ def validate(model: type[M], data: Any, source: str) -> M:
 
 
 def describe(error: ValidationError, model: type[BaseModel]) -> str:
-    """The first fault of a validation as ``key = value: what is allowed``."""
+    """First fault of a validation (``error``) by ``model`` as ``key = value: what is allowed``."""
     # a misspelt key is also a missing one: the first says more
     faults = sorted(error.errors(), key=lambda fault: fault["type"] == "missing")
     fault = faults[0]

@@ -92,7 +92,7 @@ def _reductions(
         basis = loaded.setdefault(path, load_basis(path))
         for r in resolve_ranks(settings.ranks, basis.rank):
             if r <= basis.rank:
-                yield file, load_reduction(basis, file.path, spec, r)
+                yield file, load_reduction(basis, file.path, spec, r=r)
 
 
 def compliance(scene: Scene) -> Compliance | None:

@@ -1,4 +1,4 @@
-"""The companion of a scene's runs: a finer model, trained on the training motion."""
+"""The auxiliary model of a scene's runs: a finer model, trained on the training motion."""
 
 from typing import Annotated
 
@@ -16,10 +16,11 @@ from pdrom.reduction.subspace.store import store_columns, store_model
 
 
 class Companion(CompanionSpec):
-    """Section ``companion``: the companion, tolerances of users, and a safety factor on estimates.
+    """Section ``companion``: the auxiliary model, tolerances of users, and a safety factor on
+    estimates.
 
-    The factor was chosen when results were known: an estimate may be too small, since the companion
-    has an error of its own.
+    The factor was chosen when results were known: an estimate may be too small, since the auxiliary
+    model has an error of its own.
     """
 
     tolerances: tuple[Annotated[float, Field(gt=0.0, allow_inf_nan=False)], ...] = (0.1, 0.03, 0.01)
@@ -27,7 +28,7 @@ class Companion(CompanionSpec):
 
 
 @experiment(
-    "Companion of the runs of {scene}",
+    "Auxiliary model of the runs of {scene}",
     reads={
         "mesh": MESH,
         "train": TRAIN,
@@ -37,10 +38,10 @@ class Companion(CompanionSpec):
     writes={"out": COMPANION},
 )
 def companion(mesh: File, train: File, config: SceneConfig, spec: CompanionSpec, out: File) -> None:
-    """Make the companion."""
+    """Make the auxiliary model."""
     motion = Motion(scene_of(config, mesh), train)
     frames, training = training_indices(motion.scene), training_positions(motion)
-    model = companion_model(motion.scene, training, frames, spec)
+    model = companion_model(motion.scene, training, frames, spec=spec)
     labels = {"method": "ecsw", "position_basis": model.position_basis, "base": "companion"}
     with write_hdf5(out.path) as file:
         store_columns(file.create_group("columns/companion"), model.columns)

@@ -1,4 +1,4 @@
-"""Milliseconds a frame of a scene's companion, beside the full-order run in the same job."""
+"""Milliseconds a frame of a scene's auxiliary model, beside the full-order run in the same job."""
 
 import pandas as pd
 
@@ -15,7 +15,7 @@ COLUMNS = ["scene", "elements_sampled", "companion_ms", "full_ms"]
 
 
 @experiment(
-    "Times of the companion of {scene}",
+    "Times of the auxiliary model of {scene}",
     reads={
         "mesh": MESH,
         "companion": COMPANION,

@@ -1,4 +1,4 @@
-"""Estimated errors of all runs of a scene: their distances to the companion."""
+"""Estimated errors of all runs of a scene: their distances to the auxiliary model."""
 
 import logging
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ from pdrom.core.store import open_hdf5, write_table
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.motion import Motion
-from pdrom.experiments.kit.scenes import RUNS, positions_of, scene_of
+from pdrom.experiments.kit.scenes import SPLITS, positions_of, scene_of
 from pdrom.experiments.kit.settings import Horizon
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.rerun import displacement_norms, mean_motion
@@ -77,11 +77,11 @@ def estimates(
     horizon: Horizon,
     out: File,
 ) -> None:
-    """Run both motions with the companion and compare all their runs with it."""
+    """Run both motions with the auxiliary model and compare all their runs with it."""
     ((_, companion),) = load_models(model.path)
     unit = mean_motion(positions_of(train))
     rows: list[dict[str, Any]] = []
-    for split, run in zip(RUNS, (train, heldout), strict=True):
+    for split, run in zip(SPLITS, (train, heldout), strict=True):
         motion = Motion(scene_of(config, mesh, split), run)
         beside = companion_run(motion.scene, companion)
         end = horizon.frames(perturbed, split)
@@ -94,11 +94,11 @@ def estimates(
                     "split": split,
                     "relative_error_within_horizon": error,
                     "estimate": estimate(found.positions, beside, end),
-                    "largest_estimate": largest_estimate(found.positions, beside, unit, end),
+                    "largest_estimate": largest_estimate(found.positions, beside, unit, end=end),
                     "companion_error": own,
                 }
             )
-        log.info("%s: companion's own error %s", split, own)
+        log.info("%s: own error of the auxiliary model %s", split, own)
     whole = {"k": "Int64", "r": "Int64"}
     write_table(pd.DataFrame(rows, columns=COLUMNS).astype(whole), out.path)
 

@@ -3,7 +3,7 @@
 from pdrom.artifact.reads import Setting
 from pdrom.core.paths import FULL_ORDER, MESH, File
 from pdrom.experiments.kit.declaration import experiment
-from pdrom.experiments.kit.scenes import scene_of
+from pdrom.experiments.kit.scenes import SPLITS, TRAIN, scene_of
 from pdrom.experiments.kit.settings import Solver, Threads
 from pdrom.model.runs.full_order import run
 from pdrom.model.scene import SceneConfig
@@ -21,12 +21,16 @@ from pdrom.reduction.snapshots import stored_frames, test_frames
     writes={"out": FULL_ORDER},
 )
 def fom(mesh: File, config: SceneConfig, solver: Solver, threads: Threads, out: File) -> None:
-    """Simulate one of a scene's runs; the held-out one stores the odd frames only."""
+    """Simulate one of a scene's runs; the first held-out one stores the odd frames only.
+
+    Of the other held-out ones nothing but the positions is used.
+    """
     motion = out["run"]
-    scene = scene_of(config, mesh, motion, threads)
+    scene = scene_of(config, mesh, motion, threads=threads)
     frames = scene.config.frames
+    plans = scene.config.reduce if motion in SPLITS else {}
     wanted = {
-        group: test_frames(frames) if motion == "heldout" else stored_frames(frames, plan.train)
-        for group, plan in scene.config.reduce.items()
+        group: stored_frames(frames, plan.train) if motion == TRAIN else test_frames(frames)
+        for group, plan in plans.items()
     }
     run(scene, out.path, wanted, solver)

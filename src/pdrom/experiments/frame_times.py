@@ -226,6 +226,8 @@ def _seconds(case: ProjectionCase, snapshots: File, settings: Options) -> float:
     """Processor time of basis and sampling, s."""
     data, spec = load_snapshots(snapshots.path), settings.projection_methods[case.method]
     before = process_time()
-    basis = compute_basis(data.train, data.row_mass, data.roundoff, data.rows_per_element, spec)
+    basis = compute_basis(
+        data.train, data.row_mass, data.roundoff, rows_per_element=data.rows_per_element, spec=spec
+    )
     select(basis, spec, case.r)
     return process_time() - before

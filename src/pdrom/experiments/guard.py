@@ -154,7 +154,7 @@ class _Trial:
         self.trained = Trained.on(self.reference, model)
         space = load_basis(basis.path)
         r = min(resolve_ranks([case.r], space.rank)[0], space.rank)
-        self.reduction: Reduction = load_reduction(space, sampling.path, case.method, r)
+        self.reduction: Reduction = load_reduction(space, sampling.path, case.method, r=r)
 
     def rows(self) -> list[dict[str, Any]]:
         """The full-order run, then the reduced ones."""
@@ -171,8 +171,9 @@ class _Trial:
 
     def _row(self, settings: GuardSettings) -> dict[str, Any]:
         outcome, seen = guarded_rerun(
-            self.scene, self.system, self.case.group, self.reduction, self.reference, self.limit,
-            settings, self.trained,
+            self.scene, self.system, self.case.group, reduction=self.reduction,
+            reference=self.reference, blowup_extent=self.limit,
+            settings=settings, trained=self.trained,
         )  # fmt: skip
         estimated = seen.watched and settings.alarm == "estimate"
         share = seen.fallback_frames / outcome.frames if seen.watched else None
@@ -204,7 +205,12 @@ class _Trial:
 
     def _guarded(self, settings: GuardSettings) -> Advance:
         advance, _ = guarded(
-            self.scene, self.system, self.case.group, self.reduction, settings, self.trained
+            self.scene,
+            self.system,
+            self.case.group,
+            reduction=self.reduction,
+            settings=settings,
+            trained=self.trained,
         )
         return advance
 

@@ -86,7 +86,7 @@ def iterations(
     name = scene.config.name
     frames = max(1, horizon.frames(sensitivity))
     own = positions_of(fom, frames)
-    best = ConvergedStepper(scene, system, sweep.tolerance, sweep.limit)
+    best = ConvergedStepper(scene, system, sweep.tolerance, limit=sweep.limit)
     limit = _run(best, scene, frames)
     if not best.converged:
         log.warning("%s: no convergence in %d evaluations", name, sweep.limit)
@@ -96,7 +96,7 @@ def iterations(
     for count, window in accelerated(counts, sweep.anderson_window):
         reached = own
         if (count, window) != (scene.config.iterations, scene.config.anderson_window):
-            reached = _run(stepper_of(scene, system, count, window), scene, frames)
+            reached = _run(stepper_of(scene, system, count, window=window), scene, frames)
         converged = _error(reached, limit) if best.converged else None
         rows.append((name, count, window, frames, converged, _error(reached, own), None))
     residual = max(best.changes) / scene.mesh.extent
@@ -116,7 +116,14 @@ def stepper_of(scene: Scene, system: GlobalSystem, iterations: int, window: int)
     """Step loop of the full-order model with its own number of iterations and acceleration."""
     acceleration = Anderson(window) if window else None
     space = scene.space(system)
-    return Stepper(space, scene.config.time_step, iterations, scene.groups, False, acceleration)
+    return Stepper(
+        space,
+        scene.config.time_step,
+        iterations,
+        local_steps=scene.groups,
+        track_objective=False,
+        acceleration=acceleration,
+    )
 
 
 def _run(loop: Stepper, scene: Scene, frames: int) -> np.ndarray:

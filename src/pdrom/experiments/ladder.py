@@ -14,7 +14,7 @@ from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.repetition import Repeater, Repetitions
 from pdrom.experiments.kit.scenes import positions_of, scene_of
-from pdrom.experiments.kit.settings import BlowupExtent, Horizon
+from pdrom.experiments.kit.settings import BlowupExtent, Horizon, Modes
 from pdrom.model.metrics import relative_errors
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.basis import Basis, compute_basis
@@ -28,7 +28,8 @@ from pdrom.reduction.snapshots import SPLITS, SnapshotSet, load_snapshots
 log = logging.getLogger(__name__)
 
 COLUMNS = [
-    "scene", "group", "direction", "rung", "r", "condition", "gain", "error_train", "error_test",
+    "scene", "group", "direction", "rung", "rows_per_element", "entries", "r", "condition", "gain",
+    "error_train", "error_test",
     "error_heldout", "finite", "blowup_frame", "relative_error_within_horizon", "repetitions",
     "error_median", "error_low", "error_high", "gain_low", "gain_high",
 ]  # fmt: skip
@@ -42,6 +43,8 @@ class Ladder(Repetitions):
     signs : how many choices of the singular vectors' signs the first rung is repeated with
     repeated : scenes whose runs are repeated
     up, down : methods, from the published one upwards, and the sound one less one ingredient
+    square : separate or shared coefficients on single rows or whole elements, at each of ``sizes``;
+        rows are sampled p times as often as elements, which have p of them: as many entries
     """
 
     r: Annotated[int, Field(ge=1, le=100_000)]
@@ -49,12 +52,22 @@ class Ladder(Repetitions):
     repeated: tuple[str, ...] = ()
     up: Rungs
     down: Rungs
+    square: tuple[MethodSpec, ...] = ()
+    sizes: tuple[Modes, ...] = ()
 
-    def rungs(self) -> list[tuple[str, MethodSpec, int | None]]:
-        """(direction, method, seed of the signs) of all rows, in order."""
-        rows = [("up", method, None) for method in self.up]
-        rows += [("down", method, None) for method in self.down]
-        return rows + [("signs", self.up[0], seed) for seed in range(1, self.signs + 1)]
+    def rungs(self, p: int) -> list[tuple[str, MethodSpec, int | None, int]]:
+        """(direction, method, seed of the signs, size) of all rows of a group, in order.
+
+        Parameters
+        ----------
+        p : rows of an element
+        """
+        rows: list[tuple[str, MethodSpec, int | None, int]] = []
+        rows += [("up", method, None, self.r) for method in self.up]
+        rows += [("down", method, None, self.r) for method in self.down]
+        rows += [("signs", self.up[0], seed, self.r) for seed in range(1, self.signs + 1)]
+        square = [_as_many_entries(method, p) for method in self.square]
+        return rows + [("square", method, None, r) for r in self.sizes for method in square]
 
 
 class LadderFile(Ladder):
@@ -97,27 +110,44 @@ def ladder(
     group, system = scene.group(labels["group"]), scene.system
     repeater = None
     if labels["scene"] in ladder.repeated:
-        repeater = Repeater(scene, group.name, data, reference, end, ladder, blowup_extent)
+        repeater = Repeater(
+            scene,
+            group.name,
+            data,
+            reference=reference,
+            end=end,
+            asked=ladder,
+            blowup_extent=blowup_extent,
+        )
     bases: dict[tuple[str, int | None], Basis] = {}
     rows = []
-    for direction, method, seed in ladder.rungs():
-        row = {**labels, "direction": direction, "rung": _name(method, seed), "r": ladder.r}
+    for direction, method, seed, r in ladder.rungs(group.rows_per_element):
+        row = {**labels, "direction": direction, "rung": _name(method, seed), "r": r}
+        row["rows_per_element"] = group.rows_per_element
         key = (method.basis_id, seed)
         if key not in bases:
             bases[key] = _basis(data, method, seed)
-        reduction = _reduce(bases[key], method, ladder.r)
+        if direction == "square" and r > bases[key].rank:
+            continue
+        reduction = _reduce(bases[key], method, r)
         if reduction is not None:
             steps = replace_group(scene, group.name, ReducedLocalStep(group, reduction))
-            outcome = rerun(scene, system, steps, reference, blowup_extent)
+            outcome = rerun(scene, system, steps, reference=reference, blowup_extent=blowup_extent)
             row |= {"r": reduction.r, **_measures(reduction, data)}
             row |= _ran(outcome, displacement, end)
-            if repeater is not None and seed is None:
+            if repeater is not None and seed is None and direction != "square":
                 row |= _repeated(repeater, method, reduction.r)
         rows.append(row)
         log.info("%s, %s", direction, row["rung"])
     table = pd.DataFrame(rows, columns=COLUMNS)
-    whole = dict.fromkeys(("blowup_frame", "repetitions"), "Int64")
+    whole = dict.fromkeys(("blowup_frame", "repetitions", "entries"), "Int64")
     write_table(table.astype(whole), out.path)
+
+
+def _as_many_entries(method: MethodSpec, p: int) -> MethodSpec:
+    if method.rows != "joint":
+        return method
+    return method.model_copy(update={"oversampling": p * method.oversampling})
 
 
 def _name(method: MethodSpec, seed: int | None) -> str:
@@ -127,14 +157,19 @@ def _name(method: MethodSpec, seed: int | None) -> str:
 def _basis(data: SnapshotSet, method: MethodSpec, seed: int | None) -> Basis:
     signs = None if seed is None else np.random.default_rng(seed)
     return compute_basis(
-        data.train, data.row_mass, data.roundoff, data.rows_per_element, method, signs
+        data.train,
+        data.row_mass,
+        data.roundoff,
+        rows_per_element=data.rows_per_element,
+        spec=method,
+        signs=signs,
     )
 
 
 def _reduce(basis: Basis, method: MethodSpec, r: int) -> Reduction | None:
     """Reduction of a rung; None where the group is round-off."""
     size = min(r, basis.rank)
-    return Reduction(basis, select(basis, method, size), method, size) if size else None
+    return Reduction(basis, select(basis, method, size), method, r=size) if size else None
 
 
 def _measures(reduction: Reduction, data: SnapshotSet) -> dict[str, Any]:
@@ -142,7 +177,8 @@ def _measures(reduction: Reduction, data: SnapshotSet) -> dict[str, Any]:
     for split in SPLITS:
         p = getattr(data, split)
         errors[f"error_{split}"] = relative_errors(p, reduction.reconstruct(p), data.roundoff)[0]
-    return {"condition": reduction.condition, "gain": reduction.gain, **errors}
+    entries = sum(len(block.entries) for block in reduction.blocks)
+    return {"entries": entries, "condition": reduction.condition, "gain": reduction.gain, **errors}
 
 
 def _ran(outcome: Rerun, displacement: np.ndarray, end: int) -> dict[str, Any]:

@@ -131,7 +131,9 @@ def noise_basis(
     A method with separate systems then has one for an axis in which nothing moves, as its text
     says; elsewhere in this study such an axis has none.
     """
-    basis = compute_basis(projections, row_mass, 0.0, rows_per_element, method)
+    basis = compute_basis(
+        projections, row_mass, 0.0, rows_per_element=rows_per_element, spec=method
+    )
     return replace(basis, active_axes=(True, True, True))
 
 
@@ -140,23 +142,29 @@ def _runs(
 ) -> Iterator[tuple[dict[str, Any], Rerun | None]]:
     """Rows and runs of one start: its full-order run, then the reductions trained on it."""
     group, plan = scene.group(name), scene.config.reduce[name]
-    start = roundoff_field(scene, axes, settings.noise.perturbation, seed)
-    reference, seen = last_iterates(scene, scene.stepper(), group.project, start)
+    start = roundoff_field(scene, axes, settings.noise.perturbation, seed=seed)
+    reference, seen = last_iterates(scene, scene.stepper(), group.project, start=start)
     projections = np.stack(seen)
     even = training_frames(scene.config.frames, min(plan.train, (scene.config.frames + 1) // 2))
     masses = row_masses(group, scene.masses)
     displacement = displacement_norms(reference)
     for method, spec in settings.noise_methods.items():
-        basis = noise_basis(projections[even], masses, group.rows_per_element, spec)
+        basis = noise_basis(projections[even], masses, group.rows_per_element, method=spec)
         sizes = [r for r in settings.noise.sizes if r <= basis.rank]
         path = select_path(basis, spec, sizes) if sizes else {}
         for r in settings.noise.sizes:
             row = {"method": method, "r": r, "rank": basis.rank, "frames": 0}
             outcome = None
             if r in path:
-                reduction = Reduction(basis, path[r], spec, r)
+                reduction = Reduction(basis, path[r], spec, r=r)
                 steps = replace_group(scene, name, ReducedLocalStep(group, reduction))
-                outcome = rerun(scene, scene.system, steps, reference, settings.blowup_extent)
+                outcome = rerun(
+                    scene,
+                    scene.system,
+                    steps,
+                    reference=reference,
+                    blowup_extent=settings.blowup_extent,
+                )
                 row |= {
                     "gain": reduction.gain,
                     "frames": outcome.frames,

@@ -105,8 +105,10 @@ def _models(
     frames = training_indices(scene)
     for kind in asked.bases:
         for k in asked.sizes:
-            columns = make_columns(scene, reference[1:][frames], kind, k)
-            found = sample_elements(scene, columns, frames, asked.tolerances, norm=asked.norm)
+            columns = make_columns(scene, reference[1:][frames], kind, k=k)
+            found = sample_elements(
+                scene, columns, frames, tolerances=asked.tolerances, norm=asked.norm
+            )
             yield f"{kind}_k{k:03d}", k, columns, found
 
 

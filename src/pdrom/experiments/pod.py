@@ -20,6 +20,8 @@ log = logging.getLogger(__name__)
 def pod(snapshots: File, spec: BasisSpec, out: File) -> None:
     """Compute and save a basis of the training snapshots."""
     data = load_snapshots(snapshots.path)
-    basis = compute_basis(data.train, data.row_mass, data.roundoff, data.rows_per_element, spec)
+    basis = compute_basis(
+        data.train, data.row_mass, data.roundoff, rows_per_element=data.rows_per_element, spec=spec
+    )
     log.info("numerical rank %d of %d snapshots", basis.rank, len(data.train))
     save_basis(basis, out.path)

@@ -21,7 +21,7 @@ from pdrom.core.store import open_hdf5, write_table
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.motion import Motion
-from pdrom.experiments.kit.scenes import RUNS, scene_of
+from pdrom.experiments.kit.scenes import SPLITS, scene_of
 from pdrom.experiments.kit.settings import Horizon
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.subspace.store import load_models
@@ -59,7 +59,7 @@ def position_bases(
 ) -> None:
     """Compare the runs with full projections with the best positions in their subspace."""
     rows: list[dict[str, Any]] = []
-    for split, run in zip(RUNS, (train, heldout), strict=True):
+    for split, run in zip(SPLITS, (train, heldout), strict=True):
         motion = Motion(scene_of(config, mesh, split), run)
         end = horizon.frames(perturbed, split)
         rows += _rows(motion, subspaces, split, end)

@@ -100,10 +100,10 @@ def repetitions(
         scene_of(settings.scene, mesh),
         labels["group"],
         load_snapshots(snapshots.path),
-        positions_of(fom),
-        settings.horizon.frames(sensitivity),
-        settings.repetitions,
-        settings.blowup_extent,
+        reference=positions_of(fom),
+        end=settings.horizon.frames(sensitivity),
+        asked=settings.repetitions,
+        blowup_extent=settings.blowup_extent,
     )
     rows, frames = [], []
     for of_cell, runs in _cells(settings, repeater):

@@ -124,11 +124,11 @@ def scaling(
     results = measure(variants, sized.warmup, sized.repeats)
     rows = [{"scene": config.name, "threads": 1, **m.labels, **_times(scene, m)} for m in results]
     write_table(pd.DataFrame(rows, columns=ITERATIONS), iterations.path)
-    costs = effect_costs(scene, system, sized.frames, sized.warmup, sized.repeats)
+    costs = effect_costs(scene, system, sized.frames, warmup=sized.warmup, repeats=sized.repeats)
     write_table(costs, effects.path)
     steps = _steps_alone(scene, training.first(alone.training_frames), specs, alone)
     states = training.positions[:: len(training.positions) // STATES][:STATES]
-    times = local_costs(scene, steps, states, sized.warmup, alone.repeats)
+    times = local_costs(scene, steps, states, warmup=sized.warmup, repeats=alone.repeats)
     write_table(times.assign(factor=factor), breakeven.path)
     log.info("%s: %d vertices done", config.name, scene.mesh.vertices)
 
@@ -147,7 +147,7 @@ def _basis(scene: Scene, training: Training, spec: MethodSpec) -> Basis:
     group = scene.groups[0]
     mass, rows = row_masses(group, scene.masses), group.rows_per_element
     roundoff = float(np.linalg.norm(training.roundoff))
-    return compute_basis(training.projections, mass, roundoff, rows, spec)
+    return compute_basis(training.projections, mass, roundoff, rows_per_element=rows, spec=spec)
 
 
 def _steps_alone(
@@ -159,7 +159,7 @@ def _steps_alone(
         spec, basis = specs[name], _basis(scene, training, specs[name])
         sizes = sorted({min(r, basis.rank) for r in settings.sizes})
         for size, sampling in select_path(basis, spec, sizes).items():
-            reduction = Reduction(basis, sampling, spec, size)
+            reduction = Reduction(basis, sampling, spec, r=size)
             steps[group.name, name, size] = ReducedLocalStep(group, reduction)
     return steps
 
@@ -175,16 +175,16 @@ def _reduced(
 ) -> Variant:
     group, method = scene.groups[0], settings.method
     size = min(settings.r, basis.rank)
-    reduction = Reduction(basis, select(basis, spec, size), spec, size)
+    reduction = Reduction(basis, select(basis, spec, size), spec, r=size)
     steps = replace_group(scene, group.name, ReducedLocalStep(group, reduction))
     labels = {"r": reduction.r, "elements_sampled": len(reduction.elements)}
     return _variant(scene, system, steps, settings, {"method": method, **labels})
 
 
 def _subspace(scene: Scene, training: Training, settings: Sized) -> Variant:
-    columns = make_columns(scene, training.positions, "pod", settings.k)
+    columns = make_columns(scene, training.positions, "pod", k=settings.k)
     frames = np.arange(len(training.positions))
-    (samples,) = sample_elements(scene, columns, frames, [settings.tolerance])
+    (samples,) = sample_elements(scene, columns, frames, tolerances=[settings.tolerance])
     model = SubspaceModel("pod", columns, samples)
     labels = {
         "method": "ecsw",

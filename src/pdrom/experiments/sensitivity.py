@@ -14,6 +14,7 @@ from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.scenes import scene_of
 from pdrom.experiments.kit.sensitivity import heldout_floor, sensitivities
 from pdrom.model.effects.base import Seed
+from pdrom.model.held_out import MOTIONS
 from pdrom.model.scene import SceneConfig
 
 Perturbation = Annotated[float, Field(gt=0.0, lt=1.0)]
@@ -22,7 +23,7 @@ Perturbation = Annotated[float, Field(gt=0.0, lt=1.0)]
 class PerturbedRuns(ConfigModel):
     """Starts moved by ``perturbations`` times the extent, each with every seed.
 
-    ``reference`` is the perturbation that defines the horizon, and that of the held-out motion.
+    ``reference`` is the perturbation that defines the horizon, and that of held-out motions.
     """
 
     perturbations: tuple[Perturbation, ...] = (1e-12, 1e-10, 1e-8)
@@ -50,10 +51,12 @@ class Sensitivity(PerturbedRuns):
 def sensitivity(
     mesh: File, config: SceneConfig, chosen: PerturbedRuns, out: File, effects: File
 ) -> None:
-    """Write the differences of a scene's perturbed runs, and of its held-out motion."""
+    """Write the differences of a scene's perturbed runs, and of its held-out motions."""
     scene = scene_of(config, mesh)
     table = sensitivities(scene, chosen.perturbations, chosen.seeds)
-    motion = scene_of(config, mesh, "heldout")
-    heldout = heldout_floor(motion, chosen.reference, chosen.seeds)
-    write_table(pd.concat([table, heldout], ignore_index=True), out.path)
+    heldout = [
+        heldout_floor(scene_of(config, mesh, motion), motion, chosen.reference, chosen.seeds)
+        for motion in MOTIONS
+    ]
+    write_table(pd.concat([table, *heldout], ignore_index=True), out.path)
     write_table(contributions(scene), effects.path)

@@ -123,7 +123,7 @@ def stability(
     rows = []
     for h, ratio in _grid(scene.config.time_step, short):
         limits = (short.min_frames, short.max_frames)
-        other = varied(scene.config, h, ratio, short.duration, limits)
+        other = varied(scene.config, h, ratio, duration=short.duration, frames=limits)
         case = _Case(Scene.build(other, scene.mesh), ratio, solver, blowup_extent)
         rows += case.rows(reductions, models)
         log.info("h = %g s, stiffness times %g: %d frames", h, ratio, other.frames)
@@ -161,7 +161,7 @@ def _reductions(
         basis = load_basis(basis_of(file, spec, bases).path)
         for r in resolve_ranks(ranks, basis.rank):
             known = r <= basis.rank
-            reduction = load_reduction(basis, file.path, spec, r) if known else None
+            reduction = load_reduction(basis, file.path, spec, r=r) if known else None
             yield _Local(group, method, r, reduction)
 
 
@@ -182,7 +182,9 @@ class _Case:
             "scene": scene.config.name, "h": scene.config.time_step, "stiffness_ratio": ratio,
         }  # fmt: skip
         nothing = np.zeros((scene.config.frames + 1, *scene.mesh.points.shape))
-        self.full_order = rerun(scene, self.system, scene.groups, nothing, limit)
+        self.full_order = rerun(
+            scene, self.system, scene.groups, reference=nothing, blowup_extent=limit
+        )
         self.reference = self.full_order.positions
         self.displacement = displacement_norms(self.reference)
         self.scale = EnergyScale.of(scene, self.reference)
@@ -205,10 +207,12 @@ class _Case:
                 continue
             step = ReducedLocalStep(self.scene.group(local.group), local.reduction)
             steps = replace_group(self.scene, local.group, step)
-            outcome = rerun(self.scene, self.system, steps, self.reference, self.limit)
+            outcome = rerun(
+                self.scene, self.system, steps, reference=self.reference, blowup_extent=self.limit
+            )
             rows.append(self._row({**labels, "gain": local.reduction.gain}, outcome))
         for labels, model in models:
-            outcome = rerun_model(self.scene, model, self.reference, self.limit)
+            outcome = rerun_model(self.scene, model, self.reference, blowup_extent=self.limit)
             rows.append(self._row({"group": "all", **labels}, outcome))
         return rows
 

@@ -15,7 +15,7 @@ from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.motion import Motion, training_positions
-from pdrom.experiments.kit.scenes import RUNS, scene_of
+from pdrom.experiments.kit.scenes import SPLITS, scene_of
 from pdrom.experiments.kit.settings import BlowupExtent, Horizon, Modes
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.rerun import Rerun
@@ -94,7 +94,7 @@ def subspace_ablation(
     scene, training = motion.scene, training_positions(motion)
     rows = []
     for k in settings.ablation.sizes:
-        columns = make_columns(scene, training, POSITION_BASIS, k)
+        columns = make_columns(scene, training, POSITION_BASIS, k=k)
         trained = Training(scene, columns, training)
         row = {
             "scene": scene.config.name,
@@ -123,12 +123,12 @@ class _Trials:
         self.motions = {
             name: Motion(scene_of(settings.scene, mesh, name), run) for name, run in runs.items()
         }
-        self._ends = {name: settings.horizon.frames(sensitivity, name) for name in RUNS}
+        self._ends = {name: settings.horizon.frames(sensitivity, name) for name in SPLITS}
 
     def full_projections(self, columns: Columns) -> dict[str, Any]:
         """Errors of the runs without interpolation: what the subspace itself leaves."""
         model = SubspaceModel(POSITION_BASIS, columns)
-        errors = {motion: self._run(motion, model)[1] for motion in RUNS}
+        errors = {motion: self._run(motion, model)[1] for motion in SPLITS}
         return {
             "relative_error_full_projections": errors["train"],
             "heldout_error_full_projections": errors["heldout"],
@@ -139,7 +139,7 @@ class _Trials:
     ) -> dict[str, Any]:
         """Outcome of a variant; a refused one has not run, and its cells are empty."""
         try:
-            found = interpolate(self.motions["train"].scene, columns, trained, spec)
+            found = interpolate(self.motions["train"].scene, columns, trained, spec=spec)
         except SamplingError as error:
             log.info("refused: %s", error)
             return {}

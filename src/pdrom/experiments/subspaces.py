@@ -10,16 +10,15 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from pdrom.artifact.reads import Settings
+from pdrom.artifact.reads import Every, Settings
 from pdrom.core.names import SceneName
 from pdrom.core.paths import (
-    HELDOUT,
+    FULL_ORDER,
     MESH,
     SUBSPACES,
     SUBSPACES_HELDOUT,
     SUBSPACES_SECONDS,
     SUBSPACES_TRAIN,
-    TRAIN,
     File,
 )
 from pdrom.core.store import write_hdf5, write_table
@@ -27,7 +26,7 @@ from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.measurement import clocked
 from pdrom.experiments.kit.motion import Motion, training_indices, training_positions
-from pdrom.experiments.kit.scenes import RUNS, scene_of
+from pdrom.experiments.kit.scenes import TRAIN, scene_of
 from pdrom.experiments.kit.settings import BlowupExtent, Modes, PositionBasis, Tolerance
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import Rerun, extent_norm, step_norms
@@ -103,7 +102,7 @@ class Options(ConfigModel):
 
 @experiment(
     "Position subspaces of {scene}, with full and with sampled projections",
-    reads={"mesh": MESH, "train": TRAIN, "heldout": HELDOUT, "settings": Settings(Options)},
+    reads={"mesh": MESH, "full_order": Every(FULL_ORDER), "settings": Settings(Options)},
     writes={
         "out": SUBSPACES,
         "train_table": SUBSPACES_TRAIN,
@@ -113,26 +112,26 @@ class Options(ConfigModel):
 )
 def subspaces(
     mesh: File,
-    train: File,
-    heldout: File,
+    full_order: list[File],
     settings: Options,
     out: File,
     train_table: File,
     heldout_table: File,
     seconds_table: File,
 ) -> None:
-    """Build every model (bases, sizes, tolerances) and run both motions with it."""
-    runs = {"train": train, "heldout": heldout}
-    motions = {k: Motion(scene_of(settings.scene, mesh, k), run) for k, run in runs.items()}
-    rows: dict[str, list[dict[str, Any]]] = {name: [] for name in RUNS}
+    """Build every model (bases, sizes, tolerances) and run all motions with it."""
+    motions = {
+        run["run"]: Motion(scene_of(settings.scene, mesh, run["run"]), run) for run in full_order
+    }
+    rows: dict[str, list[dict[str, Any]]] = {name: [] for name in motions}
     seconds = []
     with write_hdf5(out.path) as file:
         for name, motion in motions.items():
             file[f"displacement/{name}"] = motion.displacement
             file[f"step/{name}"] = step_norms(motion.reference)
-        start = motions["train"]
+        start = motions[TRAIN]
         file.attrs["extent_norm"] = extent_norm(start.reference, start.scene.mesh.extent)
-        made = clocked(_subspaces(motions["train"], settings.subspace))
+        made = clocked(_subspaces(start, settings.subspace))
         for of_columns, (base, columns, kind, k, models) in made:
             store_columns(file.create_group(f"columns/{base}"), columns)
             spent: dict[str, float] = defaultdict(float)
@@ -155,9 +154,11 @@ def subspaces(
                     apart = step_norms(outcome.positions - together)
                     store[f"{name}/step_difference"] = apart
                     rows[name].append(_row(motion, labels, model, outcome))
-                log.info("%s %s: error %s", base, method, rows["train"][-1]["relative_error"])
-    for name, file in {"train": train_table, "heldout": heldout_table}.items():
-        write_table(pd.DataFrame(rows[name], columns=COLUMNS), file.path)
+                log.info("%s %s: error %s", base, method, rows[TRAIN][-1]["relative_error"])
+    tables = {name: pd.DataFrame(own, columns=COLUMNS) for name, own in rows.items()}
+    write_table(tables.pop(TRAIN), train_table.path)
+    heldout = [table.assign(motion=name) for name, table in tables.items()]
+    write_table(pd.concat(heldout, ignore_index=True), heldout_table.path)
     write_table(pd.DataFrame(seconds, columns=SECONDS_COLUMNS), seconds_table.path)
 
 
@@ -169,7 +170,7 @@ def _subspaces(
     spaces = _sampled_spaces(scene, settings.hrpd)
     for kind in settings.bases:
         for k in settings.sizes:
-            columns = make_columns(scene, training, kind, k)
+            columns = make_columns(scene, training, kind, k=k)
             models = _samplings(scene, columns, kind, settings)
             if k in settings.interpolated_sizes:
                 more = _interpolations(scene, columns, training, kind, settings, spaces)
@@ -185,7 +186,7 @@ def _samplings(
     if kind == "pod":
         tolerances = settings.tolerances
         frames = training_indices(scene)
-        found = sample_elements(scene, columns, frames, tolerances, norm=settings.norm)
+        found = sample_elements(scene, columns, frames, tolerances=tolerances, norm=settings.norm)
         for tolerance, samples in zip(tolerances, found, strict=True):
             yield ecsw_name(tolerance), samples
 
@@ -211,7 +212,7 @@ def _interpolations(
     if kind == "pod":
         states = Training(scene, columns, training)
         for method, spec in settings.interpolations.items():
-            yield method, interpolate(scene, columns, states, spec)
+            yield method, interpolate(scene, columns, states, spec=spec)
 
 
 def _row(

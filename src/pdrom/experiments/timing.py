@@ -118,18 +118,18 @@ def timing(
     variants, alone = _variants(scene, system, frames, settings, samplings, bases, subspaces)
     slow = [v for v in variants if v.labels["implementation"] == "interpreted"]
     quick = [v for v in variants if v.labels["implementation"] != "interpreted"]
-    told = partial(log.info, f"{name}: repeat %d of %d")
-    results = measure(quick, asked.warmup, asked.repeats, told)
+    reported = partial(log.info, f"{name}: repeat %d of %d")
+    results = measure(quick, asked.warmup, asked.repeats, progress=reported)
     results += measure(slow, 0, asked.repeats)
     write_table(pd.DataFrame([_row(scene, m) for m in results], columns=COLUMNS), out.path)
     log.info("%s: %d reduced local steps alone", name, len(alone))
-    times = local_costs(scene, alone, _states(fom), asked.warmup, asked.breakeven_repeats)
+    often = {"warmup": asked.warmup, "repeats": asked.breakeven_repeats}
+    times = local_costs(scene, alone, _states(fom), **often)
     write_table(times.assign(factor=1.0), breakeven.path)
     log.info("%s: effects", name)
-    costs = effect_costs(scene, system, frames, asked.warmup, asked.repeats)
-    write_table(costs, effects.path)
-    fewer = left_out(scene, costs, frames, asked.warmup, asked.repeats, settings.solver)
-    write_table(fewer, without.path)
+    often = {"warmup": asked.warmup, "repeats": asked.repeats}
+    write_table(costs := effect_costs(scene, system, frames, **often), effects.path)
+    write_table(left_out(scene, costs, frames, **often, solver=settings.solver), without.path)
 
 
 def _variants(
@@ -176,12 +176,12 @@ class _Source:
             self._stored = {int(key[1:]) for key in stored if key.startswith("r")}
 
     def sizes(self, asked: Sequence[Rank]) -> list[int]:
-        """The asked sizes that the basis can have and the file holds."""
+        """Requested sizes that the basis can have and the file holds."""
         return [r for r in resolve_ranks(asked, self._space.rank) if r in self._stored]
 
     def step(self, r: int) -> ReducedLocalStep:
         """Local step of size r."""
-        reduction = load_reduction(self._space, self._path, self.spec, r)
+        reduction = load_reduction(self._space, self._path, self.spec, r=r)
         return ReducedLocalStep(self._group, reduction)
 
 
@@ -220,7 +220,7 @@ def _other_counts(
     own = (scene.config.iterations, scene.config.anderson_window)
     for count, size in accelerated(counts, asked.anderson_window):
         if (count, size) != own:
-            loop = stepper_of(scene, system, count, size)
+            loop = stepper_of(scene, system, count, window=size)
             method = ANDERSON if size else FOM
             labels = {"method": method, "iterations": count, "implementation": "compiled"}
             variants.append(Variant(labels, loop, scene.initial_state(), frames))

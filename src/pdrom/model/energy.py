@@ -44,12 +44,12 @@ class EnergyScale:
 
     @classmethod
     def of(cls, scene: Scene, reference: np.ndarray) -> "EnergyScale":
-        """Scale of a full-order run with positions (F + 1, N, 3)."""
+        """Scale of a full-order run of ``scene`` with positions ``reference`` (F + 1, N, 3) m."""
         zero = min(_force_potential(scene, q) for q in reference)
         return cls(scene, zero, float(energies(scene, reference).max()) - zero)
 
     def ratio(self, positions: np.ndarray) -> float | None:
-        """Largest total energy of a run (F' + 1, N, 3) over that of the full-order run.
+        """Largest total energy at ``positions`` (F' + 1, N, 3) of a run, over the full order's.
 
         One for the full-order run itself. Above one, the run has gained energy that neither the
         initial state nor the handles brought into the full-order run. inf if the energy overflows;

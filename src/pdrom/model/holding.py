@@ -21,7 +21,14 @@ NAMED = 10
 
 
 def check_holds(boundaries: Sequence[Boundary], scene: str, frames: int) -> None:
-    """SceneError for a vertex that is held twice at once, unless nothing that holds it moves."""
+    """SceneError for a vertex that is held twice at once, unless nothing that holds it moves.
+
+    Parameters
+    ----------
+    boundaries : holds of the scene
+    scene : its name
+    frames : their number
+    """
     for first, second in combinations(boundaries, 2):
         if not (first.moves or second.moves):
             continue
@@ -37,7 +44,7 @@ def check_holds(boundaries: Sequence[Boundary], scene: str, frames: int) -> None
 
 
 def log_holds(boundaries: Sequence[Boundary], scene: str, vertices: int) -> None:
-    """Log how many of the mesh's ``vertices`` each effect holds.
+    """Log how many of the ``vertices`` of ``scene`` (name) each of its ``boundaries`` holds.
 
     A side that holds fewer than `FEW` is a warning: on an unstructured mesh a side is often one
     single vertex.
@@ -65,6 +72,12 @@ def log_obstructed(
 
     Vertices that are taken hold of later are taken to be where obstacles have pushed the mesh at
     rest, ``points`` (N, 3) m.
+
+    Parameters
+    ----------
+    boundaries, contacts : holds and obstacles of the scene
+    scene : its name
+    frames : their number
     """
     obstacles = [contact for contact in contacts if contact.each_alone]
     inside, blocked = np.zeros(len(points), dtype=bool), dict[str, None]()
@@ -93,7 +106,13 @@ def log_obstructed(
 def log_contacts(
     contacts: Sequence[Contact], boundaries: Sequence[Boundary], scene: str, rest: np.ndarray
 ) -> None:
-    """Warn of contacts that do not fit the rest shape (N, 3) m; held vertices do not count."""
+    """Warn of contacts that do not fit the rest shape (N, 3) m; held vertices do not count.
+
+    Parameters
+    ----------
+    contacts, boundaries : obstacles and holds of the scene
+    scene : its name
+    """
     free = np.ones(len(rest), dtype=bool)
     for boundary in boundaries:
         if boundary.active(0):

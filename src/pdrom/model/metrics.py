@@ -67,9 +67,13 @@ def shape_differences(positions: np.ndarray, reference: np.ndarray) -> np.ndarra
 
 
 def trajectory_error(difference: np.ndarray, displacement: np.ndarray) -> float | None:
-    """|| Q_red - Q_fom ||_F / || Q_fom - rest ||_F from the norms of each frame (F,).
+    """|| Q_red - Q_fom ||_F / || Q_fom - rest ||_F from the norms of each frame, m.
 
     None where the full-order run never leaves its initial state, or no frame is given.
+
+    Parameters
+    ----------
+    difference, displacement : (F,) numerators and denominators
     """
     moved = float(np.linalg.norm(displacement))
     return float(np.linalg.norm(difference)) / moved if moved > 0.0 else None

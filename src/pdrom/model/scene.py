@@ -19,7 +19,7 @@ from pdrom.model.dynamics.system import DEFAULT_SOLVER, GlobalSystem
 from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import Boundary, Contact, EffectConfig, Force, Start
 from pdrom.model.effects.entries import EffectConfigs, bind
-from pdrom.model.held_out import HeldOut
+from pdrom.model.held_out import FIRST, HeldOut, HeldOutMotion
 from pdrom.model.holding import check_holds, log_contacts, log_holds, log_obstructed
 from pdrom.model.masses import Mass, MassConfig, vertex_masses
 from pdrom.model.mesh.checks import check_mesh
@@ -90,7 +90,7 @@ class SceneConfig(_Model):
         return sorted({EFFECTS[e.effect] for e in self.effects})
 
     def coarsened(self, resolution: float, frames: float) -> Self:
-        """The scene on a coarser mesh and with fewer frames; schedules shrink alike."""
+        """The scene with shares of its ``resolution`` and ``frames``; schedules shrink alike."""
         count = max(4, round(self.frames * frames))
         even = (count + 1) // 2
         plans = {
@@ -106,9 +106,9 @@ class SceneConfig(_Model):
             }
         )
 
-    def heldout_variant(self) -> Self:
-        """The scene of the held-out trajectory (see `HeldOut`)."""
-        return self.model_copy(update={"effects": self.held_out.variant(self.effects)})
+    def heldout_variant(self, motion: HeldOutMotion = FIRST) -> Self:
+        """The scene of a held-out trajectory (see `HeldOut`)."""
+        return self.model_copy(update={"effects": self.held_out.variant(self.effects, motion)})
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class Scene:
         check_mesh(mesh, config.name)
         _check_size(config, mesh)
         if masses is None:
-            masses = vertex_masses(mesh, config.name, config.vertex_mass, config.masses)
+            masses = vertex_masses(mesh, config.name, config.vertex_mass, entries=config.masses)
         effects = [bind(entry, config.name, mesh, masses) for entry in config.effects]
         scene = cls(
             config,
@@ -179,11 +179,11 @@ class Scene:
         """Log how many vertices each effect holds, and which an obstacle wants elsewhere."""
         name, points, frames = self.config.name, self.mesh.points, self.config.frames
         log_holds(self.boundaries, name, len(points))
-        log_obstructed(self.boundaries, self.contacts, name, points, frames)
+        log_obstructed(self.boundaries, self.contacts, name, points=points, frames=frames)
 
     def log_contacts(self) -> None:
         """Warn of contacts that do not fit the rest shape, see `Contact.doubt`."""
-        log_contacts(self.contacts, self.boundaries, self.config.name, self.mesh.points)
+        log_contacts(self.contacts, self.boundaries, self.config.name, rest=self.mesh.points)
 
     def group(self, name: str) -> ConstraintGroup:
         """The constraint group called ``name``; SceneError if the scene does not list it."""
@@ -199,7 +199,7 @@ class Scene:
 
     def system_with(self, solver: str) -> GlobalSystem:
         """Global system solved by the registered ``solver``."""
-        return GlobalSystem(self.masses, self.config.time_step, self.groups, solver)
+        return GlobalSystem(self.masses, self.config.time_step, self.groups, solver=solver)
 
     def initial_state(self, perturbation: np.ndarray | None = None) -> State:
         """State before the first frame; ``perturbation`` (N, 3) m is added to the positions."""
@@ -217,14 +217,17 @@ class Scene:
         local_steps: Sequence[LocalStep] | None = None,
         track_objective: bool = True,
     ) -> Stepper:
-        """Step loop of the scene; ``local_steps`` replaces the full projections of all groups."""
+        """Step loop of the scene; ``local_steps`` replaces the full projections of all groups.
+
+        ``system`` replaces its factored system, ``track_objective`` adds the objective to reports.
+        """
         return Stepper(
             self.space(system or self.system),
             self.config.time_step,
             self.config.iterations,
-            self.groups if local_steps is None else local_steps,
-            track_objective,
-            self.acceleration(),
+            local_steps=self.groups if local_steps is None else local_steps,
+            track_objective=track_objective,
+            acceleration=self.acceleration(),
         )
 
     def acceleration(self) -> Anderson | None:
@@ -233,8 +236,8 @@ class Scene:
         return Anderson(window) if window else None
 
     def space(self, system: GlobalSystem) -> VertexSpace:
-        """Vertex positions as the coordinates of the step loop."""
-        return VertexSpace(system, self.forces, self.boundaries, self.contacts)
+        """Vertex positions as the coordinates of the step loop, with its global ``system``."""
+        return VertexSpace(system, self.forces, self.boundaries, contacts=self.contacts)
 
 
 def _check_size(config: SceneConfig, mesh: Mesh) -> None:

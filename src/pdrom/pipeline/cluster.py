@@ -89,7 +89,7 @@ class Demand:
 
 
 def install_executor(arguments: Sequence[str]) -> None:
-    """Install the executor if the command asks for it and it is not there, then start anew.
+    """Install the executor if the command asks for it and it is not there, then start again.
 
     Raises
     ------

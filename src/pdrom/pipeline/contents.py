@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 
 from pdrom.core import paths
 from pdrom.core.paths import Place
+from pdrom.model.held_out import MOTIONS
 from pdrom.pipeline.scenes import not_taken
 from pdrom.pipeline.study import Study
 
@@ -40,7 +41,7 @@ def _all(study: Study, place: Place) -> Iterator[Labels]:
                 yield {label: known[label] for label in names}
     else:
         for scene in study.scenes:
-            for run in ("train", "heldout"):
+            for run in ("train", *MOTIONS):
                 known = {"scene": scene, "run": run}
                 yield {label: known[label] for label in names}
 
@@ -101,6 +102,12 @@ def _published(study: Study, scene: str, group: str) -> bool:
     return any((case.scene, case.group) == (scene, group) for case in cases)
 
 
+def _live(study: Study) -> Iterator[Labels]:
+    """The listed scenes that the study has models of."""
+    held = {*_with_subspaces(study)} & {*study.scenes} | {*study.online}
+    return ({"scene": scene} for scene in study.settings.live.scenes if scene in held)
+
+
 _subspaces, _companions = _scenes(_with_subspaces), _scenes(_with_companions)
 _sizes = _sized(lambda study: study.settings.scaling.scenes)
 _online = [paths.ONLINE, paths.ONLINE_MODELS]
@@ -118,6 +125,7 @@ SOME: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     **dict.fromkeys([paths.NOISE, paths.NOISE_RUNS], _groups(_noisy)),
     paths.LADDER: _groups(lambda study, scene, group: scene in study.ladder.scenes),
     paths.PUBLISHED_CHOICES: _groups(_published),
+    paths.LIVE_MODEL: _live,
     paths.STABILITY: _scenes(lambda study: study.settings.stability.scenes),
     paths.SUBSPACE_ABLATION: _scenes(lambda study: study.ablation.scenes),
     paths.ALTERNATIVES: _sized(lambda study: study.settings.alternatives.scenes),

@@ -93,6 +93,7 @@ def published(plan: Plan, folders: Folders, manifest: Manifest) -> list[Publishe
     for name, job in figures.items():
         for place in (paths.FIGURE, paths.FIGURE_PICTURE):
             titles[place.at("", name=name)[1:]] = f"Figure {job.label}: {job.order.title}"
+    titles[paths.LIVE_PAGE.at("")[1:]] = "Page on which reduced models run"
     titles["machine.json"] = "The machine that the study ran on"
     manuscript = Path(folders.manuscript).name
     found = []

@@ -5,8 +5,9 @@ Who wants to see how far results depend on such settings names those that are to
 
 OpenBLAS holds kernels for many processors and takes the newest that fit; they round differently, so
 that it is told which to take. It does not check the variable ``OPENBLAS_CORETYPE``: kernels that
-the processor lacks instructions for would end the process. All has to be set before NumPy is
-loaded.
+the processor lacks instructions for would end the process. The project's own kernels are compiled
+on the machine, by default for its very processor; the compiler is told a family of processors
+likewise (docs/decisions/0015-one-target.md). All has to be set before NumPy is loaded.
 """
 
 import os
@@ -29,9 +30,17 @@ DATE = "1767225600"
 CPUINFO = Path("/proc/cpuinfo")
 # every instruction that the kernels named Haswell use beyond those that NumPy itself demands
 HASWELL = {"avx2", "fma"}
+# every instruction set that the compiler draws on for it: Linux's name of each, and the compiler's
+COMPILED_HASWELL = {
+    "abm": "lzcnt", "avx2": "avx2", "bmi1": "bmi", "bmi2": "bmi2", "f16c": "f16c", "fma": "fma",
+    "movbe": "movbe", "popcnt": "popcnt",
+}  # fmt: skip
+TARGET, FEATURES = "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"
 
 
-def settled(environment: Mapping[str, str], kernels: str | None) -> dict[str, str]:
+def settled(
+    environment: Mapping[str, str], kernels: str | None, target: Mapping[str, str]
+) -> dict[str, str]:
     """An environment without inherited settings, and with those of this project.
 
     What the variable ``PDROM_KEEP`` names is neither cleared nor set.
@@ -39,6 +48,7 @@ def settled(environment: Mapping[str, str], kernels: str | None) -> dict[str, st
     Parameters
     ----------
     kernels : OpenBLAS's name of the kernels to use, None leaves the choice to it
+    target : variables that choose what to compile for, see `compiled_for`
     """
     asked = environment.get(KEEP, "").split()
     kept = {
@@ -56,12 +66,17 @@ def settled(environment: Mapping[str, str], kernels: str | None) -> dict[str, st
     }
     if kernels:
         fixed["OPENBLAS_CORETYPE"] = kernels
+    if TARGET not in asked:  # the features are those of the target
+        fixed |= target
     return kept | {name: value for name, value in fixed.items() if name not in asked}
 
 
 def settle() -> None:
     """Give this process, and so its jobs, the `settled` environment; before NumPy is loaded."""
-    environment = settled(os.environ, core_type_here())
+    system, machine, features = platform.system(), platform.machine(), features_here()
+    environment = settled(
+        os.environ, core_type(system, machine, features), compiled_for(machine, features)
+    )
     for name in set(os.environ) - set(environment):
         del os.environ[name]
     os.environ.update(environment)
@@ -86,6 +101,26 @@ def core_type(system: str, machine: str, features: set[str]) -> str | None:
     return "ARMV8" if machine == "aarch64" else None
 
 
+def compiled_for(machine: str, features: set[str]) -> dict[str, str]:
+    """Variables that make the compiler's target one that every processor of a family has.
+
+    Haswell where an x86-64 processor has what the compiler draws on for it, on ARM what the
+    architecture itself has. Empty elsewhere: the compiler then takes the machine's own.
+
+    Parameters
+    ----------
+    machine, features : as in `core_type`
+    """
+    if machine in ("aarch64", "arm64"):
+        return {TARGET: "generic", FEATURES: ""}
+    if machine != "x86_64" or not features >= COMPILED_HASWELL.keys():
+        return {}
+    return {
+        TARGET: "haswell",
+        FEATURES: ",".join(f"+{name}" for name in COMPILED_HASWELL.values()),
+    }
+
+
 def processor_features(cpuinfo: str) -> set[str]:
     """Flags that every processor of /proc/cpuinfo has; none where it names none."""
     flags = [
@@ -96,10 +131,9 @@ def processor_features(cpuinfo: str) -> set[str]:
     return set.intersection(*flags) if flags else set()
 
 
-def core_type_here() -> str | None:
-    """`core_type` of this machine."""
+def features_here() -> set[str]:
+    """`processor_features` of this machine; none where the system does not say."""
     try:
-        cpuinfo = CPUINFO.read_text(encoding="utf-8", errors="replace")
+        return processor_features(CPUINFO.read_text(encoding="utf-8", errors="replace"))
     except OSError:
-        cpuinfo = ""
-    return core_type(platform.system(), platform.machine(), processor_features(cpuinfo))
+        return set()

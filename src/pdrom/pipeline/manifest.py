@@ -1,7 +1,7 @@
 """The manifest of a study: each of its results with its checksum and with what made it.
 
-It is written at the end of every run that succeeds, from the seals, so that no large file is read
-again: an HDF5 file has the BLAKE2b digest of its seal, everything else its SHA-256 as well. Equal
+It is written at the end of every run that succeeds, from the checksum files, so that no large file
+is read again: an HDF5 file has its BLAKE2b digest, everything else its SHA-256 as well. Equal
 results have an equal manifest.
 """
 
@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from pdrom.core import paths
 from pdrom.core.errors import StorageError
-from pdrom.core.store import Condition, Seal, check_file, read_seal, write_text
+from pdrom.core.store import Checksum, Condition, check_file, read_checksum, write_text
 from pdrom.core.yamlfile import describe
 from pdrom.pipeline.folders import Folders
 from pdrom.pipeline.plan import Plan
@@ -45,13 +45,13 @@ class Entry(_Record):
     environment: str | None = None
 
     def fits(self, path: Path) -> bool:
-        """Whether a file has the bytes that the entry tells of."""
+        """Whether a file has the bytes that the entry records."""
         if self.sha256:
             with open(path, "rb") as handle:
                 return hashlib.file_digest(handle, "sha256").hexdigest() == self.sha256
-        seal = read_seal(path)
-        told = seal is not None and seal.digest == self.blake2b
-        return told and check_file(path) is Condition.INTACT
+        checksum = read_checksum(path)
+        reported = checksum is not None and checksum.digest == self.blake2b
+        return reported and check_file(path) is Condition.INTACT
 
 
 class Manifest(_Record):
@@ -72,10 +72,10 @@ def write_manifest(plan: Plan, folders: Folders, options: Iterable[str]) -> tupl
     environments: dict[str, dict[str, str]] = {}
     files = {}
     for path in sorted(study_files(plan, folders)):
-        seal = read_seal(path)
-        if seal is not None:
+        checksum = read_checksum(path)
+        if checksum is not None:
             inside = os.path.relpath(path, folders.results)
-            files[inside] = _entry(Path(path), seal, environments)
+            files[inside] = _entry(Path(path), checksum, environments)
     made = Manifest(options=tuple(options), environments=environments, files=files)
     text = f"{made.model_dump_json(indent=1, exclude_none=True)}\n"
     place = Path(paths.MANIFEST.at(folders.results))
@@ -107,7 +107,7 @@ def own_files(plan: Plan, folders: Folders) -> set[str]:
     return {
         folders.manuscript, *plan.paper.files, *plan.table_paths,
         *plan.figures, *(job.png for job in plan.figure_jobs.values()),
-        *plan.measured,
+        *plan.measured, *plan.page.outputs.values(),
     }  # fmt: skip
 
 
@@ -147,8 +147,8 @@ def _is_target(path: str, results: str, scenes: set[str], methods: set[str]) -> 
     return False
 
 
-def _entry(path: Path, seal: Seal, environments: dict[str, dict[str, str]]) -> Entry:
-    made = json.loads(seal.provenance) if seal.provenance else {}
+def _entry(path: Path, checksum: Checksum, environments: dict[str, dict[str, str]]) -> Entry:
+    made = json.loads(checksum.provenance) if checksum.provenance else {}
     environment = {name: made.pop(name) for name in _ENVIRONMENT if name in made}
     if environment:
         key = hashlib.sha256(json.dumps(environment, sort_keys=True).encode()).hexdigest()[:8]
@@ -156,6 +156,6 @@ def _entry(path: Path, seal: Seal, environments: dict[str, dict[str, str]]) -> E
         made["environment"] = key
     if path.suffix != LARGE:
         content = path.read_bytes()
-        if hashlib.blake2b(content).hexdigest() == seal.digest:
+        if hashlib.blake2b(content).hexdigest() == checksum.digest:
             made["sha256"] = hashlib.sha256(content).hexdigest()
-    return Entry(bytes=path.stat().st_size, blake2b=seal.digest, **made)
+    return Entry(bytes=path.stat().st_size, blake2b=checksum.digest, **made)

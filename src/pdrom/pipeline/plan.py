@@ -25,6 +25,7 @@ from pdrom.pipeline.scenes import require_scenes
 from pdrom.pipeline.study import Study, StudySettings
 from pdrom.pipeline.subspace_scenes import check_subspaces
 from pdrom.pipeline.values import scaled_methods
+from pdrom.report.live.page import live_page
 from pdrom.tables import declared
 from pdrom.tables.claims import load_claims
 
@@ -99,6 +100,7 @@ class Plan:
         named = {
             f"{folder / 'ladder.yaml'}: scenes": self.study.ladder.scenes,
             f"{folder / 'subspace_ablation.yaml'}: scenes": self.study.ablation.scenes,
+            "live.scenes": settings.live.scenes,
             "subspace.scenes": settings.subspace.scenes,
             "scaling.scenes": tuple(settings.scaling.scenes),
             "stability.scenes": settings.stability.scenes,
@@ -139,12 +141,18 @@ class Plan:
 
     @property
     def fixed(self) -> dict[str, list[Job]]:
-        """Jobs of tables, figures and the manuscript by the folder of their logs, in order."""
+        """Jobs of tables, figures, page and the manuscript by the folder of their logs, in order."""
         return {
             "tables": [self.job(table) for table in self.tables.values()],
             "figures": [figure.job for figure in self.figure_jobs.values()],
+            "article": [self.page],
             "paper": [self.paper.inputs, self.paper.manuscript],
         }
+
+    @property
+    def page(self) -> Job:
+        """The page on which models run."""
+        return self.job(live_page)
 
     @cached_property
     def paper(self) -> PaperJobs:

@@ -13,7 +13,7 @@ NOTHING = "Nothing to be done"
 # What Snakemake says of a failed job, which the last lines of the run name with its cause.
 JOB_FAULT = "RuleException"
 CLOSING = "At least one job did not complete successfully"
-# Jobs, and share of the expected work, that must be done before the time that is left is told.
+# Jobs, and share of the expected work, that must be done before the time that is left is reported.
 ENOUGH_JOBS, ENOUGH = 2, 0.05
 # Share of its expected time that a job is taken to need still, however long it has been running.
 REST = 0.1

@@ -10,7 +10,7 @@ from pdrom.pipeline.figures import FigureJob
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.resolve import Job
 
-KINDS = {"table": "tables", "figure": "figures", "paper": "paper"}
+KINDS = {"table": "tables", "figure": "figures", "article": "article", "paper": "paper"}
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,9 @@ def rules(plan: Plan, cores: int) -> Iterator[Rule]:
         yield _fixed(plan, plan.job(table), "table", f"Table {table.name}", shown)
     for figure in plan.figure_jobs.values():
         yield _figure(plan, figure)
+    page = plan.page
+    shown = {"out": {"category": "Page"}}
+    yield _fixed(plan, page, "article", f"Page {page.outputs['out']}", shown)
     paper = plan.paper
     yield _fixed(plan, paper.inputs, "paper", paper.inputs.artifact.title, {})
     message = f"Manuscript {paper.manuscript.outputs['out']}"

@@ -14,6 +14,7 @@ from pdrom.pipeline.commandline import CommandLine, options, recall, remember
 from pdrom.pipeline.expectation import expected_seconds, tell_expectation
 from pdrom.pipeline.failures import Failures, listen
 from pdrom.pipeline.folders import Folders
+from pdrom.pipeline.fork_server import hold_pipe, start_server
 from pdrom.pipeline.full import apart
 from pdrom.pipeline.manifest import write_manifest
 from pdrom.pipeline.plan import Plan
@@ -27,7 +28,6 @@ from pdrom.pipeline.running import (
 )
 from pdrom.pipeline.summary import configuration, preview, summary
 from pdrom.pipeline.targets import Rule, known
-from pdrom.pipeline.warm import hold_pipe, start_server
 
 # What Snakemake compares by date.
 DATED = ("results", "paper", "config", "workflow")

@@ -20,6 +20,7 @@ from pdrom.experiments.iterations import IterationSweep
 from pdrom.experiments.kit.sampling import Sweep
 from pdrom.experiments.kit.settings import BlowupExtent, Solver, Threads
 from pdrom.experiments.ladder import LadderFile
+from pdrom.experiments.live import Live
 from pdrom.experiments.noise import Noise
 from pdrom.experiments.offline import Offline
 from pdrom.experiments.online import Online
@@ -82,6 +83,7 @@ class StudySettings(ConfigModel):
     companion: Companion = Companion()
     hard_cases: HardCases = HardCases()
     online: Online = Online()
+    live: Live = Live()
     alternatives: Alternatives = Alternatives()
     viewer: Viewer = Viewer()
     variants: Variants = Variants()

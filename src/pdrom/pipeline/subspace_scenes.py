@@ -10,7 +10,7 @@ log = logging.getLogger(__name__)
 
 
 def check_subspaces(study: Study) -> None:
-    """Say which scenes go without subspaces, companion and estimates.
+    """Say which scenes go without subspaces, auxiliary model and estimates.
 
     Raises
     ------
@@ -27,12 +27,12 @@ def check_subspaces(study: Study) -> None:
             if name in outside:
                 raise ConfigurationError(
                     f"{key}: scene '{name}' has the effect '{outside[name][0]}', which no position "
-                    "subspace (and no companion) takes"
+                    "subspace (and no auxiliary model) takes"
                 )
     for name, effects in outside.items():
         log.warning(
-            "%s: no position subspaces, no companion and no estimated errors, since none takes the "
-            "effect '%s'", name, "', '".join(effects),
+            "%s: no position subspaces, no auxiliary model and no estimated errors, since none "
+            "takes the effect '%s'", name, "', '".join(effects),
         )  # fmt: skip
 
 

@@ -31,7 +31,7 @@ REASONS = {
     "Code has changed": "script has changed",
     "Params have changed": "settings or code have changed",
     "Software environment definition has changed": "environment has changed",
-    FOLLOWS: "input is made anew",
+    FOLLOWS: "input is made again",
 }
 END = "This was a dry-run"
 

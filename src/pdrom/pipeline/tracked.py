@@ -1,13 +1,13 @@
 """Measurements that git keeps: costs of jobs, and the winners on large meshes.
 
 ``./reproduce run python -m pdrom.pipeline.tracked costs`` writes `config/reference/job_costs.csv`
-anew, from the logs of the full and of the tiny study in ``results``. It holds the mean processor
+again, from the logs of the full and of the tiny study in ``results``. It holds the mean processor
 seconds of a kind of job on the meshes of both studies, with the longest time and the largest memory
 of a job, which the requests of `workflow/profiles/slurm` are to cover. A kind is what a job's log
 is named by below ``logs``: an experiment, or ``tables``, ``figures`` or ``paper``.
 
 ``./reproduce run python -m pdrom.pipeline.tracked meshes`` writes the file of the table
-`large_meshes` anew, from a finished run of ``config/alternatives.yaml``, which takes too long for
+`large_meshes` again, from a finished run of ``config/alternatives.yaml``, which takes too long for
 the default run. Its times are those of one machine, so that the record names both.
 """
 
@@ -34,7 +34,7 @@ LARGE = "config/alternatives.yaml"
 
 def write_tracked(path: Path, content: bytes) -> None:
     """Write a file that git keeps: whole or not at all, without a checksum beside it."""
-    with atomic_path(path, sealed=False) as temporary:
+    with atomic_path(path, with_checksum=False) as temporary:
         temporary.write_bytes(content)
 
 
@@ -102,7 +102,7 @@ KEPT = {"costs": _costs, "meshes": _meshes}
 
 
 def main(words: Sequence[str]) -> None:
-    """Write the measurements that are named anew.
+    """Write the measurements that are named again.
 
     Raises
     ------

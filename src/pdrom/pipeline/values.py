@@ -8,9 +8,11 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from pdrom.core import paths
+from pdrom.core.paths import Place
 from pdrom.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
 from pdrom.experiments.guard import Trial
 from pdrom.experiments.kit.settings import Horizon
+from pdrom.experiments.live import JOINT, JointRows
 from pdrom.experiments.repetitions import Repeated
 from pdrom.experiments.reruns import OfScene
 from pdrom.experiments.stability import Stability
@@ -74,10 +76,31 @@ def _trials(study: Study, labels: Labels) -> tuple[Trial, ...]:
 
 
 def _companions(study: Study, labels: Labels) -> tuple[OfScene, ...]:
-    """The companion that a job's guard estimates errors with, if it does."""
+    """The auxiliary model that a job's guard estimates errors with, if it does."""
     guard = study.settings.guard
     estimates = guard.action != "none" and guard.alarm == "estimate"
     return (OfScene(scene=labels["scene"]),) if estimates else ()
+
+
+def _held(place: Place) -> Callable[[Study, Labels], tuple[OfScene, ...]]:
+    """The scene of a job if the study itself holds its file of a kind."""
+
+    def held(study: Study, labels: Labels) -> tuple[OfScene, ...]:
+        own = {"scene": labels["scene"]}
+        return (OfScene(**own),) if own in labels_of(study, place) else ()
+
+    return held
+
+
+def _joint_rows(study: Study, labels: Labels) -> tuple[JointRows, ...]:
+    """Joint rows of the reduced groups of a scene, as far as the study samples them."""
+    scene = labels["scene"]
+    if JOINT not in study.methods or scene not in study.scenes:
+        return ()
+    method = study.methods[JOINT]
+    return tuple(
+        JointRows(scene=scene, group=group, method=method) for group in study.scenes[scene].reduce
+    )
 
 
 def _timed_scenes(study: Study, labels: Labels) -> tuple[NamedScene, ...]:
@@ -165,6 +188,10 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "stability": _stability,
     "trials": _trials,
     "companions": _companions,
+    "with_subspaces": _held(paths.SUBSPACES),
+    "with_online_models": _held(paths.ONLINE_MODELS),
+    "with_companion": _held(paths.COMPANION),
+    "joint_rows": _joint_rows,
     "timed_scenes": _timed_scenes,
     "large_scenes": _large_scenes,
     "subspace_cases": _subspace_cases,

@@ -85,10 +85,12 @@ class MethodSpec(BasisSpec):
             raise ValueError(f"rows = 'joint' with selection = '{self.selection}': only 'greedy'")
         if self.rows == "element" and self.solve == "square":
             raise ValueError("rows = 'element' with solve = 'square': allowed are qr, tikhonov")
-        if self.oversampling > 1 and not self.may_oversample:
+        joint = self.rows == "joint" and self.solve != "square"
+        if self.oversampling > 1 and not (self.may_oversample or joint):
             raise ValueError(
                 f"oversampling = {self.oversampling} with rows = '{self.rows}', solve = "
-                f"'{self.solve}': only rows = 'scalar' or 'element' with solve = 'qr', 'tikhonov'"
+                f"'{self.solve}': only rows = 'scalar', 'joint', 'element' with solve = 'qr', "
+                "'tikhonov'"
             )
         if self.gain_bound is not None and (not self.may_oversample or self.per_axis):
             raise ValueError(
@@ -116,11 +118,12 @@ class MethodSpec(BasisSpec):
     @property
     def modules(self) -> list[str]:
         """Places of the code that the method names (for fingerprints), "module:attribute"."""
-        return [SELECTIONS[self.selection]] if self.rows in ("scalar", "element") else []
+        selects = self.rows in ("scalar", "element") or self.oversampling > 1
+        return [SELECTIONS[self.selection]] if selects else []
 
     @property
     def may_oversample(self) -> bool:
-        """Whether there can be more samples than modes."""
+        """Whether there can be more samples than modes, as many as a bound of the gain needs."""
         return self.rows in ("scalar", "element") and self.solve != "square"
 
     @property
@@ -137,7 +140,7 @@ class MethodSpec(BasisSpec):
 
 
 def load_methods(path: Path) -> dict[str, MethodSpec]:
-    """Methods of config/methods.yaml by name; ConfigurationError for any fault."""
+    """Methods of the file ``path`` (methods.yaml) by name; ConfigurationError for any fault."""
     content = read_yaml(path)
     if not isinstance(content, dict) or not content:
         raise ConfigurationError(f"{path}: a mapping of method names is required")

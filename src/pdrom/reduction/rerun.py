@@ -92,17 +92,17 @@ def compare(
 
 
 def extent_norm(reference: np.ndarray, extent: float) -> float:
-    """Frobenius norm of a frame in which every vertex is off by the rest extent, m."""
+    """Frobenius norm, m, of a frame of ``reference`` with every vertex off by the rest extent."""
     return extent * float(np.sqrt(reference.shape[1]))
 
 
 def displacement_norms(reference: np.ndarray) -> np.ndarray:
-    """|| Q_fom - rest ||_F of each frame, (F,) m; rest is the initial state."""
+    """|| Q_fom - rest ||_F of the frames of ``reference`` (F + 1, N, 3) but the first, (F,) m."""
     return np.linalg.norm((reference[1:] - reference[0]).reshape(len(reference) - 1, -1), axis=1)
 
 
 def step_norms(positions: np.ndarray) -> np.ndarray:
-    """|| Q^(n + 1) - Q^n ||_F of each frame, (F,) m: of the velocities at its end, times the step.
+    """|| Q^(n + 1) - Q^n ||_F of each frame of ``positions`` (F + 1, N, 3) m, (F,) m.
 
     The step loop has no other velocities. Of the difference of two runs (F + 1, N, 3) it is that of
     their velocities.
@@ -111,5 +111,5 @@ def step_norms(positions: np.ndarray) -> np.ndarray:
 
 
 def mean_motion(reference: np.ndarray) -> float:
-    """Root mean square of `displacement_norms` over the frames of a run, m."""
+    """Root mean square of `displacement_norms` over the frames of ``reference``, m."""
     return float(np.sqrt(np.mean(displacement_norms(reference) ** 2)))

@@ -24,12 +24,12 @@ def test_frames(frames: int) -> np.ndarray:
 
 
 def stored_frames(frames: int, count: int) -> np.ndarray:
-    """Frames of the training run whose snapshots are needed, ascending."""
+    """Frames of the training run (``frames``) needed for ``count`` snapshots, ascending."""
     return np.sort(np.concatenate([training_frames(frames, count), test_frames(frames)]))
 
 
 def row_masses(group: ConstraintGroup, masses: np.ndarray) -> np.ndarray:
-    """Lumped mass of each operator row (e p,) kg.
+    """Lumped mass (e p,) kg of each operator row of ``group``, from vertex ``masses`` (N,) kg.
 
     Every vertex hands its mass out in equal parts to the elements that touch it, so that the masses
     of the elements sum to those of the touched vertices; each row of an element carries it.
@@ -72,6 +72,12 @@ def collect(
 ) -> SnapshotSet:
     """Read the snapshots of ``group`` from two runs and split them.
 
+    Parameters
+    ----------
+    training_run, heldout_run : files of the two full-order runs
+    masses : (N,) kg
+    train : frames that train, ascending
+
     Raises
     ------
     SnapshotError
@@ -108,7 +114,7 @@ def _read(path: str | os.PathLike[str], group: str) -> tuple[np.ndarray, np.ndar
 
 
 def save_snapshots(snapshots: SnapshotSet, path: str | os.PathLike[str]) -> None:
-    """Write a snapshot set (datasets train, test, heldout, <split>_frames, row_mass)."""
+    """Write ``snapshots`` to ``path`` (datasets train, test, heldout, <split>_frames, row_mass)."""
     with write_hdf5(path) as file:
         for split in SPLITS:
             file[split] = getattr(snapshots, split)
@@ -120,7 +126,7 @@ def save_snapshots(snapshots: SnapshotSet, path: str | os.PathLike[str]) -> None
 
 
 def load_snapshots(path: str | os.PathLike[str]) -> SnapshotSet:
-    """Read what `save_snapshots` wrote; StorageError if the file is damaged."""
+    """Read the file ``path`` by `save_snapshots`; StorageError if it is damaged."""
     with open_hdf5(path) as file:
         return SnapshotSet(
             **{split: file[split][...] for split in SPLITS},

@@ -13,10 +13,10 @@ HEAD = """\
 
 Made from the declarations in `src/pdrom/report/figures` by `./reproduce pages`.
 
-A figure is drawn to `results/figures/NAME.pdf` and `.png` by `./reproduce figure NAME`; in place of
-the name stands its number in `main.pdf`, as in `figure 10`, or that of the figure of the preprint
-which it rebuilds, as in `figure preprint:8`. What it shows is chosen in
-`config/figures.yaml`, by the keys given here.
+`./reproduce figure NAME` draws a figure to `results/figures/NAME.pdf` and `.png`.
+The name may be replaced by the figure's number in `main.pdf` (`figure 10`) or by the number of the
+figure of the preprint that it rebuilds (`figure preprint:8`).
+The keys given here choose in `config/figures.yaml` what it shows.
 """
 
 
@@ -29,10 +29,15 @@ def figures_page(root: Path = Path()) -> str:
         keys = ", ".join(f"`{key}`" for key in figure.options.model_fields)
         reads = ", ".join(dict.fromkeys(_words(read) for read in figure.reads.values()))
         parts.append(
-            f"## `{name}`{number}\n\n**{_text(figure.title)}.** {_text(figure.caption)}\n\n"
-            f"Keys: {keys}. Reads: {reads}.\n"
+            f"## `{name}`{number}\n\n**{_text(figure.title)}.**\n{_lines(figure.caption)}\n\n"
+            f"Keys: {keys}.\nReads: {reads}.\n"
         )
     return "\n".join(parts)
+
+
+def _lines(caption: str) -> str:
+    """Caption with one sentence a line."""
+    return re.sub(r"\. (?=[A-Z`])", ".\n", _text(caption))
 
 
 def _text(marked: str) -> str:

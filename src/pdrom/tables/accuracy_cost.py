@@ -24,6 +24,7 @@ from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.experiments.kit.names import ANDERSON, FOM
 from pdrom.tables.kit.declaration import flag, integer, table, timed
+from pdrom.tables.kit.held_out import COLUMNS, MEDIAN, with_held_out
 from pdrom.tables.kit.one_time import timings_in_one_time
 from pdrom.tables.kit.parts import joined
 from pdrom.tables.kit.vocabulary import (
@@ -54,9 +55,12 @@ CONVERGED, OWN = "converged", "own iterations"
         ERROR_WITHIN,
         MS_PER_FRAME,
         timed(flag("pareto", "no point of the same reference is as good in both, better in one")),
+        *COLUMNS,
+        timed(flag("pareto_heldout", "the same by the error held out; full order as it is")),
     ),
     reads={
         "reruns": TableOf("reduced_reruns"),
+        "heldout": TableOf("heldout_reruns"),
         "timings": Every(paths.TIMINGS),
         "frame_times": TableOf("frame_times"),
         "sweeps": Every(paths.ITERATIONS),
@@ -65,6 +69,7 @@ CONVERGED, OWN = "converged", "own iterations"
 )
 def accuracy_cost(
     reruns: pd.DataFrame,
+    heldout: pd.DataFrame,
     timings: list[File],
     frame_times: pd.DataFrame,
     sweeps: list[File],
@@ -76,7 +81,7 @@ def accuracy_cost(
 
     Parameters
     ----------
-    reruns : the table reduced_reruns
+    reruns, heldout : the tables reduced_reruns and heldout_reruns
     timings : timing tables of the scenes
     frame_times : the table of that name
     sweeps : tables of the scenes' full-order runs with other numbers of iterations
@@ -88,13 +93,18 @@ def accuracy_cost(
     full = full.assign(method="full", position_basis="full", relative_error_within_horizon=0.0)
     sweep = _sweep(joined(sweeps), times)
     points = reruns.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
-    points = points.assign(iterations=points.scene.map(iterations))
+    points = with_held_out(points.assign(iterations=points.scene.map(iterations)), heldout)
     parts = [full.assign(iterations=full.scene.map(iterations)), points, sweep]
     points = pd.concat([part for part in parts if len(part)], ignore_index=True)
-    points["pareto"] = False
-    for _, rows in points.groupby(["scene", reference_of(points)], sort=False):
-        error = rows.relative_error_within_horizon.to_numpy(float)
-        points.loc[rows.index, "pareto"] = pareto(error, rows.ms_per_frame.to_numpy(float))
+    reduced = points.method.isin(reruns.method) & ~_unreduced(points)
+    unseen = points[MEDIAN].where(reduced, points.relative_error_within_horizon)
+    errors = {"pareto": points.relative_error_within_horizon, "pareto_heldout": unseen}
+    for name, error in errors.items():
+        points[name] = False
+        known = points[error.notna()]
+        for _, rows in known.groupby(["scene", reference_of(known)], sort=False):
+            own = error[rows.index].to_numpy(float)
+            points.loc[rows.index, name] = pareto(own, rows.ms_per_frame.to_numpy(float))
     order = points.scene.map({scene: i for i, scene in enumerate(iterations)})
     return points.iloc[np.argsort(order, kind="stable")]
 
@@ -119,13 +129,18 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     return points.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
 
 
+def _unreduced(points: pd.DataFrame) -> pd.Series:
+    """Whether each point is the full order: ``full`` is also a model with reduced positions."""
+    return (points.method == "full") & (points.position_basis == "full")
+
+
 def reference_of(points: pd.DataFrame) -> pd.Series:
-    """Reference of the error of each row of the table: `CONVERGED` or `OWN`."""
+    """Reference of the error of each row of ``points``: `CONVERGED` or `OWN`."""
     return points.method.isin([FOM, ANDERSON]).map({True: CONVERGED, False: OWN})
 
 
 def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
-    """Whether no other point is at least as good in both and better in one."""
+    """Whether no other point is as good in ``error`` and ``cost`` and better in one of them."""
     return [
         not any((e <= a) & (c <= b) & ((e < a) | (c < b)) for e, c in zip(error, cost, strict=True))
         for a, b in zip(error, cost, strict=True)

@@ -8,6 +8,7 @@ import pandas as pd
 from pdrom.artifact.reads import Every, Setting, TableOf
 from pdrom.core import paths
 from pdrom.core.paths import File
+from pdrom.model.held_out import FIRST
 from pdrom.tables.gain_prediction import FAILED
 from pdrom.tables.kit.declaration import compared, integer, number, table, text
 from pdrom.tables.kit.parts import joined
@@ -55,9 +56,12 @@ def alarms(
     rows: list[dict[str, Any]] = []
     for split, runs, files in (
         ("train", reruns, guarded),
-        ("heldout", heldout, guarded_heldout),
+        (FIRST, heldout[heldout.motion == FIRST], guarded_heldout),
     ):
-        rows += _rows(split, runs, joined(files), estimates, threshold, alarm)
+        watched = joined(files)
+        own = watched if watched.empty else watched[watched.guard_count.notna()]
+        own = own[own.motion == FIRST] if split == FIRST and len(own) else own
+        rows += _rows(split, runs, own, estimates, threshold, alarm)
     return pd.DataFrame(rows)
 
 

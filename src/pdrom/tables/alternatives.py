@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.artifact.reads import Every
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.experiments.alternatives.settings import CONVERGED, REDUCED
+from pdrom.experiments.alternatives.settings import ACCELERATED, CONVERGED, OWN, REDUCED
 from pdrom.tables.kit.declaration import compared, flag, integer, number, table, text
 from pdrom.tables.kit.parts import joined
 from pdrom.tables.kit.vocabulary import ELEMENTS_SAMPLED, MS_PER_FRAME, SCENE, VERTICES, K
@@ -13,6 +13,8 @@ from pdrom.tables.kit.vocabulary import ELEMENTS_SAMPLED, MS_PER_FRAME, SCENE, V
 STIFFNESS = compared("exact", number("stiffness", "factor on all weights of the scene"))
 SUBSTEPS = integer("substeps", "steps that a frame is divided into")
 ITERATIONS = integer("iterations", "iterations of each substep")
+
+TRAINED_ON = text("trained_on", f"frames that a reduction is trained on: {OWN}, {CONVERGED}")
 
 
 @table(
@@ -22,9 +24,14 @@ ITERATIONS = integer("iterations", "iterations of each substep")
         compared("exact", number("factor", "on the vertices along a side of the scene's own mesh")),
         VERTICES,
         STIFFNESS,
-        text("method", f"how a frame is solved; {CONVERGED}: to the end; {REDUCED}: reduced"),
+        text(
+            "method",
+            f"how a frame is solved; {CONVERGED}: to the end; {REDUCED}: reduced, {ACCELERATED}: "
+            "and accelerated in the subspace",
+        ),
         SUBSTEPS,
         ITERATIONS,
+        TRAINED_ON,
         K,
         ELEMENTS_SAMPLED,
         integer("frames", "frames that errors are taken over"),

@@ -31,9 +31,9 @@ OWN_MESH = "1"  # factor of a scene's own mesh, whose curve is measured with its
         timed(number("ratio", "the first over the second")),
         timed(integer("breakeven_r", "size from which the reduction costs more, of the curve")),
         timed(number("solve_ms", "of it, the solve of size r for the coefficients", "ms")),
-        timed(number("lift_ms", "of it, the lift from the coefficients to the mesh", "ms")),
+        timed(number("lift_ms", "of it, the reconstruction from the coefficients", "ms")),
         timed(number("solve_ratio", "the solve alone over the full local step")),
-        timed(number("lift_ratio", "the lift alone over the full local step")),
+        timed(number("lift_ratio", "the reconstruction alone over the full local step")),
     ),
     reads={"own": Every(paths.BREAK_EVEN), "sized": Every(paths.BREAK_EVEN_SIZED)},
 )

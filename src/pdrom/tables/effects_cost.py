@@ -32,4 +32,4 @@ def effects_cost(parts: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
     rows = joined(parts)
     if rows.empty:
         return rows
-    return in_one_time(rows, rows.groupby("scene").ms_per_frame.sum(), frame_times, TIMES)
+    return in_one_time(rows, rows.groupby("scene").ms_per_frame.sum(), frame_times, columns=TIMES)

@@ -33,4 +33,4 @@ def effects_left_out(parts: list[File], frame_times: pd.DataFrame) -> pd.DataFra
     if rows.empty:
         return rows
     own = rows[rows.left_out == NOTHING].set_index("scene").ms_per_frame
-    return in_one_time(rows, own, frame_times, TIMES)
+    return in_one_time(rows, own, frame_times, columns=TIMES)

@@ -1,4 +1,4 @@
-"""Table estimates: the error of every run as its companion estimates it, beside the true one."""
+"""Table estimates: errors of runs as the auxiliary model estimates them, beside the true ones."""
 
 import pandas as pd
 
@@ -11,7 +11,7 @@ from pdrom.tables.kit.reruns import KEYS
 from pdrom.tables.kit.vocabulary import ERROR_WITHIN, GROUP, METHOD, POSITION_BASIS, SCENE, K, R
 
 BAND = (0.3, 3.0)  # estimates between these multiples of the error count as good
-MARGIN = 1.5  # an estimate above this multiple of the companion's own error is resolved
+MARGIN = 1.5  # an estimate above this multiple of the auxiliary model's own error is resolved
 
 
 @table(
@@ -28,7 +28,8 @@ MARGIN = 1.5  # an estimate above this multiple of the companion's own error is 
         compared(
             "error",
             number(
-                "estimate", "distance to the companion, relative to its motion, before the horizon"
+                "estimate",
+                "distance to the auxiliary model, relative to its motion, before the horizon",
             ),
         ),
         compared(
@@ -39,12 +40,12 @@ MARGIN = 1.5  # an estimate above this multiple of the companion's own error is 
         ),
         compared("error", number("ratio", "effectivity: estimate over error")),
         compared("error", flag("within", f"the ratio lies between {BAND[0]:g} and {BAND[1]:g}")),
-        number("companion_error", "of the companion's own run of the motion before the horizon"),
+        number("companion_error", "error of the auxiliary model's own run before the horizon"),
         compared(
             "error", number("floor", "the same of the training motion, which is known offline")
         ),
         compared("error", flag("resolved", f"the estimate exceeds {MARGIN:g} times the floor")),
-        timed(number("overhead", "time of the companion's frame over that of the run")),
+        timed(number("overhead", "time of the auxiliary model's frame over that of the run")),
         timed(number("full_order_share", "the same over that of the full-order run")),
     ),
     reads={
@@ -56,8 +57,8 @@ MARGIN = 1.5  # an estimate above this multiple of the companion's own error is 
 def estimates(parts: list[File], times: list[File], reruns: pd.DataFrame) -> pd.DataFrame:
     """One row per run of both motions; without an error where the run ended before the horizon.
 
-    A resolved estimate differs from the error by at most the companion's own error over the motion:
-    if that is no larger than ``floor``, the ratio lies between 0.6 and 3.
+    A resolved estimate differs from the error by at most the auxiliary model's own error over the
+    motion: if that is no larger than ``floor``, the ratio lies between 0.6 and 3.
     """
     rows = joined(parts)
     if rows.empty:

@@ -12,7 +12,7 @@ from pdrom.tables.kit.declaration import compared, integer, number, table, text
 
 
 @table(
-    title="Predictors of failure in scenes that had no say in their limit",
+    title="Predictors of failure in scenes that their limit was not fitted to",
     columns=(
         text("predictor", f"one of: {', '.join(PREDICTORS)}"),
         text("method", f"method of the runs; {EVERY}, or {WITHIN}: a limit for each method"),

@@ -1,4 +1,4 @@
-"""Table frame_times: the one time of each full-order run, which all other tables are told in."""
+"""Table frame_times: the one time of each full-order run, to which all other tables refer."""
 
 import pandas as pd
 

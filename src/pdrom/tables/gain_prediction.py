@@ -131,7 +131,7 @@ def best_threshold(x: np.ndarray, failed: np.ndarray) -> tuple[float, int]:
 
 
 def failures_ordered(x: np.ndarray, failed: np.ndarray) -> float | None:
-    """Mann-Whitney statistic over the number of pairs; None without both kinds of runs."""
+    """Mann-Whitney statistic of ``x`` by ``failed`` (n,) over pairs; None without both kinds."""
     many, others = int(failed.sum()), int((~failed).sum())
     if not many or not others:
         return None

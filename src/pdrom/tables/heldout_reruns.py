@@ -5,14 +5,18 @@ import pandas as pd
 from pdrom.artifact.reads import Every, Setting, TableOf
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.experiments.kit.horizon import HELDOUT
-from pdrom.tables.kit.declaration import table
+from pdrom.model.held_out import MOTIONS
+from pdrom.tables.kit.declaration import table, text
 from pdrom.tables.kit.reruns import COLUMNS, MEASURES, judged_reruns
 
 
 @table(
     title="Reduced runs of the held-out motions",
-    columns=(*COLUMNS, *MEASURES),
+    columns=(
+        *COLUMNS,
+        *MEASURES,
+        text("motion", f"how the motion differs from the training one: {', '.join(MOTIONS)}"),
+    ),
     reads={
         "runs": Every(paths.RERUNS),
         "rows": Every(paths.RERUNS_HELDOUT),
@@ -31,6 +35,17 @@ def heldout_reruns(
     threshold: float,
 ) -> pd.DataFrame:
     """Runs judged by the horizon of their own motion, see `judged_reruns`."""
-    return judged_reruns(
-        runs, rows, subspaces, subspace_rows, sensitivity, HELDOUT, threshold, "heldout"
-    )
+    found = [
+        judged_reruns(
+            runs,
+            rows,
+            subspaces,
+            subspace_rows=subspace_rows,
+            sensitivity=sensitivity,
+            perturbation=name,
+            threshold=threshold,
+            motion=name,
+        ).assign(motion=name)
+        for name in MOTIONS
+    ]
+    return pd.concat(found, ignore_index=True)

@@ -17,9 +17,12 @@ from pdrom.tables.kit.vocabulary import BLOWUP_FRAME, ERROR_WITHIN, FINITE, GAIN
         GROUP,
         text(
             "direction",
-            "up from published choices, down from sound ones, signs of the modes",
+            "up from published choices, down from sound ones, signs of the modes, square: "
+            "coefficients by samples",
         ),
         text("rung", "choice that changes on this rung"),
+        integer("rows_per_element", "rows of an element"),
+        compared("value", integer("entries", "sampled entries that determine the coefficients")),
         R,
         compared("value", number("condition", "condition number of the sampled modes")),
         GAIN,

@@ -10,13 +10,19 @@ from pdrom.tables.kit.declaration import table, text
 from pdrom.tables.winners import winners
 
 RECORDED = "config/reference/large_meshes/winners.csv"
+# The record is older than reductions trained on converged frames.
+LATER = ("reduced_method", "reduced_trained_on", "reduced_iterations", "own_ms")
 
 
 # Nothing is measured here, hence nothing is timed: the same file gives the same table.
 @table(
     title="Who reaches an error in the shortest time on larger meshes, recorded",
     columns=(
-        *(replace(column, timed=False, declared=None) for column in winners.columns),
+        *(
+            replace(column, timed=False, declared=None)
+            for column in winners.columns
+            if column.name not in LATER
+        ),
         text("processor", "of the machine that the times belong to"),
         text("date", "day of the record"),
     ),

@@ -16,7 +16,7 @@ from pdrom.tables.kit.parts import joined
         number("working_set", "what is read over and over", "B"),
         compared(
             "timed",
-            text("level", "smallest cache that holds the working set, as the system tells"),
+            text("level", "smallest cache that holds the working set, as the system reports"),
         ),
         timed(number("rate", "median of the repeats", "1e9/s")),
         timed(number("low", "their first quartile", "1e9/s")),

@@ -6,9 +6,9 @@ import pandas as pd
 from pdrom.artifact.reads import TableOf
 from pdrom.tables.gain_prediction import FAILED
 from pdrom.tables.kit.declaration import compared, integer, number, table, timed
+from pdrom.tables.kit.held_out import with_held_out
 from pdrom.tables.kit.vocabulary import METHOD, POSITION_BASIS
 
-_RUN = ["scene", "group", "method", "position_basis", "k", "r"]
 _ERROR = "relative_error_within_horizon"
 
 
@@ -30,22 +30,40 @@ _ERROR = "relative_error_within_horizon"
         timed(number("least_speedup", "the smallest of them")),
         timed(number("most_speedup", "the largest of them")),
         timed(number("error_train", "median error of these fastest runs on the training motion")),
-        timed(number("error_heldout", "the same on the held-out motion, where it was run")),
-        timed(integer("heldout", "runs of which it was")),
+        timed(
+            number(
+                "error_heldout",
+                "median of their errors on held-out motions, of each the median over its motions",
+            )
+        ),
+        timed(integer("heldout", "runs that had a held-out motion")),
+        timed(number("error_heldout_low", "median of the least error of each over its motions")),
+        timed(number("error_heldout_high", "median of the largest")),
+        compared(
+            "share",
+            integer(
+                "accurate_heldout",
+                "scenes (and groups) whose most accurate size on the training motion has at most a "
+                "tenth held out",
+            ),
+        ),
+        timed(integer("pays_heldout", "those that pay whose run has at most a tenth held out")),
     ),
     reads={"reruns": TableOf("reduced_reruns"), "heldout": TableOf("heldout_reruns")},
 )
 def payoff(reruns: pd.DataFrame, heldout: pd.DataFrame) -> pd.DataFrame:
-    """One row per method, over all scenes and sizes; only what ran and was timed counts."""
-    runs = reruns[reruns.speedup.notna() & reruns.max_extent.notna()]
-    held = heldout[[*_RUN, _ERROR]].rename(columns={_ERROR: "error_heldout"})
-    sizes = {"k": "Int64", "r": "Int64"}
-    runs = runs.astype(sizes).merge(held.astype(sizes), on=_RUN, how="left")
+    """One row per method, over all scenes and sizes; only what ran and was timed counts.
+
+    Sizes are chosen on the training motion and scored on held-out ones, see `with_held_out`.
+    """
+    runs = with_held_out(reruns[reruns.speedup.notna() & reruns.max_extent.notna()], heldout)
     rows = []
     for (basis, method), own in runs.groupby(["position_basis", "method"], sort=False):
         accurate = own[own[_ERROR] <= FAILED]
         fastest = accurate.sort_values("speedup").groupby(["scene", "group"]).tail(1)
         speed = fastest.speedup.to_numpy(float)
+        best = own.sort_values(_ERROR, kind="stable").groupby(["scene", "group"]).head(1)
+        seen = best[best.error_heldout.notna()]
         rows.append({
             "position_basis": basis,
             "method": method,
@@ -59,5 +77,9 @@ def payoff(reruns: pd.DataFrame, heldout: pd.DataFrame) -> pd.DataFrame:
             "error_train": fastest[_ERROR].median(),
             "error_heldout": fastest.error_heldout.median(),
             "heldout": int(fastest.error_heldout.notna().sum()),
+            "error_heldout_low": fastest.error_heldout_low.median(),
+            "error_heldout_high": fastest.error_heldout_high.median(),
+            "accurate_heldout": int((seen.error_heldout <= FAILED).sum()),
+            "pays_heldout": int(np.sum((speed > 1.0) & (fastest.error_heldout <= FAILED))),
         })  # fmt: skip
     return pd.DataFrame(rows)

@@ -39,7 +39,14 @@ def reduced_reruns(
 ) -> pd.DataFrame:
     """All runs with their times, see `judged_reruns`."""
     judged = judged_reruns(
-        runs, rows, subspaces, subspace_rows, sensitivity, perturbation, threshold, TRAIN
+        runs,
+        rows,
+        subspaces,
+        subspace_rows=subspace_rows,
+        sensitivity=sensitivity,
+        perturbation=perturbation,
+        threshold=threshold,
+        motion=TRAIN,
     )
     return _with_times(judged, timings_in_one_time(timings, frame_times))
 

@@ -25,6 +25,8 @@ CASE = ["scene", "stiffness", "reference", "limit"]
         timed(integer("from_best", "vertices from which on it beats the best full-order method")),
         timed(number("breaks_even", "vertices where it would be as fast as that, interpolated")),
         timed(number("speedup", "over the best full-order method on the largest mesh")),
+        timed(integer("from_best_own", "from_best, trained on frames of the scene's iterations")),
+        timed(number("speedup_own", "the same of their speed-up")),
     ),
     reads={"rows": TableOf("winners")},
 )
@@ -40,6 +42,7 @@ def reduction_pays(rows: pd.DataFrame) -> pd.DataFrame:
         sizes = case.vertices.to_numpy(float)
         plain = (case.plain_ms / case.reduced_ms).to_numpy(float)
         best = case.reduced_speedup.to_numpy(float)
+        own = (case.ms_per_frame / case.own_ms).to_numpy(float)
         found.append(
             {
                 **dict(zip(CASE, labels, strict=True)),
@@ -49,10 +52,12 @@ def reduction_pays(rows: pd.DataFrame) -> pd.DataFrame:
                 "from_best": _pays_from(sizes, best),
                 "breaks_even": _breaks_even(sizes, best),
                 "speedup": best[-1],
+                "from_best_own": _pays_from(sizes, own),
+                "speedup_own": own[-1],
             }
         )
     made = pd.DataFrame(found, columns=reduction_pays.column_names)
-    return made.astype(dict.fromkeys(["from_plain", "from_best"], "Int64"))
+    return made.astype(dict.fromkeys(["from_plain", "from_best", "from_best_own"], "Int64"))
 
 
 def _first(speedups: np.ndarray) -> int:

@@ -105,7 +105,7 @@ def stability(
 
 
 def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
-    """One of `OUTCOMES` for each row; needs the full-order row of every setting."""
+    """One of `OUTCOMES` for each row of ``runs``, by the limits ``wrong`` and ``departure``."""
     full = runs[(runs.method == "full") & (runs.position_basis == "full")]
     extents = full.set_index(SETTING).max_extent.to_dict()
     return [

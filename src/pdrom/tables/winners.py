@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import pandas as pd
 
 from pdrom.artifact.reads import Setting, TableOf
-from pdrom.experiments.alternatives.settings import REDUCED
+from pdrom.experiments.alternatives.settings import OWN, REDUCED, REDUCTIONS
 from pdrom.tables.alternatives import ITERATIONS, STIFFNESS, SUBSTEPS
-from pdrom.tables.kit.declaration import compared, number, table, text, timed
+from pdrom.tables.kit.declaration import compared, integer, number, table, text, timed
 from pdrom.tables.kit.vocabulary import METHOD, MS_PER_FRAME, SCENE, VERTICES
 
 REFERENCES = ("implicit", "continuous")
@@ -39,6 +39,10 @@ LIMIT = compared("exact", number("limit", "error that is allowed"))
         timed(number("reduced_error", "smallest error of the reduction")),
         timed(number("reduced_ms", "time of a frame of the reduction, if it reaches it", "ms")),
         timed(number("reduced_speedup", "time of the first over that of the reduction")),
+        timed(text("reduced_method", "the reduction that is the fastest to reach it")),
+        timed(text("reduced_trained_on", "the frames that it is trained on")),
+        timed(integer("reduced_iterations", "its iterations of a substep")),
+        timed(number("own_ms", f"time of the fastest plain one trained on {OWN}", "ms")),
     ),
     reads={"rows": TableOf("alternatives"), "limits": Setting("alternatives.errors")},
 )
@@ -69,13 +73,17 @@ def winners(rows: pd.DataFrame, limits: Sequence[float]) -> pd.DataFrame:
 def _best(rows: pd.DataFrame, limit: float) -> dict[str, object]:
     """Who reaches ``limit`` first, second and reduced; what nobody does is left out."""
     reaching = rows[rows.error <= limit].sort_values("ms_per_frame", kind="stable")
-    full, reduced = reaching[reaching.method != REDUCED], reaching[reaching.method == REDUCED]
-    made: dict[str, object] = {"reduced_error": rows.error[rows.method == REDUCED].min()}
+    inside = reaching.method.isin(REDUCTIONS)
+    full, reduced = reaching[~inside], reaching[inside]
+    made: dict[str, object] = {"reduced_error": rows.error[rows.method.isin(REDUCTIONS)].min()}
     plain = reaching[(reaching.method == PLAIN) & (reaching.substeps == 1)]
     if len(plain):
         made["plain_ms"] = plain.ms_per_frame.iloc[0]
     if len(reduced):
-        made["reduced_ms"] = reduced.ms_per_frame.iloc[0]
+        own = reduced[(reduced.method == REDUCED) & (reduced.trained_on == OWN)]
+        first = reduced.iloc[0]
+        made |= {f"reduced_{key}": first[key] for key in ("method", "trained_on", "iterations")}
+        made |= {"reduced_ms": first.ms_per_frame, "own_ms": own.ms_per_frame.min()}
     if len(full):
         best = full.iloc[0]
         made |= best[["method", "substeps", "iterations", "error", "ms_per_frame"]].to_dict()

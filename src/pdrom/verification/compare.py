@@ -17,7 +17,7 @@ from pdrom.verification.rows import RUN, Context, names, of_fitted_samples, of_w
 
 # Not compared with a reference.
 NOT_COMPARED: tuple[Quantity, ...] = ("timed", "skipped")
-# How far a number of samples may be off that a fit leaves, and what a wrong run tells, relative.
+# How far a number of samples from a fit, and the numbers of a wrong run, may be off, relative.
 FITTED, OF_WRONG_RUNS = 0.25, 0.3
 
 
@@ -48,7 +48,7 @@ class Comparison:
         return self.context.loose(self.table, column, self.e)
 
     def compared(self, column: Column) -> np.ndarray:
-        """Cells of a column that are compared: no clock has a say in them."""
+        """Cells of a column that are compared: those that do not depend on timing."""
         return np.array([column.name not in names for names in self._timed], dtype=bool)
 
     def beyond(self, column: Column, wider: float = 0.0) -> np.ndarray:

@@ -30,7 +30,7 @@ SHOWN = 20
 
 
 def verify_files(subject: Subject) -> Status:
-    """Compare the files of a study with its manifest; say what makes a bad one anew."""
+    """Compare the files of a study with its manifest; say what makes a bad one again."""
     place = Path(MANIFEST.at(subject.results))
     if not place.is_file():
         _say(f"{place}: not there; a run that succeeds writes it: {subject.command()}")
@@ -53,7 +53,7 @@ def _compare(subject: Subject, manifest: Manifest) -> Status:
     faults = {path: fault for path, fault in faults.items() if fault}
     faults |= dict.fromkeys(_other(chain.from_iterable(plan.fixed.values()), set(faults)), OTHER)
     for path, fault in list(faults.items())[:SHOWN]:
-        hint = "" if fault == FOREIGN else f"; make it anew by {anew(subject, path)}"
+        hint = "" if fault == FOREIGN else f"; make it again by {command_for(subject, path)}"
         _say(f"{path}: {fault}{hint}")
     if len(faults) > SHOWN:
         _say(f"and {len(faults) - SHOWN} more; finish the study by {subject.command()}")
@@ -92,8 +92,8 @@ def _other(made: Iterable[Job], faulty: set[str]) -> list[str]:
     ]
 
 
-def anew(subject: Subject, path: str) -> str:
-    """The command that makes one file anew, whatever is in its place."""
+def command_for(subject: Subject, path: str) -> str:
+    """The command that makes one file again, whatever is in its place."""
     return shlex.join(["./reproduce", *subject.options, "--force", "--", path])
 
 

@@ -49,8 +49,8 @@ def main() -> int:
             sys.stderr.write(f"pdrom: release: {reason}\n")
         return Status.FAULTY if reasons else bundle(sys.argv[1:])
     except (PdromError, OSError) as error:
-        told = error if isinstance(error, PdromError) else ConfigurationError(str(error))
-        sys.stderr.write(f"pdrom: {told}\n")
+        reported = error if isinstance(error, PdromError) else ConfigurationError(str(error))
+        sys.stderr.write(f"pdrom: {reported}\n")
         return Status.FAULTY
 
 

@@ -51,4 +51,4 @@ class Subject:
         """Plan of the configuration, as Snakemake merges it."""
         command = CommandLine.parse(self.options)
         whole = merged(Path(DEFAULT), command.configfiles, command.settings)
-        return load_plan(whole, Path(), command.configfiles, self.folders, quiet=True)
+        return load_plan(whole, Path(), command.configfiles, folders=self.folders, quiet=True)

@@ -20,7 +20,7 @@ NOTHING = "Nothing to be done"
 
 
 def update(subject: Subject, reason: str) -> Path:
-    """Write the expected tables of a configuration anew; the folder that holds them.
+    """Write the expected tables of a configuration again; the folder that holds them.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def write(results: str, frames: Mapping[str, pd.DataFrame], reason: str) -> Path
 
 
 def _require_new(subject: Subject) -> None:
-    """StorageError if a run would make one of the tables anew."""
+    """StorageError if a run would make one of the tables again."""
     command = [sys.executable, "-m", "pdrom.pipeline.front", "-n", *subject.options, "--"]
     done = subprocess.run([*command, *declared()], capture_output=True, text=True, check=False)
     if done.returncode != 0:

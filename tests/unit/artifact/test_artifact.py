@@ -22,7 +22,7 @@ from pdrom.artifact.reads import (
     TableOf,
 )
 from pdrom.core.paths import File, Place
-from pdrom.core.store import read_table, seal_path, write_table
+from pdrom.core.store import checksum_path, read_table, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import Experiment, experiment, experiments
 
@@ -106,7 +106,7 @@ def test_a_job_runs_from_plain_data_and_says_what_made_it(tmp_path):
         outputs={"out": out},
     )
     assert read_table(out).x.tolist() == [2.0, 4.0]
-    assert "multiplied" in seal_path(Path(out)).read_text()
+    assert "multiplied" in checksum_path(Path(out)).read_text()
 
 
 def test_a_job_depends_on_as_much_of_a_section_as_its_function_asks_for():

@@ -215,7 +215,7 @@ def test_a_table_is_shown_with_what_its_columns_mean(folder, capsys):
     assert run(["show", "singular_values.csv"]) == Status.DONE
     said = capsys.readouterr().out
     assert "2 rows of 2 columns" in said
-    assert "unsealed" in said
+    assert "no checksum" in said
     assert "table of the study" in said
     assert "1 to 3" in said
 

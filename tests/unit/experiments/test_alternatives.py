@@ -25,6 +25,7 @@ STEPS = {
     "newton": ((1, 20),),
     "explicit": ((1, 1), (64, 1)),
     "ecsw": ((1, 10), (4, 2)),
+    "ecsw-anderson": ((1, 10),),
 }
 
 
@@ -54,7 +55,14 @@ def written(tmp_path_factory):
 def test_rows_of_a_scene(written):
     table = read_table(written)
     assert table.columns.tolist() == experiment.COLUMNS
-    assert len(table) == 2 * (1 + sum(map(len, STEPS.values())))
+    reduced = table.trained_on.notna()
+    # a reduction is trained twice
+    assert len(table) == 2 * (1 + sum(map(len, STEPS.values())) + 3)
+    assert table[reduced].groupby("trained_on").size().to_dict() == {
+        "converged": 6,
+        "own iterations": 6,
+    }
+    table = table[table.trained_on != "converged"]
     case = table[table.stiffness == 1.0].set_index(["method", "substeps", "iterations"])
     # many iterations end at the implicit step, many explicit steps in continuous time
     assert case.error_implicit["newton", 1, 20] < 1e-4
@@ -98,6 +106,7 @@ def test_winners_are_the_cheapest_that_reach_the_error():
         ],
         columns=["method", "ms_per_frame", "error_implicit"],
     ).assign(
+        trained_on=lambda t: t.method.map({"ecsw": "own iterations"}),
         scene="s", vertices=9, stiffness=1.0, substeps=1, iterations=1,
         error_continuous=lambda t: t.error_implicit, reference_error=1e-2,
     )  # fmt: skip
@@ -149,6 +158,9 @@ def test_the_size_from_which_a_reduction_pays():
             "plain_ms": [2.0, 8.0, 200.0],
             "reduced_ms": [1.0, 1.0, 1.0],
             "reduced_speedup": [0.25, 0.5, 50.0],
+            "ms_per_frame": [0.25, 0.5, 50.0],
+            # what is trained on the scene's own iterations is slower
+            "own_ms": [1.0, 2.0, 2.0],
         }
     )
     strict = rows.assign(limit=0.01, reduced_speedup=[0.5, np.nan, 3.0], plain_ms=np.nan)
@@ -164,6 +176,7 @@ def test_the_size_from_which_a_reduction_pays():
     # a straight line in both logarithms
     crossing = 400 * (10_000 / 400) ** (np.log(2.0) / np.log(100.0))
     assert found.breaks_even[0.1] == pytest.approx(crossing)
+    assert (found.from_best_own[0.1], found.speedup_own[0.1]) == (10_000, 25.0)
     assert found.from_best[0.01] == 10_000
     assert pd.isna(found.from_plain[0.01])
     assert pd.isna(found.breaks_even[0.01])

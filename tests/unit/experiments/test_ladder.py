@@ -39,7 +39,19 @@ def test_rungs_change_one_ingredient_at_a_time():
         }
 
 
+@pytest.mark.parametrize("p", [1, 2, 3])
+def test_the_square_samples_as_many_entries_in_each_of_its_places(p, rng):
+    snapshots = rng.standard_normal((12, 20 * p, 3))
+    entries = set()
+    for direction, method, _, _ in LADDER.rungs(p):
+        if direction == "square":
+            basis = compute_basis(snapshots, np.ones(20 * p), 0.0, p, method)
+            reduction = Reduction(basis, select(basis, method, 5), method, 5)
+            entries.add(sum(len(block.entries) for block in reduction.blocks))
+    assert entries == {3 * p * 5}
+
+
 def test_signs_repeat_the_published_rung():
-    signs = [row for row in LADDER.rungs() if row[0] == "signs"]
+    signs = [row for row in LADDER.rungs(2) if row[0] == "signs"]
     assert len(signs) == LADDER.signs >= 5
-    assert all(method == LADDER.up[0] for _, method, _ in signs)
+    assert all(method == LADDER.up[0] for _, method, _, _ in signs)

@@ -26,6 +26,7 @@ from pdrom.experiments.kit.sampling import Sweep
 from pdrom.experiments.kit.settings import Horizon
 from pdrom.experiments.stability import ShortRuns
 from pdrom.experiments.subspaces import SubspaceModels
+from pdrom.model.held_out import MOTIONS
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.method import MethodSpec, load_methods
@@ -76,11 +77,12 @@ def study(tmp_path_factory) -> Made:
     ).config
     grid = file("mesh.h5")
     mesh.mesh(sources=[], config=scene.mesh, out=grid)
-    runs = {run: file(f"{run}.h5", run=run) for run in ("train", "heldout")}
+    runs = {run: file(f"{run}.h5", run=run) for run in ("train", *MOTIONS)}
     for run in runs.values():
         fom.fom(mesh=grid, config=scene, solver="supernodal", threads=1, out=run)
     stored = file("snapshots.h5", group="strain")
-    snapshots.snapshots(mesh=grid, **runs, config=scene, out=stored)
+    two = {run: runs[run] for run in ("train", "heldout")}
+    snapshots.snapshots(mesh=grid, **two, config=scene, out=stored)
     bases, samplings = [], []
     for name, spec in METHODS.items():
         bases.append(file(f"pod/{name}.h5", group="strain", basis=spec.basis_id))
@@ -93,7 +95,7 @@ def study(tmp_path_factory) -> Made:
             heldout_ranks=(), guard=GuardSettings(), **LIMITS,
         )  # fmt: skip
         reruns.reruns(
-            mesh=grid, fom=runs["train"], heldout=runs["heldout"], snapshots=stored,
+            mesh=grid, fom=runs["train"], motions=list(runs.values()), snapshots=stored,
             basis=bases[-1], companions=[], settings=settings, **outputs,
         )  # fmt: skip
         samplings.append(outputs["sampling"])
@@ -104,7 +106,7 @@ def study(tmp_path_factory) -> Made:
     )  # fmt: skip
     subspaces.subspaces(
         mesh=grid,
-        **runs,
+        full_order=list(runs.values()),
         settings=subspaces.Options(scene=scene, subspace=asked, blowup_extent=100.0),
         out=models,
         train_table=tables["train"],

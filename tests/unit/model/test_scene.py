@@ -155,6 +155,17 @@ def test_held_out_run_differs_in_speed_direction_and_seed():
     assert load_scene(ROOT, "bar_release").heldout_variant().effects[-1].effect == "kick"
 
 
+@pytest.mark.parametrize("name", ["bar_twist", "spring_oop"])
+def test_one_rule_gives_every_scene_a_kick_of_its_own_and_twice_the_stiffness(name):
+    scene = load_scene(ROOT, name)
+    *same, kick = scene.heldout_variant("kick").effects
+    assert tuple(same) == scene.effects
+    assert (kick.effect, kick.speed, kick.seed) == ("kick", 0.5, 2)
+    for stiff, own in zip(scene.heldout_variant("stiffness").effects, scene.effects, strict=True):
+        weight = {"weight": 2.0 * own.weight} if own.effect in scene.groups else {}
+        assert stiff == own.model_copy(update=weight)
+
+
 def test_every_scene_file_is_valid():
     for path in sorted((ROOT / "config" / "scenes").glob("*.yaml")):
         assert load_scene(ROOT, path.stem).name == path.stem

@@ -52,7 +52,7 @@ def test_what_cannot_be_installed_is_one_line(tmp_path, monkeypatch, capsys):
 
 def test_an_environment_that_is_there_is_used(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(subprocess, "run", lambda *_, **__: pytest.fail("it is installed anew"))
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: pytest.fail("it is installed again"))
     site.LOCK.write_text("mkdocs==1\n")
     site.TOOLS.mkdir(parents=True)
     (site.TOOLS / site.LOCK.name).write_text("mkdocs==1\n")

@@ -75,7 +75,7 @@ def test_short_runs_are_planned_where_the_study_holds_them():
     job = Resolver(made, "results").job(stability, {"scene": "strain_oop"})
     plain = job.settings["short"]
     assert plain["ranks"] == [6]
-    # which scenes have short runs and how they are judged makes no run anew
+    # which scenes have short runs and how they are judged makes no run again
     assert not {"scenes", "wrong", "left", "departure"} & set(plain)
 
 

@@ -13,7 +13,7 @@ from pdrom.pipeline.study import Study
 from pdrom.pipeline.subspace_scenes import check_subspaces
 from places import ROOT
 
-# What only a position subspace, or a companion, has.
+# What only a position subspace, or an auxiliary model, has.
 INSIDE = (
     paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,
     paths.POSITION_BASES, paths.COMPANION, paths.ESTIMATES, paths.COMPANION_TIMES,
@@ -60,8 +60,8 @@ def test_everything_else_is_held(root):
 def test_one_line_says_what_the_scene_goes_without(root, caplog):
     check_subspaces(study(root))
     assert caplog.messages == [
-        "windy: no position subspaces, no companion and no estimated errors, since none takes the "
-        "effect 'wind'"
+        "windy: no position subspaces, no auxiliary model and no estimated errors, since none "
+        "takes the effect 'wind'"
     ]
     caplog.clear()
     check_subspaces(study(root, scenes=["spring_oop"]))

@@ -101,7 +101,7 @@ def test_minutes():
     [
         ("Missing output files: a.h5; Input files updated by another job: b.h5",
          {"output is missing"}),
-        ("Input files updated by another job: a.h5, b.h5", {"input is made anew"}),
+        ("Input files updated by another job: a.h5, b.h5", {"input is made again"}),
         ("Updated input files: a.yaml; Code has changed since last execution; Params have changed "
          "since last execution: {}",
          {"input is newer", "script has changed", "settings or code have changed"}),
@@ -136,7 +136,7 @@ def test_jobs_are_counted_by_rule_and_their_times_added():
     assert preview.text().splitlines() == [
         "    2 fom     output is missing, settings or code have changed",
         "    1 timing  output is missing",
-        "    1 all     input is made anew",
+        "    1 all     input is made again",
         "pdrom: 4 jobs, about 40 min on 2 cores, about 60 min of processor time",
     ]
 

@@ -37,11 +37,11 @@ def read(tmp_path):
     times = COMPANION_TIMES.at(str(tmp_path), scene="calm")
     write_table(pd.DataFrame([("calm", 30, 0.4, 1.6)], columns=TIMES), times)
     reruns = pd.DataFrame(rows, columns=COLUMNS).query("split == 'train'").drop(columns="split")
-    reruns = reruns.assign(ms_per_frame=0.2, horizon_frame=9)
+    reruns = reruns.assign(ms_per_frame=0.2, horizon_frame=9, motion="heldout")
     guarded = pd.DataFrame(
         [("calm", "spring", m, r, e, f) for m, basis, _, r, e, _, f in RUNS if basis == "full"],
         columns=["scene", "group", "method", "r", "relative_error", "guard_frame"],
-    )
+    ).assign(guard_count=0, motion="heldout")
     local = {"scene": "calm", "group": "spring", "method": "all"}
     files = [place.at(str(tmp_path), **local) for place in (RERUNS_TRAIN, RERUNS_HELDOUT)]
     for file in files:
@@ -89,10 +89,14 @@ def test_a_guard_that_listens_to_the_estimate_has_no_other_row(read):
 
 def test_the_cheapest_model_within_the_tolerance_is_chosen(read):
     made, reruns, _ = read
-    chosen = model_choice(made, reruns, (0.1, 0.03, 0.001), 1.0).set_index("tolerance")
+    kicked = reruns.assign(motion="kick", frames=9, blowup_frame=None)
+    kicked["relative_error_within_horizon"] *= 1000.0
+    chosen = model_choice(made, reruns, kicked, (0.1, 0.03, 0.001), 1.0).set_index("tolerance")
     assert (chosen.loc[0.1, "method"], chosen.loc[0.1, "r"]) == ("ecsw", 20)
     assert (chosen.loc[0.03, "k"], chosen.loc[0.03, "r"]) == (20, 40)
     assert chosen.loc[[0.1, 0.03], "met"].all()
+    # met for the motion that it was chosen on, and missed on another one
+    assert not chosen.loc[[0.1, 0.03], "met_heldout"].any()
     assert not chosen.loc[0.001, "found"]
 
 
@@ -101,7 +105,9 @@ def test_a_model_is_chosen_only_with_room_for_an_estimate_that_is_too_small(read
     made, reruns, _ = read
     inside = made[(made.split == "heldout") & (made.position_basis != "full")]
     tolerance = float(inside.sort_values("r").estimate.iloc[0])
-    first, safer = (model_choice(made, reruns, (tolerance,), f).iloc[0] for f in (1.0, 1.3))
+    unseen = reruns.assign(frames=9, blowup_frame=None)
+    chosen = (model_choice(made, reruns, unseen, (tolerance,), f) for f in (1.0, 1.3))
+    first, safer = (found.iloc[0] for found in chosen)
     assert (first.r, safer.r) == (20, 40)
     assert first.estimate == tolerance
     assert 1.3 * safer.estimate <= tolerance

@@ -137,8 +137,38 @@ def test_order_is_the_share_of_pairs(runs):
     assert value is None if not pairs else value == pytest.approx(np.mean(pairs))
 
 
+def square(*runs: tuple) -> pd.DataFrame:
+    """Rows of the ladder's two by two: scene, rung, rows of an element, gain and error."""
+    names = ["scene", "rung", "rows_per_element", "gain", "relative_error_within_horizon"]
+    return pd.DataFrame(runs, columns=names).assign(direction="square", group="spring", r=20)
+
+
+def test_samples_and_coefficients_are_exchanged_at_equal_entries():
+    """A scene and its twin are one family; elements of a single row are no other sample."""
+    reruns, reconstruction = tables()
+    runs = [
+        (scene, rung, p, gain, error)
+        for scene, p in (("calm", 2), ("calm_twin", 2), ("wild", 1))
+        for rung, gain, error in (
+            ("single rows, separate", 1000.0, 0.5),
+            ("single rows, shared", 50.0, 0.05),
+            ("whole elements, separate", 100.0, 0.6),
+            ("whole elements, shared", 8.0, 0.05),
+        )
+    ]
+    twins = [t.assign(scene="calm_twin")[t.scene == "calm"] for t in (reruns, reconstruction)]
+    both = [pd.concat(two) for two in zip((reruns, reconstruction), twins, strict=True)]
+    table = gain_interventions(*both, square(*runs)).set_index("step")
+    shared = table.loc["shared coefficients, single rows"]
+    assert (shared.pairs, shared.scenes, shared.families, shared.families_fallen) == (3, 3, 2, 2)
+    assert (shared.gain_ratio, shared.error_ratio, shared.p_value) == (0.05, 0.1, 0.5)
+    elements = table.loc["whole elements, separate coefficients"]
+    # the gain falls tenfold and the error does not
+    assert (elements.pairs, elements.families, elements.unexplained_share) == (2, 1, 1.0)
+
+
 def test_interventions_compare_runs_on_one_basis():
-    table = gain_interventions(*tables()).set_index("step")
+    table = gain_interventions(*tables(), square()).set_index("step")
     # block-deim ran in one scene only, where its gain and its error are below those of deim
     step = table.loc["whole elements for single entries"]
     assert (step.pairs, step.scenes, step.scenes_fallen) == (1, 1, 1)
@@ -169,9 +199,12 @@ def test_scenes_count_once_however_many_sizes_they_have():
                 gains = {"scene": scene, "group": "spring", "method": method, "r": r, "gain": gain}
                 gains |= {"split": "train", "relative_error": 0.1, "elements_sampled": 9}
                 parts.append((row, gains))
-    table = gain_interventions(*(pd.DataFrame(list(rows)) for rows in zip(*parts, strict=True)))
-    (step,) = table.itertuples()
-    assert (step.pairs, step.scenes, step.scenes_fallen) == (48, 5, 3)
+    read = (pd.DataFrame(list(rows)) for rows in zip(*parts, strict=True))
+    step, ordered = gain_interventions(*read, square()).itertuples()
+    assert (step.pairs, step.scenes, step.scenes_fallen, step.families) == (48, 5, 3, 5)
+    # the gain falls everywhere, the error not in the two pairs of t and of w
+    assert step.unexplained_share == pytest.approx(4 / 48)
+    assert (ordered.step, ordered.pairs) == ("lower gain, shared coefficients", 48)
     assert step.error_ratio == 0.5
     # sign test by hand, the tie of "w" counted as no fall: 2 (10 + 5 + 1) / 32
     assert step.p_value == pytest.approx(1.0)

@@ -13,6 +13,7 @@ from pdrom.core.errors import StorageError
 from pdrom.core.paths import File, Place
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.experiments.kit.horizon import floor_of
+from pdrom.model.held_out import MOTIONS
 from pdrom.reduction.basis import Basis, save_basis
 from pdrom.tables.accuracy_cost import accuracy_cost, pareto, reference_of
 from pdrom.tables.heldout_reruns import heldout_reruns
@@ -187,7 +188,7 @@ def files(tmp_path) -> Files:
         rows = []
         with write_hdf5(folder / "deim.h5") as file:
             file.attrs["extent_norm"] = 2.0
-            for store in (file, file.create_group("heldout")):
+            for store in (file, *map(file.create_group, MOTIONS)):
                 store["displacement"], store["step"] = DISPLACEMENT, STEP
                 for r, difference in runs.items():
                     run = store.create_group(f"r{r:04d}")
@@ -205,15 +206,15 @@ def files(tmp_path) -> Files:
                     "relative_error": 0.5 if whole else None,
                 }  # fmt: skip
             rows.append(row)
-        for name in ("deim.csv", "deim_heldout.csv"):
-            written(folder / name, RERUN, *rows)
+        for name, more in {"deim.csv": {}, "deim_heldout.csv": {"motion": "heldout"}}.items():
+            written(folder / name, [*RERUN, *more], *({**row, **more} for row in rows))
         reruns.append(str(folder / "deim.h5"))
     folder = tmp_path / "subspaces" / "b"
     folder.mkdir(parents=True)
     models = {("pod", 8, "full"): [0.4] * 4, ("pod", 8, "ecsw-1e-02"): [0.8] * 4}
     with write_hdf5(folder / "models.h5") as file:
         file.attrs["extent_norm"] = 4.0
-        for motion in ("train", "heldout"):
+        for motion in ("train", *MOTIONS):
             file[f"displacement/{motion}"], file[f"step/{motion}"] = DISPLACEMENT, STEP
         for (base, k, method), difference in models.items():
             for motion in ("train", "heldout"):
@@ -226,8 +227,8 @@ def files(tmp_path) -> Files:
          "frames": 4, "finite": True, "max_extent": 1.0, "relative_error": 0.1}
         for p, k, m in models
     ]  # fmt: skip
-    for name in ("models.csv", "models_heldout.csv"):
-        written(folder / name, HYPER, *rows)
+    for name, more in {"models.csv": {}, "models_heldout.csv": {"motion": "heldout"}}.items():
+        written(folder / name, [*HYPER, *more], *({**row, **more} for row in rows))
     subspaces = [str(folder / "models.h5")]
 
     def time(scene, implementation="compiled", ms=8.0, **labels):
@@ -307,6 +308,7 @@ def test_there_need_be_no_subspace(files):
 def test_held_out_runs_are_judged_by_their_own_horizon(files):
     table = files.heldout()
     assert table.horizon_frame.tolist() == [1, 1, 1, 4, 4, 4, 4]
+    assert set(table.motion) == {"heldout"}
     assert table.relative_error_within_horizon[0] == pytest.approx(0.1)
     # it blew up in frame 1, which is behind the horizon
     assert table.relative_error_within_horizon[1] == pytest.approx(0.5)
@@ -348,8 +350,10 @@ def no_sweep(folder) -> File:
 
 
 def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
-    runs, timings = files.reduced(), files.timings
-    table = accuracy_cost(runs, timings, NOT_TIMED, [no_sweep(tmp_path)], {"a": 10, "b": 20})
+    runs, unseen, timings = files.reduced(), files.heldout(), files.timings
+    table = accuracy_cost(
+        runs, unseen, timings, NOT_TIMED, [no_sweep(tmp_path)], {"a": 10, "b": 20}
+    )
     points = list(zip(table.scene, table.method, table.ms_per_frame, strict=True))
     assert points == [
         ("a", "full", 8.0), ("a", "deim", 4.0),
@@ -360,7 +364,7 @@ def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
     assert table.relative_error_within_horizon[[0, 2]].tolist() == [0.0, 0.0]
     assert table.pareto.tolist() == [True] * 6
     slow = runs.assign(ms_per_frame=100.0)
-    table = accuracy_cost(slow, timings, NOT_TIMED, [no_sweep(tmp_path)], {"a": 1, "b": 1})
+    table = accuracy_cost(slow, unseen, timings, NOT_TIMED, [no_sweep(tmp_path)], {"a": 1, "b": 1})
     assert table.pareto.tolist() == [True, False, True, False, False, False]
 
 
@@ -378,8 +382,8 @@ def sweep(folder, **changes) -> File:
 
 
 def test_runs_with_other_iterations_have_their_own_reference(files, tmp_path):
-    runs, timings = files.reduced(), files.timings
-    table = accuracy_cost(runs, timings, NOT_TIMED, [sweep(tmp_path)], {"a": 10, "b": 20})
+    runs, unseen, timings = files.reduced(), files.heldout(), files.timings
+    table = accuracy_cost(runs, unseen, timings, NOT_TIMED, [sweep(tmp_path)], {"a": 10, "b": 20})
     fom = table[table.method == "fom"]
     assert fom.iterations.tolist() == [2, 10, 40]
     assert fom.relative_error_within_horizon.tolist() == [0.4, 0.1, 0.02]
@@ -404,9 +408,9 @@ def test_runs_with_other_iterations_have_their_own_reference(files, tmp_path):
 
 
 def test_without_a_converged_run_there_is_no_point_against_it(files, tmp_path):
-    runs, timings = files.reduced(), files.timings
+    runs, unseen, timings = files.reduced(), files.heldout(), files.timings
     sweeps = [sweep(tmp_path, error_converged=None)]
-    table = accuracy_cost(runs, timings, NOT_TIMED, sweeps, {"a": 10, "b": 20})
+    table = accuracy_cost(runs, unseen, timings, NOT_TIMED, sweeps, {"a": 10, "b": 20})
     assert "fom" not in set(table.method)
     assert (table.method == "fewer-iterations").sum() == 1
 

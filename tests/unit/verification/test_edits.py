@@ -1,4 +1,4 @@
-"""Edits of tables, sealed again, that a sceptic tries: each is noticed."""
+"""Edits of tables, with new checksums, that a sceptic tries: each is noticed."""
 
 from pathlib import Path
 

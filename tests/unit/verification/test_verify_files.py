@@ -67,10 +67,10 @@ def study(tmp_path, monkeypatch):
     monkeypatch.setitem(vars(SUBJECT), "plan", plan)
     monkeypatch.setattr(files, "own_files", lambda *_: set(NAMES))
     monkeypatch.setattr(files, "asked_for", lambda paths, *_: [])
-    reseal(monkeypatch)
+    renew_checksum(monkeypatch)
 
 
-def reseal(monkeypatch):
+def renew_checksum(monkeypatch):
     """Write the manifest of what is there, as a run does or somebody who hides an edit."""
     found = [name for name in NAMES if Path(name).is_file()]
     monkeypatch.setattr(manifest, "study_files", lambda *_: found)
@@ -78,7 +78,7 @@ def reseal(monkeypatch):
 
 
 def rewrite(change):
-    """Another manifest, sealed again."""
+    """Another manifest, with new checksums."""
     path = Path("results/manifest.json")
     content = json.loads(path.read_text())
     change(content["files"])
@@ -114,16 +114,16 @@ def test_a_changed_digit_is_noticed_and_its_command_named(name, capsys):
     assert verify_files(SUBJECT) is Status.DIFFERS
     said = capsys.readouterr().out
     command = f"./reproduce --configfile 'my study.yaml' --force -- {name}"
-    assert f"{name}: damaged (its checksum differs); make it anew by {command}\n" in said
+    assert f"{name}: damaged (its checksum differs); make it again by {command}\n" in said
     assert "3 of 4 files" in said
 
 
 @pytest.mark.parametrize("content", ["x\n3.0\n2.6\n", "", "a picture"])
-def test_a_sealed_file_that_its_inputs_do_not_give_is_noticed(content, monkeypatch, capsys):
+def test_a_file_with_checksum_that_its_inputs_do_not_give_is_noticed(content, monkeypatch, capsys):
     write_text(content, NAMES[2])
-    reseal(monkeypatch)
+    renew_checksum(monkeypatch)
     assert verify_files(SUBJECT) is Status.DIFFERS
-    assert f"{NAMES[2]}: not what its inputs give; make it anew by" in capsys.readouterr().out
+    assert f"{NAMES[2]}: not what its inputs give; make it again by" in capsys.readouterr().out
 
 
 def test_what_inputs_do_not_give_any_more_is_noticed(monkeypatch):
@@ -135,7 +135,7 @@ def test_what_inputs_do_not_give_any_more_is_noticed(monkeypatch):
 def test_an_entry_that_was_taken_out_is_noticed(name, capsys):
     rewrite(lambda entries: entries.pop(f"../{name}".replace("../results/", "")))
     assert verify_files(SUBJECT) is Status.DIFFERS
-    assert f"{name}: not in the manifest; make it anew by" in capsys.readouterr().out
+    assert f"{name}: not in the manifest; make it again by" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", ["../../secret", "/etc/hostname", "../paper/main.tex", "notes.md"])
@@ -151,7 +151,7 @@ def test_what_a_target_names_beside_the_study_may_be_listed(monkeypatch):
     assert verify_files(SUBJECT) is Status.HOLDS
 
 
-def test_a_seal_that_does_not_fit_is_noticed():
+def test_a_checksum_that_does_not_fit_is_noticed():
     Path(NAMES[3]).with_name(".m.tex.blake2b").unlink()
     assert verify_files(SUBJECT) is Status.DIFFERS
 
@@ -159,12 +159,12 @@ def test_a_seal_that_does_not_fit_is_noticed():
 def test_a_lost_file_has_a_code_of_its_own(capsys):
     Path(NAMES[0]).unlink()
     assert verify_files(SUBJECT) is Status.MISSING
-    assert f"{NAMES[0]}: not there; make it anew by" in capsys.readouterr().out
+    assert f"{NAMES[0]}: not there; make it again by" in capsys.readouterr().out
 
 
 def test_a_file_that_was_removed_and_left_out_of_the_manifest_is_missing(monkeypatch):
     Path(NAMES[3]).unlink()
-    reseal(monkeypatch)
+    renew_checksum(monkeypatch)
     assert "paper/m.tex" not in read_manifest("results").files
     assert verify_files(SUBJECT) is Status.MISSING
 
@@ -210,7 +210,7 @@ def figure_job(subject):
 
 
 def test_a_figure_is_drawn_again_to_the_byte(results, subject):
-    """Replaced, sealed again: it is not what its table gives. And so is one of another table."""
+    """Replaced, with new checksums, by a figure that its table does not give, or another's."""
     job = figure_job(subject)
     with again.made(job) as made:
         for path, new in made.items():

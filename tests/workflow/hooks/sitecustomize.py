@@ -1,8 +1,8 @@
 """Faults on demand, for the jobs of a sandbox: see `sandbox.Sandbox.run`.
 
 Python imports this module at its start. ``PDROM_FAULT`` is ``kind:pattern``: when a result is
-complete whose temporary file (not its seal) matches the pattern, but has not got its name yet, the
-process is killed ("kill"), told that the disk is full ("full"), kept waiting by a slow disk
+complete whose temporary file (not its checksum) matches the pattern, but has not got its name yet,
+the process is killed ("kill"), told that the disk is full ("full"), kept waiting by a slow disk
 ("slow") or held until there is a file `release` in its folder ("hold").
 """
 

@@ -1,4 +1,4 @@
-"""A file that takes its name only when it is complete, with its seal beside it if it needs one."""
+"""A file that takes its name only when it is complete, with a checksum file if it needs one."""
 
 import os
 import re
@@ -8,20 +8,20 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from pdrom.core.errors import StorageError
+from pdrom.core.store.checksum import CHECKSUM_SUFFIX, checksum_path, digest_of, new_checksum
 from pdrom.core.store.oserrors import reason
-from pdrom.core.store.seal import SEAL_SUFFIX, digest_of, new_seal, seal_path
 
 
 @contextmanager
-def atomic_path(path: str | os.PathLike[str], sealed: bool = True) -> Iterator[Path]:
-    """Yield a temporary path beside ``path``; seal and rename it on success, else remove it.
+def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Iterator[Path]:
+    """Yield a temporary path beside ``path``; checksum and rename it on success, else remove it.
 
     What a killed process left of the same target is removed first: one job at a time makes a file.
 
     Parameters
     ----------
-    sealed : whether a seal lies beside the file; not so for one that has its seal inside, or that
-        goes into a user's own folder
+    with_checksum : whether a checksum file lies beside it; not so for a file that has its checksum
+        inside, or that goes into a user's own folder
 
     Raises
     ------
@@ -31,29 +31,29 @@ def atomic_path(path: str | os.PathLike[str], sealed: bool = True) -> Iterator[P
     target = Path(path)
     _require_no_folder(target)
     temporary = target.with_name(f".{target.stem}.{uuid.uuid4().hex[:12]}{target.suffix}")
-    seal = temporary.with_name(f"{temporary.name}{SEAL_SUFFIX}")
+    checksum = temporary.with_name(f"{temporary.name}{CHECKSUM_SUFFIX}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         _remove_leftovers(target)
         yield temporary
         _bring_to_disk(temporary)
-        if sealed:
-            seal.write_bytes(new_seal(digest_of(temporary), target.name).content)
-            _bring_to_disk(seal)
-            _rename(temporary, seal, target)
+        if with_checksum:
+            checksum.write_bytes(new_checksum(digest_of(temporary), target.name).content)
+            _bring_to_disk(checksum)
+            _rename(temporary, checksum, target)
         else:
             os.replace(temporary, target)
-            seal_path(target).unlink(missing_ok=True)  # of an earlier file
+            checksum_path(target).unlink(missing_ok=True)  # of an earlier file
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
     finally:
-        for left in (temporary, seal):
+        for left in (temporary, checksum):
             with suppress(OSError):
                 left.unlink(missing_ok=True)
 
 
 def require_place(path: str | os.PathLike[str]) -> None:
-    """Refuse a place that cannot be written, before a long computation of what goes there.
+    """Refuse a ``path`` that cannot be written, before a long computation of what goes there.
 
     Raises
     ------
@@ -78,8 +78,8 @@ def _require_no_folder(target: Path) -> None:
 
 
 def _remove_leftovers(target: Path) -> None:
-    stem, suffix, seal = map(re.escape, (target.stem, target.suffix, SEAL_SUFFIX))
-    name = re.compile(rf"\.{stem}\.[0-9a-f]{{12}}{suffix}({seal})?")
+    stem, suffix, checksum = map(re.escape, (target.stem, target.suffix, CHECKSUM_SUFFIX))
+    name = re.compile(rf"\.{stem}\.[0-9a-f]{{12}}{suffix}({checksum})?")
     for path in target.parent.iterdir():
         if name.fullmatch(path.name):
             path.unlink(missing_ok=True)
@@ -90,16 +90,16 @@ def _bring_to_disk(path: Path) -> None:
         os.fsync(handle.fileno())
 
 
-def _rename(temporary: Path, seal: Path, target: Path) -> None:
-    """Give both files their names, the seal first.
+def _rename(temporary: Path, checksum: Path, target: Path) -> None:
+    """Give both files their names, the checksum first.
 
-    A process killed in between leaves no file, or an older one that its seal does not fit: both are
-    made again. In the other order it would leave a good file without a seal. Where the second name
-    is refused, the older file keeps its own seal.
+    A process killed in between leaves no file, or an older one that its checksum does not fit: both
+    are made again. In the other order it would leave a good file without a checksum. Where the
+    second name is refused, the older file keeps its own checksum.
     """
-    place = seal_path(target)
+    place = checksum_path(target)
     previous = place.read_bytes() if place.is_file() else None
-    os.replace(seal, place)
+    os.replace(checksum, place)
     try:
         os.replace(temporary, target)
     except BaseException:

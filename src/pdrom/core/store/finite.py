@@ -4,7 +4,7 @@ import numpy as np
 
 
 def require_finite(name: str, array: np.ndarray, error: type[Exception]) -> np.ndarray:
-    """Return ``array`` or raise ``error`` naming the first entry that is NaN or infinite."""
+    """Return ``array``, or raise ``error`` with ``name`` and its first entry that is not finite."""
     finite = np.isfinite(array)
     if not finite.all():
         first = tuple(int(i) for i in np.argwhere(~finite)[0])

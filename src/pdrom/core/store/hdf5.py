@@ -17,11 +17,11 @@ from pdrom.core.store.oserrors import reason
 
 @contextmanager
 def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
-    """Yield a new HDF5 file that takes its name only when complete, with provenance and seal.
+    """Yield a new HDF5 file; it takes its name ``path`` when complete, with a checksum.
 
     No time stamps are inside.
     """
-    with atomic_path(path, sealed=False) as temporary:
+    with atomic_path(path, with_checksum=False) as temporary:
         with open(temporary, "w+b", buffering=0) as handle:
             sink = _Sink(handle)
             with h5py.File(sink, "w", track_order=True, userblock_size=SIZE) as file:
@@ -70,13 +70,13 @@ class _Sink:
 
 @contextmanager
 def open_hdf5(path: str | os.PathLike[str], unchecked: bool = False) -> Iterator[h5py.File]:
-    """Open an HDF5 file of the results for reading.
+    """Open the HDF5 file ``path`` of the results for reading.
 
-    Its seal is checked before HDF5 sees the file, so that what HDF5 misses in it was never written.
+    Its checksum is compared before HDF5 sees the file, so that damage is no error of HDF5.
 
     Parameters
     ----------
-    unchecked : whether a file without a seal is read
+    unchecked : whether a file without a checksum is read
 
     Raises
     ------

@@ -6,7 +6,7 @@ import re
 
 
 def reason(error: OSError) -> str:
-    """Words of the operating system; HDF5 hides the number in a long text."""
+    """Words of the operating system for ``error``; HDF5 hides the number in a long text."""
     hidden = re.search(r"errno = (\d+)", str(error))
     number = error.errno or (int(hidden[1]) if hidden else 0)
     return os.strerror(number) if number in errno.errorcode else " ".join(str(error).split())[:200]

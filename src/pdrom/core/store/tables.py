@@ -15,21 +15,23 @@ from pdrom.core.store.oserrors import reason
 FLOAT_FORMAT = "%.10g"
 
 
-def write_table(table: pd.DataFrame, path: str | os.PathLike[str], sealed: bool = True) -> None:
-    """Write a table as CSV: fixed float format, an empty cell where there is no value.
+def write_table(
+    table: pd.DataFrame, path: str | os.PathLike[str], with_checksum: bool = True
+) -> None:
+    """Write a table as CSV to ``path``: fixed float format, an empty cell where there is no value.
 
-    ``sealed`` as in `atomic_path`.
+    ``with_checksum`` as in `atomic_path`.
     """
-    with atomic_path(path, sealed) as temporary:
+    with atomic_path(path, with_checksum) as temporary:
         table.to_csv(temporary, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
 
 
 def read_table(
     path: str | os.PathLike[str], columns: Sequence[str] | None = None, result: bool = True
 ) -> pd.DataFrame:
-    """Read a CSV table; StorageError if it is missing, damaged or lacks one of ``columns``.
+    """Read the CSV table ``path``; StorageError if missing, damaged or without one of ``columns``.
 
-    ``result`` marks a table that a run wrote, with a seal; other tables have none.
+    ``result`` marks a table that a run wrote, with a checksum; other tables have none.
     """
     if result:
         require_intact(path)

@@ -18,9 +18,9 @@ from pdrom.core.paths import ALTERNATIVES, File
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.alternatives.candidates import Candidate, candidates
-from pdrom.experiments.alternatives.settings import CONVERGED, Comparison, ImplicitReference
+from pdrom.experiments.alternatives.settings import CONVERGED, Comparison
 from pdrom.experiments.alternatives.solvers.continuous import continuous
-from pdrom.experiments.kit.converged import ConvergedStepper
+from pdrom.experiments.kit.converged import converged_run
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.measurement import Variant, measure
 from pdrom.experiments.kit.settings import BlowupExtent
@@ -32,9 +32,9 @@ from pdrom.reduction.rerun import displacement_norms
 log = logging.getLogger(__name__)
 
 COLUMNS = [
-    "scene", "factor", "vertices", "stiffness", "method", "substeps", "iterations", "k",
-    "elements_sampled", "frames", "finite", "ms_per_frame", "error_implicit", "error_continuous",
-    "reference_error",
+    "scene", "factor", "vertices", "stiffness", "method", "substeps", "iterations", "trained_on",
+    "k", "elements_sampled", "frames", "finite", "ms_per_frame", "error_implicit",
+    "error_continuous", "reference_error",
 ]  # fmt: skip
 
 
@@ -125,28 +125,19 @@ def references(scene: Scene, section: Comparison) -> References:
     """Both references of a scene's own motion."""
     wanted = section.continuous
     limit = wanted.limit // scene.mesh.vertices
-    exact = continuous(scene, scene.config.frames, wanted.tolerance, wanted.substeps, limit)
+    exact = continuous(
+        scene, scene.config.frames, wanted.tolerance, substeps=wanted.substeps, limit=limit
+    )
     name = scene.config.name
     log.info("%s: %d explicit steps a frame, error %.1e", name, exact.substeps, exact.error)
     if not exact.within(wanted.tolerance):
         log.warning("%s: motion in continuous time is known to %.1e only", name, exact.error)
     implicit = None
     if section.affords(CONVERGED, scene.mesh.vertices):
-        implicit = _converged(scene, section.implicit)
+        implicit = converged_run(scene, section.implicit.tolerance, section.implicit.limit)
+        if implicit is None:
+            log.warning("%s: no convergence in %d evaluations", name, section.implicit.limit)
     return References(implicit, exact.positions, exact.error)
-
-
-def _converged(scene: Scene, section: ImplicitReference) -> np.ndarray | None:
-    best = ConvergedStepper(scene, scene.system, section.tolerance, section.limit)
-    state = scene.initial_state()
-    positions = [state.positions]
-    for frame in range(scene.config.frames):
-        state, _ = best.step(state, frame)
-        positions.append(state.positions)
-    if not best.converged:
-        log.warning("%s: no convergence in %d evaluations", scene.config.name, section.limit)
-        return None
-    return np.stack(positions)
 
 
 def _variant(candidate: Candidate, frames: int) -> Variant:

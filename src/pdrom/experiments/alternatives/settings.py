@@ -1,6 +1,6 @@
 """Section ``alternatives``: methods, their steps, and what they are compared with."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field
 
@@ -10,16 +10,18 @@ from pdrom.experiments.alternatives.solvers.methods import METHODS
 from pdrom.experiments.kit.measurement import Protocol
 from pdrom.experiments.kit.settings import Count, Modes, Repeats, Tolerance
 
-REDUCED = "ecsw"  # the only method that is no full-order one
-CONVERGED = "converged"  # the implicit step itself, however long it takes
+REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # the others are full-order ones
+OWN: Final = "own iterations"  # frames that a reduction may be trained on, beside converged ones
+CONVERGED: Final = "converged"  # the implicit step itself, however long it takes
 
+Trained = Literal["own iterations", "converged"]
 Factors = Annotated[tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...], Field(min_length=1)]
 Work = Annotated[int, Field(ge=1, le=10**12, description="vertices times steps")]
 Steps = Annotated[tuple[Count, Count], Field(description="substeps of a frame, iterations of each")]
 
 
 def _known(by_method: dict[str, Any]) -> dict[str, Any]:
-    allowed = (*METHODS, REDUCED, CONVERGED)
+    allowed = (*METHODS, *REDUCTIONS, CONVERGED)
     for name in by_method:
         if name not in allowed:
             raise ValueError(f"unknown method '{name}'{choices(name, allowed)}")
@@ -50,7 +52,8 @@ def default_steps() -> dict[str, tuple[Steps, ...]]:
         "xpbd": (*_sweep(5, 10, 20, 50), *_small(5, 10, 20, 50, 100)),
         "vertex-descent": (*_sweep(10, 20, 50), *_small(10, 20, 50)),
         "explicit": _small(5, 10, 20, 40, 80, 160),
-        REDUCED: ((1, 10), (1, 40), (1, 80)),
+        REDUCED: _sweep(10, 20, 40, 80, 160),
+        ACCELERATED: _sweep(10, 20),
     }
 
 
@@ -82,9 +85,10 @@ class Comparison(Protocol):
     over ``compared`` frames of the held-out motion, for each factor on all weights that
     ``stiffness`` has for the scene (1 if none, and on other meshes than its own); ``frames`` of
     them are timed. The reduction has each of ``modes`` and samples to ``tau``, trained on the
-    training motion. ``work`` bounds the vertices times substeps times iterations of a frame of a
-    method: steps beyond are left out (converged: the implicit reference, one step of one
-    iteration). Runs for the errors come first, so that timings need no warm-up.
+    training motion, its frames as they are or converged (``trained_on``). ``work`` bounds the
+    vertices times substeps times iterations of a frame of a method: steps beyond are left out
+    (converged: the implicit reference, one step of one iteration). Runs for the errors come first,
+    so that timings need no warm-up.
     """
 
     warmup: Annotated[int, Field(ge=0, le=1000)] = 0
@@ -96,6 +100,7 @@ class Comparison(Protocol):
     work: Annotated[dict[str, Work], AfterValidator(_known)] = Field(default_factory=dict)
     modes: Annotated[tuple[Modes, ...], Field(min_length=1)] = (40,)
     tau: Tolerance = 1e-2
+    trained_on: Annotated[tuple[Trained, ...], Field(min_length=1)] = (OWN, CONVERGED)
     implicit: ImplicitReference = ImplicitReference()
     continuous: ContinuousReference = ContinuousReference()
     frames: Count = 4

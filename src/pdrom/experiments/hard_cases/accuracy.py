@@ -116,7 +116,9 @@ def bending_errors(cases: int, effect: str = "bending") -> Iterator[tuple[str, f
             found = group.project_elements(y, np.array([element]))
             pole = group.side[element] * group.normals[element]
             with mp.workdps(digits_for(row[used], y[used])):
-                p, condition = half_sphere(row[used], y[used], group.magnitude[element], pole)
+                p, condition = half_sphere(
+                    row[used], y[used], group.magnitude[element], normal=pole
+                )
                 yield name, float(mp.norm(exact(found) - p) / mp.norm(p)), float(condition)
 
 

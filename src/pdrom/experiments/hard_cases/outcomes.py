@@ -57,7 +57,7 @@ def rows(
     bounded = largest_projections(training.group, training.scene.mesh.points) is not None
     for name in names(methods):
         named = {"case": case.name, "method": name, "bounded_projections": bounded}
-        yield {**named, **row(training, name, methods, expected)}
+        yield {**named, **row(training, name, methods, expected=expected)}
 
 
 def row(
@@ -70,7 +70,7 @@ def row(
     entry = expected.get(name)
     extent = scale_of(training)
     try:
-        reduced = reduced_run(training, name, methods, BLOWUP * extent)
+        reduced = reduced_run(training, name, methods, limit=BLOWUP * extent)
     except NotReducibleError as error:
         return {"frames": 0, "outcome": NOT_TAKEN, "why": str(error)}
     except PdromError as error:

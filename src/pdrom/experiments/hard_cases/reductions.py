@@ -48,12 +48,12 @@ def _samples(
         return {}
     if sampling == "ecsw":
         frames = np.arange(scene.config.frames)
-        return sample_elements(scene, columns, frames, [TOLERANCE], start)[0]
+        return sample_elements(scene, columns, frames, tolerances=[TOLERANCE], start=start)[0]
     if sampling == "hrpd":
         points = scene.mesh.points
         return {g.name: hrpd(g, columns, sampled_space(g, points, HRPD)) for g in scene.groups}
     states = States(scene, columns, positions, start)
-    return interpolate(scene, columns, states, INTERPOLATIONS[sampling])
+    return interpolate(scene, columns, states, spec=INTERPOLATIONS[sampling])
 
 
 class Training:
@@ -80,8 +80,8 @@ class Training:
                 np.stack(self._snapshots),
                 row_masses(self.group, self.scene.masses),
                 float(np.linalg.norm(self._roundoff)),
-                self.group.rows_per_element,
-                spec,
+                rows_per_element=self.group.rows_per_element,
+                spec=spec,
             )
         return self._bases[spec.basis_id]
 
@@ -131,16 +131,16 @@ def _local(training: Training, spec: MethodSpec, limit: float) -> ReducedRun:
     r = min(R, basis.rank)
     if r == 0:
         return ReducedRun(None, 0, None, None)
-    reduction = Reduction(basis, select(basis, spec, r), spec, r)
+    reduction = Reduction(basis, select(basis, spec, r), spec, r=r)
     step = Watched(ReducedLocalStep(training.group, reduction), training.group)
     loop = scene.stepper(local_steps=replace_group(scene, training.group.name, step))
-    run = record(scene, loop, training.state(), Roundoff(scene, loop), limit=limit)
+    run = record(scene, loop, training.state(), roundoff=Roundoff(scene, loop), limit=limit)
     return ReducedRun(run, r, None, reduction.gain)
 
 
 def _subspace(training: Training, kind: str, sampling: str, limit: float) -> ReducedRun:
     scene, positions = training.scene, training.run.positions
-    columns = make_columns(scene, positions[1::2], kind, K)
+    columns = make_columns(scene, positions[1::2], kind, k=K)
     start = training.state()
     fields = (start.positions, start.velocities)
     state = State(*(coordinates(columns, scene.masses, field) for field in fields))
@@ -150,7 +150,9 @@ def _subspace(training: Training, kind: str, sampling: str, limit: float) -> Red
     steps = untracked.local_steps
     loop: Stepper = untracked
     if not isinstance(untracked, SafeguardedStepper):
-        loop = Stepper(untracked.space, untracked.time_step, untracked.iterations, steps)
+        loop = Stepper(
+            untracked.space, untracked.time_step, untracked.iterations, local_steps=steps
+        )
     roundoff = Roundoff(scene, loop, columns)
-    run = record(scene, loop, state, roundoff, model.positions, limit)
+    run = record(scene, loop, state, roundoff=roundoff, positions=model.positions, limit=limit)
     return ReducedRun(run, model.elements_evaluated(scene), columns.B.shape[1], None)

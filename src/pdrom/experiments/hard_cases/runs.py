@@ -15,4 +15,4 @@ def full_order(
 ) -> Record:
     """Run ``scene``, made by ``case``, from its start; ``observe`` sees every last iterate."""
     loop = scene.stepper()
-    return record(scene, loop, case.start(scene), Roundoff(scene, loop), observe=observe)
+    return record(scene, loop, case.start(scene), roundoff=Roundoff(scene, loop), observe=observe)

@@ -209,7 +209,7 @@ def linear_extent(scene: Scene, force: np.ndarray) -> float:
     """
     space = VertexSpace(scene.system, scene.forces, scene.boundaries)
     steps = [ConstantProjections("constant", force)]
-    loop = Stepper(space, scene.config.time_step, 1, steps, track_objective=False)
+    loop = Stepper(space, scene.config.time_step, 1, local_steps=steps, track_objective=False)
     state: State = scene.initial_state()
     largest = float(np.ptp(state.positions, axis=0).max())
     for frame in range(scene.config.frames):

@@ -41,10 +41,10 @@ def contributions(scene: Scene) -> pd.DataFrame:
     of a start the kinetic energy that it brings. Where an effect has none it is nan.
     """
     watched = [_Watched(contact) for contact in scene.contacts]
-    space = VertexSpace(scene.system, scene.forces, scene.boundaries, watched)  # type: ignore[arg-type]
+    space = VertexSpace(scene.system, scene.forces, scene.boundaries, contacts=watched)  # type: ignore[arg-type]
     config = scene.config
     loop = Stepper(
-        space, config.time_step, config.iterations, scene.groups, track_objective=False,
+        space, config.time_step, config.iterations, local_steps=scene.groups, track_objective=False,
         acceleration=scene.acceleration(),
     )  # fmt: skip
     state, rows = scene.initial_state(), []

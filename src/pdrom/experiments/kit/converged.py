@@ -144,9 +144,25 @@ class ConvergedStepper(Stepper):
             elimination.solve(rhs, target)
             return energy + self.space.inertia_energy(y - s), target
 
-        end = minimise(evaluate, self.space.system.matrix, s, self._tolerance, self.iterations)
+        end = minimise(
+            evaluate, self.space.system.matrix, s, tolerance=self._tolerance, limit=self.iterations
+        )
         self.changes.append(end.change)
         self.evaluations.append(end.evaluations)
         if on_last_iterate is not None:
             on_last_iterate(end.y)
         return self._finish(state, end.y, frame), FrameReport(np.empty(0), np.zeros(4))
+
+
+def converged_run(scene: Scene, tolerance: float, limit: int) -> np.ndarray | None:
+    """Positions (F + 1, N, 3) m of a run of converged frames, the initial ones first.
+
+    None where a frame does not reach the ``tolerance`` in ``limit`` evaluations.
+    """
+    best = ConvergedStepper(scene, scene.system, tolerance, limit)
+    state = scene.initial_state()
+    positions = [state.positions]
+    for frame in range(scene.config.frames):
+        state, _ = best.step(state, frame)
+        positions.append(state.positions)
+    return np.stack(positions) if best.converged else None

@@ -64,7 +64,7 @@ class Timed:
         return float(self._kernel.sum())
 
     def reset(self) -> None:
-        """Begin anew."""
+        """Begin again."""
         self._asked = 0.0
         self._kernel[:] = 0.0
 
@@ -95,7 +95,9 @@ def effect_costs(
     groups, *others = by_role
     space = VertexSpace(system, *others)
     config = scene.config
-    loop = Stepper(space, config.time_step, config.iterations, groups, track_objective=False)
+    loop = Stepper(
+        space, config.time_step, config.iterations, local_steps=groups, track_objective=False
+    )
     stands = [stand for role in by_role for stand in role]
     names = list(dict.fromkeys(stand.name for stand in stands))
     samples = [_profile(loop, scene, frames, stands, names) for _ in range(warmup + repeats)]

@@ -60,7 +60,7 @@ class Subspaces(ConfigModel):
 class TimedScene(ConfigModel):
     """A scene, timed in full order, once more as a control, and with its reductions.
 
-    mesh : file of the mesh; it is made anew if there is none
+    mesh : file of the mesh; it is made if there is none
     """
 
     scene: SceneConfig
@@ -126,7 +126,7 @@ def _variants(asked: TimedScene, request: Request) -> Iterator[Variant]:
     for role in (FULL, CONTROL):
         yield variant({"role": role}, list(scene.groups))
     for own in asked.projections:
-        reduction = load_reduction(load_basis(own.basis), own.sampling, own.spec, own.r)
+        reduction = load_reduction(load_basis(own.basis), own.sampling, own.spec, r=own.r)
         step = ReducedLocalStep(scene.group(own.group), reduction)
         labels: dict[str, Any] = {"role": REDUCED, "position_basis": "full"}
         labels |= own.model_dump(include={"group", "method", "r"})

@@ -10,8 +10,6 @@ import pandas as pd
 
 from pdrom.model.metrics import trajectory_error
 
-HELDOUT = "heldout"  # label of the perturbed held-out motion, whose horizon is its own
-
 
 def floor_of(table: pd.DataFrame, scene: str, perturbation: float | str) -> np.ndarray:
     """Sensitivity floor (F,) of a scene at one size (or under one label) of the perturbation.

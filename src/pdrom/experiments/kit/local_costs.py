@@ -27,7 +27,8 @@ def local_costs(
 ) -> pd.DataFrame:
     """Milliseconds of one local step, mean over some states, with one thread and with two.
 
-    Of a reduced one also the dense product that solves for its coefficients, and its lift, alone.
+    Of a reduced one also the dense product that solves for its coefficients, and its
+    reconstruction, alone.
 
     The steps of a number of threads are interleaved; a second thread that waits for work would
     disturb those that have one.

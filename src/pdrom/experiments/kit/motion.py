@@ -28,7 +28,7 @@ class Motion:
 
     def run(self, model: SubspaceModel, limit: float) -> Rerun:
         """Run a model; a blow-up ends the run and is recorded."""
-        return rerun_model(self.scene, model, self.reference, limit)
+        return rerun_model(self.scene, model, self.reference, blowup_extent=limit)
 
 
 def training_indices(scene: Scene) -> np.ndarray:

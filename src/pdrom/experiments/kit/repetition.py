@@ -99,7 +99,12 @@ class Repeater:
         field = perturbation_field(self.scene, self.asked.perturbation, seed) if moved else None
         steps = replace_group(self.scene, self.group.name, ReducedLocalStep(self.group, reduction))
         outcome = rerun(
-            self.scene, self.scene.system, steps, self.reference, self.blowup_extent, offset=field
+            self.scene,
+            self.scene.system,
+            steps,
+            reference=self.reference,
+            blowup_extent=self.blowup_extent,
+            offset=field,
         )
         error = error_within(outcome.difference, self._displacement, self.end)
         errors = np.full(len(self._displacement), np.inf)
@@ -128,12 +133,16 @@ class Repeater:
             data = self.data
             train = data.train if subset is None else drawn(data, subset)
             self._bases[key] = compute_basis(
-                train, data.row_mass, data.roundoff, data.rows_per_element, method
+                train,
+                data.row_mass,
+                data.roundoff,
+                rows_per_element=data.rows_per_element,
+                spec=method,
             )
         basis = self._bases[key]
         held = [r for r in sizes if r <= basis.rank]
         path = select_path(basis, method, held) if held else {}
-        return {r: Reduction(basis, path[r], method, r) for r in held}
+        return {r: Reduction(basis, path[r], method, r=r) for r in held}
 
 
 def drawn(data: SnapshotSet, seed: int) -> np.ndarray:

@@ -61,7 +61,7 @@ def sample(
     rows = []
     with write_hdf5(sampling.path) as file:
         for r in wanted:
-            reduction = Reduction(basis, path[r], method, r)
+            reduction = Reduction(basis, path[r], method, r=r)
             _store(file, r, path[r], reduction)
             rows += [{**labels, "r": r, **row} for row in _errors(reduction, data)]
     beyond = [r for r in resolve_ranks(ranks, basis.rank) if r > basis.rank]

@@ -1,18 +1,22 @@
 """Scene of a run bound to its mesh file, and that run, for several experiments."""
 
+from typing import cast
+
 import numpy as np
 
 from pdrom.core.paths import File
 from pdrom.core.store import open_hdf5
+from pdrom.model.held_out import FIRST, HeldOutMotion
 from pdrom.model.mesh.types import load_mesh
 from pdrom.model.scene import Scene, SceneConfig
 
-RUNS = ("train", "heldout")
+TRAIN = "train"
+SPLITS = (TRAIN, FIRST)  # what experiments on a single held-out motion run
 
 
-def scene_of(config: SceneConfig, mesh: File, run: str = "train", threads: int = 1) -> Scene:
-    """Scene of ``run`` ("train" or "heldout") on its mesh file."""
-    chosen = config.heldout_variant() if run == "heldout" else config
+def scene_of(config: SceneConfig, mesh: File, run: str = TRAIN, threads: int = 1) -> Scene:
+    """Scene of ``run`` ("train" or a held-out motion) on its mesh file."""
+    chosen = config if run == TRAIN else config.heldout_variant(cast(HeldOutMotion, run))
     scene = Scene.build(chosen, load_mesh(mesh.path), threads)
     scene.log_holds()
     return scene

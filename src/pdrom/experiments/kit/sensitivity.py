@@ -8,7 +8,6 @@ the time step are changed, and each effect is left out.
 import numpy as np
 import pandas as pd
 
-from pdrom.experiments.kit.horizon import HELDOUT
 from pdrom.model.dynamics.solvers import solver_class
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.runs.full_order import trajectory
@@ -37,12 +36,12 @@ def perturbation_field(scene: Scene, size: float, seed: int) -> np.ndarray:
     return size * scene.mesh.extent * field / np.linalg.norm(field, axis=1, keepdims=True)
 
 
-def heldout_floor(heldout: Scene, size: float, seeds: tuple[int, ...]) -> pd.DataFrame:
-    """Rows of the held-out motion, whose horizon is its own; perturbation "heldout"."""
+def heldout_floor(heldout: Scene, motion: str, size: float, seeds: tuple[int, ...]) -> pd.DataFrame:
+    """Rows of a held-out motion, whose horizon is its own; its name stands as perturbation."""
     base = trajectory(heldout)
     runs = [trajectory(heldout, perturbation_field(heldout, size, seed)) for seed in seeds]
     return pd.concat(
-        _rows(heldout, HELDOUT, seed, relative_difference(run, base))
+        _rows(heldout, motion, seed, relative_difference(run, base))
         for seed, run in zip(seeds, runs, strict=True)
     )
 
@@ -82,7 +81,7 @@ def removable(config: SceneConfig) -> list[str]:
 
 
 def _fresh(scene: Scene, **changes: object) -> Scene:
-    """The scene bound anew with changes of its configuration."""
+    """The scene bound again with changes of its configuration."""
     return Scene.build(scene.config.model_copy(update=changes), scene.mesh)
 
 

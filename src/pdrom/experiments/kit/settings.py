@@ -7,7 +7,7 @@ from pydantic import AfterValidator, Field
 from pdrom.core.paths import File
 from pdrom.core.store import read_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.kit.horizon import HELDOUT, floor_of, horizon
+from pdrom.experiments.kit.horizon import floor_of, horizon
 from pdrom.model.dynamics.solvers import SOLVERS
 
 
@@ -39,6 +39,6 @@ class Horizon(ConfigModel):
 
     def frames(self, perturbed: File, run: str = "train") -> int:
         """Frames before the horizon of a scene's ``run``, from the table of its perturbed runs."""
-        label = HELDOUT if run == "heldout" else self.perturbation
+        label = self.perturbation if run == "train" else run
         spread = floor_of(read_table(perturbed.path), perturbed["scene"], label)
         return horizon(spread, self.threshold)

@@ -99,5 +99,5 @@ def _variants(
             stored, row_sizes = runs[simulated]
             snapshots = training_snapshots(stored, count, variant.taken)
             decomposed[key] = decompose(snapshots, row_sizes, variant.taken)
-        found = errors(decomposed[key], group.rows_per_element, sizes, variant)
+        found = errors(decomposed[key], group.rows_per_element, sizes, variant=variant)
         yield variant, found, sizes

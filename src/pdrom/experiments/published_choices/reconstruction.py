@@ -74,7 +74,7 @@ def errors(
     moving = ~idle_axes(data.snapshots)
     kept = tuple(bool(axis) for axis in moving | ("idle" in taken))
     basis = modes(data, kept, sizes[-1], "signs" in taken, variant.signs)
-    picked = joint_rows(basis, kept, True, _tie_factors(len(basis) // 3, variant.ties))
+    picked = joint_rows(basis, kept, True, factors=_tie_factors(len(basis) // 3, variant.ties))
     # an element has several rows; the published code reads its number as that of a row
     rows = picked // rows_per_element if "rows" in taken else picked
     found = np.full((len(sizes), 3), np.nan)

@@ -86,7 +86,9 @@ def _halved(effect: EffectConfig) -> EffectConfig:
 
 def _bar(config: BarMesh) -> Mesh:
     """The bar with the two patterns of cells exchanged, and their tetrahedra in another order."""
-    mesh = bar(config.nx, config.ny, config.nz, config.extent, config.lift, exchanged=True)
+    mesh = bar(
+        config.nx, config.ny, config.nz, extent=config.extent, lift=config.lift, exchanged=True
+    )
     cells = np.indices((config.nx - 1, config.ny - 1, config.nz - 1)).reshape(3, -1)
     pattern = (cells.sum(axis=0) + 1) % 2
     order = np.array([_ORDER[0], _ORDER[1]])[pattern] + 5 * np.arange(len(pattern))[:, None]
@@ -99,7 +101,14 @@ def _stepper(scene: Scene, group: ConstraintGroup, taken: Set[Choice]) -> Steppe
         steps = [TurnedStep(g) if g is group else g for g in steps]
     space = PublishedSpace(scene, "floor" in taken, "heavy" in taken)
     config = scene.config
-    return Stepper(space, config.time_step, config.iterations, steps, False, scene.acceleration())
+    return Stepper(
+        space,
+        config.time_step,
+        config.iterations,
+        local_steps=steps,
+        track_objective=False,
+        acceleration=scene.acceleration(),
+    )
 
 
 class TurnedStep:

@@ -89,7 +89,7 @@ class ConstraintGroup(Effect):
         return CELLS[cls.cells](mesh)
 
     def element_weights(self, mesh: Mesh) -> float | np.ndarray:
-        """w of each element before its rest measure, (e,), or one number for all of them.
+        """w of each element of ``mesh`` before its rest measure, (e,), or one number for all.
 
         Raises
         ------
@@ -120,7 +120,7 @@ class ConstraintGroup(Effect):
         return np.repeat(self.weights, self.rows_per_element)
 
     def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
-        """Freeze what depends on the frame's first positions q (N, 3); most groups have nothing."""
+        """Freeze what depends on first positions q (N, 3) m of a frame, for ``elements`` or all."""
 
     def kernel_parameters(self) -> np.ndarray:
         """Numbers that ``gradient_kernel`` needs beside S q, in the order that it expects.
@@ -146,7 +146,7 @@ class ConstraintGroup(Effect):
         raise NotImplementedError(f"{self.name} has no sampler")
 
     def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:
-        """Projections of some elements, (len(elements) p, 3), in the order given."""
+        """Projections of ``elements`` at ``y`` (N, 3) m, (len(elements) p, 3), in their order."""
         elements = np.ascontiguousarray(elements, dtype=np.int64)
         return projections(self.sampler(elements), y, self.rows_per_element * len(elements))
 
@@ -160,7 +160,7 @@ class ConstraintGroup(Effect):
 
     @abstractmethod
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
-        """NumPy reference of the projection: S_e q -> p_e, both (len(elements), p, 3)."""
+        """NumPy reference of the projection: ``d`` = S_e q -> p_e, both (len(elements), p, 3)."""
 
     @abstractmethod
     def restricted(
@@ -222,7 +222,7 @@ class StencilGroup(ConstraintGroup):
 
 
 def require_cells(mesh: Mesh, kind: str, effect: str) -> np.ndarray:
-    """The mesh's cells of ``kind``; SceneError if the mesh has none."""
+    """The mesh's cells of ``kind``, which ``effect`` needs; SceneError if there are none."""
     cells = getattr(mesh, kind)
     if kind == "triangles" and len(mesh.tetrahedra):
         raise SceneError(f"effect '{effect}' needs a surface mesh, this mesh is a volume")

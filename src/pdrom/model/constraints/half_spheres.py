@@ -92,7 +92,7 @@ def _half_spheres(work, manifold, block):
         _to_rims(work, manifold, first)
     for lane in range(LANES):
         n, unit = load(manifold, first + POLE, lane), load(work, P, lane)
-        magnitude = manifold[(first + MAGNITUDE) * LANES + lane]
+        magnitude = at(manifold, (first + MAGNITUDE) * LANES + lane)
         pole = choose(dot(n, n) == 0.0, load(manifold, first + REST, lane), scaled(magnitude, n))
         vanishes = absolute_sum(load(work, H, lane)) == 0.0
         save(work, P, lane, choose(vanishes, pole, scaled(magnitude, unit)))
@@ -176,7 +176,7 @@ def accumulate_vertices(y_place, rhs_place, record, part):
             )  # fmt: skip
         _half_spheres(work, manifold, block)
         for lane in range(used):
-            w = manifold[(block * MANIFOLD + WEIGHT) * LANES + lane]
+            w = at(manifold, (block * MANIFOLD + WEIGHT) * LANES + lane)
             h, p = load(work, H, lane), load(work, P, lane)
             energy += w * square_distance(h, p)
             force = arithmetic.of_three(w * p[0], w * p[1], w * p[2])

@@ -11,6 +11,7 @@ import numpy as np
 
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.rows import at
 
 LANES = 32
 
@@ -59,16 +60,16 @@ def take(packed, numbers, elements, start, out):
         e = elements[min(start + lane, last)]
         base = e // LANES * numbers * LANES + e % LANES
         for i in range(numbers):
-            out[i * LANES + lane] = packed[base + i * LANES]
+            out[i * LANES + lane] = at(packed, base + i * LANES)
 
 
 @lane_function
 def load(work, first, lane):
     """Vector of the numbers ``first``, ``first + 1``, ``first + 2`` of a lane."""
     return (
-        work[first * LANES + lane],
-        work[(first + 1) * LANES + lane],
-        work[(first + 2) * LANES + lane],
+        at(work, first * LANES + lane),
+        at(work, (first + 1) * LANES + lane),
+        at(work, (first + 2) * LANES + lane),
     )
 
 

@@ -30,7 +30,7 @@ _SIGNATURE = types.float64(types.intp, types.intp, types.intp, types.intp)
 def local_kernel(function):
     """Compile ``function(y, rhs, record, part) -> energy``; all but the part are addresses.
 
-    y, rhs : rows of four (N, 4); S^T W p(y) of the part's units is added to rhs
+    y, rhs : padded vectors (N, 4); S^T W p(y) of the part's units is added to rhs
     record : int64 numbers, see `VERTICES`
     part : one of `PARTS`, or `PREPARE`
     """
@@ -144,7 +144,7 @@ class LocalPass:
         return 2 if self.touched else 1
 
     def add(self, y: np.ndarray, rhs: np.ndarray, threads: int) -> float:
-        """Add S^T W p(y) to ``rhs``, both flat rows of four; the energy."""
+        """Add S^T W p(y) to ``rhs``, both flat padded vectors; the energy."""
         places = y.ctypes.data, rhs.ctypes.data
         add_part(*self.preparing, PREPARE, *places)
         if not self.touched:

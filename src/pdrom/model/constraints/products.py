@@ -170,6 +170,10 @@ def reference_nearest(values: np.ndarray, low: float, high: float) -> np.ndarray
     """NumPy reference: the same for values (e, 2 or 3) in the same order, by bisection.
 
     Where several solutions are possible each is bracketed on a grid, and the nearest one taken.
+
+    Parameters
+    ----------
+    low, high : least and largest product allowed
     """
     product = values.prod(axis=1)
     bound = np.clip(product, low, high)

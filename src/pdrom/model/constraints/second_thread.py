@@ -30,7 +30,7 @@ Work = Callable[[], float]
 
 
 def both(first: Work, second: Work, threads: int) -> tuple[float, float]:
-    """Results of both calls: one after the other, or at once if ``threads`` is 2.
+    """Results of ``first`` and ``second``: in turn, or at once if ``threads`` is 2.
 
     What either raises is raised here. With two threads neither may write what the other reads.
     """

@@ -18,14 +18,20 @@ from pdrom.model.mesh.measures import boundary_edges
 
 
 def interior_vertices(triangles: np.ndarray, vertices: int) -> np.ndarray:
-    """Vertices (n,) on no boundary edge, ascending."""
+    """Vertices (n,) of ``triangles`` (T, 3) on no boundary edge, ascending; of all ``vertices``."""
     inside = np.ones(vertices, dtype=bool)
     inside[boundary_edges(triangles)] = False
     return np.flatnonzero(inside)
 
 
 def cotangent_laplacian(points: np.ndarray, triangles: np.ndarray) -> sparse.csr_array:
-    """(L q)_v = sum_j (cot a_j + cot b_j)(q_v - q_j), (N, N) CSR (Pinkall and Polthier 1993)."""
+    """(L q)_v = sum_j (cot a_j + cot b_j)(q_v - q_j), (N, N) CSR (Pinkall and Polthier 1993).
+
+    Parameters
+    ----------
+    points : (N, 3) m
+    triangles : (T, 3)
+    """
     n = len(points)
     rows, columns, values = [], [], []
     for corner in range(3):
@@ -41,7 +47,7 @@ def cotangent_laplacian(points: np.ndarray, triangles: np.ndarray) -> sparse.csr
 
 
 def vertex_fans(triangles: np.ndarray, vertices: int) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles around each vertex: ``fan[start[v]:start[v + 1]]``."""
+    """``triangles`` (T, 3) around each of ``vertices``: ``fan[start[v]:start[v + 1]]``."""
     order = np.argsort(triangles.ravel(), kind="stable")
     counts = np.bincount(triangles.ravel(), minlength=vertices)
     start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)

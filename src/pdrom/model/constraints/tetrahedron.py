@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from pdrom.model.compiled.rows import at
 from pdrom.model.constraints import svd3
 from pdrom.model.constraints.base import GroupConfig, require_cells
 from pdrom.model.constraints.gradient_kernel import gradient_kernel
@@ -68,7 +69,7 @@ def forces(work, geometry, block):
             load(geometry, start, lane), load(geometry, start + 3, lane),
             load(geometry, start + 6, lane),
         )  # fmt: skip
-        w = geometry[weight * LANES + lane]
+        w = at(geometry, weight * LANES + lane)
         for corner in range(3):
             force = mix3(r0[corner], p0, r1[corner], p1, r2[corner], p2)
             save(work, FORCE + 3 * corner, lane, scaled(w, force))

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from pdrom.model.compiled.rows import at
 from pdrom.model.constraints.base import require_cells
 from pdrom.model.constraints.clamp2 import clamp_block
 from pdrom.model.constraints.gradient_kernel import gradient_kernel
@@ -43,10 +44,10 @@ def gradients(work, geometry, block):
     first = (block * GEOMETRY + OPERATOR) * LANES
     for lane in range(LANES):
         e0, e1 = load(work, EDGE, lane), load(work, EDGE + 3, lane)
-        at = first + lane
-        save(work, F, lane, mix(geometry[at], e0, geometry[at + LANES], e1))
-        at += 2 * LANES
-        save(work, F + 3, lane, mix(geometry[at], e0, geometry[at + LANES], e1))
+        place = first + lane
+        save(work, F, lane, mix(at(geometry, place), e0, at(geometry, place + LANES), e1))
+        place += 2 * LANES
+        save(work, F + 3, lane, mix(at(geometry, place), e0, at(geometry, place + LANES), e1))
 
 
 @lane_function
@@ -56,9 +57,9 @@ def forces(work, geometry, block):
     first = (block * GEOMETRY + OPERATOR) * LANES
     for lane in range(LANES):
         p0, p1 = load(work, P, lane), load(work, P + 3, lane)
-        w, at = geometry[weight + lane], first + lane
-        r00, r01 = geometry[at], geometry[at + LANES]
-        r10, r11 = geometry[at + 2 * LANES], geometry[at + 3 * LANES]
+        w, place = at(geometry, weight + lane), first + lane
+        r00, r01 = at(geometry, place), at(geometry, place + LANES)
+        r10, r11 = at(geometry, place + 2 * LANES), at(geometry, place + 3 * LANES)
         save(work, FORCE, lane, scaled(w, mix(r00, p0, r10, p1)))
         save(work, FORCE + 3, lane, scaled(w, mix(r01, p0, r11, p1)))
         work[ENERGY * LANES + lane] += w * (
@@ -88,7 +89,13 @@ def _project_gradients(d, allowed, p, m):
 
 
 def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Inverse rest edge matrices D^-1 (T, 2, 2) in a frame of each triangle, and areas (T,) m^2."""
+    """Inverse rest edge matrices D^-1 (T, 2, 2) in a frame of each triangle, and areas (T,) m^2.
+
+    Parameters
+    ----------
+    points : (N, 3) m
+    triangles : (T, 3)
+    """
     first = points[triangles[:, 1]] - points[triangles[:, 0]]
     second = points[triangles[:, 2]] - points[triangles[:, 0]]
     length = np.linalg.norm(first, axis=1)

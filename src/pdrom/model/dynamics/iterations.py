@@ -53,6 +53,18 @@ class CompiledIterations:
         """Whether the system is solved by compiled code, too."""
         return isinstance(elimination, Elimination) and elimination.factor is not None
 
+    @property
+    def threads(self) -> int:
+        """Threads that share a local step, 1 or 2."""
+        if self._pass.parts == 1:
+            return 1
+        return max((step.threads for step in self._steps), default=1)
+
+    @property
+    def compiled_arguments(self) -> tuple[Any, ...]:
+        """Arguments of `all_iterations` that are the same for all frames."""
+        return self._inertia, self._tables, self._shared, self._places, self._clock
+
     def run(
         self,
         which: range,
@@ -80,14 +92,12 @@ class CompiledIterations:
         iterate, start = rows.flat(y), rows.flat(base)
         prediction = rows.flat(s) if tracked else start
         factor = elimination.factor
-        threads = 1
-        if self._pass.parts == 2:
-            threads = max((step.threads for step in self._steps), default=1)
+        threads = self.threads
         tables, shared, places = self._tables, self._shared, self._places
         self._counters[:] = 0
 
         def first() -> float:
-            return _iterate(
+            return all_iterations(
                 which.start, which.stop, iterations, iterate, prediction, start, right,
                 self._inertia, tables, shared, places, threads == 2, factor, history, objective,
                 seconds, self._clock,
@@ -122,10 +132,11 @@ def _assist(count, y, tables, shared, places):
 
 
 @compiled(nogil=True)
-def _iterate(
+def all_iterations(
     first, end, iterations, y, s, base, rhs, inertia, tables, shared, places, assisted, factor,
     history, objective, seconds, watch,
 ):  # fmt: skip
+    """Do iterations of a frame in place, see `CompiledIterations.run`."""
     addresses, records, preparing, second = tables
     shared_energy, other, start, stop = shared
     given, done = places

@@ -29,6 +29,8 @@ NOTHING_FREE: Factor = (
     np.zeros(0),
     np.zeros(0),
 )
+# First arguments of `pdrom.model.dynamics.sweeps.load`, where no unknown has a held neighbour.
+NO_COUPLING = (np.zeros(0, np.int64), np.zeros(1, np.int32), np.zeros(0, np.int32), np.zeros(0))
 
 
 class SparseSolver(ABC):
@@ -43,6 +45,8 @@ class SparseSolver(ABC):
 
     factor: Factor | None = None
     """For a compiled loop; None if the solver is not compiled."""
+    coupling = NO_COUPLING
+    """To the held vertices, for a compiled loop."""
 
     @abstractmethod
     def __init__(
@@ -115,16 +119,16 @@ class SupernodalSolver(SparseSolver):
         self._loads = rows.zeros(rows.WIDTH * n)
         self._sweep = (self.panels.arrays, order, self._loads, rows.empty(rows.WIDTH * n))
         self.factor = self._sweep
-        self._coupling = None
+        self.coupling = NO_COUPLING
         if coupling is not None:
             own = sparse.csr_array(coupling[unknowns])
             # few unknowns have a held neighbour
             beside = np.flatnonzero(np.diff(own.indptr))
-            self._coupling = beside, own.indptr, own.indices, own.data
+            self.coupling = beside, own.indptr, own.indices, own.data
 
     def set_targets(self, targets: np.ndarray) -> None:
-        if self._coupling is not None:
-            load(*self._coupling, np.ascontiguousarray(targets), self._loads)
+        if len(self.coupling[0]):
+            load(*self.coupling, np.ascontiguousarray(targets), self._loads)
 
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
         right, solution = rows.flat(rhs), rows.flat(y)

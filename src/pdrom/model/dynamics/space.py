@@ -11,7 +11,15 @@ from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.frames import end, predict, weighted
 from pdrom.model.dynamics.iterations import CompiledIterations
 from pdrom.model.dynamics.system import GlobalSystem
-from pdrom.model.effects.base import Boundary, Contact, Force, held_targets, held_vertices
+from pdrom.model.dynamics.whole_frames import WholeFrames
+from pdrom.model.effects.base import (
+    Boundary,
+    Contact,
+    Force,
+    held_path,
+    held_targets,
+    held_vertices,
+)
 
 
 class Solve(Protocol):
@@ -40,6 +48,12 @@ class Space(ABC):
         self, local_steps: Sequence[Any], acceleration: Anderson | None = None
     ) -> CompiledIterations | None:
         """Compiled iterations with these local steps, None if there are none."""
+        return None
+
+    def whole(
+        self, local_steps: Sequence[Any], loop: Any, acceleration: Anderson | None
+    ) -> WholeFrames | None:
+        """Whole frames in compiled code around a compiled ``loop``, None if there are none."""
         return None
 
     @abstractmethod
@@ -89,6 +103,10 @@ class VertexSpace(Space):
     def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return held_targets(self._boundaries, frame, positions)
 
+    def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates that are held in the first ``frames``, and their values (n, m, 3)."""
+        return held_path(self._boundaries, frames, positions)
+
     def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
         elimination = self.system.eliminate(fixed)
         elimination.set_targets(targets)
@@ -110,6 +128,15 @@ class VertexSpace(Space):
         if any(getattr(step, "local_kernel", None) is None for step in local_steps):
             return None
         return CompiledIterations(local_steps, self.system.inertia, acceleration)
+
+    def whole(
+        self, local_steps: Sequence[Any], loop: Any, acceleration: Anderson | None
+    ) -> WholeFrames | None:
+        effects = self._forces, self._boundaries, self._contacts
+        # a subclass may do any part of a frame in its own way
+        if type(self) is not VertexSpace or not WholeFrames.suits(local_steps, *effects):
+            return None
+        return WholeFrames(self, loop, self._forces, self._contacts, acceleration)
 
     def inertia(self, s: np.ndarray) -> np.ndarray:
         return unflat(weighted(self.system.inertia, flat(s)))

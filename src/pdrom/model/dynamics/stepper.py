@@ -6,7 +6,7 @@ v = (y - q) / h and q = y. What replaces the projections of a group is a `LocalS
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Protocol
@@ -70,6 +70,15 @@ class FrameReport:
     seconds: np.ndarray
 
 
+class CompiledFrames(Protocol):
+    """Frames that need nothing of Python, see `pdrom.model.dynamics.whole_frames`."""
+
+    def run(
+        self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+        """Positions, velocities, objectives and seconds after some of ``frames``; None: not now."""
+
+
 class Stepper:
     """Advances a state frame by frame in the coordinates of a `Space`."""
 
@@ -89,6 +98,9 @@ class Stepper:
         self._acceleration = acceleration
         self._track = track_objective
         self._compiled = space.compiled(self.local_steps, acceleration)
+        self._whole: CompiledFrames | None = None
+        if self._compiled is not None:
+            self._whole = space.whole(self.local_steps, self._compiled, acceleration)
         self._watching = [local for local in local_steps if isinstance(local, WatchedStep)]
 
     def step(
@@ -98,6 +110,9 @@ class Stepper:
         on_last_iterate: Callable[[np.ndarray], None] | None = None,
     ) -> tuple[State, FrameReport]:
         """Do one frame (0-based ``frame``); ``on_last_iterate`` sees the last local iterate y."""
+        if on_last_iterate is None:
+            for done in self._at_once(state, range(frame, frame + 1)):
+                return done
         seconds = np.zeros(len(PHASES))
         started = perf_counter()
         s, elimination, base = self._begin(state, frame)
@@ -107,6 +122,35 @@ class Stepper:
         after = self._finish(state, y, frame)
         seconds[3] = perf_counter() - before
         return after, FrameReport(objective, seconds)
+
+    def run(self, state: State, frames: range) -> Iterator[tuple[State, FrameReport]]:
+        """Do frames one after the other, as `step` without an observer; many in one compiled call.
+
+        What a caller does between two of them changes nothing in those that follow.
+        """
+        while frames:
+            # a subclass may have steps of its own
+            own = type(self).step is not Stepper.step
+            done = () if own else self._at_once(state, frames)
+            for after in done or (self.step(state, frames.start),):
+                state, frames = after[0], frames[1:]
+                yield after
+
+    def _at_once(self, state: State, frames: range) -> Sequence[tuple[State, FrameReport]]:
+        """The first of the frames, as many as compiled code can do in one call; none or more."""
+        if self._whole is None or self._watching:
+            return ()
+        q, v, h = state.positions, state.velocities, self.time_step
+        started = perf_counter()
+        done = self._whole.run(q, v, frames, h, self.iterations, self._track)
+        if done is None:
+            return ()
+        # what the interpreter takes for a call belongs to the beginnings of its frames
+        done[3][:, 0] += max(perf_counter() - started - done[3].sum(), 0.0) / len(done[3])
+        return [
+            (State(q, v), FrameReport(objective, seconds))
+            for q, v, objective, seconds in zip(*done, strict=True)
+        ]
 
     def _begin(self, state: State, frame: int) -> tuple[np.ndarray, Solve, np.ndarray]:
         """Inertial prediction s with held coordinates at their targets, the system, (M/h^2) s."""

@@ -8,7 +8,13 @@ from scipy import sparse
 from pdrom.core.errors import SolverError
 from pdrom.core.store import require_finite
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.dynamics.solvers import NOTHING_FREE, Factor, SparseSolver, solver_class
+from pdrom.model.dynamics.solvers import (
+    NO_COUPLING,
+    NOTHING_FREE,
+    Factor,
+    SparseSolver,
+    solver_class,
+)
 
 DEFAULT_SOLVER = "supernodal"
 
@@ -22,6 +28,7 @@ class Elimination:
     Attributes
     ----------
     factor : arguments of `pdrom.model.dynamics.sweeps.sweep`; None if another solver is in use
+    coupling : first arguments of `pdrom.model.dynamics.sweeps.load`
     """
 
     def __init__(self, matrix: sparse.csr_array, fixed: np.ndarray, solver: str) -> None:
@@ -30,10 +37,11 @@ class Elimination:
         coupling = sparse.csr_array(matrix[self.free][:, fixed]) if len(fixed) else None
         self._solver: SparseSolver | None = None
         self.factor: Factor | None = NOTHING_FREE
+        self.coupling = NO_COUPLING
         if len(self.free):
             block = matrix if not len(fixed) else matrix[self.free][:, self.free]
             self._solver = solver_class(solver)(sparse.csr_array(block), self.free, coupling)
-            self.factor = self._solver.factor
+            self.factor, self.coupling = self._solver.factor, self._solver.coupling
             require_accurate(block, self._solve_free)
 
     def _solve_free(self, rhs: np.ndarray, out: np.ndarray) -> None:

@@ -55,7 +55,7 @@ class EffectConfig(ConfigModel):
         return self.model_copy(update=changes)
 
     def check_step(self, time_step: float) -> None:
-        """Raise ValueError if the effect is unstable with this time step (s)."""
+        """Raise ValueError if the effect is unstable with a step of ``time_step`` s."""
 
     def reversed(self) -> Self:
         """The motion in the opposite direction; an effect that does not move stays as it is."""
@@ -85,6 +85,7 @@ class Effect(ABC):
     """Whether a position subspace takes the effect; one that it does not take is refused there."""
 
     def __init__(self, config: EffectConfig, mesh: Mesh, masses: np.ndarray) -> None:
+        """Bind ``config`` to a mesh whose vertices have ``masses`` (N,) kg."""
         self.config: Any = config
         self.name: str = config.effect
 
@@ -112,10 +113,13 @@ class Force(Effect):
 
     @abstractmethod
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
-        """Acceleration of the frame, (3,) or (N, 3) m/s^2."""
+        """Acceleration, (3,) or (N, 3) m/s^2, at ``positions`` m and ``velocities`` m/s (N, 3)."""
 
     def potential(self, positions: np.ndarray, masses: np.ndarray) -> float:
-        """Potential energy in joule up to a constant; a force that has none (damping) adds none."""
+        """Potential energy, J, at ``positions`` (N, 3) m of ``masses`` (N,) kg, up to a constant.
+
+        A force that has no potential (damping) adds none.
+        """
         return 0.0
 
 
@@ -151,6 +155,17 @@ class Boundary(Effect):
         were when it took hold of them.
         """
 
+    def takes_hold(self, frame: int) -> bool:
+        """Whether the targets of ``frame`` need the positions at its beginning, none before."""
+        return True
+
+    def path(self, frames: range, current: np.ndarray) -> np.ndarray:
+        """`targets` (f, n, 3) of frames, of which only the first may take hold."""
+        first = self.targets(frames.start, current)
+        if not self.moves:
+            return np.broadcast_to(first, (len(frames), *first.shape))
+        return np.array([first, *(self.targets(frame, current) for frame in frames[1:])])
+
     @abstractmethod
     def units(self) -> list[np.ndarray]:
         """Sets of vertices that are always held together."""
@@ -168,16 +183,42 @@ def held_targets(
     """The vertices that are held in ``frame``, as `held_vertices`, and their targets (n, 3) m.
 
     ``positions`` (N, 3) m are those at the frame's beginning.
+
+    Parameters
+    ----------
+    boundaries : holds of the scene
     """
-    active = [b for b in boundaries if b.active(frame)]
-    if not active:
-        return np.empty(0, dtype=np.int64), np.empty((0, 3))
-    held = [b.held(frame) for b in active]
-    targets = [b.targets(frame, positions[v]) for b, v in zip(active, held, strict=True)]
-    if len(active) == 1 and (np.diff(held[0]) > 0).all():
-        return held[0], targets[0]
-    vertices, first = np.unique(np.concatenate(held), return_index=True)
-    return vertices, np.concatenate(targets)[first]
+    vertices, path = held_path(boundaries, range(frame, frame + 1), positions)
+    return vertices, path[0]
+
+
+def held_path(
+    boundaries: Sequence[Boundary], frames: range, positions: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """`held_targets` of the first of ``frames`` and of those after it whose targets it knows.
+
+    Targets are (n, m, 3) m for n >= 1 frames: up to the first in which others are held, or in which
+    any are taken hold of.
+    """
+    active = [b for b in boundaries if b.active(frames.start)]
+    held = [b.held(frames.start) for b in active]
+    current = [positions[v] for v in held]
+    single = len(active) == 1 and bool((held[0][1:] > held[0][:-1]).all())
+    vertices, first = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    if single:
+        vertices = held[0]
+    elif active:
+        vertices, first = np.unique(np.concatenate(held), return_index=True)
+    known = 1
+    while known < len(frames) and not (
+        any(b.active(frames[known]) != (b in active) for b in boundaries)
+        or any(b.takes_hold(frames[known]) for b in active)
+    ):
+        known += 1
+    paths = [b.path(frames[:known], q) for b, q in zip(active, current, strict=True)]
+    if single:
+        return vertices, np.ascontiguousarray(paths[0])
+    return vertices, np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]
 
 
 class Contact(Effect):
@@ -186,10 +227,17 @@ class Contact(Effect):
     each_alone: ClassVar[bool] = True
     """Whether a vertex is corrected by itself, whatever the others do."""
 
+    height: float | None = None
+    """y in metres of a contact that does nothing but lift vertices to it."""
+
     def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
         """`correct` all vertices but those ``held`` (n,), in place.
 
         A contact that shares a correction between vertices overrides this.
+
+        Parameters
+        ----------
+        positions, before : (N, 3) m at the end and at the beginning of the frame
         """
         targets = positions[held]
         self.correct(positions, before)

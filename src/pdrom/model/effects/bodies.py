@@ -11,6 +11,11 @@ def square(point: np.ndarray, normal: np.ndarray, low: np.ndarray, high: np.ndar
     """The part of a plane that is seen from the region between ``low`` and ``high`` (3,) m.
 
     A square about the middle of the region, seen along the normal, that covers it from every side.
+
+    Parameters
+    ----------
+    point : (3,) m, on the plane
+    normal : (3,)
     """
     normal = normal / np.linalg.norm(normal)
     middle, reach = 0.5 * (low + high), np.linalg.norm(high - low)
@@ -24,7 +29,7 @@ def square(point: np.ndarray, normal: np.ndarray, low: np.ndarray, high: np.ndar
 
 
 def ball(centre: np.ndarray, radius: float) -> Mesh:
-    """A sphere in circles of latitude; corners lie on it."""
+    """A sphere about ``centre`` (3,) m in circles of latitude; corners at ``radius`` m."""
     around = 2 * RINGS
     polar = np.pi * np.arange(1, RINGS)[:, None] / RINGS
     turn = 2.0 * np.pi * np.arange(around)[None] / around
@@ -43,7 +48,7 @@ def ball(centre: np.ndarray, radius: float) -> Mesh:
 
 
 def cuboid(lower: np.ndarray, upper: np.ndarray) -> Mesh:
-    """A box along the axes."""
+    """A box along the axes between the corners ``lower`` and ``upper`` (3,) m."""
     upwards = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
     faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     triangles = [[f[0], *pair] for f in faces for pair in (f[1:3], f[2:4])]

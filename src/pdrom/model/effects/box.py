@@ -41,7 +41,7 @@ class Box(Obstacle):
         return np.hstack([points - self._lower, self._upper - points])
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Normals (n, 3) of the nearest face; of equally near ones the first."""
+        """Normals (n, 3) of the faces nearest to ``points`` (n, 3) m; of equals the first."""
         face = self._to_faces(points).argmin(axis=1)
         return _axis_vectors(face % 3, np.where(face < 3, -1.0, 1.0))
 

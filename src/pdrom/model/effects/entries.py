@@ -13,7 +13,7 @@ from pdrom.model.mesh.types import Mesh
 
 
 def effect_config(entry: Any, index: int) -> EffectConfig:
-    """Typed configuration of one entry of ``effects``; ValueError names what is wrong."""
+    """Typed configuration of ``entry``, number ``index`` of ``effects``; ValueError for a fault."""
     if isinstance(entry, EffectConfig):
         return entry
     if not isinstance(entry, dict) or not isinstance(entry.get("effect"), str):
@@ -39,7 +39,7 @@ EffectConfigs = Annotated[tuple[SerializeAsAny[EffectConfig], ...], BeforeValida
 
 
 def bind(config: EffectConfig, scene: str, mesh: Mesh, masses: np.ndarray) -> Effect:
-    """The effect on a mesh with vertex ``masses`` (N,) kg; SceneError names scene and effect."""
+    """Effect ``config`` on a mesh of ``masses`` (N,) kg; SceneError names ``scene`` and effect."""
     try:
         return EFFECTS.load(config.effect)(config, mesh, masses)
     except SceneError as error:

@@ -24,7 +24,13 @@ class Floor(Contact):
         height: Length = 0.0
 
         def body(self, low: np.ndarray, high: np.ndarray) -> Mesh:
-            return square(np.array([0.0, self.height, 0.0]), np.array([0.0, 1.0, 0.0]), low, high)
+            return square(
+                np.array([0.0, self.height, 0.0]), np.array([0.0, 1.0, 0.0]), low, high=high
+            )
+
+    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
+        super().__init__(config, mesh, masses)
+        self.height = config.height
 
     def correct(self, positions: np.ndarray, before: np.ndarray) -> None:
         np.maximum(positions[:, 1], self.config.height, out=positions[:, 1])

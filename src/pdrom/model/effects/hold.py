@@ -42,8 +42,11 @@ class Hold(Boundary):
     def held(self, frame: int) -> np.ndarray:
         return self.vertices
 
+    def takes_hold(self, frame: int) -> bool:
+        return frame == self.config.start
+
     def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
-        if self._anchor is None or frame == self.config.start:
+        if self._anchor is None or self.takes_hold(frame):
             self._anchor = current.copy()
         return self._moved(self._anchor, frame)
 
@@ -94,6 +97,12 @@ class Translate(Hold):
 
     moves = True
     by_offsets = True
+
+    def path(self, frames: range, current: np.ndarray) -> np.ndarray:
+        first = self.targets(frames.start, current)
+        done = np.array([self.config.progress(frame) for frame in frames])
+        anchor = first if self._anchor is None else self._anchor
+        return anchor + done[:, None, None] * np.array(self.config.offset)
 
     def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
         return anchor + self.config.progress(frame) * np.array(self.config.offset)

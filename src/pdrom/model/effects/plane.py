@@ -27,7 +27,7 @@ class Plane(Obstacle):
             return require_direction(self)
 
         def body(self, low: np.ndarray, high: np.ndarray) -> Mesh:
-            return square(np.array(self.point), np.array(self.normal), low, high)
+            return square(np.array(self.point), np.array(self.normal), low, high=high)
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)

@@ -62,9 +62,13 @@ class Poke(Boundary):
         turn = frame // (self.config.over + self.config.rest)
         return self._order[turn : turn + 1]
 
+    def takes_hold(self, frame: int) -> bool:
+        turn, phase = divmod(frame, self.config.over + self.config.rest)
+        return turn != self._turn or phase == 0
+
     def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
         turn, phase = divmod(frame, self.config.over + self.config.rest)
-        if self._anchor is None or turn != self._turn or phase == 0:
+        if self._anchor is None or self.takes_hold(frame):
             self._turn, self._anchor = turn, current.copy()
         progress = (phase + 1) / self.config.over
         target = self._anchor.copy()

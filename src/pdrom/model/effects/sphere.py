@@ -34,7 +34,7 @@ class Sphere(Obstacle):
         return self.config.radius - np.linalg.norm(points - self._centre, axis=1)
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Normals (n, 3), at the centre itself upwards."""
+        """Normals (n, 3) at ``points`` (n, 3) m, at the centre itself upwards."""
         arm = points - self._centre
         length = np.linalg.norm(arm, axis=1)[:, None]
         return np.where(length > 0.0, arm / np.where(length > 0.0, length, 1.0), UP)

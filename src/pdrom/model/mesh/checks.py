@@ -28,7 +28,7 @@ def check_mesh(mesh: Mesh, name: str) -> Mesh:
     if len(cells) == 0:
         raise MeshError(f"{name}: no triangles and no tetrahedra")
     require_finite(f"{name}: points", mesh.points, MeshError)
-    check_indices(cells, mesh.vertices, kind, name)
+    check_indices(cells, mesh.vertices, kind, name=name)
     _check_neighbours(cells, kind, name)
     _check_vertices(mesh, cells, name)
     _check_measures(mesh, cells, kind, name)
@@ -36,7 +36,13 @@ def check_mesh(mesh: Mesh, name: str) -> Mesh:
 
 
 def check_indices(cells: np.ndarray, vertices: int, kind: str, name: str) -> None:
-    """MeshError for an index out of range, DegenerateElementError for one given twice."""
+    """MeshError for an index out of range, DegenerateElementError for one given twice.
+
+    Parameters
+    ----------
+    cells : (E, corners), with ``vertices`` the number of vertices
+    kind, name : of the cells and of the mesh, for messages
+    """
     outside = np.flatnonzero(((cells < 0) | (cells >= vertices)).any(axis=1))
     if len(outside):
         raise MeshError(
@@ -55,6 +61,11 @@ def check_range(points: np.ndarray, scale: float, name: str) -> None:
     """MeshError for a vertex or an extent that is out of range when multiplied by ``scale``.
 
     Beyond the range squares of lengths overflow, or lose every digit.
+
+    Parameters
+    ----------
+    points : (N, 3) m
+    name : of the mesh, for messages
     """
     limit = MAX_LENGTH / scale
     outside = np.flatnonzero(~(np.abs(points) <= limit).all(axis=1))

@@ -56,8 +56,10 @@ class ClothMesh(MeshModel):
         return self.model_copy(update=sizes)
 
     def build(self, root: Path) -> Mesh:
-        """Generate the mesh."""
-        return cloth(self.rows, self.columns, self.plane, self.extent, self.lift, self.wave)
+        """Generate the mesh; nothing is read below ``root``."""
+        return cloth(
+            self.rows, self.columns, self.plane, extent=self.extent, lift=self.lift, wave=self.wave
+        )
 
     @property
     def label(self) -> str:
@@ -86,8 +88,8 @@ class BarMesh(MeshModel):
         return self.model_copy(update=sizes)
 
     def build(self, root: Path) -> Mesh:
-        """Generate the mesh."""
-        return bar(self.nx, self.ny, self.nz, self.extent, self.lift)
+        """Generate the mesh; nothing is read below ``root``."""
+        return bar(self.nx, self.ny, self.nz, extent=self.extent, lift=self.lift)
 
     @property
     def label(self) -> str:
@@ -113,11 +115,11 @@ class MeshFile(MeshModel):
         return value
 
     def coarsened(self, factor: float) -> Self:
-        """A mesh file has one resolution."""
+        """The mesh itself, whatever ``factor``: a mesh file has one resolution."""
         return self
 
     def build(self, root: Path) -> Mesh:
-        """Read the mesh; triangles that face the other way than their neighbours are turned over.
+        """Read the mesh file below ``root``, all triangles turned the same way round.
 
         Raises
         ------
@@ -149,7 +151,7 @@ class MeshFile(MeshModel):
         return [self.path]
 
     def file(self, root: Path) -> Path:
-        """The mesh file; MeshError if a link leads out of the project's folder."""
+        """The mesh file below ``root``; MeshError if a link leads out of the project's folder."""
         path = root / self.path
         try:
             inside = path.resolve().is_relative_to(root.resolve())

@@ -55,7 +55,7 @@ ADVICE = f"{VARIABLE}=2 in the environment doubles the limits"
 
 
 def read_mesh_file(path: Path) -> Mesh:
-    """Read triangles or tetrahedra from a file of one of `FORMATS`.
+    """Read triangles or tetrahedra from the file ``path`` of one of `FORMATS`.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def read_mesh_file(path: Path) -> Mesh:
         raise MeshError(f"{path}: cannot be read ({error.strerror})") from error
     points, cells = _arrays(path, digest, limits)
     kind = "triangle" if cells.shape[1] == 3 else "tetrahedron"
-    check_indices(cells, len(points), kind, str(path))
+    check_indices(cells, len(points), kind, name=str(path))
     if kind == "triangle":
         return Mesh(points.copy(), cells.astype(np.int32))
     # formats differ in how they number the corners

@@ -64,6 +64,10 @@ def bar(
     Vertex (i, j, k) has index ``(i * ny + j) * nz + k``. Neighbouring cells mirror each other so
     that their face diagonals meet; ``exchanged`` gives each cell the pattern of its neighbours.
     Centred, longest side ``extent`` metres, lifted along y.
+
+    Parameters
+    ----------
+    lift : m along y
     """
     counts = np.array([nx, ny, nz])
     spacing = extent / (counts.max() - 1)
@@ -92,7 +96,7 @@ def _bar_tetrahedra(nx: int, ny: int, nz: int, parity: int) -> np.ndarray:
 
 
 def orient(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
-    """The tetrahedra (E, 4) int32, two corners swapped where the signed volume is negative."""
+    """``tetrahedra`` (E, 4) of ``points`` (N, 3) m, turned to a positive volume; int32."""
     a, b, c, d = (points[tetrahedra[:, i]] for i in range(4))
     negative = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0.0
     oriented = tetrahedra.astype(np.int32)
@@ -101,7 +105,7 @@ def orient(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
 
 
 def boundary(tetrahedra: np.ndarray) -> np.ndarray:
-    """Faces (T, 3) int32 that belong to one tetrahedron only, oriented outwards."""
+    """Faces (T, 3) int32 that belong to one of ``tetrahedra`` (E, 4), oriented outwards."""
     faces = tetrahedra[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
     ordered = np.sort(faces, axis=1).astype(np.int64)
     size = int(faces.max()) + 1

@@ -36,11 +36,11 @@ class GivenMesh(MeshModel):
         return cls(kind="given", blake2b=digest.hexdigest())
 
     def coarsened(self, factor: float) -> Self:
-        """Given arrays have one resolution."""
+        """The arrays themselves, whatever ``factor``: they have one resolution."""
         return self
 
     def build(self, root: Path) -> Mesh:
-        """MeshError: there are no arrays in a configuration."""
+        """MeshError, whatever ``root``: there are no arrays in a configuration."""
         raise MeshError("mesh.kind = 'given': its arrays come from Python (pdrom.api.build_scene)")
 
     @property
@@ -55,6 +55,10 @@ def given_mesh(points: Any, cells: Any, name: str) -> Mesh:
     Triangles that face the other way than their neighbours, and corners of tetrahedra, are put
     into order. What else a mesh has to satisfy is checked when a scene is built.
 
+    Parameters
+    ----------
+    cells : (T, 3) or (E, 4), counted from 0
+
     Raises
     ------
     MeshError
@@ -66,10 +70,10 @@ def given_mesh(points: Any, cells: Any, name: str) -> Mesh:
         raise MeshError(f"{name}: {len(points)} points and {len(cells)} cells, both are required")
     check_range(points, 1.0, name)
     if cells.shape[1] == 4:
-        check_indices(cells, len(points), "tetrahedron", name)
+        check_indices(cells, len(points), "tetrahedron", name=name)
         tetrahedra = orient(points, cells)
         return Mesh(points, boundary(tetrahedra), tetrahedra)
-    check_indices(cells, len(points), "triangle", name)
+    check_indices(cells, len(points), "triangle", name=name)
     turned = turned_alike(cells, name)
     triangles = np.where(turned[:, None], cells[:, ::-1], cells)
     return Mesh(points, triangles.astype(np.int32))

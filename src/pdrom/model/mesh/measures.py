@@ -6,14 +6,14 @@ from pdrom.model.mesh.types import Mesh
 
 
 def barycentric_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """A third of the area of the adjacent triangles, (N,) m^2."""
+    """A third of the area of the adjacent ``triangles`` (T, 3) at ``points`` (N, 3) m, (N,) m^2."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     return np.bincount(triangles.ravel(), np.repeat(area / 3.0, 3), minlength=len(points))
 
 
 def barycentric_volumes(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
-    """A quarter of the volume of the adjacent tetrahedra, (N,) m^3."""
+    """A quarter of the volume of the adjacent ``tetrahedra`` at ``points`` (N, 3) m, (N,) m^3."""
     corner = points[tetrahedra]
     volume = np.abs(np.linalg.det(corner[:, 1:] - corner[:, :1])) / 6.0
     return np.bincount(tetrahedra.ravel(), np.repeat(volume / 4.0, 4), minlength=len(points))

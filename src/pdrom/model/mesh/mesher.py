@@ -63,6 +63,11 @@ def fill(points: np.ndarray, triangles: np.ndarray, edge: float) -> tuple[np.nda
     """Points (N, 3), those of the surface first, and tetrahedra (E, 4) inside a closed surface.
 
     The surface stays as it is. ``edge`` is the length about which edges inside have.
+
+    Parameters
+    ----------
+    points : (N, 3) m, of the surface
+    triangles : (T, 3), closed
     """
     from meshpy import tet
 

@@ -152,6 +152,10 @@ def farthest_points(points: np.ndarray, candidates: np.ndarray, count: int) -> n
     """``count`` of ``candidates`` by farthest-point sampling, starting nearest to the centre.
 
     Ties go to the smallest index, so that the order is deterministic.
+
+    Parameters
+    ----------
+    points : (N, 3) m
     """
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     chosen = [int(candidates[np.argmin(_distance(points[candidates], centre))])]

@@ -59,8 +59,8 @@ class DiscMesh(_Unstructured):
         return 1.4 * edges**2
 
     def build(self, root: Path) -> Mesh:
-        """Generate the mesh."""
-        return disc(self.edge, self.hole, self.plane, self.extent, self.lift)
+        """Generate the mesh; nothing is read below ``root``."""
+        return disc(self.edge, self.hole, self.plane, extent=self.extent, lift=self.lift)
 
     @property
     def label(self) -> str:
@@ -78,8 +78,8 @@ class ShellMesh(_Unstructured):
         return 5.5 * edges**2
 
     def build(self, root: Path) -> Mesh:
-        """Generate the mesh."""
-        return shell(self.shape, self.edge, self.extent, self.lift)
+        """Generate the mesh; nothing is read below ``root``."""
+        return shell(self.shape, self.edge, self.extent, lift=self.lift)
 
     @property
     def label(self) -> str:
@@ -97,8 +97,8 @@ class SolidMesh(_Unstructured):
         return 1.5 * edges**3
 
     def build(self, root: Path) -> Mesh:
-        """Generate the mesh."""
-        return solid(self.shape, self.edge, self.extent, self.lift)
+        """Generate the mesh; nothing is read below ``root``."""
+        return solid(self.shape, self.edge, self.extent, lift=self.lift)
 
     @property
     def label(self) -> str:

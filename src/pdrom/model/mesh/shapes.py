@@ -37,7 +37,7 @@ def disc(edge: float, hole: float, plane: Plane, extent: float, lift: float) -> 
     segments = [_loop(len(rims[0])), *(_loop(len(rim), len(rims[0])) for rim in rims[1:])]
     middle = np.zeros(2) if hole > 0.0 else None
     uv, triangles = triangulate(
-        np.concatenate(rims), np.concatenate(segments), middle, edge / extent
+        np.concatenate(rims), np.concatenate(segments), middle, edge=edge / extent
     )
     u, v = extent * uv.T
     points = np.column_stack((u, v, 0.0 * u) if plane == "xy" else (u, 0.0 * u, v))
@@ -46,13 +46,18 @@ def disc(edge: float, hole: float, plane: Plane, extent: float, lift: float) -> 
 
 
 def shell(shape: str, edge: float, extent: float, lift: float) -> Mesh:
-    """Closed surface called ``shape`` (a key of `SURFACES`), oriented outwards."""
+    """Closed surface ``shape`` (a key of `SURFACES`), oriented outwards.
+
+    Parameters
+    ----------
+    edge, extent, lift : length of edges, longest side, height above the ground, m
+    """
     points, triangles = SURFACES[shape](edge / extent)
     return Mesh(_placed(points, extent, lift), triangles)
 
 
 def solid(shape: str, edge: float, extent: float, lift: float) -> Mesh:
-    """Tetrahedra inside the closed surface called ``shape``."""
+    """Tetrahedra inside the closed surface ``shape``; ``edge``, ``extent``, ``lift`` as `shell`."""
     surface, triangles = SURFACES[shape](edge / extent)
     points, tetrahedra = fill(surface, triangles, edge / extent)
     tetrahedra = orient(points, tetrahedra)
@@ -85,9 +90,9 @@ def _deformed(shape: Map, edge: float) -> Surface:
     upper, lower = half(1), half(-1)
     rim = _on_circle(_spaced(lambda t: upper(_on_circle(t)), edge))
     n, segments = len(rim), _loop(len(rim))
-    top, above = triangulate(rim, segments, None, edge, upper)
+    top, above = triangulate(rim, segments, None, edge=edge, image=upper)
     turned = np.roll(rim, -TURNED, axis=0)
-    bottom, below = triangulate(turned, segments, None, edge, lower)
+    bottom, below = triangulate(turned, segments, None, edge=edge, image=lower)
     shared = (np.arange(n) + TURNED) % n
     number = np.concatenate([shared, len(top) + np.arange(len(bottom) - n)]).astype(np.int32)
     points = np.concatenate([upper(top), lower(bottom[n:])])
@@ -127,7 +132,7 @@ def _torus(edge: float) -> Surface:
         np.column_stack([0.0 * v, np.append(height, v[:0:-1])]),
     ]
     rim = np.round(np.concatenate(sides), 12)
-    uv, triangles = triangulate(rim, _loop(len(rim)), None, edge, image)
+    uv, triangles = triangulate(rim, _loop(len(rim)), None, edge=edge, image=image)
     # vertices of the right and the upper side are those opposite, all corners are the first one
     n, m = len(u), len(v)
     same = np.arange(len(uv))

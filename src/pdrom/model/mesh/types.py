@@ -46,7 +46,7 @@ class Mesh:
 
 
 def save_mesh(mesh: Mesh, path: str | os.PathLike[str], attributes: dict | None = None) -> None:
-    """Write a mesh to HDF5 (datasets points, triangles, tetrahedra)."""
+    """Write ``mesh`` to an HDF5 file (points, triangles, tetrahedra) with ``attributes``."""
     with write_hdf5(path) as file:
         store_mesh(mesh, file)
         file.attrs.update(attributes or {})
@@ -60,11 +60,11 @@ def store_mesh(mesh: Mesh, group: h5py.Group) -> None:
 
 
 def load_mesh(path: str | os.PathLike[str]) -> Mesh:
-    """Read a mesh written by `save_mesh`; StorageError if the file is damaged."""
+    """Read the file ``path`` by `save_mesh`; StorageError if it is damaged."""
     with open_hdf5(path) as file:
         return stored_mesh(file)
 
 
 def stored_mesh(group: h5py.Group) -> Mesh:
-    """The mesh that `store_mesh` wrote."""
+    """Mesh that `store_mesh` wrote into the HDF5 ``group``."""
     return Mesh(*(group[name][...] for name in _ARRAYS))

@@ -26,7 +26,7 @@ class CutError(UnreadableError):
 
 
 def only_kind(kinds: Iterable[str]) -> str:
-    """The one kind of cells of a mesh; `RefusedError` if there is none, or another."""
+    """The one kind of cells of a mesh among ``kinds``; `RefusedError` for none or another."""
     found = list(dict.fromkeys(kinds))
     if len(found) != 1 or found[0] not in CORNERS:
         raise RefusedError(
@@ -41,7 +41,7 @@ def kind_of_face(corners: int) -> str:
 
 
 def numbers(rows: list[bytes], columns: int, what: str) -> np.ndarray:
-    """The first ``columns`` numbers of every row, (rows, columns) float64."""
+    """First ``columns`` numbers of every row, (rows, columns) float64; ``what`` names a fault."""
     if not rows:
         return np.empty((0, columns))
     try:
@@ -51,7 +51,7 @@ def numbers(rows: list[bytes], columns: int, what: str) -> np.ndarray:
 
 
 def whole(array: np.ndarray, what: str) -> np.ndarray:
-    """The numbers as integers; `UnreadableError` for one that is none."""
+    """``array`` as integers; `UnreadableError`, which names ``what``, for one that is none."""
     if not (np.isfinite(array).all() and (np.abs(array) < 2**53).all()):
         raise UnreadableError(f"{what} that are no whole numbers")
     integers = array.astype(np.int64)
@@ -61,7 +61,7 @@ def whole(array: np.ndarray, what: str) -> np.ndarray:
 
 
 def check_last_number(content: bytes, vertices: int) -> None:
-    """`CutError` if a text ends in a number that may be the beginning of a longer one.
+    """`CutError` if the text ``content`` ends in what may be the beginning of a longer number.
 
     Only the end of the line distinguishes ``12`` from the first digits of ``123``. An index that
     could not be longer, as there are not so many ``vertices``, is taken.

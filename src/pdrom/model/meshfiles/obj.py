@@ -26,7 +26,7 @@ IGNORED = frozenset(
 
 
 def read(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Points (N, 3) and triangles (E, 3), counted from 0; the weight w of a vertex is for curves.
+    """Points (N, 3) and triangles (E, 3) of ``path``, from 0; weights w of vertices are for curves.
 
     Raises
     ------

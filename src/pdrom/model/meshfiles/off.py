@@ -24,7 +24,7 @@ _HEADER = re.compile(rb"(?:ST)?C?N?OFF\b")
 
 
 def read(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Points (N, 3) and triangles (E, 3); colours of vertices and faces are left out.
+    """Points (N, 3) and triangles (E, 3) of ``path``; colours are left out.
 
     Raises
     ------

@@ -36,7 +36,7 @@ class Element:
 
 
 def read(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Points (N, 3) and triangles (E, 3), whatever other properties and elements there are.
+    """Points (N, 3) and triangles (E, 3) of ``path``, whatever else there is.
 
     Raises
     ------

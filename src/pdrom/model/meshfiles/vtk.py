@@ -43,7 +43,8 @@ class _Cells:
 
 
 def read(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Points (N, 3) and triangles (E, 3) or tetrahedra (E, 4); polygons with three corners count.
+    """Points (N, 3), triangles (E, 3) or tetrahedra (E, 4) of ``path``; polygons may have 3
+    corners.
 
     Raises
     ------

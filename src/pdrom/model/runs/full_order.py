@@ -20,16 +20,23 @@ log = logging.getLogger(__name__)
 def simulate(
     scene: Scene, perturbation: np.ndarray | None = None, **stepper: Any
 ) -> Iterator[tuple[State, FrameReport]]:
-    """States and reports of all frames of a scene, one after the other."""
+    """States and reports of all frames of ``scene``, one after the other.
+
+    Parameters
+    ----------
+    perturbation : (N, 3) m, added to the first positions
+    """
     loop = scene.stepper(**stepper)
-    state = scene.initial_state(perturbation)
-    for frame in range(scene.config.frames):
-        state, report = loop.step(state, frame)
-        yield state, report
+    yield from loop.run(scene.initial_state(perturbation), range(scene.config.frames))
 
 
 def trajectory(scene: Scene, perturbation: np.ndarray | None = None, **stepper: Any) -> np.ndarray:
-    """Positions (F + 1, N, 3) of a run, the initial ones first."""
+    """Positions (F + 1, N, 3) m of a run of ``scene``, as `simulate`, the initial ones first.
+
+    Parameters
+    ----------
+    perturbation : (N, 3) m, added to the first positions
+    """
     positions = [scene.initial_state(perturbation).positions]
     positions += [state.positions for state, _ in simulate(scene, perturbation, **stepper)]
     return np.stack(positions)
@@ -51,6 +58,8 @@ def run(
         is not listed stores nothing.
     with_mesh : stores the mesh, too, for a file that is to be looked at alone
     on_frame : called after each frame with its number
+    path : HDF5 file that is written
+    solver : name of a sparse solver, see `pdrom.model.dynamics.solvers`
     """
     frames = scene.config.frames
     system = scene.system_with(solver)

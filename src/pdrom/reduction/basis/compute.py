@@ -29,6 +29,7 @@ def compute_basis(
     rows_per_element : p
     signs : flips the modes at random before "mean-in-modes" adds the mean to them; there the span
         depends on these arbitrary signs
+    spec : weighting, centring and layout
 
     Raises
     ------

@@ -62,7 +62,7 @@ _ATTRIBUTES = ("rank", "roundoff", "rows_per_element", "separate_axes", "active_
 
 
 def save_basis(basis: Basis, path: str | os.PathLike[str]) -> None:
-    """Write a basis to HDF5."""
+    """Write ``basis`` to the HDF5 file ``path``."""
     with write_hdf5(path) as file:
         for name in _ARRAYS:
             file[name] = getattr(basis, name)
@@ -71,7 +71,7 @@ def save_basis(basis: Basis, path: str | os.PathLike[str]) -> None:
 
 
 def load_basis(path: str | os.PathLike[str]) -> Basis:
-    """Read what `save_basis` wrote; StorageError if the file is damaged."""
+    """Read the file ``path`` by `save_basis`; StorageError if it is damaged."""
     with open_hdf5(path) as file:
         return Basis(
             **{name: file[name][...] for name in _ARRAYS},

@@ -10,7 +10,7 @@ class Alarm(ABC):
 
     @abstractmethod
     def raised(self, state: State, report: FrameReport) -> tuple[str, str] | None:
-        """(group, reason) if the frame gives an alarm; "all" if it may be any group.
+        """(group, reason) if the frame to ``state`` with its ``report`` triggers; "all" if any.
 
         Called once a frame; the frame may be repeated with full projections after it.
         """

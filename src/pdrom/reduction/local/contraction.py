@@ -49,6 +49,7 @@ class Tangent:
         ----------
         matrix : (N, N) A
         held : vertices held in the frame, ascending
+        group : the reduced group
         """
         free = np.setdiff1d(np.arange(len(matrix)), held)
         inverse = np.zeros_like(matrix)
@@ -64,7 +65,7 @@ class Tangent:
 def iteration_numbers(
     group: ConstraintGroup, reduction: Reduction, tangents: Sequence[Tangent]
 ) -> tuple[float, float]:
-    """Contraction number and spectral radius, the largest over some states.
+    """Contraction number and spectral radius of ``group`` reduced, largest over ``tangents``.
 
     inf where the reduction does not exist. Clipped coefficients (``bounds`` of the method) are
     taken as free: clipping does not enlarge differences.

@@ -1,5 +1,5 @@
 """The alarm that the estimated error of a run is too large: its distance to an auxiliary
-model, the companion."""
+model, the auxiliary model."""
 
 import numpy as np
 
@@ -11,15 +11,16 @@ from pdrom.reduction.subspace.model import SubspaceModel
 
 
 class EstimateAlarm(Alarm):
-    """Runs a companion beside a run, a frame for each of its frames.
+    """Runs an auxiliary model beside a run, a frame for each of its frames.
 
     An alarm is given where the estimate over the frames so far exceeds ``threshold``, and where the
-    companion itself blew up, so that nothing vouches for the run any more.
+    auxiliary model itself blew up, so that nothing vouches for the run any more.
 
     Parameters
     ----------
     scene : of the run
     group : the reduced group
+    companion : auxiliary model of the scene
     motion : of the training run, see `RunningEstimate`
     """
 

@@ -36,7 +36,12 @@ class Trained:
 
     @classmethod
     def on(cls, reference: np.ndarray, companion: SubspaceModel | None = None) -> "Trained":
-        """Take them from the training run's positions ``reference``, (F + 1, N, 3) m."""
+        """Take them from the training run's positions ``reference``, (F + 1, N, 3) m.
+
+        Parameters
+        ----------
+        companion : auxiliary model that estimates the error
+        """
         return cls(largest_extent(reference), mean_motion(reference), companion)
 
 
@@ -72,9 +77,9 @@ def guarded(
     full = scene.stepper(system, track_objective=False)
     if settings.alarm == "estimate":
         if trained.companion is None:
-            raise ConfigurationError("guard.alarm = 'estimate': a companion is required")
+            raise ConfigurationError("guard.alarm = 'estimate': an auxiliary model is required")
         estimate = EstimateAlarm(
-            scene, group, trained.companion, trained.motion, settings.threshold
+            scene, group, trained.companion, motion=trained.motion, threshold=settings.threshold
         )
         reduced = loop(ReducedLocalStep(chosen, reduction))
         guard = Guard(settings.action, estimate, reduced, full)
@@ -101,8 +106,11 @@ def guarded_rerun(
     ----------
     reference, blowup_extent : see `pdrom.reduction.local.rerun.rerun`
     settings, trained : see `guarded`
+    system : factored system of the scene's global step
     """
-    advance, record = guarded(scene, system, group, reduction, settings, trained)
+    advance, record = guarded(
+        scene, system, group, reduction=reduction, settings=settings, trained=trained
+    )
     start, frames, unit = scene.initial_state(), scene.config.frames, scene.mesh.extent
     run = BoundedRun(advance, start, frames, blowup_extent, unit)
     return compare(run, reference, lambda: record.stopped), record

@@ -49,7 +49,7 @@ class Lift:
     coefficients : (sets, r) those of the last evaluation
     axes, own_sets : (c,) axis that a column adds to, set whose coefficients it takes
     lifted : (c, N, r) S^T W V
-    offset : (4 N,) S^T W mean, rows of four
+    offset : (4 N,) S^T W mean, padded vectors
     seconds : (2,) time of the two parts of the lift so far
     """
 

@@ -15,9 +15,9 @@ from pdrom.reduction.sampling.reduction import Block, Reduction
 class ReducedLocalStep:
     """Evaluates sampled elements of a group and lifts their coefficients to the right-hand side.
 
-    Precomputed: the offset S^T W mean (N, 3), the lift S^T W V for each coefficient block, and the
-    solution operators. Online: the projections of the sampled elements, a small dense product for
-    c, and the dense lift, shared by the group's threads.
+    Precomputed: the offset S^T W mean (N, 3), the reconstruction S^T W V for each coefficient
+    block, and the solution operators. Online: the projections of the sampled elements, a small
+    dense product for c, and the dense reconstruction, shared by the group's threads.
 
     Attributes
     ----------
@@ -25,6 +25,7 @@ class ReducedLocalStep:
     """
 
     def __init__(self, group: ConstraintGroup, reduction: Reduction) -> None:
+        """Precompute what ``reduction`` of ``group`` needs online."""
         self.name = group.name
         self._group = group
         self._elements = np.ascontiguousarray(reduction.elements, dtype=np.int64)
@@ -42,8 +43,13 @@ class ReducedLocalStep:
         """Threads of the group."""
         return self._group.threads
 
+    @property
+    def frame_lagged(self) -> bool:
+        """Whether ``begin_frame`` freezes anything."""
+        return self._group.frame_lagged
+
     def begin_frame(self, q: np.ndarray) -> None:
-        """Freeze frame-lagged data of the sampled elements only."""
+        """Freeze frame-lagged data of the sampled elements at positions ``q`` (N, 3) m."""
         self._group.begin_frame(q, None if self._everything else self._elements)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
@@ -55,11 +61,11 @@ class ReducedLocalStep:
         return float("nan")
 
     def sample(self, y: np.ndarray) -> np.ndarray:
-        """Projections of the sampled elements, as one vector."""
+        """Projections of the sampled elements at ``y`` (N, 3) m, as one vector."""
         return self._group.project_elements(y, self._elements).ravel()
 
     def solve(self, sampled: np.ndarray) -> None:
-        """Set the coefficients from what `sample` gives; the systems are inverted."""
+        """Set the coefficients from ``sampled`` (`sample`); the systems are inverted already."""
         data = self._lift
         coefficients(
             sampled, data.starts, data.positions, data.packed, data.operators, data.shifts,
@@ -86,7 +92,7 @@ class ReducedLocalStep:
 
     @property
     def lift_seconds(self) -> float:
-        """Time of the lift so far; two threads do its parts at once."""
+        """Time of the reconstruction so far; two threads do its parts at once."""
         seconds = self._lift.seconds
         return float(seconds.max() if self.threads == 2 else seconds.sum())
 

@@ -22,6 +22,7 @@ def reach(
     ----------
     largest : (e,) bounds of | p_e |_F, see `pdrom.experiments.kit.boundedness.largest_projections`
     compliance : (N, N) K^+, m/N
+    group, reduction : constraint group and its reduction
     """
     mean = np.linalg.norm(reduction.basis.mean.reshape(group.elements, -1), axis=1)
     radii = np.repeat(largest + mean, 3 * group.rows_per_element)
@@ -38,7 +39,7 @@ def reach(
 
 
 def lifted_modes(group: ConstraintGroup, reduction: Reduction) -> list[np.ndarray]:
-    """S^T W V of each coefficient block as fields (N, 3, r)."""
+    """S^T W V of each coefficient block of ``group``'s ``reduction`` as fields (N, 3, r)."""
     lift = group.S.T.multiply(group.row_weights[None, :]).tocsr()
     fields = []
     for block in reduction.blocks:

@@ -12,7 +12,7 @@ from pdrom.reduction.rerun import Rerun, compare
 
 
 def replace_group(scene: Scene, group: str, replacement: LocalStep) -> list[LocalStep]:
-    """Local steps of the scene with the one of ``group`` replaced."""
+    """Local steps of the scene with the one of ``group`` replaced by ``replacement``."""
     scene.group(group)
     return [replacement if g.name == group else g for g in scene.groups]
 
@@ -32,6 +32,8 @@ def rerun(
     reference : (F + 1, N, 3) positions of the full-order run
     blowup_extent : the run ends when the extent exceeds this multiple of the rest extent
     offset : (N, 3) m, added to the first positions
+    system : factored system of the scene's global step
+    local_steps : those that take the place of the scene's own
     """
     loop = scene.stepper(system, local_steps, track_objective=False)
     start, frames, unit = scene.initial_state(offset), scene.config.frames, scene.mesh.extent

@@ -52,7 +52,7 @@ class TrainedRange(Alarm):
         return (group, "objective") if self._rises(report.objective) else None
 
     def accept(self, state: State) -> None:
-        """Every frame is looked at for itself."""
+        """Do nothing with ``state``: every frame is looked at for itself."""
 
     @property
     def estimate(self) -> None:
@@ -73,5 +73,5 @@ def _extent(q: np.ndarray) -> float:
 
 
 def largest_extent(positions: np.ndarray) -> float:
-    """Longest side of the bounding box over a run (F + 1, N, 3), m."""
+    """Longest side of the bounding box over ``positions`` (F + 1, N, 3) of a run, m."""
     return float(np.ptp(positions, axis=1).max())

@@ -23,6 +23,7 @@ class WatchedLocalStep(ReducedLocalStep, WatchedStep):
     """
 
     def __init__(self, group: ConstraintGroup, reduction: Reduction, iterations: int) -> None:
+        """Watch a ``reduction`` of ``group`` in a frame of so many ``iterations``."""
         super().__init__(group, reduction)
         self._iterations = iterations
         self._boxes = [_Box(*_trained(reduction, b.axis)) for b in reduction.blocks]
@@ -49,7 +50,7 @@ class WatchedLocalStep(ReducedLocalStep, WatchedStep):
         super().begin_frame(q)
 
     def look(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """`accumulate` in a watched iteration; the energy is that of the reduced projections."""
+        """Do a watched `accumulate` of ``y``, ``rhs`` (N, 3); its energy is a reduced one."""
         before = rhs.copy()
         self.accumulate(y, rhs)
         for box, own in zip(self._boxes, self.coefficients, strict=True):

@@ -121,7 +121,7 @@ class _Growing:
 
     def _growth(self, elements: np.ndarray, products: np.ndarray) -> np.ndarray:
         blocks, products = self._blocks[elements], products[elements]
-        return eigenvalue_growth(blocks, products, self._weakest, self._gap)
+        return eigenvalue_growth(blocks, products, self._weakest, gap=self._gap)
 
 
 def eigenvalue_growth(

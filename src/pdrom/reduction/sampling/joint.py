@@ -20,6 +20,10 @@ def joint_rows(
     may be useless for one axis. The published code does not exclude rows that it has already
     (``repeat``); otherwise there are fewer than r rows if the basis has no more. ``factors``
     (rows,) take the place of `tie_weights`.
+
+    Parameters
+    ----------
+    active : which of the three axes move
     """
     rows, r = len(v) // 3, v.shape[1]
     axes = [(np.asfortranarray(v[a::3]), GrowingFit(r)) for a in np.flatnonzero(active)]

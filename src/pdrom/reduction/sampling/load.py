@@ -15,15 +15,15 @@ from pdrom.reduction.sampling.types import Sampling
 def load_reduction(
     basis: Basis, sampling: str | os.PathLike[str], method: MethodSpec, r: int
 ) -> Reduction:
-    """The stored reduction of size r; StorageError if the file does not hold it."""
+    """Reduction of size r by ``method``, ``basis`` and the file ``sampling``, or StorageError."""
     with open_hdf5(sampling) as file:
         store = file[f"r{r:04d}"]
         stored = Sampling(store["entries"][...], store["elements"][...])
-    return Reduction(basis, stored, method, r)
+    return Reduction(basis, stored, method, r=r)
 
 
 def basis_of(sampling: File, method: MethodSpec, bases: Sequence[File]) -> File:
-    """The basis of a file of samples among ``bases``; StorageError if it is not there."""
+    """Basis among ``bases`` that ``method`` needs for the file ``sampling``; else StorageError."""
     wanted = {"scene": sampling["scene"], "group": sampling["group"], "basis": method.basis_id}
     for basis in bases:
         if basis.labels == wanted:

@@ -47,6 +47,7 @@ class Reduction:
     """
 
     def __init__(self, basis: Basis, sampling: Sampling, spec: MethodSpec, r: int) -> None:
+        """Take r modes of ``basis``, the entries of ``sampling``, and solve as ``spec`` says."""
         self.basis, self.sampling, self.spec, self.r = basis, sampling, spec, r
         self.v = basis.truncated(r)
         axes = [int(a) for a in np.flatnonzero(basis.active_axes)] if spec.per_axis else [None]
@@ -59,7 +60,7 @@ class Reduction:
         return self.sampling.elements
 
     def limited(self, coefficients: np.ndarray) -> np.ndarray:
-        """Coefficients (..., r) in the range of the training snapshots, if the method limits them.
+        """``coefficients`` (..., r) in the range of the training, if the method limits them.
 
         Each one is clipped: for orthonormal modes the nearest admissible point to V c. It brings c
         nearer to every admissible c*, so that it cannot hurt where the true ones are in range;
@@ -112,7 +113,7 @@ class Reduction:
         return len(np.unique(self.sampling.entries // 3))
 
     def reconstruct(self, snapshots: np.ndarray) -> np.ndarray:
-        """Reduced version of full projections (n, e p, 3), same shape; nan if it does not exist."""
+        """Reduced version of ``snapshots`` (n, e p, 3), same shape; nan if it does not exist."""
         matrix = snapshots.reshape(len(snapshots), -1)
         result = np.tile(self.basis.mean, (len(matrix), 1))
         for block in self.blocks:

@@ -48,6 +48,11 @@ def extend(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np.nda
 
     Ends with all e elements if there are fewer. Raises SamplingError if the modes depend on each
     other at the elements to start with.
+
+    Parameters
+    ----------
+    v : (rows, r) basis
+    size : rows of a block
     """
     count = min(count, len(v) // size)
     if count <= len(elements):
@@ -66,7 +71,7 @@ class SOpt(Selection):
         return {r: path[:r] for r in ranks}
 
     def extend(self, v: np.ndarray, size: int, chosen: np.ndarray, count: int) -> np.ndarray:
-        return extend(v, size, chosen, count)
+        return extend(v, size, chosen, count=count)
 
 
 class _Sampled:

@@ -19,7 +19,7 @@ def select(basis: Basis, spec: MethodSpec, r: int) -> Sampling:
 
 
 def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[int, Sampling]:
-    """Samplings for several r; greedy selections are nested and made once for the largest.
+    """Samplings of ``basis`` by ``spec`` for several ``ranks``, nested where they are greedy.
 
     Raises
     ------
@@ -36,8 +36,9 @@ def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[in
         )
         return dict.fromkeys(ranks, everything)
     if spec.rows == "joint":
-        path = 3 * joint_rows(v, basis.active_axes, spec.repeat_rows)
-        return {r: _of_entries(path[:r], basis, spec) for r in ranks}
+        path = joint_rows(v, basis.active_axes, spec.repeat_rows)
+        rows = {r: _extended(v[:, :r], 3, path[:r], spec, r) for r in ranks}
+        return {r: _of_entries(3 * own, basis, spec) for r, own in rows.items()}
     if spec.rows == "element":
         counts = (basis.rows_per_element, basis.elements)
         chosen = _sampled_blocks(v, 3 * basis.rows_per_element, spec, ranks)
@@ -56,12 +57,19 @@ def _sampled_blocks(
     selection: Selection = SELECTIONS.load(spec.selection)()
     chosen = {}
     for r, start in selection.one_a_mode(v, size, ranks).items():
-        if spec.oversampling > 1:
-            start = selection.extend(v[:, :r], size, start, spec.oversampling * r)
+        start = _extended(v[:, :r], size, start, spec, r)
         if spec.gain_bound is not None:
-            start = bound_gain(v[:, :r], size, start, spec.gain_bound)
+            start = bound_gain(v[:, :r], size, start, bound=spec.gain_bound)
         chosen[r] = start
     return chosen
+
+
+def _extended(v: np.ndarray, size: int, start: np.ndarray, spec: MethodSpec, r: int) -> np.ndarray:
+    """Blocks ``start`` and as many more as the method's oversampling of r modes asks for."""
+    if spec.oversampling == 1:
+        return start
+    selection: Selection = SELECTIONS.load(spec.selection)()
+    return selection.extend(v, size, start, min(spec.oversampling * r, len(v) // size))
 
 
 def _of_entries(entries: np.ndarray, basis: Basis, spec: MethodSpec) -> Sampling:

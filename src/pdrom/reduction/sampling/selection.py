@@ -25,5 +25,11 @@ class Selection(ABC):
         """
 
     def extend(self, v: np.ndarray, size: int, chosen: np.ndarray, count: int) -> np.ndarray:
-        """``chosen`` blocks followed by others, ``count`` in all: by GappyPOD+E."""
-        return oversample(v, size, chosen, count)
+        """``chosen`` blocks followed by others, ``count`` in all: by GappyPOD+E.
+
+        Parameters
+        ----------
+        v : (rows, r) basis
+        size : rows of a block
+        """
+        return oversample(v, size, chosen, count=count)

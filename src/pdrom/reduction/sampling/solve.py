@@ -7,7 +7,7 @@ from pdrom.reduction.method import Solve
 
 
 def solution_operator(a: np.ndarray, solve: Solve, tikhonov: float) -> np.ndarray:
-    """Matrix (r, m) that maps sampled values b to coefficients c.
+    """Matrix (r, m) that maps values b sampled by ``a`` (m, r) to coefficients c, by ``solve``.
 
     square : A^-1; nan where A is singular to working precision or not square: the interpolation
         does not exist, a run with it ends in its first frame
@@ -40,7 +40,7 @@ def _singular(diagonal: np.ndarray) -> bool:
 
 
 def norm_and_condition(a: np.ndarray, operator: np.ndarray) -> tuple[float, float]:
-    """2-norm of the solution operator (the gain) and condition number of A; inf if singular."""
+    """2-norm of ``operator`` (the gain) and condition number of ``a`` (m, r); inf if singular."""
     if not np.isfinite(operator).all():
         return np.inf, np.inf
     sigma = linalg.svdvals(a, check_finite=False)

@@ -23,7 +23,14 @@ class Sampling:
     def of_entries(
         cls, entries: np.ndarray, rows_per_element: int, elements: int, repeats: bool = False
     ) -> "Sampling":
-        """Sampling of entries; SamplingError for one out of range or, unless allowed, repeated."""
+        """Sampling of entries; SamplingError for one out of range or, unless allowed, repeated.
+
+        Parameters
+        ----------
+        entries : (m,) indices of a vectorised projection of all ``elements``
+        rows_per_element : p
+        repeats : whether an entry may come twice
+        """
         entries = np.asarray(entries, dtype=np.int64)
         size = 3 * rows_per_element
         if len(entries) == 0 or entries.min() < 0 or entries.max() >= size * elements:
@@ -38,7 +45,7 @@ class Sampling:
 
     @classmethod
     def of_elements(cls, elements: np.ndarray, rows_per_element: int, total: int) -> "Sampling":
-        """Sampling of all 3p entries of whole elements."""
+        """Sampling of all 3p entries of ``elements`` (m,) of ``total``, p ``rows_per_element``."""
         elements = np.asarray(elements, dtype=np.int64)
         size = 3 * rows_per_element
         entries = (size * elements[:, None] + np.arange(size)).ravel()

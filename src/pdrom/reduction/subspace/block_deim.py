@@ -38,7 +38,7 @@ class TrainedBasis:
 
 
 def train_basis(group: ConstraintGroup, states: States, spec: InterpolationSpec) -> TrainedBasis:
-    """Basis of what ``spec`` interpolates, at ``states``; SnapshotError if there are none."""
+    """Basis of what ``spec`` interpolates for ``group``, at ``states``; SnapshotError for none."""
     snapshots = training_snapshots(group, states, spec.interpolates == "residual")
     mean = snapshots.mean(axis=0) * (spec.centring == "affine")
     V, sigma = pod((snapshots - mean).T)
@@ -50,6 +50,10 @@ def block_deim(
     group: ConstraintGroup, columns: Columns, basis: TrainedBasis, spec: InterpolationSpec
 ) -> Interpolation:
     """Interpolation of a group's projections with the first ``spec.modes`` modes of ``basis``.
+
+    Parameters
+    ----------
+    columns : position subspace
 
     Raises
     ------
@@ -78,7 +82,7 @@ def block_deim(
 
 
 def training_snapshots(group: ConstraintGroup, states: States, residual: bool) -> np.ndarray:
-    """Projections p, or p - S y, at every state: (n, 3 e p)."""
+    """Projections p of ``group``, or p - S y (``residual``), at all ``states``: (n, 3 e p)."""
     if len(states) == 0:
         raise SnapshotError(f"block-deim: group '{group.name}': no training states")
     rows = []
@@ -90,13 +94,19 @@ def training_snapshots(group: ConstraintGroup, states: States, residual: bool) -
 
 
 def select_elements(V: np.ndarray, size: int, spec: InterpolationSpec) -> np.ndarray:
-    """Greedy elements, one per mode, then others up to the oversampling and to the gain bound."""
+    """Greedy elements, one a mode, then others up to the oversampling and the gain of ``spec``.
+
+    Parameters
+    ----------
+    V : (3 e p, r) basis
+    size : 3 p, entries of an element
+    """
     elements = oversample(V, size, block_elements(V, size), spec.oversampling * V.shape[1])
     return elements if spec.gain is None else bound_gain(V, size, elements, spec.gain)
 
 
 def check_gain(group: str, gain: float, elements: int, spec: InterpolationSpec) -> None:
-    """A-posteriori check; SamplingError names what was found and what is allowed."""
+    """Check ``gain`` of so many ``elements`` of ``group`` against ``spec``; SamplingError above."""
     limit = np.inf if spec.refuse_above is None else spec.refuse_above
     if not np.isfinite(gain) or gain > limit:
         raise SamplingError(

@@ -44,7 +44,7 @@ class Columns:
 
 
 def affine_columns(points: np.ndarray) -> np.ndarray:
-    """1, x, y, z of the rest shape, (N, 4)."""
+    """1, x, y, z of the rest shape ``points`` (N, 3) m, (N, 4)."""
     return np.column_stack([np.ones(len(points)), points])
 
 
@@ -55,6 +55,11 @@ def displacement_modes(
 
     Each axis of each frame of ``trajectory`` (n, N, 3) is one snapshot, so that x, y and z share
     the modes (Monem et al. 2023). Fewer are returned where the data hold fewer.
+
+    Parameters
+    ----------
+    points : (N, 3) m, rest shape
+    masses : (N,) kg
     """
     displacements = (trajectory - points).transpose(1, 0, 2).reshape(len(points), -1)
     weight = np.sqrt(masses)[:, None]
@@ -79,6 +84,11 @@ def build_columns(
 
     An atom gets its affine columns and, where its vertices move otherwise in ``trajectory``
     (n, N, 3), POD modes of that motion down to `OWN_MOTION` of it.
+
+    Parameters
+    ----------
+    points : (N, 3) m, rest shape
+    masses : (N,) kg
     """
     n = len(points)
     held = np.zeros(n, dtype=bool)

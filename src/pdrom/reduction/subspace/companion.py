@@ -1,12 +1,12 @@
 """A companion: an auxiliary, finer model that runs beside reduced runs and estimates their errors.
 
-The distance of a run to the companion stands for its distance to the full order (a hierarchical
-estimate, Bank and Weiser 1985). If the companion's own error is at most theta < 1 times that of the
-run, saturation, then by the triangle inequality the estimate lies between 1 - theta and 1 + theta
-times the error. The companion has the run's own scene and its forces, contacts and handles, the
-snapshot modes and as many skinning modes, which a motion that the training did not hold needs, and
-sampled elements of its own. It does not depend on the run: one companion serves all runs of a
-motion, and none of them needs the full order.
+The distance of a run to the auxiliary model stands for its distance to the full order (a
+hierarchical estimate, Bank and Weiser 1985). If the auxiliary model's own error is at most theta <
+1 times that of the run, saturation, then by the triangle inequality the estimate lies between 1 -
+theta and 1 + theta times the error. The auxiliary model has the run's own scene and its forces,
+contacts and handles, the snapshot modes and as many skinning modes, which a motion that the
+training did not hold needs, and sampled elements of its own. It does not depend on the run: one
+auxiliary model serves all runs of a motion, and none of them needs the full order.
 """
 
 from collections.abc import Iterator
@@ -32,11 +32,12 @@ class CompanionSpec(ConfigModel):
 def companion_model(
     scene: Scene, training: np.ndarray, frames: np.ndarray, spec: CompanionSpec
 ) -> SubspaceModel:
-    """Companion of all runs of a scene.
+    """Auxiliary model of all runs of a scene.
 
     Parameters
     ----------
     training : (n, N, 3) m, full-order positions after the training ``frames`` (n,), ascending
+    spec : modes, tolerance of the sampling, number of frames
     """
     kind = "pod+skinning"
     columns = make_columns(scene, training, kind, spec.modes)
@@ -46,7 +47,7 @@ def companion_model(
 
 
 def companion_frames(scene: Scene, model: SubspaceModel) -> Iterator[np.ndarray]:
-    """Positions (N, 3) m of the companion, the initial ones first, each computed when needed.
+    """Positions (N, 3) m of the auxiliary model in ``scene``, initial ones first, when needed.
 
     They end with the run, or before the first frame that is not finite.
     """
@@ -59,14 +60,14 @@ def companion_frames(scene: Scene, model: SubspaceModel) -> Iterator[np.ndarray]
 
 
 def companion_run(scene: Scene, model: SubspaceModel) -> np.ndarray:
-    """`companion_frames` of the whole run, (F' + 1, N, 3) m."""
+    """`companion_frames` of the whole run of ``scene`` with ``model``, (F' + 1, N, 3) m."""
     return np.stack(list(companion_frames(scene, model)))
 
 
 def estimate(positions: np.ndarray, companion: np.ndarray, end: int) -> float | None:
     """Estimated relative error of a run over its frames before ``end``.
 
-    || Q - Q' ||_F / || Q' - Q'_0 ||_F with the companion Q'; None where it does not move, or
+    || Q - Q' ||_F / || Q' - Q'_0 ||_F with the auxiliary model Q'; None where it does not move, or
     neither has a frame.
 
     Parameters
@@ -103,11 +104,11 @@ class RunningEstimate:
         return self._ratio(self._squares, self._frames) if self._frames else None
 
     def after(self, positions: np.ndarray, companion: np.ndarray) -> float:
-        """Estimate after one more frame, whose ends are (N, 3) m each."""
+        """Estimate after one more frame that ends at ``positions`` and ``companion`` (N, 3) m."""
         return self._ratio(self._squares + _square(positions, companion), self._frames + 1)
 
     def add(self, positions: np.ndarray, companion: np.ndarray) -> None:
-        """Take in one more frame."""
+        """Take in one more frame that ends at ``positions`` and ``companion`` (N, 3) m."""
         self._squares += _square(positions, companion)
         self._frames += 1
 
@@ -128,6 +129,7 @@ def largest_estimate(
     Parameters
     ----------
     positions, companion : (F + 1, N, 3) m, the initial ones first
+    motion : root mean square displacement of the training run, m
     """
     running, largest = RunningEstimate(motion), None
     for own, other in zip(positions[1 : end + 1], companion[1:], strict=False):

@@ -1,4 +1,4 @@
-"""All iterations of a frame in one compiled loop over the sampled elements.
+"""Frames in one compiled loop over the sampled elements.
 
 In the free coordinates z of a position subspace one iteration is
 
@@ -7,7 +7,8 @@ In the free coordinates z of a position subspace one iteration is
     z = c + L^T p        global solve, with c = A^-1 (M/h^2 s - load) and L = W D A^-1
 
 D and L are (m p, K'): two small dense products and the projections, nothing else, no allocation,
-and no array that grows with the mesh.
+and no array that grows with the mesh. Without contacts and frame-lagged groups c is one product, of
+s with its held coordinates at their targets, and a call does many frames.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,12 +16,15 @@ from time import perf_counter
 from typing import TypeGuard
 
 import numpy as np
-from numba import njit
 
+from pdrom.model.compiled.clock import clock, now
+from pdrom.model.compiled.functions import compiled
 from pdrom.model.constraints.gradient_kernel import call
 from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.space import Solve
 from pdrom.model.dynamics.stepper import LocalStep, Stepper
+from pdrom.model.dynamics.whole_frames import BLOCK, Blocks
+from pdrom.reduction.subspace.dense import blocks, product, read, vectors, write
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
 from pdrom.reduction.subspace.space import DenseElimination, ReducedSpace
 
@@ -42,10 +46,11 @@ class FusedStepper(Stepper):
         acceleration: Anderson | None = None,
     ) -> None:
         super().__init__(space, time_step, iterations, local_steps, False, acceleration)
-        self._sampled = None
+        self._fused: _Fused | None = None
         if acceleration is None and _fusible(local_steps):
-            self._sampled = _Sampled(local_steps)
-        self._operators: dict[int, _Operators] = {}
+            self._fused = _Fused(space, _Sampled(local_steps))
+            if not space.has_contacts and not any(s.group.frame_lagged for s in local_steps):
+                self._whole = self._fused
 
     def _iterate(
         self,
@@ -56,15 +61,10 @@ class FusedStepper(Stepper):
         on_last_iterate: Callable[[np.ndarray], None] | None,
     ) -> tuple[np.ndarray, np.ndarray]:
         watched = on_last_iterate is not None
-        if self._sampled is None or watched or not isinstance(elimination, DenseElimination):
+        if self._fused is None or watched or not isinstance(elimination, DenseElimination):
             return super()._iterate(s, base, elimination, seconds, on_last_iterate)
         before = perf_counter()
-        # eliminations live as long as their space
-        key = id(elimination)
-        if key not in self._operators:
-            self._operators[key] = _Operators(self._sampled, elimination)
-        self._sampled.refresh()
-        y = self._operators[key].iterate(self._sampled, s, base, self.iterations)
+        y = self._fused.iterate(elimination, s, base, self.iterations)
         seconds[1] += perf_counter() - before
         return y, np.empty(0)
 
@@ -76,6 +76,56 @@ def _fusible(steps: Sequence[LocalStep]) -> TypeGuard[Sequence[SubspaceLocalStep
     )
 
 
+class _Fused:
+    """Iterations and frames in a space, with the operators of every set of held coordinates."""
+
+    def __init__(self, space: ReducedSpace, sampled: "_Sampled") -> None:
+        self._space, self._sampled = space, sampled
+        self._operators: dict[int, _Operators] = {}
+        self._clock = clock()
+
+    def _of(self, elimination: DenseElimination) -> "_Operators":
+        # eliminations live as long as their space
+        key = id(elimination)
+        if key not in self._operators:
+            inertia = self._space.inertia_matrix
+            self._operators[key] = _Operators(self._sampled, elimination, inertia)
+        return self._operators[key]
+
+    def iterate(
+        self, elimination: DenseElimination, s: np.ndarray, base: np.ndarray, iterations: int
+    ) -> np.ndarray:
+        """Coordinates (K, 3) after the iterations of a frame that starts at s."""
+        own, sampled, free = self._of(elimination), self._sampled, elimination.free
+        sampled.refresh()
+        targets = vectors(len(elimination.fixed))
+        write(elimination.targets, targets)
+        product(own.coupling, own.rows, len(elimination.fixed), own.nothing, targets, own.offset)
+        write(elimination.solved(base), own.constant)
+        write(s[free], own.z)
+        _iterations(iterations, len(free), own.rows, own.iterated, sampled.arrays)
+        y = s.copy()
+        y[free] = read(own.z, len(free))
+        return y
+
+    def run(
+        self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
+    ) -> Blocks:
+        """As many of ``frames`` as one call can do, see `WholeFrames.run`; nothing is tracked."""
+        fixed, targets = self._space.held_path(frames[:BLOCK], q)
+        elimination = self._space.elimination(fixed)
+        own, count = self._of(elimination), len(targets)
+        positions, velocities = np.empty((2, count + 1, *q.shape))
+        positions[0], velocities[0] = q, v
+        seconds = np.zeros((count, 4))
+        _frames(
+            positions, velocities, *self._space.affine, h, elimination.fixed, elimination.free,
+            targets, own.begun, iterations, own.rows, own.iterated, self._sampled.arrays, seconds,
+            self._clock,
+        )  # fmt: skip
+        return positions[1:], velocities[1:], np.empty((count, 0)), seconds
+
+
 class _Sampled:
     """Sampled elements of all groups, one after the other."""
 
@@ -85,83 +135,111 @@ class _Sampled:
         self.strain = np.vstack([step.strain for step in steps])
         self.row_weights = np.concatenate([group.row_weights for group in groups])
         rows = [group.elements * group.rows_per_element for group in groups]
-        self.addresses = np.array([group.gradient_kernel.address for group in groups])
-        self.elements = np.array([group.elements for group in groups])
-        self.starts = np.concatenate([[0], np.cumsum(rows)])
         parts = [group.kernel_parameters().ravel() for group in groups]
-        self.parameter_starts = np.concatenate([[0], np.cumsum([len(part) for part in parts])])
-        self.parameters = np.concatenate(parts)
+        self._starts = np.concatenate([[0], np.cumsum([len(part) for part in parts])])
+        self._parameters = np.concatenate(parts)
         self._lagged = [i for i, group in enumerate(groups) if group.frame_lagged]
-        self.gradients = np.empty((len(self.strain), 3))
-        self.projections = np.empty((len(self.strain), 3))
+        self.arrays = (
+            np.array([group.gradient_kernel.address for group in groups]),
+            np.array([group.elements for group in groups]),
+            np.concatenate([[0], np.cumsum(rows)]),
+            self._parameters,
+            self._starts,
+            vectors(len(self.strain)),
+            vectors(len(self.strain)),
+        )
+        """Addresses, elements, first rows, parameters and their starts, S q, projections."""
 
     def refresh(self) -> None:
         """Take over what the groups froze at the beginning of the frame."""
         for i in self._lagged:
-            start, stop = self.parameter_starts[i : i + 2]
-            self.parameters[start:stop] = self._groups[i].kernel_parameters().ravel()
+            start, stop = self._starts[i : i + 2]
+            self._parameters[start:stop] = self._groups[i].kernel_parameters().ravel()
 
 
 class _Operators:
-    """D, L and the coupling to the held coordinates, for one set of those."""
+    """Matrices of an iteration for one set of held coordinates, and its vectors.
 
-    def __init__(self, sampled: _Sampled, elimination: DenseElimination) -> None:
-        self._elimination = elimination
-        strain, free = sampled.strain, elimination.free
-        self._strain = np.ascontiguousarray(strain[:, free])
-        self._coupling = np.ascontiguousarray(strain[:, elimination.fixed])
-        self._lift = np.ascontiguousarray(elimination.lift(sampled.row_weights[:, None] * strain))
-        self._offset = np.zeros((len(strain), 3))
-        self._z = np.empty((3, len(free)))
+    iterated : D, L^T, d_0, c and z
+    begun : product that gives c from s, coupling to the held coordinates, working vectors
+    """
 
-    def iterate(
-        self, sampled: _Sampled, s: np.ndarray, base: np.ndarray, iterations: int
-    ) -> np.ndarray:
-        """Coordinates (K, 3) after the iterations of a frame that starts at s."""
-        elimination = self._elimination
-        if len(elimination.fixed):
-            np.matmul(self._coupling, elimination.targets, out=self._offset)
-        constant = np.ascontiguousarray(elimination.solved(base).T)
-        self._z[...] = s[elimination.free].T
-        _iterations(
-            iterations, self._strain, self._lift, self._offset, constant, self._z,
-            sampled.addresses, sampled.elements, sampled.starts, sampled.parameters,
-            sampled.parameter_starts, sampled.gradients, sampled.projections,
+    def __init__(
+        self, sampled: _Sampled, elimination: DenseElimination, inertia: np.ndarray
+    ) -> None:
+        strain, free, fixed = sampled.strain, elimination.free, elimination.fixed
+        self.rows = len(strain)
+        lift = elimination.lift(sampled.row_weights[:, None] * strain)
+        self.offset, self.constant, self.z = (vectors(n) for n in (self.rows, *[len(free)] * 2))
+        self.nothing = vectors(max(len(inertia), self.rows))
+        self.coupling = blocks(strain[:, fixed])
+        self.iterated = (
+            blocks(strain[:, free]), blocks(lift.T), self.offset, self.constant, self.z
         )  # fmt: skip
-        y = s.copy()
-        y[elimination.free] = self._z.T
-        return y
+        response = blocks(elimination.response(inertia))
+        self.begun = (
+            response, self.coupling, self.nothing, vectors(len(inertia)), vectors(len(fixed))
+        )  # fmt: skip
 
 
-# sums may be reordered, which vectorises the dot products; nan and inf keep their meaning
-@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
-def _iterations(
-    count, strain, lift, offset, constant, z,
-    addresses, elements, starts, parameters, parameter_starts, d, p,
-):  # fmt: skip
-    rows, size = strain.shape
+@compiled(nogil=True)
+def _iterations(count, size, rows, operators, sampled):
+    strain, lift, offset, constant, z = operators
+    addresses, elements, starts, parameters, parameter_starts, d, p = sampled
     for _ in range(count):
-        for row in range(rows):
-            dx, dy, dz = offset[row, 0], offset[row, 1], offset[row, 2]
-            for k in range(size):
-                value = strain[row, k]
-                dx += value * z[0, k]
-                dy += value * z[1, k]
-                dz += value * z[2, k]
-            d[row, 0], d[row, 1], d[row, 2] = dx, dy, dz
+        product(strain, rows, size, offset, z, d)
         for g in range(len(addresses)):
             call(
                 addresses[g],
-                d[starts[g] :].ctypes.data,
+                d[3 * starts[g] :].ctypes.data,
                 parameters[parameter_starts[g] :].ctypes.data,
-                p[starts[g] :].ctypes.data,
+                p[3 * starts[g] :].ctypes.data,
                 elements[g],
             )
-        z[...] = constant
-        for row in range(rows):
-            px, py, pz = p[row, 0], p[row, 1], p[row, 2]
-            for k in range(size):
-                value = lift[row, k]
-                z[0, k] += value * px
-                z[1, k] += value * py
-                z[2, k] += value * pz
+        product(lift, size, rows, constant, p, z)
+
+
+@compiled(nogil=True)
+def _predict(z, v, acceleration, rate, rates, h, s):
+    """Write s = z + h v + h^2 (a + c v + C v)."""
+    for i in range(len(z)):
+        for axis in range(3):
+            total = acceleration[i, axis] + rate * v[i, axis]
+            for k in range(len(rates)):
+                total += rates[i, k] * v[k, axis]
+            s[3 * i + axis] = z[i, axis] + h * v[i, axis] + h**2 * total
+
+
+@compiled(nogil=True)
+def _frames(
+    positions, velocities, acceleration, rate, rates, h, fixed, free, targets, begun, iterations,
+    rows, operators, sampled, seconds, watch,
+):  # fmt: skip
+    response, coupling, nothing, s, held = begun
+    _, _, offset, constant, z = operators
+    for f in range(len(targets)):
+        began = now(watch)
+        before, after, speeds = positions[f], positions[f + 1], velocities[f + 1]
+        _predict(before, velocities[f], acceleration, rate, rates, h, s)
+        for i in range(len(fixed)):
+            for axis in range(3):
+                s[3 * fixed[i] + axis] = held[3 * i + axis] = targets[f, i, axis]
+        product(response, len(free), len(before), nothing, s, constant)
+        # those that rest have done it in the first frame
+        if f == 0 or (targets[f] != targets[f - 1]).any():
+            product(coupling, rows, len(fixed), nothing, held, offset)
+        for i in range(len(free)):
+            for axis in range(3):
+                z[3 * i + axis] = s[3 * free[i] + axis]
+        between = now(watch)
+        _iterations(iterations, len(free), rows, operators, sampled)
+        ended = now(watch)
+        for i in range(len(free)):
+            for axis in range(3):
+                s[3 * free[i] + axis] = z[3 * i + axis]
+        for i in range(len(before)):
+            for axis in range(3):
+                after[i, axis] = s[3 * i + axis]
+                speeds[i, axis] = (after[i, axis] - before[i, axis]) / h
+        seconds[f, 0], seconds[f, 1] = between - began, ended - between
+        seconds[f, 3] = now(watch) - ended

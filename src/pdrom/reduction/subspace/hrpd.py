@@ -27,7 +27,7 @@ SINGULAR = 1e8
 
 
 def hrpd(group: ConstraintGroup, columns: Columns, sampled: "SampledSpace | None") -> Interpolation:
-    """Interpolation of the projections from a sampled space, for the subspace ``columns``."""
+    """Interpolation of ``group`` from a sampled space, for the subspace ``columns``."""
     strain, stiffness = reduced_strain(group, columns)
     if sampled is None:
         return Interpolation.of_constant(stiffness, np.zeros((len(stiffness), 3)))
@@ -62,7 +62,11 @@ class SampledSpace:
 def sampled_space(
     group: ConstraintGroup, points: np.ndarray, spec: HrpdSpec
 ) -> SampledSpace | None:
-    """Space and samples of ``spec``; None where the rest vectors, and so all columns, are noise.
+    """Space and samples of ``group`` by ``spec``; None where all columns are noise.
+
+    Parameters
+    ----------
+    points : (N, 3) m, rest shape
 
     Raises
     ------
@@ -92,6 +96,7 @@ def projection_space(
     rest : (e p, 3) rest vectors S q_rest
     centres : (e, 3)
     weights : (e p,) diagonal of W
+    dimension : d
     """
     root = np.sqrt(weights)[:, None]
     active = rest[:, np.linalg.norm(rest, axis=0) > DEPENDENT * np.linalg.norm(rest)]
@@ -110,7 +115,7 @@ def projection_space(
 
 
 def element_centres(group: ConstraintGroup, points: np.ndarray) -> np.ndarray:
-    """Mean position (e, 3) of the vertices that each element touches."""
+    """Mean position (e, 3) m over ``points`` (N, 3) m of the vertices that each element touches."""
     touched = sparse.csr_array((group.S != 0).astype(np.float64))
     by_element = sum(
         touched[row :: group.rows_per_element] for row in range(group.rows_per_element)

@@ -21,7 +21,14 @@ from pdrom.reduction.subspace.specs import InterpolationSpec
 def interpolate(
     scene: Scene, columns: Columns, training: "Training", spec: InterpolationSpec
 ) -> dict[str, Interpolation]:
-    """Interpolation of every group of the scene; errors as `block_deim`."""
+    """Interpolation of every group of the scene; errors as `block_deim`.
+
+    Parameters
+    ----------
+    columns : position subspace
+    training : states that train it
+    spec : modes, states, oversampling, bounds
+    """
     made = {g.name: block_deim(g, columns, training.basis(g, spec), spec) for g in scene.groups}
     if spec.safeguard is None:
         return made
@@ -63,7 +70,7 @@ class Training:
         return self._bases[key]
 
     def control(self, tolerance: float) -> dict[str, Samples]:
-        """Energy-conserving samples of every group for the safeguard."""
+        """Energy-conserving samples of every group at ``tolerance`` tau for the safeguard."""
         if tolerance not in self._controls:
             frames = training_frames(self._scene.config.frames, len(self._training))
             found = sample_elements(self._scene, self._columns, frames, [tolerance], self._start)

@@ -48,13 +48,19 @@ class Interpolation:
 
     @classmethod
     def of_constant(cls, stiffness: np.ndarray, offset: np.ndarray) -> "Interpolation":
-        """For projections that are constant (e.g. zero) up to round-off: no element is needed."""
+        """Interpolation of projections that are constant up to round-off: it samples no element.
+
+        Parameters
+        ----------
+        stiffness : (K, K) B^T S^T W S B
+        offset : (K, 3) B^T S^T W p
+        """
         none = np.empty(0, dtype=np.int64)
         empty = np.empty((len(stiffness), 0))
         return cls(none, np.empty((0, 0)), empty, offset, stiffness, gain=1.0)
 
     def save(self, store) -> None:
-        """Write into an HDF5 group."""
+        """Write into the HDF5 group ``store``."""
         store.attrs["gain"], store.attrs["residual"] = self.gain, self.residual
         for name in _ARRAYS:
             if getattr(self, name) is not None:
@@ -62,7 +68,7 @@ class Interpolation:
 
     @classmethod
     def load(cls, store) -> "Interpolation":
-        """Read what `save` wrote."""
+        """Read what `save` wrote into the HDF5 group ``store``."""
         arrays = {name: store[name][...] for name in _ARRAYS if name in store}
         return cls(
             **arrays, gain=float(store.attrs["gain"]), residual=bool(store.attrs["residual"])
@@ -92,7 +98,7 @@ class InterpolatedLocalStep:
             self.group.begin_frame(self._rows @ q)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add the interpolated B^T S^T W p to ``rhs`` (K, 3); the energy is unknown: nan."""
+        """Add B^T S^T W p at ``y`` (K, 3) to ``rhs`` (K, 3); the energy is unknown: nan."""
         i = self._interpolation
         rhs += i.offset
         if len(self._elements) == 0:
@@ -109,7 +115,7 @@ class InterpolatedLocalStep:
 
 
 def reduced_strain(group: ConstraintGroup, columns: Columns) -> tuple[np.ndarray, np.ndarray]:
-    """S B (e p, K) and the stiffness B^T S^T W S B (K, K)."""
+    """S B (e p, K) and the stiffness B^T S^T W S B (K, K) of ``group`` in ``columns``."""
     strain = group.S @ columns.B
     return strain, strain.T @ (group.row_weights[:, None] * strain)
 

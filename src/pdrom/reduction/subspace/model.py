@@ -25,7 +25,7 @@ ECSW = "ecsw"
 
 
 def ecsw_name(tolerance: float) -> str:
-    """Name in tables of a model with energy-conserving samples."""
+    """Name in tables of a model with energy-conserving samples at tolerance tau, ``tolerance``."""
     return f"{ECSW}-{tolerance:.0e}"
 
 
@@ -46,7 +46,7 @@ class SubspaceModel:
     samples: Mapping[str, Samples | Interpolation] = field(default_factory=dict)
 
     def elements_evaluated(self, scene: Scene) -> int:
-        """Elements of all groups that a local step evaluates; those of a safeguard do not count."""
+        """Elements that a local step of ``scene`` evaluates; those of a safeguard do not count."""
         return sum(self._evaluated(group) for group in scene.groups)
 
     def _evaluated(self, group: ConstraintGroup) -> int:
@@ -54,7 +54,7 @@ class SubspaceModel:
         return group.elements if elements is None else len(elements)
 
     def loop(self, scene: Scene) -> tuple[Stepper, State]:
-        """Step loop in the coordinates of the subspace, and the initial state."""
+        """Step loop of ``scene`` in the coordinates of the subspace, and the initial state."""
         steps: list[SubspaceLocalStep | InterpolatedLocalStep] = []
         for group in scene.groups:
             chosen = self.samples.get(group.name, Samples())
@@ -85,7 +85,7 @@ class SubspaceModel:
         return ControlStepper(space, h, iterations, steps, track_objective=False)
 
     def positions(self, z: np.ndarray) -> np.ndarray:
-        """Vertex positions (N, 3) m of coordinates (K, 3)."""
+        """Vertex positions (N, 3) m of coordinates ``z`` (K, 3)."""
         return self.columns.B @ z
 
 
@@ -96,6 +96,7 @@ def make_columns(scene: Scene, training: np.ndarray, kind: str, k: int) -> Colum
     ----------
     training : (n, N, 3) positions of the training frames
     kind : "pod", "skinning", or "pod+skinning" with k modes of each
+    scene : its rest shape, masses and holds
     """
     points, masses = scene.mesh.points, scene.masses
     parts = []
@@ -120,6 +121,10 @@ def sample_elements(
     They are trained on iterates of the subspace with all projections, in some of the training
     ``frames`` of a run that begins at ``start`` (coordinates) or where the scene does, and meet the
     tolerances in ``norm`` (see module `training`).
+
+    Parameters
+    ----------
+    columns : position subspace
     """
     chosen = frames[np.unique(np.linspace(0, len(frames) - 1, FRAMES).round().astype(int))]
     training = training_run(scene, columns, chosen, start, norm)

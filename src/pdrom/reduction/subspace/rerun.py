@@ -14,7 +14,7 @@ from pdrom.reduction.subspace.safeguard import SafeguardedStepper
 def rerun_model(
     scene: Scene, model: SubspaceModel, reference: np.ndarray, blowup_extent: float = np.inf
 ) -> Rerun:
-    """Outcome of a run; a blow-up ends it and is recorded.
+    """Outcome of a run of ``scene`` with ``model``; a blow-up ends it and is recorded.
 
     Parameters
     ----------

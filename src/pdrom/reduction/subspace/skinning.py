@@ -8,7 +8,7 @@ from pdrom.reduction.subspace.columns import DEPENDENT, affine_columns, orthonor
 
 
 def skinning_weights(points: np.ndarray, handles: int) -> np.ndarray:
-    """Weights (N, handles): smooth, in [0, 1], summing to 1 at every vertex.
+    """Weights (N, handles) at ``points`` (N, 3) m: smooth, in [0, 1], summing to 1 at every vertex.
 
     Handles are vertices by farthest-point sampling. Each has the compactly supported kernel
     (1 - d/R)^4 (4 d/R + 1) of Wendland with R three times the covering radius, so that every vertex
@@ -29,6 +29,11 @@ def skinning_modes(points: np.ndarray, masses: np.ndarray, k: int) -> np.ndarray
 
     The handles are as many as give k columns; of the last handle's columns those with the largest
     singular values are kept, so that bases of equal size can be compared.
+
+    Parameters
+    ----------
+    points : (N, 3) m
+    masses : (N,) kg
     """
     weight = np.sqrt(masses)[:, None]
     fields = affine_columns(points - points.mean(axis=0))

@@ -6,6 +6,8 @@ probe vertices.
 """
 
 from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy import linalg
@@ -14,7 +16,14 @@ from pdrom.core.errors import NotReducibleError, SolverError
 from pdrom.model.dynamics.space import Solve, Space
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.dynamics.system import require_accurate
-from pdrom.model.effects.base import Boundary, Contact, Effect, held_vertices
+from pdrom.model.effects.base import (
+    Boundary,
+    Contact,
+    Effect,
+    held_path,
+    held_targets,
+    held_vertices,
+)
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.columns import Columns
 
@@ -39,17 +48,26 @@ class DenseElimination:
         self._load = np.zeros((len(self.free), 3))
 
     def set_targets(self, targets: np.ndarray) -> None:
-        """Values (m, 3) of the fixed coordinates."""
+        """Set the values ``targets`` (m, 3) of the fixed coordinates."""
         self.targets = targets
         self._load = self._coupling @ targets
 
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
-        """Overwrite the free coordinates of ``y``."""
+        """Overwrite the free coordinates of ``y`` (K, 3) by the solution for ``rhs`` (K, 3)."""
         y[self.free] = self.solved(rhs)
 
     def solved(self, rhs: np.ndarray) -> np.ndarray:
         """Free coordinates that belong to ``rhs`` (K, 3)."""
         return self._inverse @ (rhs[self.free] - self._load)
+
+    def response(self, inertia: np.ndarray) -> np.ndarray:
+        """Free coordinates (K', K) to all of s, the fixed ones of which are at their targets.
+
+        This is the solve for ``inertia`` s, (K, K) M/h^2, with the load of the targets.
+        """
+        result = self._inverse @ inertia[self.free]
+        result[:, self.fixed] -= self._inverse @ self._coupling
+        return result
 
     def lift(self, rows: np.ndarray) -> np.ndarray:
         """Response (m, K') of the free coordinates to a unit force on each of ``rows`` (m, K)."""
@@ -67,6 +85,7 @@ class ReducedSpace(Space):
     ----------
     matrix : (K, K) system matrix A: inertia and stiffness
     inertia_matrix : (K, K) B^T M B / h^2
+    forces : constant coordinates (K, 3) and rate (number or (K, K)) of each force
     """
 
     def __init__(self, scene: Scene, columns: Columns, matrices: Sequence[np.ndarray]) -> None:
@@ -76,31 +95,52 @@ class ReducedSpace(Space):
         mass = columns.B.T @ (scene.masses[:, None] * columns.B)
         self.matrix = mass / h**2 + sum(matrices, np.zeros_like(mass))
         self.inertia_matrix = mass / h**2
-        self._forces = [_reduce_force(f, columns, mass, scene) for f in scene.forces]
-        self._boundaries = [_ReducedBoundary(b, columns) for b in scene.boundaries]
+        self.forces = [_reduce_force(f, columns, mass, scene) for f in scene.forces]
+        # they answer as boundaries do, of coordinates in place of vertices
+        self._boundaries: Any = [_ReducedBoundary(b, columns) for b in scene.boundaries]
         self._contacts = [_ReducedContact(c, columns, scene) for c in scene.contacts]
         self._cache: dict[bytes, DenseElimination] = {}
 
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
         total = np.zeros_like(positions)
-        for constant, rate in self._forces:
+        for constant, rate in self.forces:
             total += constant
             total += rate @ velocities if np.ndim(rate) else rate * velocities
         return total
 
-    def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        active = [b for b in self._boundaries if b.boundary.active(frame)]
-        if not active:
-            return np.empty(0, dtype=np.int64), np.empty((0, 3))
-        parts = [b.targets(frame, positions) for b in active]
-        indices, first = np.unique(np.concatenate([i for i, _ in parts]), return_index=True)
-        return indices, np.concatenate([t for _, t in parts])[first]
+    @cached_property
+    def affine(self) -> tuple[np.ndarray, float, np.ndarray]:
+        """Acceleration by all forces as constant (K, 3), rate and rates (K, K) or none, (0, 0)."""
+        constant, rate, rates = np.zeros((len(self.matrix), 3)), 0.0, np.zeros((0, 0))
+        for own, factor in self.forces:
+            constant += own
+            if np.ndim(factor) == 0:
+                rate += float(factor)
+            else:
+                rates = rates + factor if len(rates) else np.array(factor)
+        return constant, rate, rates
 
-    def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
+    @property
+    def has_contacts(self) -> bool:
+        """Whether coordinates are corrected at the end of a frame."""
+        return bool(self._contacts)
+
+    def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return held_targets(self._boundaries, frame, positions)
+
+    def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates that are held in the first ``frames``, and their values (n, m, 3)."""
+        return held_path(self._boundaries, frames, positions)
+
+    def elimination(self, fixed: np.ndarray) -> DenseElimination:
+        """The factored system without the ``fixed`` coordinates."""
         key = fixed.tobytes()
         if key not in self._cache:
             self._cache[key] = DenseElimination(self.matrix, fixed)
-        elimination = self._cache[key]
+        return self._cache[key]
+
+    def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
+        elimination = self.elimination(fixed)
         elimination.set_targets(targets)
         return elimination
 
@@ -126,7 +166,7 @@ def _require_reducible(effects: Sequence[Effect]) -> None:
 
 
 def coordinates(columns: Columns, masses: np.ndarray, field: np.ndarray) -> np.ndarray:
-    """Mass-orthogonal projection of a field (N, 3) on the subspace, (K, 3)."""
+    """Mass-orthogonal projection of ``field`` (N, 3) on the span of ``columns``, (K, 3)."""
     return _mass_solve(columns, masses, columns.B.T @ (masses[:, None] * field))
 
 
@@ -142,7 +182,7 @@ def _mass_solve(columns: Columns, masses: np.ndarray, rhs: np.ndarray) -> np.nda
 
 
 def reduced_state(scene: Scene, columns: Columns) -> State:
-    """Initial state of the scene in coordinates; the rest shape is in the space exactly."""
+    """Initial state of ``scene`` in coordinates of ``columns``; its rest shape is exact."""
     state = scene.initial_state()
     return State(
         coordinates(columns, scene.masses, state.positions),
@@ -178,16 +218,25 @@ class _ReducedBoundary:
 
     def __init__(self, boundary: Boundary, columns: Columns) -> None:
         self.boundary = boundary
+        self.active, self.takes_hold = boundary.active, boundary.takes_hold
         self._parts: dict[bytes, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
         self._columns = columns
 
-    def targets(self, frame: int, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def held(self, frame: int) -> np.ndarray:
+        """Coordinates of the atoms that are held in ``frame``, ascending."""
+        return self._of(frame)[0]
+
+    def path(self, frames: range, current: np.ndarray) -> np.ndarray:
+        """Values (n, m, 3) of these coordinates, which are ``current`` at first, see `Boundary`."""
+        _, rows, inverse = self._of(frames.start)
+        return inverse @ self.boundary.path(frames, rows @ current)
+
+    def _of(self, frame: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         vertices = self.boundary.held(frame)
         key = vertices.tobytes()
         if key not in self._parts:
             self._parts[key] = self._prepare(vertices)
-        indices, rows, inverse = self._parts[key]
-        return indices, inverse @ self.boundary.targets(frame, rows @ z[indices])
+        return self._parts[key]
 
     def _prepare(self, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         held = set(vertices.tolist())
@@ -201,13 +250,17 @@ class _ReducedBoundary:
         return indices, rows, np.linalg.pinv(rows)
 
 
+def probe_vertices(n: int) -> np.ndarray:
+    """Vertices of a mesh of n at which contacts are looked for, ascending."""
+    return np.unique(np.linspace(0, n - 1, min(PROBES, n)).round().astype(np.int64))
+
+
 class _ReducedContact:
     """A contact, looked for at probe vertices and, where one is hit, resolved at all vertices."""
 
     def __init__(self, contact: Contact, columns: Columns, scene: Scene) -> None:
         self._contact = contact
-        n = scene.mesh.vertices
-        self._vertices = np.unique(np.linspace(0, n - 1, min(PROBES, n)).round().astype(np.int64))
+        self._vertices = probe_vertices(scene.mesh.vertices)
         self._probes = np.ascontiguousarray(columns.B[self._vertices])
         self._columns = columns
         weighted = columns.B * scene.masses[:, None]

@@ -13,7 +13,7 @@ from pdrom.reduction.subspace.model import Samples, SubspaceModel
 
 
 def store_columns(store: h5py.Group, columns: Columns) -> None:
-    """Write the columns of a subspace."""
+    """Write the ``columns`` of a subspace into the HDF5 group ``store``."""
     store["B"], store["free"] = columns.B, columns.free
     store.attrs["modes"] = columns.modes
     for i, (atom, own) in enumerate(zip(columns.atoms, columns.atom_columns, strict=True)):
@@ -23,7 +23,7 @@ def store_columns(store: h5py.Group, columns: Columns) -> None:
 def store_model(
     store: h5py.Group, labels: dict[str, Any], samples: Mapping[str, Samples | Interpolation]
 ) -> None:
-    """Write the labels of a model and what it samples of each group."""
+    """Write a model's ``labels`` and ``samples`` of each group to the HDF5 group ``store``."""
     store.attrs.update(labels)
     for name, chosen in samples.items():
         if isinstance(chosen, Interpolation):
@@ -34,7 +34,7 @@ def store_model(
 
 
 def load_models(path: str | os.PathLike[str]) -> list[tuple[dict[str, object], SubspaceModel]]:
-    """Labels (method, position_basis, k) and model of everything in the file, in order."""
+    """Labels (method, position_basis, k) and models of the file ``path``, in order."""
     with open_hdf5(path) as file:
         columns = {base: _columns(store) for base, store in file["columns"].items()}
         models = []

@@ -58,6 +58,11 @@ def training_run(
 
     Only the training motion is run, and only ``frames`` of it are kept. It begins at ``start``, in
     coordinates (K, 3), or where the scene does.
+
+    Parameters
+    ----------
+    columns : position subspace
+    norm : in which the sampling's equations are measured
     """
     steps = [SubspaceLocalStep(group, columns) for group in scene.groups]
     space = ReducedSpace(scene, columns, [step.matrix for step in steps])

@@ -53,7 +53,7 @@ def accuracy_cost(results: Results, options: Options) -> Figure:
     figure = style.new_figure(sum(heights))
     parts = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
     ax = parts[0].subplots()
-    draw_panel(ax, found, first, results, LOWEST, size=4.2)
+    draw_panel(ax, found, first, results=results, low=LOWEST, size=4.2)
     label_iterations(ax, found, first)
     _draw_rates(ax)
     ax.set_title(f"{group_title(results, first)}: {style.words(first)}")
@@ -67,7 +67,7 @@ def accuracy_cost(results: Results, options: Options) -> Figure:
 
 def _draw_small(axes: np.ndarray, found: TradeOffs, scenes: list[str], results: Results) -> None:
     for ax, scene in zip(axes, scenes, strict=True):
-        draw_panel(ax, found, scene, results, LOWEST, size=2.4)
+        draw_panel(ax, found, scene, results=results, low=LOWEST, size=2.4)
         ax.set_title(f"{group_title(results, scene)}:\n{style.words(scene)}")
         ax.set_xlabel("time per frame (ms)")
     axes[0].set_ylabel("relative error")

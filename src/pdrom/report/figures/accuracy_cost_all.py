@@ -46,8 +46,8 @@ def accuracy_cost_all(results: Results, options: Options) -> Figure:
     upper, lower = figure.subfigures(2, 1, height_ratios=heights)
     axes = panels(upper, len(scenes), options.columns, sharey=True)
     for ax, scene in zip(axes, scenes, strict=True):
-        draw_panel(ax, found, scene, results, size=2.2)
+        draw_panel(ax, found, scene, results=results, size=2.2)
         ax.set_title(f"{group_title(results, scene)}:\n{style.words(scene)}", fontsize=7)
-    label_outer(axes, options.columns, "time per frame (ms)", "relative error")
+    label_outer(axes, options.columns, "time per frame (ms)", y="relative error")
     draw_legend(lower, blocks, LEGEND_COLUMNS)
     return figure

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.artifact.reads import TableOf
-from pdrom.experiments.alternatives.settings import CONVERGED, REDUCED
+from pdrom.experiments.alternatives.settings import ACCELERATED, CONVERGED, REDUCED
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.artists import Axes, Figure
 from pdrom.report.figures.kit.declaration import figure
@@ -34,6 +34,7 @@ LOOKS = {
     "vertex-descent": ("vertex block descent", style.SKY, "P"),
     "explicit": ("explicit (Verlet)", style.VERMILLION, "X"),
     REDUCED: ("POD subspace, ecsw", style.GREEN, "*"),
+    ACCELERATED: ("the same, accelerated", style.GREEN, "p"),
 }
 
 
@@ -44,7 +45,8 @@ LOOKS = {
         "of each pair the error against the implicit step of 16 ms solved to convergence, right "
         "the total error, against the motion in continuous time; the dashed line is the converged "
         "implicit step itself. Filled markers: one step a frame with more iterations; hollow ones: "
-        "the frame divided into substeps. The reduction (ecsw) was trained on another motion. "
+        "the frame divided into substeps. The reduction (ecsw) was trained on another motion, on "
+        "its frames as they are or converged. "
         "$\\times 100$: the same scene with stiffer weights. Errors outside are drawn on the rim."
     ),
     reads=(TableOf("alternatives"),),
@@ -61,7 +63,7 @@ def alternatives(results: Results, options: Scenes) -> Figure:
     axes = panels(figure, 2 * len(cases), 2 * beside, sharey=True)
     for (labels, case), *pair in zip(cases, axes[::2], axes[1::2], strict=True):
         _draw_case(pair, labels, case)
-    label_outer(axes, 2 * beside, "ms a frame", "relative error")
+    label_outer(axes, 2 * beside, "ms a frame", y="relative error")
     drawn = {label: look for m, (label, *look) in LOOKS.items() if (table.method == m).any()}
     style.legend(figure, style.handles(drawn, markersize=4), 4)
     return figure

@@ -33,10 +33,10 @@ def bending_runs(results: Results, options: ReducedRuns) -> Figure:
     def rows_of(
         results: Results, options: ReducedRuns, floors: Floors, scene: str, group: str
     ) -> list[Row]:
-        found = experiment_rows(results, options, floors, scene, group)
+        found = experiment_rows(results, options, floors, scene=scene, group=group)
         if found[0].note != NOTHING_RAN:
             return found
         own = noise[(noise.scene == scene) & (noise.group == group)]
-        return noise_rows(results, options, floors, scene, group, own) or found
+        return noise_rows(results, options, floors, scene=scene, group=group, table=own) or found
 
     return draw_experiments(results, options, rows_of)

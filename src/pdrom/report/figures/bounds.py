@@ -76,7 +76,7 @@ def _dots(ax: Axes, runs: pd.DataFrame, x: str, y: str, colour: str, marker: str
         return
     limits = {"bound": BOUNDS, "max_extent": EXTENTS, "contraction": NUMBERS, "error": ERRORS}
     across, along = runs[x].to_numpy(float), runs[y].to_numpy(float)
-    rim_arrows(ax, across, along, colour, limits[x], limits[y])
+    rim_arrows(ax, across, along, colour=colour, across=limits[x], along=limits[y])
     ax.plot(
         clipped(across, *limits[x]), clipped(along, *limits[y]),
         linestyle="none", color=colour, marker=marker, markersize=3.2, alpha=0.7,

@@ -24,7 +24,8 @@ class Options(Scenes, Methods, Columns):
     title="Break-even on finer meshes",
     caption=(
         "Smallest $r$ from which the reduced local step costs as much as the full one, over the "
-        "number of vertices, with the full step and the lift on one thread and on two. The first "
+        "number of vertices, with the full step and the reconstruction on one thread and on two. "
+        "The first "
         "mesh is the scene's own; its basis is that of the study, those of the finer ones come "
         "from the first frames of a run."
     ),
@@ -46,7 +47,7 @@ def break_even_sizes(results: Results, options: Options) -> Figure:
         ax.set_title(style.words(scene))
         ax.set_xlim(0.8 * points.vertices.min(), 1.25 * points.vertices.max())
     axes[0].set_ylim(bottom=0.0)
-    label_outer(axes, options.columns, "vertices", "break-even size r")
+    label_outer(axes, options.columns, "vertices", y="break-even size r")
     _legend(figure, results, styles)
     return figure
 

@@ -47,7 +47,7 @@ def claims_sensitivity(results: Results, options: Options) -> Figure:
             if (claim, kind) in counts.index
         }
         names = [f"{claim} {verdicts.get(claim, 'cannot be decided')}" for claim in claims]
-        draw_counts(ax, names, VARIED, cells)
+        draw_counts(ax, names, VARIED, cells=cells)
         ax.tick_params(axis="x", labelsize=6.5)
         ax.tick_params(axis="y", labelsize=6.5)
         ax.set_title(title)

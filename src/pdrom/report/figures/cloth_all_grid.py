@@ -63,7 +63,7 @@ def cloth_all_grid(results: Results, options: ReducedRuns) -> Figure:
         label, ran = f"{style.words(group)} reduced", any(runs)
         panels = [panel for run in runs for panel in run or _blank(len(frames))]
         rows.append((label, panels, None if ran else NOTHING_RAN))
-    windows = [shared_window(camera, q, [], 0.04) for q in full]
+    windows = [shared_window(camera, q, [], margin=0.04) for q in full]
     size = (max(w.width for w in windows), max(w.height for w in windows))
     windows = [fit_aspect(w.resized(*size)) for w in windows] * len(methods)
     ghosts = np.concatenate([full] * len(methods))
@@ -96,7 +96,7 @@ def _run(
         return None
     plain = style.surface_colour(style.GREY)
     panels = [
-        _coloured(run_panel(path, info, frame, plain, ""), q, mesh)
+        _coloured(run_panel(path, info, frame, colour=plain, title=""), q, mesh)
         for frame, q in zip(frames, full, strict=True)
     ]
     middle = len(panels) // 2

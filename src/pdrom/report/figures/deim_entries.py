@@ -72,7 +72,7 @@ def _elements(results: Results, scene: str, group: str) -> tuple[ElementMap, int
     with open_hdf5(path) as file:
         count, rows = int(file.attrs["elements"]), int(file.attrs["rows_per_element"])
     mesh = load_mesh(results.path(MESH, scene))
-    return element_map(group, mesh, count, str(path)), 3 * rows
+    return element_map(group, mesh, count, source=str(path)), 3 * rows
 
 
 def _at(samplings: list[SamplingView], ranks: tuple[int | str, ...]) -> SamplingView:
@@ -95,7 +95,7 @@ def axes_hit(entries: np.ndarray, per_element: int) -> dict[int, str]:
 
 def _draw_hits(ax: Axes, elements: ElementMap, hit: dict[int, str], camera: Camera) -> None:
     points = elements.mesh.points
-    draw_surface(ax, points, elements.surface, camera, NEUTRAL, wire=0.18)
+    draw_surface(ax, points, elements.surface, camera=camera, colour=NEUTRAL, wire=0.18)
     centres = camera.project(elements.centres(points))
     for axis, colour in (*style.AXES.items(), ("several", SEVERAL)):
         where = centres[[e for e, a in hit.items() if a == axis]]

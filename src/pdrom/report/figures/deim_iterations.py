@@ -61,7 +61,7 @@ def deim_iterations(results: Results, options: Options) -> Figure:
     rows = results.holdings.methods[method].rows
     steps = iterations(basis.V, samplings[-1].entries, basis.rows_per_element, rows, options.count)
     mesh = load_mesh(results.path(MESH, scene))
-    elements = element_map(group, mesh, basis.elements, str(path))
+    elements = element_map(group, mesh, basis.elements, source=str(path))
     title = f"{results.experiment_title(scene, group)}, {results.method_title(method)}"
     return _draw_steps(steps, elements, options.camera, options.columns, title)
 

@@ -30,7 +30,7 @@ class Options(Experiments, Methods):
         "not fail at the same size), over all scenes and sizes. Dashed: the error from which on a "
         "run counts as failed; dotted: the gain that separates failed runs from others with the "
         "fewest mistakes. Arrows on the rim lie outside the axes. Crosses: range and median over "
-        "runs, in some scenes, that are trained on as many frames drawn anew. Right: how many of "
+        "runs, in some scenes, that are trained on as many resampled frames. Right: how many of "
         "them failed, by decade of the gain."
     ),
     reads=(
@@ -68,7 +68,7 @@ def error_against_gain(results: Results, options: Options) -> Figure:
 
 def _draw_method(ax: Axes, runs: pd.DataFrame, colour: str, marker: str) -> None:
     x, y = runs.gain.to_numpy(float), runs.error.to_numpy(float)
-    rim_arrows(ax, x, y, colour, GAINS, ERRORS)
+    rim_arrows(ax, x, y, colour=colour, across=GAINS, along=ERRORS)
     ax.plot(
         clipped(x, *GAINS), clipped(y, *ERRORS), linestyle="none", color=colour, marker=marker,
         markersize=3.2, alpha=0.7, markeredgewidth=0.0, clip_on=False,

@@ -59,10 +59,13 @@ def iterations(results: Results, options: Options) -> Figure:
         low, high = ax.get_xlim()
         ax.set_xlim(0.5 * low, high)
         label_counts(
-            ax, plain[TIME], clipped(plain[ERROR].to_numpy(float), LOW, HIGH), plain.iterations
+            ax,
+            plain[TIME],
+            clipped(plain[ERROR].to_numpy(float), LOW, HIGH),
+            counts=plain.iterations,
         )
         ax.set_title(style.words(scene))
-    label_outer(axes, options.columns, "time per frame (ms)", "error against K \N{INFINITY}")
+    label_outer(axes, options.columns, "time per frame (ms)", y="error against K \N{INFINITY}")
     looks = {label: (colour, marker) for label, colour, marker in RUNS.values()}
     style.legend(figure, style.handles(looks), len(looks))
     return figure

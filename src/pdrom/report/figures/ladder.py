@@ -26,7 +26,7 @@ ERRORS, GAINS = (1e-4, 1e2), (1.0, 1e5)  # limits; what lies outside is drawn on
         "whole elements with oversampling; below it each row takes a single ingredient away from "
         "the sound method or exchanges it. Left the error of the rerun within the horizon, right "
         "the gain of the interpolation; what blew up or is singular lies on the right rim. Bars "
-        "show the range over runs that are trained on as many frames drawn anew, on some scenes; "
+        "show the range over runs that are trained on as many resampled frames, on some scenes; "
         "pale ones that over choices of the arbitrary signs of the singular vectors."
     ),
     reads=(TableOf("ladder"),),
@@ -41,10 +41,10 @@ def ladder(results: Results, options: Scenes) -> Figure:
     the right rim.
     """
     table = results.asked_rows("ladder", COLUMNS, options)
-    table = table[table.gain.notna()]
+    table = table[table.gain.notna() & (table.direction != "square")]
     if table.empty:
         raise NothingToDraw("no scene that climbs the ladder")
-    climbed = table[table.direction != "signs"]
+    climbed = table[table.direction.isin(["up", "down"])]
     rungs = list(dict.fromkeys(zip(climbed.direction, climbed.rung, strict=True)))
     scenes = list(dict.fromkeys(table.scene))
     figure = style.new_figure(0.26 * len(rungs) + 1.3)

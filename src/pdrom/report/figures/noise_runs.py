@@ -46,7 +46,7 @@ def noise_runs(results: Results, options: Scenes) -> Figure:
     figure = style.new_figure(0.25 * len(rows) + 1.0)
     ax = figure.subplots()
     labels = [f"{style.words(scene)}, {NOISY[axes]}" for scene, axes in rows]
-    draw_counts(ax, labels, [f"$r$ = {r}" for _, r in columns], cells)
+    draw_counts(ax, labels, [f"$r$ = {r}" for _, r in columns], cells=cells)
     methods = [method for method, _ in columns]
     for method in dict.fromkeys(methods):
         places = [x for x, other in enumerate(methods) if other == method]

@@ -46,7 +46,7 @@ def published_choices(results: Results, options: Scenes) -> Figure:
         _draw_case(ax, rows, own)
         ax.set_title(results.experiment_title(scene, group))
         handles |= {str(line.get_label()): line for line in ax.get_lines()}
-    label_outer(axes, PANELS, "basis size r", "relative error (x)")
+    label_outer(axes, PANELS, "basis size r", y="relative error (x)")
     style.legend(figure, list(handles.values()), 3)
     return figure
 

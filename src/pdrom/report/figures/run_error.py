@@ -35,7 +35,7 @@ class Options(Experiments, Methods, Ranks, Columns):
         "Relative error of reduced runs frame by frame. The shaded area is the sensitivity floor "
         "of the scene and the dotted line its horizon: errors to the right of it cannot be told "
         "from chaos. Bands in the colour of a method, in some scenes and up to the horizon, hold "
-        "the same runs trained on as many frames drawn anew."
+        "the same runs trained on as many resampled frames."
     ),
     reads=(Chosen(RERUNS), TableOf("repetitions"), Every(REPEATED_FRAMES), *FLOORS),
     options=Options,
@@ -66,7 +66,7 @@ def run_error(results: Results, options: Options) -> Figure:
             _draw_runs(ax, results.path(RERUNS, scene, group, method), runs, options.ranks, method)
         ax.set_title(results.experiment_title(scene, group))
         ax.set_xlim(0, None)
-    label_outer(axes, options.columns, "frame", "relative error")
+    label_outer(axes, options.columns, "frame", y="relative error")
     _legend(figure, results, methods, options.ranks, bool(bands))
     return figure
 
@@ -103,7 +103,7 @@ def _draw_floor(ax: Axes, floor: np.ndarray, end: int | None) -> None:
 def _ran(
     results: Results, scene: str, group: str, method: str, options: Options
 ) -> list[RerunInfo]:
-    """Reduced runs of the asked sizes; without those whose size exceeds the numerical rank."""
+    """Reduced runs of the requested sizes; without those whose size exceeds the numerical rank."""
     infos = choose_ranks(rerun_infos(results.path(RERUNS, scene, group, method)), options.ranks)
     return [info for info in infos if not info.marked]
 

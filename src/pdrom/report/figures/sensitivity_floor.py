@@ -54,7 +54,7 @@ def sensitivity_floor(results: Results, options: Options) -> Figure:
             loc="upper center", bbox_to_anchor=(0.5, -0.31), fontsize=7.5, handlelength=1.6,
             labelspacing=0.25,
         )  # fmt: skip
-    label_outer(axes, columns, "frame", "relative difference")
+    label_outer(axes, columns, "frame", y="relative difference")
     for ax in axes:
         ax.set_xlabel("frame")
     dot = {"color": "#555555", "marker": "o", "linestyle": "none"}

@@ -56,7 +56,7 @@ def singular_values(results: Results, options: Options) -> Figure:
             reference_drawn |= _draw_published(ax, published, options.published[scene], group)
         _draw_values(ax, rows, looks[group])
         ax.set_title(results.experiment_title(scene, group))
-    label_outer(axes, options.columns, "component", "singular value / first")
+    label_outer(axes, options.columns, "component", y="singular value / first")
     _legend(figure, {group: looks[group] for _, group, _ in pairs}, reference_drawn)
     return figure
 

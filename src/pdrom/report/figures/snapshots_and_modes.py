@@ -60,7 +60,7 @@ def snapshots_and_modes(results: Results, options: Options) -> Figure:
     path = results.path(BASIS, scene, group, method)
     basis, snapshots = read_basis(path), load_snapshots(results.path(SNAPSHOTS, scene, group))
     mesh = load_mesh(results.path(MESH, scene))
-    elements = element_map(group, mesh, snapshots.elements, str(path))
+    elements = element_map(group, mesh, snapshots.elements, source=str(path))
     centred = snapshots.train.reshape(len(snapshots.train), -1).T - basis.mean[:, None]
     frames, positions = positions_at(results.path(FULL_ORDER, scene), options.frames)
     camera = options.camera

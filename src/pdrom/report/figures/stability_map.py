@@ -50,7 +50,7 @@ def stability_map(results: Results, options: Options) -> Figure:
     figure = style.new_figure(ROW * sum(rows) + 0.5 * len(strips) + 0.55)
     axes = figure.subplots(len(strips), 1, squeeze=False, height_ratios=rows)[:, 0]
     for ax, strip in zip(axes, strips, strict=True):
-        draw_cells(ax, list(strip.rows.values()), strip.blocks, strip.cell)
+        draw_cells(ax, list(strip.rows.values()), strip.blocks, cell=strip.cell)
         ax.set_xlabel(strip.xlabel, fontsize=7)
         ax.set_ylabel("scene", fontsize=7)
     legend(figure, list({o for strip in strips for o in strip.outcomes()}))

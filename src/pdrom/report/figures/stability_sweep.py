@@ -114,7 +114,7 @@ def _panel(
         values, known = cells[j]
         return known.get((models[i], values[k]))
 
-    draw_cells(ax, [model.label for model in models], blocks, cell)
+    draw_cells(ax, [model.label for model in models], blocks, cell=cell)
     ax.set_ylabel("method", fontsize=7)
 
 

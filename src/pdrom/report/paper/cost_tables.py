@@ -7,6 +7,7 @@ import pandas as pd
 from pdrom.report.paper.macros import format_number
 from pdrom.report.paper.tabular import name, tabular
 from pdrom.report.words.text import escape
+from pdrom.tables.kit.held_out import MEDIAN, over_motions
 
 Tables = Mapping[str, pd.DataFrame]
 NONE = "--"
@@ -60,7 +61,7 @@ def _of_subspaces(runs: pd.DataFrame, heldout: pd.DataFrame) -> list[str]:
             heldout, scene=run.scene, group="all", method=run.method, k=run.k,
             position_basis=run.position_basis,
         )  # fmt: skip
-        return _cell(same, error)
+        return _cell(over_motions(same), lambda found: format_number(found[MEDIAN]))
 
     full = _rows(runs, position_basis="pod", method="full")
     sampled = _rows(runs, position_basis="pod", method=_TOLERANCE)

@@ -43,7 +43,7 @@ def _failure(row: Any) -> str:
 def hard_reductions(tables: Tables) -> str:
     """Every reduction over the hard cases: how many it passes, how it fails, and why."""
     rows = []
-    told: dict[str, str] = {}  # reasons, by the first reduction that has them
+    reported: dict[str, str] = {}  # reasons, by the first reduction that has them
     for method, part in tables["hard_cases"].groupby("method", sort=False):
         count = part.outcome.value_counts()
         failed = part[part.outcome.isin(FAILURES)]
@@ -52,7 +52,7 @@ def hard_reductions(tables: Tables) -> str:
         cells = [count.get(outcome, 0) for outcome in outcomes]
         other = len(part) - sum(cells)
         reason = str(why.iloc[0]) if len(why) else "--"
-        first = told.setdefault(reason, method)
+        first = reported.setdefault(reason, method)
         shown = escape(reason) if first == method or reason == "--" else f"as {name(first)}"
         rows.append([name(method), *(str(c) for c in (*cells, other)), shown])
     header = [

@@ -46,12 +46,14 @@ def payoff(tables: Tables) -> str:
             *(_number(v) for v in (row.least_speedup, row.best_speedup, row.most_speedup)),
             _number(row.error_train),
             f"{_number(row.error_heldout)} ({row.heldout})",
+            str(row.accurate_heldout),
+            str(row.pays_heldout),
         ]
         for row in tables["payoff"].itertuples()
     ]
     header = ["reduction", "runs in", "accurate in", "pays in", "loses in", "least", "median",
-              "most", "training", "held out (of)"]  # fmt: skip
-    return tabular(header, rows, "lrrrrrrrrr")
+              "most", "training", "held out (of)", "accurate", "pays"]  # fmt: skip
+    return tabular(header, rows, "lrrrrrrrrrrr")
 
 
 def pays(tables: Tables) -> str:

@@ -166,7 +166,7 @@ def guard(tables: Tables) -> str:
         cells = [error, estimate, format_number(row.energy_ratio), first, share]
         ms = format_number(row.ms_per_frame)
         rows.append([name(row.scene), method, action, alarm, *cells, ms])
-    header = ["scene", "method", "guard", "alarm", "error", "estimate", "energy", "first alarm",
+    header = ["scene", "method", "action", "trigger", "error", "estimate", "energy", "first",
               "repeated", "ms"]  # fmt: skip
     return tabular(header, rows, "llllrrrlrr")
 

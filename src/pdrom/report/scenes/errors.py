@@ -26,12 +26,12 @@ PROJECTIONS = "reconstruction_error"  # table, known of the pipeline's results
 
 def error_against_r(scene: ViewedScene, pdf: Path, png: Path) -> None:
     """Write the picture."""
-    write_picture(_draw_against_r, scene, "errors against the basis size", pdf, png)
+    write_picture(_draw_against_r, scene, "errors against the basis size", pdf=pdf, png=png)
 
 
 def error_against_time(scene: ViewedScene, pdf: Path, png: Path) -> None:
     """Write the picture."""
-    write_picture(_draw_against_time, scene, "error against time", pdf, png)
+    write_picture(_draw_against_time, scene, "error against time", pdf=pdf, png=png)
 
 
 def _draw_against_r(scene: ViewedScene) -> Figure:
@@ -57,7 +57,7 @@ def _draw_against_r(scene: ViewedScene) -> Figure:
         for method, look in _looks(scene).items():
             rows = table[(table.group == group) & (table.method == method)]
             draw(ax, rows.sort_values("r"), look)
-    label_outer(axes, 2, "basis size r", "relative error")
+    label_outer(axes, 2, "basis size r", y="relative error")
     handles = _methods(scene, marked=True)
     if PROJECTIONS in scene.tables:
         handles += [
@@ -107,7 +107,7 @@ def _draw_against_time(scene: ViewedScene) -> Figure:
             for run, line in {r.r: (r, s) for r, s in _two(sizes)}.values():
                 _draw_error(ax, run, look[0], line)
         ax.set_xlim(0, None)
-    label_outer(axes, 2, "frame", "relative error")
+    label_outer(axes, 2, "frame", y="relative error")
     handles = _methods(scene)
     handles += [_line("largest size", linestyle=LARGE), _line("r = 20 or below", linestyle=SMALL)]
     handles.append(_line("blew up", **CROSS))

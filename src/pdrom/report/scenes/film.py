@@ -30,7 +30,7 @@ def animation(scene: ViewedScene, film: Path) -> None:
     """Write a film that common browsers and players show, by the ffmpeg that a package brings."""
     shots = pictures(scene, MP4_DPI)
     first = next(shots)
-    with atomic_path(film, sealed=False) as path:
+    with atomic_path(film, with_checksum=False) as path:
         writer = imageio_ffmpeg.write_frames(
             str(path), first.shape[1::-1], fps=_rate(scene), macro_block_size=2, output_params=SAME
         )
@@ -48,7 +48,7 @@ def gif(scene: ViewedScene, film: Path) -> None:
     shots = [Image.fromarray(picture) for picture in pictures(scene, GIF_DPI)]
     palette = shots[-1].quantize(COLOURS)
     first, *others = [p.quantize(palette=palette, dither=Image.Dither.NONE) for p in shots]
-    with atomic_path(film, sealed=False) as path:
+    with atomic_path(film, with_checksum=False) as path:
         first.save(
             path,
             save_all=True,
@@ -93,7 +93,14 @@ def pictures(scene: ViewedScene, dpi: int) -> Iterator[np.ndarray]:
             for ax, panel in zip(axes, panels, strict=False):
                 ax.clear()
                 outline = None if panel.reference else full
-                draw_run(ax, scene.mesh, panel.seen_by(CAMERA), CAMERA, window, outline)
+                draw_run(
+                    ax,
+                    scene.mesh,
+                    panel.seen_by(CAMERA),
+                    camera=CAMERA,
+                    window=window,
+                    ghost=outline,
+                )
             canvas.draw()
             picture = np.asarray(canvas.buffer_rgba())[..., :3]
             high, wide = (2 * (side // 2) for side in picture.shape[:2])

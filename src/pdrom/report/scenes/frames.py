@@ -20,7 +20,7 @@ NO_LIMIT = 100.0  # inches: the picture need not fit on a page
 
 def frames(scene: ViewedScene, pdf: Path, png: Path) -> None:
     """Write the picture."""
-    write_picture(_draw, scene, "frames", pdf, png)
+    write_picture(_draw, scene, "frames", pdf=pdf, png=png)
 
 
 def _draw(scene: ViewedScene) -> Figure:

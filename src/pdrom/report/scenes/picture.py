@@ -54,4 +54,4 @@ def write_picture(
     """Draw in the style of the study's figures and write both files."""
     with style.look():
         figure = draw(scene)
-    write_figure(figure, f"{scene.name}: {title}", pdf, png, sealed=False)
+    write_figure(figure, f"{scene.name}: {title}", pdf, png=png, with_checksum=False)

@@ -8,7 +8,7 @@ from pdrom.report.viewer.runs import ViewedScene
 
 def runs(scene: ViewedScene, table: Path) -> None:
     """Write errors, failures and samples; without a row where nothing is reduced."""
-    write_table(scene.tables["runs"](), table, sealed=False)
+    write_table(scene.tables["runs"](), table, with_checksum=False)
 
 
 def advice(scene: ViewedScene, effects: Path, costs: Path) -> None:

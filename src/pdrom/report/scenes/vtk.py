@@ -46,7 +46,7 @@ def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
 def _write(mesh: Mesh, points: np.ndarray, data: dict[str, np.ndarray], path: Path) -> None:
     volume = len(mesh.tetrahedra) > 0
     cells = [("tetra", mesh.tetrahedra) if volume else ("triangle", mesh.triangles)]
-    with atomic_path(path, sealed=False) as temporary:
+    with atomic_path(path, with_checksum=False) as temporary:
         meshio.Mesh(points, cells, point_data=data).write(temporary, file_format="vtu")
 
 
@@ -57,5 +57,5 @@ def _write_collection(path: Path, names: list[str], time_step: float) -> None:
         time = f"{frame * time_step:.9g}"
         ElementTree.SubElement(collection, "DataSet", timestep=time, part="0", file=name)
     ElementTree.indent(root)
-    with atomic_path(path, sealed=False) as temporary:
+    with atomic_path(path, with_checksum=False) as temporary:
         ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)

@@ -1,13 +1,12 @@
 """Runs as plain data for the page: the surface alone, some frames, positions of 16 bits."""
 
-import base64
-import zlib
 from collections.abc import Sequence
 from math import ceil
 from typing import Any
 
 import numpy as np
 
+from pdrom.core.packed import pack_positions, pack_text
 from pdrom.model.effects.base import EffectConfig
 from pdrom.model.mesh.types import Mesh
 from pdrom.report.viewer.runs import ViewedRun, ViewedScene
@@ -15,7 +14,6 @@ from pdrom.report.viewer.view import view_of
 
 FRAMES = 75  # stored of a run, at most
 ROOM = 0.2  # around a run, of its longest side
-LEVELS = 65535  # of a quantised coordinate, over the run's bounding box
 
 
 def pack_scene(scene: ViewedScene) -> dict[str, Any]:
@@ -28,7 +26,7 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
     return {
         "name": scene.name,
         "title": scene.title,
-        "triangles": _text(triangles.reshape(-1, 3).astype("<u4")),
+        "triangles": pack_text(triangles.reshape(-1, 3).astype("<u4")),
         "timeStep": scene.time_step,
         "stride": stride,
         "full": pack_positions(full),
@@ -66,7 +64,7 @@ def shown_region(
 def _pack_body(body: Mesh) -> dict[str, Any]:
     return {
         "points": [_numbers(axis) for axis in body.points.T],
-        "triangles": _text(body.triangles.astype("<u4")),
+        "triangles": pack_text(body.triangles.astype("<u4")),
     }
 
 
@@ -80,29 +78,6 @@ def _pack_run(run: ViewedRun, stride: int, used: np.ndarray) -> dict[str, Any]:
         "blowup": run.blowup_frame,
         "ms": run.ms,
     }
-
-
-def pack_positions(positions: np.ndarray) -> dict[str, Any]:
-    """Positions (F, N, 3) as steps of a 65535th of their bounding box, and only their changes.
-
-    A coordinate is wrong by half a step at most; changes from frame to frame, modulo 2^16, compress
-    better than the positions.
-    """
-    low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
-    step = np.where(high > low, (high - low) / LEVELS, 1.0)
-    levels = np.round((positions - low) / step).astype(np.int64)
-    changes = np.diff(levels, axis=0, prepend=0) % (LEVELS + 1)
-    return {
-        "frames": len(positions),
-        "vertices": positions.shape[1],
-        "low": low.tolist(),
-        "step": step.tolist(),
-        "changes": _text(changes.astype("<u2")),
-    }
-
-
-def _text(values: np.ndarray) -> str:
-    return base64.b64encode(zlib.compress(np.ascontiguousarray(values).tobytes(), 9)).decode()
 
 
 def _numbers(values: np.ndarray) -> list[float | None]:

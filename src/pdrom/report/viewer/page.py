@@ -16,11 +16,11 @@ LARGEST = 25_000_000  # bytes
 
 
 def write_page(
-    scenes: Sequence[ViewedScene], path: str | os.PathLike[str], sealed: bool = True
+    scenes: Sequence[ViewedScene], path: str | os.PathLike[str], with_checksum: bool = True
 ) -> None:
     """Write the viewer of some scenes; the library's licence stands in its script.
 
-    ``sealed`` as in `pdrom.core.store.atomic_path`.
+    ``with_checksum`` as in `pdrom.core.store.atomic_path`.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def write_page(
             f"{path}: {size / 1e6:.0f} MB, allowed are {LARGEST / 1e6:.0f}: choose fewer scenes, "
             "methods or sizes (keys viewer.scenes, methods, viewer.ranks)"
         )
-    write_text(text, path, sealed)
+    write_text(text, path, with_checksum)
 
 
 def page(packed: Sequence[dict]) -> str:

@@ -5,7 +5,8 @@ from pathlib import Path
 import pandas as pd
 
 from pdrom.artifact.reads import ProjectFile, TableOf
-from pdrom.tables.claims import METRICS, VERDICTS, load_claims, timed_columns
+from pdrom.tables.claims import VERDICTS, load_claims, timed_columns
+from pdrom.tables.claims.metrics import READ
 from pdrom.tables.claims.sensitivity import PARTS, VARIED, sensitivity_rows
 from pdrom.tables.kit.declaration import compared, flag, table, text, timed
 
@@ -39,7 +40,7 @@ def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
     ),
     reads={
         "rules": ProjectFile("config/claims.yaml"),
-        **{name: TableOf(name) for name in sorted({m.table for m in METRICS.values()})},
+        **{name: TableOf(name) for name in READ},
     },
     timed_cells=_timed_cells,
 )

@@ -1,7 +1,7 @@
 """Metrics of claims: a number for each chosen row of a table, with the row's labels."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -12,6 +12,7 @@ from pdrom.tables.claims.rows import AXES, Tables, filtered, labelled
 from pdrom.tables.claims.run_metrics import (
     best_useful_speedup,
     error_trend,
+    held_out,
     noise_error,
     position_basis_ratio,
     repeated_trend_p_value,
@@ -19,6 +20,7 @@ from pdrom.tables.claims.run_metrics import (
     trend_p_value,
     useful_speedup,
 )
+from pdrom.tables.kit.reruns import KEYS
 
 _PLACE = ("scene", "group", "method", "position_basis")
 
@@ -83,6 +85,7 @@ class Metric:
     values : from tables, ``where`` and ``accuracy`` to a row of labels and a `VALUE` for each
     labels : columns that rows may be chosen by, beside those of the table
     ratio : a value as the ratio of two times, where it is made of times in another way
+    beside : further tables that it reads
     """
 
     values: Callable[[Tables, dict, float], pd.DataFrame]
@@ -90,6 +93,7 @@ class Metric:
     columns: tuple[str, ...]
     labels: tuple[str, ...] = ()
     ratio: Callable[[np.ndarray], np.ndarray] = np.asarray
+    beside: tuple[str, ...] = ()
 
 
 def _over_the_rest(share: np.ndarray) -> np.ndarray:
@@ -141,3 +145,16 @@ METRICS = {
         ("scene", "k", "position_basis", "relative_error_within_horizon"),
     ),
 }
+_HELD_OUT = (
+    "rerun_error", "useful_speedup", "best_useful_speedup", "error_trend", "position_basis_ratio",
+)  # fmt: skip
+METRICS |= {
+    f"heldout_{name}": replace(
+        METRICS[name],
+        values=held_out(METRICS[name].values),
+        columns=tuple(dict.fromkeys((*METRICS[name].columns, *KEYS))),
+        beside=("heldout_reruns",),
+    )
+    for name in _HELD_OUT
+}
+READ = sorted({table for m in METRICS.values() for table in (m.table, *m.beside)})

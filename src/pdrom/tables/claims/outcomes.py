@@ -16,7 +16,7 @@ FOUND = ("satisfied", "of", "close", "least", "median", "most", "verdict")
 
 
 def outcome_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
-    """Rows of the table claims_tests, in the order of the file."""
+    """Rows of the table claims_tests from ``rules`` and ``tables``, in the order of the file."""
     rows = [
         {"claim": name, "part": part, **_said(test), **_found(test, tables)}
         for name, rule in rules.items()

@@ -27,5 +27,5 @@ def filtered(table: pd.DataFrame, where: Mapping[str, tuple[Value, ...]]) -> pd.
 
 
 def labelled(rows: pd.DataFrame, values: pd.Series) -> pd.DataFrame:
-    """Labels of ``rows``, as far as they have them, and a value for each."""
+    """Labels of ``rows``, as far as they have them, and one of ``values`` for each."""
     return rows[[label for label in LABELS if label in rows]].assign(**{VALUE: values})

@@ -53,14 +53,14 @@ class TestRule(_Model):
 
     @property
     def timed(self) -> bool:
-        """Whether a clock has a say in what is compared."""
+        """Whether what is compared depends on timing."""
         metric = METRICS[self.metric]
         timing = declared()[metric.table].timing_columns
         return not set(timing).isdisjoint({*metric.columns, *self.where})
 
     @property
     def factor(self) -> float:
-        """The margin, `MARGIN` unless said otherwise; 1 where no clock has a say."""
+        """The margin, `MARGIN` by default; 1 where nothing depends on timing."""
         if not self.timed:
             return 1.0
         return MARGIN if self.margin is None else self.margin
@@ -145,7 +145,7 @@ class ClaimRule(_Model):
 
 
 def load_claims(path: Path) -> dict[str, ClaimRule]:
-    """Claims by identifier; ConfigurationError for any fault."""
+    """Claims of the file ``path`` by identifier; ConfigurationError for any fault."""
     content = read_yaml(path)
     if not isinstance(content, dict) or not content:
         raise ConfigurationError(f"{path}: a mapping of claims is required")

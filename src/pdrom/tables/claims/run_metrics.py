@@ -1,9 +1,14 @@
 """Metrics of claims about reduced runs: a number for each chosen run, with its labels."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pandas as pd
 
 from pdrom.tables.claims.rows import VALUE, Tables, filtered, labelled
+from pdrom.tables.kit.held_out import MEDIAN, with_held_out
+
+Values = Callable[[Tables, dict, float], pd.DataFrame]
 
 
 def _full_rank_only(table: pd.DataFrame, where: dict) -> tuple[pd.DataFrame, dict]:
@@ -20,7 +25,7 @@ def _full_rank_only(table: pd.DataFrame, where: dict) -> tuple[pd.DataFrame, dic
 
 
 def _reruns(tables: Tables, where: dict) -> pd.DataFrame:
-    """Reruns; only those whose positions are not reduced, unless ``where`` says otherwise.
+    """Reruns; only those whose positions are not reduced, unless ``where`` selects others.
 
     A method may have the same name with full and with reduced positions.
     """
@@ -31,6 +36,20 @@ def _reruns(tables: Tables, where: dict) -> pd.DataFrame:
 def _tried(rows: pd.DataFrame) -> pd.DataFrame:
     """Reruns that started: not the marked ones, whose size exceeds the numerical rank."""
     return rows[(rows.frames > 0) | rows.blowup_frame.notna()]
+
+
+def held_out(values: Values) -> Values:
+    """``values`` of the same runs with their median error over held-out motions.
+
+    Runs without a held-out motion that can be judged are left out. Times are the training run's.
+    """
+
+    def of_held_out(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
+        runs = with_held_out(tables["reduced_reruns"], tables["heldout_reruns"])
+        runs = runs[runs[MEDIAN].notna()].assign(relative_error_within_horizon=runs[MEDIAN])
+        return values({**tables, "reduced_reruns": runs}, where, accuracy)
+
+    return of_held_out
 
 
 def rerun_error(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:

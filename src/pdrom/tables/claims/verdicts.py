@@ -34,7 +34,7 @@ class Outcome:
 
 
 def timed_columns(rule: ClaimRule) -> set[str]:
-    """Columns of a claim's row in which a clock has a say: two runs may differ there."""
+    """Columns of a claim's row that depend on timing: two runs may differ there."""
     found: set[str] = set()
     for part, suffix in (("published", ""), ("beyond", "_beyond")):
         tests: Sequence[TestRule] = getattr(rule, part)
@@ -48,29 +48,29 @@ def timed_columns(rule: ClaimRule) -> set[str]:
 
 
 def is_timed(test: TestRule) -> bool:
-    """Whether a clock has a say in what a test compares."""
+    """Whether what a test compares depends on timing."""
     return test.timed
 
 
 def values_of(test: TestRule, tables: Tables) -> pd.DataFrame:
-    """Labels and a value for each row that a test compares."""
+    """Labels and a value for each row of ``tables`` that ``test`` compares."""
     return METRICS[test.metric].values(tables, dict(test.where), test.accuracy)
 
 
 def satisfied(test: TestRule, values: np.ndarray) -> np.ndarray:
-    """Whether each value satisfies the comparison."""
+    """Whether each of ``values`` satisfies the comparison of ``test``."""
     return values >= test.threshold if test.compare == ">=" else values <= test.threshold
 
 
 def close(test: TestRule, values: np.ndarray) -> np.ndarray:
-    """Whether each value is a ratio of times so close to the limit that it decides nothing."""
+    """Whether each of ``values`` is a ratio of times within the margin of ``test``'s limit."""
     ratio = METRICS[test.metric].ratio
     apart = ratio(values) / ratio(np.array(test.threshold))
     return (apart > 1.0 / test.factor) & (apart < test.factor)
 
 
 def answer(share: float, good: int, total: int) -> str:
-    """Verdict of a test that ``good`` of ``total`` rows satisfy, see `TestRule`."""
+    """Verdict of a test that ``good`` of ``total`` rows satisfy where ``share`` must."""
     if total == 0:
         return UNDECIDED
     if good >= share * total:
@@ -87,7 +87,7 @@ def answer_of(test: TestRule, values: np.ndarray) -> str:
 
 
 def evaluate(test: TestRule, tables: Tables) -> Outcome:
-    """Compare the rows of a test with its threshold."""
+    """Compare the rows of ``tables`` that ``test`` selects with its threshold."""
     rows = values_of(test, tables)
     values = rows[VALUE].to_numpy(float)
     if len(values) == 0:
@@ -145,7 +145,7 @@ def _text(value: float) -> str:
 
 
 def combined(verdicts: Sequence[str]) -> str:
-    """Verdict of a claim whose parts have these: it holds where all of them hold."""
+    """Verdict of a claim whose parts have ``verdicts``: it holds where all of them hold."""
     for verdict in (UNDECIDED, FAILS, MACHINE, DEPENDS):
         if verdict in verdicts:
             return verdict
@@ -153,7 +153,7 @@ def combined(verdicts: Sequence[str]) -> str:
 
 
 def claims_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
-    """Rows of the table claims, in the order of the file."""
+    """Rows of the table claims from ``rules`` and ``tables``, in the order of the file."""
     return pd.DataFrame([_row(name, rule, tables) for name, rule in rules.items()])
 
 

@@ -36,8 +36,8 @@ class Column:
     """A column; any cell may be empty.
 
     unit : empty for text, counts and what has no dimension
-    timed : a clock (or the memory in use) has a say in it, so that two runs may differ
-    declared : its quantity, where the type and the name do not tell it
+    timed : it depends on timing (or on the memory in use), so that two runs may differ
+    declared : its quantity, where that does not follow from type and name
     tolerance : its own, where that of its quantity is not the right one; of words and truth values
         the share of the rows that may be others
     """
@@ -65,7 +65,7 @@ class Column:
         return TOLERANCES.get(self.quantity, 0.0) if self.kind == "number" else 0.0
 
     def cast(self, values: pd.Series) -> pd.Series:
-        """Values with the type of the column; ValueError or TypeError if they do not fit."""
+        """``values`` with the type of the column; ValueError or TypeError if they do not fit."""
         if self.kind == "text":
             return values
         if self.kind == "flag":
@@ -83,22 +83,27 @@ def _flags(values: pd.Series) -> pd.Series:
 
 
 def text(name: str, meaning: str) -> Column:
-    """A column of words."""
+    """Column ``name`` of words.
+
+    Parameters
+    ----------
+    meaning : for readers, in a few words
+    """
     return Column(name, "text", meaning)
 
 
 def integer(name: str, meaning: str) -> Column:
-    """A column of counts, sizes or indices."""
+    """Column ``name`` of counts, sizes or indices; ``meaning`` as in `text`."""
     return Column(name, "integer", meaning)
 
 
 def flag(name: str, meaning: str) -> Column:
-    """A column of True and False."""
+    """Column ``name`` of True and False; ``meaning`` as in `text`."""
     return Column(name, "flag", meaning)
 
 
 def number(name: str, meaning: str, unit: str = "") -> Column:
-    """A column of floating-point numbers."""
+    """Column ``name`` of floating-point numbers in ``unit``; ``meaning`` as in `text`."""
     return Column(name, "number", meaning, unit)
 
 
@@ -122,7 +127,7 @@ class TimedCells(Protocol):
 class Table(Artifact):
     """A table of the study; calling it makes it.
 
-    timed_cells : where not the column alone says whether a clock has a say in a cell
+    timed_cells : columns of each row that depend on timing, where that differs from row to row
     """
 
     columns: tuple[Column, ...] = ()
@@ -175,7 +180,7 @@ class Table(Artifact):
             raise StorageError(f"{place} is no {column.kind} ({error})") from error
 
     def without_times(self, table: pd.DataFrame, root: Path) -> pd.DataFrame:
-        """``table``, as text, with every cell emptied in which a clock has a say.
+        """``table``, as text, with every cell emptied that depends on timing.
 
         Parameters
         ----------
@@ -202,6 +207,12 @@ def table(
     timed_cells: TimedCells | None = None,
 ) -> Callable[[Callable[..., pd.DataFrame]], Table]:
     """Declare the function below as the one that makes the table of its name.
+
+    Parameters
+    ----------
+    title : for readers
+    columns : in their order
+    timed_cells : see `Table`
 
     Raises
     ------

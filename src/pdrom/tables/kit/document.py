@@ -9,11 +9,12 @@ HEAD = """# Tables of the study
 
 Written by `./reproduce pages` from the declarations; not to be edited by hand.
 
-CSV, one row per observation, SI units unless a unit says otherwise, an empty cell where there is no
-value. In a column marked "timed" a clock (or the memory in use) has a say: only there may two runs
-on one machine differ, in `claims` only in claims about times. "Compared as" is the kind for which
-`./reproduce verify` has a tolerance, and the column's own one, see
-[verification.md](verification.md).
+Tables are CSV with one row per observation, SI units unless a unit says otherwise, and an empty
+cell where there is no value.
+A column marked "timed" depends on timing or on the memory in use: only there may two runs on one
+machine differ (in `claims`, only in claims about times).
+"Compared as" is the kind for which `./reproduce verify` has a tolerance, followed by the column's
+own tolerance if it has one, see [verification.md](verification.md).
 """
 
 
@@ -29,7 +30,7 @@ def _section(table: Table) -> str:
     lines = [
         f"## {table.name}",
         "",
-        f"{table.title}. Made by `{table.module}` from {', '.join(_sources(table))}.",
+        f"{table.title}.\nMade by `{table.module}` from {', '.join(_sources(table))}.",
         "",
         "| column | type | unit | timed | compared as | meaning |",
         "|---|---|---|---|---|---|",

@@ -11,7 +11,7 @@ CONFIRMED = 1.5
 
 
 def median_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
-    """Median, and the 2.5 % and 97.5 % quantiles of medians of values drawn anew (bootstrap).
+    """Median, and the 2.5 % and 97.5 % quantiles of medians of resampled values (bootstrap).
 
     The quantiles of fewer than two values are the value.
     """

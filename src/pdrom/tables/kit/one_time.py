@@ -1,4 +1,4 @@
-"""Times of jobs, told in the one time that each full-order run has (table frame_times).
+"""Times of jobs, as multiples of the one time that each full-order run has (table frame_times).
 
 A job times its own full-order run beside its variants, but the machine runs at another speed in
 another job, and so one run would have several times. Ratios within a job do not mind: the job's
@@ -42,10 +42,10 @@ def in_one_time(
 
 
 def timings_in_one_time(timings: Sequence[File], times: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the timing jobs of all scenes, see `in_one_time`."""
+    """Rows of the ``timings`` of all scenes in ``times``, see `in_one_time`."""
     rows = joined(timings)
     if rows.empty:
         return rows
     own = rows[rows.method.isna() & (rows.implementation == "compiled")]
     own = own.set_index("scene").ms_per_frame
-    return in_one_time(rows, own, times, [name for name in PHASES if name in rows])
+    return in_one_time(rows, own, times, columns=[name for name in PHASES if name in rows])

@@ -12,7 +12,7 @@ QUANTITIES: dict[Quantity, str] = {
     "value": "well-conditioned numbers, and numbers of samples: relative",
     "error": "how runs and approximations end: relative, words and frames equal",
     "share": "shares, correlations and numbers of runs over many: absolute",
-    "timed": "what a clock, a compiler or a cache has a say in: not judged",
+    "timed": "what depends on timing, a compiler or a cache: not judged",
     "skipped": "rounding errors, and words about other columns: not compared",
 }
 # How far one cell may be off, where its column says nothing else.
@@ -22,7 +22,7 @@ TALLY = 2.0
 
 
 def usual_quantity(kind: str, name: str, timed: bool) -> Quantity:
-    """Kind of a column that does not declare it: by its type, and words in its name."""
+    """Kind of a column that declares none: by its type (``kind``, ``timed``) and ``name``."""
     if timed:
         return "timed"
     if kind != "number":

@@ -1,4 +1,4 @@
-"""Reruns of both motions with their errors, horizons and floors."""
+"""Reruns of all motions with their errors, horizons and floors."""
 
 from collections.abc import Callable, Sequence
 
@@ -57,7 +57,7 @@ def judged_reruns(
     ----------
     runs, rows : HDF5 files of the runs and their tables of the motion, in the same order
     subspaces, subspace_rows : the same in position subspaces
-    motion : "train" or "heldout"
+    motion : "train" or a held-out one, whose rows are chosen from all of the tables
     """
     ends = horizons(sensitivity, perturbation, threshold)
     parts = [_local_only(run, row, ends, motion) for run, row in zip(runs, rows, strict=True)]
@@ -74,7 +74,7 @@ def judged_reruns(
 
 def _local_only(run: File, row: File, ends: dict[str, int], motion: str) -> pd.DataFrame:
     """Rows of runs whose positions are not reduced."""
-    table, end = read_table(row.path), ends[run["scene"]]
+    table, end = _of_motion(row, motion), ends[run["scene"]]
     with open_hdf5(run.path) as file:
         store = file if motion == TRAIN else file[motion]
         runs = [store[f"r{r:04d}"] for r in table.r]
@@ -84,9 +84,15 @@ def _local_only(run: File, row: File, ends: dict[str, int], motion: str) -> pd.D
     return table.assign(position_basis="full", k=None)
 
 
+def _of_motion(row: File, motion: str) -> pd.DataFrame:
+    """Rows of a motion; a table of training runs has no column that names one."""
+    table = read_table(row.path)
+    return table if motion == TRAIN else table[table.motion == motion]
+
+
 def _subspace(run: File, row: File, ends: dict[str, int], motion: str) -> pd.DataFrame:
     """Rows of runs in position subspaces."""
-    table, end = read_table(row.path), ends[run["scene"]]
+    table, end = _of_motion(row, motion), ends[run["scene"]]
     with open_hdf5(run.path) as file:
         models = [f"{t.position_basis}_k{t.k:03d}_{t.method}" for t in table.itertuples()]
         runs = [file[f"models/{model}/{motion}"] for model in models]

@@ -27,7 +27,7 @@ def write_after(command: CommandLine, dag: Any, plan: Plan, folders: Folders) ->
     """Write the map of a run that has made everything; one with targets leaves it as it is."""
     if not command.targets:
         configuration = " ".join([*command.configfiles, *command.settings]) or DEFAULT
-        made = claim_map(dag, plan, folders, recall(), configuration)
+        made = claim_map(dag, plan, folders, options=recall(), configuration=configuration)
         write_table(made, MAP.at(folders.results))
 
 

@@ -23,17 +23,18 @@ Verdicts = Mapping[str, tuple[str, str]]
 HEAD = """\
 # Claim map
 
-What each claim, figure, table and number of the text is made by; written by `./reproduce pages`.
-Every run of a whole study writes a map of its own, `results/claim_map.csv` (other configurations:
-below `results/studies/NAME`), with what each line took on its machine: processor time from
-nothing (`minutes`) and of the last job (`minutes_alone`), the largest memory and the disk (MB).
+Every claim, figure, table and number of the text, with what makes it; `./reproduce pages` wrote it.
+Every run of a whole study writes `results/claim_map.csv` (other configurations: below
+`results/studies/NAME`) with what each line took on its machine: processor time from nothing
+(`minutes`) and of the last job (`minutes_alone`), the largest memory and the disk (MB).
 
-* Verdicts are the expected ones of the full study. A dash: a figure does not stand there.
-* **columns**: how many of each kind, which says how exactly `./reproduce verify` expects them
-  ([how](verification.md)). A figure is reproduced when the tables that it reads are, a claim when
-  its verdict is the same.
-* The rule is `figure_NAME` for a figure, `NAME_table` for a table, `paper` for the manuscript; a
-  number of the text is read by `paper_inputs`.
+* Verdicts are the expected ones of the full study.
+* A dash: the figure is not in that document.
+* **columns**: the number of columns of each kind, which says how exactly `./reproduce verify`
+  expects them ([how](verification.md)).
+* A figure is reproduced when the tables that it reads are, a claim when its verdict is the same.
+* The rule is `figure_NAME` for a figure, `NAME_table` for a table, `paper` for the manuscript.
+  A number of the text is read by `paper_inputs`.
 """
 
 
@@ -61,8 +62,8 @@ def _page(listed: list[Entry], numbers: Mapping[str, Numbers], verdicts: Verdict
 
     parts = [
         HEAD,
-        "## Claims\n\nThe verdicts, and the rows that they rest on, are in the table `claims`: "
-        "`./reproduce claims`. A claim is seen in the first of the names, which have lines of "
+        "## Claims\n\nThe table `claims` has the verdicts and the rows that they rest on: "
+        "`./reproduce claims`.\nA claim is seen in the first of the names, which have lines of "
         "their own below.\n",
         section(
             "claim",
@@ -85,8 +86,7 @@ def _page(listed: list[Entry], numbers: Mapping[str, Numbers], verdicts: Verdict
                 _tolerances(declared()[e.name]),
             ),
         ),
-        "## Numbers of the text\n\nBy section of the manuscript: the tables that its numbers are "
-        "read from.\n",
+        "## Numbers of the text\n\nTables from which each section reads its numbers.\n",
         section("section", "| section | tables |", lambda e: (e.title, _names(e.rests_on))),
         "## The manuscript\n",
         section("manuscript", "| file | command |", lambda e: (f"`{e.name}`", _command(e))),

@@ -1,4 +1,4 @@
-"""Files: whole or not at all, and never without the seal that fits them."""
+"""Files: whole or not at all, and never without the checksum that fits them."""
 
 import errno
 import os
@@ -14,8 +14,8 @@ from pdrom.core.errors import StorageError
 from pdrom.core.store import (
     atomic_path,
     check_file,
+    checksum_path,
     read_text,
-    seal_path,
     write_hdf5,
     write_table,
     write_text,
@@ -45,7 +45,7 @@ def test_name_appears_only_when_complete(tmp_path):
         assert temporary.parent == path.parent
         assert temporary.suffix == path.suffix
     assert path.read_text() == "whole"
-    assert sorted(path.parent.iterdir()) == sorted([path, seal_path(path)])
+    assert sorted(path.parent.iterdir()) == sorted([path, checksum_path(path)])
 
 
 def test_who_reads_the_old_file_keeps_it(tmp_path):
@@ -83,7 +83,7 @@ def old_file(tmp_path, kind):
     write_one(path, kind)
     before = path.read_bytes()
     names = sorted(tmp_path.iterdir())
-    assert names == sorted([path] if kind == "hdf5" else [path, seal_path(path)])
+    assert names == sorted([path] if kind == "hdf5" else [path, checksum_path(path)])
 
     def untouched():
         assert path.read_bytes() == before
@@ -107,7 +107,7 @@ def let_through(monkeypatch, call, count, fault):
     monkeypatch.setattr(os, call, limited)
 
 
-# a kind of file, and how many calls work: there is a second one for a seal beside it
+# a kind of file, and how many calls work: there is a second one for a checksum beside it
 CALLS = [("hdf5", 0), ("table", 0), ("table", 1), ("text", 0), ("text", 1)]
 
 
@@ -153,8 +153,8 @@ write_text("new", path)
 
 @pytest.mark.parametrize("existed", [False, True])
 @pytest.mark.parametrize("count", [0, 1])
-def test_a_kill_between_the_seal_and_the_file_is_healed(tmp_path, existed, count):
-    """The old file is intact, or noticed as damaged; a file without a seal is never left."""
+def test_a_kill_between_the_checksum_and_the_file_is_healed(tmp_path, existed, count):
+    """The old file is intact, or noticed as damaged; a file without a checksum is never left."""
     path = tmp_path / "result.txt"
     if existed:
         write_text("old", path)
@@ -165,7 +165,7 @@ def test_a_kill_between_the_seal_and_the_file_is_healed(tmp_path, existed, count
         assert check_file(path) == ("damaged" if count else "intact")
     write_text("new", path)
     assert read_text(path) == "new"
-    assert sorted(tmp_path.iterdir()) == sorted([path, seal_path(path)])
+    assert sorted(tmp_path.iterdir()) == sorted([path, checksum_path(path)])
 
 
 KILLED = """

@@ -54,7 +54,7 @@ def test_faulty_tables_are_named(tmp_path, content, message):
         read_table(path, ["a", "c", "d"], result=False)
 
 
-def test_a_table_that_no_run_makes_needs_no_seal_and_stays(tmp_path):
+def test_a_table_that_no_run_makes_needs_no_checksum_and_stays(tmp_path):
     path = tmp_path / "reference.csv"
     path.write_text("a,b\n1,2\n")
     assert len(read_table(path, result=False)) == 1
@@ -64,7 +64,7 @@ def test_a_table_that_no_run_makes_needs_no_seal_and_stays(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_table_of_the_results_needs_its_seal(tmp_path):
+def test_a_table_of_the_results_needs_its_checksum(tmp_path):
     (tmp_path / "t.csv").write_text("a,b\n1,2\n")
     with pytest.raises(StorageError, match=r"t\.csv: its checksum .* is missing"):
         read_table(tmp_path / "t.csv")

@@ -11,7 +11,7 @@ import pytest
 
 from pdrom.core.aside import damaged_set_aside
 from pdrom.core.errors import StorageError
-from pdrom.core.store import check_file, open_hdf5, seal_path, write_hdf5
+from pdrom.core.store import check_file, checksum_path, open_hdf5, write_hdf5
 
 
 def test_failed_hdf5_leaves_the_old_file(tmp_path):
@@ -108,12 +108,12 @@ def plain(tmp_path):
     path = tmp_path / "old.h5"
     with h5py.File(path, "w") as file:
         file["x"] = np.arange(1000)
-    seal_path(path).write_text("of an older version\n")
+    checksum_path(path).write_text("of an older version\n")
     return path
 
 
 def test_a_file_without_a_checksum_inside_is_refused_unless_asked_for(plain):
-    assert check_file(plain) == "unsealed"
+    assert check_file(plain) == "no checksum"
     expected = r"old\.h5: no checksum inside .*; --unchecked \(.*\) reads it if it is sound$"
     with pytest.raises(StorageError, match=expected), open_hdf5(plain):
         pass
@@ -122,7 +122,7 @@ def test_a_file_without_a_checksum_inside_is_refused_unless_asked_for(plain):
     os.truncate(plain, 3000)
     with pytest.raises(StorageError, match=r"old\.h5: cannot be read"), open_hdf5(plain, True):
         pass
-    assert sorted(plain.parent.iterdir()) == sorted([plain, seal_path(plain)])
+    assert sorted(plain.parent.iterdir()) == sorted([plain, checksum_path(plain)])
 
 
 def test_a_wrong_checksum_is_refused_also_by_who_asks_for_none(tmp_path):

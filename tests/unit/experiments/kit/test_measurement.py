@@ -1,4 +1,4 @@
-"""Timings: interleaved, warm, started afresh, and the phases of one repeat."""
+"""Timings: interleaved, after a warm-up, started afresh, and the phases of one repeat."""
 
 import numpy as np
 import pytest

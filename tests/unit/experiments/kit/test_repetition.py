@@ -1,4 +1,4 @@
-"""Repetitions of reduced runs: what is drawn anew, and what stays."""
+"""Repetitions of reduced runs: what is resampled, and what stays."""
 
 import numpy as np
 import pytest

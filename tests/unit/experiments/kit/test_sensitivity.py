@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from builders import make_scene
-from pdrom.experiments.kit.horizon import HELDOUT, horizon
+from pdrom.experiments.kit.horizon import horizon
 from pdrom.experiments.kit.sensitivity import (
     COLUMNS,
     heldout_floor,
@@ -91,8 +91,8 @@ def test_small_perturbations_act_in_proportion():
 
 def test_held_out_floor_is_labelled_as_such():
     scene = make_scene(SPRING, {"effect": "gravity"}, {"effect": "pins", "select": "top"}, frames=3)
-    table = heldout_floor(scene, 1e-10, (1, 2, 3))
-    assert set(table.perturbation) == {HELDOUT}
+    table = heldout_floor(scene, "kick", 1e-10, (1, 2, 3))
+    assert set(table.perturbation) == {"kick"}
     assert table.seed.tolist() == [1, 1, 1, 2, 2, 2, 3, 3, 3]
     assert table.relative_difference[table.seed == 2].to_numpy() == pytest.approx(
         relative_difference(

@@ -59,7 +59,7 @@ def test_every_format_is_read(tmp_path, suffix, name):
 
 
 def centres(mesh: Mesh, kind: str) -> np.ndarray:
-    """Centres of all cells, in an order of their own: some formats number the vertices anew."""
+    """Centres of all cells, in an order of their own: some formats renumber the vertices."""
     return np.unique(mesh.points[getattr(mesh, kind)].mean(axis=1).round(5), axis=0)
 
 

@@ -36,7 +36,7 @@ REPORT = FrameReport(np.empty(0), np.zeros(4))
 
 @dataclass(frozen=True)
 class Case:
-    """A sheet whose handle is moved and whose springs are reduced badly, and a companion."""
+    """A sheet whose handle is moved and whose springs are reduced badly, and an auxiliary model."""
 
     scene: Scene
     reference: np.ndarray
@@ -177,7 +177,7 @@ def test_what_is_not_finite_gives_an_alarm(case, value):
 
 
 def test_an_estimate_without_a_companion_is_refused(case):
-    with pytest.raises(ConfigurationError, match="a companion is required"):
+    with pytest.raises(ConfigurationError, match="an auxiliary model is required"):
         guarded_rerun(
             case.scene, case.scene.system, "spring", case.reduction, case.reference, 50.0,
             GuardSettings(alarm="estimate"), Trained.on(case.reference),

@@ -1,4 +1,4 @@
-"""A companion tells the error of a run by its distance, as far as it is better than the run."""
+"""The distance to an auxiliary model estimates the error of a run, if the model is better."""
 
 import numpy as np
 import pytest
@@ -74,7 +74,7 @@ def test_saturation_bounds_the_effectivity(seed, theta):
     own *= theta * np.linalg.norm(error) / np.linalg.norm(own)
     companion = truth + own
     found = estimate(truth + error, companion, 5)
-    # both relative to the companion's motion
+    # both relative to the auxiliary model's motion
     unit = np.linalg.norm(companion[1:] - companion[0])
     ratio = found * unit / np.linalg.norm(error)
     assert 1.0 - theta - 1e-9 <= ratio <= 1.0 + theta + 1e-9

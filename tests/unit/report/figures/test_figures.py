@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from pdrom.artifact.reads import Chosen, Every, TableOf
 from pdrom.core.errors import StorageError
 from pdrom.core.paths import MESH, RERUNS, TABLE
-from pdrom.core.store import seal_path
+from pdrom.core.store import checksum_path
 from pdrom.core.store.block import write_block
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import save_mesh
@@ -56,8 +56,8 @@ def test_draws_without_warnings_and_writes_both_files(study, figure_name, tmp_pa
     assert pdf.read_bytes().startswith(b"%PDF")
     assert png.read_bytes().startswith(b"\x89PNG")
     assert pdf.stat().st_size < 1_500_000
-    seals = [seal_path(pdf).name, seal_path(png).name]
-    assert sorted(path.name for path in tmp_path.iterdir()) == [*seals, "a.pdf", "a.png"]
+    checksums = [checksum_path(pdf).name, checksum_path(png).name]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [*checksums, "a.pdf", "a.png"]
 
 
 def test_every_panel_holds_data_and_axes_are_labelled(study, figure_name):
@@ -137,7 +137,7 @@ def test_reads_only_what_it_declares(study, figure_name, tmp_path):
     for path in inputs(study, figure_name):
         target = tmp_path / path.relative_to(study.root).parent
         target.mkdir(parents=True, exist_ok=True)
-        for file in filter(Path.exists, (path, seal_path(path))):
+        for file in filter(Path.exists, (path, checksum_path(path))):
             shutil.copy(file, target)
     chosen = Results(str(tmp_path), holdings.chosen(options), settings)
     figure = draw_figure(declaration(figure_name), chosen, options)

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from pdrom.core.errors import PaperError
-from pdrom.core.store import seal_path
+from pdrom.core.store import checksum_path
 from pdrom.report.paper.tex import build_pdf, packages_of
 
 DOCUMENT = r"""\documentclass{article}
@@ -47,7 +47,7 @@ def built(tmp_path_factory):
 def test_output_is_a_pdf_alone_in_its_folder(built):
     for output in built:
         assert output.read_bytes().startswith(b"%PDF-")
-        assert sorted(output.parent.iterdir()) == [seal_path(output), output]
+        assert sorted(output.parent.iterdir()) == [checksum_path(output), output]
         names = {path.name for path in output.parent.parent.iterdir()}
         assert names == {"main.tex", "generated", "out"}
 

@@ -58,8 +58,8 @@ TABLES = {
         columns=COLUMNS,
     ),
     "heldout_reruns": pd.DataFrame(
-        [("b", "all", "full", "pod", 6, 0.5)],
-        columns=["scene", "group", "method", "position_basis", "k", ERROR],
+        [("b", "all", "full", "pod", 6, 7, 9, None, 9, error) for error in (0.25, 0.5, 9.0)],
+        columns=[*COLUMNS[:4], "k", "r", *COLUMNS[5:9]],
     ),
     "accuracy_cost": pd.DataFrame(
         [
@@ -241,8 +241,8 @@ TABLES = {
     ),
     "payoff": pd.DataFrame(
         [
-            ("full", "deim_x", 3, 0, 0, 0, *5 * [None], 0),
-            ("pod", "ecsw", 3, 2, 1, 1, *5 * [0.5], 2),
+            ("full", "deim_x", 3, 0, 0, 0, *5 * [None], 0, 0, 0),
+            ("pod", "ecsw", 3, 2, 1, 1, *5 * [0.5], 2, 2, 1),
         ],
         columns=[
             "position_basis",
@@ -257,6 +257,8 @@ TABLES = {
             "error_train",
             "error_heldout",
             "heldout",
+            "accurate_heldout",
+            "pays_heldout",
         ],
     ),
     "hard_cases": pd.DataFrame(

@@ -31,7 +31,7 @@ from pdrom.report.viewer.runs import ViewedRun, ViewedScene
 from pdrom.tables.accuracy_cost import accuracy_cost
 from pdrom.tables.effects_contribution import effects_contribution
 from pdrom.tables.reduced_reruns import reduced_reruns
-from small_scene import SCENE, run_jobs, small_study
+from small_scene import NEEDED, SCENE, run_jobs, small_study
 
 PICTURES = ["frames", "error_against_r", "error_against_time"]
 
@@ -41,7 +41,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, str]:
     """A study and its results folder, with everything that the scene's files are made of."""
     root = tmp_path_factory.mktemp("own")
     study, results = small_study(root), str(root / "results")
-    run_jobs(study, results)
+    run_jobs(study, results, NEEDED, SCENE)
     return study, results
 
 

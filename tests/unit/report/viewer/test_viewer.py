@@ -17,16 +17,11 @@ from PIL import Image
 from playwright.sync_api import Locator, Page, sync_playwright
 
 from pdrom.core.errors import StorageError
+from pdrom.core.packed import LEVELS, pack_positions
 from pdrom.model.effects.entries import effect_config
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.report.viewer import page as writer
-from pdrom.report.viewer.pack import (
-    FRAMES,
-    LEVELS,
-    pack_positions,
-    pack_scene,
-    shown_region,
-)
+from pdrom.report.viewer.pack import FRAMES, pack_scene, shown_region
 from pdrom.report.viewer.page import write_page
 from pdrom.report.viewer.runs import ViewedRun, ViewedScene
 from pdrom.report.viewer.view import EYE, Y, rotation_to

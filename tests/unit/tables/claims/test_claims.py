@@ -24,6 +24,7 @@ from pdrom.tables.claims import (
     claims_rows,
     load_claims,
     timed_columns,
+    values_of,
 )
 from pdrom.tables.claims import evaluate as evaluated
 from pdrom.tables.claims.claims import claims
@@ -67,8 +68,10 @@ def tables() -> dict[str, pd.DataFrame]:
         ],
     )  # fmt: skip
     reruns["speedup"] = 2.0 / reruns.local_ms
+    twice = reruns.assign(relative_error_within_horizon=2.0 * reruns.relative_error_within_horizon)
     return {
         "reduced_reruns": reruns,
+        "heldout_reruns": pd.concat([reruns, twice, twice]).assign(horizon_frame=9),
         "breakeven": pd.DataFrame(
             {
                 "scene": ["a", "a", "b"],
@@ -513,12 +516,23 @@ def test_the_claims_are_those_of_the_paper():
     assert list(RULES) == [f"C{i}" for i in range(1, 13)]
 
 
-@pytest.mark.parametrize("name", RULES)
-def test_without_data_nothing_is_decided(name):
+def test_without_data_nothing_is_decided():
     """Every rule names columns that exist, and none passes for lack of rows."""
     empty = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
-    row = claims_rows({name: RULES[name]}, empty).iloc[0]
-    assert (row.claim, row.verdict, row.verdict_beyond) == (name, UNDECIDED, UNDECIDED)
+    rows = claims_rows(RULES, empty)
+    assert rows.claim.tolist() == list(RULES)
+    assert (rows[["verdict", "verdict_beyond"]] == UNDECIDED).all(axis=None)
+
+
+def test_held_out_motions_decide_by_their_median():
+    where = {"position_basis": ["full"]}
+    names = ("rerun_error", "heldout_rerun_error")
+    own, unseen = (values_of(rule(name, where=where), tables()) for name in names)
+    assert unseen.value.tolist() == (2.0 * own.value).tolist()
+    assert unseen.method.tolist() == own.method.tolist()
+    none = tables()
+    none["heldout_reruns"] = none["heldout_reruns"].assign(horizon_frame=0)
+    assert values_of(rule("heldout_rerun_error"), none).empty
 
 
 # Which cells a clock decides ----------------------------------------------------------------------

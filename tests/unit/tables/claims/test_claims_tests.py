@@ -15,41 +15,46 @@ SHARES = pd.DataFrame(
 )
 
 
-def tables():
+@pytest.fixture(scope="module")
+def tables() -> dict[str, pd.DataFrame]:
     empty = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
     return empty | {"local_share": SHARES}
 
 
-def test_what_a_test_found():
-    found = claims_tests.checked(outcome_rows(RULES, tables()))
+@pytest.fixture(scope="module")
+def outcomes(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
+    return outcome_rows(RULES, tables)
+
+
+def test_what_a_test_found(outcomes):
+    found = claims_tests.checked(outcomes)
     one = found[(found.claim == "C1") & (found.part == "beyond") & found.decides].iloc[0]
     assert (one.satisfied, one.of, one.close, one.verdict) == (2, 3, 2, MACHINE)
     assert one.margin == 4.0
     assert (one.least, one["median"], one.most) == (0.2, 0.8, 0.9)
 
 
-def test_a_test_without_rows_is_undecided():
-    found = outcome_rows(RULES, tables())
-    nothing = found[found.of == 0]
+def test_a_test_without_rows_is_undecided(outcomes):
+    nothing = outcomes[outcomes.of == 0]
     assert (nothing.verdict == UNDECIDED).all()
     assert nothing[["least", "median", "most"]].isna().all(axis=None)
 
 
-def test_the_tests_that_decide_give_the_verdicts():
-    tests = outcome_rows(RULES, tables())
-    for row in claims_rows(RULES, tables()).itertuples():
+def test_the_tests_that_decide_give_the_verdicts(tables, outcomes):
+    for row in claims_rows(RULES, tables).itertuples():
         for part, verdict in (("published", row.verdict), ("beyond", row.verdict_beyond)):
-            mine = tests[(tests.claim == row.claim) & (tests.part == part) & tests.decides]
+            mine = outcomes[(outcomes.claim == row.claim) & (outcomes.part == part)]
+            mine = mine[mine.decides]
             assert combined(list(mine.verdict)) == verdict
 
 
-def test_words_tell_the_tests_of_a_part_apart():
-    assert not outcome_rows(RULES, tables()).duplicated(["claim", "part", "what"]).any()
+def test_words_tell_the_tests_of_a_part_apart(outcomes):
+    assert not outcomes.duplicated(["claim", "part", "what"]).any()
 
 
 @pytest.mark.parametrize(("claim", "timed"), [("C2", False), ("C9", True)])
-def test_a_clock_has_its_say_where_times_are_compared(claim, timed):
-    said = outcome_rows(RULES, tables()).query("claim == @claim").head(1)
+def test_a_clock_has_its_say_where_times_are_compared(claim, timed, outcomes):
+    said = outcomes.query("claim == @claim").head(1)
     one, other = (
         claims_tests.without_times(claims_tests.checked(said.assign(satisfied=n)), ROOT)
         for n in (1, 2)

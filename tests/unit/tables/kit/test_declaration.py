@@ -136,7 +136,7 @@ def test_only_times_may_differ(tmp_path):
 def test_timing_columns_are_those_declared():
     found = timing_columns()
     assert found["local_share"] == ("local_ms", "assembly_ms", "global_ms", "local_share")
-    assert found["accuracy_cost"] == ("ms_per_frame", "pareto")
+    assert found["accuracy_cost"] == ("ms_per_frame", "pareto", "pareto_heldout")
     untimed = {"singular_values", "reconstruction_error", "sensitivity", "stability", "targets"}
     assert not untimed & set(found)
 

@@ -49,7 +49,7 @@ def rows_of(matrix: sparse.csr_array) -> Matrix:
 
 @compiled(nogil=True)
 def add_projections(tables, y, rhs):
-    """Add S^T W p(y) of all groups to ``rhs``, both rows of four, flat; the energy W(y)."""
+    """Add S^T W p(y) of all groups to ``rhs``, both padded vectors, flat; the energy W(y)."""
     kernels, preparing, second = tables
     y_place, rhs_place = y.ctypes.data, rhs.ctypes.data
     add_part(preparing[0], preparing[1], PREPARE, y_place, rhs_place)
@@ -59,7 +59,7 @@ def add_projections(tables, y, rhs):
 
 @compiled(nogil=True)
 def multiply(matrix, y, out):
-    """Overwrite ``out`` by the matrix times ``y``, both rows of four, flat."""
+    """Overwrite ``out`` by the matrix times ``y``, both padded vectors, flat."""
     indptr, indices, data = matrix
     for i in range(len(indptr) - 1):
         total = constant(0.0)

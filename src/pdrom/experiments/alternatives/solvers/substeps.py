@@ -22,7 +22,7 @@ from pdrom.model.scene import Scene
 class Substeps(NamedTuple):
     """Some substeps of a frame, in the order in which the compiled loops take them.
 
-    y, v : positions and velocities as padded rows of four, flat; changed in place
+    y, v : positions and velocities as padded vectors, flat; changed in place
     acceleration : (3,) m/s^2
     time_step : of a substep, s
     substeps, iterations : how many, and in each of them

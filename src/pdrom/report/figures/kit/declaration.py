@@ -80,9 +80,9 @@ class Declaration(Artifact):
 
         order = Order.model_validate(settings["order"])
         published = Path(order.published) if order.published else None
-        read = Results(self._folder(inputs), order.holdings, order.settings, published)
-        drawn = draw_figure(self, read, self.options.model_validate(order.options), order.full)
-        write_figure(drawn, order.title, outputs["pdf"], outputs["png"])
+        read = Results(self._folder(inputs), order.holdings, order.settings, published=published)
+        drawn = draw_figure(self, read, self.options.model_validate(order.options), full=order.full)
+        write_figure(drawn, order.title, outputs["pdf"], png=outputs["png"])
 
     def _folder(self, inputs: Mapping[str, Any]) -> str:
         """Folder of the results, which the inputs lie in; empty without any."""

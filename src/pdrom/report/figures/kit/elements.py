@@ -85,8 +85,10 @@ class ElementMap:
     ) -> None:
         """Draw the mesh at ``points`` (N, 3) m with ``values`` (e,) of its elements as colour."""
         if self.kind == "edge" and self.surface.open:
-            draw_surface(ax, points, self.surface, camera, "#FFFFFF", wire=0.0, contrast=0.15)
-            draw_lines(ax, points[self.cells], camera, colours.to_rgba(values))
+            draw_surface(
+                ax, points, self.surface, camera=camera, colour="#FFFFFF", wire=0.0, contrast=0.15
+            )
+            draw_lines(ax, points[self.cells], camera, colours=colours.to_rgba(values))
             return
         if self.kind == "edge":
             values, faces = _edges_to_vertices(self, values), True
@@ -95,7 +97,7 @@ class ElementMap:
         carried = self.face_values(values) if not faces else values[self.mesh.triangles].mean(1)
         rgb = colours.to_rgba(np.nan_to_num(carried))[:, :3]
         rgb[~np.isfinite(carried)] = (0.92, 0.91, 0.89)
-        draw_surface(ax, points, self.surface, camera, rgb, wire=0.12, contrast=0.35)
+        draw_surface(ax, points, self.surface, camera=camera, colour=rgb, wire=0.12, contrast=0.35)
 
 
 def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMap:

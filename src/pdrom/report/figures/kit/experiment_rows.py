@@ -34,7 +34,9 @@ def experiment_rows(
     for method in results.methods(options):
         path = results.path(RERUNS, scene, group, method)
         infos = choose_ranks(rerun_infos(path), options.ranks)
-        runs[method] = [run_panel(path, i, frame, colour, i.title).seen_by(camera) for i in infos]
+        runs[method] = [
+            run_panel(path, i, frame, colour=colour, title=i.title).seen_by(camera) for i in infos
+        ]
     everything = [panel for panels in runs.values() for panel in panels]
     window = shared_window(camera, full[0], everything)
     title = results.experiment_title(scene, group)

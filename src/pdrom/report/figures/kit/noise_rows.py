@@ -47,7 +47,10 @@ def noise_rows(
         for counts, kinds in _alike(table[table.method == method]).items():
             fail = dict(counts)
             panels = [
-                replace(run_panel(path, info, frames[0], colour, info.title), remark=fail[info.r])
+                replace(
+                    run_panel(path, info, frames[0], colour=colour, title=info.title),
+                    remark=fail[info.r],
+                )
                 for info in rerun_infos(path, f"{kinds[0]}/{method}")
                 if info.r in fail
             ]

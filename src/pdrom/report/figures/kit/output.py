@@ -43,16 +43,16 @@ def write_figure(
     title: str,
     pdf: str | os.PathLike[str],
     png: str | os.PathLike[str],
-    sealed: bool = True,
+    with_checksum: bool = True,
 ) -> None:
     """Write ``figure`` as PDF (embedded TrueType fonts, no dates) and as its PNG twin.
 
-    Either file appears only when complete. ``sealed`` as in `pdrom.core.store.atomic_path`.
+    Either file appears only when complete. ``with_checksum`` as in `pdrom.core.store.atomic_path`.
     """
     FigureCanvasAgg(figure)
     document = {"Title": title, "Creator": "pdrom", "CreationDate": None, "ModDate": None}
     with style.look():
-        with atomic_path(Path(pdf), sealed) as temporary:
+        with atomic_path(Path(pdf), with_checksum) as temporary:
             figure.savefig(temporary, format="pdf", dpi=RASTER_DPI, metadata=document)
-        with atomic_path(Path(png), sealed) as temporary:
+        with atomic_path(Path(png), with_checksum) as temporary:
             figure.savefig(temporary, format="png", dpi=PNG_DPI, metadata={"Title": title})

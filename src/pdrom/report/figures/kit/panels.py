@@ -116,14 +116,16 @@ def draw_run(
     shown, zoom = panel.zoomed(window), panel.scale(window)
     surface = mesh_surface(mesh)
     if not panel.failure:
-        draw_floor(ax, panel.positions, surface, camera, shown)
+        draw_floor(ax, panel.positions, surface, camera=camera, window=shown)
     if ghost is not None:
         edges = outline_edges(mesh.points, mesh.triangles)
         if not len(edges):  # a round body has no edges of its own
             edges = silhouette_edges(ghost, mesh.triangles, camera)
-        draw_outline(ax, ghost, edges, camera)
+        draw_outline(ax, ghost, edges, camera=camera)
     contrast = 0.5 if isinstance(panel.colour, np.ndarray) else 1.0
-    draw_surface(ax, panel.positions, surface, camera, panel.colour, contrast=contrast)
+    draw_surface(
+        ax, panel.positions, surface, camera=camera, colour=panel.colour, contrast=contrast
+    )
     set_window(ax, shown)
     lines = [text for text in (panel.failure, panel.remark) if text]
     if zoom > SLACK:

@@ -92,7 +92,7 @@ def rerun_errors(path: str, info: RerunInfo) -> np.ndarray:
 
 
 def choose_ranks(infos: list[RerunInfo], asked: tuple[int | str, ...]) -> list[RerunInfo]:
-    """Runs of the asked sizes, in this order, without repetition; all if none of them exists."""
+    """Runs of the requested sizes, in this order, none twice; all if none of them exists."""
     chosen: dict[str, RerunInfo] = {}
     for rank in asked:
         for info in infos:

@@ -43,7 +43,7 @@ def draw_reconstruction(results: Results, options: Reconstruction) -> Figure:
             style_note(ax, "projections are round-off:\nno relative error exists")
         ax.set_title(results.experiment_title(scene, group))
         ax.set_xlim(0, max(float(rows.r.max()), 1.0) * 1.02)
-    label_outer(axes, options.columns, "basis size r", "relative error")
+    label_outer(axes, options.columns, "basis size r", y="relative error")
     _legend(figure, results, methods, options.splits, reference_drawn)
     return figure
 

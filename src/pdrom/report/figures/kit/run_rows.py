@@ -109,7 +109,7 @@ def _draw_row(
     for i, panel in enumerate(drawn):
         ax = figure.add_axes((left + (i + 0.02) * step, low, 0.96 * step, high - low))
         ghost = None if panel.reference else row.ghosts[i]
-        draw_run(ax, row.mesh, panel, camera, row.windows[i], ghost)
+        draw_run(ax, row.mesh, panel, camera=camera, window=row.windows[i], ghost=ghost)
     if row.note:
         start = left + len(drawn) * step
         ax = figure.add_axes((start, low, 1.0 - start, high - low))

@@ -148,7 +148,7 @@ def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
     """Number of iterations beside each run that stops earlier; near ones share a label."""
     rows = found.points[(found.points.scene == scene) & (found.points.method == FEWER)]
     rows = rows.sort_values(TIME)
-    label_counts(ax, rows[TIME], rows[ERROR], rows.iterations, "K = ")
+    label_counts(ax, rows[TIME], rows[ERROR], counts=rows.iterations, prefix="K = ")
 
 
 def group_title(results: Results, scene: str) -> str:

@@ -11,6 +11,6 @@ run that is gone, the system ends those of a server that is gone, the client wha
 and a plain interpreter waits for the end of its run.
 """
 
-from pdrom.pipeline.warm.start import hold_pipe, interpreter, start_server
+from pdrom.pipeline.fork_server.start import hold_pipe, interpreter, start_server
 
 __all__ = ["hold_pipe", "interpreter", "start_server"]

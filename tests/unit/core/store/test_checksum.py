@@ -1,4 +1,4 @@
-"""Damage of any kind, in a result or in its seal, is noticed and leads to a new file."""
+"""Damage of any kind, in a result or in its checksum, is noticed and leads to a new file."""
 
 import errno
 import os
@@ -18,12 +18,12 @@ from pdrom.core.aside import damaged_set_aside
 from pdrom.core.errors import StorageError
 from pdrom.core.store import (
     check_file,
+    checksum_path,
     open_hdf5,
     provenance_of,
     read_table,
     read_text,
     require_intact,
-    seal_path,
     write_hdf5,
     write_table,
     write_text,
@@ -57,7 +57,7 @@ def read_one(path: Path) -> None:
 
 @pytest.fixture(scope="module", params=["r.h5", "r.csv", "r.tex"])
 def result(request, tmp_path_factory) -> Path:
-    """A small result with its seal; what a test does to it is undone by `noticed`."""
+    """A small result with its checksum; what a test does to it is undone by `noticed`."""
     path = tmp_path_factory.mktemp("result") / request.param
     write_one(path)
     assert check_file(path) == "intact"
@@ -66,33 +66,33 @@ def result(request, tmp_path_factory) -> Path:
 
 
 def hidden(path: Path) -> list[str]:
-    """Names of the files beside a result: none has its seal inside but HDF5."""
-    return [] if path.suffix == ".h5" else [seal_path(path).name]
+    """Names of the files beside a result: none has its checksum inside but HDF5."""
+    return [] if path.suffix == ".h5" else [checksum_path(path).name]
 
 
-def seal_of(path: Path) -> bytes:
-    """The bytes of a result's seal, inside it or beside it."""
-    return path.read_bytes()[:SIZE] if path.suffix == ".h5" else seal_path(path).read_bytes()
+def checksum_of(path: Path) -> bytes:
+    """The bytes of a result's checksum, inside it or beside it."""
+    return path.read_bytes()[:SIZE] if path.suffix == ".h5" else checksum_path(path).read_bytes()
 
 
-def places(seal: bytes) -> list[int]:
-    """Every byte of a seal, and some of the zeros that fill a block."""
-    told = len(seal.rstrip(b"\0"))
-    return [*range(told), *range(told, len(seal), 100)]
+def places(checksum: bytes) -> list[int]:
+    """Every byte of a checksum, and some of the zeros that fill a block."""
+    told = len(checksum.rstrip(b"\0"))
+    return [*range(told), *range(told, len(checksum), 100)]
 
 
-def noticed(path: Path, content: bytes | None = None, seal: bytes | None = None) -> bool:
-    """Whether other bytes of the file, or of its seal, are found.
+def noticed(path: Path, content: bytes | None = None, checksum: bytes | None = None) -> bool:
+    """Whether other bytes of the file, or of its checksum, are found.
 
     A job sets the file aside, any other reader leaves it where it is. Both are put back.
     """
     before = {p: p.read_bytes() for p in path.parent.iterdir()}
     if content is not None:
         path.write_bytes(content)
-    if seal is not None and path.suffix == ".h5":
-        path.write_bytes(seal + path.read_bytes()[SIZE:])
-    elif seal is not None:
-        seal_path(path).write_bytes(seal)
+    if checksum is not None and path.suffix == ".h5":
+        path.write_bytes(checksum + path.read_bytes()[SIZE:])
+    elif checksum is not None:
+        checksum_path(path).write_bytes(checksum)
     changed = {p: p.read_bytes() for p in path.parent.iterdir()}
     assert check_file(path) == "damaged"
     with pytest.raises(
@@ -147,47 +147,47 @@ def test_appended_bytes_are_noticed(result):
         assert noticed(result, result.read_bytes() + more)
 
 
-def test_a_changed_bit_in_every_byte_of_the_seal_is_noticed(result):
-    seal = seal_of(result)
-    for i in places(seal):
-        assert noticed(result, seal=flipped(seal, 8 * i + i % 8))
+def test_a_changed_bit_in_every_byte_of_the_checksum_is_noticed(result):
+    checksum = checksum_of(result)
+    for i in places(checksum):
+        assert noticed(result, checksum=flipped(checksum, 8 * i + i % 8))
 
 
-def test_every_cut_seal_is_noticed(result):
-    seal = seal_of(result)
-    # an HDF5 file that has lost its whole block is a file without a seal
-    cuts = [seal[:kept] for kept in places(seal) if kept or result.suffix != ".h5"]
-    for changed in (*cuts, seal + b"\n", seal.upper()):
-        assert noticed(result, seal=changed)
+def test_every_cut_checksum_is_noticed(result):
+    checksum = checksum_of(result)
+    # an HDF5 file that has lost its whole block is a file without a checksum
+    cuts = [checksum[:kept] for kept in places(checksum) if kept or result.suffix != ".h5"]
+    for changed in (*cuts, checksum + b"\n", checksum.upper()):
+        assert noticed(result, checksum=changed)
 
 
-def test_the_seal_tells_the_provenance_and_counts_without_it(result):
+def test_the_checksum_tells_the_provenance_and_counts_without_it(result):
     assert provenance_of(result)["pdrom_version"] == __version__
     if result.suffix == ".h5":
         return
-    seal = seal_path(result).read_bytes()
-    seal_path(result).write_bytes(seal.split(b"\n", 1)[1])
+    checksum = checksum_path(result).read_bytes()
+    checksum_path(result).write_bytes(checksum.split(b"\n", 1)[1])
     assert (check_file(result), provenance_of(result)) == ("intact", {})
-    seal_path(result).write_bytes(seal)
+    checksum_path(result).write_bytes(checksum)
 
 
 @given(data=st.data())
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_a_changed_bit_in_the_file_and_one_in_the_seal_are_noticed(result, data):
-    content, seal = result.read_bytes(), seal_of(result)
+def test_a_changed_bit_in_the_file_and_one_in_the_checksum_are_noticed(result, data):
+    content, checksum = result.read_bytes(), checksum_of(result)
     bit = data.draw(st.integers(0, 8 * len(content) - 1))
-    other = data.draw(st.none() | st.integers(0, 8 * len(seal) - 1))
-    changed = None if other is None else flipped(seal, other)
+    other = data.draw(st.none() | st.integers(0, 8 * len(checksum) - 1))
+    changed = None if other is None else flipped(checksum, other)
     assert noticed(result, flipped(content, bit), changed)
 
 
-def test_a_copy_without_its_seal_is_refused_and_left_alone_but_by_a_job(result, tmp_path):
+def test_a_copy_without_its_checksum_is_refused_and_left_alone_but_by_a_job(result, tmp_path):
     copy = Path(shutil.copy(result, tmp_path))
-    if copy.suffix == ".h5":  # the seal is inside
+    if copy.suffix == ".h5":  # the checksum is inside
         read_one(copy)
         assert check_file(copy) == "intact"
         return
-    assert check_file(copy) == "unsealed"
+    assert check_file(copy) == "no checksum"
     with pytest.raises(
         StorageError, match=r"its checksum \.r\..* is missing \(copied without it\?\)$"
     ):
@@ -205,13 +205,13 @@ def test_a_folder_that_is_copied_or_renamed_stays_intact(result, tmp_path):
     read_one(tmp_path / "copy" / result.name)
 
 
-def test_the_seal_of_another_result_does_not_fit(result, tmp_path):
-    """Equal content under another name has another seal, where the seal is not inside."""
+def test_the_checksum_of_another_result_does_not_fit(result, tmp_path):
+    """Equal content under another name has another checksum, where the checksum is not inside."""
     shutil.copy(result, tmp_path / "other")
     if result.suffix == ".h5":
         assert check_file(tmp_path / "other") == "intact"
         return
-    shutil.copy(seal_path(result), seal_path(tmp_path / "other"))
+    shutil.copy(checksum_path(result), checksum_path(tmp_path / "other"))
     assert check_file(tmp_path / "other") == "damaged"
 
 
@@ -260,20 +260,20 @@ def test_only_what_the_disk_lost_is_set_aside(tmp_path, monkeypatch, number, asi
 
 
 @pytest.mark.skipif(shutil.which("b2sum") is None, reason="b2sum is not installed")
-def test_the_seal_is_what_b2sum_checks(result):
+def test_the_checksum_is_what_b2sum_checks(result):
     folder = result.parent
     if result.suffix == ".h5":
         behind = result.read_bytes()[SIZE:]
         done = subprocess.run(["b2sum"], input=behind, capture_output=True, check=True)
-        assert done.stdout in seal_of(result)
+        assert done.stdout in checksum_of(result)
         return
-    command = ["b2sum", "--check", "--strict", seal_path(result).name]
+    command = ["b2sum", "--check", "--strict", checksum_path(result).name]
     assert subprocess.run(command, cwd=folder, check=False).returncode == 0
 
 
-def test_an_unsealed_file_that_replaces_a_sealed_one_takes_its_seal_along(tmp_path):
+def test_a_file_without_checksum_that_replaces_one_with_it_takes_the_checksum_along(tmp_path):
     path = tmp_path / "t.txt"
     write_text("result", path)
-    write_text("a user's own", path, sealed=False)
+    write_text("a user's own", path, with_checksum=False)
     assert list(tmp_path.iterdir()) == [path]
-    assert check_file(path) == "unsealed"
+    assert check_file(path) == "no checksum"

@@ -21,8 +21,8 @@ import time
 from contextlib import suppress
 from typing import NoReturn
 
-from pdrom.pipeline.warm.client import of_this_user
-from pdrom.pipeline.warm.request import Request
+from pdrom.pipeline.fork_server.client import of_this_user
+from pdrom.pipeline.fork_server.request import Request
 
 NUMBER = b"%20d"
 # Seconds that a client may take for its request, which it sends as soon as it is connected.

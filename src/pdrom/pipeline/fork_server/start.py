@@ -9,8 +9,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from pdrom.pipeline.warm.alone import PIPE
-from pdrom.pipeline.warm.client import ADDRESS, place_of
+from pdrom.pipeline.fork_server.alone import PIPE
+from pdrom.pipeline.fork_server.client import ADDRESS, place_of
 
 # Forks of a process that has loaded system frameworks are unsafe on macOS.
 SUPPORTED = sys.platform == "linux"
@@ -79,7 +79,7 @@ def start_server(python: str = sys.executable, libraries: Sequence[str] = LIBRAR
         listener.listen(64)
         numbers = (listener.fileno(), owner)
         subprocess.Popen(
-            [python, "-m", "pdrom.pipeline.warm.server", *map(str, numbers), *libraries],
+            [python, "-m", "pdrom.pipeline.fork_server.server", *map(str, numbers), *libraries],
             pass_fds=numbers,
             stdin=subprocess.DEVNULL,
             start_new_session=True,

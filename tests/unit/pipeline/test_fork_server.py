@@ -13,16 +13,16 @@ import psutil
 import pytest
 
 from pdrom.pipeline import run as running
-from pdrom.pipeline.warm import interpreter
-from pdrom.pipeline.warm.client import ADDRESS, of_this_user, place_of
-from pdrom.pipeline.warm.start import SUPPORTED
+from pdrom.pipeline.fork_server import interpreter
+from pdrom.pipeline.fork_server.client import ADDRESS, of_this_user, place_of
+from pdrom.pipeline.fork_server.start import SUPPORTED
 
 pytestmark = pytest.mark.skipif(not SUPPORTED, reason="no safe forks on this platform")
 
 # A process that starts the server, runs the shell commands of its arguments, and says how they end.
 OWNER = """
 import subprocess, sys
-from pdrom.pipeline.warm import start_server
+from pdrom.pipeline.fork_server import start_server
 start_server(libraries=["fractions"])
 for command in sys.argv[1:]:
     done = subprocess.run(command, shell=True)
@@ -141,8 +141,8 @@ signal.pause()
 # A process that is a server: its address, its patience; its owner holds its standard input.
 SERVER = """
 import os, socket, sys
-from pdrom.pipeline.warm.client import place_of
-from pdrom.pipeline.warm.server import Server, run
+from pdrom.pipeline.fork_server.client import place_of
+from pdrom.pipeline.fork_server.server import Server, run
 listener = socket.socket(socket.AF_UNIX)
 listener.bind(place_of(sys.argv[1]))
 listener.listen()
@@ -274,7 +274,7 @@ def test_a_plain_interpreter_ends_with_the_run(tmp_path):
     code = f"""
 import subprocess
 from pathlib import Path
-from pdrom.pipeline.warm import hold_pipe
+from pdrom.pipeline.fork_server import hold_pipe
 hold_pipe(Path({str(tmp_path / "pipe")!r}))
 subprocess.run({f"{interpreter()} {path}; echo its end"!r}, shell=True)
 """

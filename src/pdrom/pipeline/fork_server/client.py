@@ -61,8 +61,8 @@ def place_of(name: str) -> bytes:
 
 def of_this_user(connection: socket.socket) -> bool:
     """Whether the process at the other end is this user's; a name has no permissions of its own."""
-    told = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
-    _process, user, _group = struct.unpack("3i", told)
+    reported = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
+    _process, user, _group = struct.unpack("3i", reported)
     return bool(user == os.geteuid())
 
 

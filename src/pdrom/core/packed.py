@@ -1,0 +1,39 @@
+"""Arrays as plain data for scripts of a page: text in JSON, or changes of quantised positions."""
+
+import base64
+import zlib
+from typing import Any
+
+import numpy as np
+
+LEVELS = 65535  # of a quantised coordinate, over the run's bounding box
+
+
+def pack_text(values: np.ndarray) -> str:
+    """Bytes of an array, compressed, in base 64."""
+    return base64.b64encode(zlib.compress(np.ascontiguousarray(values).tobytes(), 9)).decode()
+
+
+def pack_array(values: np.ndarray, kind: str) -> dict[str, Any]:
+    """An array of any shape; ``kind`` is "f8", "f4", "u4" or "u1", little-endian."""
+    shape, data = list(np.shape(values)), np.asarray(values).astype(f"<{kind}")
+    return {"kind": kind, "shape": shape, "data": pack_text(data)}
+
+
+def pack_positions(positions: np.ndarray) -> dict[str, Any]:
+    """Positions (F, N, 3) as steps of a 65535th of their bounding box, and only their changes.
+
+    A coordinate is wrong by half a step at most; changes from frame to frame, modulo 2^16, compress
+    better than the positions.
+    """
+    low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
+    step = np.where(high > low, (high - low) / LEVELS, 1.0)
+    levels = np.round((positions - low) / step).astype(np.int64)
+    changes = np.diff(levels, axis=0, prepend=0) % (LEVELS + 1)
+    return {
+        "frames": len(positions),
+        "vertices": positions.shape[1],
+        "low": low.tolist(),
+        "step": step.tolist(),
+        "changes": pack_text(changes.astype("<u2")),
+    }

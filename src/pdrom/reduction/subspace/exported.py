@@ -1,0 +1,179 @@
+"""A model of a position subspace as plain data, for the engine of the page (`engine.js`).
+
+The engine makes strains and the reduced system from basis, rest shape and samples, by the formulas
+of `pdrom.reduction.subspace`; what is here is exact to the last bit unless it says otherwise.
+"""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from pdrom.core.errors import SceneError, choices
+from pdrom.core.packed import pack_array
+from pdrom.model.constraints.base import ConstraintGroup, StencilGroup
+from pdrom.model.effects.floor import Floor
+from pdrom.model.effects.hold import Pins
+from pdrom.model.scene import Scene
+from pdrom.reduction.subspace.columns import Columns
+from pdrom.reduction.subspace.interpolation import Interpolation
+from pdrom.reduction.subspace.model import Samples, SubspaceModel
+from pdrom.reduction.subspace.space import (
+    PROBES,
+    ReducedSpace,
+    coordinates,
+    probe_vertices,
+    reduced_state,
+)
+
+# Numbers of a basis above which only the rows that an iteration needs are doubles.
+DOUBLES = 60_000
+MANIFOLDS = ("clamped", "length")
+
+
+def export_scene(scene: Scene) -> dict[str, Any]:
+    """Facts of a scene that all its models share.
+
+    Raises
+    ------
+    SceneError
+        The engine has no kernel for a group, or does not know an effect.
+    """
+    _require_known(scene)
+    floors = [contact.config.height for contact in scene.contacts]
+    return {
+        "timeStep": scene.config.time_step,
+        "iterations": scene.config.iterations,
+        "frames": scene.config.frames,
+        "points": pack_array(scene.mesh.points, "f8"),
+        "masses": pack_array(scene.masses, "f8"),
+        "floors": floors,
+        "probes": PROBES,
+        "holds": [
+            {
+                "name": b.side or b.name,
+                "from": b.config.start,
+                "until": b.config.until,
+                "vertices": b.vertices.tolist(),
+            }
+            for b in scene.boundaries
+        ],
+        "groups": {group.name: _export_group(group) for group in scene.groups},
+    }
+
+
+def _require_known(scene: Scene) -> None:
+    for effect, known in (
+        *(
+            (group, isinstance(group, StencilGroup) and group.manifold in MANIFOLDS)
+            for group in scene.groups
+        ),
+        *((contact, isinstance(contact, Floor)) for contact in scene.contacts),
+        *((boundary, isinstance(boundary, Pins)) for boundary in scene.boundaries),
+    ):
+        if not known:
+            allowed = ("spring", "strain", "tetrahedron_strain", "deformation_gradient")
+            raise SceneError(
+                f"scene '{scene.config.name}': the page's engine has no '{effect.name}'"
+                f"{choices(effect.name, (*allowed, 'floor', 'pins'))}"
+            )
+    if scene.config.anderson_window:
+        raise SceneError(
+            f"scene '{scene.config.name}': anderson_window = {scene.config.anderson_window}: the "
+            "page's engine has no acceleration (allowed: 0)"
+        )
+
+
+def _export_group(group: ConstraintGroup) -> dict[str, Any]:
+    clamped = group.manifold == "clamped"
+    return {
+        "kind": group.manifold,
+        "rows": group.rows_per_element,
+        "range": group.kernel_parameters().tolist() if clamped else None,
+        "elements": group.elements,
+    }
+
+
+def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str, Any]:
+    """Columns of a subspace with everything that depends on nothing else.
+
+    Parameters
+    ----------
+    needed : vertices (n,) whose rows an iteration uses; those are doubles in any case
+    """
+    space = ReducedSpace(scene, columns, [])
+    start = reduced_state(scene, columns)
+    exact = columns.B.size <= DOUBLES
+    rows = np.unique(np.concatenate([needed, probe_vertices(scene.mesh.vertices)]))
+    return {
+        "B": pack_array(columns.B, "f8" if exact else "f4"),
+        "exact": None
+        if exact
+        else {
+            "vertices": pack_array(rows, "u4"),
+            "rows": pack_array(columns.B[rows], "f8"),
+        },
+        "free": columns.free.tolist(),
+        "atoms": [atom.tolist() for atom in columns.atoms],
+        "atomColumns": [own.tolist() for own in columns.atom_columns],
+        "inertia": pack_array(space.inertia_matrix, "f8"),
+        "positions": pack_array(start.positions, "f8"),
+        "velocities": pack_array(start.velocities, "f8"),
+        "forces": [
+            {
+                "constant": pack_array(constant, "f8"),
+                "rate": pack_array(np.atleast_2d(rate), "f8"),
+            }
+            for constant, rate in space.forces
+        ],
+    }
+
+
+def export_model(scene: Scene, model: SubspaceModel) -> dict[str, Any]:
+    """Samples of each group of a model."""
+    return {
+        "evaluated": model.elements_evaluated(scene),
+        "groups": {
+            group.name: _export_samples(group, model.samples.get(group.name, Samples()))
+            for group in scene.groups
+        },
+    }
+
+
+def _export_samples(group: ConstraintGroup, chosen: Samples | Interpolation) -> dict[str, Any]:
+    elements = np.arange(group.elements) if chosen.elements is None else chosen.elements
+    stencil = _stencil(group)[elements]
+    if isinstance(chosen, Samples):
+        factors = np.ones(len(elements)) if chosen.factors is None else chosen.factors
+        weights = group.weights[elements] * factors
+        return {"stencil": pack_array(stencil, "u4"), "weights": pack_array(weights, "f8")}
+    if chosen.residual or chosen.lower is not None:
+        raise SceneError(
+            f"group '{group.name}': the page's engine interpolates projections without bounds only"
+        )
+    arrays = ("operator", "modes", "offset", "stiffness")
+    return {"stencil": pack_array(stencil, "u4")} | {
+        name: pack_array(getattr(chosen, name), "f8") for name in arrays
+    }
+
+
+def _stencil(group: ConstraintGroup) -> np.ndarray:
+    assert isinstance(group, StencilGroup)  # others are refused
+    return group.stencil
+
+
+def needed_vertices(scene: Scene, models: Iterable[SubspaceModel]) -> np.ndarray:
+    """Vertices (n,) of all elements that any of the models samples."""
+    found = [np.empty(0, np.int64)]
+    for model in models:
+        for group in scene.groups:
+            elements = model.samples.get(group.name, Samples()).elements
+            chosen = np.arange(group.elements) if elements is None else elements
+            found.append(_stencil(group)[chosen].ravel())
+    return np.unique(np.concatenate(found))
+
+
+def trained_box(scene: Scene, columns: Columns, reference: np.ndarray) -> np.ndarray:
+    """Least and largest coordinates (2, K, 3) of a run (F + 1, N, 3), projected on a subspace."""
+    frames = [coordinates(columns, scene.masses, q) for q in reference]
+    return np.stack([np.min(frames, axis=0), np.max(frames, axis=0)])

@@ -1,0 +1,400 @@
+"use strict";
+// The page's own script: choices, handles, the loop of frames, and what is said about them.
+(() => {
+  const { Drawing, Layer, ball, colour } = pdromDrawing;
+  const SPEED = 0.03; // a handle moves at most this part of the scene's size a frame
+  const REACH = 26; // CSS pixels from a handle's vertex within which a pointer takes it
+  const KEY_STEP = 0.04; // of the scene's size
+  const ROOM = 1.35; // of the picture about the shape at rest
+  const LAG = 0.1; // part of its way to the shape that the camera goes in a frame
+  const SAMPLE = 400; // vertices that the size of the shape is looked at, at most
+  const TOLD = 200; // ms between two updates of the numbers
+  const METHODS = { elements: "whole elements", joint: "joint rows" };
+  const at = (id) => document.getElementById(id);
+  const scenes = JSON.parse(at("scenes").textContent);
+  const loaded = new Map(); // scene -> promise of its unpacked file
+  let waiting = null; // takes the file that is being loaded
+  let shown = null; // {data, frames, bases}: the scene
+  let run = null, companion = null, apart = null, handles = [], times = [], estimateSquares = 0, alarmed = "", dragging = false;
+  let playing = true, told = 0, due = 0, drawing = null, layers = {};
+
+  window.pdromLive = (content) => waiting(content);
+
+  function load(index) {
+    if (!loaded.has(index)) loaded.set(index, new Promise((resolve, reject) => {
+      waiting = (content) => resolve(content);
+      const script = document.createElement("script");
+      script.src = scenes[index].file;
+      script.onerror = () => reject(new Error(`${scenes[index].file}: missing; it lies beside this page`));
+      document.head.append(script);
+    }).then(async (content) => {
+      const { shown: { full, ...rest }, ...others } = content;
+      const [data, frames] = await Promise.all([
+        pdromEngine.unpacked({ ...others, shown: rest }), pdromEngine.frames(full)]);
+      return { data, frames, bases: new Map() };
+    }));
+    return loaded.get(index);
+  }
+
+  function basis(number) {
+    if (!shown.bases.has(number)) shown.bases.set(number, new pdromEngine.Basis(shown.data, shown.data.bases[number]));
+    return shown.bases.get(number);
+  }
+
+  // ---- choices ----
+
+  function fill(id, values, words = String) {
+    const select = at(id), before = select.value;
+    select.replaceChildren(...values.map((value) => new Option(words(value), value)));
+    if (values.map(String).includes(before)) select.value = before;
+    select.disabled = values.length < 2;
+  }
+
+  const distinct = (values) => [...new Set(values)];
+
+  function chosen() {
+    const models = shown.data.models.filter((model) => model.family !== "companion");
+    fill("method", distinct(models.map((model) => model.family)), (family) => METHODS[family]);
+    const ofMethod = models.filter((model) => model.family === at("method").value);
+    fill("k", distinct(ofMethod.map((model) => model.k)));
+    const ofSize = ofMethod.filter((model) => String(model.k) === at("k").value);
+    fill("tau", ofSize.filter((model) => model.tau).map((model) => model.tau), (tau) => String(tau));
+    at("tolerance").hidden = at("tau").options.length === 0;
+    return ofSize.find((model) => !model.tau || String(model.tau) === at("tau").value);
+  }
+
+  async function scene() {
+    document.body.dataset.ready = "no";
+    try {
+      shown = await load(Number(at("scene").value));
+    } catch (error) {
+      say(error.message, true);
+      return;
+    }
+    at("iterations").value = shown.data.iterations;
+    const { models } = shown.data, sizes = distinct(models.filter((m) => m.tau).map((m) => m.k));
+    chosen();
+    if (sizes.includes(20)) at("k").value = 20;
+    chosen();
+    if ([...at("tau").options].some((option) => option.value === "0.01")) at("tau").value = 0.01;
+    at("estimate").disabled = !models.some((model) => model.family === "companion");
+    start();
+  }
+
+  // ---- a run ----
+
+  function start() {
+    const model = chosen(), { data } = shown;
+    run = new pdromEngine.Run(data, model, basis(model.basis));
+    const beside = data.models.find((other) => other.family === "companion");
+    companion = at("estimate").checked && beside ? new pdromEngine.Run(data, beside, basis(beside.basis)) : null;
+    apart = companion && new pdromEngine.Distance(run.basis, companion.basis);
+    iterations();
+    handles = run.basis.atoms.map((vertices, number) => ({ number, vertices, own: false, held: true, offset: [0, 0, 0],
+      wanted: [0, 0, 0], name: nameOf(vertices, number) }));
+    times = [];
+    estimateSquares = 0;
+    alarmed = "";
+    measured = "";
+    make();
+    buttons();
+    at("elements").textContent = `${run.elements} of ${all()}`;
+    const parts = [`${data.title}.`, model.family === "joint"
+      ? `Joint rows: ${model.r} modes of the projections, interpolated at ${run.elements} elements (the preprint's way).`
+      : "Whole elements with weights, sampled so that the equations keep their energy.", drawing.accelerated
+      ? "Drawn by WebGL2." : "This browser has no WebGL2: the picture is drawn on the processor, and slower."];
+    at("about").textContent = parts.join(" ");
+    playing = true;
+    pressed();
+    document.body.dataset.ready = "yes";
+  }
+
+  const all = () => Object.values(shown.data.groups).reduce((total, group) => total + group.elements, 0);
+
+  function nameOf(vertices, number) {
+    const hold = shown.data.holds.find((each) => each.vertices.includes(vertices[0]));
+    return hold ? hold.name : `handle ${number + 1}`;
+  }
+
+  function iterations() {
+    const count = Number(at("iterations").value);
+    at("iterationsShown").textContent = count;
+    run.iterations = count;
+  }
+
+  // Atom -> offset in the coming frame: what the scene holds, and what the reader does.
+  function held() {
+    const scheduled = run.scheduled(run.frame), result = new Map();
+    for (const handle of handles) {
+      if (!handle.own) handle.held = scheduled.has(handle.number);
+      if (!handle.held) continue;
+      follow(handle);
+      result.set(handle.number, handle.offset);
+    }
+    return result;
+  }
+
+  // A handle goes towards where the reader wants it, at a bounded speed.
+  function follow(handle) {
+    const most = SPEED * drawing.camera.radius, way = handle.wanted.map((x, i) => x - handle.offset[i]);
+    const length = Math.hypot(...way), part = length > most ? most / length : 1;
+    handle.offset = handle.offset.map((x, i) => x + part * way[i]);
+  }
+
+  function frame() {
+    const before = performance.now(), where = held();
+    run.step(where);
+    const own = performance.now() - before;
+    times.push(own);
+    if (times.length > 60) times.shift();
+    if (companion) {
+      companion.step(where);
+      estimateSquares += apart.of(run.z, companion.z) ** 2;
+    }
+    alarmed = alarm();
+    if (!run.finite) playing = false;
+    if (!playing) pressed();
+  }
+
+  const mine = () => handles.some((handle) => handle.own);
+
+  // ---- the monitor ----
+
+  const estimated = () => Math.sqrt(estimateSquares / run.frame) / shown.data.guard.motion;
+
+  function alarm() {
+    const { guard } = shown.data;
+    if (!run.finite) return "the run is no longer finite";
+    const out = run.distance();
+    if (out > guard.margin) return "the shape is unlike all that was trained";
+    if (size() > guard.extent) return "the shape is larger than any that was trained";
+    if (companion && run.frame > 0 && !(estimated() <= guard.threshold)) return "the estimated error is too large";
+    return "";
+  }
+
+  // Positions of some vertices.
+  function sampled() {
+    const { vertices } = shown.data.shown, every = Math.ceil(vertices.length / SAMPLE);
+    if (!run.sample) run.sample = vertices.filter((_, i) => i % every === 0);
+    return run.basis.lift(run.z, run.sample, new Float64Array(3 * run.sample.length));
+  }
+
+  function size() {
+    const q = sampled();
+    let largest = 0;
+    for (let axis = 0; axis < 3; axis++) {
+      let low = Infinity, high = -Infinity;
+      for (let i = axis; i < q.length; i += 3) {
+        low = Math.min(low, q[i]);
+        high = Math.max(high, q[i]);
+      }
+      largest = Math.max(largest, high - low);
+    }
+    return largest;
+  }
+
+  // ---- pictures ----
+
+  // Layers of a run: its surface, the recorded run as wires, the handles, the floor.
+  function make() {
+    const { data, frames } = shown, { vertices, triangles } = data.shown, K = run.K, n = vertices.length;
+    const B = new Float32Array(n * K);
+    vertices.forEach((v, i) => B.set(run.basis.B.subarray(K * v, K * (v + 1)), K * i));
+    if (shown !== make.of) drawing.camera.reset();
+    make.of = shown;
+    dragging = false;
+    drawing.clear();
+    const [centre, radius] = ball([frames[0]]);
+    drawing.camera.look(centre, ROOM * radius);
+    layers = { body: new Layer({ triangles, n, colour: colour("--surface") }),
+      ghost: new Layer({ triangles, n, look: "wires", colour: colour("--ghost"), alpha: 0.35 }) };
+    layers.body.lifted(B, K);
+    run.held = Uint32Array.from(handles.flatMap((handle) => handle.vertices));
+    layers.handles = new Layer({ n: run.held.length, look: "points", points: run.held.map((_, i) => i),
+      colour: colour("--handle") });
+    for (const height of data.floors) layers.floor = floor(height);
+    Object.values(layers).forEach((layer) => drawing.add(layer));
+    show();
+  }
+
+  function floor(height) {
+    const [[x, , z], radius] = ball(shown.frames), r = 1.2 * radius;
+    const layer = new Layer({ triangles: Uint32Array.of(0, 1, 2, 0, 2, 3), n: 4, colour: colour("--floor"), alpha: 0.3 });
+    layer.set(Float32Array.of(x - r, height, z - r, x + r, height, z - r, x + r, height, z + r, x - r, height, z + r));
+    return layer;
+  }
+
+  // The camera goes with the shape, but not while a reader drags a part of it.
+  function followShape() {
+    if (dragging || !run.finite) return;
+    const q = sampled(), centre = [0, 0, 0];
+    for (let i = 0; i < q.length; i++) centre[i % 3] += 3 * q[i] / q.length;
+    const { camera } = drawing;
+    camera.look(camera.centre.map((x, i) => x + LAG * (centre[i] - x)), camera.radius);
+  }
+
+  function show() {
+    layers.body.move(Float32Array.from(run.z));
+    followShape();
+    layers.handles.set(run.basis.lift(run.z, run.held, new Float32Array(3 * run.held.length)));
+    const recorded = recordedAt(run.frame);
+    layers.ghost.visible = at("ghost").checked && recorded !== null;
+    if (recorded) layers.ghost.set(recorded);
+    drawing.redraw();
+  }
+
+  // Positions of the recorded run at a frame, between two stored ones if need be; null after its end.
+  function recordedAt(frame) {
+    const { frames, data: { shown: { stride } } } = shown, place = frame / stride, first = Math.floor(place);
+    if (place > frames.length - 1) return null;
+    const part = place - first;
+    if (part === 0) return frames[first];
+    return frames[first].map((x, i) => (1 - part) * x + part * frames[first + 1][i]);
+  }
+
+  // ---- words ----
+
+  let measured = "";
+
+  function say(text, bad) {
+    at("verdict").classList.toggle("bad", bad);
+    if (at("verdict").textContent !== text) at("verdict").textContent = text;
+  }
+
+  function percent(x) {
+    if (!Number.isFinite(x)) return "no number";
+    return `${100 * x < 100 ? (100 * x).toPrecision(2) : Math.round(100 * x)} %`;
+  }
+
+  function tell() {
+    if (alarmed) say(`Outside the trained range: ${alarmed}.`, true);
+    else say("Inside the trained range.", false);
+    const { data } = shown, sorted = [...times].sort((a, b) => a - b), recorded = recordedAt(run.frame);
+    at("frame").textContent = `${run.frame}, ${(run.frame * data.timeStep).toFixed(2)} s`;
+    at("ms").textContent = sorted.length ? `${sorted[sorted.length >> 1].toFixed(2)} ms` : "";
+    if (recorded && !mine() && run.frame % data.shown.stride === 0) measured = percent(difference(recorded));
+    at("distance").textContent = mine() ? "your motion was not recorded" : recorded ? measured : "the recording has ended";
+    at("estimated").textContent = companion && run.frame ? percent(estimated()) : "not estimated";
+    at("outside").textContent = percent(run.distance());
+    document.body.dataset.frame = run.frame;
+    at("handles").querySelectorAll("button.hold").forEach((button, i) => {
+      const { held: on, name } = handles[i], text = on ? `Let go of ${name}` : `Hold ${name}`;
+      button.classList.toggle("on", on);
+      if (button.textContent !== text) button.textContent = text;
+    });
+  }
+
+  // Distance of the drawn surface from the recorded one over its mean motion, as the study's tables have it.
+  function difference(recorded) {
+    const { vertices } = shown.data.shown, q = run.basis.lift(run.z, vertices, new Float64Array(3 * vertices.length));
+    let square = 0;
+    for (let i = 0; i < q.length; i++) square += (q[i] - recorded[i]) ** 2;
+    return Math.sqrt(square * shown.data.masses.length / vertices.length) / shown.data.guard.motion;
+  }
+
+  // ---- handles ----
+
+  function take(handle) {
+    const before = handle.held && run.taken.has(handle.number);
+    handle.own = true;
+    handle.held = true;
+    if (!before) Object.assign(handle, { offset: [0, 0, 0], wanted: [0, 0, 0] });
+  }
+
+  function grab(x, y, looking) {
+    if (!run) return null;
+    const q = layers.handles.positions;
+    let best = REACH, found = -1;
+    run.held.forEach((_, i) => {
+      const [u, v] = drawing.seen([q[3 * i], q[3 * i + 1], q[3 * i + 2]]), away = Math.hypot(u - x, v - y);
+      if (away < best) [best, found] = [away, i];
+    });
+    if (found < 0) return null;
+    const handle = handles.find((each) => each.vertices.includes(run.held[found]));
+    if (looking) return handle;
+    take(handle);
+    dragging = true;
+    resume();
+    const point = [...q.slice(3 * found, 3 * found + 3)];
+    return {
+      move: (right, down) => { handle.wanted = drawing.moved(right, down, point).map((d, i) => d + handle.wanted[i]); },
+      end: () => { dragging = false; },
+    };
+  }
+
+  function push(handle, event) {
+    const [x, y, z] = drawing.camera.axes(), step = KEY_STEP * drawing.camera.radius;
+    const ways = { ArrowLeft: [x, -1], ArrowRight: [x, 1], ArrowUp: [y, 1], ArrowDown: [y, -1], PageUp: [z, -1], PageDown: [z, 1] };
+    if (!ways[event.key]) return;
+    event.preventDefault();
+    take(handle);
+    resume();
+    const [way, sign] = ways[event.key];
+    handle.wanted = handle.wanted.map((w, i) => w + sign * step * way[i]);
+  }
+
+  function buttons() {
+    at("handles").replaceChildren(...handles.flatMap((handle) => {
+      const mover = document.createElement("button"), holder = document.createElement("button");
+      mover.type = holder.type = "button";
+      mover.textContent = `Handle ${handle.name}`;
+      mover.setAttribute("aria-label", `Handle ${handle.name}: arrow keys move it, page up and page down away and towards you`);
+      mover.addEventListener("keydown", (event) => push(handle, event));
+      holder.className = "hold";
+      holder.addEventListener("click", () => {
+        if (handle.held) Object.assign(handle, { own: true, held: false });
+        else take(handle);
+        resume();
+        tell();
+      });
+      return [mover, holder];
+    }));
+  }
+
+  // ---- the loop ----
+
+  function pressed() {
+    at("play").textContent = playing ? "Pause" : "Play";
+  }
+
+  function resume() {
+    if (!run.finite) return;
+    playing = true;
+    pressed();
+  }
+
+  // A frame of the run takes its own time step, on faster screens too; slower ones show it slowly.
+  function beat(now) {
+    requestAnimationFrame(beat);
+    if (!run) return;
+    if (playing && now >= due) {
+      due = Math.max(due + 1000 * shown.data.timeStep, now) - 4;
+      frame();
+      show();
+    }
+    if (now - told > TOLD) {
+      told = now;
+      tell();
+    }
+  }
+
+  drawing = new Drawing(at("picture"), { grab, plain: location.hash === "#plain" });
+  fill("scene", scenes.map((_, i) => i), (i) => scenes[i].scene.replaceAll("_", " "));
+  at("choice").addEventListener("submit", (event) => event.preventDefault());
+  at("scene").addEventListener("change", scene);
+  for (const id of ["method", "k", "tau", "estimate"]) at(id).addEventListener("change", start);
+  at("ghost").addEventListener("change", show);
+  at("iterations").addEventListener("input", iterations);
+  at("again").addEventListener("click", start);
+  at("play").addEventListener("click", () => {
+    playing = !playing && run.finite;
+    pressed();
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => run && make());
+  const named = scenes.findIndex(({ scene: name }) => location.search.slice(1).split("&").includes(name));
+  if (scenes.length === 0) say("No scene of this study has models: its configuration lists none of them.", true);
+  else {
+    at("scene").value = Math.max(named, 0);
+    scene().then(() => requestAnimationFrame(beat));
+  }
+})();

@@ -1,0 +1,83 @@
+"""The page on which reduced models run: one file, and beside it a file of models for each scene."""
+
+import json
+import re
+from pathlib import Path
+
+from pdrom.artifact.artifact import Artifact, declare
+from pdrom.artifact.reads import Every, ProjectFile
+from pdrom.core.errors import StorageError
+from pdrom.core.paths import LIVE_MODEL, LIVE_PAGE, File
+from pdrom.core.store import read_text, require_intact, write_text
+
+HEAD = re.compile(r'pdromLive\(\{"format":1,"scene":("\w+"),"title":("(?:[^"\\]|\\.)*"),')
+
+
+def _write(
+    models: list[File],
+    html: Path,
+    style: Path,
+    engine: Path,
+    drawing: Path,
+    script: Path,
+    out: File,
+) -> None:
+    """Write the page; it loads the models of a scene when a reader chooses it.
+
+    Raises
+    ------
+    StorageError
+        A file of models is damaged, or none.
+    """
+    parts = {"STYLE": style, "ENGINE": engine, "DRAWING": drawing, "SCRIPT": script}
+    texts = {name: path.read_text("utf-8") for name, path in parts.items()}
+    scenes = [_listed(file, Path(out.path).parent) for file in models]
+    texts["SCENES"] = safe_json(scenes)
+    write_text(filled(html.read_text("utf-8"), texts), out.path)
+
+
+def _listed(file: File, folder: Path) -> dict[str, str]:
+    require_intact(file.path)
+    head = HEAD.match(read_text(file.path))
+    if head is None:
+        raise StorageError(f"{file.path}: no models for the page, or of another version")
+    scene, title = map(json.loads, head.groups())
+    return {"scene": scene, "title": title, "file": str(Path(file.path).relative_to(folder))}
+
+
+def safe_json(value: object) -> str:
+    """JSON in which no text ends the element that holds it, or opens a comment."""
+    return json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def filled(template: str, parts: dict[str, str]) -> str:
+    """Return a template with its ``{{NAME}}`` replaced; what is filled in is not looked at."""
+    before, *rest = template.split("{{")
+    pieces = [before]
+    for piece in rest:
+        name, _, after = piece.partition("}}")
+        pieces += [parts[name], after]
+    return "".join(pieces)
+
+
+def _asset(name: str) -> ProjectFile:
+    return ProjectFile(f"src/pdrom/report/live/{name}")
+
+
+live_page = declare(
+    Artifact(
+        "live_page",
+        "Page on which models run",
+        {
+            "models": Every(LIVE_MODEL),
+            "html": _asset("live.html"),
+            "style": _asset("live.css"),
+            "engine": _asset("engine.js"),
+            "drawing": _asset("drawing.js"),
+            "script": _asset("live.js"),
+        },
+        {"out": LIVE_PAGE},
+        _write,
+    ),
+    "out",
+)

@@ -1,0 +1,47 @@
+"""Scripts of the page without a browser: by the Node.js that Playwright's wheel brings."""
+
+import json
+import subprocess
+from pathlib import Path
+from typing import Any
+
+from playwright._impl._driver import compute_driver_executable
+
+from places import ROOT
+
+ENGINE = ROOT / "src/pdrom/report/live/engine.js"
+# Unpacks the file of models, then evaluates the script with what was given.
+MAIN = """
+const { readFileSync } = require("fs");
+const given = JSON.parse(readFileSync(0, "utf8"));
+const engine = new Function(readFileSync(given.engine, "utf8") + "; return pdromEngine;")();
+let content = null;
+if (given.file) new Function("pdromLive", readFileSync(given.file, "utf8"))((c) => { content = c; });
+const { shown, ...others } = content || {};
+const script = new Function("engine", "data", "given", given.script);
+const plain = (_, x) => (ArrayBuffer.isView(x) ? Array.from(x) : x);
+engine.unpacked(others).then((data) => console.log(JSON.stringify(script(engine, data, given), plain)));
+"""
+RUN = """
+const all = data.models.map((model) => {
+  const run = new engine.Run(data, model, new engine.Basis(data, data.bases[model.basis]));
+  const coordinates = [Array.from(run.z)];
+  for (let frame = 0; frame < given.frames; frame++) {
+    run.step();
+    coordinates.push(Array.from(run.z));
+  }
+  return { family: model.family, elements: run.elements, distance: run.distance(), coordinates };
+});
+return all;
+"""
+
+
+def evaluate(script: str, file: Path | None = None, **given: Any) -> Any:
+    """Value that a script returns, with the engine, the unpacked models and what is given."""
+    node = compute_driver_executable()[0]
+    data = {"engine": str(ENGINE), "file": file and str(file), "script": script, **given}
+    done = subprocess.run(
+        [node, "-e", MAIN], input=json.dumps(data), capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
