@@ -5,8 +5,8 @@ The source names a number by where it stands in a table::
     \val{reduced_reruns|scene=bar_release|method=block-deim|r=20|relative_error_within_horizon}
 
 (table, any number of filters, the column; optionally ``max``, ``min``, ``median``, ``count`` or
-``distinct``, the number of different values, of the rows that match). A filter is column=value,
-column!=value, or column<=number. The keys are found in the source, resolved here, and written as
+``distinct``, the number of different values, of the rows that match). A filter is column=value
+or column!=value. The keys are found in the source, resolved here, and written as
 one TeX macro each. No number is typed, and none is generated that the text does not use.
 """
 
@@ -22,7 +22,7 @@ from pdrom.core.errors import PaperError
 from pdrom.report.words.text import escape
 
 _KEY = re.compile(r"\\val\{([^{}]*)\}")
-_FILTER = re.compile(r"(.*?)(=|!=|<=)(.*)")
+_FILTER = re.compile(r"(.*?)(!?=)(.*)")
 Filter = tuple[str, str, str]  # column, sign, value
 MISSING = "n/a"
 _COUNTS = ("count", "distinct")
@@ -126,8 +126,6 @@ def _filter(entry: str) -> Filter:
 def _matching(rows: pd.DataFrame, filters: Sequence[Filter]) -> pd.DataFrame:
     for field, sign, value in filters:
         matches = rows[field].map(lambda cell, value=value: _same(cell, value))
-        if sign == "<=":
-            matches = pd.to_numeric(rows[field]) <= float(value)
         rows = rows[matches.astype(bool) != (sign == "!=")]
     return rows
 

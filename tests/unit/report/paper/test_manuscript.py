@@ -98,7 +98,7 @@ def test_every_key_names_a_column_of_a_table():
         table, *parts = key.split("|")
         if table == "machine":
             continue
-        fields = [re.split("[!<]?=", part)[0] for part in parts]
+        fields = [re.split("!?=", part)[0] for part in parts]
         unknown = set(fields) - columns[table] - set(AGGREGATES)
         assert not unknown, key
 
