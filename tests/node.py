@@ -16,11 +16,13 @@ const { readFileSync } = require("fs");
 const given = JSON.parse(readFileSync(0, "utf8"));
 const engine = new Function(readFileSync(given.engine, "utf8") + "; return pdromEngine;")();
 let content = null;
-if (given.file) new Function("pdromLive", readFileSync(given.file, "utf8"))((c) => { content = c; });
+const take = (found) => { content = found; };
+if (given.file) new Function("pdromLive", readFileSync(given.file, "utf8"))(take);
 const { shown, ...others } = content || {};
 const script = new Function("engine", "data", "given", given.script);
 const plain = (_, x) => (ArrayBuffer.isView(x) ? Array.from(x) : x);
-engine.unpacked(others).then((data) => console.log(JSON.stringify(script(engine, data, given), plain)));
+engine.unpacked(others)
+  .then((data) => console.log(JSON.stringify(script(engine, data, given), plain)));
 """
 RUN = """
 const all = data.models.map((model) => {
