@@ -48,7 +48,7 @@ def test_no_title_ends_the_script_and_scenes_are_named_in_order(tmp_path):
     )
     text = write_page(tmp_path, [file]).read_text("utf-8")
     assert '[{"scene":"one","title":"A \\u003c/script> \\"b\\"","file":"live/one.js"}]' in text
-    assert text.count("</script>") == 4
+    assert text.count("</script>") == 5
 
 
 @pytest.mark.parametrize("content", ["", "pdromLive({});", 'pdromLive({"format":2,"scene":"x"});'])
