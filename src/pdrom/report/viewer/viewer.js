@@ -4,7 +4,7 @@
   const { Drawing, Layer, colour } = pdromDrawing;
   const LOWEST = 1e-12, HIGHEST = 1e6; // errors outside are drawn on the rim, whatever the axis
   const WIDTH = 400, HEIGHT = 360, LEFT = 52, RIGHT = 8, TOP = 24, BOTTOM = 64; // of the chart, in its own units
-  const CUBE = 0.75; // of the shown cube's side: radius of the ball that the camera sees
+  const CUBE = 0.5; // of the shown cube's side: radius of the ball that the camera sees
   const at = (id) => document.getElementById(id);
   const scenes = JSON.parse(at("scenes").textContent);
   const unpacked = new WeakMap();
@@ -171,7 +171,9 @@
       parts.push(word(LEFT - 5, place + 4, `1e${decade}`, "end"));
     }
     const last = (shown.full.length - 1) * scene.stride;
-    for (let i = 0; i <= 4; i++) parts.push(word(x(i * last / 4), bottom + 16, time(i * last / 4).toPrecision(2)));
+    for (let i = 0; i <= 4; i++) {
+      parts.push(word(x(i * last / 4), bottom + 16, time(i * last / 4).toPrecision(2), i < 4 ? "middle" : "end"));
+    }
     if (scene.floor.some((error) => error > 0)) {
       const line = path(scene.floor, range).replaceAll("M", "L").slice(1);
       parts.push(element("path", { class: "floor", d: `M${x(1)} ${bottom}L${line}L${x(scene.floor.length)} ${bottom}Z` }));
