@@ -15,11 +15,11 @@ NEEDED = (
     "mesh",
     "fom",
     "sensitivity",
-    "iterations",
     "snapshots",
     "pod",
     "reruns",
     "subspaces",
+    "iterations",
     "timing",
 )
 CHANGES = {
