@@ -123,9 +123,7 @@ def iterations(
     write_table(pd.DataFrame(inside, columns=MODELS), models.path)
 
 
-def _subspaces(
-    source: File, limit: np.ndarray, converged: bool
-) -> Iterator[tuple[str, str, int, str, float | None]]:
+def _subspaces(source: File, limit: np.ndarray, converged: bool) -> Iterator[tuple[object, ...]]:
     """Rows of `MODELS`: errors of the training runs against the converged one, ``limit``."""
     models = load_models(source.path)
     with open_hdf5(source.path) as file:
