@@ -1,15 +1,24 @@
 """Error of K iterations against the limit K -> infinity."""
 
 import logging
+from collections.abc import Iterator
 from typing import Annotated
 
 import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from pdrom.artifact.reads import Setting
-from pdrom.core.paths import ITERATIONS, MESH, SENSITIVITY, TRAIN, File
-from pdrom.core.store import write_table
+from pdrom.artifact.reads import Every, Setting
+from pdrom.core.paths import (
+    ITERATIONS,
+    MESH,
+    SENSITIVITY,
+    SUBSPACES,
+    SUBSPACES_CONVERGED,
+    TRAIN,
+    File,
+)
+from pdrom.core.store import open_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.converged import ConvergedStepper
 from pdrom.experiments.kit.declaration import experiment
@@ -21,9 +30,11 @@ from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import displacement_norms
+from pdrom.reduction.subspace.store import load_models
 
 log = logging.getLogger(__name__)
 
+MODELS = ["scene", "position_basis", "k", "method", "error_converged"]
 COLUMNS = [
     "scene", "iterations", "window", "frames", "error_converged", "error_scene", "residual",
 ]  # fmt: skip
@@ -56,22 +67,25 @@ class IterationSweep(IterationCounts):
         "mesh": MESH,
         "fom": TRAIN,
         "sensitivity": SENSITIVITY,
+        "subspaces": Every(SUBSPACES),
         "config": Setting("scene"),
         "sweep": Setting("iterations"),
         "horizon": Setting("horizon"),
         "solver": Setting("solver"),
     },
-    writes={"out": ITERATIONS},
+    writes={"out": ITERATIONS, "models": SUBSPACES_CONVERGED},
 )
 def iterations(
     mesh: File,
     fom: File,
     sensitivity: File,
+    subspaces: list[File],
     config: SceneConfig,
     sweep: IterationSweep,
     horizon: Horizon,
     solver: Solver,
     out: File,
+    models: File,
 ) -> None:
     """Run a scene with every K up to its horizon, and once to convergence.
 
@@ -79,7 +93,8 @@ def iterations(
     K against the converged run and against the scene's own run; the last row is the converged run
     itself (``iterations`` empty) with its largest residual: the change by one more iteration,
     relative to the extent. If a frame stays above the tolerance there is no converged reference,
-    and the errors against it are empty.
+    and the errors against it are empty. The runs in position subspaces, whose iterations and
+    training frames are those of the scene, have their error against it, too.
     """
     scene = scene_of(config, mesh)
     system = scene.system_with(solver)
@@ -104,6 +119,21 @@ def iterations(
     rows.append((name, None, None, frames, converged, _error(limit, own), residual))
     table = pd.DataFrame(rows, columns=COLUMNS).astype({"iterations": "Int64", "window": "Int64"})
     write_table(table, out.path)
+    inside = [row for file in subspaces for row in _subspaces(file, limit, best.converged)]
+    write_table(pd.DataFrame(inside, columns=MODELS), models.path)
+
+
+def _subspaces(source: File, limit: np.ndarray, converged: bool) -> Iterator[tuple[object, ...]]:
+    """Rows of `MODELS`: errors of the training runs against the converged one, ``limit``."""
+    models = load_models(source.path)
+    with open_hdf5(source.path) as file:
+        for labels, model in models:
+            basis, k, method = (labels[name] for name in MODELS[1:4])
+            run = file[f"models/{basis}_k{k:03d}_{method}/train/coordinates"][: len(limit)]
+            whole = converged and len(run) == len(limit)
+            reached = np.stack([model.positions(z) for z in run]) if whole else None
+            error = None if reached is None else _error(reached, limit)
+            yield source["scene"], basis, k, method, error
 
 
 def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:

@@ -23,7 +23,7 @@ from pdrom.artifact.reads import Every, PerScene, TableOf
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.experiments.kit.names import ANDERSON, FOM
-from pdrom.tables.kit.declaration import flag, integer, table, timed
+from pdrom.tables.kit.declaration import compared, flag, integer, number, table, timed
 from pdrom.tables.kit.held_out import COLUMNS, MEDIAN, with_held_out
 from pdrom.tables.kit.one_time import timings_in_one_time
 from pdrom.tables.kit.parts import joined
@@ -39,6 +39,7 @@ from pdrom.tables.kit.vocabulary import (
 )
 
 FEWER = "fewer-iterations"
+_MODEL = ["scene", "position_basis", "k", "method"]
 CONVERGED, OWN = "converged", "own iterations"
 
 
@@ -55,6 +56,14 @@ CONVERGED, OWN = "converged", "own iterations"
         ERROR_WITHIN,
         MS_PER_FRAME,
         timed(flag("pareto", "no point of the same reference is as good in both, better in one")),
+        compared(
+            "error",
+            number(
+                "error_converged",
+                "error against the run of converged frames: of the full order, whose error before "
+                "the horizon may have another reference, and in position subspaces",
+            ),
+        ),
         *COLUMNS,
         timed(flag("pareto_heldout", "the same by the error held out; full order as it is")),
     ),
@@ -64,6 +73,7 @@ CONVERGED, OWN = "converged", "own iterations"
         "timings": Every(paths.TIMINGS),
         "frame_times": TableOf("frame_times"),
         "sweeps": Every(paths.ITERATIONS),
+        "models": Every(paths.SUBSPACES_CONVERGED),
         "iterations": PerScene("iterations"),
     },
 )
@@ -73,6 +83,7 @@ def accuracy_cost(
     timings: list[File],
     frame_times: pd.DataFrame,
     sweeps: list[File],
+    models: list[File],
     iterations: Mapping[str, int],
 ) -> pd.DataFrame:
     """Points of the reruns whose error within the horizon and time exist, and full-order runs.
@@ -85,6 +96,7 @@ def accuracy_cost(
     timings : timing tables of the scenes
     frame_times : the table of that name
     sweeps : tables of the scenes' full-order runs with other numbers of iterations
+    models : errors of the runs in position subspaces against the converged run
     iterations : scene -> its own local/global iterations K per frame
     """
     times = timings_in_one_time(timings, frame_times)
@@ -94,6 +106,10 @@ def accuracy_cost(
     sweep = _sweep(joined(sweeps), times)
     points = reruns.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
     points = with_held_out(points.assign(iterations=points.scene.map(iterations)), heldout)
+    known = joined(models).reindex(columns=[*_MODEL, "error_converged"]).astype({"k": "Int64"})
+    points = points.merge(known, on=_MODEL, how="left")
+    own = sweep[sweep.method == FOM].set_index(["scene", "iterations"]).error_converged
+    full["error_converged"] = [own.get((scene, iterations[scene]), np.nan) for scene in full.scene]
     parts = [full.assign(iterations=full.scene.map(iterations)), points, sweep]
     points = pd.concat([part for part in parts if len(part)], ignore_index=True)
     reduced = points.method.isin(reruns.method) & ~_unreduced(points)

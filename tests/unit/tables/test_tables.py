@@ -352,7 +352,7 @@ def no_sweep(folder) -> File:
 def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
     runs, unseen, timings = files.reduced(), files.heldout(), files.timings
     table = accuracy_cost(
-        runs, unseen, timings, NOT_TIMED, [no_sweep(tmp_path)], {"a": 10, "b": 20}
+        runs, unseen, timings, NOT_TIMED, [no_sweep(tmp_path)], [], {"a": 10, "b": 20}
     )
     points = list(zip(table.scene, table.method, table.ms_per_frame, strict=True))
     assert points == [
@@ -364,7 +364,9 @@ def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
     assert table.relative_error_within_horizon[[0, 2]].tolist() == [0.0, 0.0]
     assert table.pareto.tolist() == [True] * 6
     slow = runs.assign(ms_per_frame=100.0)
-    table = accuracy_cost(slow, unseen, timings, NOT_TIMED, [no_sweep(tmp_path)], {"a": 1, "b": 1})
+    table = accuracy_cost(
+        slow, unseen, timings, NOT_TIMED, [no_sweep(tmp_path)], [], {"a": 1, "b": 1}
+    )
     assert table.pareto.tolist() == [True, False, True, False, False, False]
 
 
@@ -383,7 +385,13 @@ def sweep(folder, **changes) -> File:
 
 def test_runs_with_other_iterations_have_their_own_reference(files, tmp_path):
     runs, unseen, timings = files.reduced(), files.heldout(), files.timings
-    table = accuracy_cost(runs, unseen, timings, NOT_TIMED, [sweep(tmp_path)], {"a": 10, "b": 20})
+    model = {"scene": "b", "position_basis": "pod", "k": 8, "method": "ecsw-1e-02"}
+    model["error_converged"] = 0.3
+    inside = written(tmp_path / "models.csv", list(model), model)
+    own = {"a": 10, "b": 20}
+    table = accuracy_cost(runs, unseen, timings, NOT_TIMED, [sweep(tmp_path)], [inside], own)
+    assert table[table.position_basis == "pod"].error_converged.tolist()[1:] == [0.3]
+    assert table[table.method == "full"].error_converged.tolist()[:1] == [0.1]
     fom = table[table.method == "fom"]
     assert fom.iterations.tolist() == [2, 10, 40]
     assert fom.relative_error_within_horizon.tolist() == [0.4, 0.1, 0.02]
@@ -410,7 +418,7 @@ def test_runs_with_other_iterations_have_their_own_reference(files, tmp_path):
 def test_without_a_converged_run_there_is_no_point_against_it(files, tmp_path):
     runs, unseen, timings = files.reduced(), files.heldout(), files.timings
     sweeps = [sweep(tmp_path, error_converged=None)]
-    table = accuracy_cost(runs, unseen, timings, NOT_TIMED, sweeps, {"a": 10, "b": 20})
+    table = accuracy_cost(runs, unseen, timings, NOT_TIMED, sweeps, [], {"a": 10, "b": 20})
     assert "fom" not in set(table.method)
     assert (table.method == "fewer-iterations").sum() == 1
 
