@@ -9,18 +9,22 @@ from playwright._impl._driver import compute_driver_executable
 
 from places import ROOT
 
-ENGINE = ROOT / "src/pdrom/report/live/engine.js"
+SCRIPTS = [ROOT / "src/pdrom/report/live" / name for name in ("packed.js", "engine.js")]
 # Unpacks the file of models, then evaluates the script with what was given.
 MAIN = """
 const { readFileSync } = require("fs");
 const given = JSON.parse(readFileSync(0, "utf8"));
-const engine = new Function(readFileSync(given.engine, "utf8") + "; return pdromEngine;")();
+const text = given.scripts.map((path) => readFileSync(path, "utf8")).join("");
+const { engine, packed } = new Function(
+  text + "; return { engine: pdromEngine, packed: pdromPacked };")();
 let content = null;
-if (given.file) new Function("pdromLive", readFileSync(given.file, "utf8"))((c) => { content = c; });
+const take = (found) => { content = found; };
+if (given.file) new Function("pdromLive", readFileSync(given.file, "utf8"))(take);
 const { shown, ...others } = content || {};
 const script = new Function("engine", "data", "given", given.script);
 const plain = (_, x) => (ArrayBuffer.isView(x) ? Array.from(x) : x);
-engine.unpacked(others).then((data) => console.log(JSON.stringify(script(engine, data, given), plain)));
+packed.unpacked(others)
+  .then((data) => console.log(JSON.stringify(script(engine, data, given), plain)));
 """
 RUN = """
 const all = data.models.map((model) => {
@@ -39,7 +43,8 @@ return all;
 def evaluate(script: str, file: Path | None = None, **given: Any) -> Any:
     """Value that a script returns, with the engine, the unpacked models and what is given."""
     node = compute_driver_executable()[0]
-    data = {"engine": str(ENGINE), "file": file and str(file), "script": script, **given}
+    scripts = [str(path) for path in SCRIPTS]
+    data = {"scripts": scripts, "file": file and str(file), "script": script, **given}
     done = subprocess.run(
         [node, "-e", MAIN], input=json.dumps(data), capture_output=True, text=True, check=False
     )

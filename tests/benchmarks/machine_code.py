@@ -35,10 +35,8 @@ def counts(kernel: str) -> tuple[int, ...]:
 
 def main(targets: tuple[str, ...]) -> None:
     """Print a table of all kernels and targets; each target has a process of its own."""
-    sys.stdout.write(
-        "| kernel | target | instructions | on vectors | spilled vectors | gathers |\n"
-    )
-    sys.stdout.write("|---|---|---|---|---|---|\n")
+    heads = ("kernel", "target", "instructions", "on vectors", "spilled vectors", "gathers")
+    sys.stdout.write(f"| {' | '.join(heads)} |\n{'|---' * len(heads)}|\n")
     sys.stdout.flush()
     for target in targets:
         environment = {**os.environ, "NUMBA_CPU_NAME": target, "NUMBA_CPU_FEATURES": ""}

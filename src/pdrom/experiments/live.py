@@ -4,10 +4,9 @@ import json
 import logging
 from collections.abc import Iterator
 from math import ceil
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from pdrom.artifact.reads import EachOf, Settings
 from pdrom.core.errors import StorageError
@@ -46,7 +45,7 @@ from pdrom.reduction.subspace.exported import (
 )
 from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.joint import interpolation_of
-from pdrom.reduction.subspace.model import ECSW, SubspaceModel, ecsw_name
+from pdrom.reduction.subspace.model import SubspaceModel, ecsw_name
 from pdrom.reduction.subspace.store import load_models
 
 log = logging.getLogger(__name__)

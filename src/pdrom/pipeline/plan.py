@@ -141,7 +141,7 @@ class Plan:
 
     @property
     def fixed(self) -> dict[str, list[Job]]:
-        """Jobs of tables, figures, page and the manuscript by the folder of their logs, in order."""
+        """Jobs of tables, figures, page and manuscript by the folder of their logs, in order."""
         return {
             "tables": [self.job(table) for table in self.tables.values()],
             "figures": [figure.job for figure in self.figure_jobs.values()],

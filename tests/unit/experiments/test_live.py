@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,18 +9,12 @@ import pytest
 from builders import GROUPS, make_scene
 from node import RUN, evaluate
 from pdrom.core.errors import SceneError, StorageError
-from pdrom.core.paths import File
-from pdrom.core.store import write_hdf5
 from pdrom.experiments import live as module
-from pdrom.experiments.live import LiveModels, Options, live
-from pdrom.model.mesh.types import save_mesh
-from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
-from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.subspace import exported
 from pdrom.reduction.subspace.exported import export_scene
-from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
-from pdrom.reduction.subspace.store import store_columns, store_model
+from pdrom.reduction.subspace.model import SubspaceModel
+from written_models import write_models
 
 FRAMES = 24
 PULL = [{"effect": "gravity"}, {"effect": "damping", "rate": 0.5}]
@@ -39,29 +32,6 @@ def scene_with(group: str, *more: Mapping) -> Scene:
     return make_scene(*PULL, floor, pins, own, *more, **settings)
 
 
-def written(scene: Scene, folder: Path) -> tuple[Path, SubspaceModel]:
-    """File of one model that samples every second element, and the model."""
-    reference = trajectory(scene, track_objective=False)
-    (group,) = scene.groups
-    elements = np.arange(0, group.elements, 2)
-    samples = {group.name: Samples(elements, np.full(len(elements), 2.0))}
-    model = SubspaceModel("pod", make_columns(scene, reference[1:], "pod", 3), samples)
-    save_mesh(scene.mesh, folder / "mesh.h5")
-    with write_hdf5(folder / "train.h5") as file:
-        file["positions"] = reference
-    with write_hdf5(folder / "models.h5") as file:
-        store_columns(file.create_group("columns/own"), model.columns)
-        labels = {"method": "ecsw-1e-02", "position_basis": "pod", "k": 3, "base": "own"}
-        store_model(file.create_group("models/own"), labels, samples)
-    asked = LiveModels(sizes=(3,))
-    options = Options(scene=scene.config, live=asked, guard=GuardSettings(), joint_rows=())
-    mesh, train, models, out = (
-        File(str(folder / name), {}) for name in ("mesh.h5", "train.h5", "models.h5", "test.js")
-    )
-    live(mesh, train, [models], [], [], [], [], options, out)
-    return folder / "test.js", model
-
-
 def positions(scene: Scene, model: SubspaceModel) -> np.ndarray:
     """Positions (F + 1, N, 3) of pdrom's own run."""
     loop, state = model.loop(scene)
@@ -75,7 +45,7 @@ def positions(scene: Scene, model: SubspaceModel) -> np.ndarray:
 @pytest.mark.parametrize("group", WEIGHTS)
 def test_the_engine_runs_a_model_as_pdrom_does(group, tmp_path):
     scene = scene_with(group)
-    file, model = written(scene, tmp_path)
+    file, model = write_models(scene, tmp_path)
     (run,) = evaluate(RUN, file, frames=FRAMES)
     assert run["elements"] == model.elements_evaluated(scene)
     found = model.columns.B @ np.reshape(run["coordinates"], (FRAMES + 1, -1, 3))
@@ -83,14 +53,14 @@ def test_the_engine_runs_a_model_as_pdrom_does(group, tmp_path):
     floor = scene.mesh.points[:, 1].min() - BELOW
     assert own[-1][:, 1].min() == pytest.approx(floor, abs=0.02), "it fell on the floor"
     assert np.abs(found - own).max() < 1e-10
-    assert (tmp_path / "test.js").read_bytes() == written(scene, tmp_path)[0].read_bytes()
+    assert (tmp_path / "test.js").read_bytes() == write_models(scene, tmp_path)[0].read_bytes()
 
 
 def test_a_large_basis_is_short_but_for_what_is_computed_with(tmp_path, monkeypatch):
     monkeypatch.setattr(exported, "DOUBLES", 10)
     monkeypatch.setattr(exported, "PROBES", 4)
     scene = scene_with("strain")
-    file, model = written(scene, tmp_path)
+    file, model = write_models(scene, tmp_path)
     basis = evaluate("return new engine.Basis(data, data.bases[0]).B;", file)
     own = model.columns.B
     apart = np.abs(np.reshape(basis, own.shape) - own).max(axis=1)
@@ -101,7 +71,7 @@ def test_a_large_basis_is_short_but_for_what_is_computed_with(tmp_path, monkeypa
 
 def test_a_handle_takes_its_vertices_where_the_reader_does(tmp_path):
     """Offsets are from where it was taken hold of; what moves only that is no new shape."""
-    file, model = written(scene_with("spring"), tmp_path)
+    file, model = write_models(scene_with("spring"), tmp_path)
     script = """
     const run = new engine.Run(data, data.models[0], new engine.Basis(data, data.bases[0]));
     for (let frame = 0; frame < 5; frame++) run.step(new Map([[0, [0, 0.1 * frame, 0.2]]]));
@@ -110,13 +80,13 @@ def test_a_handle_takes_its_vertices_where_the_reader_does(tmp_path):
     atom = model.columns.atoms[0]
     found = (model.columns.B @ np.reshape(evaluate(script, file), (-1, 3)))[atom]
     start = scene_with("spring").mesh.points[atom]
-    assert found == pytest.approx(start + [0.0, 0.4, 0.2], abs=1e-12)
+    assert found == pytest.approx(start + np.array([0.0, 0.4, 0.2]), abs=1e-12)
 
 
 def test_a_file_that_is_too_large_names_the_keys(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "LARGEST", 100)
     with pytest.raises(StorageError, match=r"live\.sizes, live\.tolerances"):
-        written(scene_with("spring"), tmp_path)
+        write_models(scene_with("spring"), tmp_path)
     assert not (tmp_path / "test.js").exists()
 
 
@@ -169,7 +139,7 @@ def test_projections_are_the_nearest_matrices(name, rows, low, high):
 
 
 def test_the_file_says_what_it_is(tmp_path):
-    file, _ = written(scene_with("spring"), tmp_path)
+    file, _ = write_models(scene_with("spring"), tmp_path)
     text = file.read_text("utf-8")
     assert text.startswith('pdromLive({"format":1,"scene":"test","title":"test",')
     content = json.loads(text.removeprefix("pdromLive(").removesuffix(");\n"))

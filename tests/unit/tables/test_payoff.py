@@ -30,6 +30,7 @@ def tables(runs) -> tuple[pd.DataFrame, pd.DataFrame]:
     both = pd.DataFrame(rows, columns=[*LABELS, ERROR, "speedup", "max_extent", "held"])
     both = both.astype({"speedup": float, "held": float, "k": "Int64"})
     held = both[both.held.notna()].drop(columns=ERROR).rename(columns={"held": ERROR})
+    held = held.assign(frames=9, blowup_frame=None, horizon_frame=9)
     return both.drop(columns="held"), held
 
 

@@ -29,7 +29,7 @@ LEFT_OUT = ["scene", "left_out", "groups", "elements", "ms_per_frame", "saved_ms
 _QUESTIONS: dict[type[Effect], tuple[str, ...]] = {
     ConstraintGroup: ("begin_frame", "accumulate"),
     Force: ("acceleration",),
-    Boundary: ("active", "held", "targets"),
+    Boundary: ("active", "held", "takes_hold", "path"),
     Contact: ("apply",),
 }
 

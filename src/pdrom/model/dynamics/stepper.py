@@ -146,7 +146,8 @@ class Stepper:
         if done is None:
             return ()
         # what the interpreter takes for a call belongs to the beginnings of its frames
-        done[3][:, 0] += max(perf_counter() - started - done[3].sum(), 0.0) / len(done[3])
+        beside = perf_counter() - started - float(done[3].sum())
+        done[3][:, 0] += max(beside, 0.0) / len(done[3])
         return [
             (State(q, v), FrameReport(objective, seconds))
             for q, v, objective, seconds in zip(*done, strict=True)

@@ -63,8 +63,7 @@ class Poke(Boundary):
         return self._order[turn : turn + 1]
 
     def takes_hold(self, frame: int) -> bool:
-        turn, phase = divmod(frame, self.config.over + self.config.rest)
-        return turn != self._turn or phase == 0
+        return frame % (self.config.over + self.config.rest) == 0
 
     def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
         turn, phase = divmod(frame, self.config.over + self.config.rest)

@@ -63,15 +63,9 @@ def export_scene(scene: Scene) -> dict[str, Any]:
 
 
 def _require_known(scene: Scene) -> None:
-    for effect, known in (
-        *(
-            (group, isinstance(group, StencilGroup) and group.manifold in MANIFOLDS)
-            for group in scene.groups
-        ),
-        *((contact, isinstance(contact, Floor)) for contact in scene.contacts),
-        *((boundary, isinstance(boundary, Pins)) for boundary in scene.boundaries),
-    ):
-        if not known:
+    for effect in (*scene.groups, *scene.contacts, *scene.boundaries):
+        projected = isinstance(effect, StencilGroup) and effect.manifold in MANIFOLDS
+        if not (projected or isinstance(effect, (Floor, Pins))):
             allowed = ("spring", "strain", "tetrahedron_strain", "deformation_gradient")
             raise SceneError(
                 f"scene '{scene.config.name}': the page's engine has no '{effect.name}'"
@@ -175,5 +169,7 @@ def needed_vertices(scene: Scene, models: Iterable[SubspaceModel]) -> np.ndarray
 
 def trained_box(scene: Scene, columns: Columns, reference: np.ndarray) -> np.ndarray:
     """Least and largest coordinates (2, K, 3) of a run (F + 1, N, 3), projected on a subspace."""
-    frames = [coordinates(columns, scene.masses, q) for q in reference]
-    return np.stack([np.min(frames, axis=0), np.max(frames, axis=0)])
+    frames, n, _ = reference.shape
+    together = coordinates(columns, scene.masses, reference.transpose(1, 0, 2).reshape(n, -1))
+    z = together.reshape(-1, frames, 3)
+    return np.stack([z.min(axis=1), z.max(axis=1)])

@@ -394,6 +394,12 @@ const pdromDrawing = (() => {
       this.redraw();
     }
 
+    // The same canvas, seen from elsewhere.
+    from({ up, eye }) {
+      Object.assign(this.camera, new Camera(up, eye));
+      return this;
+    }
+
     add(layer) {
       this.layers.push(layer);
       return layer;

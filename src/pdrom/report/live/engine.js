@@ -7,44 +7,6 @@ const pdromEngine = (() => {
   const FLAT = 1e-2, EQUAL = 1e-17, LOW = 1e-60, HIGH = 1e60; // as in clamp2.py
   const SMALLEST = 1e-300;
 
-  // ---- reading a model file ----
-
-  async function bytes(text) {
-    const raw = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-    const stream = new Blob([raw]).stream().pipeThrough(new DecompressionStream("deflate"));
-    return new Response(stream).arrayBuffer();
-  }
-
-  const KINDS = { f8: Float64Array, f4: Float32Array, u4: Uint32Array };
-
-  async function unpack(packed) {
-    return new KINDS[packed.kind](await bytes(packed.data));
-  }
-
-  // Replaces every packed array inside a value.
-  async function unpacked(value) {
-    if (Array.isArray(value)) return Promise.all(value.map(unpacked));
-    if (value === null || typeof value !== "object") return value;
-    if (value.kind && value.data !== undefined) return unpack(value);
-    const parts = await Promise.all(Object.entries(value).map(async ([k, v]) => [k, await unpacked(v)]));
-    return Object.fromEntries(parts);
-  }
-
-  // Frames (n, 3) of packed positions.
-  async function frames(packed) {
-    const changes = new Uint16Array(await bytes(packed.changes)), size = 3 * packed.vertices;
-    const level = new Uint16Array(size), all = [];
-    for (let f = 0; f < packed.frames; f++) {
-      const q = new Float32Array(size);
-      for (let i = 0; i < size; i++) {
-        level[i] += changes[size * f + i];
-        q[i] = packed.low[i % 3] + packed.step[i % 3] * level[i];
-      }
-      all.push(q);
-    }
-    return all;
-  }
-
   // ---- small linear algebra ----
 
   // (m, n) times (n, 3); four rows together read x once
@@ -642,5 +604,5 @@ const pdromEngine = (() => {
     }
   }
 
-  return { unpacked, frames, unpack, Basis, Run, Distance, clamp3, clamp2 };
+  return { Basis, Run, Distance, clamp3, clamp2 };
 })();

@@ -30,7 +30,7 @@
     }).then(async (content) => {
       const { shown: { full, ...rest }, ...others } = content;
       const [data, frames] = await Promise.all([
-        pdromEngine.unpacked({ ...others, shown: rest }), pdromEngine.frames(full)]);
+        pdromPacked.unpacked({ ...others, shown: rest }), pdromPacked.frames(full)]);
       return { data, frames, bases: new Map() };
     }));
     return loaded.get(index);

@@ -17,6 +17,7 @@ def _write(
     models: list[File],
     html: Path,
     style: Path,
+    packed: Path,
     engine: Path,
     drawing: Path,
     script: Path,
@@ -29,7 +30,13 @@ def _write(
     StorageError
         A file of models is damaged, or none.
     """
-    parts = {"STYLE": style, "ENGINE": engine, "DRAWING": drawing, "SCRIPT": script}
+    parts = {
+        "STYLE": style,
+        "PACKED": packed,
+        "ENGINE": engine,
+        "DRAWING": drawing,
+        "SCRIPT": script,
+    }
     texts = {name: path.read_text("utf-8") for name, path in parts.items()}
     scenes = [_listed(file, Path(out.path).parent) for file in models]
     texts["SCENES"] = safe_json(scenes)
@@ -72,6 +79,7 @@ live_page = declare(
             "models": Every(LIVE_MODEL),
             "html": _asset("live.html"),
             "style": _asset("live.css"),
+            "packed": _asset("packed.js"),
             "engine": _asset("engine.js"),
             "drawing": _asset("drawing.js"),
             "script": _asset("live.js"),

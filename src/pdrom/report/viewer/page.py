@@ -1,14 +1,12 @@
-"""Writing the page: the library's script, ours, and the runs, in one file."""
+"""Writing the page: scripts and runs in one file."""
 
-import json
 import os
 from collections.abc import Sequence
 from importlib.resources import files
 
-from plotly.offline import get_plotlyjs
-
 from pdrom.core.errors import StorageError
 from pdrom.core.store import write_text
+from pdrom.report.live.page import filled, safe_json
 from pdrom.report.viewer.pack import pack_scene
 from pdrom.report.viewer.runs import ViewedScene
 
@@ -18,7 +16,7 @@ LARGEST = 25_000_000  # bytes
 def write_page(
     scenes: Sequence[ViewedScene], path: str | os.PathLike[str], with_checksum: bool = True
 ) -> None:
-    """Write the viewer of some scenes; the library's licence stands in its script.
+    """Write the viewer of some scenes.
 
     ``with_checksum`` as in `pdrom.core.store.atomic_path`.
 
@@ -40,21 +38,13 @@ def write_page(
 def page(packed: Sequence[dict]) -> str:
     """The whole page of packed scenes."""
     parts = {
-        "STYLE": _own("viewer.css"),
-        "LIBRARY": get_plotlyjs(),
-        "SCRIPT": _own("viewer.js"),
-        # no text ends the element that holds it, or opens a comment in which its end is none
-        "SCENES": json.dumps(packed, separators=(",", ":"), allow_nan=False).replace(
-            "<", "\\u003c"
-        ),
+        "STYLE": _read("viewer.css"),
+        "SCRIPT": _read("viewer.js"),
+        "SCENES": safe_json(packed),
     }
-    before, *rest = _own("viewer.html").split("{{")
-    pieces = [before]
-    for piece in rest:
-        name, _, after = piece.partition("}}")
-        pieces += [parts[name], after]
-    return "".join(pieces)
+    parts |= {"PACKED": _read("packed.js", "live"), "DRAWING": _read("drawing.js", "live")}
+    return filled(_read("viewer.html"), parts)
 
 
-def _own(name: str) -> str:
-    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+def _read(name: str, folder: str = "viewer") -> str:
+    return files(f"pdrom.report.{folder}").joinpath(name).read_text(encoding="utf-8")

@@ -1,43 +1,23 @@
 "use strict";
-// The page's own script: choices, frames, playing. Plotly draws; its licence stands above its code.
+// The page's own script: choices, frames, playing, the chart of errors.
 (async () => {
-  const GREY = "#b9b4a7", WIRE = "#55524a", BLUE = "#0072b2", OBSTACLE = "#7a6a9a", RED = "#b3261e";
+  const { Drawing, Layer, colour } = pdromDrawing;
   const LOWEST = 1e-12, HIGHEST = 1e6; // errors outside are drawn on the rim, whatever the axis
+  const WIDTH = 400, HEIGHT = 360, LEFT = 52, RIGHT = 8, TOP = 24, BOTTOM = 64; // of the chart, in its own units
+  const CUBE = 0.5; // of the shown cube's side: radius of the ball that the camera sees
   const at = (id) => document.getElementById(id);
   const scenes = JSON.parse(at("scenes").textContent);
   const unpacked = new WeakMap();
-  let shown = null; // {scene, run, full, reduced, faces, edges, bodies}
-  let timer = null, syncing = false;
-  let wanted = null, drawing = null; // what is still to be drawn: null, "frame" or "all"; who draws
+  let shown = null; // {scene, run, full, reduced, triangles, bodies}
+  let drawing = null, layers = {}, chart = {}, up = "", playing = null;
 
-  async function bytes(text) {
-    const raw = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-    const stream = new Blob([raw]).stream().pipeThrough(new DecompressionStream("deflate"));
-    return new Response(stream).arrayBuffer();
+  async function once(packed, read) {
+    if (!unpacked.has(packed)) unpacked.set(packed, await read(packed));
+    return unpacked.get(packed);
   }
 
-  // Corners of packed triangles.
-  async function corners(text) {
-    const all = new Uint32Array(await bytes(text)), pick = (corner) => all.filter((_, i) => i % 3 === corner);
-    return { i: pick(0), j: pick(1), k: pick(2) };
-  }
-
-  // Frames of packed positions: three arrays of coordinates each.
-  async function positions(packed) {
-    if (unpacked.has(packed)) return unpacked.get(packed);
-    const changes = new Uint16Array(await bytes(packed.changes));
-    const n = packed.vertices, level = new Uint16Array(3 * n), frames = [];
-    for (let f = 0; f < packed.frames; f++) {
-      const xyz = [new Float32Array(n), new Float32Array(n), new Float32Array(n)];
-      for (let i = 0; i < 3 * n; i++) {
-        level[i] += changes[3 * n * f + i];
-        xyz[i % 3][(i / 3) | 0] = packed.low[i % 3] + packed.step[i % 3] * level[i];
-      }
-      frames.push(xyz);
-    }
-    unpacked.set(packed, frames);
-    return frames;
-  }
+  const positions = (packed) => once(packed, pdromPacked.frames);
+  const corners = (data) => pdromPacked.unpack({ kind: "u4", data });
 
   function fill(select, values, words = String) {
     const before = select.value;
@@ -58,121 +38,94 @@
     return [scene, ofMethod.find((run) => String(run.r) === at("r").value) || null];
   }
 
-  function space(ranges, domain, camera, uirevision) {
-    const axis = (range) => ({ range, visible: false });
-    const [x, y, z] = ranges.map(axis);
-    return { xaxis: x, yaxis: y, zaxis: z, domain, camera, aspectmode: "cube", uirevision };
-  }
-
-  const vector = ([x, y, z]) => ({ x, y, z });
-
-  // Plotly's light goes with the camera: from the upper left, near enough to reach faces seen from the front. Ambient
-  // and diffuse add up to one: more is cut off, and every face looks the same.
-  function surface(name, xyz, faces, scene, look) {
-    const [x, y, z] = xyz;
-    return { type: "mesh3d", name, x, y, z, ...faces, scene, flatshading: true, hoverinfo: "skip",
-      lighting: { ambient: 0.2, diffuse: 0.8, specular: 0, fresnel: 0 },
-      lightposition: { x: -1500, y: 1000, z: 0 }, ...look };
-  }
-
-  // Edges (a, b, a, b, ...) of a surface, each once.
-  function edgesOf({ i, j, k }) {
-    const seen = new Set(), edges = [];
-    const add = (a, b) => {
-      const key = Math.min(a, b) * 2 ** 26 + Math.max(a, b);
-      if (!seen.has(key)) edges.push(a, b);
-      seen.add(key);
-    };
-    i.forEach((a, f) => { add(a, j[f]); add(j[f], k[f]); add(k[f], a); });
-    return edges;
-  }
-
-  // Coordinates of all edges one after the other, with a gap behind each.
-  function lines(xyz, edges) {
-    return xyz.map((values) => {
-      const out = [];
-      for (let e = 0; e < edges.length; e += 2) out.push(values[edges[e]], values[edges[e + 1]], null);
-      return out;
-    });
-  }
-
-  function wires(name, [x, y, z]) {
-    return { type: "scatter3d", mode: "lines", name, x, y, z, scene: "scene", hoverinfo: "skip", showlegend: false,
-      line: { color: WIRE, width: 1 } };
-  }
-
-  function distance(a, b) {
-    return Float32Array.from(a[0], (v, i) => Math.hypot(v - b[0][i], a[1][i] - b[1][i], a[2][i] - b[2][i]));
-  }
-
   // Whether both runs are in one picture, the full order as wires: two surfaces in one place would flicker.
   const above = () => at("view").value === "above" && shown.reduced;
 
-  // Frame of the page -> what is stored; a run that ended early keeps its last frame.
-  const full = (k) => shown.full[k];
-  const reduced = (k) => shown.reduced && shown.reduced[Math.min(k, shown.reduced.length - 1)];
-
-  // One thing is drawn at a time; what is asked for meanwhile is drawn afterwards, once.
-  function update(what) {
-    if (wanted !== "all") wanted = what;
-    drawing = drawing || drawWanted().finally(() => { drawing = null; });
-    return drawing;
-  }
-
-  async function drawWanted() {
-    while (wanted) {
-      const now = wanted;
-      wanted = null;
-      if (now === "all") await choose();
-      else await showFrame();
-    }
+  // Positions at a frame, also between two; a run that ended early keeps its last one.
+  function between(frames, k) {
+    const first = Math.min(Math.floor(k), frames.length - 1), part = k - first;
+    if (part === 0 || first === frames.length - 1) return frames[first];
+    const a = frames[first], b = frames[first + 1], q = new Float32Array(a.length);
+    for (let i = 0; i < q.length; i++) q[i] = a[i] + part * (b[i] - a[i]);
+    return q;
   }
 
   async function choose() {
-    const [scene, run] = chosenRun();
-    shown = { scene, run, faces: await corners(scene.triangles), full: await positions(scene.full),
-      reduced: run && await positions(run.positions), bodies: [] };
-    for (const { points, triangles } of scene.bodies) shown.bodies.push([points, await corners(triangles)]);
-    shown.edges = edgesOf(shown.faces);
+    const [scene, run] = chosenRun(), bodies = [];
+    for (const body of scene.bodies) {
+      const [x, y, z] = body.points;
+      bodies.push({ q: Float32Array.from(x.flatMap((v, i) => [v, y[i], z[i]])), triangles: await corners(body.triangles) });
+    }
+    shown = { scene, run, bodies, triangles: await corners(scene.triangles), full: await positions(scene.full),
+      reduced: run && await positions(run.positions) };
     at("frame").max = shown.full.length - 1;
     at("frame").value = Math.min(at("frame").value, shown.full.length - 1);
-    await drawShapes();
-    await drawErrors();
-    await showFrame();
+    makeLayers();
+    drawErrors();
+    tell();
+    show(Number(at("frame").value));
   }
 
-  async function drawShapes() {
-    const k = Number(at("frame").value), beside = shown.reduced && !above();
-    const { up, eye } = shown.scene.view, own = { up: vector(up), eye: vector(eye) };
-    const old = at("shapes").layout, revision = `camera ${up}`; // scenes with one up share the camera
-    const camera = old && old.uirevision === revision ? old.scene.camera : own;
-    const traces = [above() ? wires("full order", lines(full(k), shown.edges))
-      : surface("full order", full(k), shown.faces, "scene", { color: GREY })];
-    if (shown.reduced) {
-      const size = Math.max(...shown.scene.ranges.map((range) => range[1] - range[0])) / 1.4;
-      // intensity in any case: a surface that once had one keeps it, whatever its colour
-      const scale = at("colour").checked ? { colorscale: "Viridis" }
-        : { colorscale: [[0, BLUE], [1, BLUE]], showscale: false };
-      const colour = { intensity: distance(reduced(k), full(k)), cmin: 0, cmax: 0.1 * size,
-        colorbar: { title: { text: "distance, m" }, thickness: 12, len: 0.6 }, ...scale };
-      traces.push(surface("reduced", reduced(k), shown.faces, beside ? "scene2" : "scene", colour));
+  const side = () => Math.max(...shown.scene.ranges.map(([low, high]) => high - low));
+
+  function makeLayers() {
+    const { scene, triangles } = shown, n = scene.full.vertices, beside = shown.reduced && !above();
+    if (!drawing || up !== String(scene.view.up)) { // scenes with one up share the camera
+      up = String(scene.view.up);
+      if (drawing) drawing.clear();
+      drawing = drawing ? drawing.from(scene.view) : new Drawing(at("shapes"), { ...scene.view, plain: location.hash === "#plain" });
     }
-    const sides = beside ? ["scene", "scene2"] : ["scene"];
-    for (const side of sides) for (const [points, faces] of shown.bodies) {
-      const flatshading = points[0].length < 100; // a ball is round, a box has edges
-      traces.push(surface("obstacle", points, faces, side, { color: OBSTACLE, opacity: 0.3, flatshading }));
+    drawing.clear();
+    drawing.views = beside ? 2 : 1;
+    drawing.camera.look(scene.ranges.map(([low, high]) => 0.5 * (low + high)), CUBE * side());
+    layers = { full: drawing.add(new Layer({ triangles, n, look: above() ? "wires" : "surface",
+      colour: colour(above() ? "--ghost" : "--surface") })) };
+    if (shown.reduced) layers.reduced = drawing.add(new Layer({ triangles, n, view: beside ? 1 : 0, colour: colour("--reduced") }));
+    for (let view = 0; view < drawing.views; view++) for (const { q, triangles: faces } of shown.bodies) {
+      const body = new Layer({ triangles: faces, n: q.length / 3, view, alpha: 0.3, colour: colour("--obstacle") });
+      body.set(q);
+      drawing.add(body);
     }
-    const note = (text, x) => ({ text, x, y: 1, xref: "paper", yref: "paper", showarrow: false, font: { size: 14 } });
-    const layout = { margin: { l: 0, r: 0, t: 24, b: 0 }, uirevision: revision,
-      scene: space(shown.scene.ranges, { x: [0, beside ? 0.48 : 0.95], y: [0, 1] }, camera, revision),
-      annotations: beside ? [note("full order", 0.2), note("reduced", 0.7)]
-        : [note(shown.reduced ? "full order (wires) and reduced" : "full order", 0.45)] };
-    if (beside) layout.scene2 = space(shown.scene.ranges, { x: [0.48, 0.95], y: [0, 1] }, camera, revision);
-    await Plotly.react(at("shapes"), traces, layout, { displaylogo: false, responsive: true });
+    at("left").textContent = above() ? "full order (wires) and reduced" : "full order";
+    at("right").textContent = beside ? "reduced" : "";
+    at("legend").hidden = !(shown.reduced && at("colour").checked);
+    at("largest").textContent = `${(0.1 * side() / 1.4).toPrecision(2)} and more`;
   }
+
+  // Draws frame k of what is stored, which may lie between two of them.
+  function show(k) {
+    const full = between(shown.full, k);
+    layers.full.set(full);
+    if (shown.reduced) {
+      const reduced = between(shown.reduced, k);
+      layers.reduced.set(reduced);
+      layers.reduced.shade(at("colour").checked ? distances(reduced, full, 0.1 * side() / 1.4) : null);
+    }
+    drawing.draw();
+    const place = x(k * shown.scene.stride);
+    chart.now.setAttribute("x1", place);
+    chart.now.setAttribute("x2", place);
+    const stored = Math.floor(k + 1e-9), frame = stored * shown.scene.stride;
+    at("status").textContent = words(stored, frame);
+    at("frame").setAttribute("aria-valuetext", `frame ${frame}`);
+    document.body.dataset.frame = stored;
+  }
+
+  // Distances of vertices over a largest one.
+  function distances(a, b, most) {
+    const values = new Float32Array(a.length / 3);
+    for (let i = 0, v = 0; v < values.length; v++, i += 3) {
+      values[v] = Math.min(Math.hypot(a[i] - b[i], a[i + 1] - b[i + 1], a[i + 2] - b[i + 2]) / most, 1);
+    }
+    return values;
+  }
+
+  // ---- errors ----
 
   const time = (frame) => frame * shown.scene.timeStep;
   const clipped = (error) => (error === null ? null : Math.min(Math.max(error, LOWEST), HIGHEST));
+  const x = (frame) => LEFT + (WIDTH - LEFT - RIGHT) * frame / Math.max(1, (shown.full.length - 1) * shown.scene.stride);
+  const y = (error, [low, high]) => TOP + (HEIGHT - TOP - BOTTOM) * (high - Math.log10(error)) / (high - low);
 
   // Decades of the axis: those of the scene's errors and of its floor, for all its runs the same ones.
   function decades(scene) {
@@ -183,7 +136,66 @@
     return [low, Math.max(high, low + 1)];
   }
 
-  // Largest and last error of a run, in words.
+  function element(name, attributes, text = "") {
+    const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+    for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+    made.textContent = text;
+    return made;
+  }
+
+  function word(left, down, text, anchor = "middle") {
+    return element("text", { x: left, y: down, "text-anchor": anchor }, text);
+  }
+
+  // Places of known errors; a gap where none is known.
+  function path(values, range) {
+    let pen = "M";
+    return values.map((error, f) => {
+      if (!(error > 0)) {
+        pen = "M";
+        return "";
+      }
+      const step = `${pen}${x(f + 1).toFixed(1)} ${y(clipped(error), range).toFixed(1)}`;
+      pen = "L";
+      return step;
+    }).join("");
+  }
+
+  function drawErrors() {
+    const { scene, run } = shown, range = decades(scene), [low, high] = range, bottom = HEIGHT - BOTTOM, parts = [];
+    at("errors").setAttribute("viewBox", `0 0 ${WIDTH} ${HEIGHT}`);
+    const every = Math.max(1, Math.ceil((high - low) / 10));
+    for (let decade = low; decade <= high; decade += every) {
+      const place = y(10 ** decade, range);
+      parts.push(element("line", { class: "grid", x1: LEFT, x2: WIDTH - RIGHT, y1: place, y2: place }));
+      parts.push(word(LEFT - 5, place + 4, `1e${decade}`, "end"));
+    }
+    const last = (shown.full.length - 1) * scene.stride;
+    for (let i = 0; i <= 4; i++) {
+      parts.push(word(x(i * last / 4), bottom + 16, time(i * last / 4).toPrecision(2), i < 4 ? "middle" : "end"));
+    }
+    if (scene.floor.some((error) => error > 0)) {
+      const line = path(scene.floor, range).replaceAll("M", "L").slice(1);
+      parts.push(element("path", { class: "floor", d: `M${x(1)} ${bottom}L${line}L${x(scene.floor.length)} ${bottom}Z` }));
+    }
+    if (run) parts.push(element("path", { class: "error", d: path(run.error, range) }));
+    if (scene.horizon !== null) {
+      const place = x(scene.horizon);
+      parts.push(element("line", { class: "horizon", x1: place, x2: place, y1: TOP, y2: bottom }));
+    }
+    chart.now = element("line", { class: "now", x1: LEFT, x2: LEFT, y1: TOP, y2: bottom });
+    parts.push(chart.now, word((LEFT + WIDTH) / 2, bottom + 34, "time, s"), word(4, 14, "relative error", "start"));
+    if (scene.floor.length) {
+      parts.push(element("rect", { class: "floor", x: LEFT, y: HEIGHT - 18, width: 18, height: 9 }));
+      parts.push(word(LEFT + 24, HEIGHT - 9, "sensitivity floor", "start"));
+    }
+    at("errors").replaceChildren(...parts);
+    at("errors").dataset.decades = range.join(" ");
+  }
+
+  // ---- words ----
+
+  // Largest and last error of a run.
   function told(run) {
     const known = run.error.flatMap((error, f) => (error === null ? [] : [[error, f + 1]]));
     if (!known.length) return "no frame has a relative error";
@@ -191,21 +203,8 @@
     return `largest ${largest.toPrecision(2)} (frame ${when}), last ${last.toPrecision(2)} (frame ${end})`;
   }
 
-  async function drawErrors() {
-    const { scene, run } = shown, [low, high] = decades(scene);
-    const series = (values) => ({ x: values.map((_, f) => time(f + 1)), y: values.map(clipped) });
-    const traces = [];
-    if (scene.floor.length) traces.push({ ...series(scene.floor), name: "sensitivity floor", fill: "tozeroy",
-      mode: "lines", line: { color: "#c9c4b8" } });
-    if (run) traces.push({ ...series(run.error), name: "relative error", mode: "lines", line: { color: BLUE } });
-    traces.push({ x: [0, 0], y: [10 ** low, 10 ** high], name: "now", mode: "lines", line: { color: "#222", width: 1 } });
-    const shapes = scene.horizon === null ? [] : [{ type: "line", x0: time(scene.horizon), x1: time(scene.horizon),
-      yref: "paper", y0: 0, y1: 1, line: { dash: "dot", color: RED } }];
-    await Plotly.react(at("errors"), traces, { margin: { l: 60, r: 10, t: 24, b: 40 }, shapes,
-      legend: { orientation: "h", y: -0.18 }, xaxis: { title: { text: "time, s" }, range: [0, time((shown.full.length - 1) * scene.stride)] },
-      yaxis: { type: "log", range: [low, high], dtick: Math.max(1, Math.ceil((high - low) / 10)), title: { text: "relative error" }, exponentformat: "power" } },
-      { displaylogo: false, responsive: true });
-    const ms = (value) => (value === null ? "not timed" : `${value.toPrecision(3)} ms a frame`);
+  function tell() {
+    const { scene, run } = shown, ms = (value) => (value === null ? "not timed" : `${value.toPrecision(3)} ms a frame`);
     const parts = [`${scene.title}.`, `Full order: ${ms(scene.ms)}.`];
     if (run) parts.push(`Reduced: ${ms(run.ms)}.`);
     if (run) parts.push(`Relative error: distance of the two runs over the full order's motion (its distance from the start, root mean square over the frames); ${told(run)}.`);
@@ -213,74 +212,58 @@
     parts.push(!scene.floor.length ? "Sensitivity floor and horizon are not known here."
       : scene.horizon === null ? "The floor stays below the threshold: the whole run can be judged."
         : `Beyond frame ${scene.horizon} (dotted line) errors cannot be told from chaos.`);
+    if (!drawing.accelerated) parts.push("This browser has no WebGL2: pictures are drawn on the processor, and slower.");
     at("about").textContent = parts.join(" ");
   }
 
-  async function showFrame() {
-    const k = Number(at("frame").value), frame = k * shown.scene.stride;
-    const first = above() ? lines(full(k), shown.edges) : full(k);
-    const runs = shown.reduced ? [first, reduced(k)] : [first];
-    const change = { x: runs.map((r) => r[0]), y: runs.map((r) => r[1]), z: runs.map((r) => r[2]) };
-    if (shown.reduced) change.intensity = [undefined, distance(reduced(k), full(k))];
-    await Plotly.restyle(at("shapes"), change, runs.map((_, i) => i));
-    const line = at("errors").data.length - 1;
-    await Plotly.restyle(at("errors"), { x: [[time(frame), time(frame)]] }, [line]);
-    at("status").textContent = words(k, frame);
-    at("frame").setAttribute("aria-valuetext", `frame ${frame}`);
-    await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
-    document.body.dataset.frame = k;
+  function words(k, frame) {
+    const parts = [`frame ${frame}, ${time(frame).toFixed(2)} s`], { run } = shown;
+    if (run && shown.reduced.length <= k) parts.push("the reduced run had ended");
+    else if (run && frame > 0 && run.error[frame - 1] != null) parts.push(`relative error ${run.error[frame - 1].toPrecision(2)}`);
+    if (shown.scene.horizon !== null && frame > shown.scene.horizon) parts.push("past the horizon");
+    return parts.join(", ");
   }
 
-  function words(k, frame) {
-    const told = [`frame ${frame}, ${time(frame).toFixed(2)} s`];
-    const { run } = shown;
-    if (run && shown.reduced.length <= k) told.push("the reduced run had ended");
-    else if (run && frame > 0 && run.error[frame - 1] != null) told.push(`relative error ${run.error[frame - 1].toPrecision(2)}`);
-    if (shown.scene.horizon !== null && frame > shown.scene.horizon) told.push("past the horizon");
-    return told.join(", ");
-  }
+  // ---- playing: in the scene's own time ----
 
   function stop() {
-    clearInterval(timer);
-    timer = null;
+    playing = null;
     at("play").textContent = "Play";
     at("play").setAttribute("aria-pressed", "false");
   }
 
   function play() {
-    if (timer !== null) return stop();
+    if (playing) return stop();
     at("play").textContent = "Pause";
     at("play").setAttribute("aria-pressed", "true");
-    const beat = Math.max(40, 1000 * shown.scene.timeStep * shown.scene.stride);
-    timer = setInterval(() => {
-      if (drawing) return;
-      const input = at("frame");
-      input.value = input.value === input.max ? 0 : Number(input.value) + 1;
-      update("frame");
-    }, beat);
+    playing = { from: Number(at("frame").value), since: performance.now() };
+    requestAnimationFrame(beat);
   }
 
-  // One camera for both pictures.
-  function follow(change) {
-    const moved = ["scene", "scene2"].find((name) => change[`${name}.camera`]);
-    if (!moved || syncing || !at("shapes").layout.scene2) return;
-    syncing = true;
-    const other = moved === "scene" ? "scene2" : "scene";
-    Plotly.relayout(at("shapes"), { [`${other}.camera`]: change[`${moved}.camera`] }).then(() => { syncing = false; });
+  function beat(now) {
+    if (!playing) return;
+    const last = shown.full.length - 1, seconds = Math.max(0, now - playing.since) / 1000;
+    const k = (playing.from + seconds / (shown.scene.timeStep * shown.scene.stride)) % (last + 1);
+    at("frame").value = Math.floor(k);
+    show(Math.min(k, last));
+    requestAnimationFrame(beat);
   }
 
   async function changed() {
     stop();
     document.body.dataset.ready = "no";
-    await update("all");
+    await choose();
     document.body.dataset.ready = "yes";
   }
 
   fill(at("scene"), scenes.map((_, i) => i), (i) => scenes[i].name.replaceAll("_", " "));
   at("choice").addEventListener("change", changed);
   at("choice").addEventListener("submit", (event) => event.preventDefault());
-  at("frame").addEventListener("input", () => update("frame"));
+  at("frame").addEventListener("input", () => {
+    stop();
+    show(Number(at("frame").value));
+  });
   at("play").addEventListener("click", play);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", changed);
   await changed();
-  at("shapes").on("plotly_relayout", follow);
 })();

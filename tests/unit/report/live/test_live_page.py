@@ -1,0 +1,156 @@
+"""The page on which models run: one file, scenes beside it, and it works in a real browser."""
+
+import io
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import Page, sync_playwright
+
+from builders import make_scene
+from pdrom.core.errors import StorageError
+from pdrom.core.paths import File
+from pdrom.core.store import write_text
+from pdrom.report.live.page import filled, live_page
+from places import ROOT
+from written_models import write_models
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+# software rendering, so that a machine without a graphics card draws, too
+OPTIONS = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]
+LIMIT = 120_000  # ms after which a page that does not answer has failed
+
+
+def write_page(folder: Path, models: list[Path]) -> Path:
+    """The page of some files of models, which lie below its folder."""
+    assets = [ROOT / read.path for name, read in live_page.files.items() if name != "models"]
+    out = folder / "live.html"
+    live_page([File(str(path), {}) for path in models], *assets, File(str(out), {}))
+    return out
+
+
+def test_what_is_filled_in_is_not_looked_at():
+    assert filled("a{{X}}b{{Y}}", {"X": "{{Y}}", "Y": "}}"}) == "a{{Y}}b}}"
+
+
+def test_no_title_ends_the_script_and_scenes_are_named_in_order(tmp_path):
+    file = tmp_path / "live" / "one.js"
+    write_text(
+        'pdromLive({"format":1,"scene":"one","title":"A </script> \\"b\\"","more":0});\n', file
+    )
+    text = write_page(tmp_path, [file]).read_text("utf-8")
+    assert '[{"scene":"one","title":"A \\u003c/script> \\"b\\"","file":"live/one.js"}]' in text
+    assert text.count("</script>") == 5
+
+
+@pytest.mark.parametrize("content", ["", "pdromLive({});", 'pdromLive({"format":2,"scene":"x"});'])
+def test_a_file_without_models_is_named(content, tmp_path):
+    write_text(content, tmp_path / "other.js")
+    with pytest.raises(StorageError, match=r"other\.js: no models for the page"):
+        write_page(tmp_path, [tmp_path / "other.js"])
+    assert not (tmp_path / "live.html").exists()
+
+
+def test_a_damaged_file_is_refused(tmp_path):
+    write_text("pdromLive({});", tmp_path / "own.js")
+    (tmp_path / "own.js").write_text("other", encoding="utf-8")
+    with pytest.raises(StorageError, match=r"own\.js"):
+        write_page(tmp_path, [tmp_path / "own.js"])
+
+
+@pytest.fixture(scope="module", params=["", "#plain"], ids=["WebGL2", "canvas"])
+def opened(request, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    """The page of a sheet in a headless browser; what it said and asked for is noted."""
+    program = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if program is None:
+        pytest.skip(f"no browser on this machine ({', '.join(BROWSERS)})")
+    folder = tmp_path_factory.mktemp("page")
+    (folder / "live").mkdir()
+    pull, pins = {"effect": "gravity"}, {"effect": "pins", "select": "left"}
+    sheet = {"kind": "cloth", "rows": 8, "columns": 8, "plane": "xz"}
+    scene = make_scene(pull, pins, {"effect": "spring", "weight": 1e4}, mesh=sheet, frames=120)
+    path = write_page(folder, [write_models(scene, folder / "live", every=1)[0]])
+    with sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=program, args=OPTIONS)
+        page = browser.new_page(viewport={"width": 900, "height": 800})
+        page.set_default_timeout(LIMIT)
+        page.said, page.asked = [], []
+        page.on("console", lambda message: page.said.append(message.text))
+        page.on("pageerror", lambda error: page.said.append(str(error)))
+        page.on("request", lambda asked: page.asked.append(asked.url))
+        page.goto(path.as_uri() + request.param)
+        page.wait_for_selector('body[data-ready="yes"]')
+        yield page
+        browser.close()
+
+
+def after(page: Page, frame: int) -> None:
+    """Wait until the run has come so far."""
+    page.wait_for_function(f"Number(document.body.dataset.frame) >= {frame}")
+
+
+def picture(page: Page) -> np.ndarray:
+    """What is drawn, (height, width, 3), without the words on it."""
+    with Image.open(io.BytesIO(page.locator("#picture").screenshot())) as image:
+        return np.asarray(image.convert("RGB"), dtype=int)[60:]
+
+
+@pytest.mark.slow
+def test_it_runs_and_is_drawn(opened: Page) -> None:
+    after(opened, 2)
+    seen = picture(opened)
+    assert np.mean(seen.min(axis=2) < 200) > 0.005
+    after(opened, 25)
+    assert np.mean(np.abs(picture(opened) - seen).max(axis=2) > 30) > 1e-3
+    assert opened.inner_text("#verdict") == "Inside the trained range."
+    assert "%" in opened.inner_text("#distance")
+    after(opened, 125)
+    opened.wait_for_function("document.getElementById('distance').textContent.includes('ended')")
+
+
+@pytest.mark.slow
+def test_a_dragged_handle_leaves_the_trained_range(opened: Page) -> None:
+    opened.click("#again")
+    opened.wait_for_function("Number(document.body.dataset.frame) < 60")
+    opened.focus("#handles button")
+    opened.wait_for_function(
+        """() => {
+        document.activeElement.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowUp'}));
+        return document.getElementById('verdict').classList.contains('bad');
+        }"""
+    )
+    assert "Outside the trained range" in opened.inner_text("#verdict")
+    assert opened.inner_text("#distance") == "your motion was not recorded"
+    opened.get_by_role("button", name="Let go of left").click()
+    opened.get_by_role("button", name="Hold left").wait_for()
+
+
+@pytest.mark.slow
+def test_a_pointer_takes_a_handle_and_turns_the_picture_elsewhere(opened: Page) -> None:
+    opened.click("#again")
+    opened.click("#play")
+    picture_box = opened.locator("#picture").bounding_box()
+    # no handle lies in the corner
+    opened.mouse.move(picture_box["x"] + 10, picture_box["y"] + picture_box["height"] - 10)
+    before = picture(opened)
+    opened.mouse.down()
+    opened.mouse.move(picture_box["x"] + 200, picture_box["y"] + picture_box["height"] - 40)
+    opened.mouse.up()
+    opened.wait_for_timeout(0)
+    assert np.mean(np.abs(picture(opened) - before).max(axis=2) > 30) > 1e-3
+    assert opened.inner_text("#play") == "Play"
+    assert opened.inner_text("#distance") != "your motion was not recorded"
+
+
+@pytest.mark.slow
+def test_nothing_is_asked_of_a_network_and_nothing_is_said(opened: Page) -> None:
+    assert [url for url in opened.asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    assert opened.said == []

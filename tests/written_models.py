@@ -1,0 +1,38 @@
+"""Files of models for the page, of small scenes."""
+
+from pathlib import Path
+
+import numpy as np
+
+from pdrom.core.paths import File
+from pdrom.core.store import write_hdf5
+from pdrom.experiments.live import LiveModels, Options, live
+from pdrom.model.mesh.types import save_mesh
+from pdrom.model.runs.full_order import trajectory
+from pdrom.model.scene import Scene
+from pdrom.reduction.local.guard_settings import GuardSettings
+from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
+from pdrom.reduction.subspace.store import store_columns, store_model
+
+
+def write_models(scene: Scene, folder: Path, every: int = 2) -> tuple[Path, SubspaceModel]:
+    """File of one model that samples some of the elements, and the model."""
+    reference = trajectory(scene, track_objective=False)
+    (group,) = scene.groups
+    elements = np.arange(0, group.elements, every)
+    samples = {group.name: Samples(elements, np.full(len(elements), float(every)))}
+    model = SubspaceModel("pod", make_columns(scene, reference[1:], "pod", 3), samples)
+    save_mesh(scene.mesh, folder / "mesh.h5")
+    with write_hdf5(folder / "train.h5") as file:
+        file["positions"] = reference
+    with write_hdf5(folder / "models.h5") as file:
+        store_columns(file.create_group("columns/own"), model.columns)
+        labels = {"method": "ecsw-1e-02", "position_basis": "pod", "k": 3, "base": "own"}
+        store_model(file.create_group("models/own"), labels, samples)
+    asked = LiveModels(sizes=(3,))
+    options = Options(scene=scene.config, live=asked, guard=GuardSettings(), joint_rows=())
+    mesh, train, models, out = (
+        File(str(folder / name), {}) for name in ("mesh.h5", "train.h5", "models.h5", "test.js")
+    )
+    live(mesh, train, [models], [], [], [], [], options, out)
+    return folder / "test.js", model
