@@ -20,7 +20,9 @@ def blocks(matrix: np.ndarray) -> np.ndarray:
     m, n = matrix.shape
     whole = np.zeros((-(-m // TALL) * TALL, n))
     whole[:m] = matrix
-    return copied(np.ascontiguousarray(whole.reshape(-1, TALL, n).transpose(0, 2, 1)).ravel())
+    return copied(
+        np.ascontiguousarray(whole.reshape(len(whole) // TALL, TALL, n).transpose(0, 2, 1)).ravel()
+    )
 
 
 def vectors(count: int) -> np.ndarray:
