@@ -60,7 +60,7 @@ class StudySettings(ConfigModel):
     scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
     methods: Annotated[tuple[str, ...], Field(min_length=1)]
     ranks: Annotated[tuple[Rank, ...], Field(min_length=1)] = (6, 10, 20, 50, "full")
-    heldout_ranks: tuple[Rank, ...] = ("full",)
+    heldout_ranks: tuple[Rank, ...] | None = None
     sweep: Sweep = Sweep()
     solver: Solver = DEFAULT_SOLVER
     threads: Threads = 1
@@ -100,7 +100,7 @@ class StudySettings(ConfigModel):
     @model_validator(mode="after")
     def _heldout_ranks_are_run(self) -> Self:
         """Samples exist for the ranks; those of the full rank always do."""
-        for rank in self.heldout_ranks:
+        for rank in self.heldout_ranks or ():
             if rank not in (*self.ranks, "full"):
                 allowed = ", ".join(map(str, self.ranks))
                 raise ValueError(f"heldout_ranks = {rank}: allowed are ranks ({allowed}) and full")

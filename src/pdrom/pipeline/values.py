@@ -20,6 +20,7 @@ from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.contents import labels_of
 from pdrom.pipeline.study import Study
+from pdrom.reduction.local.ranks import Rank
 from pdrom.reduction.method import BasisSpec, MethodSpec
 
 Labels = Mapping[str, str]
@@ -171,6 +172,12 @@ def _projection_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
     return {case.method: study.methods[case.method] for case in _projection_cases(study, labels)}
 
 
+def _heldout_ranks(study: Study, labels: Labels) -> tuple[Rank, ...]:
+    """Sizes that run on the first held-out motion: all, unless the configuration chooses."""
+    chosen = study.settings.heldout_ranks
+    return study.settings.ranks if chosen is None else chosen
+
+
 DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "scene": _scene,
     "mesh": _mesh,
@@ -197,6 +204,7 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "subspace_cases": _subspace_cases,
     "projection_cases": _projection_cases,
     "projection_methods": _projection_methods,
+    "heldout_ranks": _heldout_ranks,
     "ladder": lambda study, labels: study.ladder,
     "ablation": lambda study, labels: study.ablation,
 }
