@@ -71,7 +71,7 @@ class Live(LiveModels):
     Shown are those that the study has models of: position subspaces, or ``online.scenes``.
     """
 
-    scenes: tuple[SceneName, ...] = ("bar_release", "spring_oop", "bar80", "sheet100_strain")
+    scenes: tuple[SceneName, ...] = ()
 
 
 class JointRows(ConfigModel):

@@ -94,6 +94,12 @@ def published(plan: Plan, folders: Folders, manifest: Manifest) -> list[Publishe
         for place in (paths.FIGURE, paths.FIGURE_PICTURE):
             titles[place.at("", name=name)[1:]] = f"Figure {job.label}: {job.order.title}"
     titles[paths.LIVE_PAGE.at("")[1:]] = "Page on which reduced models run"
+    models = Path(paths.LIVE_MODEL.pattern).parent
+    titles |= {
+        name: f"Models of {Path(name).stem} for the page"
+        for name in manifest.files
+        if Path(name).parent == models
+    }
     titles["machine.json"] = "The machine that the study ran on"
     manuscript = Path(folders.manuscript).name
     found = []

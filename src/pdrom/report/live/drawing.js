@@ -397,7 +397,6 @@ const pdromDrawing = (() => {
     // The same canvas, seen from elsewhere.
     from({ up, eye }) {
       Object.assign(this.camera, new Camera(up, eye));
-      return this;
     }
 
     add(layer) {

@@ -70,11 +70,9 @@
 
   function makeLayers() {
     const { scene, triangles } = shown, n = scene.full.vertices, beside = shown.reduced && !above();
-    if (!drawing || up !== String(scene.view.up)) { // scenes with one up share the camera
-      up = String(scene.view.up);
-      if (drawing) drawing.clear();
-      drawing = drawing ? drawing.from(scene.view) : new Drawing(at("shapes"), { ...scene.view, plain: location.hash === "#plain" });
-    }
+    drawing ??= new Drawing(at("shapes"), { ...scene.view, plain: location.hash === "#plain" });
+    if (up !== String(scene.view.up)) drawing.from(scene.view); // scenes with one up share the camera
+    up = String(scene.view.up);
     drawing.clear();
     drawing.views = beside ? 2 : 1;
     drawing.camera.look(scene.ranges.map(([low, high]) => 0.5 * (low + high)), CUBE * side());
