@@ -8,7 +8,8 @@ from itertools import combinations
 import numpy as np
 
 from pdrom.core.errors import SceneError
-from pdrom.model.effects.base import Boundary, Contact, held_targets
+from pdrom.model.effects.base import Boundary, Contact
+from pdrom.model.effects.held import held_targets
 
 log = logging.getLogger(__name__)
 

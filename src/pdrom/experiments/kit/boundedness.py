@@ -35,7 +35,7 @@ from scipy import linalg
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import State, Stepper
-from pdrom.model.effects.base import held_vertices
+from pdrom.model.effects.held import held_vertices
 from pdrom.model.scene import Scene
 
 # Eigenvalues of a stiffness below this fraction of the largest one are zero.

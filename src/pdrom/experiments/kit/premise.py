@@ -12,7 +12,7 @@ The theorem of `pdrom.experiments.kit.boundedness` asks of a scene, contacts asi
 import numpy as np
 
 from pdrom.experiments.kit.boundedness import kept_velocity, largest_projections
-from pdrom.model.effects.base import held_vertices
+from pdrom.model.effects.held import held_vertices
 from pdrom.model.scene import Scene
 
 

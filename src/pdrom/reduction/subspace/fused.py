@@ -25,8 +25,9 @@ from pdrom.model.dynamics.space import Solve
 from pdrom.model.dynamics.stepper import LocalStep, Stepper
 from pdrom.model.dynamics.whole_frames import BLOCK, Blocks
 from pdrom.reduction.subspace.dense import blocks, product, read, vectors, write
+from pdrom.reduction.subspace.elimination import DenseElimination
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
-from pdrom.reduction.subspace.space import DenseElimination, ReducedSpace
+from pdrom.reduction.subspace.space import ReducedSpace
 
 
 class FusedStepper(Stepper):
