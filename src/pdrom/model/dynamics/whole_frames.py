@@ -49,13 +49,15 @@ class WholeFrames:
         self._space, self._loop, self._anderson = space, loop, acceleration
         vertices = len(space.system.inertia)
         nothing = np.zeros((vertices, 3))
+        constants = [f.acceleration(nothing, nothing) for f in forces]
         self._constants = np.array(
-            [np.zeros(3) if np.any(f.rate) else f.acceleration(nothing, nothing) for f in forces]
-        ).reshape(-1, 3)
+            [np.broadcast_to(own, (vertices, 3)) for own in constants]
+        ).reshape(-1, vertices, 3)
         rates = [np.broadcast_to(np.asarray(f.rate, float), vertices) for f in forces]
         self._rates = np.array(rates).reshape(-1, vertices)
-        # one for all vertices where no force looks at their velocities
-        self._acceleration = np.zeros((vertices if self._rates.any() else 1, 3))
+        # one for all vertices where no force tells them apart
+        alike = not self._rates.any() and bool((self._constants == self._constants[:, :1]).all())
+        self._acceleration = np.zeros((1 if alike else vertices, 3))
         self._floors = np.array([contact.height for contact in contacts], dtype=float)
         self._work = tuple(empty(WIDTH * vertices) for _ in range(2))
         self._first = unflat(zeros(WIDTH * vertices))
@@ -110,7 +112,7 @@ def _accelerate(constants, rates, velocities, result):
             total = 0.0
             for k in range(len(constants)):
                 # no product with a rate of zero: a velocity that is not finite stays where it is
-                own = -rates[k, i] * velocities[i, axis] if rates[k, i] else constants[k, axis]
+                own = -rates[k, i] * velocities[i, axis] if rates[k, i] else constants[k, i, axis]
                 total += own
             result[i, axis] = total
 
