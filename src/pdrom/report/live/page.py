@@ -2,7 +2,9 @@
 
 import json
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from pdrom.artifact.artifact import Artifact, declare
 from pdrom.artifact.reads import Every, ProjectFile
@@ -10,6 +12,8 @@ from pdrom.core.errors import StorageError
 from pdrom.core.paths import LIVE_MODEL, LIVE_PAGE, File
 from pdrom.core.store import read_text, require_intact, write_text
 
+# Folder of the models, from that of the page.
+MODELS = Path(LIVE_MODEL.pattern).parent.name
 HEAD = re.compile(r'pdromLive\(\{"format":1,"scene":("\w+"),"title":("(?:[^"\\]|\\.)*"),')
 
 
@@ -21,7 +25,7 @@ def _write(
     engine: Path,
     drawing: Path,
     script: Path,
-    out: File,
+    out: str,
 ) -> None:
     """Write the page; it loads the models of a scene when a reader chooses it.
 
@@ -38,18 +42,18 @@ def _write(
         "SCRIPT": script,
     }
     texts = {name: path.read_text("utf-8") for name, path in parts.items()}
-    scenes = [_listed(file, Path(out.path).parent) for file in models]
+    scenes = [_listed(file) for file in models]
     texts["SCENES"] = safe_json(scenes)
-    write_text(filled(html.read_text("utf-8"), texts), out.path)
+    write_text(filled(html.read_text("utf-8"), texts), out)
 
 
-def _listed(file: File, folder: Path) -> dict[str, str]:
+def _listed(file: File) -> dict[str, str]:
     require_intact(file.path)
     head = HEAD.match(read_text(file.path))
     if head is None:
         raise StorageError(f"{file.path}: no models for the page, or of another version")
     scene, title = map(json.loads, head.groups())
-    return {"scene": scene, "title": title, "file": str(Path(file.path).relative_to(folder))}
+    return {"scene": scene, "title": title, "file": f"{MODELS}/{Path(file.path).name}"}
 
 
 def safe_json(value: object) -> str:
@@ -71,8 +75,18 @@ def _asset(name: str) -> ProjectFile:
     return ProjectFile(f"src/pdrom/report/live/{name}")
 
 
+class _Page(Artifact):
+    """A file that may be made anywhere, to be compared with the study's."""
+
+    def perform(
+        self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
+    ) -> None:
+        """Write it."""
+        self.function(**self.read(settings, inputs), out=str(outputs["out"]))
+
+
 live_page = declare(
-    Artifact(
+    _Page(
         "live_page",
         "Page on which models run",
         {

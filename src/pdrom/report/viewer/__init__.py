@@ -1,1 +1,1 @@
-"""A page on which runs are looked at: one file, drawn by the renderer of `pdrom.report.live`."""
+"""A page on which runs are looked at: one file, no network, drawn as `pdrom.report.live` draws."""

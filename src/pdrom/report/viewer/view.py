@@ -26,8 +26,12 @@ def rotation_to(up: np.ndarray) -> np.ndarray:
     if cosine <= -1.0 + 1e-12:
         return np.diag([1.0, -1.0, -1.0])
     x, y, z = np.cross(Y, up)
+    square = float(x * x + y * y + z * z)
+    if square == 0.0:
+        return np.eye(3)
     turn = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + turn + turn @ turn / (1.0 + cosine)
+    # not over 1 + cosine, of which half a turn leaves no digits
+    return np.eye(3) + turn + turn @ turn * ((1.0 - cosine) / square)
 
 
 def view_of(effects: Sequence[EffectConfig]) -> dict[str, list[float]]:

@@ -33,7 +33,7 @@ def write_page(folder: Path, models: list[Path]) -> Path:
     """The page of some files of models, which lie below its folder."""
     assets = [ROOT / read.path for name, read in live_page.files.items() if name != "models"]
     out = folder / "live.html"
-    live_page([File(str(path), {}) for path in models], *assets, File(str(out), {}))
+    live_page([File(str(path), {}) for path in models], *assets, str(out))
     return out
 
 
