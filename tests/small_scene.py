@@ -12,7 +12,7 @@ from pdrom.pipeline.study import Study
 
 SCENE = "own"
 NEEDED = (
-    "mesh", "fom", "sensitivity", "iterations", "snapshots", "pod", "reruns", "subspaces", "timing",
+    "mesh", "fom", "sensitivity", "subspaces", "iterations", "snapshots", "pod", "reruns", "timing",
 )  # fmt: skip
 CHANGES = {
     "ranks": [2, "full"],

@@ -36,8 +36,8 @@ ASKED = {
     "guard": {"repeats": 1, "cases": [{"scene": SCENE, "method": METHOD, "r": 2}]},
 }
 JOBS = (
-    "mesh", "fom", "sensitivity", "iterations", "snapshots", "pod", "companion", "reruns",
-    "subspaces", "bounds", "estimates", "position_bases", "repetitions", "guard", "timing",
+    "mesh", "fom", "sensitivity", "subspaces", "iterations", "snapshots", "pod", "companion",
+    "reruns", "bounds", "estimates", "position_bases", "repetitions", "guard", "timing",
 )  # fmt: skip
 STEP, GRAVITY, VERTEX_MASS = 0.016, 9.81, 10.0
 

@@ -70,9 +70,9 @@ def test_an_edit_of_an_inlined_function_reaches_every_kernel(tmp_path):
     lanes = tmp_path / "src" / "pdrom" / "model" / "constraints" / "lanes.py"
     before = _spring_in(tmp_path)
     text = lanes.read_text()
-    loaded = "        work[first * LANES + lane],"
+    loaded = "        at(work, first * LANES + lane),"
     assert loaded in text
-    lanes.write_text(text.replace(loaded, "        2.0 * work[first * LANES + lane],"))
+    lanes.write_text(text.replace(loaded, "        2.0 * at(work, first * LANES + lane),"))
     assert before == pytest.approx([1.0, 0.0, 0.0])
     assert _spring_in(tmp_path) == pytest.approx([2.0, 0.0, 0.0])
 
