@@ -36,6 +36,7 @@ MEASURED = (
     *RUNS, paths.RECONSTRUCTION, paths.RERUNS_TRAIN, paths.SUBSPACES, paths.SUBSPACES_TRAIN,
     paths.TIMINGS,
 )  # fmt: skip
+HELD_OUT = (paths.RERUNS_HELDOUT, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_CONVERGED)
 EFFECTS = (paths.CONTRIBUTIONS, paths.EFFECTS, paths.LEFT_OUT, paths.ITERATIONS)
 
 KINDS: dict[str, Kind] = {
@@ -54,7 +55,8 @@ KINDS: dict[str, Kind] = {
     "runs": Kind("Table of the reduced runs", "tables", ("runs.csv",), MEASURED),
     "advice": Kind(
         "Tables for pdrom advise: what each effect does, and errors and times of all settings",
-        "tables", ("effects_contribution.csv", "accuracy_cost.csv"), (*MEASURED, *EFFECTS),
+        "tables", ("effects_contribution.csv", "accuracy_cost.csv"),
+        (*MEASURED, *HELD_OUT, *EFFECTS),
         by_default=False, tables=("effects_contribution", "accuracy_cost"),
     ),
     "animation": Kind("Film (MP4)", "film", ("animation.mp4",), RUNS, by_default=False),

@@ -18,6 +18,7 @@ from pdrom.report.figures.kit.read import RerunInfo, choose_ranks, rerun_errors,
 from pdrom.report.viewer.runs import ViewedRun, ViewedScene
 from pdrom.tables.accuracy_cost import accuracy_cost
 from pdrom.tables.effects_contribution import effects_contribution
+from pdrom.tables.heldout_reruns import heldout_reruns
 from pdrom.tables.kit.one_time import NOT_TIMED
 from pdrom.tables.reconstruction_error import reconstruction_error
 from pdrom.tables.reduced_reruns import reduced_reruns
@@ -111,11 +112,21 @@ class SceneResults:
         """Errors and times of every setting, as the study's table accuracy_cost has them."""
         return accuracy_cost(
             self._reruns(),
+            self._heldout(),
             [self._file(paths.TIMINGS)],
             NOT_TIMED,
             [self._file(paths.ITERATIONS)],
+            [self._file(paths.SUBSPACES_CONVERGED)],
             {self.scene.name: self.scene.iterations},
         )
+
+    def _heldout(self) -> pd.DataFrame:
+        inside = [paths.SUBSPACES, paths.SUBSPACES_HELDOUT] if self.subspaces else []
+        models, rows = ([self._file(place)] for place in inside) if inside else ([], [])
+        return heldout_reruns(
+            self._each(paths.RERUNS), self._each(paths.RERUNS_HELDOUT), models, rows,
+            self._table(paths.SENSITIVITY), self.threshold,
+        )  # fmt: skip
 
     def _reruns(self) -> pd.DataFrame:
         inside = [paths.SUBSPACES, paths.SUBSPACES_TRAIN] if self.subspaces else []
