@@ -1,6 +1,5 @@
 """The report of a run opens in a real browser, without a network: every figure, every caption."""
 
-import shutil
 from collections.abc import Iterator
 
 import numpy as np
@@ -8,17 +7,16 @@ import pytest
 import yaml
 from checkout import copy_repository
 from PIL import Image
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page
 from sandbox import MICRO, MICRO_FILE
 
+from browser import browser_or_skip, page_at
 from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.words.markup import to_plain
 from pdrom.tables import declared
 from places import MICRO_RESULTS
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 ARGUMENTS = ("--configfile", MICRO_FILE)
-LIMIT = 120_000  # ms after which a page that does not answer has failed
 
 pytestmark = pytest.mark.slow
 
@@ -26,9 +24,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     """A report whose figures differ by their width; what the page said and asked for is noted."""
-    program = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if program is None:
-        pytest.skip(f"no browser on this machine ({', '.join(BROWSERS)})")
+    browser_or_skip()
     checkout = copy_repository(tmp_path_factory.mktemp("report"))
     (checkout.folder / MICRO_FILE).write_text(yaml.safe_dump(MICRO), encoding="utf-8")
     checkout.count_as_finished(*ARGUMENTS)
@@ -37,17 +33,8 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
         Image.fromarray(np.full((1, width), 127, dtype=np.uint8)).save(picture)
     done = checkout.snakemake("--report", "report.html", *ARGUMENTS)
     assert done.returncode == 0, done.stderr
-    with sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": 1500, "height": 900})
-        page.set_default_timeout(LIMIT)
-        page.said, page.asked = [], []
-        page.on("console", lambda m: page.said.append(m.text) if m.type == "error" else None)
-        page.on("pageerror", lambda error: page.said.append(str(error)))
-        page.on("request", lambda request: page.asked.append(request.url))
-        page.goto((checkout.folder / "report.html").as_uri())
+    with page_at((checkout.folder / "report.html").as_uri(), width=1500, height=900) as page:
         yield page
-        browser.close()
 
 
 def test_the_first_page_names_the_configuration(opened: Page) -> None:

@@ -18,7 +18,7 @@ def held_targets(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The vertices that are held in ``frame``, as `held_vertices`, and their targets (n, 3) m.
 
-    ``positions`` (N, 3) m are those at the frame's beginning.
+    ``positions`` (N, 3) m are those at the frame's beginning; ``boundaries`` are the scene's.
     """
     vertices, path = held_path(boundaries, range(frame, frame + 1), positions)
     return vertices, path[0]
@@ -31,6 +31,11 @@ def held_path(
 
     Targets are (n, m, 3) m for n >= 1 frames: up to the first in which others are held, or in which
     any are taken hold of.
+
+    Parameters
+    ----------
+    boundaries : holds of the scene
+    positions : (N, 3) m at the beginning of the first frame
     """
     active = [b for b in boundaries if b.active(frames.start)]
     held = [b.held(frames.start) for b in active]

@@ -26,23 +26,23 @@ def blocks(matrix: np.ndarray) -> np.ndarray:
 
 
 def vectors(count: int) -> np.ndarray:
-    """Zeros for so many vectors, to be read and written by `product`."""
+    """Zeros for ``count`` vectors, to be read and written by `product`."""
     return zeros(3 * (-(-count // TALL) * TALL) + WIDTH)
 
 
 def write(values: np.ndarray, to: np.ndarray) -> None:
-    """Copy vectors (n, 3) to where `product` reads them."""
+    """Copy vectors ``values`` (n, 3) ``to`` where `product` reads them."""
     to[: values.size] = values.ravel()
 
 
 def read(vectors: np.ndarray, count: int) -> np.ndarray:
-    """The first vectors as a view (count, 3)."""
+    """The first ``count`` of ``vectors`` as a view (count, 3)."""
     return vectors[: 3 * count].reshape(count, 3)
 
 
 @compiled(nogil=True)
 def product(matrix, m, n, start, x, out):
-    """out <- start + M x with a matrix (m, n) in `blocks`; the others are `vectors`."""
+    """Write ``start`` + M ``x`` into ``out``, `vectors`; ``matrix`` M (m, n) is in `blocks`."""
     entry = 0
     for row in range(0, 3 * m, 3 * TALL):
         a, b = load(start, row), load(start, row + 3)

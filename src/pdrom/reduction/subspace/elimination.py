@@ -8,7 +8,18 @@ from pdrom.model.dynamics.system import require_accurate
 
 
 class DenseElimination:
-    """Reduced system with fixed coordinates eliminated; the inverse is small and explicit."""
+    """Reduced system with fixed coordinates eliminated; the inverse is small and explicit.
+
+    Parameters
+    ----------
+    matrix : (K, K) of the reduced system, kg/s^2
+    fixed : coordinates (m,) that have targets, ascending
+
+    Raises
+    ------
+    SolverError
+        The block of the free coordinates is not positive definite, or its solution inaccurate.
+    """
 
     def __init__(self, matrix: np.ndarray, fixed: np.ndarray) -> None:
         self.free = np.setdiff1d(np.arange(len(matrix)), fixed)
@@ -24,12 +35,12 @@ class DenseElimination:
         self._load = np.zeros((len(self.free), 3))
 
     def set_targets(self, targets: np.ndarray) -> None:
-        """Values (m, 3) of the fixed coordinates."""
+        """Set the values ``targets`` (m, 3) of the fixed coordinates."""
         self.targets = targets
         self._load = self._coupling @ targets
 
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
-        """Overwrite the free coordinates of ``y``."""
+        """Overwrite the free coordinates of ``y`` (K, 3) by the solution for ``rhs`` (K, 3)."""
         y[self.free] = self.solved(rhs)
 
     def solved(self, rhs: np.ndarray) -> np.ndarray:

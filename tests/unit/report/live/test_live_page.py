@@ -1,15 +1,15 @@
 """The page on which models run: one file, scenes beside it, and it works in a real browser."""
 
 import io
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page
 
+from browser import browser_or_skip, page_at
 from builders import make_scene
 from pdrom.core.errors import StorageError
 from pdrom.core.paths import File
@@ -17,16 +17,6 @@ from pdrom.core.store import write_text
 from pdrom.report.live.page import filled, live_page
 from places import ROOT
 from written_models import write_models
-
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
-# software rendering, so that a machine without a graphics card draws, too
-OPTIONS = [
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]
-LIMIT = 120_000  # ms after which a page that does not answer has failed
 
 
 def write_page(folder: Path, models: list[Path]) -> Path:
@@ -69,27 +59,16 @@ def test_a_damaged_file_is_refused(tmp_path):
 @pytest.fixture(scope="module", params=["", "#plain"], ids=["WebGL2", "canvas"])
 def opened(request, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     """The page of a sheet in a headless browser; what it said and asked for is noted."""
-    program = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if program is None:
-        pytest.skip(f"no browser on this machine ({', '.join(BROWSERS)})")
+    browser_or_skip()
     folder = tmp_path_factory.mktemp("page")
     (folder / "live").mkdir()
     pull, pins = {"effect": "gravity"}, {"effect": "pins", "select": "left"}
     sheet = {"kind": "cloth", "rows": 8, "columns": 8, "plane": "xz"}
     scene = make_scene(pull, pins, {"effect": "spring", "weight": 1e4}, mesh=sheet, frames=120)
     path = write_page(folder, [write_models(scene, folder / "live", every=1)[0]])
-    with sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=program, args=OPTIONS)
-        page = browser.new_page(viewport={"width": 900, "height": 800})
-        page.set_default_timeout(LIMIT)
-        page.said, page.asked = [], []
-        page.on("console", lambda message: page.said.append(message.text))
-        page.on("pageerror", lambda error: page.said.append(str(error)))
-        page.on("request", lambda asked: page.asked.append(asked.url))
-        page.goto(path.as_uri() + request.param)
+    with page_at(path.as_uri() + request.param, width=900, height=800) as page:
         page.wait_for_selector('body[data-ready="yes"]')
         yield page
-        browser.close()
 
 
 def after(page: Page, frame: int) -> None:

@@ -3,7 +3,6 @@
 import base64
 import io
 import json
-import shutil
 import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -14,8 +13,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
-from playwright.sync_api import Locator, Page, sync_playwright
+from playwright.sync_api import Locator, Page
 
+from browser import browser_or_skip, page_at
 from pdrom.core.errors import StorageError
 from pdrom.core.packed import LEVELS, pack_positions
 from pdrom.model.effects.entries import effect_config
@@ -25,16 +25,6 @@ from pdrom.report.viewer.pack import FRAMES, pack_scene, shown_region
 from pdrom.report.viewer.page import write_page
 from pdrom.report.viewer.runs import ViewedRun, ViewedScene
 from pdrom.report.viewer.view import EYE, Y, rotation_to
-
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
-# software rendering, so that a machine without a graphics card draws, too
-OPTIONS = [
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]
-LIMIT = 120_000  # ms after which a page that does not answer has failed
 
 
 def unpack_positions(packed: dict[str, Any]) -> np.ndarray:
@@ -176,9 +166,7 @@ def test_the_rotation_takes_y_there_and_mirrors_nothing(direction):
 @pytest.fixture(scope="module")
 def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     """The page of two scenes in a headless browser; what it said and asked for is noted."""
-    program = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if program is None:
-        pytest.skip(f"no browser on this machine ({', '.join(BROWSERS)})")
+    browser_or_skip()
     path = tmp_path_factory.mktemp("viewer") / "index.html"
     sideways = [{"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]}]
     scenes = [
@@ -188,18 +176,9 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
         viewed("sideways", effects=sideways),
     ]
     write_page(scenes, path)
-    with sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=program, args=OPTIONS)
-        page = browser.new_page(viewport={"width": 1000, "height": 700})
-        page.set_default_timeout(LIMIT)
-        page.said, page.asked = [], []
-        page.on("console", lambda m: page.said.append(m.text) if m.type == "error" else None)
-        page.on("pageerror", lambda error: page.said.append(str(error)))
-        page.on("request", lambda request: page.asked.append(request.url))
-        page.goto(path.as_uri())
+    with page_at(path.as_uri(), width=1000, height=700) as page:
         ready(page)
         yield page
-        browser.close()
 
 
 def ready(page: Page) -> None:

@@ -1,0 +1,45 @@
+"""A headless browser for tests of pages; a machine without one skips them."""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+from playwright.sync_api import Page, sync_playwright
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+# software rendering, so that a machine without a graphics card draws, too
+OPTIONS = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]
+LIMIT = 120_000  # ms after which a page that does not answer has failed
+
+
+def browser_or_skip() -> str:
+    """Path of a browser; the test is skipped where there is none."""
+    program = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if program is None:
+        pytest.skip(f"no browser on this machine ({', '.join(BROWSERS)})")
+    return program
+
+
+@contextmanager
+def page_at(address: str, width: int, height: int) -> Iterator[Page]:
+    """The page at ``address``; its ``said`` are its messages, its ``asked`` the addresses it loads.
+
+    ``width`` and ``height`` are in pixels.
+    """
+    with sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=browser_or_skip(), args=OPTIONS)
+        page = browser.new_page(viewport={"width": width, "height": height})
+        page.set_default_timeout(LIMIT)
+        page.said, page.asked = [], []
+        page.on("console", lambda message: page.said.append(message.text))
+        page.on("pageerror", lambda error: page.said.append(str(error)))
+        page.on("request", lambda request: page.asked.append(request.url))
+        page.goto(address)
+        yield page
+        browser.close()
