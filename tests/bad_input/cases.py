@@ -116,6 +116,8 @@ STUDY_CASES = [
     more("section as a number", "coarsen: 0.5\n", "coarsen = 0.5", "valid dictionary"),
     more("factor above one", "coarsen: {resolution: 2}\n", "coarsen.resolution = 2", "equal to 1"),
     more("factor NaN", "coarsen: {frames: .nan}\n", "coarsen.frames = nan"),
+    more("set without name", "claim_sets: {owns: [spring_oop]}\n", "claim_sets", "'owns'", "own"),
+    more("motion too fast", "replicate: {frames_factor: 0}\n", "replicate.frames_factor = 0"),
     more("infinite limit", "blowup_extent: .inf\n", "blowup_extent = inf", "1000000000000"),
     more("truth value for a number", "timing: {repeats: yes}\n", "repeats = True", "truth value"),
     more("huge number of repeats", "timing: {repeats: 1.0e+9}\n", "timing.repeats", "1000"),

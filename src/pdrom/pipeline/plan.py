@@ -86,7 +86,7 @@ class Plan:
     def check(self) -> None:
         """Read every file of the configuration, so that a fault shows early."""
         folder = self.root / "config"
-        load_claims(folder / "claims.yaml")
+        load_claims(folder / "claims.yaml", self.settings.claim_sets)
         load_expectations(folder / "hard_cases.yaml")
         self._check_scenes(folder)
         check_subspaces(self.study)

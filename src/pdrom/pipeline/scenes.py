@@ -1,4 +1,4 @@
-"""Scenes of config/scenes, coarsened as a study asks, and built to find every fault early.
+"""Scenes of config/scenes, changed as a study requests, and built to find every fault early.
 
 A configuration also makes scenes out of others: finer meshes, other weights, other starts.
 """
@@ -6,7 +6,7 @@ A configuration also makes scenes out of others: finer meshes, other weights, ot
 from collections.abc import Callable, Iterable, Iterator
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
@@ -30,6 +30,50 @@ class Coarsen(ConfigModel):
     resolution: Fraction = 1.0
     frames: Fraction = 1.0
 
+    def of(self, scene: SceneConfig) -> SceneConfig:
+        """Return the coarsened ``scene``."""
+        return scene if self == Coarsen() else scene.coarsened(self.resolution, self.frames)
+
+
+class Replicate(ConfigModel):
+    """Another sample of every scene, on which rules that were fixed before are tried again.
+
+    frames_factor : stretches handles, pins and schedules in time; below 1 the motion is faster
+    kick : speed of a random start (m/s), along the axes of the scene's held-out motions
+    seed : of that start; held-out motions take the seeds that follow theirs by as much
+    """
+
+    frames_factor: Annotated[float, Field(ge=0.1, le=10.0)] = 1.0
+    kick: Annotated[float, Field(ge=0.0, le=1e3)] = 0.0
+    seed: Seed = 0
+
+    def of(self, scene: SceneConfig) -> SceneConfig:
+        """Return ``scene`` at another speed, from another start, with other held-out seeds."""
+        if self == Replicate():
+            return scene
+        effects = [effect.with_frames_scaled(self.frames_factor) for effect in scene.effects]
+        held_out = scene.held_out
+        if self.kick:
+            kick = {"effect": "kick", "speed": self.kick, "seed": self.seed}
+            effects.append(effect_config(kick | {"axes": held_out.kick_axes}, len(effects)))
+        held_out = held_out.model_copy(update={"seed": (held_out.seed + self.seed) % 2**63})
+        return scene.model_copy(update={"effects": tuple(effects), "held_out": held_out})
+
+
+class Changes(NamedTuple):
+    """Changes that a study makes to every scene of config/scenes."""
+
+    coarsen: Coarsen = Coarsen()
+    replicate: Replicate = Replicate()
+
+    def of(self, scene: SceneConfig) -> SceneConfig:
+        """Return ``scene`` with both changes."""
+        return self.coarsen.of(self.replicate.of(scene))
+
+
+Change = Coarsen | Replicate | Changes
+UNCHANGED = Changes()
+
 
 def scene_names(root: Path) -> list[str]:
     """Names of all scenes that have a file."""
@@ -44,20 +88,20 @@ def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
             raise ConfigurationError(f"{key}: unknown scene '{name}'{choices(name, known)}")
 
 
-def load_scene(root: Path, name: str, coarsen: Coarsen | None = None) -> SceneConfig:
+def load_scene(root: Path, name: str, changes: Change = UNCHANGED) -> SceneConfig:
     """Configuration of scene ``name``, see `load_bound_scene`."""
-    return load_bound_scene(root, name, coarsen).config
+    return load_bound_scene(root, name, changes).config
 
 
-def load_bound_scene(root: Path, name: str, coarsen: Coarsen | None = None) -> Scene:
-    """Scene ``name`` from config/scenes, coarsened, and built to find every fault early.
+def load_bound_scene(root: Path, name: str, changes: Change = UNCHANGED) -> Scene:
+    """Scene ``name`` from config/scenes, changed, and built to find every fault early.
 
     Raises
     ------
     ConfigurationError
         Naming the file and the fault; also for faults of the held-out variant.
     """
-    return bind(root, read_scene(root, name, coarsen), str(scene_file(root, name)))
+    return bind(root, read_scene(root, name, changes), str(scene_file(root, name)))
 
 
 def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
@@ -82,16 +126,14 @@ def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
     return bound
 
 
-def read_scene(root: Path, name: str, coarsen: Coarsen | None = None) -> SceneConfig:
-    """Configuration of scene ``name``, coarsened, without its mesh; ConfigurationError."""
+def read_scene(root: Path, name: str, changes: Change = UNCHANGED) -> SceneConfig:
+    """Configuration of scene ``name``, changed, without its mesh; ConfigurationError."""
     require_scenes(root, [name], "scenes")
     path = scene_file(root, name)
     scene = validate(SceneConfig, named(read_yaml(path), name), str(path))
     if scene.name != name:
         raise ConfigurationError(f"{path}: name = '{scene.name}', required: '{name}', as the file")
-    if coarsen is not None and coarsen != Coarsen():
-        scene = scene.coarsened(coarsen.resolution, coarsen.frames)
-    return scene
+    return changes.of(scene)
 
 
 def scene_file(root: Path, name: str) -> Path:

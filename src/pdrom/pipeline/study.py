@@ -37,7 +37,9 @@ from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.pipeline.scenes import (
+    Changes,
     Coarsen,
+    Replicate,
     Variants,
     bind,
     load_bound_scene,
@@ -66,6 +68,8 @@ class StudySettings(ConfigModel):
     threads: Threads = 1
     blowup_extent: BlowupExtent = 100.0
     coarsen: Coarsen = Coarsen()
+    replicate: Replicate = Replicate()
+    claim_sets: dict[str, tuple[SceneName, ...]] = Field(default_factory=dict)
     sensitivity: Sensitivity = Sensitivity()
     iterations: IterationSweep = IterationSweep()
     timing: Timing = Timing()
@@ -88,6 +92,11 @@ class StudySettings(ConfigModel):
     viewer: Viewer = Viewer()
     variants: Variants = Variants()
     study: str | None = None
+
+    @property
+    def changes(self) -> Changes:
+        """Changes of every scene of config/scenes."""
+        return Changes(self.coarsen, self.replicate)
 
     @model_validator(mode="after")
     def _given_once(self) -> Self:
@@ -114,9 +123,9 @@ class Study:
         self.settings = settings
         self.root = root
         self.bound: dict[str, Scene] = {
-            name: load_bound_scene(root, name, settings.coarsen) for name in settings.scenes
+            name: load_bound_scene(root, name, settings.changes) for name in settings.scenes
         }
-        for config in settings.variants.of(partial(read_scene, root, coarsen=settings.coarsen)):
+        for config in settings.variants.of(partial(read_scene, root, changes=settings.changes)):
             self.bound[config.name] = bind(root, config, "variants")
         self.scenes: dict[str, SceneConfig] = {n: s.config for n, s in self.bound.items()}
         self.online: dict[str, SceneConfig] = {
@@ -175,7 +184,7 @@ class Study:
 
     def _loaded(self, name: str) -> SceneConfig:
         """Configuration of a scene that the study does not keep bound to its mesh."""
-        return load_bound_scene(self.root, name, self.settings.coarsen).config
+        return load_bound_scene(self.root, name, self.settings.changes).config
 
     def only(self, scene: str) -> "Study":
         """Return a study of one scene, which need not be held."""
@@ -208,7 +217,7 @@ class Study:
         if identifier in self.meshes:
             return self.meshes[identifier]
         for name in scene_names(self.root):
-            mesh = read_scene(self.root, name, self.settings.coarsen).mesh
+            mesh = read_scene(self.root, name, self.settings.changes).mesh
             if mesh.identifier == identifier:
                 return mesh
         raise ConfigurationError(f"no scene in config/scenes has the mesh '{identifier}'")

@@ -128,7 +128,7 @@ def known(plan: Plan) -> Known:
     study, names = plan.study, Names(list(plan.figure_jobs), declared())
 
     def mesh(scene: str) -> str:
-        return read_scene(study.root, scene, study.settings.coarsen).mesh.identifier
+        return read_scene(study.root, scene, study.settings.changes).mesh.identifier
 
     return Known(
         results=plan.results,

@@ -11,7 +11,7 @@ from pdrom.core.paths import LABELS
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.pipeline.plan import Plan
-from pdrom.pipeline.scenes import Variants, read_scene
+from pdrom.pipeline.scenes import Replicate, Variants, read_scene
 from pdrom.pipeline.study import Study
 from pdrom.pipeline.targets import known
 from places import ROOT
@@ -61,6 +61,21 @@ def test_a_study_holds_its_variants_beside_its_scenes() -> None:
     assert len(study.scenes) == 1 + 8
     fine, coarse = (study.bound[f"spring_oop_m{m}_w1_s1"].mesh for m in ("1p5", "0p5"))
     assert fine.vertices > coarse.vertices
+
+
+def test_a_replicated_scene_is_faster_and_starts_elsewhere() -> None:
+    change = Replicate(frames_factor=0.8, kick=0.1, seed=100)
+    base, scene = read("bar_twist"), read_scene(ROOT, "bar_twist", change)
+    turns = [[e.over for e in s.effects if e.effect == "rotate"] for s in (base, scene)]
+    assert turns == [[100, 100], [80, 80]]
+    assert scene.effects[-1].model_dump() == {
+        "effect": "kick", "speed": 0.1, "seed": 100, "axes": ("x", "y", "z"),
+    }  # fmt: skip
+    assert scene.held_out.seed == base.held_out.seed + 100
+    assert (scene.frames, scene.mesh, scene.reduce) == (base.frames, base.mesh, base.reduce)
+    starts = [s.effects[-1].seed for s in (scene.heldout_variant("kick"),)]
+    assert starts == [102]
+    assert read_scene(ROOT, "bar_twist", Replicate()) == base
 
 
 def test_files_of_variants_are_targets() -> None:

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from pdrom.artifact.reads import ProjectFile, TableOf
+from pdrom.artifact.reads import ProjectFile, Setting, TableOf
 from pdrom.tables.claims import VERDICTS, load_claims, timed_columns
 from pdrom.tables.claims.metrics import READ
+from pdrom.tables.claims.rules import NONE_ADDED, Added
 from pdrom.tables.claims.sensitivity import PARTS, VARIED, sensitivity_rows
 from pdrom.tables.kit.declaration import compared, flag, table, text, timed
 
@@ -40,10 +41,13 @@ def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
     ),
     reads={
         "rules": ProjectFile("config/claims.yaml"),
+        "added": Setting("claim_sets"),
         **{name: TableOf(name) for name in READ},
     },
     timed_cells=_timed_cells,
 )
-def claims_sensitivity(rules: Path, **tables: pd.DataFrame) -> pd.DataFrame:
+def claims_sensitivity(
+    rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame
+) -> pd.DataFrame:
     """One row per claim, part and variation."""
-    return sensitivity_rows(load_claims(rules), tables)
+    return sensitivity_rows(load_claims(rules, added), tables)

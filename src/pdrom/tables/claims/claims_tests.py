@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from pdrom.artifact.reads import ProjectFile, TableOf
+from pdrom.artifact.reads import ProjectFile, Setting, TableOf
 from pdrom.tables.claims import FOUND, VERDICTS, is_timed, load_claims, outcome_rows
 from pdrom.tables.claims.metrics import READ
+from pdrom.tables.claims.rules import NONE_ADDED, Added
 from pdrom.tables.claims.sensitivity import PARTS
 from pdrom.tables.kit.declaration import compared, flag, integer, number, table, text, timed
 
@@ -47,10 +48,11 @@ def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
     ),
     reads={
         "rules": ProjectFile("config/claims.yaml"),
+        "added": Setting("claim_sets"),
         **{name: TableOf(name) for name in READ},
     },
     timed_cells=_timed_cells,
 )
-def claims_tests(rules: Path, **tables: pd.DataFrame) -> pd.DataFrame:
+def claims_tests(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame) -> pd.DataFrame:
     """One row per claim, part and test, in the order of the file."""
-    return outcome_rows(load_claims(rules), tables)
+    return outcome_rows(load_claims(rules, added), tables)

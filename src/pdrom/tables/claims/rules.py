@@ -3,8 +3,9 @@
 import datetime
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, FiniteFloat, model_validator
@@ -17,6 +18,8 @@ from pdrom.tables.claims.rows import Value
 
 SETS = "sets"
 _NAMED = "@"  # opens the name of a set in ``where``
+Added = Mapping[str, Sequence[Value]]
+NONE_ADDED: Added = MappingProxyType({})
 MARGIN = 1.5  # of tests that compare times and name no other
 
 
@@ -144,12 +147,27 @@ class ClaimRule(_Model):
         return hashlib.blake2b(content.encode(), digest_size=4).hexdigest()
 
 
-def load_claims(path: Path) -> dict[str, ClaimRule]:
-    """Claims of the file ``path`` by identifier; ConfigurationError for any fault."""
+def load_claims(path: Path, added: Added = NONE_ADDED) -> dict[str, ClaimRule]:
+    """Claims of the file ``path`` by identifier.
+
+    Parameters
+    ----------
+    added : values that a study adds to named sets of the file, for scenes that the rules were not
+        written for
+
+    Raises
+    ------
+    ConfigurationError
+        For any fault of the file, and for a set that it does not have.
+    """
     content = read_yaml(path)
     if not isinstance(content, dict) or not content:
         raise ConfigurationError(f"{path}: a mapping of claims is required")
-    sets = _sets(content.get(SETS, {}), f"{path}: {SETS}")
+    sets = dict(_sets(content.get(SETS, {}), f"{path}: {SETS}"))
+    for name, values in added.items():
+        if name not in sets:
+            raise ConfigurationError(f"claim_sets: no set '{name}'{choices(name, sets)}")
+        sets[name] = [*sets[name], *values]
     rules = {str(claim): rule for claim, rule in content.items() if claim != SETS}
     if not rules:
         raise ConfigurationError(f"{path}: a mapping of claims is required")

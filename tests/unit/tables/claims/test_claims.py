@@ -457,6 +457,16 @@ def test_a_set_stands_for_its_values(tmp_path):
     assert len(METRICS["local_share"].values(tables(), dict(test.where), 0.1)) == 2
 
 
+def test_a_study_adds_scenes_to_sets_that_exist(tmp_path):
+    path = tmp_path / "claims.yaml"
+    content = {"sets": {"ends": ["a"]}, "C1": claim({"where": {"scene": ["@ends"]}})}
+    path.write_text(yaml.safe_dump(content))
+    (test,) = load_claims(path, {"ends": ("z",)})["C1"].published
+    assert test.where["scene"] == ("a", "z")
+    with pytest.raises(ConfigurationError, match=r"claim_sets: no set 'end'.*ends"):
+        load_claims(path, {"end": ("z",)})
+
+
 def test_changes_are_told_in_their_order(tmp_path):
     path = tmp_path / "claims.yaml"
     first, second = (
