@@ -47,6 +47,7 @@ def default_steps() -> dict[str, tuple[Steps, ...]]:
     return {
         "projective": (*_sweep(1, 2, 5, 10, 20, 40, 80), *_small(2, 5, 10, 20, 40), (5, 4)),
         "anderson": (*_sweep(5, 10, 20, 40, 80), (5, 5), (10, 5)),
+        "chebyshev": _sweep(10, 20, 40, 80),
         "l-bfgs": (*_sweep(5, 10, 20, 40, 80), (5, 5), (10, 5)),
         "newton": _sweep(1, 2, 3),
         "xpbd": (*_sweep(5, 10, 20, 50), *_small(5, 10, 20, 50, 100)),

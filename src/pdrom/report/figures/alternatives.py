@@ -28,6 +28,7 @@ PAIRS = 2  # cases side by side
 LOOKS = {
     "projective": ("projective dynamics", style.BLACK, "o"),
     "anderson": ("with Anderson acceleration", style.GREY, "s"),
+    "chebyshev": ("with Chebyshev acceleration", style.GREY, "<"),
     "l-bfgs": ("L-BFGS", style.BLUE, "^"),
     "newton": ("projected Newton", style.PURPLE, "D"),
     "xpbd": ("XPBD", style.ORANGE, "v"),

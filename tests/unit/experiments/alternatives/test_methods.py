@@ -15,7 +15,14 @@ SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
 HELD = ({"effect": "gravity"}, {"effect": "pins", "select": "left"})
 CLOSED_FORM = ("spring", "strain", "tetrahedron_strain", "deformation_gradient")
 # What minimises the objective of a frame, and iterations that suffice on these meshes.
-IMPLICIT = {"projective": 3000, "anderson": 300, "l-bfgs": 200, "newton": 40, "vertex-descent": 300}
+IMPLICIT = {
+    "projective": 3000,
+    "anderson": 300,
+    "chebyshev": 1500,
+    "l-bfgs": 200,
+    "newton": 40,
+    "vertex-descent": 300,
+}
 
 
 def small(group: str, *effects: dict, weight: float = 1e5, **settings):

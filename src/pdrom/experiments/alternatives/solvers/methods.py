@@ -10,6 +10,7 @@ METHODS = Registry(
     {
         "projective": "pdrom.experiments.alternatives.solvers.small_steps:SmallSteps",
         "anderson": "pdrom.experiments.alternatives.solvers.anderson:Accelerated",
+        "chebyshev": "pdrom.experiments.alternatives.solvers.chebyshev:Chebyshev",
         "l-bfgs": "pdrom.experiments.alternatives.solvers.lbfgs:QuasiNewton",
         "newton": "pdrom.experiments.alternatives.solvers.newton:Newton",
         "xpbd": "pdrom.experiments.alternatives.solvers.xpbd:CompliantConstraints",
