@@ -23,11 +23,11 @@ from pdrom.core.paths import (
 )
 from pdrom.core.store import open_hdf5, write_table
 from pdrom.experiments.kit.declaration import experiment
-from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.motion import Motion
 from pdrom.experiments.kit.scenes import SPLITS, positions_of, scene_of
 from pdrom.experiments.kit.settings import Horizon
 from pdrom.model.scene import SceneConfig
+from pdrom.reduction.deviations import error_within
 from pdrom.reduction.rerun import displacement_norms, mean_motion
 from pdrom.reduction.subspace.companion import companion_run, estimate, largest_estimate
 from pdrom.reduction.subspace.store import load_models

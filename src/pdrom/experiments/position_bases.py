@@ -19,11 +19,11 @@ from pdrom.core.paths import (
 )
 from pdrom.core.store import open_hdf5, write_table
 from pdrom.experiments.kit.declaration import experiment
-from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.motion import Motion
 from pdrom.experiments.kit.scenes import SPLITS, scene_of
 from pdrom.experiments.kit.settings import Horizon
 from pdrom.model.scene import SceneConfig
+from pdrom.reduction.deviations import error_within
 from pdrom.reduction.subspace.store import load_models
 
 COLUMNS = [

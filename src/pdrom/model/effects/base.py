@@ -190,6 +190,10 @@ class Contact(Effect):
     height: float | None = None
     """y in metres of a contact that does nothing but lift vertices to it."""
 
+    def gaps(self, points: np.ndarray) -> np.ndarray:
+        """Distances (n,) m of ``points`` (n, 3) m to the obstacle; inf if there is none."""
+        return np.full(len(points), np.inf)
+
     def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
         """`correct` all vertices but those ``held`` (n,), in place.
 
