@@ -54,7 +54,6 @@ def save(reduced: ReducedRun, path: str | os.PathLike[str]) -> None:
         _store(file, "full", reduced.full.positions.astype(np.float32), "m")
         _store(file, "full_ms", reduced.full.ms, "ms")
         _store(file, "difference", outcome.difference, "m")
-        _store(file, "shape_difference", outcome.shape_difference, "m")
         _store(file, "error", reduced.error, "1")
         _store(file, "extent", outcome.extent, "1")
         _store(file, "displacement", displacement_norms(reduced.full.positions), "m")
@@ -125,7 +124,6 @@ def _reduced(scene: Scene, file: h5py.File) -> ReducedRun:
     outcome = Rerun(
         positions,
         file["difference"][...],
-        file["shape_difference"][...],
         file["extent"][...],
         None if blowup < 0 else blowup,
         positions,

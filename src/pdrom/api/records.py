@@ -7,6 +7,7 @@ import numpy as np
 
 from pdrom.core.brief import brief
 from pdrom.model.scene import Scene
+from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.local.guard import GuardRecord
 from pdrom.reduction.rerun import Rerun, mean_motion
 
@@ -69,6 +70,15 @@ class ReducedRun:
     def error(self) -> np.ndarray:
         """Error of each frame (F',) relative to the root mean square displacement of the run."""
         return self.outcome.difference / mean_motion(self.full.positions)
+
+    @property
+    def errors(self) -> dict[str, float | None]:
+        """Errors of the whole run: positions, velocities, shape, energy, first contact.
+
+        By the names of the table reduced_reruns; None if the run ended early, or where the
+        full-order run has nothing to compare with.
+        """
+        return Yardstick(self.full.scene, self.full.positions).errors(self.outcome)
 
     @property
     def title(self) -> str:

@@ -18,7 +18,7 @@ RESULTS = "results"
 LABELS = {
     "mesh": r"[A-Za-z0-9_.-]+",
     "scene": r"[a-z][a-z0-9_]*",
-    "run": r"train|heldout|kick|stiffness",
+    "run": r"train|heldout|kick|stiffness|speed|gravity|kick_stiffness",
     "group": r"[a-z_]+",
     "basis": r"[a-z0-9-]+",
     "method": r"[a-z0-9-]+",

@@ -13,7 +13,7 @@ from pdrom.artifact.reads import Every, Setting
 from pdrom.core.paths import (
     COMPANION,
     ESTIMATES,
-    HELDOUT,
+    FULL_ORDER,
     MESH,
     RERUNS,
     SENSITIVITY,
@@ -23,11 +23,11 @@ from pdrom.core.paths import (
 )
 from pdrom.core.store import open_hdf5, write_table
 from pdrom.experiments.kit.declaration import experiment
-from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.motion import Motion
-from pdrom.experiments.kit.scenes import SPLITS, positions_of, scene_of
+from pdrom.experiments.kit.scenes import positions_of, scene_of
 from pdrom.experiments.kit.settings import Horizon
 from pdrom.model.scene import SceneConfig
+from pdrom.reduction.deviations import error_within
 from pdrom.reduction.rerun import displacement_norms, mean_motion
 from pdrom.reduction.subspace.companion import companion_run, estimate, largest_estimate
 from pdrom.reduction.subspace.store import load_models
@@ -55,7 +55,7 @@ class _Run:
     reads={
         "mesh": MESH,
         "train": TRAIN,
-        "heldout": HELDOUT,
+        "full_order": Every(FULL_ORDER),
         "model": COMPANION,
         "perturbed": SENSITIVITY,
         "reruns": Every(RERUNS),
@@ -68,7 +68,7 @@ class _Run:
 def estimates(
     mesh: File,
     train: File,
-    heldout: File,
+    full_order: list[File],
     model: File,
     perturbed: File,
     reruns: list[File],
@@ -77,11 +77,15 @@ def estimates(
     horizon: Horizon,
     out: File,
 ) -> None:
-    """Run both motions with the auxiliary model and compare all their runs with it."""
+    """Run every motion with the auxiliary model and compare its runs with it.
+
+    Those of reduced projections count where their positions are kept, see docs/formats.md.
+    """
     ((_, companion),) = load_models(model.path)
     unit = mean_motion(positions_of(train))
     rows: list[dict[str, Any]] = []
-    for split, run in zip(SPLITS, (train, heldout), strict=True):
+    for run in full_order:
+        split = run["run"]
         motion = Motion(scene_of(config, mesh, split), run)
         beside = companion_run(motion.scene, companion)
         end = horizon.frames(perturbed, split)

@@ -22,13 +22,13 @@ from pdrom.core.store import open_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.converged import ConvergedStepper
 from pdrom.experiments.kit.declaration import experiment
-from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.scenes import positions_of, scene_of
 from pdrom.experiments.kit.settings import Horizon, Solver, Tolerance
 from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.deviations import error_within
 from pdrom.reduction.rerun import displacement_norms
 from pdrom.reduction.subspace.store import load_models
 

@@ -11,13 +11,13 @@ from pdrom.artifact.reads import Setting
 from pdrom.core.paths import LADDER, MESH, SENSITIVITY, SNAPSHOTS, TRAIN, File
 from pdrom.core.store import write_table
 from pdrom.experiments.kit.declaration import experiment
-from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.repetition import Repeater, Repetitions
 from pdrom.experiments.kit.scenes import positions_of, scene_of
 from pdrom.experiments.kit.settings import BlowupExtent, Horizon, Modes
 from pdrom.model.metrics import relative_errors
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.basis import Basis, compute_basis
+from pdrom.reduction.deviations import error_within
 from pdrom.reduction.local.local_step import ReducedLocalStep
 from pdrom.reduction.local.rerun import replace_group, rerun
 from pdrom.reduction.method import MethodSpec

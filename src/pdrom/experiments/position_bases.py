@@ -7,23 +7,15 @@ import numpy as np
 import pandas as pd
 from scipy import linalg
 
-from pdrom.artifact.reads import Setting
-from pdrom.core.paths import (
-    HELDOUT,
-    MESH,
-    POSITION_BASES,
-    SENSITIVITY,
-    SUBSPACES,
-    TRAIN,
-    File,
-)
+from pdrom.artifact.reads import Every, Setting
+from pdrom.core.paths import FULL_ORDER, MESH, POSITION_BASES, SENSITIVITY, SUBSPACES, File
 from pdrom.core.store import open_hdf5, write_table
 from pdrom.experiments.kit.declaration import experiment
-from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.motion import Motion
-from pdrom.experiments.kit.scenes import SPLITS, scene_of
+from pdrom.experiments.kit.scenes import scene_of
 from pdrom.experiments.kit.settings import Horizon
 from pdrom.model.scene import SceneConfig
+from pdrom.reduction.deviations import error_within
 from pdrom.reduction.subspace.store import load_models
 
 COLUMNS = [
@@ -38,8 +30,7 @@ FLAT = 1e-9
     "What the position subspaces of {scene} can hold",
     reads={
         "mesh": MESH,
-        "train": TRAIN,
-        "heldout": HELDOUT,
+        "full_order": Every(FULL_ORDER),
         "perturbed": SENSITIVITY,
         "subspaces": SUBSPACES,
         "config": Setting("scene"),
@@ -49,8 +40,7 @@ FLAT = 1e-9
 )
 def position_bases(
     mesh: File,
-    train: File,
-    heldout: File,
+    full_order: list[File],
     perturbed: File,
     subspaces: File,
     config: SceneConfig,
@@ -59,7 +49,8 @@ def position_bases(
 ) -> None:
     """Compare the runs with full projections with the best positions in their subspace."""
     rows: list[dict[str, Any]] = []
-    for split, run in zip(SPLITS, (train, heldout), strict=True):
+    for run in full_order:
+        split = run["run"]
         motion = Motion(scene_of(config, mesh, split), run)
         end = horizon.frames(perturbed, split)
         rows += _rows(motion, subspaces, split, end)

@@ -30,16 +30,17 @@ from pdrom.experiments.kit.sampling import Sweep, sample
 from pdrom.experiments.kit.scenes import TRAIN as TRAINING
 from pdrom.experiments.kit.scenes import positions_of, scene_of
 from pdrom.experiments.kit.settings import BlowupExtent, Solver
-from pdrom.model.energy import EnergyScale
+from pdrom.model.energy import largest
 from pdrom.model.held_out import FIRST
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, load_basis
+from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.local.guard import GUARD_COLUMNS, GuardRecord
 from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.local.guarded import Trained, guarded_rerun
 from pdrom.reduction.local.ranks import Rank, resolve_ranks
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.rerun import Rerun, displacement_norms, extent_norm, step_norms
+from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.sampling.load import load_reduction
 from pdrom.reduction.snapshots import load_snapshots
 from pdrom.reduction.subspace.store import load_models
@@ -137,9 +138,10 @@ def reruns(
             motion, reference = run["run"], positions_of(run)
             scene = scene_of(settings.scene, mesh, motion)
             case = _Case(scene, motion, labels, settings, space, sampling.path, trained)
-            file.attrs["extent_norm"] = extent_norm(reference, scene.mesh.extent)
+            yardstick = Yardstick(scene, reference)
+            file.attrs.update(yardstick.units)
             store = file if motion == TRAINING else file.create_group(motion)
-            rows = case.run(store, ranks.get(motion, full), reference)
+            rows = case.run(store, ranks.get(motion, full), yardstick)
             whole = ["guard_frame", "guard_count", "fallback_frames"]
             table = pd.DataFrame(rows, columns=COLUMNS).astype(dict.fromkeys(whole, "Int64"))
             found[motion] = table
@@ -161,18 +163,17 @@ class _Case:
     trained: Trained
 
     def run(
-        self, file: h5py.Group, ranks: tuple[Rank, ...], reference: np.ndarray
+        self, file: h5py.Group, ranks: tuple[Rank, ...], yardstick: Yardstick
     ) -> list[dict[str, Any]]:
         """Rerun for every r and return the rows; an r beyond the rank is a marked row.
 
         Parameters
         ----------
-        reference : (F + 1, N, 3) positions of the motion's full-order run
+        yardstick : the motion's full-order run
         """
-        settings = self.settings
-        displacement = displacement_norms(reference)
-        scale = EnergyScale.of(self.scene, reference)
-        file["displacement"], file["step"] = displacement, step_norms(reference)
+        settings, reference = self.settings, yardstick.reference
+        for name, values in yardstick.series.items():
+            file[name] = values
         system = self.scene.system_with(settings.solver)
         rows = []
         for r in resolve_ranks(ranks, self.basis.rank):
@@ -189,14 +190,20 @@ class _Case:
                 self.scene, system, self.labels["group"], reduction=reduction, reference=reference,
                 blowup_extent=settings.blowup_extent, settings=guard, trained=self.trained,
             )  # fmt: skip
-            energy = scale.ratio(outcome.positions)
-            _store(store, outcome, displacement, seen)
-            together = reference[: outcome.frames + 1]
-            store["step_difference"] = step_norms(outcome.positions - together)
+            apart = yardstick.deviations(outcome)
+            for name, values in apart.items():
+                store[name] = values
+            _store(store, outcome, yardstick.displacement, seen)
             if watched:  # the error of these is estimated, too
                 store["positions"] = outcome.positions.astype(np.float32)
-            measured = {"energy_ratio": energy, "gain": reduction.gain, **seen.columns()}
-            rows.append({**self.labels, "r": r, **_row(outcome, displacement), **measured})
+            measured = {
+                "energy_ratio": largest(apart["energy"]),
+                "gain": reduction.gain,
+                **seen.columns(),
+            }
+            rows.append(
+                {**self.labels, "r": r, **_row(outcome, yardstick.displacement), **measured}
+            )
             log.info("r = %d: %d frames, blow-up %s", r, outcome.frames, outcome.blowup_frame)
         return rows
 
@@ -212,8 +219,6 @@ class _Case:
 
 
 def _store(store: h5py.Group, outcome: Rerun, displacement: np.ndarray, seen: GuardRecord) -> None:
-    store["difference"] = outcome.difference
-    store["shape_difference"] = outcome.shape_difference
     store["error"] = outcome.difference / np.sqrt(np.mean(displacement**2))
     store["extent"] = outcome.extent
     blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame

@@ -13,11 +13,11 @@ from pdrom.core.paths import HELDOUT, MESH, SENSITIVITY, SUBSPACE_ABLATION, TRAI
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import experiment
-from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.motion import Motion, training_positions
 from pdrom.experiments.kit.scenes import SPLITS, scene_of
 from pdrom.experiments.kit.settings import BlowupExtent, Horizon, Modes
 from pdrom.model.scene import SceneConfig
+from pdrom.reduction.deviations import error_within
 from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.interpolated import Training, interpolate

@@ -28,8 +28,9 @@ from pdrom.experiments.kit.measurement import clocked
 from pdrom.experiments.kit.motion import Motion, training_indices, training_positions
 from pdrom.experiments.kit.scenes import TRAIN, scene_of
 from pdrom.experiments.kit.settings import BlowupExtent, Modes, PositionBasis, Tolerance
+from pdrom.model.energy import largest
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.rerun import Rerun, extent_norm, step_norms
+from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.hrpd import hrpd, sampled_space
 from pdrom.reduction.subspace.interpolated import Training, interpolate
@@ -127,10 +128,10 @@ def subspaces(
     seconds = []
     with write_hdf5(out.path) as file:
         for name, motion in motions.items():
-            file[f"displacement/{name}"] = motion.displacement
-            file[f"step/{name}"] = step_norms(motion.reference)
+            for series, values in motion.series.items():
+                file[f"{series}/{name}"] = values
         start = motions[TRAIN]
-        file.attrs["extent_norm"] = extent_norm(start.reference, start.scene.mesh.extent)
+        file.attrs.update(start.units)
         made = clocked(_subspaces(start, settings.subspace))
         for of_columns, (base, columns, kind, k, models) in made:
             store_columns(file.create_group(f"columns/{base}"), columns)
@@ -148,12 +149,12 @@ def subspaces(
                 store_model(store, labels, samples)
                 for name, motion in motions.items():
                     outcome = motion.run(model, settings.blowup_extent)
-                    for series in ("coordinates", "difference", "shape_difference", "extent"):
-                        store[f"{name}/{series}"] = getattr(outcome, series)
-                    together = motion.reference[: outcome.frames + 1]
-                    apart = step_norms(outcome.positions - together)
-                    store[f"{name}/step_difference"] = apart
-                    rows[name].append(_row(motion, labels, model, outcome))
+                    seen = motion.deviations(outcome)
+                    kept = {"coordinates": outcome.coordinates, "extent": outcome.extent, **seen}
+                    for series, values in kept.items():
+                        store[f"{name}/{series}"] = values
+                    energy = largest(seen["energy"])
+                    rows[name].append(_row(motion, labels, model, outcome, energy))
                 log.info("%s %s: error %s", base, method, rows[TRAIN][-1]["relative_error"])
     tables = {name: pd.DataFrame(own, columns=COLUMNS) for name, own in rows.items()}
     write_table(tables.pop(TRAIN), train_table.path)
@@ -216,7 +217,11 @@ def _interpolations(
 
 
 def _row(
-    motion: Motion, labels: dict[str, Any], model: SubspaceModel, outcome: Rerun
+    motion: Motion,
+    labels: dict[str, Any],
+    model: SubspaceModel,
+    outcome: Rerun,
+    energy: float | None,
 ) -> dict[str, Any]:
     scene = motion.scene
     return {
@@ -229,5 +234,5 @@ def _row(
         "blowup_frame": outcome.blowup_frame,
         "max_extent": outcome.max_extent,
         "relative_error": outcome.error(motion.displacement),
-        "energy_ratio": motion.scale.ratio(outcome.positions),
+        "energy_ratio": energy,
     }

@@ -36,29 +36,46 @@ class EnergyScale:
 
     zero : that least potential, J
     peak : largest total energy of the full-order run, J, counted from there
+    own : energies of that run at the sampled frames, see `relative`
     """
 
     scene: Scene
     zero: float
     peak: float
+    own: np.ndarray
 
     @classmethod
     def of(cls, scene: Scene, reference: np.ndarray) -> "EnergyScale":
         """Scale of a full-order run of ``scene`` with positions ``reference`` (F + 1, N, 3) m."""
         zero = min(_force_potential(scene, q) for q in reference)
-        return cls(scene, zero, float(energies(scene, reference).max()) - zero)
+        own = energies(scene, reference) - zero
+        peak = float(own.max())
+        return cls(scene, zero, peak, own / peak if peak > _roundoff(scene) else np.empty(0))
+
+    def relative(self, positions: np.ndarray) -> np.ndarray:
+        """Total energies at ``positions`` (F' + 1, N, 3) of a run, over the full order's largest.
+
+        At the frames of `energies`; inf where one overflows. Empty if the full-order run has no
+        energy above round-off to compare with.
+        """
+        if not len(self.own):
+            return self.own
+        own = (energies(self.scene, positions) - self.zero) / self.peak
+        return np.where(np.isfinite(own), own, np.inf)
 
     def ratio(self, positions: np.ndarray) -> float | None:
         """Largest total energy at ``positions`` (F' + 1, N, 3) of a run, over the full order's.
 
         One for the full-order run itself. Above one, the run has gained energy that neither the
-        initial state nor the handles brought into the full-order run. inf if the energy overflows;
-        None if the full-order run has no energy above round-off to compare with.
+        initial state nor the handles brought into the full-order run. None if there is nothing to
+        compare with, see `relative`.
         """
-        if not self.peak > _roundoff(self.scene):
-            return None
-        own = float(energies(self.scene, positions).max()) - self.zero
-        return own / self.peak if np.isfinite(own) else float("inf")
+        return largest(self.relative(positions))
+
+
+def largest(energy: np.ndarray) -> float | None:
+    """Largest of `EnergyScale.relative`, None if there is none."""
+    return float(energy.max()) if len(energy) else None
 
 
 def _energy(scene: Scene, positions: np.ndarray, frame: int) -> float:

@@ -50,9 +50,9 @@ def shape_residuals(positions: np.ndarray, reference: np.ndarray) -> tuple[np.nd
     a, b = positions / scale, reference / scale
     a = a - a.mean(axis=1, keepdims=True)
     b = b - b.mean(axis=1, keepdims=True)
-    u, _, vt = np.linalg.svd(np.einsum("fni,fnj->fij", a, b))
+    u, _, vt = np.linalg.svd(a.transpose(0, 2, 1) @ b)
     u[..., -1] *= np.sign(np.linalg.det(u @ vt))[:, None]
-    return a @ u @ vt - b, scale[:, 0, 0]
+    return a @ (u @ vt) - b, scale[:, 0, 0]
 
 
 def shape_differences(positions: np.ndarray, reference: np.ndarray) -> np.ndarray:

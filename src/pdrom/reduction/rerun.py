@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdrom.core.brief import brief
-from pdrom.model.metrics import shape_differences, trajectory_error
+from pdrom.model.metrics import trajectory_error
 from pdrom.model.runs.bounded import BoundedRun
 
 
@@ -16,7 +16,6 @@ class Rerun:
 
     positions : (F' + 1, N, 3) m, the initial ones first; only finite frames
     difference : (F',) || Q_red - Q_fom ||_F of each frame, m
-    shape_difference : (F',) what is left of it without the best rigid motion of each frame, m
     extent : (F',) longest side of the bounding box over the rest extent
     blowup_frame : first frame whose extent exceeds the limit or is not finite, else None
     coordinates : (F' + 1, K, 3) of the step loop; the positions themselves outside a subspace
@@ -25,7 +24,6 @@ class Rerun:
 
     positions: np.ndarray
     difference: np.ndarray
-    shape_difference: np.ndarray
     extent: np.ndarray
     blowup_frame: int | None
     coordinates: np.ndarray
@@ -84,7 +82,6 @@ def compare(
     return Rerun(
         stacked,
         np.array(difference),
-        shape_differences(stacked[1:], reference[1 : len(stacked)]),
         np.array(extents),
         run.blowup_frame,
         stacked if same else np.stack(coordinates),

@@ -27,6 +27,7 @@ from pdrom.tables.kit.declaration import compared, flag, integer, number, table,
 from pdrom.tables.kit.held_out import COLUMNS, MEDIAN, with_held_out
 from pdrom.tables.kit.one_time import timings_in_one_time
 from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.reruns import USERS
 from pdrom.tables.kit.vocabulary import (
     ERROR_WITHIN,
     GROUP,
@@ -66,6 +67,7 @@ CONVERGED, OWN = "converged", "own iterations"
         ),
         *COLUMNS,
         timed(flag("pareto_heldout", "the same by the error held out; full order as it is")),
+        *USERS,
     ),
     reads={
         "reruns": TableOf("reduced_reruns"),

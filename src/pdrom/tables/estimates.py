@@ -5,6 +5,7 @@ import pandas as pd
 from pdrom.artifact.reads import Every, TableOf
 from pdrom.core import paths
 from pdrom.core.paths import File
+from pdrom.model.held_out import MOTIONS
 from pdrom.tables.kit.declaration import compared, flag, number, table, text, timed
 from pdrom.tables.kit.parts import joined
 from pdrom.tables.kit.reruns import KEYS
@@ -23,7 +24,7 @@ MARGIN = 1.5  # an estimate above this multiple of the auxiliary model's own err
         POSITION_BASIS,
         K,
         R,
-        text("split", "motion of the run: train, heldout"),
+        text("split", f"motion of the run: train, {', '.join(MOTIONS)}"),
         ERROR_WITHIN,
         compared(
             "error",
@@ -55,7 +56,7 @@ MARGIN = 1.5  # an estimate above this multiple of the auxiliary model's own err
     },
 )
 def estimates(parts: list[File], times: list[File], reruns: pd.DataFrame) -> pd.DataFrame:
-    """One row per run of both motions; without an error where the run ended before the horizon.
+    """One row per run whose positions are kept; no error where it ended before the horizon.
 
     A resolved estimate differs from the error by at most the auxiliary model's own error over the
     motion: if that is no larger than ``floor``, the ratio lies between 0.6 and 3.

@@ -5,6 +5,7 @@ import pandas as pd
 from pdrom.artifact.reads import Every
 from pdrom.core import paths
 from pdrom.core.paths import File
+from pdrom.model.held_out import MOTIONS
 from pdrom.tables.kit.declaration import compared, flag, number, table, text
 from pdrom.tables.kit.parts import joined
 from pdrom.tables.kit.vocabulary import ERROR_WITHIN, POSITION_BASIS, SCENE, K
@@ -16,7 +17,7 @@ _PAIR = ["scene", "split", "k"]
     title="Position subspaces: best approximation and run",
     columns=(
         SCENE,
-        text("split", "motion: train, heldout"),
+        text("split", f"motion: train, {', '.join(MOTIONS)}"),
         POSITION_BASIS,
         K,
         compared(

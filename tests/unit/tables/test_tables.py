@@ -130,6 +130,7 @@ def test_floor_is_the_largest_over_the_seeds(tmp_path):
 
 NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # table frame_times without rows
 DISPLACEMENT = np.array([1.0, 2.0, 3.0, 4.0])
+ENERGY, CONTACT = [1.0, 0.9], np.array([0, 0, 1, 1], dtype=np.uint8)
 STEP = DISPLACEMENT / 2.0  # of the velocities; their differences are thrice those of the positions
 
 
@@ -173,6 +174,13 @@ class Files:
         }
 
 
+def store_series(run, difference):
+    """Series of a run with these differences; it touches the floor at once."""
+    run["difference"], run["shape_difference"] = difference, np.divide(difference, 10.0)
+    run["step_difference"] = np.multiply(difference, 3.0)
+    run["energy"], run["contact"] = [1.0, 0.7], np.ones(len(difference), dtype=np.uint8)
+
+
 @pytest.fixture
 def files(tmp_path) -> Files:
     """Reruns of scene a (horizon 2) and b (whole), subspace runs of b, and their timings."""
@@ -187,15 +195,14 @@ def files(tmp_path) -> Files:
         folder.mkdir(parents=True)
         rows = []
         with write_hdf5(folder / "deim.h5") as file:
-            file.attrs["extent_norm"] = 2.0
+            file.attrs.update(extent_norm=2.0, time_step=0.1)
             for store in (file, *map(file.create_group, MOTIONS)):
                 store["displacement"], store["step"] = DISPLACEMENT, STEP
+                store["energy"], store["contact"] = ENERGY, CONTACT
                 for r, difference in runs.items():
                     run = store.create_group(f"r{r:04d}")
                     if difference is not None:
-                        run["difference"] = difference
-                        run["shape_difference"] = np.divide(difference, 10.0)
-                        run["step_difference"] = np.multiply(difference, 3.0)
+                        store_series(run, difference)
         for r, difference in runs.items():
             row = {"scene": scene, "group": "spring", "method": "deim", "r": r, "frames": 0}
             if difference is not None:
@@ -213,15 +220,15 @@ def files(tmp_path) -> Files:
     folder.mkdir(parents=True)
     models = {("pod", 8, "full"): [0.4] * 4, ("pod", 8, "ecsw-1e-02"): [0.8] * 4}
     with write_hdf5(folder / "models.h5") as file:
-        file.attrs["extent_norm"] = 4.0
+        file.attrs.update(extent_norm=4.0, time_step=0.1)
         for motion in ("train", *MOTIONS):
             file[f"displacement/{motion}"], file[f"step/{motion}"] = DISPLACEMENT, STEP
+            file[f"energy/{motion}"], file[f"contact/{motion}"] = ENERGY, CONTACT
         for (base, k, method), difference in models.items():
             for motion in ("train", "heldout"):
-                run = f"models/{base}_k{k:03d}_{method}/{motion}"
-                file[f"{run}/difference"] = difference
-                file[f"{run}/shape_difference"] = np.divide(difference, 10.0)
-                file[f"{run}/step_difference"] = np.multiply(difference, 3.0)
+                store_series(
+                    file.create_group(f"models/{base}_k{k:03d}_{method}/{motion}"), difference
+                )
     rows = [
         {"scene": "b", "group": "all", "method": m, "position_basis": p, "k": k, "r": 33,
          "frames": 4, "finite": True, "max_extent": 1.0, "relative_error": 0.1}
@@ -265,6 +272,18 @@ def test_errors_in_units_of_the_extent(files):
     np.testing.assert_allclose(table.shape_error, table.error_over_extent / 10.0)
     # over the frames before the horizon, too: three times the difference over half the norm
     np.testing.assert_allclose(table.velocity_error, 6.0 * table.relative_error_within_horizon)
+    shape = table.relative_shape_error
+    np.testing.assert_allclose(shape, table.relative_error_within_horizon / 10.0)
+
+
+def test_energy_and_first_contact_before_the_horizon(files):
+    """Scene a ends before the second sample of the energy and before its first contact."""
+    table = files.reduced()
+    assert table.energy_drift.isna().tolist() == [True, True, True, False, True, False, False]
+    assert table.energy_drift[[3, 5, 6]].tolist() == pytest.approx([0.2] * 3)
+    assert table.contact_delay[0] == -np.inf
+    assert table.contact_delay[[3, 5, 6]].tolist() == pytest.approx([-0.2] * 3)
+    assert table.contact_delay[[1, 2, 4]].isna().all()
 
 
 def error(difference, end) -> float:

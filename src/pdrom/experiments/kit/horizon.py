@@ -8,8 +8,6 @@ threshold, and a difference between two runs says nothing about their methods.
 import numpy as np
 import pandas as pd
 
-from pdrom.model.metrics import trajectory_error
-
 
 def floor_of(table: pd.DataFrame, scene: str, perturbation: float | str) -> np.ndarray:
     """Sensitivity floor (F,) of a scene at one size (or under one label) of the perturbation.
@@ -37,22 +35,3 @@ def horizons(table: pd.DataFrame, perturbation: float | str, threshold: float) -
     """`horizon` of every scene of the table; see `floor_of`."""
     scenes = table.scene.unique()
     return {s: horizon(floor_of(table, s, perturbation), threshold) for s in scenes}
-
-
-def rms_within(difference: np.ndarray, norm: float, end: int) -> float | None:
-    """Root mean square over the frames before ``end``, over ``norm``; None as `error_within`."""
-    if len(difference) < end or end == 0:
-        return None
-    return float(np.sqrt(np.mean(np.square(difference[:end] / norm))))
-
-
-def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> float | None:
-    """Relative error over the frames before ``end``; None if the run did not get there.
-
-    Parameters
-    ----------
-    difference, displacement : norms by frame, see `pdrom.model.metrics.trajectory_error`
-    """
-    if len(difference) < end:
-        return None
-    return trajectory_error(difference[:end], displacement[:end])

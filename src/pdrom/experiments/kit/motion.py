@@ -4,27 +4,19 @@ import numpy as np
 
 from pdrom.core.paths import File
 from pdrom.experiments.kit.scenes import positions_of
-from pdrom.model.energy import EnergyScale
 from pdrom.model.scene import Scene
-from pdrom.reduction.rerun import Rerun, displacement_norms
+from pdrom.reduction.deviations import Yardstick
+from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.snapshots import training_frames
 from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.rerun import rerun_model
 
 
-class Motion:
-    """A motion of a scene with its full-order run.
-
-    reference : (F + 1, N, 3) m
-    displacement : (F,) m, see `displacement_norms`
-    scale : of the energies of its runs
-    """
+class Motion(Yardstick):
+    """A motion of a scene with its full-order run, which is read from its file."""
 
     def __init__(self, scene: Scene, full_order: File) -> None:
-        self.scene = scene
-        self.reference = positions_of(full_order)
-        self.displacement = displacement_norms(self.reference)
-        self.scale = EnergyScale.of(scene, self.reference)
+        super().__init__(scene, positions_of(full_order))
 
     def run(self, model: SubspaceModel, limit: float) -> Rerun:
         """Run a model; a blow-up ends the run and is recorded."""

@@ -12,11 +12,11 @@ import numpy as np
 from pydantic import Field
 
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.kit.horizon import error_within
 from pdrom.experiments.kit.sensitivity import perturbation_field
 from pdrom.experiments.kit.settings import Tolerance
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis import Basis, compute_basis
+from pdrom.reduction.deviations import error_within
 from pdrom.reduction.local.local_step import ReducedLocalStep
 from pdrom.reduction.local.rerun import replace_group, rerun
 from pdrom.reduction.method import MethodSpec

@@ -17,6 +17,7 @@ group                                                               `pdrom.model
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -58,6 +59,16 @@ class EffectConfig(ConfigModel):
 
     def reversed(self) -> Self:
         """The motion in the opposite direction; an effect that does not move stays as it is."""
+        return self
+
+    def tilted(self, degrees: float, axes: Sequence[int]) -> Self:
+        """An acceleration that is the same everywhere, turned; any other effect stays as it is.
+
+        Parameters
+        ----------
+        degrees : by how much
+        axes : of 0, 1, 2; it turns towards the one that it points along least
+        """
         return self
 
     def body(self, low: np.ndarray, high: np.ndarray) -> Mesh | None:
@@ -178,6 +189,10 @@ class Contact(Effect):
 
     height: float | None = None
     """y in metres of a contact that does nothing but lift vertices to it."""
+
+    def gaps(self, points: np.ndarray) -> np.ndarray:
+        """Distances (n,) m of ``points`` (n, 3) m to the obstacle; inf if there is none."""
+        return np.full(len(points), np.inf)
 
     def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
         """`correct` all vertices but those ``held`` (n,), in place.

@@ -32,5 +32,8 @@ class Floor(Contact):
         super().__init__(config, mesh, masses)
         self.height = config.height
 
+    def gaps(self, points: np.ndarray) -> np.ndarray:
+        return points[:, 1] - self.config.height
+
     def correct(self, positions: np.ndarray, before: np.ndarray) -> None:
         np.maximum(positions[:, 1], self.config.height, out=positions[:, 1])

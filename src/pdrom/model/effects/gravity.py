@@ -1,6 +1,7 @@
 """Uniform acceleration."""
 
-from typing import Literal
+from collections.abc import Sequence
+from typing import Literal, Self
 
 import numpy as np
 
@@ -16,6 +17,18 @@ class Gravity(Force):
 
         effect: Literal["gravity"] = "gravity"
         acceleration: Vector = (0.0, -9.81, 0.0)
+
+        def tilted(self, degrees: float, axes: Sequence[int]) -> Self:
+            own = np.array(self.acceleration)
+            size = float(np.linalg.norm(own))
+            axis = min(axes, key=lambda axis: abs(own[axis]))
+            if abs(own[axis]) == size:  # nothing to turn, or no other axis
+                return self
+            side = size * np.eye(3)[axis] - own[axis] / size * own
+            side *= size / np.linalg.norm(side)
+            angle = np.radians(degrees)
+            turned = np.cos(angle) * own + np.sin(angle) * side
+            return self.model_copy(update={"acceleration": tuple(map(float, turned))})
 
     rate = 0.0
 

@@ -33,6 +33,9 @@ class Obstacle(Contact):
         super().__init__(config, mesh, masses)
         self._slack = SLACK * mesh.extent
 
+    def gaps(self, points: np.ndarray) -> np.ndarray:
+        return -self.depths(points)
+
     def correct(self, positions: np.ndarray, before: np.ndarray) -> None:
         outside = self.depths(before) <= self._slack
         hits, entries, normals = self.entries(before, positions)

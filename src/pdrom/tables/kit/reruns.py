@@ -1,16 +1,19 @@
 """Reruns of all motions with their errors, horizons and floors."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import h5py
-import numpy as np
 import pandas as pd
 
 from pdrom.core.paths import File
 from pdrom.core.store import open_hdf5, read_table
-from pdrom.experiments.kit.horizon import error_within, floor_of, horizons, rms_within
+from pdrom.experiments.kit.horizon import floor_of, horizons
+from pdrom.reduction.deviations import DEVIATIONS, ERRORS, REFERENCE, Series, errors_within
 from pdrom.tables.kit.vocabulary import (
     BLOWUP_FRAME,
+    CONTACT_DELAY,
+    ENERGY_DRIFT,
     ERROR_OVER_EXTENT,
     ERROR_WITHIN,
     FINITE,
@@ -22,6 +25,7 @@ from pdrom.tables.kit.vocabulary import (
     METHOD,
     POSITION_BASIS,
     RELATIVE_ERROR,
+    RELATIVE_SHAPE_ERROR,
     SCENE,
     SHAPE_ERROR,
     VELOCITY_ERROR,
@@ -33,7 +37,9 @@ COLUMNS = (
     SCENE, GROUP, METHOD, POSITION_BASIS, K, R, FRAMES, FINITE, BLOWUP_FRAME, MAX_EXTENT,
     RELATIVE_ERROR, ERROR_WITHIN, HORIZON_FRAME, FLOOR,
 )  # fmt: skip
-MEASURES = (ERROR_OVER_EXTENT, SHAPE_ERROR, VELOCITY_ERROR)  # of the same frames
+# of the same frames
+USERS = (VELOCITY_ERROR, RELATIVE_SHAPE_ERROR, ENERGY_DRIFT, CONTACT_DELAY)
+MEASURES = (ERROR_OVER_EXTENT, SHAPE_ERROR, *USERS)
 KEYS = ["scene", "group", "method", "position_basis", "k", "r"]  # what tells runs apart
 TRAIN = "train"
 
@@ -78,9 +84,8 @@ def _local_only(run: File, row: File, ends: dict[str, int], motion: str) -> pd.D
     with open_hdf5(run.path) as file:
         store = file if motion == TRAIN else file[motion]
         runs = [store[f"r{r:04d}"] for r in table.r]
-        displacement, step = store["displacement"][...], store["step"][...]
-        extent_norm = file.attrs["extent_norm"]
-        table = table.assign(**_errors(runs, displacement, step, extent_norm, end))
+        reference = {series: store[series][...] for series in REFERENCE}
+        table = table.assign(**_errors(runs, reference, end, file.attrs))
     return table.assign(position_basis="full", k=None)
 
 
@@ -96,32 +101,20 @@ def _subspace(run: File, row: File, ends: dict[str, int], motion: str) -> pd.Dat
     with open_hdf5(run.path) as file:
         models = [f"{t.position_basis}_k{t.k:03d}_{t.method}" for t in table.itertuples()]
         runs = [file[f"models/{model}/{motion}"] for model in models]
-        displacement, step = file[f"displacement/{motion}"][...], file[f"step/{motion}"][...]
-        extent_norm = file.attrs["extent_norm"]
-        table = table.assign(**_errors(runs, displacement, step, extent_norm, end))
+        reference = {series: file[f"{series}/{motion}"][...] for series in REFERENCE}
+        table = table.assign(**_errors(runs, reference, end, file.attrs))
     return table
 
 
 def _errors(
-    runs: Sequence[h5py.Group],
-    displacement: np.ndarray,
-    step: np.ndarray,
-    extent_norm: float,
-    end: int,
+    runs: Sequence[h5py.Group], reference: Series, end: int, units: Mapping[str, Any]
 ) -> dict[str, list[float | None]]:
     """Errors before the horizon; a run of a size beyond the rank has no frames and no errors."""
-
-    def each(series: str, error: Callable[[np.ndarray], float | None]) -> list[float | None]:
-        return [error(run[series][...]) if series in run else None for run in runs]
-
-    def over_extent(difference: np.ndarray) -> float | None:
-        return rms_within(difference, extent_norm, end)
-
-    return {
-        "relative_error_within_horizon": each(
-            "difference", lambda difference: error_within(difference, displacement, end)
-        ),
-        "error_over_extent": each("difference", over_extent),
-        "shape_error": each("shape_difference", over_extent),
-        "velocity_error": each("step_difference", lambda apart: error_within(apart, step, end)),
-    }
+    known = {unit: float(units[unit]) for unit in ("extent_norm", "time_step")}
+    found = [
+        errors_within({series: run[series][...] for series in DEVIATIONS}, reference, end, **known)
+        if "difference" in run
+        else dict.fromkeys(ERRORS)
+        for run in runs
+    ]
+    return {name: [errors[name] for errors in found] for name in ERRORS}

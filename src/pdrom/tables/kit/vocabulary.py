@@ -53,6 +53,30 @@ VELOCITY_ERROR = compared(
         "error of the velocities before the horizon, over the norm of those of the full-order run",
     ),
 )
+RELATIVE_SHAPE_ERROR = compared(
+    "error",
+    number(
+        "relative_shape_error",
+        "error of the positions before the horizon without the best rigid motion of each frame",
+    ),
+)
+ENERGY_DRIFT = compared(
+    "error",
+    number(
+        "energy_drift",
+        "largest difference of the total energy before the horizon, over the largest energy of the "
+        "full-order run",
+    ),
+)
+CONTACT_DELAY = compared(
+    "error",
+    number(
+        "contact_delay",
+        "by how much the first contact with an obstacle before the horizon is late; inf if it is "
+        "missed, -inf if the full order has none, empty if neither has",
+        "s",
+    ),
+)
 HORIZON_FRAME = integer("horizon_frame", "first frame that cannot be judged: the scene's horizon")
 FLOOR = compared(
     "error", number("sensitivity_floor", "largest drift of perturbed runs before the horizon")

@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pdrom.core.store import read_table, write_table
-from pdrom.experiments.kit.horizon import error_within, floor_of, horizon, horizons
+from pdrom.experiments.kit.horizon import floor_of, horizon, horizons
+from pdrom.reduction.deviations import error_within
 
 PERTURBED = {
     ("a", "1e-10", 1): [0.0, 1e-9, 5e-3, 1e-9],

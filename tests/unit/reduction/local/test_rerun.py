@@ -131,7 +131,7 @@ def test_numbers_that_are_none_end_the_run_before_them(bad):
 
 def test_an_empty_run_has_no_extent():
     none, start = np.array([]), np.zeros((1, 3, 3))
-    run = Rerun(start, none, none, none, 0, start)
+    run = Rerun(start, none, none, 0, start)
     assert (run.frames, run.max_extent) == (0, 0.0)
 
 

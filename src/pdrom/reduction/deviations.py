@@ -1,0 +1,183 @@
+"""How far a run is from its full-order run in what users look at: by frame, and as errors.
+
+Beside the positions these are the velocities, the shape (what the best rigid motion of each frame,
+Kabsch 1976, leaves of the difference), the total energy, and when an obstacle is first touched.
+"""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from pdrom.model.energy import STRIDE, EnergyScale
+from pdrom.model.metrics import shape_differences, trajectory_error
+from pdrom.model.scene import Scene
+from pdrom.reduction.rerun import Rerun, displacement_norms, extent_norm, step_norms
+
+# Frames that are compared at a time: what is kept beside the run does not grow with it.
+BLOCK = 32
+# A vertex that is closer to an obstacle than this part of the extent touches it; in a subspace
+# vertices do not end on its surface.
+TOUCH = 1e-3
+
+# What is stored of the full order and of a run.
+REFERENCE = ("displacement", "step", "energy", "contact")
+DEVIATIONS = ("difference", "shape_difference", "step_difference", "energy", "contact")
+ERRORS = (
+    "relative_error_within_horizon", "error_over_extent", "shape_error", "relative_shape_error",
+    "velocity_error", "energy_drift", "contact_delay",
+)  # fmt: skip
+Series = Mapping[str, np.ndarray]
+
+
+class Yardstick:
+    """A full-order run, by which other runs of its scene are measured.
+
+    scene : of the run
+    reference : (F + 1, N, 3) m, its positions, the initial ones first
+    """
+
+    def __init__(self, scene: Scene, reference: np.ndarray) -> None:
+        self.scene, self.reference = scene, reference
+
+    @cached_property
+    def displacement(self) -> np.ndarray:
+        """Displacements by frame (F,) m, see `displacement_norms`."""
+        return displacement_norms(self.reference)
+
+    @cached_property
+    def scale(self) -> EnergyScale:
+        """Reference for the energies of runs."""
+        return EnergyScale.of(self.scene, self.reference)
+
+    @cached_property
+    def series(self) -> dict[str, np.ndarray]:
+        """Series of the full-order run that `errors_within` asks for.
+
+        ``displacement`` and ``step`` (F,) m, the latter the time step times the velocities;
+        ``energy`` and ``contact`` as in `deviations`.
+        """
+        blocks = [q for q, _ in _blocks(self.reference, self.reference)]
+        return {
+            "displacement": self.displacement,
+            "step": np.concatenate([step_norms(q) for q in blocks]),
+            "energy": self.scale.own,
+            "contact": np.concatenate([self._touched(q[1:]) for q in blocks]),
+        }
+
+    @property
+    def units(self) -> dict[str, float]:
+        """Extent norm, m, and time step, s, which `errors_within` needs beside the series."""
+        extent = extent_norm(self.reference, self.scene.mesh.extent)
+        return {"extent_norm": extent, "time_step": self.scene.config.time_step}
+
+    def deviations(self, outcome: Rerun) -> dict[str, np.ndarray]:
+        """Series of a run.
+
+        Returns
+        -------
+        ``difference``, ``shape_difference`` and ``step_difference`` (F',) m of positions, shapes
+        and steps; ``energy`` at every `STRIDE`-th frame over the largest of the full order, empty
+        if that has none; ``contact`` (F',), 1 where an obstacle is touched.
+        """
+        steps, shapes, contacts = [], [], []
+        with np.errstate(over="ignore", invalid="ignore"):
+            for q, p in _blocks(outcome.positions, self.reference):
+                steps.append(step_norms(q - p))
+                shapes.append(shape_differences(q[1:], p[1:]))
+                contacts.append(self._touched(q[1:]))
+        return {
+            "difference": outcome.difference,
+            "shape_difference": np.concatenate(shapes),
+            "step_difference": np.concatenate(steps),
+            "energy": self.scale.relative(outcome.positions),
+            "contact": np.concatenate(contacts),
+        }
+
+    def errors(self, outcome: Rerun) -> dict[str, float | None]:
+        """Errors of a whole run by the names of their columns, see `errors_within`."""
+        end = len(self.displacement)
+        return errors_within(self.deviations(outcome), self.series, end, **self.units)
+
+    def _touched(self, positions: np.ndarray) -> np.ndarray:
+        """Whether a vertex of frames (f, N, 3) m touches an obstacle, (f,) of 0 and 1.
+
+        Those that touch it at the start do not count.
+        """
+        near = TOUCH * self.scene.mesh.extent
+        touched = np.zeros(len(positions), dtype=np.uint8)
+        for contact in self.scene.contacts:
+            away = contact.gaps(self.reference[0]) > near
+            gaps = contact.gaps(positions.reshape(-1, 3)).reshape(positions.shape[:2])
+            touched |= ((gaps <= near) & away).any(axis=1)
+        return touched
+
+
+def errors_within(
+    run: Series, reference: Series, end: int, extent_norm: float, time_step: float
+) -> dict[str, float | None]:
+    """Errors over the frames before ``end`` by the names of their columns.
+
+    None of a run that did not get there, and of a quantity that the full order does not have.
+
+    Parameters
+    ----------
+    run, reference : series of `Yardstick.deviations` and `Yardstick.series`
+    extent_norm, time_step : see `Yardstick.units`
+    """
+    if len(run["difference"]) < end:
+        return dict.fromkeys(ERRORS)
+    displacement, shape = reference["displacement"], run["shape_difference"]
+    found = (
+        error_within(run["difference"], displacement, end),
+        rms_within(run["difference"], extent_norm, end),
+        rms_within(shape, extent_norm, end),
+        error_within(shape, displacement, end),
+        error_within(run["step_difference"], reference["step"], end),
+        _drift(run["energy"], reference["energy"], end),
+        _delay(run["contact"][:end], reference["contact"][:end], time_step),
+    )
+    return dict(zip(ERRORS, found, strict=True))
+
+
+def rms_within(difference: np.ndarray, norm: float, end: int) -> float | None:
+    """Root mean square over the frames before ``end``, over ``norm``; None as `error_within`."""
+    if len(difference) < end or end == 0:
+        return None
+    return float(np.sqrt(np.mean(np.square(difference[:end] / norm))))
+
+
+def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> float | None:
+    """Relative error over the frames before ``end``; None if the run did not get there.
+
+    Parameters
+    ----------
+    difference, displacement : norms by frame, see `pdrom.model.metrics.trajectory_error`
+    """
+    if len(difference) < end:
+        return None
+    return trajectory_error(difference[:end], displacement[:end])
+
+
+def _drift(energy: np.ndarray, own: np.ndarray, end: int) -> float | None:
+    """Largest difference of two series of energies before a frame."""
+    count = end // STRIDE + 1  # the first is that of the start
+    if count == 1 or not len(own):
+        return None
+    return float(np.abs(energy[:count] - own[:count]).max())
+
+
+def _delay(contact: np.ndarray, own: np.ndarray, time_step: float) -> float | None:
+    """Seconds by which the first contact comes late, inf if never, -inf if it should not come."""
+    first, wanted = (
+        float(np.argmax(touched)) if np.any(touched) else np.inf for touched in (contact, own)
+    )
+    return None if first == wanted == np.inf else time_step * (first - wanted)
+
+
+def _blocks(positions: np.ndarray, reference: np.ndarray) -> list[tuple[Any, Any]]:
+    """Views of the same frames of both runs; each begins with the last frame of the one before."""
+    starts = range(0, max(len(positions) - 1, 1), BLOCK)
+    ends = (min(start + BLOCK + 1, len(positions)) for start in starts)
+    return [(positions[s:e], reference[s:e]) for s, e in zip(starts, ends, strict=True)]

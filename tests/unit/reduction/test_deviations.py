@@ -1,0 +1,127 @@
+"""Errors in what users look at, against runs whose errors are known."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from builders import OBSTACLES, make_scene, random_rotation
+from pdrom.model.runs.full_order import trajectory
+from pdrom.reduction import deviations
+from pdrom.reduction.deviations import DEVIATIONS, ERRORS, REFERENCE, TOUCH, Yardstick
+from pdrom.reduction.rerun import displacement_norms
+
+SPRING = {"effect": "spring", "weight": 1e4}
+FRAMES = 40
+
+
+def yardstick(*effects, **settings) -> Yardstick:
+    """A small sheet of springs that falls for `FRAMES` frames."""
+    scene = make_scene({"effect": "gravity"}, *effects, SPRING, frames=FRAMES, **settings)
+    return Yardstick(scene, trajectory(scene))
+
+
+def errors(measure: Yardstick, positions: np.ndarray) -> dict:
+    apart = (positions - measure.reference[: len(positions)])[1:]
+    difference = np.linalg.norm(apart, axis=(1, 2))
+    return measure.errors(SimpleNamespace(positions=positions, difference=difference))
+
+
+FLOOR = {"effect": "floor", "height": 1.5}
+
+
+def test_the_full_order_run_has_no_error():
+    measure = yardstick(FLOOR)
+    found = errors(measure, measure.reference)
+    assert tuple(found) == ERRORS
+    shapes = [found.pop("shape_error"), found.pop("relative_shape_error")]
+    assert shapes == pytest.approx([0.0, 0.0], abs=1e-13)
+    assert set(found.values()) == {0.0}
+
+
+def test_a_rigid_motion_is_an_error_of_positions_and_none_of_the_shape():
+    measure = yardstick()
+    moved = measure.reference @ random_rotation(np.random.default_rng(3)).T + [0.3, 0.1, -0.2]
+    found = errors(measure, moved)
+    assert found["relative_error_within_horizon"] > 0.1
+    assert found["relative_shape_error"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_run_at_half_the_speed_has_half_the_velocities():
+    """Position and velocity errors over the norms of the full order, as of any half motion."""
+    measure = yardstick()
+    start = measure.reference[0]
+    found = errors(measure, start + 0.5 * (measure.reference - start))
+    assert found["velocity_error"] == pytest.approx(0.5)
+    assert found["relative_error_within_horizon"] == pytest.approx(0.5)
+
+
+def test_energy_drift_of_a_run_that_stands_still():
+    """It keeps the energy of the start; the full order falls and loses none of its springs'."""
+    measure = yardstick({"effect": "damping", "rate": 2.0})
+    own = measure.series["energy"]
+    found = errors(measure, measure.reference[:1].repeat(FRAMES + 1, axis=0))
+    assert found["energy_drift"] == pytest.approx(np.abs(own[0] - own).max())
+    assert found["energy_drift"] > 0.1
+
+
+@pytest.mark.parametrize("late", [3, -3])
+def test_first_contact_comes_late_by_the_frames_that_a_run_is_behind(late):
+    measure = yardstick(FLOOR)
+    frames = np.clip(np.arange(FRAMES + 1) - late, 0, FRAMES)
+    found = errors(measure, measure.reference[frames])
+    assert found["contact_delay"] == pytest.approx(late * measure.scene.config.time_step)
+
+
+def test_contacts_that_are_missed_or_should_not_be():
+    measure = yardstick(FLOOR)
+    start = measure.reference[:1].repeat(FRAMES + 1, axis=0)
+    assert errors(measure, start)["contact_delay"] == np.inf
+    still = Yardstick(measure.scene, start)
+    assert errors(still, measure.reference)["contact_delay"] == -np.inf
+    assert errors(still, start)["contact_delay"] is None
+    assert errors(yardstick(), measure.reference)["contact_delay"] is None
+
+
+def test_vertices_that_touch_at_the_start_do_not_count():
+    measure = yardstick({"effect": "floor", "height": 2.0}, mesh={"kind": "cloth", "rows": 6,
+                        "columns": 5, "plane": "xz"})  # fmt: skip
+    assert not measure.series["contact"].any()
+
+
+@pytest.mark.parametrize("name", OBSTACLES)
+def test_gaps_to_an_obstacle_shrink_to_nothing_on_its_surface(name):
+    scene = make_scene({"effect": name, **OBSTACLES[name]}, SPRING)
+    (obstacle,) = scene.contacts
+    outside = np.random.default_rng(5).uniform(-4.0, 4.0, (200, 3))
+    outside = outside[obstacle.gaps(outside) > 0.0]
+    inside = 0.99 * np.array([[0.1, 0.2, 0.3]])
+    assert len(outside) > 20
+    assert obstacle.gaps(inside)[0] < TOUCH
+    hits, entries, _ = obstacle.entries(outside, np.broadcast_to(inside, outside.shape))
+    if name != "plane":  # the point lies in the other two
+        assert hits.all()
+    np.testing.assert_allclose(obstacle.gaps(entries[hits]), 0.0, atol=1e-12)
+
+
+def test_a_run_that_ended_early_has_no_errors():
+    measure = yardstick(FLOOR)
+    for left in (FRAMES, 1):
+        assert set(errors(measure, measure.reference[:left]).values()) == {None}
+
+
+def test_blocks_of_frames_do_not_matter(monkeypatch):
+    measure = yardstick(FLOOR)
+    positions = measure.reference + np.random.default_rng(1).normal(
+        scale=0.01, size=measure.reference.shape
+    )
+    run = SimpleNamespace(positions=positions, difference=displacement_norms(positions))
+    found = []
+    for block in (1, 7, 1000):
+        monkeypatch.setattr(deviations, "BLOCK", block)
+        measure = Yardstick(measure.scene, measure.reference)
+        found.append({**measure.series, **measure.deviations(run)})
+    assert set(found[0]) == {*REFERENCE, *DEVIATIONS}
+    for other in found[1:]:
+        for name, values in found[0].items():
+            np.testing.assert_allclose(other[name], values, rtol=1e-12, atol=1e-13)
