@@ -21,6 +21,7 @@ from pdrom.tables import declared
 from pdrom.verification.bundle import parser as bundle_parser
 from pdrom.verification.command import parser as verify_parser
 from pdrom.verification.references import folder_of, read_reference
+from pdrom.verification.studies.__main__ import parser as compare_parser
 from places import ROOT
 
 PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "docs").rglob("*.md")])
@@ -97,7 +98,7 @@ def test_commands_are_understood(command: str, monkeypatch: pytest.MonkeyPatch) 
     # the scene and the study that a reader makes stand for any
     words = command.replace("my_sheet", "spring_oop").replace("mine.yaml", "tiny.yaml")
     first, *others = shlex.split(words)
-    parsers = {"verify": verify_parser, "bundle": bundle_parser}
+    parsers = {"verify": verify_parser, "compare": compare_parser, "bundle": bundle_parser}
     if first in parsers:
         assert parsers[first]().parse_args(others)
     elif first in ("scene", "viewer"):

@@ -32,7 +32,7 @@ LEFT_OUT = {
     r"^\.ci/run": "runs the tests itself",
     r"^\.venv/bin/(ruff|snakefmt|mypy)": "executed by .ci/run",
     r"^\./reproduce --report": "executed by test_report.py",
-    r"^\./reproduce (verify|bundle|release)": "needs a finished study; has tests of its own",
+    r"^\./reproduce (verify|compare|bundle|release)": "needs a study; has tests of its own",
     r"^\./reproduce (pages|docs)": "executed by tests/unit/verification",
     r"^pdrom advise": "reads a finished study; executed by tests/unit/command/test_advise.py",
     r"^\.venv/bin/python -m pdrom\.verification": "executed by tests/unit/verification",

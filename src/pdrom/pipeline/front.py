@@ -4,7 +4,8 @@
 arguments were completed and the configuration files were checked. ``figure`` as the first argument
 names figures by their number in the manuscript or in the preprint; ``scene`` and ``viewer`` run the
 jobs of scenes and have ``pdrom`` draw what they made; ``verify`` compares what was made with what
-is expected, ``test`` hands the others to pytest, and ``run`` starts a program of the environment.
+is expected, ``compare`` two studies; ``test`` hands the others to pytest, and ``run`` starts a
+program of the environment.
 """
 
 import os
@@ -31,6 +32,7 @@ LINES = ("--logger", "pdrom")
 HANDED_ON = {
     "test": "pytest",
     "verify": "pdrom.verification",
+    "compare": "pdrom.verification.studies",
     "bundle": "pdrom.verification.bundle",
     "docs": "pdrom.pipeline.site",
     "release": "pdrom.verification.release",

@@ -139,35 +139,7 @@ class Examination:
             return [Line("claim", "all", line.outcome, line.text)]
         decided = found if again is None else again.set_index("claim")
         names = dict.fromkeys([*expected.index, *found.index])
-        return [self._claim(str(name), expected, found, decided) for name in names]
-
-    def _claim(
-        self, name: str, expected: pd.DataFrame, found: pd.DataFrame, decided: pd.DataFrame
-    ) -> Line:
-        if name not in expected.index or name not in found.index:
-            text = "the claim is new" if name in found.index else "the claim is gone"
-            return Line("claim", name, Outcome.DIFFERS, text)
-        outcome, same, changed = Outcome.REPRODUCED, [], []
-        for column, (part, words) in PARTS.items():
-            a, b, c = (str(frame.loc[name, column]) for frame in (expected, found, decided))
-            if a == b == c:
-                same.append(f"{words}: {b}")
-            elif b != c:
-                changed.append(f"{words}: found '{b}', the tables at hand give '{c}'")
-                outcome = Outcome.DIFFERS
-            else:
-                timed = self._rests_on_times(name, part)
-                why = ", which rests on times" if timed else ""
-                changed.append(f"{words}: expected '{a}', found '{b}'{why}")
-                if not timed or outcome is Outcome.DIFFERS:
-                    outcome = Outcome.DIFFERS
-                else:
-                    outcome = Outcome.NOT_COMPARABLE
-        return Line("claim", name, outcome, "; ".join(changed or same))
-
-    def _rests_on_times(self, claim: str, part: str) -> bool:
-        tests = getattr(load_claims(RULES)[claim], part)
-        return any(test.decides and is_timed(test) for test in tests)
+        return [claim_line(str(name), expected, found, decided) for name in names]
 
     def _missing(self, kind: str, name: str, paths: list[str]) -> Line | None:
         for path in paths:
@@ -214,6 +186,44 @@ class Examination:
             return Line("figure", name, Outcome.NOT_COMPARABLE, f"{text}, which hold times")
         more = f" and {len(files)} intact files" if read and files else ""
         return Line("figure", name, Outcome.REPRODUCED, text + more)
+
+
+def claim_line(
+    name: str, expected: pd.DataFrame, found: pd.DataFrame, decided: pd.DataFrame
+) -> Line:
+    """Line of a claim.
+
+    Parameters
+    ----------
+    expected, found : tables of claims by claim
+    decided : that which the tables at hand give
+    """
+    if name not in expected.index or name not in found.index:
+        text = "the claim is new" if name in found.index else "the claim is gone"
+        return Line("claim", name, Outcome.DIFFERS, text)
+    outcome, same, changed = Outcome.REPRODUCED, [], []
+    for column, (part, words) in PARTS.items():
+        a, b, c = (str(frame.loc[name, column]) for frame in (expected, found, decided))
+        if a == b == c:
+            same.append(f"{words}: {b}")
+        elif b != c:
+            changed.append(f"{words}: found '{b}', the tables at hand give '{c}'")
+            outcome = Outcome.DIFFERS
+        else:
+            timed = _rests_on_times(name, part)
+            why = ", which rests on times" if timed else ""
+            changed.append(f"{words}: expected '{a}', found '{b}'{why}")
+            if not timed or outcome is Outcome.DIFFERS:
+                outcome = Outcome.DIFFERS
+            else:
+                outcome = Outcome.NOT_COMPARABLE
+    return Line("claim", name, outcome, "; ".join(changed or same))
+
+
+def _rests_on_times(claim: str, part: str) -> bool:
+    """Whether a test decides that compares times, of the ``published`` or ``beyond`` ones."""
+    rule = load_claims(RULES).get(claim)
+    return any(test.decides and is_timed(test) for test in getattr(rule, part, ()))
 
 
 def _results(paths: Sequence[str]) -> list[str]:

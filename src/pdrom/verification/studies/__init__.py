@@ -1,0 +1,1 @@
+"""``./reproduce compare A B``: two studies side by side, as a page and an exit code."""
