@@ -2,6 +2,7 @@
 
 import base64
 import io
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.resources import files
@@ -55,10 +56,11 @@ def page(findings: Findings, lines: Sequence[Line], times: Iterable[Ratio]) -> s
 
 
 def verdict(lines: Sequence[Line]) -> str:
-    """Sentence about what differs."""
-    names = [f"{line.kind} {line.name}" for line in lines if line.outcome is Outcome.DIFFERS]
-    many = f"{len(names)} of {len(lines)} differ beyond tolerance: {', '.join(names)}."
-    return many if names else "Nothing differs beyond tolerance."
+    """Sentence about how many lines of each kind differ."""
+    kinds = Counter(line.kind for line in lines if line.outcome is Outcome.DIFFERS)
+    counts = ", ".join(f"{count} {kind}{'s' * (count > 1)}" for kind, count in kinds.items())
+    many = f"{kinds.total()} of {len(lines)} differ beyond tolerance: {counts}."
+    return many if kinds else "Nothing differs beyond tolerance."
 
 
 def _asset(package: str, name: str) -> str:
