@@ -77,6 +77,11 @@ def test_files_are_read_back(full, tmp_path):
     assert (read.title, read.gain, read.ms) == (reduced.title, reduced.gain, reduced.ms)
     assert read.outcome.positions == pytest.approx(reduced.outcome.positions, abs=1e-6)
     assert read.error == pytest.approx(reduced.error, rel=1e-5)
+    whole = np.sqrt(np.mean(np.square(reduced.error)))
+    errors, found = reduced.errors, read.errors
+    assert errors["relative_error_within_horizon"] == pytest.approx(whole)
+    assert errors.pop("contact_delay") is found.pop("contact_delay") is None  # there is no floor
+    assert found == pytest.approx(errors, rel=1e-3)
     assert read.full.scene.config == full.scene.config
     stored = api.run(full.scene, tmp_path / "full.h5")
     again = api.load(tmp_path / "full.h5")

@@ -69,13 +69,14 @@ ENERGY_DRIFT = compared(
     ),
 )
 CONTACT_DELAY = compared(
-    "error",
+    "share",  # absolute: a whole number of frames, of which one is allowed
     number(
         "contact_delay",
         "by how much the first contact with an obstacle before the horizon is late; inf if it is "
         "missed, -inf if the full order has none, empty if neither has",
         "s",
     ),
+    tolerance=0.02,
 )
 HORIZON_FRAME = integer("horizon_frame", "first frame that cannot be judged: the scene's horizon")
 FLOOR = compared(
