@@ -16,7 +16,7 @@ from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5, require_place
 from pdrom.model.dynamics.stepper import FrameReport, State
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
-from pdrom.model.runs.bounded import Advance, BoundedRun
+from pdrom.model.runs.bounded import Advance, BoundedRun, frame_by_frame
 from pdrom.model.runs.full_order import run as run_full_order
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis import Basis, compute_basis
@@ -154,13 +154,14 @@ def reduce(
         made = fitting_basis(basis_of_group, chosen, spec)
     reduction = Reduction(made, select(made, spec, r), spec, r=r)
     trained = _trained(full, group, guard)
-    advance, seen = guarded(
+    loop, seen = guarded(
         scene, scene.system, group, reduction=reduction, settings=guard, trained=trained
     )
     seconds: list[float] = []
     start, frames, unit = scene.initial_state(), scene.config.frames, scene.mesh.extent
-    frame_by_frame = BoundedRun(_clocked(advance, seconds), start, frames, BLOWUP_EXTENT, unit)
-    outcome = compare(frame_by_frame, full.positions, lambda: seen.stopped)
+    clocked = frame_by_frame(_clocked(loop.step, seconds))
+    run = BoundedRun(clocked, start, frames, BLOWUP_EXTENT, unit)
+    outcome = compare(run, full.positions, lambda: seen.stopped)
     ms = 1e3 * float(np.median(seconds))
     name = method if isinstance(method, str) else method.title
     return ReducedRun(full, group, name, r, float(reduction.gain), outcome, ms, seen)

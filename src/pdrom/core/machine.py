@@ -36,10 +36,25 @@ class Kernels(_Record):
     threads: int
 
 
+class Units(_Record):
+    """Seconds of three loops that anyone can measure, see `pdrom.experiments.kit.units`."""
+
+    unit_scalar_s: float
+    unit_vector_s: float
+    unit_memory_s: float
+
+    @property
+    def unit_s(self) -> float:
+        """Geometric mean of the three: what times of other machines are compared by."""
+        return (self.unit_scalar_s * self.unit_vector_s * self.unit_memory_s) ** (1 / 3)
+
+
 class Machine(_Record):
     """The machine that timings and last digits belong to, and the code that ran on it.
 
     threads : the most that one of the libraries would use
+    target : processor that the project's code is compiled for; empty leaves it to the compiler
+    units : None where they were not measured
     """
 
     cpu: str
@@ -51,10 +66,12 @@ class Machine(_Record):
     threads: int
     libraries: dict[str, str]
     kernels: tuple[Kernels, ...]
+    target: str = ""
+    units: Units | None = None
 
 
-def machine() -> Machine:
-    """Record of this machine and this process."""
+def machine(units: Units | None = None) -> Machine:
+    """Record of this machine and this process, with ``units`` that were measured."""
     kernels = loaded_kernels()
     return Machine(
         cpu=_cpu_model(),
@@ -66,6 +83,8 @@ def machine() -> Machine:
         threads=max((each.threads for each in kernels), default=1),
         libraries=library_versions(),
         kernels=kernels,
+        target=os.environ.get("NUMBA_CPU_NAME", ""),
+        units=units,
     )
 
 

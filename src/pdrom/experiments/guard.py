@@ -17,7 +17,7 @@ from pdrom.experiments.kit.scenes import positions_of, scene_of
 from pdrom.experiments.kit.settings import BlowupExtent, Solver
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.energy import EnergyScale
-from pdrom.model.runs.bounded import Advance, BoundedRun
+from pdrom.model.runs.bounded import Advance, BoundedRun, frame_by_frame
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import load_basis
 from pdrom.reduction.local.guard_settings import Action, AlarmName, GuardSettings
@@ -204,7 +204,7 @@ class _Trial:
         return self.scene.stepper(self.system, self.scene.groups, track_objective=False).step
 
     def _guarded(self, settings: GuardSettings) -> Advance:
-        advance, _ = guarded(
+        loop, _ = guarded(
             self.scene,
             self.system,
             self.case.group,
@@ -212,12 +212,12 @@ class _Trial:
             settings=settings,
             trained=self.trained,
         )
-        return advance
+        return loop.step
 
 
 def _time(advance: Advance, scene: Scene) -> float:
     """Seconds per frame of a run, which ends where it is no longer finite."""
-    run = BoundedRun(advance, scene.initial_state(), scene.config.frames)
+    run = BoundedRun(frame_by_frame(advance), scene.initial_state(), scene.config.frames)
     started = perf_counter()
     frames = sum(1 for _ in run)
     return (perf_counter() - started) / max(1, frames)

@@ -1,12 +1,18 @@
-"""Record of the machine and of the library versions."""
+"""Record of the machine, its units of time, and the library versions."""
 
 from pdrom.core import machine as this
 from pdrom.core.paths import MACHINE, File
 from pdrom.core.store import write_text
 from pdrom.experiments.kit.declaration import experiment
+from pdrom.experiments.kit.units import units
 
 
-@experiment("Record of the machine and the library versions", reads={}, writes={"out": MACHINE})
+@experiment(
+    "Record of the machine and the library versions",
+    reads={},
+    writes={"out": MACHINE},
+    alone=True,
+)
 def machine(out: File) -> None:
-    """Write what is known of the machine."""
-    write_text(this.machine().model_dump_json(indent=2) + "\n", out.path)
+    """Measure the units, and write them with what is known of the machine."""
+    write_text(this.machine(units()).model_dump_json(indent=2) + "\n", out.path)

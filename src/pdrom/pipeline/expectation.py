@@ -1,14 +1,40 @@
-"""Expected times of jobs: by kind, as they were measured (see `pdrom.pipeline.tracked`)."""
+"""Expected times of jobs: by kind, as they were measured (see `pdrom.pipeline.tracked`).
+
+Where the last run has measured the units of this machine, times are scaled by them.
+"""
 
 import logging
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
+from pdrom.core.machine import Machine, Units
+from pdrom.core.paths import MACHINE
 from pdrom.core.store import read_table
 from pdrom.pipeline.plan import Plan
 from pdrom.pipeline.progress import Expected
 from pdrom.pipeline.scenes import Coarsen
 from pdrom.pipeline.tracked import COLUMNS, COSTS, kind_of
+
+RUN_TIMES = Path("config/reference/run_times.csv")
+
+
+def units_of(study: str, root: Path) -> Units:
+    """Units of the machine on which a ``study``, full or tiny, was timed (`RUN_TIMES`)."""
+    row = read_table(root / RUN_TIMES, result=False).set_index("study").loc[study]
+    return Units(**row[list(Units.model_fields)])
+
+
+def slower_here(plan: Plan, study: str) -> float:
+    """How much longer this machine takes than that of `units_of`; 1 where it is not known."""
+    try:
+        record = (plan.root / MACHINE.at(plan.results)).read_bytes()
+        here = Machine.model_validate_json(record).units
+    except (OSError, ValidationError):
+        return 1.0  # before the first run, or a record of an older version
+    return 1.0 if here is None else here.unit_s / units_of(study, plan.root).unit_s
 
 
 def expected_seconds(plan: Plan) -> Callable[[str], float]:
@@ -16,10 +42,12 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
 
     A kind that was not measured takes the median of all.
     """
-    column = "seconds" if plan.settings.coarsen == Coarsen() else "coarse_seconds"
+    full = plan.settings.coarsen == Coarsen()
+    study, column = ("full", "seconds") if full else ("tiny", "coarse_seconds")
     table = read_table(plan.root / COSTS, COLUMNS, result=False)
-    known = dict(zip(table.kind, table[column], strict=True))
-    return lambda log: float(known.get(kind_of(log, plan.results), table[column].median()))
+    seconds = slower_here(plan, study) * table[column]
+    known = dict(zip(table.kind, seconds, strict=True))
+    return lambda log: float(known.get(kind_of(log, plan.results), seconds.median()))
 
 
 def tell_expectation(workflow: Any, plan: Plan) -> None:

@@ -8,10 +8,12 @@ import pytest
 import yaml
 
 from pdrom.core.errors import PdromError
+from pdrom.core.machine import Units, machine
 from pdrom.core.usage import Usage
 from pdrom.experiments.kit.declaration import experiments
-from pdrom.pipeline.expectation import expected_seconds
+from pdrom.pipeline.expectation import RUN_TIMES, expected_seconds, units_of
 from pdrom.pipeline.scenes import Coarsen
+from pdrom.pipeline.summary import minutes
 from pdrom.pipeline.tracked import COLUMNS, COSTS, main, measured_costs
 from places import ROOT
 
@@ -53,6 +55,32 @@ def test_a_job_takes_what_jobs_of_its_kind_took_on_meshes_like_its_own(log, kind
     assert expected_seconds(plan())(place) == TABLE.seconds[kind]
     coarse = expected_seconds(plan(resolution=0.5))
     assert coarse(place) == TABLE.coarse_seconds[kind]
+
+
+def test_times_are_scaled_by_the_units_of_the_last_run(tmp_path):
+    """A machine with twice the units takes twice as long; an older record has none."""
+    asked = SimpleNamespace(**vars(plan()) | {"results": str(tmp_path)})
+    log, usual = f"{tmp_path}/logs/guard.log", TABLE.seconds["guard"]
+    there = units_of("full", ROOT).model_dump()
+    twice = Units(**{name: 2.0 * seconds for name, seconds in there.items()})
+    for units, factor in ((twice, 2.0), (None, 1.0)):
+        (tmp_path / "machine.json").write_text(machine(units).model_dump_json(), "utf-8")
+        assert expected_seconds(asked)(log) == pytest.approx(factor * usual)
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/running.md"])
+def test_pages_say_the_times_of_the_record_and_the_unit(page):
+    text = (ROOT / page).read_text("utf-8")
+    times = pd.read_csv(ROOT / RUN_TIMES).set_index("study")
+    assert f"{times.cpu['full']} (unit {units_of('full', ROOT).unit_s:.3f} s" in text
+    if page == "README.md":
+        assert f"about {times.wall_s['full'] / 60:.0f} minutes" in text
+        tiny = ("no", "one", "two", "three", "four")[round(times.wall_s["tiny"] / 60)]
+        assert f"in {tiny} minutes" in text
+        return
+    for study in times.itertuples():
+        processor = f"({minutes(study.processor_s)} of processor time)"
+        assert f"{minutes(study.wall_s)} with the set-up {processor}" in text
 
 
 def test_a_kind_that_was_not_measured_takes_the_median():

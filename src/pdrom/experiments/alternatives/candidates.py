@@ -44,7 +44,7 @@ class Candidate:
         None if it is not finite, or larger than ``limit`` times the ``extent`` (m).
         """
         run = BoundedRun(
-            self.loop.step, self.start, frames * self.steps, limit, extent, self.positions
+            self.loop.run, self.start, frames * self.steps, limit, extent, self.positions
         )
         found = [self.positions(self.start.positions)]
         found += [f.positions for f in run if (f.number + 1) % self.steps == 0]

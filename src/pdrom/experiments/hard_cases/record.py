@@ -7,7 +7,7 @@ import numpy as np
 
 from pdrom.experiments.hard_cases.roundoff import Roundoff
 from pdrom.model.dynamics.stepper import FrameReport, LocalStep, State, Stepper
-from pdrom.model.runs.bounded import BoundedRun
+from pdrom.model.runs.bounded import BoundedRun, frame_by_frame
 from pdrom.model.scene import Scene
 
 Positions = Callable[[np.ndarray], np.ndarray]
@@ -79,7 +79,9 @@ def record(
         watch = None if observe is None else (lambda y: observe(frame, y))
         return loop.step(before, frame, watch)
 
-    run = BoundedRun(advance, state, scene.config.frames, limit, positions=positions)
+    run = BoundedRun(
+        frame_by_frame(advance), state, scene.config.frames, limit, positions=positions
+    )
     for frame in run:
         before, after, report = state, frame.state, frame.report
         with np.errstate(over="ignore", invalid="ignore"):

@@ -8,6 +8,19 @@ import numpy as np
 from pdrom.model.dynamics.stepper import FrameReport, State
 
 Advance = Callable[[State, int], tuple[State, FrameReport]]
+Run = Callable[[State, range], Iterator[tuple[State, FrameReport]]]
+"""Function of a state and frames that does them one after the other, as `Stepper.run`."""
+
+
+def frame_by_frame(advance: Advance) -> Run:
+    """Run that does every frame by a call of ``advance``, and none before it is asked for."""
+
+    def run(state: State, frames: range) -> Iterator[tuple[State, FrameReport]]:
+        for frame in frames:
+            state, report = advance(state, frame)
+            yield state, report
+
+    return run
 
 
 @dataclass(frozen=True)
@@ -30,13 +43,13 @@ class Frame:
 class BoundedRun:
     """Frames of a run, in order, up to a blow-up; the frame that grew too large is the last.
 
-    advance : does one frame
+    run : does the frames, perhaps some beyond a blow-up
     limit : the run ends when its extent, in multiples of ``unit`` (m), exceeds it
-    positions : vertex positions of the coordinates of ``advance``
+    positions : vertex positions of the coordinates of ``run``
     blowup_frame : first frame that is not finite or exceeds the limit; None while there is none
     """
 
-    advance: Advance
+    run: Run
     state: State
     frames: int
     limit: float = np.inf
@@ -45,9 +58,10 @@ class BoundedRun:
     blowup_frame: int | None = None
 
     def __iter__(self) -> Iterator[Frame]:
+        states = self.run(self.state, range(self.frames))
         for number in range(self.frames):
             with np.errstate(over="ignore", invalid="ignore"):
-                self.state, report = self.advance(self.state, number)
+                self.state, report = next(states)
                 q = self.positions(self.state.positions)
                 extent = float(np.ptp(q, axis=0).max()) / self.unit
             if not np.isfinite(q).all():

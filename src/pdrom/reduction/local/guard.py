@@ -1,9 +1,11 @@
 """A guard at run time: a reduced run is watched by an alarm, and something follows from it."""
 
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from pdrom.model.dynamics.stepper import FrameReport, State, Stepper
+from pdrom.model.runs.bounded import frame_by_frame
 from pdrom.reduction.local.alarm import Alarm
 from pdrom.reduction.local.guard_settings import Action
 
@@ -63,6 +65,10 @@ class Guard:
     loop: Stepper
     full: Stepper
     record: GuardRecord = field(default_factory=GuardRecord)
+
+    def run(self, state: State, frames: range) -> Iterator[tuple[State, FrameReport]]:
+        """Do frames one after the other; none before it is asked for."""
+        return frame_by_frame(self.step)(state, frames)
 
     def step(self, state: State, frame: int) -> tuple[State, FrameReport]:
         """Do one frame.

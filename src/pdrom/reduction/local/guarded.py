@@ -7,7 +7,7 @@ import numpy as np
 from pdrom.core.errors import ConfigurationError
 from pdrom.model.dynamics.stepper import LocalStep, Stepper
 from pdrom.model.dynamics.system import GlobalSystem
-from pdrom.model.runs.bounded import Advance, BoundedRun
+from pdrom.model.runs.bounded import BoundedRun
 from pdrom.model.scene import Scene
 from pdrom.reduction.local.estimate_alarm import EstimateAlarm
 from pdrom.reduction.local.guard import Guard, GuardRecord
@@ -52,8 +52,8 @@ def guarded(
     reduction: Reduction,
     settings: GuardSettings,
     trained: Trained,
-) -> tuple[Advance, GuardRecord]:
-    """Return the step function of a guarded run and the guard's record.
+) -> tuple[Stepper | Guard, GuardRecord]:
+    """Return what does the frames of a guarded run, and the guard's record.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def guarded(
 
     chosen = scene.group(group)
     if settings.action == "none":
-        return loop(ReducedLocalStep(chosen, reduction)).step, GuardRecord.unwatched()
+        return loop(ReducedLocalStep(chosen, reduction)), GuardRecord.unwatched()
     full = scene.stepper(system, track_objective=False)
     if settings.alarm == "estimate":
         if trained.companion is None:
@@ -87,7 +87,7 @@ def guarded(
         watched = WatchedLocalStep(chosen, reduction, scene.config.iterations)
         leaves = TrainedRange(settings, [watched], trained.extent)
         guard = Guard(settings.action, leaves, loop(watched, watched=True), full)
-    return guard.step, guard.record
+    return guard, guard.record
 
 
 def guarded_rerun(
@@ -108,9 +108,9 @@ def guarded_rerun(
     settings, trained : see `guarded`
     system : factored system of the scene's global step
     """
-    advance, record = guarded(
+    loop, record = guarded(
         scene, system, group, reduction=reduction, settings=settings, trained=trained
     )
     start, frames, unit = scene.initial_state(), scene.config.frames, scene.mesh.extent
-    run = BoundedRun(advance, start, frames, blowup_extent, unit)
+    run = BoundedRun(loop.run, start, frames, blowup_extent, unit)
     return compare(run, reference, lambda: record.stopped), record

@@ -12,6 +12,7 @@ import numpy as np
 
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.clock import clock, now
+from pdrom.model.compiled.dots import dots
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH, at
 from pdrom.model.constraints.local_kernel import (
@@ -25,8 +26,6 @@ from pdrom.model.constraints.local_kernel import (
     local_kernel,
 )
 
-# Sums may be reordered, which vectorises the dot products; nan and inf keep their meaning.
-REORDERED = {"reassoc", "contract", "nsz"}
 SPLIT_FROM = 1 << 17  # entries of a lift (N, r) from which its rows are in two parts
 
 # Entries of the record: the numbers of modes, sets, columns and sampled numbers, address and record
@@ -96,7 +95,7 @@ class Lift:
         )
 
 
-@compiled(nogil=True, fastmath=REORDERED)
+@compiled(nogil=True)
 def coefficients(sampled, starts, positions, packed, operators, shifts, limits, result):
     """Write the coefficients of all sets that belong to the numbers of the sampled elements."""
     sets, modes = shifts.shape
@@ -105,20 +104,28 @@ def coefficients(sampled, starts, positions, packed, operators, shifts, limits, 
         # side by side, so that a product for each mode reads whole vectors
         for j in range(last - first):
             packed[j] = at(sampled, at(positions, first + j))
+        size = last - first
+        for i in range(0, modes, 3):
+            # the last one again where there are fewer than three
+            a, b, c = i, min(i + 1, modes - 1), min(i + 2, modes - 1)
+            result[k, a], result[k, b], result[k, c] = dots(
+                operators,
+                first * modes + a * size,
+                first * modes + b * size,
+                first * modes + c * size,
+                size,
+                packed,
+                (-shifts[k, a], -shifts[k, b], -shifts[k, c]),
+            )
         for i in range(modes):
-            begin = first * modes + i * (last - first)
-            total = -shifts[k, i]
-            for j in range(last - first):
-                total += at(operators, begin + j) * at(packed, j)
             # not a number stays one
-            if total < limits[0, i]:
-                total = limits[0, i]
-            elif total > limits[1, i]:
-                total = limits[1, i]
-            result[k, i] = total
+            if result[k, i] < limits[0, i]:
+                result[k, i] = limits[0, i]
+            elif result[k, i] > limits[1, i]:
+                result[k, i] = limits[1, i]
 
 
-@compiled(nogil=True, fastmath=REORDERED)
+@compiled(nogil=True)
 def lift(values, axes, own_sets, lifted, offset, first, last, rhs):
     """Add S^T W (mean + V c) to the rows ``first`` to ``last`` - 1 of the right-hand side."""
     for i in range(WIDTH * first, WIDTH * last):
@@ -126,13 +133,16 @@ def lift(values, axes, own_sets, lifted, offset, first, last, rhs):
     columns, vertices, modes = lifted.shape
     flat = lifted.reshape(columns * vertices * modes)
     for column in range(columns):
-        own = values[own_sets[column]]
-        for vertex in range(first, last):
-            begin = (column * vertices + vertex) * modes
-            total = 0.0
-            for i in range(modes):
-                total += at(flat, begin + i) * at(own, i)
-            rhs[WIDTH * vertex + axes[column]] += total
+        own, axis, start = values[own_sets[column]], axes[column], column * vertices
+        for vertex in range(first, last - 2, 3):
+            i = (start + vertex) * modes
+            x, y, z = dots(flat, i, i + modes, i + 2 * modes, modes, own, (0.0, 0.0, 0.0))
+            rhs[WIDTH * vertex + axis] += x
+            rhs[WIDTH * (vertex + 1) + axis] += y
+            rhs[WIDTH * (vertex + 2) + axis] += z
+        for vertex in range(last - (last - first) % 3, last):
+            i = (start + vertex) * modes
+            rhs[WIDTH * vertex + axis] += dots(flat, i, i, i, modes, own, (0.0, 0.0, 0.0))[0]
 
 
 @local_kernel

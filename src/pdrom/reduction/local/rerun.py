@@ -37,4 +37,4 @@ def rerun(
     """
     loop = scene.stepper(system, local_steps, track_objective=False)
     start, frames, unit = scene.initial_state(offset), scene.config.frames, scene.mesh.extent
-    return compare(BoundedRun(loop.step, start, frames, blowup_extent, unit), reference)
+    return compare(BoundedRun(loop.run, start, frames, blowup_extent, unit), reference)

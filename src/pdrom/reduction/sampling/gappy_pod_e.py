@@ -11,6 +11,9 @@ from scipy import linalg
 
 from pdrom.core.errors import SamplingError
 
+# Rounding errors of a product of a block with itself, relative to its trace.
+ROUNDOFF = 1e-11
+
 
 def oversample(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np.ndarray:
     """``elements`` followed by others, ``count`` in all (or as many as there are).
@@ -49,6 +52,9 @@ class _Growing:
     def __init__(self, v: np.ndarray, size: int, elements: np.ndarray) -> None:
         self._rows = np.ascontiguousarray(v)
         self._blocks = self._rows.reshape(-1, size, v.shape[1])
+        # a tenth of the numbers of the blocks say all but a few digits of the growth
+        self._squares = self._blocks @ self._blocks.transpose(0, 2, 1)
+        self._sizes = np.trace(self._squares, axis1=1, axis2=2)
         self._picked = [int(e) for e in elements]
         self._check()
         rows = self._blocks[self._picked].reshape(-1, v.shape[1])
@@ -106,7 +112,8 @@ class _Growing:
 
         The growth is at most |B u|^2: candidates are those where this is larger than the bound of
         the element with the largest |B u|^2, which wins ties: if the smallest eigenvalue is double,
-        all bounds are zero.
+        all bounds are zero. Of these again those whose growth by `_squares`, too large by what
+        rounding may take away, is not below the growth of the best of them.
         """
         products = (self._rows @ self._weakest).reshape(self.total, -1)
         strength = np.einsum("es,es->e", products, products)
@@ -116,8 +123,21 @@ class _Growing:
         if bound == 0.0:
             return first
         others = np.flatnonzero(strength > bound)
+        if len(others):
+            most = self._growth_at_most(others, products)
+            best = self._growth(others[[np.argmax(most)]], products)[0]
+            others = others[most >= best]
         growth = self._growth(others, products)
         return int(others[np.argmax(growth)]) if growth.max(initial=0.0) > bound else first
+
+    def _growth_at_most(self, elements: np.ndarray, products: np.ndarray) -> np.ndarray:
+        """Numbers that `_growth` does not exceed, without the blocks themselves."""
+        products = products[elements]
+        squared = np.einsum("es,es->e", products, products)
+        stretched = np.einsum("est,et->es", self._squares[elements], products)
+        beside = np.einsum("es,es->e", stretched, products) / squared - squared
+        least = np.maximum(beside - ROUNDOFF * self._sizes[elements], 0.0)
+        return (1.0 + ROUNDOFF) * _smaller_root(squared, least, self._gap)
 
     def _growth(self, elements: np.ndarray, products: np.ndarray) -> np.ndarray:
         blocks, products = self._blocks[elements], products[elements]
@@ -152,11 +172,16 @@ def eigenvalue_growth(
     gap : g >= 0
     """
     squared = np.einsum("es,es->e", products, products)
-    if np.isinf(gap):
-        return squared
     pulled = (products[:, None, :] @ blocks)[:, 0] - squared[:, None] * weakest
     beside = np.einsum("ek,ek->e", pulled, pulled)
     beside = np.divide(beside, squared, out=np.zeros_like(beside), where=squared > 0.0)
+    return _smaller_root(squared, beside, gap)
+
+
+def _smaller_root(squared: np.ndarray, beside: np.ndarray, gap: float) -> np.ndarray:
+    """t of `eigenvalue_growth` for |b|^2 and c, which lowers it, (m,)."""
+    if np.isinf(gap):
+        return squared
     mean = squared + beside
     denominator = gap + mean + np.sqrt((gap - mean) ** 2 + 4.0 * gap * beside)
     growth = np.zeros_like(squared)

@@ -53,7 +53,7 @@ def companion_frames(scene: Scene, model: SubspaceModel) -> Iterator[np.ndarray]
     """
     loop, start = model.loop(scene)
     frames, unit = scene.config.frames, scene.mesh.extent
-    run = BoundedRun(loop.step, start, frames, np.inf, unit, model.positions)
+    run = BoundedRun(loop.run, start, frames, np.inf, unit, model.positions)
     yield model.positions(start.positions)
     for frame in run:
         yield frame.positions

@@ -22,7 +22,7 @@ def rerun_model(
     """
     loop, start = model.loop(scene)
     frames, unit = scene.config.frames, scene.mesh.extent
-    run = BoundedRun(loop.step, start, frames, blowup_extent, unit, model.positions)
+    run = BoundedRun(loop.run, start, frames, blowup_extent, unit, model.positions)
     outcome = compare(run, reference)
     if isinstance(loop, SafeguardedStepper):
         return replace(outcome, fallbacks=loop.fallbacks)

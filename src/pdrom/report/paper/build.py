@@ -65,8 +65,10 @@ def _machine_table(path: Path) -> pd.DataFrame:
         raise StorageError(f"{path}: {describe(error, Machine)}") from error
     versions = {f"version_{name}": version for name, version in record.libraries.items()}
     architectures = ", ".join(sorted({k.architecture for k in record.kernels if k.architecture}))
-    plain = record.model_dump(exclude={"libraries", "kernels"})
+    plain = record.model_dump(exclude={"libraries", "kernels", "units"})
     row = {**plain, **versions, "kernels": architectures}
+    if record.units is not None:
+        row |= {**record.units.model_dump(), "unit_s": record.units.unit_s}
     # names of a machine are not ours and may hold any character
     words = {key: replaced(value) for key, value in row.items() if isinstance(value, str)}
     return pd.DataFrame([{**row, **words}])

@@ -234,10 +234,12 @@ def test_fused_iterations_are_the_plain_ones(name):
     loop, state = SubspaceModel("pod", columns, few).loop(scene)
     assert isinstance(loop, FusedStepper)
     plain = Stepper(loop.space, loop.time_step, loop.iterations, loop.local_steps)
-    other = state
-    for frame in range(scene.config.frames):
+    other, frames = state, range(scene.config.frames)
+    for frame, (many, _) in zip(frames, loop.run(state, frames), strict=True):
         state, report = loop.step(state, frame)
         other, _ = plain.step(other, frame)
+        np.testing.assert_array_equal(many.positions, state.positions)
+        np.testing.assert_array_equal(many.velocities, state.velocities)
         assert len(report.objective) == 0
         np.testing.assert_allclose(state.positions, other.positions, rtol=1e-8, atol=1e-8)
     moved = other.positions - loop_start(scene, columns)
