@@ -1,0 +1,101 @@
+"""Rungs tried on motions of one's own: their errors, and what one of their frames misses.
+
+The reference is the implicit step of each motion, here as many accelerated iterations as change
+nothing any more. From states of a rung's run one frame is done by the full order: the distance of
+its end to that of the rung's frame is the rung's defect there, exactly. A run adds up its defects
+and the motion amplifies them: where the defects are those of a motion that was tried, so is the
+error, and where they are larger, the error is taken to be larger by as much.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pdrom.model.dynamics.stepper import State
+from pdrom.model.runs.full_order import trajectory
+from pdrom.model.scene import Scene
+from pdrom.reduction.asked.ask import QUANTITIES, Quantity, relative_error
+from pdrom.reduction.asked.rung import WINDOW, Running, Rung
+
+CONVERGED = Rung(80, WINDOW)
+# The frames of a motion count until starts this far apart (of the extent) and half the iterations
+# lead to positions that differ by more than this part of the motion: then round-off decides.
+MOVED, HORIZON, SEED = 1e-10, 5e-3, 0
+# Frames of a run whose defects are taken.
+PROBED = 8
+
+
+class Motion:
+    """A motion that rungs are tried on, with its reference.
+
+    scene : its iterations are those of the reference
+    end : frames before it count
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = CONVERGED.scene(scene)
+        self.reference = trajectory(self.scene, track_objective=False)
+        hair = np.random.default_rng(SEED).standard_normal(scene.mesh.points.shape)
+        beside = Rung(CONVERGED.iterations // 2, WINDOW).scene(scene)
+        other = trajectory(beside, MOVED * scene.mesh.extent * hair, track_objective=False)
+        apart = np.linalg.norm((other - self.reference)[1:], axis=(1, 2))
+        late = np.flatnonzero(~(apart <= HORIZON * self.unit))
+        self.end = int(late[0]) if len(late) else len(apart)
+
+    @cached_property
+    def unit(self) -> float:
+        """Root mean square displacement of a frame, m."""
+        moved = np.linalg.norm(self.reference[1:] - self.reference[0], axis=(1, 2))
+        return float(np.sqrt(np.mean(moved**2)))
+
+    def error(self, positions: np.ndarray, quantity: Quantity) -> float:
+        """Error of a run (F + 1, N, 3) m before the end."""
+        last = self.end + 1
+        return relative_error(positions[:last], self.reference[:last], quantity)
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A rung on a motion.
+
+    errors : of each quantity
+    defects : (n,) of some frames, m, in units of the motion
+    """
+
+    errors: dict[Quantity, float]
+    defects: np.ndarray
+
+    @property
+    def defect(self) -> float:
+        """Root mean square of the defects."""
+        return float(np.sqrt(np.mean(self.defects**2))) if len(self.defects) else 0.0
+
+
+def tried(rung: Rung, motion: Motion, check: Rung) -> Tried:
+    """Run ``rung`` on a motion; its defects are taken with ``check``."""
+    running = rung.on(motion.scene)
+    state = running.inside(motion.scene.initial_state())
+    states = [state, *running.run(state, range(motion.scene.config.frames))]
+    positions = np.stack([running.outside(each).positions for each in states])
+    errors = {q: motion.error(positions, q) for q in QUANTITIES}
+    frames = np.unique(np.linspace(0, max(motion.end - 1, 0), PROBED + 1).round().astype(int)[1:])
+    exact = check.on(motion.scene)
+    found = [
+        defect(running.outside(states[f]), running.outside(states[f + 1]), exact, frame=int(f))
+        for f in frames
+        if np.isfinite(positions[f + 1]).all()
+    ]
+    return Tried(errors, np.array(found) / motion.unit)
+
+
+def defect(before: State, after: State, exact: Running, frame: int) -> float:
+    """Distance, m, of the end of ``frame`` to that which ``exact`` reaches from its beginning."""
+    (end,) = exact.run(before, range(frame, frame + 1))
+    return float(np.linalg.norm(after.positions - end.positions))
+
+
+def worst(found: Sequence[Tried], quantity: Quantity) -> float:
+    """Largest error of a rung on several motions."""
+    return max(each.errors[quantity] for each in found)
