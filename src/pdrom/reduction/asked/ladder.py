@@ -27,8 +27,8 @@ class AskSettings(ConfigModel):
 
     modes, tolerances : of the reductions: k, tau
     frames : of the training motion that the elements are sampled for, at most
-    plain, accelerated : iterations of the full order, without and with acceleration; reductions
-        iterate as often as the accelerated full order
+    plain, accelerated : iterations of the full order, without and with acceleration
+    iterations : of the reductions, accelerated
     factor : by which estimates are multiplied; calibrated, see table asks_calibration
     share : of the full order's time that checks may cost, for an ask of 1 %; a share inversely
         proportional to the ask, and never more than this
@@ -37,8 +37,9 @@ class AskSettings(ConfigModel):
     modes: tuple[Count, ...] = (20, 40)
     tolerances: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (5e-2, 1e-2)
     frames: Count = 25
-    plain: tuple[Count, ...] = (1, 2, 3, 5, 10, 20, 40)
-    accelerated: tuple[Count, ...] = (5, 10, 20, 40)
+    iterations: tuple[Count, ...] = (5, 10, 20)
+    plain: tuple[Count, ...] = (1, 2, 3, 5)
+    accelerated: tuple[Count, ...] = (5, 10, 20, 30)
     factor: Annotated[float, Field(ge=1.0, le=1e3)] = 1.5
     share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.05
 
@@ -123,7 +124,7 @@ def _reduced(training: Scene, motion: Motion, settings: AskSettings) -> Iterator
             found = sample_elements(scene, columns, few, tolerances=settings.tolerances)
             for tau, samples in zip(settings.tolerances, found, strict=True):
                 model = SubspaceModel("pod", columns, samples)
-                yield from (Rung(count, WINDOW, model, tau) for count in settings.accelerated)
+                yield from (Rung(count, WINDOW, model, tau) for count in settings.iterations)
     except PdromError as error:
         log.warning("%s: no reduction (%s)", training.config.name, error)
 

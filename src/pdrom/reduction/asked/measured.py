@@ -10,6 +10,7 @@ error, and where they are larger, the error is taken to be larger by as much.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from time import thread_time
 
 import numpy as np
 
@@ -17,9 +18,9 @@ from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.asked.ask import QUANTITIES, Quantity, relative_error
-from pdrom.reduction.asked.rung import WINDOW, Running, Rung
+from pdrom.reduction.asked.rung import WINDOW, Rung, Running
 
-CONVERGED = Rung(80, WINDOW)
+CONVERGED = Rung(60, WINDOW)
 # The frames of a motion count until starts this far apart (of the extent) and half the iterations
 # lead to positions that differ by more than this part of the motion: then round-off decides.
 MOVED, HORIZON, SEED = 1e-10, 5e-3, 0
@@ -61,11 +62,13 @@ class Tried:
     """A rung on a motion.
 
     errors : of each quantity
-    defects : (n,) of some frames, m, in units of the motion
+    defects : (n,) of some frames, in units of the motion
+    ms : processor time of a frame
     """
 
     errors: dict[Quantity, float]
     defects: np.ndarray
+    ms: float
 
     @property
     def defect(self) -> float:
@@ -77,17 +80,20 @@ def tried(rung: Rung, motion: Motion, check: Rung) -> Tried:
     """Run ``rung`` on a motion; its defects are taken with ``check``."""
     running = rung.on(motion.scene)
     state = running.inside(motion.scene.initial_state())
-    states = [state, *running.run(state, range(motion.scene.config.frames))]
-    positions = np.stack([running.outside(each).positions for each in states])
+    frames, started = motion.scene.config.frames, thread_time()
+    states = [state, *running.run(state, range(frames))]
+    ms = 1e3 * (thread_time() - started) / frames
+    positions = np.stack([running.positions(each.positions) for each in states])
     errors = {q: motion.error(positions, q) for q in QUANTITIES}
-    frames = np.unique(np.linspace(0, max(motion.end - 1, 0), PROBED + 1).round().astype(int)[1:])
+    last = max(motion.end - 1, 0)
+    probed = np.unique(np.linspace(0, last, PROBED + 1).round().astype(int)[1:])
     exact = check.on(motion.scene)
     found = [
         defect(running.outside(states[f]), running.outside(states[f + 1]), exact, frame=int(f))
-        for f in frames
+        for f in probed
         if np.isfinite(positions[f + 1]).all()
     ]
-    return Tried(errors, np.array(found) / motion.unit)
+    return Tried(errors, np.array(found) / motion.unit, ms)
 
 
 def defect(before: State, after: State, exact: Running, frame: int) -> float:

@@ -2,12 +2,12 @@
 
 Some frames are done twice, by the rung and by the full order from the same state, which gives the
 rung's defect there exactly. Where the defects exceed those of the motions that the rung was tried
-on, the error is estimated to exceed theirs by as much. When the estimate leaves the ask, the run goes back to the last state that was checked, or to the
-start while little is spent, and goes on with a more accurate rung. Nothing depends on the clock.
+XX while little is spent, and goes on with a more accurate rung. Nothing depends on the clock.
 """
 
 import logging
 from dataclasses import dataclass
+from time import thread_time
 
 import numpy as np
 
@@ -40,6 +40,7 @@ class Asked:
     reduced : frames that were done by a reduction
     work : estimated nanoseconds, checks and repairs included
     full_work : those of a run by the cheapest full order that keeps to the ask
+    seconds : processor time of the frames, without what is made before the first of them
     """
 
     positions: np.ndarray
@@ -52,19 +53,20 @@ class Asked:
     reduced: int
     work: float
     full_work: float
+    seconds: float
 
 
 @dataclass(frozen=True)
 class _Done:
     """A run up to the end of a frame.
 
-    positions : of every frame, (N, 3) m each
-    state : at the end
+    ends : loop and its coordinates (n, 3) at the end of every frame, the initial ones first
+    state : of all vertices at the end
     parts : (frame, step, defect) of every check
     changes : (frame, step) from which on a step went on
     """
 
-    positions: tuple[np.ndarray, ...]
+    ends: tuple[tuple[Running, np.ndarray], ...]
     state: State
     parts: tuple[tuple[int, Step, float], ...] = ()
     changes: tuple[tuple[int, Step], ...] = ()
@@ -72,15 +74,15 @@ class _Done:
     @property
     def frame(self) -> int:
         """The next frame."""
-        return len(self.positions) - 1
+        return len(self.ends) - 1
 
     @property
     def finite(self) -> bool:
         """Whether all vertices are at finite places."""
-        return bool(np.isfinite(self.positions[-1]).all())
+        return bool(np.isfinite(self.state.positions).all())
 
 
-class AskedRun:
+class CheckedRun:
     """A run of ``scene`` that keeps to ``ask``, with the rungs of a ladder of its mesh.
 
     What is made before the first frame (operators, factors) is made here.
@@ -105,6 +107,11 @@ class AskedRun:
         for rung in (first.rung, self._check(first), self._dear.rung):
             self._on(rung)
 
+    @property
+    def full_order(self) -> Rung:
+        """The cheapest full order that keeps to the ask; the most accurate one if none does."""
+        return self._dear.rung
+
     def _on(self, rung: Rung) -> Running:
         if id(rung) not in self._running:
             self._running[id(rung)] = rung.on(self._scene)
@@ -116,7 +123,8 @@ class AskedRun:
         step = self._steps[0] if promised else self._last
         expected = self._settings.factor * self._own.expected(step, self._ask)
         start = self._scene.initial_state()
-        kept = begun = _Done((start.positions,), start)
+        whole, started = self._on(self._dear.rung), thread_time()
+        kept = begun = _Done(((whole, start.positions),), start)
         while kept.frame < self._frames:
             done, keeps = self._advance(kept, step)
             if keeps or not promised:
@@ -131,7 +139,7 @@ class AskedRun:
             early = self._work <= EARLY * self._frames * self._dear.work
             kept, step = begun if early else kept, following
             log.info("frame %d: goes on with %s", kept.frame, step.rung.title)
-        return self._told(kept, promised, expected)
+        return self._told(kept, promised, expected, thread_time() - started)
 
     def _advance(self, kept: _Done, step: Step) -> tuple[_Done, bool]:
         """Frames up to the next check or the end; whether the estimate is within the ask."""
@@ -145,7 +153,7 @@ class AskedRun:
         before, ends = state, []
         for after in running.run(state, range(kept.frame, until)):
             before, state = state, after
-            ends.append(running.outside(after).positions)
+            ends.append((running, after.positions))
         self._work += step.work * (until - kept.frame)
         changes, parts = kept.changes, kept.parts
         if not changes or changes[-1][1] is not step:
@@ -156,8 +164,8 @@ class AskedRun:
             exact = self._on(check)
             size = defect(running.outside(before), end, exact, checked) / self._own.unit
             parts = (*parts, (checked, step, size))
-        done = _Done((*kept.positions, *ends), end, parts, changes)
-        extent = float(np.ptp(done.positions[-1], axis=0).max()) / self._scene.mesh.extent
+        done = _Done((*kept.ends, *ends), end, parts, changes)
+        extent = float(np.ptp(end.positions, axis=0).max()) / self._scene.mesh.extent
         estimate = self._estimate(done)
         keeps = extent <= BLOWUP_EXTENT and (estimate is None or estimate <= self._ask.error)
         return done, keeps
@@ -203,7 +211,7 @@ class AskedRun:
                 return other
         return None
 
-    def _told(self, done: _Done, promised: bool, expected: float) -> Asked:
+    def _told(self, done: _Done, promised: bool, expected: float, seconds: float) -> Asked:
         ends = [*(frame for frame, _ in done.changes[1:]), self._frames]
         reduced = sum(
             end - begin
@@ -211,7 +219,7 @@ class AskedRun:
             if step.rung.model is not None
         )
         return Asked(
-            np.stack(done.positions),
+            np.stack([running.positions(y) for running, y in done.ends]),
             promised,
             expected,
             self._estimate(done),
@@ -221,4 +229,5 @@ class AskedRun:
             reduced,
             self._work,
             self._frames * self._dear.work,
+            seconds,
         )

@@ -55,15 +55,14 @@ class Rung:
         lagged = any(group.frame_lagged for group in scene.groups)
         beside = FRAME if lagged else FRAME / 50
         if self.model is None:
-            vertices = len(scene.masses)
+            vertices = scene.mesh.vertices
             iteration = ENTRY * FILL * scene.system.matrix.nnz * np.log2(vertices)
             iteration += ACCELERATED * vertices * (self.window > 0)
             iteration += sum(PROJECTION[g.rows_per_element] * g.elements for g in scene.groups)
             return beside + self.iterations * iteration
         size, iteration = self.model.columns.B.shape[1], 0.0
         for group in scene.groups:
-            chosen = self.model.samples[group.name].elements
-            count, rows = len(chosen), group.rows_per_element
+            count, rows = self.model.evaluated(group), group.rows_per_element
             iteration += count * (PROJECTION[rows] + DENSE * rows * size)
         return beside + self.iterations * iteration
 
@@ -96,10 +95,11 @@ class Running:
 
     def outside(self, state: State) -> State:
         """A state of the loop at all vertices."""
-        if self._model is None:
-            return state
-        b = self._model.columns.B
-        return State(b @ state.positions, b @ state.velocities)
+        return State(self.positions(state.positions), self.positions(state.velocities))
+
+    def positions(self, y: np.ndarray) -> np.ndarray:
+        """Coordinates of the loop at all vertices, (N, 3)."""
+        return y if self._model is None else self._model.columns.B @ y
 
     def run(self, state: State, frames: range) -> Iterator[State]:
         """States of the loop after each of ``frames``, from its ``state``."""
