@@ -12,7 +12,7 @@ import numpy as np
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.model import SubspaceModel
-from pdrom.reduction.subspace.space import coordinates
+from pdrom.reduction.subspace.space import projector
 
 WINDOW = 5  # differences of iterates that Anderson's acceleration combines
 # Nanoseconds: a projection by its rows, an entry of the factor, a vertex in accelerated iterations,
@@ -75,23 +75,19 @@ class Running:
     """A rung's step loop on a motion; states outside are those of all vertices."""
 
     def __init__(self, rung: Rung, scene: Scene) -> None:
-        self.rung, self._scene = rung, scene
         self._model = rung.model
         self._loop: Stepper
         if self._model is None:
             self._loop = rung.scene(scene).stepper(track_objective=False)
         else:
             self._loop = self._model.loop(rung.scene(scene))[0]
+            self._project = projector(self._model.columns, scene.masses)
 
     def inside(self, state: State) -> State:
         """A state of the vertices in the coordinates of the loop."""
         if self._model is None:
             return state
-        columns, masses = self._model.columns, self._scene.masses
-        return State(
-            coordinates(columns, masses, state.positions),
-            coordinates(columns, masses, state.velocities),
-        )
+        return State(self._project @ state.positions, self._project @ state.velocities)
 
     def outside(self, state: State) -> State:
         """A state of the loop at all vertices."""

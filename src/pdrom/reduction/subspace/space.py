@@ -128,6 +128,11 @@ def coordinates(columns: Columns, masses: np.ndarray, field: np.ndarray) -> np.n
     return _mass_solve(columns, masses, columns.B.T @ (masses[:, None] * field))
 
 
+def projector(columns: Columns, masses: np.ndarray) -> np.ndarray:
+    """Matrix (K, N) of `coordinates`."""
+    return _mass_solve(columns, masses, (columns.B * masses[:, None]).T)
+
+
 def _mass_solve(columns: Columns, masses: np.ndarray, rhs: np.ndarray) -> np.ndarray:
     """(B^T M B)^-1 ``rhs``.
 
@@ -221,8 +226,7 @@ class _ReducedContact:
         self._vertices = probe_vertices(scene.mesh.vertices)
         self._probes = np.ascontiguousarray(columns.B[self._vertices])
         self._columns = columns
-        weighted = columns.B * scene.masses[:, None]
-        self._project = _mass_solve(columns, scene.masses, weighted.T)
+        self._project = projector(columns, scene.masses)
 
     def free_frames(self, path: np.ndarray) -> int:
         """How many frames of ``path`` (n, K, 3) come before the first with a probe in the floor."""
