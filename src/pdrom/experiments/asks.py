@@ -50,12 +50,12 @@ class AskedErrors(AskSettings):
 class Asks(AskedErrors):
     """Section ``asks``: what is asked of each of ``scenes`` (all if empty, the large ones too).
 
-    Of the factors the table takes, for each scene, the one that the other scenes give for the
-    ``coverage``.
+    Of the factors the table takes, for each scene, the one that the other scenes give for a
+    ``risk``: the share of promises that a new scene breaks, as it is to be expected.
     """
 
     scenes: tuple[str, ...] = ()
-    coverage: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.9
+    risk: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.1
 
 
 @experiment(

@@ -29,7 +29,7 @@ class AskSettings(ConfigModel):
     frames : of the training motion that the elements are sampled for, at most
     plain, accelerated : iterations of the full order, without and with acceleration
     iterations : of the reductions, accelerated
-    factor : by which estimates are multiplied; calibrated, see table asks_calibration
+    factor : by which estimates are multiplied; calibrated, see table asks
     share : of the full order's time that checks may cost, for an ask of 1 %; a share inversely
         proportional to the ask, and never more than this
     """

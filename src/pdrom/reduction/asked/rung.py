@@ -23,6 +23,9 @@ ENTRY, ACCELERATED, DENSE, FRAME = 1.7, 20.0, 0.8, 1e5
 FILL = 0.35
 
 
+FULL_ORDER = "full order"
+
+
 @dataclass(frozen=True)
 class Rung:
     """A way to do a frame.
@@ -42,7 +45,7 @@ class Rung:
         """Name for messages and tables."""
         count = f"K = {self.iterations}"
         if self.model is None:
-            return f"full order, {'Anderson, ' if self.window else ''}{count}"
+            return f"{FULL_ORDER}, {'Anderson, ' if self.window else ''}{count}"
         return f"ecsw, k = {self.model.columns.modes}, tau = {self.tau:g}, {count}"
 
     def scene(self, scene: Scene) -> Scene:
