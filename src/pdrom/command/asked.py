@@ -50,10 +50,14 @@ def perform_asked(arguments: argparse.Namespace) -> Status:
 
 
 def _promise(asked: "AskedRun") -> str:
+    import numpy as np
+
     outcome, wish = asked.outcome, f"{asked.ask} against the converged implicit step"
     frames = len(outcome.positions) - 1
     if asked.horizon < frames:
         wish += f", up to frame {asked.horizon} (round-off decides after it)"
+    if not np.isfinite(outcome.positions).all():
+        return f"{wish}: blew up, with the full order, too"
     if not outcome.promised:
         return f"{wish}: nothing keeps to it for sure; run in full order as well as possible"
     return f"{wish}: kept, {'by a reduction' if outcome.reduced else 'by the full order only'}"

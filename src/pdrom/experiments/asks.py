@@ -36,6 +36,7 @@ COLUMNS = [
     "repairs", "ms_per_frame", "full_step", "full_error", "full_ms", "own_ms", "oracle_step",
     "oracle_ms",
 ]  # fmt: skip
+REPEATS = 2  # runs of an ask, for the time
 SCORE_COLUMNS = ["scene", "step", "expected", "error"]
 Factor = Annotated[float, Field(ge=1.0, le=100.0)]
 
@@ -44,7 +45,7 @@ class AskedErrors(AskSettings):
     """Every ask of ``errors``, run with every one of ``factors``."""
 
     errors: tuple[Tolerance, ...] = (0.1, 0.03, 0.01)
-    factors: Annotated[tuple[Factor, ...], Field(min_length=1)] = (1.0, 1.25, 1.5, 2.0, 3.0)
+    factors: Annotated[tuple[Factor, ...], Field(min_length=1)] = (1.25, 1.5, 2.0)
 
 
 class Asks(AskedErrors):
@@ -116,7 +117,7 @@ def _asked(scene: Scene, name: str, own: Ladder, section: AskedErrors) -> Iterat
                 "factor": factor,
                 "vertices": scene.mesh.vertices,
                 "frames": motion.end,
-                **_reached(run.outcome(), motion),
+                **_reached([run.outcome() for _ in range(REPEATS)], motion),
                 "full_step": full.title,
                 "full_error": known[full.title].errors["position"],
                 "full_ms": known[full.title].ms,
@@ -126,7 +127,9 @@ def _asked(scene: Scene, name: str, own: Ladder, section: AskedErrors) -> Iterat
             }
 
 
-def _reached(outcome: Asked, motion: Motion) -> dict[str, Any]:
+def _reached(outcomes: list[Asked], motion: Motion) -> dict[str, Any]:
+    """Cells of a run, whose repetitions differ in nothing but their time; the shortest counts."""
+    outcome, seconds = outcomes[0], min(each.seconds for each in outcomes)
     return {
         "promised": outcome.promised,
         "error": motion.error(outcome.positions, "position"),
@@ -138,5 +141,5 @@ def _reached(outcome: Asked, motion: Motion) -> dict[str, Any]:
         "reduced_frames": outcome.reduced,
         "checks": len(outcome.checks),
         "repairs": outcome.repairs,
-        "ms_per_frame": 1e3 * outcome.seconds / (len(outcome.positions) - 1),
+        "ms_per_frame": 1e3 * seconds / (len(outcome.positions) - 1),
     }

@@ -71,7 +71,7 @@ class Ladder:
 
     def estimated(self, step: Step, ask: Ask, defect: float) -> float:
         """Error of a run of the step with a root mean square ``defect`` in units of the motion."""
-        known = max(each.defect for each in step.tried)
+        known = max(each.defects.max(initial=0.0) for each in step.tried)
         return self.expected(step, ask) * max(1.0, defect / known if known > 0.0 else np.inf)
 
     def admissible(self, ask: Ask, factor: float) -> list[Step]:
@@ -98,7 +98,13 @@ def ladder(training: Scene, settings: AskSettings) -> tuple[Ladder, list[Motion]
     rungs = [*_full(settings), *_reduced(training, motions[0], settings)]
     steps = []
     for rung in rungs:
-        found = [tried(rung, motion, CONVERGED) for motion in motions]
+        try:
+            found = [tried(rung, motion, CONVERGED) for motion in motions]
+        except PdromError as error:
+            if rung.model is None:
+                raise
+            log.warning("%s: left out (%s)", rung.title, error)
+            continue
         steps.append(Step(rung, rung.work(training), found))
         errors = [f"{each.errors['position']:.2e}" for each in found]
         log.info("%s: errors %s", rung.title, ", ".join(errors))

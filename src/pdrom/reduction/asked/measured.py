@@ -3,8 +3,8 @@
 The reference is the implicit step of each motion, here as many accelerated iterations as change
 nothing any more. From states of a rung's run one frame is done by the full order: the distance of
 its end to that of the rung's frame is the rung's defect there, exactly. A run adds up its defects
-and the motion amplifies them: where the defects are those of a motion that was tried, so is the
-error, and where they are larger, the error is taken to be larger by as much.
+and the motion amplifies them: where the defects are no larger than those of motions that were
+tried, neither is the error, and where they are larger, it is taken to be larger by as much.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ CONVERGED = Rung(60, WINDOW)
 # lead to positions that differ by more than this part of the motion: then round-off decides.
 MOVED, HORIZON, SEED = 1e-10, 5e-3, 0
 # Frames of a run whose defects are taken.
-PROBED = 8
+PROBED = 6
 
 
 class Motion:
@@ -69,11 +69,6 @@ class Tried:
     errors: dict[Quantity, float]
     defects: np.ndarray
     ms: float
-
-    @property
-    def defect(self) -> float:
-        """Root mean square of the defects."""
-        return float(np.sqrt(np.mean(self.defects**2))) if len(self.defects) else 0.0
 
 
 def tried(rung: Rung, motion: Motion, check: Rung) -> Tried:

@@ -101,7 +101,6 @@ class CheckedRun:
         best = min(full, key=lambda step: (own.expected(step, ask), step.work))
         self._dear = next((s for s in self._steps if s.rung.model is None), best)
         self._full, self._last = full, best
-        self._repairs, self._work = 0, 0.0
         self._running: dict[int, Running] = {}
         first = self._steps[0] if self._steps else best
         for rung in (first.rung, self._check(first), self._dear.rung):
@@ -118,7 +117,8 @@ class CheckedRun:
         return self._running[id(rung)]
 
     def outcome(self) -> Asked:
-        """Do all frames."""
+        """Do all frames; each call is a run of its own."""
+        self._repairs, self._work = 0, 0.0
         promised = bool(self._steps)
         step = self._steps[0] if promised else self._last
         expected = self._settings.factor * self._own.expected(step, self._ask)
