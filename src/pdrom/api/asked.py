@@ -30,9 +30,10 @@ def asked_run(full: FullRun, ask: Ask, scene: Scene | None) -> AskedRun:
     outcome = run.outcome()
     frames = len(outcome.positions) - 1
     ms = np.full(frames, 1e3 * outcome.seconds / frames)
-    same = scene is None or scene.config == full.scene.config
+    configs = [s.config.model_copy(update={"asked": None}) for s in (full.scene, run.scene)]
+    same = configs[0] == configs[1]
     error = training.error(outcome.positions, ask.quantity) if same else None
-    return AskedRun(scene or full.scene, ask, outcome, ms, offline, own.horizon, error)
+    return AskedRun(run.scene, ask, outcome, ms, offline, own.horizon, error)
 
 
 def _require_alike(trained: Scene, scene: Scene) -> None:

@@ -23,7 +23,8 @@ class Ask(ConfigModel):
     quantity: Quantity = "position"
 
     def __str__(self) -> str:
-        return f"{100 * self.error:g} % of the {self.quantity}s"
+        plural = {"position": "positions", "velocity": "velocities"}
+        return f"{100 * self.error:g} % of the {plural[self.quantity]}"
 
 
 def read_ask(wish: object, source: str = "error") -> Ask:

@@ -94,7 +94,7 @@ class CheckedRun:
     """
 
     def __init__(self, scene: Scene, own: Ladder, ask: Ask, settings: AskSettings) -> None:
-        self._scene, self._own, self._ask, self._settings = scene, own, ask, settings
+        self.scene, self._own, self._ask, self._settings = scene, own, ask, settings
         self._frames = scene.config.frames
         self._steps = own.admissible(ask, settings.factor)
         full = [step for step in own.steps if step.rung.model is None]
@@ -113,7 +113,7 @@ class CheckedRun:
 
     def _on(self, rung: Rung) -> Running:
         if id(rung) not in self._running:
-            self._running[id(rung)] = rung.on(self._scene)
+            self._running[id(rung)] = rung.on(self.scene)
         return self._running[id(rung)]
 
     def outcome(self) -> Asked:
@@ -122,7 +122,7 @@ class CheckedRun:
         promised = bool(self._steps)
         step = self._steps[0] if promised else self._last
         expected = self._settings.factor * self._own.expected(step, self._ask)
-        start = self._scene.initial_state()
+        start = self.scene.initial_state()
         whole, started = self._on(self._dear.rung), thread_time()
         kept = begun = _Done(((whole, start.positions),), start)
         while kept.frame < self._frames:
@@ -144,7 +144,7 @@ class CheckedRun:
     def _advance(self, kept: _Done, step: Step) -> tuple[_Done, bool]:
         """Frames up to the next check or the end; whether the estimate is within the ask."""
         running, check = self._on(step.rung), self._check(step)
-        cost = check.work(self._scene) / self._dear.work
+        cost = check.work(self.scene) / self._dear.work
         share = self._settings.share * min(1.0, 0.01 / self._ask.error)
         left = [f for f in check_frames(self._frames, cost, share) if f >= kept.frame]
         checked = left[0] if left else None
@@ -160,12 +160,12 @@ class CheckedRun:
             changes = (*changes, (kept.frame, step))
         end = running.outside(state)
         if checked is not None:
-            self._work += check.work(self._scene)
+            self._work += check.work(self.scene)
             exact = self._on(check)
             size = defect(running.outside(before), end, exact, checked) / self._own.unit
             parts = (*parts, (checked, step, size))
         done = _Done((*kept.ends, *ends), end, parts, changes)
-        extent = float(np.ptp(end.positions, axis=0).max()) / self._scene.mesh.extent
+        extent = float(np.ptp(end.positions, axis=0).max()) / self.scene.mesh.extent
         estimate = self._estimate(done)
         keeps = extent <= BLOWUP_EXTENT and (estimate is None or estimate <= self._ask.error)
         return done, keeps
@@ -202,7 +202,7 @@ class CheckedRun:
             half = [s for s in self._steps if own.expected(s, ask) <= own.expected(step, ask) / 2]
             for other in half:
                 saved = (self._frames - frame) * (self._dear.work - other.work)
-                trial = self._check(other).work(self._scene) + self._frames / 2 * other.work
+                trial = self._check(other).work(self.scene) + self._frames / 2 * other.work
                 if other.rung.model is None or saved > trial:
                     return other
             return self._dear

@@ -15,8 +15,8 @@ from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import projector
 
 WINDOW = 5  # differences of iterates that Anderson's acceleration combines
-# Nanoseconds: a projection by its rows squared, an entry of the factor, a vertex in accelerated iterations,
-# a number of a dense product, a frame that compiled code cannot do alone.
+# Nanoseconds: a projection by its rows squared, an entry of the factor, a vertex in accelerated
+# iterations, a number of a dense product, a frame that compiled code cannot do alone.
 PROJECTION = 5.0
 ENTRY, ACCELERATED, DENSE, FRAME = 1.7, 20.0, 0.8, 1e5
 # Entries of the factor of a matrix with n entries and N rows: FILL n log2 N.
