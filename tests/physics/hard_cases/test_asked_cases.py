@@ -7,7 +7,6 @@ from hard_cases import training
 from pdrom.experiments.hard_cases.catalogue import reducible_cases
 from pdrom.reduction.asked.ask import Ask
 from pdrom.reduction.asked.ladder import AskSettings, ladder
-from pdrom.reduction.asked.measured import Motion
 from pdrom.reduction.asked.run import CheckedRun
 
 SETTINGS = AskSettings(

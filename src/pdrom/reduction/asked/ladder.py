@@ -39,7 +39,7 @@ class AskSettings(ConfigModel):
     frames: Count = 25
     iterations: tuple[Count, ...] = (5, 10, 20)
     plain: tuple[Count, ...] = (1, 2, 3, 5)
-    accelerated: tuple[Count, ...] = (5, 10, 20, 30)
+    accelerated: tuple[Count, ...] = (5, 10, 20, 40)
     factor: Annotated[float, Field(ge=1.0, le=1e3)] = 1.5
     share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.05
 
@@ -95,7 +95,7 @@ def ladder(training: Scene, settings: AskSettings) -> tuple[Ladder, list[Motion]
     The ladder, and the motions with their references.
     """
     motions = [Motion(training), Motion(VALIDATION.of(training))]
-    rungs = [*_full(settings), *_reduced(training, motions[0], settings)]
+    rungs = [*_full(settings, motions[0]), *_reduced(training, motions[0], settings)]
     steps = []
     for rung in rungs:
         try:
@@ -113,7 +113,10 @@ def ladder(training: Scene, settings: AskSettings) -> tuple[Ladder, list[Motion]
     return Ladder(steps, motions[0].unit, horizon), motions
 
 
-def _full(settings: AskSettings) -> Iterator[Rung]:
+def _full(settings: AskSettings, motion: Motion) -> Iterator[Rung]:
+    """The full order; where its steps converge slowly, with half the reference's iterations too."""
+    if motion.iterations > CONVERGED.iterations:
+        yield Rung(motion.iterations // 2, WINDOW)
     yield from (Rung(count) for count in settings.plain)
     yield from (Rung(count, WINDOW) for count in settings.accelerated)
 

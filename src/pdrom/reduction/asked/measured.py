@@ -9,7 +9,6 @@ tried, neither is the error, and where they are larger, it is taken to be larger
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from time import thread_time
 
 import numpy as np
@@ -20,7 +19,10 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.asked.ask import QUANTITIES, Quantity, relative_error
 from pdrom.reduction.asked.rung import WINDOW, Rung, Running
 
-CONVERGED = Rung(60, WINDOW)
+# A full order whose frames are compared with those of others; references have as many iterations,
+# or twice as many, as long as these reach further.
+CONVERGED = Rung(80, WINDOW)
+MOST = 4 * CONVERGED.iterations
 # The frames of a motion count until starts this far apart (of the extent) and half the iterations
 # lead to positions that differ by more than this part of the motion: then round-off decides.
 MOVED, HORIZON, SEED = 1e-10, 5e-3, 0
@@ -31,30 +33,48 @@ PROBED = 6
 class Motion:
     """A motion that rungs are tried on, with its reference.
 
-    scene : its iterations are those of the reference
+    iterations : of the reference
     end : frames before it count
+    unit : root mean square displacement of a frame, m
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.scene = CONVERGED.scene(scene)
-        self.reference = trajectory(self.scene, track_objective=False)
+        self.scene = scene
         hair = np.random.default_rng(SEED).standard_normal(scene.mesh.points.shape)
-        beside = Rung(CONVERGED.iterations // 2, WINDOW).scene(scene)
-        other = trajectory(beside, MOVED * scene.mesh.extent * hair, track_objective=False)
-        apart = np.linalg.norm((other - self.reference)[1:], axis=(1, 2))
-        late = np.flatnonzero(~(apart <= HORIZON * self.unit))
-        self.end = int(late[0]) if len(late) else len(apart)
-
-    @cached_property
-    def unit(self) -> float:
-        """Root mean square displacement of a frame, m."""
-        moved = np.linalg.norm(self.reference[1:] - self.reference[0], axis=(1, 2))
-        return float(np.sqrt(np.mean(moved**2)))
+        moved = MOVED * scene.mesh.extent * hair
+        count, frames = CONVERGED.iterations, scene.config.frames
+        less = _accelerated(scene, count // 2, moved)
+        self.reference, self.iterations = _accelerated(scene, count), count
+        self.unit = _unit(self.reference)
+        self.end = _horizon(less, self.reference, self.unit)
+        while self.end < frames and count < MOST:
+            count *= 2
+            further = _accelerated(scene, count, moved)
+            end = _horizon(self.reference, further, self.unit)
+            if end <= 1.1 * self.end:
+                break
+            self.reference, self.iterations, self.end = further, count, end
 
     def error(self, positions: np.ndarray, quantity: Quantity) -> float:
         """Error of a run (F + 1, N, 3) m before the end."""
         last = self.end + 1
         return relative_error(positions[:last], self.reference[:last], quantity)
+
+
+def _accelerated(scene: Scene, iterations: int, moved: np.ndarray | None = None) -> np.ndarray:
+    return trajectory(Rung(iterations, WINDOW).scene(scene), moved, track_objective=False)
+
+
+def _unit(reference: np.ndarray) -> float:
+    moved = np.linalg.norm(reference[1:] - reference[0], axis=(1, 2))
+    return float(np.sqrt(np.mean(moved**2)))
+
+
+def _horizon(one: np.ndarray, other: np.ndarray, unit: float) -> int:
+    """Frames (of F) before the first at which two runs are too far apart."""
+    apart = np.linalg.norm((one - other)[1:], axis=(1, 2))
+    late = np.flatnonzero(~(apart <= HORIZON * unit))
+    return int(late[0]) if len(late) else len(apart)
 
 
 @dataclass(frozen=True)

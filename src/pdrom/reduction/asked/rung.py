@@ -16,9 +16,11 @@ from pdrom.reduction.subspace.space import projector
 
 WINDOW = 5  # differences of iterates that Anderson's acceleration combines
 # Nanoseconds: a projection by its rows squared, an entry of the factor, a vertex in accelerated
-# iterations, a number of a dense product, a frame that compiled code cannot do alone.
+# iterations, a number of a dense product, a frame that compiled code cannot do
+# alone, which takes a reduction longer.
 PROJECTION = 5.0
 ENTRY, ACCELERATED, DENSE, FRAME = 1.7, 20.0, 0.8, 1e5
+REDUCED_FRAME = 3e5
 # Entries of the factor of a matrix with n entries and N rows: FILL n log2 N.
 FILL = 0.35
 
@@ -56,18 +58,18 @@ class Rung:
     def work(self, scene: Scene) -> float:
         """Estimated nanoseconds of a frame of ``scene``."""
         lagged = any(group.frame_lagged for group in scene.groups)
-        beside = FRAME if lagged else FRAME / 50
+        alone = FRAME / 50
         if self.model is None:
             vertices = scene.mesh.vertices
             iteration = ENTRY * FILL * scene.system.matrix.nnz * np.log2(vertices)
             iteration += ACCELERATED * vertices * (self.window > 0)
             iteration += sum(PROJECTION * g.rows_per_element**2 * g.elements for g in scene.groups)
-            return beside + self.iterations * iteration
+            return (FRAME if lagged else alone) + self.iterations * iteration
         size, iteration = self.model.columns.B.shape[1], 0.0
         for group in scene.groups:
             count, rows = self.model.evaluated(group), group.rows_per_element
             iteration += count * rows * (PROJECTION * rows + DENSE * size)
-        return beside + self.iterations * iteration
+        return (REDUCED_FRAME if lagged else alone) + self.iterations * iteration
 
     def on(self, scene: Scene) -> "Running":
         """The rung on the motion of ``scene``."""
