@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from pdrom.api.arguments import file_path, require
-from pdrom.api.records import FullRun, ReducedRun, full_run
+from pdrom.api.records import AskedRun, FullRun, ReducedRun, full_run
 from pdrom.api.scenes import bound
 from pdrom.core.errors import StorageError
 from pdrom.core.provenance import made_by
@@ -22,8 +22,10 @@ from pdrom.reduction.local.guard import GuardRecord
 from pdrom.reduction.rerun import Rerun, displacement_norms
 
 
-def save(reduced: ReducedRun, path: str | os.PathLike[str]) -> None:
+def save(reduced: ReducedRun | AskedRun, path: str | os.PathLike[str]) -> None:
     """Write a reduced run with its full-order run, as positions in single precision.
+
+    A run with an asked error is written alone, in double precision, and read as a run of its scene.
 
     Parameters
     ----------
@@ -35,8 +37,11 @@ def save(reduced: ReducedRun, path: str | os.PathLike[str]) -> None:
     ConfigurationError, StorageError
         No reduced run; the file cannot be written.
     """
-    require(ReducedRun, reduced, "reduced", source="pdrom.api.reduce makes one")
+    require((ReducedRun, AskedRun), reduced, "reduced", source="pdrom.api.reduce makes one")
     path = file_path(path)
+    if isinstance(reduced, AskedRun):
+        _save_asked(reduced, path)
+        return
     config = reduced.full.scene.config.model_dump(mode="json")
     labels = {"group": reduced.group, "method": reduced.method, "r": reduced.r}
     outcome = reduced.outcome
@@ -57,6 +62,20 @@ def save(reduced: ReducedRun, path: str | os.PathLike[str]) -> None:
         _store(file, "error", reduced.error, "1")
         _store(file, "extent", outcome.extent, "1")
         _store(file, "displacement", displacement_norms(reduced.full.positions), "m")
+
+
+def _save_asked(asked: AskedRun, path: Path) -> None:
+    config, done = asked.scene.config.model_dump(mode="json"), asked.outcome
+    wish = {"quantity": asked.ask.quantity, "asked_error": asked.ask.error}
+    with made_by("pdrom.api.save", {"scene": config, **wish}), write_hdf5(path) as file:
+        file.attrs.update({**wish, "promised": done.promised, "expected": done.expected})
+        file.attrs["steps"] = [f"from frame {frame}: {title}" for frame, title in done.changes]
+        file.attrs["repairs"] = done.repairs
+        if done.estimate is not None:
+            file.attrs["estimate"] = done.estimate
+        store_mesh(asked.scene.mesh, file.create_group("mesh"))
+        _store(file, "positions", done.positions, "m")
+        _store(file, "timings", asked.ms[:, None], "ms")
 
 
 def load(path: str | os.PathLike[str], unchecked: bool = False) -> FullRun | ReducedRun:

@@ -7,6 +7,8 @@ import numpy as np
 
 from pdrom.core.brief import brief
 from pdrom.model.scene import Scene
+from pdrom.reduction.asked.ask import Ask
+from pdrom.reduction.asked.run import Asked
 from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.local.guard import GuardRecord
 from pdrom.reduction.rerun import Rerun, mean_motion
@@ -84,6 +86,34 @@ class ReducedRun:
     def title(self) -> str:
         """Group, method and size of the reduction."""
         return f"{self.group.replace('_', ' ')}, {self.method}, r = {self.r}"
+
+
+@dataclass(frozen=True)
+class AskedRun:
+    """A run that keeps to an asked error.
+
+    scene : its motion
+    ask : the wish
+    outcome : positions (F + 1, N, 3) m, what was done, and what it is estimated to have reached
+    ms : (F,) milliseconds a frame, checks and repairs shared out evenly
+    offline_s : seconds that the choice took before the run
+    horizon : frames of the own motions that an error can be known for; the promise ends there
+    error : true error against the converged implicit step, on the motion that the choice was made
+        on; None on another one, where it is not known
+    """
+
+    scene: Scene
+    ask: Ask
+    outcome: Asked
+    ms: np.ndarray
+    offline_s: float
+    horizon: int
+    error: float | None
+
+    def __repr__(self) -> str:
+        kept = "kept" if self.outcome.promised else "not promised"
+        steps = ", ".join(f"from {frame} {title}" for frame, title in self.outcome.changes)
+        return f"AskedRun('{self.scene.config.name}': {self.ask} {kept}; {steps})"
 
 
 def full_run(scene: Scene, file: h5py.File) -> FullRun:

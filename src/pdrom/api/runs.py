@@ -6,12 +6,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
+from typing import overload
 
 import numpy as np
 
 from pdrom.api.arguments import file_path, fitting_basis, method_spec, modes, require
-from pdrom.api.records import FullRun, ReducedRun, full_run
-from pdrom.core.errors import SnapshotError
+from pdrom.api.asked import asked_run
+from pdrom.api.records import AskedRun, FullRun, ReducedRun, full_run
+from pdrom.core.errors import ConfigurationError, SnapshotError
 from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5, require_place
 from pdrom.model.dynamics.stepper import FrameReport, State
@@ -19,6 +21,7 @@ from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.runs.bounded import Advance, BoundedRun, frame_by_frame
 from pdrom.model.runs.full_order import run as run_full_order
 from pdrom.model.scene import Scene
+from pdrom.reduction.asked.ask import Ask, read_ask
 from pdrom.reduction.basis import Basis, compute_basis
 from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.local.guarded import Trained, guarded
@@ -106,6 +109,14 @@ def basis(full: FullRun, group: str, method: str | MethodSpec = "pod") -> Basis:
     )
 
 
+Wish = float | str | Ask
+
+
+@overload
+def reduce(full: FullRun, *, error: Wish, scene: Scene | None = None) -> AskedRun: ...
+
+
+@overload
 def reduce(
     full: FullRun,
     group: str,
@@ -113,7 +124,19 @@ def reduce(
     r: int = 20,
     basis_of_group: Basis | None = None,
     guard: GuardSettings = UNGUARDED,
-) -> ReducedRun:
+) -> ReducedRun: ...
+
+
+def reduce(
+    full: FullRun,
+    group: str | None = None,
+    method: str | MethodSpec = "gappy",
+    r: int = 20,
+    basis_of_group: Basis | None = None,
+    guard: GuardSettings = UNGUARDED,
+    error: Wish | None = None,
+    scene: Scene | None = None,
+) -> ReducedRun | AskedRun:
     """The scene again, with the projections of one group reduced to r modes.
 
     A run that blows up, or that its guard stops, ends there and is a result like any other.
@@ -127,10 +150,14 @@ def reduce(
     basis_of_group : of the group, by `basis` for the same method; made of ``full`` without it
     guard : what watches the run, and what follows from an alarm; an auxiliary model that estimates
         its error is trained on ``full``
+    error : in place of all these: largest relative error that is allowed, 0.01 or "velocity=0.05",
+        against the implicit step solved to convergence. The whole scene is reduced as far as that
+        allows, or not at all.
+    scene : with ``error``, another motion of the same mesh that is run; ``full`` has trained it
 
     Returns
     -------
-    ReducedRun
+    ReducedRun, or AskedRun with an ``error``
         ``outcome`` (positions, differences, the frame of a blow-up), ``error`` of each frame,
         ``gain``, ``ms`` a frame, what the guard has ``seen``.
 
@@ -145,8 +172,16 @@ def reduce(
         An auxiliary model is asked for, and the scene has an effect that no position subspace
         takes.
     """
-    scene, spec = require(FullRun, full, "full", source=FULL_RUN).scene, method_spec(method)
-    r, chosen = modes(r), scene.group(require(str, group, "group", source=GROUP))
+    require(FullRun, full, "full", source=FULL_RUN)
+    if error is not None:
+        if group is not None:
+            raise ConfigurationError("error: of the whole scene, without a group")
+        return asked_run(full, read_ask(error), scene)
+    if scene is not None:
+        raise ConfigurationError("scene: only together with an error")
+    group = require(str, group, "group", source=GROUP)
+    scene, spec = full.scene, method_spec(method)
+    r, chosen = modes(r), scene.group(group)
     require(GuardSettings, guard, "guard", source="as in GuardSettings(action='stop')")
     if basis_of_group is None:
         made = basis(full, group, spec)

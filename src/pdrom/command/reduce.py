@@ -1,4 +1,4 @@
-"""``pdrom reduce SCENE.yaml``: a run with the projections of one group reduced."""
+"""``pdrom reduce SCENE.yaml``: a run with one group's projections reduced, or with an error."""
 
 import argparse
 import sys
@@ -23,13 +23,23 @@ def _size(text: str) -> int:
 def declare(parser: argparse.ArgumentParser) -> None:
     """The scene, what is reduced and how, and the file to write."""
     parser.add_argument("scene", metavar="SCENE.yaml", help="file of the scene")
-    parser.add_argument("--group", metavar="G", required=True, help="constraint group to reduce")
+    wish = parser.add_mutually_exclusive_group()
+    wish.add_argument("--group", metavar="G", help="constraint group to reduce")
+    wish.add_argument(
+        "--error",
+        metavar="E",
+        help="largest relative error of the run, 0.01 or velocity=0.05: the whole scene is reduced "
+        "as far as that allows, or not at all (reduce.error of the scene)",
+    )
     parser.add_argument(
         "--method", metavar="M", default="gappy", help="name in config/methods.yaml (gappy)"
     )
     parser.add_argument("--r", metavar="R", type=_size, default=20, help="number of modes (20)")
     parser.add_argument(
-        "--run", metavar="FILE", help="full-order run by pdrom run; made first if it is left out"
+        "--run",
+        metavar="FILE",
+        help="full-order run by pdrom run; made first if it is left out, required with --error, "
+        "where it may be of another motion of the same mesh",
     )
     parser.add_argument(
         "--out", metavar="FILE", help="file to write (HDF5); SCENE_G_M_R.h5 without it"
@@ -58,6 +68,10 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def perform(arguments: argparse.Namespace) -> Status:
     """Run in full order unless that is done, reduce, run again, and say how it went."""
+    if arguments.group is None:
+        from pdrom.command.asked import perform_asked
+
+        return perform_asked(arguments)
     from pdrom.api import FullRun, load, load_scene, plot, reduce, run, save
     from pdrom.command.progress import Progress
     from pdrom.core.errors import StorageError

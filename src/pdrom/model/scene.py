@@ -41,7 +41,10 @@ class ReductionPlan(_Model):
 
 
 class SceneConfig(_Model):
-    """Configuration of a scene (config/scenes/*.yaml). Units: seconds, metres, kilograms."""
+    """Configuration of a scene (config/scenes/*.yaml). Units: seconds, metres, kilograms.
+
+    ``asked`` is the error that ``pdrom reduce`` keeps to, also written ``reduce.error``.
+    """
 
     name: SceneName
     title: str
@@ -54,7 +57,18 @@ class SceneConfig(_Model):
     masses: tuple[MassConfig, ...] = ()
     effects: EffectConfigs
     reduce: dict[str, ReductionPlan] = Field(default_factory=dict)
+    asked: float | str | None = None
     held_out: HeldOut = HeldOut()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_asked(cls, keys: Any) -> Any:
+        """Take ``reduce.error``, the asked error of the whole scene, out of the groups' plans."""
+        plans = keys.get("reduce") if isinstance(keys, dict) else None
+        if not isinstance(plans, dict) or "error" not in plans:
+            return keys
+        groups = {name: plan for name, plan in plans.items() if name != "error"}
+        return {**keys, "reduce": groups, "asked": plans["error"]}
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

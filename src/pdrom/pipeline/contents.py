@@ -102,6 +102,12 @@ def _published(study: Study, scene: str, group: str) -> bool:
     return any((case.scene, case.group) == (scene, group) for case in cases)
 
 
+def _asked(study: Study) -> Iterator[Labels]:
+    """The listed scenes, or all, the large ones among them."""
+    held, listed = (*study.scenes, *study.online), study.settings.asks.scenes
+    return ({"scene": scene} for scene in held if not listed or scene in listed)
+
+
 def _live(study: Study) -> Iterator[Labels]:
     """The listed scenes that the study has models of."""
     held = {*_with_subspaces(study)} & {*study.scenes} | {*study.online}
@@ -128,5 +134,6 @@ SOME: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.LIVE_MODEL: _live,
     paths.STABILITY: _scenes(lambda study: study.settings.stability.scenes),
     paths.SUBSPACE_ABLATION: _scenes(lambda study: study.ablation.scenes),
+    **dict.fromkeys([paths.ASKS, paths.ASK_SCORES], _asked),
     paths.ALTERNATIVES: _sized(lambda study: study.settings.alternatives.scenes),
 }

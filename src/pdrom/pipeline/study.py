@@ -12,6 +12,7 @@ from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.names import SceneName
 from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
 from pdrom.experiments.alternatives.settings import Alternatives
+from pdrom.experiments.asks import Asks
 from pdrom.experiments.companion import Companion
 from pdrom.experiments.frame_times import FrameTimes
 from pdrom.experiments.guard import GuardSection
@@ -89,6 +90,7 @@ class StudySettings(ConfigModel):
     online: Online = Online()
     live: Live = Live()
     alternatives: Alternatives = Alternatives()
+    asks: Asks = Asks()
     viewer: Viewer = Viewer()
     variants: Variants = Variants()
     study: str | None = None

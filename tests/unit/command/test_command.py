@@ -68,6 +68,24 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def test_an_asked_error_is_kept_said_and_viewed(folder, capsys):
+    assert run(["run", "small.yaml"]) == Status.DONE
+    capsys.readouterr()
+    with (folder / "small.yaml").open("a", encoding="utf-8") as file:
+        file.write("reduce: {error: velocity=0.2}\n")
+    asked = ["reduce", "small.yaml", "--run", "small.h5"]
+    assert run([*asked, "--error", "0.05", "--out", "one.h5"]) == Status.DONE
+    said = capsys.readouterr().out
+    assert said.startswith("one.h5: 5 % of the positions against the converged implicit step")
+    for words in ("kept", "from frame 0: ", "of 12 frames reduced", "reached", "to choose"):
+        assert words in said
+    assert run(asked) == Status.DONE
+    assert capsys.readouterr().out.startswith("small_asked.h5: 20 % of the velocities")
+    assert run(["view", "one.h5"]) == Status.DONE
+    assert run(["show", "one.h5"]) == Status.DONE
+    assert "asked_error: 0.05" in capsys.readouterr().out
+
+
 REDUCE = ["reduce", "small.yaml", "--group", "spring", "--r", "1"]
 
 
@@ -311,6 +329,7 @@ def test_what_an_obstacle_moves_at_rest_is_said_once(folder, caplog):
     assert thin.startswith(f"{start}'self_collision': with thickness 0.01 a vertex can pass")
 
 
+ASK = ["reduce", "small.yaml", "--error"]
 GUARDED = ["reduce", "small.yaml", "--group", "spring", "--guard", "stop"]
 
 
@@ -333,6 +352,16 @@ GUARDED = ["reduce", "small.yaml", "--group", "spring", "--guard", "stop"]
         (["view", "."], "is a folder"),
         (["run", "."], "no such configuration file"),
         (["reduce", ".", "--group", "spring"], "no such configuration file"),
+        (["reduce", "small.yaml"], "--group or --error: one is required"),
+        ([*ASK, "0"], "--error = '0': a number above 0 and below 1 is required"),
+        ([*ASK, "1.0"], "--error = '1.0': a number above 0 and below 1"),
+        ([*ASK, "nan"], "--error = 'nan': a number above 0 and below 1"),
+        (
+            [*ASK, "velocty=0.1"],
+            "unknown quantity 'velocty' (allowed: position, velocity), did you",
+        ),
+        ([*ASK, "0.1"], "--error: --run is required with it: a training run"),
+        ([*ASK, "0.1", "--guard", "stop"], "--guard: only together with --group"),
     ],
 )
 def test_faults_are_one_line_and_code_1(folder, arguments, words, capsys):

@@ -7,8 +7,9 @@ In the free coordinates z of a position subspace one iteration is
     z = c + L^T p        global solve, with c = A^-1 (M/h^2 s - load) and L = W D A^-1
 
 D and L are (m p, K'): two small dense products and the projections, nothing else, no allocation,
-and no array that grows with the mesh. Without contacts and frame-lagged groups c is one product, of
-s with its held coordinates at their targets, and a call does many frames.
+and no array that grows with the mesh. Without frame-lagged groups c is one product, of s with its
+held coordinates at their targets, and a call does many frames: those before the first that meets
+a floor.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,7 +21,7 @@ import numpy as np
 from pdrom.model.compiled.clock import clock, now
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.constraints.gradient_kernel import call
-from pdrom.model.dynamics.acceleration import Anderson
+from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, combine, forget, refuse
 from pdrom.model.dynamics.space import Solve
 from pdrom.model.dynamics.stepper import LocalStep, Stepper
 from pdrom.model.dynamics.whole_frames import BLOCK, Blocks
@@ -34,8 +35,7 @@ class FusedStepper(Stepper):
     """The step loop with fused iterations; same results as the plain one up to round-off.
 
     Its time counts as local: there is no separate global step. A loop with other local steps than
-    `SubspaceLocalStep`, with a group without a gradient kernel, or with an acceleration iterates as
-    the plain one does.
+    `SubspaceLocalStep`, or with a group without a gradient kernel, iterates as the plain one does.
     """
 
     def __init__(
@@ -48,9 +48,9 @@ class FusedStepper(Stepper):
     ) -> None:
         super().__init__(space, time_step, iterations, local_steps, False, acceleration)
         self._fused: _Fused | None = None
-        if acceleration is None and _fusible(local_steps):
-            self._fused = _Fused(space, _Sampled(local_steps))
-            if not space.has_contacts and not any(s.group.frame_lagged for s in local_steps):
+        if _fusible(local_steps):
+            self._fused = _Fused(space, _Sampled(local_steps), acceleration)
+            if space.whole_frames and not any(s.group.frame_lagged for s in local_steps):
                 self._whole = self._fused
 
     def _iterate(
@@ -80,10 +80,13 @@ def _fusible(steps: Sequence[LocalStep]) -> TypeGuard[Sequence[SubspaceLocalStep
 class _Fused:
     """Iterations and frames in a space, with the operators of every set of held coordinates."""
 
-    def __init__(self, space: ReducedSpace, sampled: "_Sampled") -> None:
-        self._space, self._sampled = space, sampled
+    def __init__(
+        self, space: ReducedSpace, sampled: "_Sampled", acceleration: Anderson | None
+    ) -> None:
+        self._space, self._sampled, self._acceleration = space, sampled, acceleration
         self._operators: dict[int, _Operators] = {}
         self._clock = clock()
+        self._waiting = 0
 
     def _of(self, elimination: DenseElimination) -> "_Operators":
         # eliminations live as long as their space
@@ -104,15 +107,30 @@ class _Fused:
         product(own.coupling, own.rows, len(elimination.fixed), own.nothing, targets, own.offset)
         write(elimination.solved(base), own.constant)
         write(s[free], own.z)
-        _iterations(iterations, len(free), own.rows, own.iterated, sampled.arrays)
+        _iterations(
+            iterations, len(free), own.rows, own.iterated, sampled.arrays, self._history(free)
+        )
         y = s.copy()
         y[free] = read(own.z, len(free))
         return y
 
+    def _history(self, free: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Memory of the acceleration for iterates of the ``free`` coordinates."""
+        if self._acceleration is None:
+            return NO_HISTORY
+        self._acceleration.begin_frame(np.empty((len(free), 3)))
+        return self._acceleration.history
+
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
-    ) -> Blocks:
-        """As many of ``frames`` as one call can do, see `WholeFrames.run`; nothing is tracked."""
+    ) -> Blocks | None:
+        """As many of ``frames`` as one call can do, see `WholeFrames.run`; nothing is tracked.
+
+        None in a frame that meets a floor, and for some frames after it: it is likely still there.
+        """
+        if self._waiting and frames.start:
+            self._waiting -= 1
+            return None
         fixed, targets = self._space.held_path(frames[:BLOCK], q)
         elimination = self._space.elimination(fixed)
         own, count = self._of(elimination), len(targets)
@@ -121,10 +139,15 @@ class _Fused:
         seconds = np.zeros((count, 4))
         _frames(
             positions, velocities, *self._space.affine, h, elimination.fixed, elimination.free,
-            targets, own.begun, iterations, own.rows, own.iterated, self._sampled.arrays, seconds,
-            self._clock,
+            targets, own.begun, iterations, own.rows, own.iterated, self._sampled.arrays,
+            self._history(elimination.free), seconds, self._clock,
         )  # fmt: skip
-        return positions[1:], velocities[1:], np.empty((count, 0)), seconds
+        free = self._space.free_frames(positions[1:])
+        if free == 0:
+            self._waiting = BLOCK - 1
+            return None
+        done = slice(1, free + 1)
+        return positions[done], velocities[done], np.empty((free, 0)), seconds[:free]
 
 
 class _Sampled:
@@ -161,7 +184,8 @@ class _Sampled:
 class _Operators:
     """Matrices of an iteration for one set of held coordinates, and its vectors.
 
-    iterated : D, L^T, d_0, c and z
+    iterated : D, L^T, d_0, c and z; weights of the rows, M/h^2 of the free coordinates and room for
+        a difference of them, for the objective
     begun : product that gives c from s, coupling to the held coordinates, working vectors
     """
 
@@ -175,7 +199,9 @@ class _Operators:
         self.nothing = vectors(max(len(inertia), self.rows))
         self.coupling = blocks(strain[:, fixed])
         self.iterated = (
-            blocks(strain[:, free]), blocks(lift.T), self.offset, self.constant, self.z
+            blocks(strain[:, free]), blocks(lift.T), self.offset, self.constant, self.z,
+            sampled.row_weights, np.ascontiguousarray(inertia[np.ix_(free, free)]),
+            np.empty(3 * len(free)),
         )  # fmt: skip
         response = blocks(elimination.response(inertia))
         self.begun = (
@@ -184,10 +210,14 @@ class _Operators:
 
 
 @compiled(nogil=True)
-def _iterations(count, size, rows, operators, sampled):
-    strain, lift, offset, constant, z = operators
+def _iterations(count, size, rows, operators, sampled, history):
+    strain, lift, offset, constant, z, weights, inertia, start = operators
     addresses, elements, starts, parameters, parameter_starts, d, p = sampled
-    for _ in range(count):
+    y, accelerated = z[: 3 * size], len(history[5]) > 0
+    if accelerated:
+        start[:] = y
+        forget(history)
+    for k in range(count):
         product(strain, rows, size, offset, z, d)
         for g in range(len(addresses)):
             call(
@@ -197,7 +227,28 @@ def _iterations(count, size, rows, operators, sampled):
                 p[3 * starts[g] :].ctypes.data,
                 elements[g],
             )
+        if accelerated and refuse(history, y, _objective(weights, d, p, inertia, y, start)):
+            continue
         product(lift, size, rows, constant, p, z)
+        if accelerated and k < count - 1:
+            combine(history, y)
+
+
+@compiled(nogil=True)
+def _objective(weights, d, p, inertia, y, s):
+    """1/2 sum_i w_i |d_i - p_i|^2 + 1/2 (y - s)^T (M/h^2) (y - s)."""
+    total = 0.0
+    for i in range(len(weights)):
+        for axis in range(3):
+            total += weights[i] * (d[3 * i + axis] - p[3 * i + axis]) ** 2
+    for i in range(len(inertia)):
+        for axis in range(3):
+            moved = 0.0
+            for k in range(i):
+                moved += inertia[i, k] * (y[3 * k + axis] - s[3 * k + axis])
+            own = y[3 * i + axis] - s[3 * i + axis]
+            total += own * (2.0 * moved + inertia[i, i] * own)
+    return 0.5 * total
 
 
 @compiled(nogil=True)
@@ -214,10 +265,10 @@ def _predict(z, v, acceleration, rate, rates, h, s):
 @compiled(nogil=True)
 def _frames(
     positions, velocities, acceleration, rate, rates, h, fixed, free, targets, begun, iterations,
-    rows, operators, sampled, seconds, watch,
+    rows, operators, sampled, history, seconds, watch,
 ):  # fmt: skip
     response, coupling, nothing, s, held = begun
-    _, _, offset, constant, z = operators
+    offset, constant, z = operators[2:5]
     for f in range(len(targets)):
         began = now(watch)
         before, after, speeds = positions[f], positions[f + 1], velocities[f + 1]
@@ -233,7 +284,7 @@ def _frames(
             for axis in range(3):
                 z[3 * i + axis] = s[3 * free[i] + axis]
         between = now(watch)
-        _iterations(iterations, len(free), rows, operators, sampled)
+        _iterations(iterations, len(free), rows, operators, sampled, history)
         ended = now(watch)
         for i in range(len(free)):
             for axis in range(3):

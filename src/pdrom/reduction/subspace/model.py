@@ -47,9 +47,10 @@ class SubspaceModel:
 
     def elements_evaluated(self, scene: Scene) -> int:
         """Elements that a local step of ``scene`` evaluates; those of a safeguard do not count."""
-        return sum(self._evaluated(group) for group in scene.groups)
+        return sum(self.evaluated(group) for group in scene.groups)
 
-    def _evaluated(self, group: ConstraintGroup) -> int:
+    def evaluated(self, group: ConstraintGroup) -> int:
+        """Elements of a group that a local step evaluates."""
         elements = self.samples.get(group.name, Samples()).elements
         return group.elements if elements is None else len(elements)
 

@@ -72,9 +72,16 @@ class ReducedSpace(Space):
         return constant, rate, rates
 
     @property
-    def has_contacts(self) -> bool:
-        """Whether coordinates are corrected at the end of a frame."""
-        return bool(self._contacts)
+    def whole_frames(self) -> bool:
+        """Whether nothing but floors corrects coordinates at the end of a frame."""
+        return all(contact.height is not None for contact in self._contacts)
+
+    def free_frames(self, path: np.ndarray) -> int:
+        """How many frames of ``path`` (n, K, 3) come before the first that meets a floor."""
+        first = len(path)
+        for contact in self._contacts:
+            first = contact.free_frames(path[:first])
+        return first
 
     def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return held_targets(self._boundaries, frame, positions)
@@ -119,6 +126,11 @@ def _require_reducible(effects: Sequence[Effect]) -> None:
 def coordinates(columns: Columns, masses: np.ndarray, field: np.ndarray) -> np.ndarray:
     """Mass-orthogonal projection of ``field`` (N, 3) on the span of ``columns``, (K, 3)."""
     return _mass_solve(columns, masses, columns.B.T @ (masses[:, None] * field))
+
+
+def projector(columns: Columns, masses: np.ndarray) -> np.ndarray:
+    """Matrix (K, N) of `coordinates`."""
+    return _mass_solve(columns, masses, (columns.B * masses[:, None]).T)
 
 
 def _mass_solve(columns: Columns, masses: np.ndarray, rhs: np.ndarray) -> np.ndarray:
@@ -210,12 +222,18 @@ class _ReducedContact:
     """A contact, looked for at probe vertices and, where one is hit, resolved at all vertices."""
 
     def __init__(self, contact: Contact, columns: Columns, scene: Scene) -> None:
-        self._contact = contact
+        self._contact, self.height = contact, contact.height
         self._vertices = probe_vertices(scene.mesh.vertices)
         self._probes = np.ascontiguousarray(columns.B[self._vertices])
         self._columns = columns
-        weighted = columns.B * scene.masses[:, None]
-        self._project = _mass_solve(columns, scene.masses, weighted.T)
+        self._project = projector(columns, scene.masses)
+
+    def free_frames(self, path: np.ndarray) -> int:
+        """How many frames of ``path`` (n, K, 3) come before the first with a probe in the floor."""
+        lowest = (path[:, :, 1] @ self._probes.T).min(axis=1)
+        # a frame that is not finite is left to the plain step
+        above = lowest >= self.height
+        return len(path) if above.all() else int(np.argmin(above))
 
     def correct(self, y: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
         probed = self._probes @ y

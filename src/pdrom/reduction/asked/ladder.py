@@ -1,0 +1,147 @@
+"""All rungs of a scene, tried on its training motion and one that is made from it."""
+
+import logging
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from pdrom.core.errors import PdromError
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.model.scene import Scene
+from pdrom.reduction.asked.ask import Ask
+from pdrom.reduction.asked.measured import CONVERGED, Motion, Tried, tried, worst
+from pdrom.reduction.asked.motions import VALIDATION
+from pdrom.reduction.asked.rung import WINDOW, Rung
+from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
+
+log = logging.getLogger(__name__)
+
+Count = Annotated[int, Field(ge=1, le=10_000)]
+
+
+class AskSettings(ConfigModel):
+    """Rungs that are tried, and the factor of the estimates.
+
+    modes, tolerances : of the reductions: k, tau
+    frames : of the training motion that the elements are sampled for, at most
+    plain, accelerated : iterations of the full order, without and with acceleration
+    iterations : of the reductions, accelerated
+    factor : by which estimates are multiplied; calibrated, see table asks
+    share : of the full order's time that checks may cost, for an ask of 1 %; a share inversely
+        proportional to the ask, and never more than this
+    """
+
+    modes: tuple[Count, ...] = (20, 40)
+    tolerances: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (5e-2, 1e-2)
+    frames: Count = 25
+    iterations: tuple[Count, ...] = (5, 10, 20)
+    plain: tuple[Count, ...] = (1, 2, 3, 5)
+    accelerated: tuple[Count, ...] = (5, 10, 20, 40)
+    factor: Annotated[float, Field(ge=1.0, le=1e3)] = 1.5
+    share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.05
+
+
+@dataclass(frozen=True)
+class Step:
+    """A rung with its outcome on each own motion, the training motion first."""
+
+    rung: Rung
+    work: float
+    tried: list[Tried]
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """Steps of a scene, in the order of their work.
+
+    unit : root mean square displacement of a frame of the training motion, m
+    horizon : frames that a promise can be made for
+    """
+
+    steps: list[Step]
+    unit: float
+    horizon: int
+
+    def expected(self, step: Step, ask: Ask) -> float:
+        """Largest error of the step on the own motions; infinite where one has no frame."""
+        return worst(step.tried, ask.quantity) if self.horizon else np.inf
+
+    def estimated(self, step: Step, ask: Ask, defect: float) -> float:
+        """Error of a run of the step with a root mean square ``defect`` in units of the motion."""
+        known = max(each.defects.max(initial=0.0) for each in step.tried)
+        return self.expected(step, ask) * max(1.0, defect / known if known > 0.0 else np.inf)
+
+    def admissible(self, ask: Ask, factor: float) -> list[Step]:
+        """Steps that keep to the ask on the own motions when errors are ``factor`` times larger.
+
+        In the order of their work; the last one is a full-order step, and no reduction is dearer
+        than the first of these. Empty where even the full order would break the promise.
+        """
+        good = [s for s in self.steps if factor * self.expected(s, ask) <= ask.error]
+        full = [s for s in good if s.rung.model is None]
+        if not full:
+            return []
+        return [s for s in good if s.rung.model is None or s.work < full[0].work]
+
+
+def ladder(training: Scene, settings: AskSettings) -> tuple[Ladder, list[Motion]]:
+    """Try every rung on the training motion and the validation motion.
+
+    Returns
+    -------
+    The ladder, and the motions with their references.
+    """
+    motions = [Motion(training), Motion(VALIDATION.of(training))]
+    rungs = [*_full(settings, motions[0]), *_reduced(training, motions[0], settings)]
+    steps = []
+    for rung in rungs:
+        try:
+            found = [tried(rung, motion, CONVERGED) for motion in motions]
+        except PdromError as error:
+            if rung.model is None:
+                raise
+            log.warning("%s: left out (%s)", rung.title, error)
+            continue
+        steps.append(Step(rung, rung.work(training), found))
+        errors = [f"{each.errors['position']:.2e}" for each in found]
+        log.info("%s: errors %s", rung.title, ", ".join(errors))
+    steps.sort(key=lambda step: step.work)
+    horizon = min(motion.end for motion in motions)
+    return Ladder(steps, motions[0].unit, horizon), motions
+
+
+def _full(settings: AskSettings, motion: Motion) -> Iterator[Rung]:
+    """The full order; where its steps converge slowly, with half the reference's iterations too."""
+    if motion.iterations > CONVERGED.iterations:
+        yield Rung(motion.iterations // 2, WINDOW)
+    yield from (Rung(count) for count in settings.plain)
+    yield from (Rung(count, WINDOW) for count in settings.accelerated)
+
+
+def _reduced(training: Scene, motion: Motion, settings: AskSettings) -> Iterator[Rung]:
+    """Reductions trained on converged frames; none where the scene does not take a subspace."""
+    frames = np.arange(0, training.config.frames, 2)
+    few = frames[:: -(-len(frames) // settings.frames)]
+    # iterates of the samples' training run, in the subspace
+    scene = Rung(20).scene(training)
+    try:
+        for k in settings.modes:
+            columns = make_columns(scene, motion.reference[1:][frames], "pod", k=k)
+            found = sample_elements(scene, columns, few, tolerances=settings.tolerances)
+            for tau, samples in zip(settings.tolerances, found, strict=True):
+                model = SubspaceModel("pod", columns, samples)
+                yield from (Rung(count, WINDOW, model, tau) for count in settings.iterations)
+    except PdromError as error:
+        log.warning("%s: no reduction (%s)", training.config.name, error)
+
+
+def check_frames(frames: int, cost: float, share: float) -> Sequence[int]:
+    """Frames at which a run is checked: as many as cost the share of it, at least two.
+
+    cost : of a check, in frames
+    """
+    count = min(max(2, int(share * frames / cost)), frames)
+    return sorted({int(f) for f in (np.arange(count) + 0.5) * frames / count})

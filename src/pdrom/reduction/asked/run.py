@@ -1,0 +1,233 @@
+"""A run that keeps to an asked error: checked, repaired in time, ended in full order if it must.
+
+Some frames are done twice, by the rung and by the full order from the same state, which gives the
+rung's defect there exactly. Where the defects exceed those of the motions that the rung was tried
+XX while little is spent, and goes on with a more accurate rung. Nothing depends on the clock.
+"""
+
+import logging
+from dataclasses import dataclass
+from time import thread_time
+
+import numpy as np
+
+from pdrom.model.dynamics.stepper import State
+from pdrom.model.scene import Scene
+from pdrom.reduction.asked.ask import Ask
+from pdrom.reduction.asked.ladder import AskSettings, Ladder, Step, check_frames
+from pdrom.reduction.asked.measured import CONVERGED, defect
+from pdrom.reduction.asked.rung import Rung, Running
+
+log = logging.getLogger(__name__)
+
+# A run starts anew while it has spent less than this part of a full-order run.
+EARLY = 0.05
+# A run that has grown to this multiple of the mesh has blown up, whatever a check says.
+BLOWUP_EXTENT = 100.0
+
+
+@dataclass
+class Asked:
+    """Outcome of a run with an asked error.
+
+    positions : (F + 1, N, 3) m, the initial ones first
+    promised : whether the estimate keeps to the ask; False: nothing that was tried does
+    expected : error on the motions that the choice was made on, times the factor
+    estimate : estimated error of the run, times the factor; None without a check
+    changes : frames from which on another rung went on, and its title; the first one at frame 0
+    checks : frames that were checked, of the run as it is
+    repairs : how often the run went back
+    reduced : frames that were done by a reduction
+    work : estimated nanoseconds, checks and repairs included
+    full_work : those of a run by the cheapest full order that keeps to the ask
+    seconds : processor time of the frames, without what is made before the first of them
+    """
+
+    positions: np.ndarray
+    promised: bool
+    expected: float
+    estimate: float | None
+    changes: list[tuple[int, str]]
+    checks: list[int]
+    repairs: int
+    reduced: int
+    work: float
+    full_work: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class _Done:
+    """A run up to the end of a frame.
+
+    ends : loop and its coordinates (n, 3) at the end of every frame, the initial ones first
+    state : of all vertices at the end
+    parts : (frame, step, defect) of every check
+    changes : (frame, step) from which on a step went on
+    """
+
+    ends: tuple[tuple[Running, np.ndarray], ...]
+    state: State
+    parts: tuple[tuple[int, Step, float], ...] = ()
+    changes: tuple[tuple[int, Step], ...] = ()
+
+    @property
+    def frame(self) -> int:
+        """The next frame."""
+        return len(self.ends) - 1
+
+    @property
+    def finite(self) -> bool:
+        """Whether all vertices are at finite places."""
+        return bool(np.isfinite(self.state.positions).all())
+
+
+class CheckedRun:
+    """A run of ``scene`` that keeps to ``ask``, with the rungs of a ladder of its mesh.
+
+    What is made before the first frame (operators, factors) is made here.
+
+    Parameters
+    ----------
+    own : made of the training motion
+    settings : those that the ladder was made with
+    """
+
+    def __init__(self, scene: Scene, own: Ladder, ask: Ask, settings: AskSettings) -> None:
+        self.scene, self._own, self._ask, self._settings = scene, own, ask, settings
+        self._frames = scene.config.frames
+        self._steps = own.admissible(ask, settings.factor)
+        full = [step for step in own.steps if step.rung.model is None]
+        best = min(full, key=lambda step: (own.expected(step, ask), step.work))
+        self._dear = next((s for s in self._steps if s.rung.model is None), best)
+        self._full, self._last = full, best
+        self._running: dict[int, Running] = {}
+        first = self._steps[0] if self._steps else best
+        for rung in (first.rung, self._check(first), self._dear.rung):
+            self._on(rung)
+
+    @property
+    def full_order(self) -> Rung:
+        """The cheapest full order that keeps to the ask; the most accurate one if none does."""
+        return self._dear.rung
+
+    def _on(self, rung: Rung) -> Running:
+        if id(rung) not in self._running:
+            self._running[id(rung)] = rung.on(self.scene)
+        return self._running[id(rung)]
+
+    def outcome(self) -> Asked:
+        """Do all frames; each call is a run of its own."""
+        self._repairs, self._work = 0, 0.0
+        promised = bool(self._steps)
+        step = self._steps[0] if promised else self._last
+        expected = self._settings.factor * self._own.expected(step, self._ask)
+        start = self.scene.initial_state()
+        whole, started = self._on(self._dear.rung), thread_time()
+        kept = begun = _Done(((whole, start.positions),), start)
+        while kept.frame < self._frames:
+            done, keeps = self._advance(kept, step)
+            if keeps or not promised:
+                kept = done
+                continue
+            following = self._better(step, kept.frame)
+            if following is None:
+                promised, kept = False, done if done.finite else kept
+                step = self._last
+                continue
+            self._repairs += 1
+            early = self._work <= EARLY * self._frames * self._dear.work
+            kept, step = begun if early else kept, following
+            log.info("frame %d: goes on with %s", kept.frame, step.rung.title)
+        return self._told(kept, promised, expected, thread_time() - started)
+
+    def _advance(self, kept: _Done, step: Step) -> tuple[_Done, bool]:
+        """Frames up to the next check or the end; whether the estimate is within the ask."""
+        running, check = self._on(step.rung), self._check(step)
+        cost = check.work(self.scene) / self._dear.work
+        share = self._settings.share * min(1.0, 0.01 / self._ask.error)
+        left = [f for f in check_frames(self._frames, cost, share) if f >= kept.frame]
+        checked = left[0] if left else None
+        until = self._frames if checked is None else checked + 1
+        state = running.inside(kept.state)
+        before, ends = state, []
+        for after in running.run(state, range(kept.frame, until)):
+            before, state = state, after
+            ends.append((running, after.positions))
+        self._work += step.work * (until - kept.frame)
+        changes, parts = kept.changes, kept.parts
+        if not changes or changes[-1][1] is not step:
+            changes = (*changes, (kept.frame, step))
+        end = running.outside(state)
+        if checked is not None:
+            self._work += check.work(self.scene)
+            exact = self._on(check)
+            size = defect(running.outside(before), end, exact, checked) / self._own.unit
+            parts = (*parts, (checked, step, size))
+        done = _Done((*kept.ends, *ends), end, parts, changes)
+        extent = float(np.ptp(end.positions, axis=0).max()) / self.scene.mesh.extent
+        estimate = self._estimate(done)
+        keeps = extent <= BLOWUP_EXTENT and (estimate is None or estimate <= self._ask.error)
+        return done, keeps
+
+    def _check(self, step: Step) -> Rung:
+        """The cheapest full order that is known to be much more accurate than the step."""
+        allowed = self._ask.error
+        if step.rung.model is None:
+            allowed = min(allowed, self._own.expected(step, self._ask))
+        for other in self._full:
+            if self._own.expected(other, self._ask) <= allowed / 3.0:
+                return other.rung
+        return CONVERGED
+
+    def _estimate(self, done: _Done) -> float | None:
+        """Estimated error of a run by its checks, times the factor."""
+        if not done.parts:
+            return None
+        squares = 0.0
+        for step in {id(s): s for _, s, _ in done.parts}.values():
+            own = [size for _, each, size in done.parts if each is step]
+            size = float(np.sqrt(np.mean(np.square(own))))
+            squares += len(own) * self._own.estimated(step, self._ask, size) ** 2
+        return self._settings.factor * float(np.sqrt(squares / len(done.parts)))
+
+    def _better(self, step: Step, frame: int) -> Step | None:
+        """The step to go on with from ``frame`` on: of at most half the error.
+
+        A reduction that could save less than it would cost to find out that it fails, too, is left
+        out. None where no full order is better, either.
+        """
+        own, ask = self._own, self._ask
+        if step.rung.model is not None:
+            half = [s for s in self._steps if own.expected(s, ask) <= own.expected(step, ask) / 2]
+            for other in half:
+                saved = (self._frames - frame) * (self._dear.work - other.work)
+                trial = self._check(other).work(self.scene) + self._frames / 2 * other.work
+                if other.rung.model is None or saved > trial:
+                    return other
+            return self._dear
+        for other in self._full:
+            if own.expected(other, ask) <= own.expected(step, ask) / 2:
+                return other
+        return None
+
+    def _told(self, done: _Done, promised: bool, expected: float, seconds: float) -> Asked:
+        ends = [*(frame for frame, _ in done.changes[1:]), self._frames]
+        reduced = sum(
+            end - begin
+            for (begin, step), end in zip(done.changes, ends, strict=True)
+            if step.rung.model is not None
+        )
+        return Asked(
+            np.stack([running.positions(y) for running, y in done.ends]),
+            promised,
+            expected,
+            self._estimate(done),
+            [(frame, step.rung.title) for frame, step in done.changes],
+            [frame for frame, _, _ in done.parts],
+            self._repairs,
+            reduced,
+            self._work,
+            self._frames * self._dear.work,
+            seconds,
+        )

@@ -1,0 +1,105 @@
+"""Table asks: runs that were asked for an error, on motions that no choice has seen."""
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from pdrom.artifact.reads import Every, Setting
+from pdrom.core import paths
+from pdrom.core.paths import File
+from pdrom.reduction.asked.rung import FULL_ORDER
+from pdrom.tables.kit.declaration import compared, flag, integer, number, table, text, timed
+from pdrom.tables.kit.parts import joined
+from pdrom.tables.kit.vocabulary import MS_PER_FRAME, SCENE, VERTICES
+
+
+@table(
+    title="Asked errors and those that were reached",
+    columns=(
+        SCENE,
+        text("motion", "held-out motion that was run"),
+        compared("exact", number("asked", "largest relative error of the positions asked for")),
+        VERTICES,
+        integer("frames", "frames before the horizon, which the promise is for"),
+        compared("value", number("factor", "on estimates, by the scores of the other scenes")),
+        compared("value", number("risk", "bound on the share of promises broken that it has")),
+        compared("error", flag("promised", "the run says that it keeps to the ask")),
+        compared("error", flag("reduced", "a reduction did at least one frame")),
+        number("error", "error against the converged implicit step"),
+        number("velocity_error", "error of the velocities, likewise"),
+        compared("error", number("expected", "error on own motions, times the factor")),
+        compared("error", number("estimate", "estimate by the run's checks, times the factor")),
+        compared("error", flag("broken", "promised, and the error is above the ask")),
+        compared("error", text("first_step", "way to do a frame that the run began with")),
+        compared("error", text("last_step", "the one it ended with")),
+        compared("error", integer("reduced_frames", "frames done by a reduction")),
+        compared("error", integer("checks", "frames done by the full order as well")),
+        compared("error", integer("repairs", "how often the run went back")),
+        MS_PER_FRAME,
+        compared("error", text("full_step", "cheapest full order chosen by the same rule")),
+        number("full_error", "its error"),
+        timed(number("full_ms", "time of its frame", "ms")),
+        timed(number("own_ms", "time of a frame with the scene's own iterations", "ms")),
+        compared("error", text("oracle_step", "fastest way that keeps to the ask, by hindsight")),
+        timed(number("oracle_ms", "time of its frame", "ms")),
+    ),
+    reads={
+        "runs": Every(paths.ASKS),
+        "scores": Every(paths.ASK_SCORES),
+        "risk": Setting("asks.risk"),
+        "errors": Setting("asks.errors"),
+    },
+)
+def asks(
+    runs: list[File], scores: list[File], risk: float, errors: Sequence[float]
+) -> pd.DataFrame:
+    """Rows of all scenes, each with the factor that the scores of the others give."""
+    rows, scored = joined(runs), joined(scores)
+    if rows.empty:
+        return rows
+    parts = []
+    for scene, own in rows.groupby("scene", sort=False):
+        grid = sorted(own.factor.unique())
+        factor, bound = risk_factor(scored[scored.scene != scene], errors, risk=risk, grid=grid)
+        parts.append(own[own.factor == factor].assign(risk=bound))
+    made = pd.concat(parts, ignore_index=True)
+    promised = made.promised.astype(bool)
+    return made.assign(
+        broken=promised & ~(made.error <= made.asked), reduced=made.reduced_frames > 0
+    )
+
+
+def risk_factor(
+    scored: pd.DataFrame, errors: Sequence[float], risk: float, grid: Sequence[float]
+) -> tuple[float, float]:
+    """Smallest factor of a grid at which a new scene breaks a promise with probability ``risk``.
+
+    Each scene's loss is the share of its asks that the chosen step would break on the motion that
+    the choice has not seen. With n scenes the mean of their losses and of a loss of 1 bounds the
+    expected loss of a new scene (conformal risk control, Angelopoulos et al. 2024).
+
+    Parameters
+    ----------
+    scored : steps of scenes in the order of their work, with expected and true errors
+
+    Returns
+    -------
+    The factor, the largest of the grid where none does, and the bound that holds for it.
+    """
+    factor, bound = 1.0, 1.0
+    for factor in grid:
+        losses = [_loss(steps, errors, factor) for _, steps in scored.groupby("scene", sort=False)]
+        bound = (sum(losses) + 1.0) / (len(losses) + 1)
+        if bound <= risk:
+            break
+    return factor, bound
+
+
+def _loss(steps: pd.DataFrame, errors: Sequence[float], factor: float) -> float:
+    """Share of the asks whose cheapest step by the factor breaks them."""
+    broken = []
+    for asked in errors:
+        good = steps[factor * steps.expected <= asked]
+        kept = good.step.str.startswith(FULL_ORDER).any()
+        broken.append(bool(kept and not good.error.iloc[0] <= asked))
+    return sum(broken) / len(broken)

@@ -1,0 +1,185 @@
+"""Asked errors: what is promised is kept, what cannot be kept is said, and repairs come in time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from builders import make_scene
+from pdrom.core.errors import ConfigurationError
+from pdrom.model.runs.full_order import trajectory
+from pdrom.model.scene import Scene
+from pdrom.reduction.asked import run as checked
+from pdrom.reduction.asked.ask import Ask, read_ask, relative_error
+from pdrom.reduction.asked.ladder import AskSettings, Ladder, check_frames, ladder
+from pdrom.reduction.asked.measured import CONVERGED, Motion, Tried
+from pdrom.reduction.asked.run import CheckedRun
+from pdrom.reduction.asked.rung import Rung
+
+EFFECTS = (
+    {"effect": "gravity"},
+    {"effect": "pins", "select": "left"},
+    {"effect": "spring", "weight": 1e5},
+)
+SHEET = {"kind": "cloth", "rows": 9, "columns": 9, "plane": "xz"}
+SETTINGS = AskSettings(modes=(8,), tolerances=(1e-2,), iterations=(10,), factor=1.25)
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return make_scene(*EFFECTS, mesh=SHEET, frames=30)
+
+
+@pytest.fixture(scope="module")
+def own(scene: Scene) -> Ladder:
+    return ladder(scene, SETTINGS)[0]
+
+
+def with_reductions_first(own: Ladder) -> Ladder:
+    """The ladder as if reductions cost nothing: on so small a mesh the full order is cheap."""
+    steps = [s if s.rung.model is None else replace(s, work=1.0) for s in own.steps]
+    return replace(own, steps=sorted(steps, key=lambda step: step.work))
+
+
+def kicked(scene: Scene, speed: float) -> Scene:
+    kick = {"effect": "kick", "speed": speed, "seed": 7}
+    return make_scene(*EFFECTS, kick, mesh=SHEET, frames=scene.config.frames)
+
+
+@pytest.mark.parametrize("error", [0.1, 0.03, 0.01])
+@pytest.mark.parametrize("reduced", [False, True])
+def test_a_promise_is_kept_on_another_motion(scene, own, error, reduced):
+    motion = Motion(kicked(scene, 0.4))
+    chosen = with_reductions_first(own) if reduced else own
+    done = CheckedRun(motion.scene, chosen, Ask(error=error), SETTINGS).outcome()
+    assert done.promised
+    assert motion.error(done.positions, "position") <= error
+    assert done.positions.shape == motion.reference.shape
+    assert done.expected <= error
+
+
+def test_the_cheapest_step_that_keeps_the_ask_is_taken(scene, own):
+    for error in (0.2, 0.05):
+        steps = own.admissible(Ask(error=error), 1.25)
+        assert [s.work for s in steps] == sorted(s.work for s in steps)
+        assert all(1.25 * own.expected(s, Ask(error=error)) <= error for s in steps)
+        done = CheckedRun(scene, own, Ask(error=error), SETTINGS).outcome()
+        assert done.changes[0] == (0, steps[0].rung.title)
+
+
+def test_two_runs_are_the_same_to_the_last_bit(scene, own):
+    run = CheckedRun(kicked(scene, 1.0), with_reductions_first(own), Ask(error=0.03), SETTINGS)
+    first, again = run.outcome(), run.outcome()
+    assert np.array_equal(first.positions, again.positions)
+    assert (first.changes, first.work, first.estimate) == (
+        again.changes, again.work, again.estimate,
+    )  # fmt: skip
+
+
+def forgetful(own: Ladder) -> Ladder:
+    """The ladder with reductions that were never seen to miss anything: every check alarms."""
+    return replace(
+        own,
+        steps=[
+            s
+            if s.rung.model is None
+            else replace(s, tried=[replace(t, defects=t.defects * 1e-6) for t in s.tried])
+            for s in own.steps
+        ],
+    )
+
+
+def test_a_run_that_leaves_what_was_tried_ends_in_full_order(scene, own):
+    chosen = forgetful(with_reductions_first(own))
+    done = CheckedRun(scene, chosen, Ask(error=0.05), SETTINGS).outcome()
+    assert done.repairs >= 1
+    assert done.promised
+    assert done.changes[-1][1].startswith("full order")
+    assert Motion(scene).error(done.positions, "position") <= 0.05
+
+
+def test_an_early_repair_starts_anew_and_a_late_one_keeps_what_was_checked(scene, own, monkeypatch):
+    chosen = forgetful(with_reductions_first(own))
+    monkeypatch.setattr(checked, "EARLY", 1.0)
+    anew = CheckedRun(scene, chosen, Ask(error=0.05), SETTINGS).outcome()
+    assert [frame for frame, _ in anew.changes] == [0]
+    exact = Rung(CONVERGED.iterations, CONVERGED.window).scene(scene)
+    assert relative_error(anew.positions, trajectory(exact), "position") <= 0.05
+    monkeypatch.setattr(checked, "EARLY", 0.0)
+    sizes = iter([0.0, 1.0, *[0.0] * 99])
+    monkeypatch.setattr(checked, "defect", lambda *a: next(sizes))
+    late = CheckedRun(scene, with_reductions_first(own), Ask(error=0.05), SETTINGS).outcome()
+    (begin, _), (frame, title) = late.changes
+    assert begin == 0 < frame == late.checks[0] + 1
+    assert title.startswith("full order")
+    assert late.reduced == frame
+
+
+def test_nothing_is_promised_where_the_full_order_fails_too(scene, own):
+    wrong = replace(
+        own,
+        steps=[
+            replace(
+                s,
+                tried=[Tried({"position": 1.0, "velocity": 1.0}, t.defects, 1.0) for t in s.tried],
+            )
+            for s in own.steps
+        ],
+    )
+    done = CheckedRun(scene, wrong, Ask(error=0.5), SETTINGS).outcome()
+    assert not done.promised
+    assert done.reduced == 0
+    assert np.isfinite(done.positions).all()
+
+
+def test_a_reduction_that_blows_up_is_replaced(scene, own):
+    """Samples whose factors are wrong by far: the first check finds it."""
+    step = next(s for s in with_reductions_first(own).steps if s.rung.model is not None)
+    ((name, samples),) = step.rung.model.samples.items()
+    broken = replace(samples, factors=samples.factors * 1e-6)
+    model = replace(step.rung.model, samples={name: broken})
+    bad = replace(
+        own,
+        steps=[
+            replace(step, rung=replace(step.rung, model=model)),
+            *(s for s in own.steps if s.rung.model is None),
+        ],
+    )
+    done = CheckedRun(scene, bad, Ask(error=0.05), SETTINGS).outcome()
+    assert done.repairs >= 1
+    assert Motion(scene).error(done.positions, "position") <= 0.05
+
+
+@pytest.mark.parametrize("wish", ["0", "1", "-0.1", "nan", "inf", "", "a", True, "velocity=2"])
+def test_a_wish_that_is_no_error_is_refused(wish):
+    with pytest.raises(ConfigurationError, match="a number above 0 and below 1"):
+        read_ask(wish)
+
+
+def test_a_wish_may_name_its_quantity():
+    assert read_ask("velocity=0.05") == Ask(error=0.05, quantity="velocity")
+    assert read_ask(0.1) == read_ask("0.1") == Ask(error=0.1)
+    with pytest.raises(ConfigurationError, match="unknown quantity 'speed'"):
+        read_ask("speed=0.1")
+
+
+def test_errors_are_relative_to_the_motion():
+    rng = np.random.default_rng(0)
+    reference = np.cumsum(rng.standard_normal((5, 4, 3)), axis=0)
+    run = reference + 0.01 * (reference - reference[0])
+    for quantity in ("position", "velocity"):
+        assert relative_error(run, reference, quantity) == pytest.approx(0.01)
+    run[-1] = np.nan
+    assert relative_error(run, reference, "position") == np.inf
+    still = np.zeros((3, 4, 3))
+    assert relative_error(still, still, "position") == 0.0
+    assert relative_error(still + 1.0, still, "position") == np.inf
+
+
+@pytest.mark.parametrize("frames", [1, 2, 7, 100])
+def test_checks_cost_their_share_and_are_two_at_least(frames):
+    for cost, share in ((0.1, 0.05), (1.0, 0.05), (3.0, 0.5)):
+        found = check_frames(frames, cost, share)
+        assert len(set(found)) == len(found) <= max(2, share * frames / cost)
+        assert len(found) >= min(2, frames)
+        assert all(0 <= frame < frames for frame in found)
