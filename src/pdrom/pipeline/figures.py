@@ -174,7 +174,7 @@ def _job(
 
 def _labels(name: str, numbers: Numbers, title: str) -> dict[str, str]:
     """Columns of the report, which is sorted by the first one."""
-    own = {"main.pdf": str(numbers.manuscript or UNNUMBERED)}
+    own = {"paper": numbers.manuscript or UNNUMBERED}
     if numbers.preprint is None:
         return {"name": name, **own, "title": title}
     return {"preprint": str(numbers.preprint), **own, "name": name, "title": title}
