@@ -89,7 +89,11 @@ def _page(listed: list[Entry], numbers: Mapping[str, Numbers], verdicts: Verdict
         "## Numbers of the text\n\nTables from which each section reads its numbers.\n",
         section("section", "| section | tables |", lambda e: (e.title, _names(e.rests_on))),
         "## The manuscript\n",
-        section("manuscript", "| file | command |", lambda e: (f"`{e.name}`", _command(e))),
+        section(
+            "manuscript",
+            "| files | command |",
+            lambda e: (", ".join(f"`{file}`" for file in e.files), _command(e)),
+        ),
     ]
     return "\n".join(parts)
 
