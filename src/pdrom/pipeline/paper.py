@@ -36,7 +36,7 @@ class PaperJobs:
 
     @property
     def sources(self) -> list[str]:
-        """Its source: main.tex, then its sections."""
+        """Its source: both documents, then what they read."""
         return listed(self.manuscript.inputs["source"])
 
 
@@ -45,7 +45,7 @@ def paper_jobs(
     figures: Mapping[str, FigureJob],
     configuration: str,
     results: str,
-    manuscript: str,
+    documents: dict[str, str],
 ) -> PaperJobs:
     """The manuscript of a study.
 
@@ -54,7 +54,7 @@ def paper_jobs(
     figures : by name
     configuration : what the study was read from, for a manuscript that is not of the full one
     results : folder of the results
-    manuscript : file of the PDF
+    documents : files of the PDFs by the name of their source
     """
     facts = Facts(
         captions={name: figure.tex for name, figure in figures.items()},
@@ -83,7 +83,7 @@ def paper_jobs(
     pictures = [figure.pdf for figure in figures.values()]
     read = {"source": sources, "inputs": list(made.values()), "figures": pictures}
     content = digest(study.root, *sources)
-    return PaperJobs(inputs, Job(paper, {}, read, {"out": manuscript}, settings, content, code))
+    return PaperJobs(inputs, Job(paper, {}, read, documents, settings, content, code))
 
 
 def check_texts(study: Study) -> None:

@@ -1,4 +1,4 @@
-"""Building the PDF with a system TeX that has the packages, else with the pip-installed one."""
+"""Building PDFs with a system TeX that has the packages, else with the pip-installed one."""
 
 import logging
 import os
@@ -8,11 +8,14 @@ import stat
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
+from types import MappingProxyType
 
 from pdrom.core.errors import PaperError
 from pdrom.core.store import atomic_path
+from pdrom.report.paper.source import whole_source
 
 log = logging.getLogger(__name__)
 
@@ -73,36 +76,51 @@ def _tinytex(scratch: Path) -> Path:
     return copy
 
 
-def build_pdf(source: Path, output: Path, search: list[Path]) -> None:
-    """Compile ``source`` until its references are stable and move the PDF to ``output``.
+def build_pdfs(
+    documents: Mapping[Path, Path],
+    search: list[Path],
+    most: Mapping[str, int] = MappingProxyType({}),
+) -> None:
+    """Compile sources until their references, to each other too, are stable, and move the PDFs.
 
     Parameters
     ----------
+    documents : PDF of each source; the sources lie in one folder
     search : folders in which \\input and \\includegraphics look, beside the source's own
+    most : pages that a document may have, by the name of its source
 
     Raises
     ------
     PaperError
-        With the first TeX error, undefined references and citations, or a box that leaves the page.
+        With the first TeX error, undefined references and citations, a box that leaves the page, or
+        a document with too many pages.
     """
-    text = source.read_text(encoding="utf-8")
+    sources = list(documents)
+    packages = packages_of("".join(map(whole_source, sources)))
     with tempfile.TemporaryDirectory(prefix="pdrom-tex-") as folder:
         scratch = Path(folder)
-        pdflatex = find_pdflatex(packages_of(text), scratch)
+        pdflatex = find_pdflatex(packages, scratch)
         log.info("TeX: %s", pdflatex.name)
         job = scratch / "job"
         job.mkdir()
-        environment = _environment([source.parent, *search])
-        previous = ""
+        environment = _environment([sources[0].parent, *search])
+        previous: list[str] = []
         for _ in range(MAX_RUNS):
-            _run(pdflatex, source, job, environment)
-            current = (job / f"{source.stem}.aux").read_text(encoding="utf-8", errors="replace")
+            for source in sources:
+                _run(pdflatex, source, job, environment)
+            current = [_auxiliary(job / f"{source.stem}.aux") for source in sources]
             if current == previous:
                 break
             previous = current
-        _check_log(job / f"{source.stem}.log", source)
-        with atomic_path(output) as temporary:
-            shutil.copyfile(job / f"{source.stem}.pdf", temporary)
+        for source in sources:
+            _check_log(job / f"{source.stem}.log", source, most.get(source.stem))
+        for source, output in documents.items():
+            with atomic_path(output) as temporary:
+                shutil.copyfile(job / f"{source.stem}.pdf", temporary)
+
+
+def _auxiliary(path: Path) -> str:
+    return path.read_text(encoding="utf-8", errors="replace")
 
 
 def _environment(search: list[Path]) -> dict[str, str]:
@@ -132,7 +150,7 @@ def _run(pdflatex: Path, source: Path, job: Path, environment: dict[str, str]) -
         raise PaperError(f"{source}: {first or output[-300:]} {place}".strip())
 
 
-def _check_log(path: Path, source: Path) -> None:
+def _check_log(path: Path, source: Path, most: int | None) -> None:
     text = path.read_text(encoding="utf-8", errors="replace")
     undefined = re.findall(r"(?:Reference|Citation) `([^']*)'[^\n]*undefined", text)
     if undefined:
@@ -141,3 +159,6 @@ def _check_log(path: Path, source: Path) -> None:
     overfull = [line for line in text.splitlines() if line.startswith("Overfull")]
     if overfull:
         raise PaperError(f"{source}: {len(overfull)} boxes do not fit: {'; '.join(overfull)}")
+    pages = re.search(r"Output written on .*\((\d+) pages?", text)
+    if most is not None and pages and int(pages[1]) > most:
+        raise PaperError(f"{source}: {pages[1]} pages, at most {most} are allowed")

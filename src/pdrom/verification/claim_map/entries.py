@@ -99,7 +99,7 @@ def _sections(root: Path) -> Iterator[Entry]:
             yield Entry(
                 kind="section",
                 name=Path(path).stem,
-                title=found[1] if found else "Abstract",
+                title=_section(found[1] if found else "Abstract", Path(path)),
                 rule="paper_inputs",
                 files=tuple(TABLE.at(RESULTS, name=name) for name in held),
                 words=tuple(map(table_words, held)),
@@ -107,6 +107,10 @@ def _sections(root: Path) -> Iterator[Entry]:
             )
 
 
+def _section(title: str, path: Path) -> str:
+    return f"{title} (supplement)" if path.parent.name == "supplement" else title
+
+
 def _manuscript() -> Entry:
-    file = Folders().manuscript
-    return Entry("manuscript", file, "The manuscript and all of the above", "paper", (file,), ())
+    files = tuple(Folders().documents.values())
+    return Entry("manuscript", files[0], "The manuscript and all of the above", "paper", files, ())
