@@ -1,0 +1,145 @@
+r"""The manuscript's source as LaTeX that pandoc reads: numbers are links, tables plain.
+
+Whatever the source reads or decides when TeX runs is put in its place here: ``\val``, ``\known``,
+``\row``, ``\ifpart``, captions of figures. A link's address is ``origin:KEY``.
+"""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pdrom.report.paper.known import SHOWN, closing, sentences
+
+ORIGIN = "origin:"
+_COMMENT = re.compile(r"(?m)^[ \t]*%.*\n|(?<!\\)%.*$")
+_VAL = re.compile(r"\\val\{([^{}]*)\}")
+_MATH = re.compile(r"(?<!\\)\$((?:[^$\\]|\\.)*)\$", re.DOTALL)
+_ENSURED = re.compile(r"\\ensuremath\{((?:[^{}]|\{[^{}]*\})*)\}")
+_CAPTION = re.compile(r"\\csname caption@(\w+)\\endcsname")
+_FIGURE = re.compile(r"\\figureof\{(\w+)\}")
+_PART = re.compile(r"\\ifpart(?![A-Za-z])(.*?)(?:\\else(?![A-Za-z])(.*?))?\\fi(?![A-Za-z])", re.DOTALL)
+_HEAD = re.compile(r"\\endfirsthead.*?\\endhead\n", re.DOTALL)
+_SPEC = re.compile(r"\\(?:begin\{(?:tabular|longtable)\}|multicolumn\{\d+\})(?=\{)")
+_NUMBER = re.compile(r"(?:[^A-Za-z]|\\(?:ensuremath|cdot|infty|,|times)(?![A-Za-z]))*\d[^A-Za-z]*")
+# Of a preamble, pandoc reads short definitions; those that lay a page out are replaced.
+_SHORT = re.compile(r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile)\w+\}.*\}|newtheorem.*)$")
+REPLACED = r"""
+\newcommand{\longtableof}[4]{\begin{table}\caption{#3}\label{#2}\input{#4}\end{table}}
+\newcommand{\tablefile}[1]{\input{#1.tex}}
+\newenvironment{heretable}{\begin{table}}{\end{table}}
+"""
+
+
+@dataclass(frozen=True)
+class Origins:
+    """Contents of numbers.json, see `pdrom.report.paper.build.write_inputs`."""
+
+    known: Sequence[str]
+    numbers: Mapping[str, Mapping[str, Any]]
+    tables: Mapping[str, Sequence[str]]
+
+
+def prepared(source: str, origins: Origins, captions: Mapping[str, str], full: str, part: str | None) -> str:
+    """Return the source of a document for pandoc.
+
+    Parameters
+    ----------
+    captions : of the figures by name, TeX
+    full, part : name of the full study, and what this one was read from where it is another
+    """
+    text = _COMMENT.sub("", _decided(source, origins.known))
+    text = _FIGURE.sub(_figure, text)
+    text = _CAPTION.sub(lambda found: captions[found[1]], text)
+    text = _PART.sub(lambda found: (found[1] if part else found[2]) or "", text)
+    for name, words in {"configuration": part or full, "fullstudy": full}.items():
+        text = re.sub(rf"\\{name}(?![A-Za-z])(?:\{{\}})?", lambda _, w=words: rf"\texttt{{{w}}}", text)
+    preamble, begin, body = text.partition(r"\begin{document}")
+    body = _VAL.sub(
+        lambda found: _link(found[1], origins.numbers[found[1]]["text"]), _MATH.sub(_apart, body)
+    )
+    body = re.sub(r"\\(begin|end)\{fitted\}", "", body).replace("{fittedtabular}", "{tabular}")
+    short = "\n".join(found[0] for found in _SHORT.finditer(preamble))
+    return plain_columns("\n".join([short, REPLACED, begin, body]))
+
+
+def _decided(source: str, known: Sequence[str]) -> str:
+    r"""``source`` with its ``\known`` and ``\row`` blocks shown, noted or left out."""
+    note = r"\emph{[The full study holds the numbers of sentences that are left out here.]}"
+    pieces, start = [], 0
+    for sentence, decision in zip(sentences(source), known, strict=True):
+        opening = (r"\row{" if sentence.is_row else r"\known{") + sentence.text + "}"
+        place = source.index(opening, start)
+        shown = {SHOWN: sentence.text, "noted": note}.get(decision, "")
+        pieces += [source[start:place], shown]
+        start = place + len(opening)
+    return "".join([*pieces, source[start:]])
+
+
+def _figure(found: re.Match[str]) -> str:
+    name = found[1]
+    return (
+        rf"\begin{{figure}}\includegraphics{{{name}.pdf}}"
+        rf"\caption{{\csname caption@{name}\endcsname}}\label{{fig:{name}}}\end{{figure}}"
+    )
+
+
+def _apart(found: re.Match[str]) -> str:
+    """Mathematics, with the numbers in it between its parts: a link cannot stand inside."""
+    if not _VAL.search(found[1]):
+        return found[0]
+    parts = re.split(r"(\\val\{[^{}]*\})", found[1])
+    return "".join(p if p.startswith(r"\val") else f"${p.strip()}$ " for p in parts if p.strip())
+
+
+def _link(key: str, text: str) -> str:
+    return rf"\href{{{ORIGIN}{key.encode().hex()}}}{{{_plain_mathematics(text)}}}"
+
+
+def _plain_mathematics(text: str) -> str:
+    return _ENSURED.sub(r"$\1$", text)
+
+
+def linked_table(text: str, tables: Sequence[str], columns: Callable[[str], Sequence[str]]) -> str:
+    """Return a made TeX table whose numbers are links to the rows that they come from.
+
+    Those rows are the ones of the first of ``tables`` that has a column of the name of the made
+    table's first one; they agree with its row in every column that both have.
+
+    Parameters
+    ----------
+    columns : names of the columns of a table of the study
+    """
+    text = _HEAD.sub("", text).replace("\\captionrow\n", "").replace("longtable", "tabular")
+    text = text.replace(r"\noalign{\smallskip}", "")
+    lines = text.split("\n")
+    header = next(line for line in lines if line.endswith(r" \\")).removesuffix(r" \\").split(" & ")
+    origin = next((name for name in tables if header[0] in columns(name)), tables[0])
+    shared = [i for i, title in enumerate(header) if title in columns(origin)]
+    made, head = [], True
+    for line in lines:
+        cells = line.removesuffix(r" \\").split(" & ")
+        if not line.endswith(r" \\") or head or len(cells) != len(header):
+            head = head and not line.endswith(r" \\")
+            made.append(_plain_mathematics(line))
+            continue
+        key = "|".join([origin, *(f"{header[i]}={_plain(cells[i])}" for i in shared if cells[i])])
+        made.append(" & ".join(_link(key, c) if _NUMBER.fullmatch(c) else _plain_mathematics(c) for c in cells) + r" \\")
+    return plain_columns("\n".join(made))
+
+
+def _plain(cell: str) -> str:
+    return re.sub(r"\\texttt\{(.*)\}", r"\1", cell).replace("\\", "")
+
+
+def plain_columns(text: str) -> str:
+    """Return a source whose tables have columns of letters alone; pandoc knows no others."""
+    pieces, start = [], 0
+    for found in _SPEC.finditer(text):
+        end = closing(text, found.end() + 1)
+        spec = text[found.end() + 1 : end]
+        spec = re.sub(r"[><@!]\{(?:[^{}]|\{[^{}]*\})*\}", "", spec)
+        spec = re.sub(r"[pm]\{[^{}]*\}|[XYZ]", "l", spec)
+        pieces += [text[start : found.end() + 1], spec]
+        start = end
+    return "".join([*pieces, text[start:]])
