@@ -7,7 +7,7 @@ other result, so that it is not among the files that equal runs make equal.
 
 import json
 import mimetypes
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, metadata
@@ -101,18 +101,19 @@ def published(plan: Plan, folders: Folders, manifest: Manifest) -> list[Publishe
         if Path(name).parent == models
     }
     titles["machine.json"] = "The machine that the study ran on"
-    manuscript = Path(folders.manuscript).name
+    documents = [Path(file).name for file in folders.documents.values()]
     found = []
     for name, entry in manifest.files.items():
         of_paper = Path(name).parent.name == "paper"
-        title = titles.get(name) or (of_paper and _of_paper(Path(name), manuscript))
+        title = titles.get(name) or (of_paper and _of_paper(Path(name), documents))
         if title and entry.sha256:
             found.append(Published(name, entry.bytes, entry.sha256, title))
     return found
 
 
-def _of_paper(path: Path, manuscript: str) -> str:
-    return "The manuscript" if path.name == manuscript else f"Input of the manuscript: {path.stem}"
+def _of_paper(path: Path, documents: Sequence[str]) -> str:
+    titles = dict(zip(documents, ("The manuscript", "Supplement of the manuscript"), strict=True))
+    return titles.get(path.name, f"Input of the manuscript: {path.stem}")
 
 
 def _author(crate: ROCrate, name: str) -> Entity:

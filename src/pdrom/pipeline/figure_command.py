@@ -5,7 +5,7 @@ from itertools import takewhile
 from pathlib import Path
 
 from pdrom.core.errors import ConfigurationError, choices
-from pdrom.report.figure_numbers import figure_numbers
+from pdrom.report.figure_numbers import SUPPLEMENT, figure_numbers
 
 WORD = "figure"
 PREPRINT = "preprint:"
@@ -14,8 +14,8 @@ PREPRINT = "preprint:"
 def figure_arguments(arguments: Sequence[str]) -> list[str]:
     """Options and targets for Snakemake, from what follows the word ``figure``.
 
-    A number counts in the manuscript, ``preprint:NUMBER`` in the preprint; every figure has its
-    name, too. A target reads ``figure NAME`` (one word), which `pdrom.pipeline.targets.Names` turns
+    A number counts in the paper, one with an S before it in the supplement, ``preprint:NUMBER`` in
+    the preprint; every figure has its name, too. A target reads ``figure NAME`` (one word), which `pdrom.pipeline.targets.Names` turns
     into its file.
 
     Raises
@@ -27,7 +27,7 @@ def figure_arguments(arguments: Sequence[str]) -> list[str]:
     options = [word for word in arguments[len(asked) :] if word != "--"]
     numbers = figure_numbers(Path())
     by_place = {n.manuscript: name for name, n in numbers.items() if n.manuscript}
-    known = {str(number): by_place[number] for number in sorted(by_place)}
+    known = {number: by_place[number] for number in sorted(by_place, key=_order)}
     known |= {f"{PREPRINT}{n.preprint}": name for name, n in numbers.items() if n.preprint}
     known |= {name: name for name in numbers}
     if not asked:
@@ -36,6 +36,11 @@ def figure_arguments(arguments: Sequence[str]) -> list[str]:
         if word not in known:
             raise ConfigurationError(f"{WORD} {word}: there is none{choices(word, known)}")
     return [*options, "--", *(f"{WORD} {known[word]}" for word in asked)]
+
+
+def _order(number: str) -> tuple[bool, int]:
+    """Key of a number for sorting: the paper's, then the supplement's."""
+    return number.startswith(SUPPLEMENT), int(number.removeprefix(SUPPLEMENT))
 
 
 def described(target: str) -> str:

@@ -8,7 +8,7 @@ from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.paths import Place
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
-from pdrom.pipeline.contents import labels_of
+from pdrom.pipeline.contents import SOME, labels_of
 from pdrom.pipeline.fingerprint import closure, fingerprint
 from pdrom.pipeline.full import is_full
 from pdrom.pipeline.resolve import Job, Resolver
@@ -72,7 +72,11 @@ class _Sources(Resolver):
 
     def chosen(self, place: Place, first: bool) -> list[str]:
         """Paths of a kind for the chosen experiments and methods, or for the first of each."""
-        return list(self._holdings.files(place, self._options, self.results, first))
+        paths = list(self._holdings.files(place, self._options, self.results, first))
+        if place not in SOME:
+            return paths
+        held = {place.at(self.results, **each) for each in SOME[place](self.study)}
+        return [path for path in dict.fromkeys(paths) if path in held]
 
     def published(self, name: str) -> list[str]:
         """Table of the published code, where the options ask for one."""
@@ -174,7 +178,7 @@ def _job(
 
 def _labels(name: str, numbers: Numbers, title: str) -> dict[str, str]:
     """Columns of the report, which is sorted by the first one."""
-    own = {"main.pdf": str(numbers.manuscript or UNNUMBERED)}
+    own = {"paper": numbers.manuscript or UNNUMBERED}
     if numbers.preprint is None:
         return {"name": name, **own, "title": title}
     return {"preprint": str(numbers.preprint), **own, "name": name, "title": title}

@@ -10,6 +10,7 @@ from typing import Any
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.paths import RESULTS
 from pdrom.core.yamlfile import read_yaml
+from pdrom.report.paper.source import DOCUMENTS
 
 DEFAULT = "config/default.yaml"
 OWN = "own"
@@ -23,6 +24,12 @@ class Folders:
 
     results: str = RESULTS
     manuscript: str = "paper/main.pdf"
+
+    @property
+    def documents(self) -> dict[str, str]:
+        """PDFs of the manuscript and of its supplement beside it, by the name of their source."""
+        supplement = Path(self.manuscript).with_name("supplement.pdf").as_posix()
+        return dict(zip(DOCUMENTS, (self.manuscript, supplement), strict=True))
 
 
 def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folders:

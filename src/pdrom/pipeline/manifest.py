@@ -105,9 +105,9 @@ def read_manifest(results: str) -> Manifest:
 def own_files(plan: Plan, folders: Folders) -> set[str]:
     """Files that a whole run of a study makes."""
     return {
-        folders.manuscript, *plan.paper.files, *plan.table_paths,
+        *folders.documents.values(), *plan.paper.files, *plan.table_paths,
         *plan.figures, *(job.png for job in plan.figure_jobs.values()),
-        *plan.measured, *plan.page.outputs.values(),
+        *plan.measured, *plan.page.outputs.values(), *plan.paper.article.outputs.values(),
     }  # fmt: skip
 
 

@@ -68,7 +68,7 @@ class Plan:
         self.study = study
         self.root = study.root
         self.results = folders.results
-        self.manuscript = folders.manuscript
+        self.documents = folders.documents
         self.configuration = configuration
         self.experiments = experiments()
         self.tables = declared()
@@ -145,7 +145,7 @@ class Plan:
         return {
             "tables": [self.job(table) for table in self.tables.values()],
             "figures": [figure.job for figure in self.figure_jobs.values()],
-            "article": [self.page],
+            "article": [self.page, self.paper.article],
             "paper": [self.paper.inputs, self.paper.manuscript],
         }
 
@@ -158,5 +158,5 @@ class Plan:
     def paper(self) -> PaperJobs:
         """The manuscript."""
         return paper_jobs(
-            self.study, self.figure_jobs, self.configuration, self.results, self.manuscript
+            self.study, self.figure_jobs, self.configuration, self.results, self.documents
         )

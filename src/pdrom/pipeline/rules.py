@@ -47,8 +47,11 @@ def rules(plan: Plan, cores: int) -> Iterator[Rule]:
     yield _fixed(plan, page, "article", f"Page {page.outputs['out']}", shown)
     paper = plan.paper
     yield _fixed(plan, paper.inputs, "paper", paper.inputs.artifact.title, {})
-    message = f"Manuscript {paper.manuscript.outputs['out']}"
-    yield _fixed(plan, paper.manuscript, "paper", message, {"out": {"category": "Manuscript"}})
+    files = paper.manuscript.outputs
+    shown = {document: {"category": "Manuscript"} for document in files}
+    yield _fixed(plan, paper.manuscript, "paper", f"Manuscript {', '.join(files.values())}", shown)
+    pages = paper.article
+    yield _fixed(plan, pages, "article", pages.artifact.title, {"main": {"category": "Page"}})
 
 
 def _experiment(plan: Plan, experiment: Experiment, cores: int) -> Rule:

@@ -74,7 +74,7 @@ def summary(
         lines.append(f"made: {', '.join([*command.targets[:LISTED], *others])}")
     else:
         lines += _verdicts(folders, apart)
-        lines.append(f"manuscript: {folders.manuscript}")
+        lines.append(f"manuscript: {', '.join(folders.documents.values())}")
         for kind, files in (("figures", figures), ("tables", tables)):
             found = sum(Path(file).is_file() for file in files)
             lines.append(f"{kind}: {found} in {folders.results}/{kind}")

@@ -55,8 +55,9 @@ class Names:
 
 
 def _own(target: str, folders: Folders) -> str:
-    if target == Folders().manuscript:
-        return folders.manuscript
+    for document, file in Folders().documents.items():
+        if target == file:
+            return folders.documents[document]
     inside = target.startswith(f"{RESULTS}/") and not target.startswith(f"{RESULTS}/studies/")
     return folders.results + target.removeprefix(RESULTS) if inside else target
 

@@ -29,6 +29,10 @@ HEAD = """\
 # A codechecker runs ./reproduce, compares the files below (./reproduce verify),
 # and fills in what is empty.
 """
+DOCUMENTS = (
+    {"file": "paper/main.pdf", "comment": "The manuscript"},
+    {"file": "paper/supplement.pdf", "comment": "Supplement of the manuscript"},
+)
 _TITLE = re.compile(r"\\title\{([^\\}]*)")
 
 
@@ -46,7 +50,7 @@ def codecheck(tables: Iterable[Table]) -> str:
     content = {
         "version": SPECIFICATION,
         "paper": {"title": title[1], "authors": authors, "reference": _preprint()},
-        "manifest": [{"file": "paper/main.pdf", "comment": "The manuscript"}, *figures, *made],
+        "manifest": [*DOCUMENTS, *figures, *made],
         "codechecker": [{"name": None, "ORCID": None}],
         "report": None,
         "repository": None,

@@ -1,27 +1,33 @@
-"""Numbers of the figures: in the manuscript, by the order of its source, and in the preprint."""
+"""Numbers of the figures: in the paper or its supplement, by their order, and in the preprint."""
 
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from pdrom.report.figures.kit.catalogue import declarations
-from pdrom.report.paper.source import whole_source
+from pdrom.report.paper.source import documents
 
+SUPPLEMENT = "S"  # before a number of the supplement
 _COMMENT = re.compile(r"(?<!\\)%.*")
 _PLACED = re.compile(r"\\figureof\{(\w+)\}")
 
 
 @dataclass(frozen=True)
 class Numbers:
-    """Numbers of a figure in ``main.pdf`` and in the preprint; None where it does not stand."""
+    """Numbers of a figure, as "3" in the paper or "S7" in its supplement, and in the preprint.
 
-    manuscript: int | None
+    None where it does not stand.
+    """
+
+    manuscript: str | None
     preprint: int | None
 
     @property
     def words(self) -> str:
-        """Both numbers, as in "figure 10 of main.pdf, figure 8 of the preprint"."""
-        places = {"main.pdf": self.manuscript, "the preprint": self.preprint}
+        """Both numbers, as in "figure S10 of supplement.pdf, figure 8 of the preprint"."""
+        own = self.manuscript or ""
+        document = "supplement.pdf" if own.startswith(SUPPLEMENT) else "main.pdf"
+        places = {document: self.manuscript, "the preprint": self.preprint}
         return ", ".join(f"figure {n} of {place}" for place, n in places.items() if n is not None)
 
     def label(self, name: str) -> str:
@@ -37,7 +43,8 @@ def figure_numbers(root: Path) -> dict[str, Numbers]:
     PaperError
         A section of the manuscript has no file.
     """
-    source = _COMMENT.sub("", whole_source(root / "paper" / "main.tex"))
-    placed = _PLACED.findall(source)
-    counted = {name: number for number, name in enumerate(placed, 1)}
+    counted = {}
+    for prefix, source in zip(("", SUPPLEMENT), documents(root / "paper").values(), strict=True):
+        placed = _PLACED.findall(_COMMENT.sub("", source))
+        counted |= {name: f"{prefix}{number}" for number, name in enumerate(placed, 1)}
     return {name: Numbers(counted.get(name), f.number) for name, f in declarations().items()}

@@ -5,7 +5,7 @@ The results lie in ``published``, where no run takes them for its own::
 
     pdrom-0.1.0/...                         what git tracks
     pdrom-0.1.0/published/results/...       manifest, crate, tables, figures
-    pdrom-0.1.0/published/paper/main.pdf
+    pdrom-0.1.0/published/paper/main.pdf    and supplement.pdf
     pdrom-0.1.0/published/paper/source/...  for plain pdflatex, in one folder
 
 Equal sources and results give equal bytes: files are sorted, and dated as results are.
@@ -111,9 +111,9 @@ def paper(subject: Subject) -> Iterator[Member]:
     """The manuscript's source with all that it reads, in one folder."""
     plan = subject.plan
     files = [Path(path) for path in (*plan.paper.files, *plan.figures)]
-    main, *sections = (Path(path) for path in plan.paper.sources)
-    named = {path.name: path for path in (main, *files)}
-    named |= {str(path.relative_to(main.parent)): path for path in sections}
+    sources = [Path(path) for path in plan.paper.sources]
+    named = {path.name: path for path in files}
+    named |= {str(path.relative_to(sources[0].parent)): path for path in sources}
     for name, path in named.items():
         yield Member(f"published/paper/source/{name}", path.read_bytes())
 

@@ -19,7 +19,7 @@ from pdrom.report.article.tree import Labels, numbered, resolved
 from pdrom.report.article.verified import write_verified
 from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.paper.build import NUMBERS, Facts, fact_tables
-from pdrom.report.paper.source import whole_source
+from pdrom.report.paper.source import DOCUMENTS, documents
 from pdrom.tables import declared
 from pdrom.tables.claims.rules import load_claims
 
@@ -33,7 +33,8 @@ ASSETS = {
     "script": "article.js",
 }
 # Pages of the documents by the name of their source.
-PAGES = {"main": "index.html", "supplement": "supplement.html"}
+PAGES = dict(zip(DOCUMENTS, ("index.html", "supplement.html"), strict=True))
+TITLES = dict(zip(DOCUMENTS, ("Paper", "Supplement"), strict=True))
 LINKS = {"tables.html": "Tables", "claims.html": "Claims", "live.html": "A model, running"}
 _FIGURE = re.compile(r"\\figureof\{(\w+)\}")
 _PREFIX = re.compile(r"\\renewcommand\{?\\thefigure\}?\{([A-Z]+)")
@@ -73,14 +74,14 @@ def write_article(
     write_text(claims_page(rules, tests, verdicts, plain), outputs["claims"])
     for name in ("style", "script"):
         write_text(assets[name].read_text("utf-8"), outputs[name])
-    texts = _documents(source)
+    texts = documents(Path(source[0]).parent)
     pages = _figure_pages(texts)
     sizes = _write_figures(figures, outputs)
     files = _linked_inputs(made, origins)
     labels: dict[str, tuple[str, str]] = {}
     trees: dict[str, Tree] = {}
     for stem, text in texts.items():
-        tex = prepared(text, _own(origins, texts, stem), facts.captions, facts.full_study, facts.part)
+        tex = prepared(text, stem, origins, facts)
         counted = Labels(found[1] if (found := _PREFIX.search(text)) else "", PAGES[stem], labels)
         trees[stem] = numbered(
             parsed(tex, files, Path(references)),
@@ -88,23 +89,12 @@ def write_article(
             lambda name, node: shown_figure(name, node, *sizes[name], pages),
         )
     for stem, tree in trees.items():
-        others = {PAGES[s]: s.capitalize() for s in texts if s != stem}
+        others = {PAGES[other]: TITLES[other] for other in texts if other != stem}
         write_text(
             page(resolved(tree, labels, rules), assets["text"], _variables(others, facts)),
             outputs[stem],
         )
     write_verified({}, Path(outputs["main"]).parent)
-
-
-def _documents(source: list[str]) -> dict[str, str]:
-    """Source of each document with its sections in their places, by its name."""
-    paths = [Path(path) for path in source if Path(path).stem in PAGES]
-    return {path.stem: whole_source(path) for path in paths}
-
-
-def _own(origins: Origins, texts: Mapping[str, str], stem: str) -> Origins:
-    """Origins with the decisions on the blocks of one document, which are counted over all."""
-    return origins
 
 
 def _figure_pages(texts: Mapping[str, str]) -> dict[str, str]:
@@ -117,7 +107,10 @@ def _write_figures(
     """Write pictures and PDF files; return the size of each, and whether it has a PDF here."""
     found = {}
     for name in sorted({Path(path).stem for path in figures}):
-        pdf, png = (next(Path(p) for p in figures if Path(p).name == f"{name}.{end}") for end in ("pdf", "png"))
+        pdf, png = (
+            next(Path(p) for p in figures if Path(p).name == f"{name}.{end}")
+            for end in ("pdf", "png")
+        )
         size = write_picture(png, Path(outputs[f"picture_{name}"]))
         with_pdf = copies_pdf(pdf)
         if with_pdf:
@@ -156,7 +149,7 @@ class _Article(Artifact):
 
 
 def _writes() -> dict[str, Any]:
-    names = {"main": "index.html", "tables": "tables.html", "claims": "claims.html"}
+    names = {**PAGES, "tables": "tables.html", "claims": "claims.html"}
     names |= {"style": "article.css", "script": "article.js"}
     names |= {f"table_{name}": f"tables/{name}.html" for name in (*declared(), *FACTS)}
     names |= {f"picture_{name}": f"figures/{name}.webp" for name in declarations()}

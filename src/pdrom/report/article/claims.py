@@ -59,7 +59,9 @@ def _tests(name: str, part: str, rules: tuple[TestRule, ...], tests: pd.DataFram
     return f"<h3>{PARTS[part]}</h3><div class=scroll tabindex=0 role=region aria-label='Tests of {name}, {part}'><table>{head}{rows}</table></div>"
 
 
-def _paired(rules: tuple[TestRule, ...], tests: pd.DataFrame) -> Iterator[tuple[TestRule, tuple[int, pd.Series]]]:
+def _paired(
+    rules: tuple[TestRule, ...], tests: pd.DataFrame
+) -> Iterator[tuple[TestRule, tuple[int, pd.Series]]]:
     return zip(rules, tests.iterrows(), strict=True)
 
 
@@ -72,7 +74,9 @@ def _found(name: str, part: str, row: pd.Series) -> str:
 
 def _rule(rule: TestRule) -> str:
     table = METRICS[rule.metric].table
-    where = "; ".join(f"{column}: {', '.join(map(str, values))}" for column, values in rule.where.items())
+    where = "; ".join(
+        f"{column}: {', '.join(map(str, values))}" for column, values in rule.where.items()
+    )
     sign = {">=": "at least", "<=": "at most"}[rule.compare]
     margin = f"; ratios within a factor {rule.factor:g} decide nothing" if rule.timed else ""
     return (

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from pdrom.report.paper.build import Facts
 from pdrom.report.paper.known import SHOWN, closing, sentences
 
 ORIGIN = "origin:"
@@ -18,7 +19,10 @@ _MATH = re.compile(r"(?<!\\)\$((?:[^$\\]|\\.)*)\$", re.DOTALL)
 _ENSURED = re.compile(r"\\ensuremath\{((?:[^{}]|\{[^{}]*\})*)\}")
 _CAPTION = re.compile(r"\\csname caption@(\w+)\\endcsname")
 _FIGURE = re.compile(r"\\figureof\{(\w+)\}")
-_PART = re.compile(r"\\ifpart(?![A-Za-z])(.*?)(?:\\else(?![A-Za-z])(.*?))?\\fi(?![A-Za-z])", re.DOTALL)
+_PART = re.compile(
+    r"\\ifpart(?![A-Za-z])(.*?)(?:\\else(?![A-Za-z])(.*?))?\\fi(?![A-Za-z])", re.DOTALL
+)
+_DROPPED = re.compile(r"\\(?:tableofcontents|input\{\w+\.bbl\}|renewcommand\{.*)")
 _HEAD = re.compile(r"\\endfirsthead.*?\\endhead\n", re.DOTALL)
 _SPEC = re.compile(r"\\(?:begin\{(?:tabular|longtable)\}|multicolumn\{\d+\})(?=\{)")
 _NUMBER = re.compile(r"(?:[^A-Za-z]|\\(?:ensuremath|cdot|infty|,|times)(?![A-Za-z]))*\d[^A-Za-z]*")
@@ -35,32 +39,38 @@ REPLACED = r"""
 class Origins:
     """Contents of numbers.json, see `pdrom.report.paper.build.write_inputs`."""
 
-    known: Sequence[str]
+    known: Mapping[str, Sequence[str]]
     numbers: Mapping[str, Mapping[str, Any]]
     tables: Mapping[str, Sequence[str]]
 
 
-def prepared(source: str, origins: Origins, captions: Mapping[str, str], full: str, part: str | None) -> str:
-    """Return the source of a document for pandoc.
-
-    Parameters
-    ----------
-    captions : of the figures by name, TeX
-    full, part : name of the full study, and what this one was read from where it is another
-    """
-    text = _COMMENT.sub("", _decided(source, origins.known))
+def prepared(source: str, document: str, origins: Origins, facts: Facts) -> str:
+    """Return the ``source`` of a ``document`` for pandoc."""
+    preamble, begin, text = source.partition(r"\begin{document}")
+    text = _COMMENT.sub("", _decided(text, origins.known[document]))
     text = _FIGURE.sub(_figure, text)
-    text = _CAPTION.sub(lambda found: captions[found[1]], text)
-    text = _PART.sub(lambda found: (found[1] if part else found[2]) or "", text)
-    for name, words in {"configuration": part or full, "fullstudy": full}.items():
-        text = re.sub(rf"\\{name}(?![A-Za-z])(?:\{{\}})?", lambda _, w=words: rf"\texttt{{{w}}}", text)
-    preamble, begin, body = text.partition(r"\begin{document}")
-    body = _VAL.sub(
-        lambda found: _link(found[1], origins.numbers[found[1]]["text"]), _MATH.sub(_apart, body)
+    text = _CAPTION.sub(lambda found: facts.captions[found[1]], text)
+    text = _PART.sub(lambda found: (found[1] if facts.part else found[2]) or "", text)
+    full = facts.full_study
+    for name, words in {"configuration": facts.part or full, "fullstudy": full}.items():
+        text = re.sub(
+            rf"\\{name}(?![A-Za-z])(?:\{{\}})?", lambda _, w=words: rf"\texttt{{{w}}}", text
+        )
+    text = _VAL.sub(
+        lambda found: _link(found[1], origins.numbers[found[1]]["text"]), _MATH.sub(_apart, text)
     )
-    body = re.sub(r"\\(begin|end)\{fitted\}", "", body).replace("{fittedtabular}", "{tabular}")
-    short = "\n".join(found[0] for found in _SHORT.finditer(preamble))
-    return plain_columns("\n".join([short, REPLACED, begin, body]))
+    text = re.sub(r"\\(begin|end)\{fitted\}", "", text).replace("{fittedtabular}", "{tabular}")
+    text = _DROPPED.sub("", text)
+    short = [found[0] for found in _SHORT.finditer(preamble)]
+    return plain_columns("\n".join([*short, _title(preamble), REPLACED, begin, text]))
+
+
+def _title(preamble: str) -> str:
+    r"""The lines of the title, with a colon between them."""
+    start = preamble.index(r"\title{") + len(r"\title{")
+    lines = _PART.sub("", preamble[start : closing(preamble, start)]).split(r"\\")
+    words = [re.sub(r"^\[[^\]]*\]|\\large|%", "", line).strip() for line in lines]
+    return rf"\title{{{': '.join(words).replace('?:', '?')}}}"
 
 
 def _decided(source: str, known: Sequence[str]) -> str:
@@ -124,7 +134,12 @@ def linked_table(text: str, tables: Sequence[str], columns: Callable[[str], Sequ
             made.append(_plain_mathematics(line))
             continue
         key = "|".join([origin, *(f"{header[i]}={_plain(cells[i])}" for i in shared if cells[i])])
-        made.append(" & ".join(_link(key, c) if _NUMBER.fullmatch(c) else _plain_mathematics(c) for c in cells) + r" \\")
+        made.append(
+            " & ".join(
+                _link(key, c) if _NUMBER.fullmatch(c) else _plain_mathematics(c) for c in cells
+            )
+            + r" \\"
+        )
     return plain_columns("\n".join(made))
 
 

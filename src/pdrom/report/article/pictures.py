@@ -79,7 +79,10 @@ def _origin(name: str, with_pdf: bool, pages: Mapping[str, str]) -> list[Node]:
     for place, other in enumerate(_kin(name, pages)):
         made += words(", " if place else "Other scenes: ")
         made.append(link(words(other), f"{pages[other]}#fig:{other}"))
-    mark = {"t": "Span", "c": [attributes("", "", data_verified=f"figure {name}"), words("not yet")]}
+    mark = {
+        "t": "Span",
+        "c": [attributes("", "", data_verified=f"figure {name}"), words("not yet")],
+    }
     return [*made, *words(" Last verification: "), mark, *words(".")]
 
 

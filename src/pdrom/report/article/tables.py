@@ -25,7 +25,9 @@ FACTS = {
 def table_page(name: str, csv: bytes, template: str) -> str:
     """HTML of a table, with the command that makes it and the tolerance of every column."""
     table = declared().get(name)
-    kinds = {c.name: (c.meaning, c.unit, c.quantity, c.within) for c in table.columns} if table else {}
+    kinds = (
+        {c.name: (c.meaning, c.unit, c.quantity, c.within) for c in table.columns} if table else {}
+    )
     columns = "".join(
         f"<tr data-column='{escape(column)}'><th scope=row>{escape(column)}</th><td>{escape(meaning)}</td>"
         f"<td>{escape(unit)}</td><td>{kind}: {escape(QUANTITIES[kind])}</td><td>{within:g}</td></tr>"
@@ -36,7 +38,8 @@ def table_page(name: str, csv: bytes, template: str) -> str:
         "NAME": name,
         "TITLE": escape(table.title if table else FACTS[name]),
         "COMMAND": escape(f"./reproduce {argument(name)}"),
-        "COLUMNS": columns or "<tr><td colspan=5>facts of the configuration, compared with nothing</td></tr>",
+        "COLUMNS": columns
+        or "<tr><td colspan=5>facts of the configuration, compared with nothing</td></tr>",
         "DATA": base64.b64encode(packed).decode(),
     }
     return filled(template, parts)

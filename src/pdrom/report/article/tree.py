@@ -149,7 +149,10 @@ def _equation(node: Node, kind: str, labels: Labels) -> Node:
     lines = [tex] if kind == "equation" else re.split(r"\\\\", tex)
     found = [(m[1] if (m := _LABEL.search(line)) else "") for line in lines]
     marks = [
-        {"t": "Span", "c": [attributes(label, "number"), words(f"({labels.next('equation', label)})")]}
+        {
+            "t": "Span",
+            "c": [attributes(label, "number"), words(f"({labels.next('equation', label)})")],
+        }
         for label in found
     ]
     math = {"t": "Math", "c": [node["c"][0], _LABEL.sub("", tex)]}
@@ -200,7 +203,9 @@ def _resolved_link(node: Node, labels: Mapping[str, tuple[str, str]]) -> Node | 
     attribute, inlines, (address, _) = node["c"]
     keys = dict(attribute[2])
     if address.startswith(ORIGIN):
-        return link(inlines, address_of(bytes.fromhex(address.removeprefix(ORIGIN)).decode()), "val")
+        return link(
+            inlines, address_of(bytes.fromhex(address.removeprefix(ORIGIN)).decode()), "val"
+        )
     if "reference" in keys:
         number, page = labels[keys["reference"]]
         shown = f"({number})" if keys["reference-type"] == "eqref" else number

@@ -19,7 +19,7 @@ from pdrom.report.figures.kit.trade_offs import (
 )
 
 RATES = (60, 30)  # frames per second
-LARGE, SMALL = 3.3, 1.75  # inches, heights of panels
+LARGE, SMALL = 2.6, 1.6  # inches, heights of panels
 LOWEST = 1e-3  # of the axes: what matters here lies above
 COLUMNS = 4  # of the legend
 

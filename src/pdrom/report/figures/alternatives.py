@@ -59,7 +59,7 @@ def alternatives(results: Results, options: Scenes) -> Figure:
     if not cases:
         raise NothingToDraw("no alternatives")
     beside = min(PAIRS, len(cases))
-    figure = style.new_figure(1.75 * rows_of(len(cases), beside) + 0.75)
+    figure = style.new_figure(1.55 * rows_of(len(cases), beside) + 0.75)
     axes = panels(figure, 2 * len(cases), 2 * beside, sharey=True)
     for (labels, case), *pair in zip(cases, axes[::2], axes[1::2], strict=True):
         _draw_case(pair, labels, case)

@@ -52,7 +52,7 @@ def error_against_gain(results: Results, options: Options) -> Figure:
     runs = results.held_rows(runs, options)
     if runs.empty:
         raise NothingToDraw("no run with a gain")
-    figure = style.new_figure(3.3)
+    figure = style.new_figure(3.0)
     left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
     ranges = _ranges(results.table("repetitions", RANGES), runs)
     methods = [m for m in results.holdings.methods if (runs.method == m).any()]

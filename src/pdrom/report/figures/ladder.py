@@ -20,11 +20,11 @@ ERRORS, GAINS = (1e-4, 1e2), (1.0, 1e5)  # limits; what lies outside is drawn on
 
 
 @figure(
-    title="The ladder from the published choices to sound ones",
+    title="One choice after the other",
     caption=(
         "Above the line one ingredient after the other is changed, from the published code to "
         "whole elements with oversampling; below it each row takes a single ingredient away from "
-        "the sound method or exchanges it. Left the error of the rerun within the horizon, right "
+        "the complete method or exchanges it. Left the error of the rerun within the horizon, right "
         "the gain of the interpolation; what blew up or is singular lies on the right rim. Bars "
         "show the range over runs that are trained on as many resampled frames, on some scenes; "
         "pale ones that over choices of the arbitrary signs of the singular vectors."
@@ -47,7 +47,7 @@ def ladder(results: Results, options: Scenes) -> Figure:
     climbed = table[table.direction.isin(["up", "down"])]
     rungs = list(dict.fromkeys(zip(climbed.direction, climbed.rung, strict=True)))
     scenes = list(dict.fromkeys(table.scene))
-    figure = style.new_figure(0.26 * len(rungs) + 1.3)
+    figure = style.new_figure(0.2 * len(rungs) + 1.2)
     left, right = figure.subplots(1, 2, sharey=True)
     error = ("relative_error_within_horizon", "error_low", "error_high")
     _draw_quantity(left, table, rungs, scenes, error, ERRORS)

@@ -9,7 +9,7 @@ from pdrom.report.figures.kit.results import Results
 
 @figure(
     number=8,
-    title="Reconstruction error of the preprint's scenes",
+    title="Reconstruction error of three scenes of the preprint",
     caption=(
         "Relative error of reconstructed projections against the number $r$ of basis vectors, for "
         "the snapshots used (train), the frames between them (test) and another run (held out). "

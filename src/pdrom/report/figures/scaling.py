@@ -13,16 +13,11 @@ from pdrom.report.figures.kit.results import NothingToDraw, Results
 
 COLUMNS = [
     "scene", "method", "threads", "vertices", "ms_per_iteration", "local_ms", "global_ms",
-    "factorisation_ms", "memory_mb",
 ]  # fmt: skip
 PHASES = {
     "ms_per_iteration": ("whole iteration", "-"),
     "local_ms": ("local step", "--"),
     "global_ms": ("global solve", ":"),
-}
-OFFLINE = {
-    "factorisation_ms": ("factorisation (ms)", style.VERMILLION, "s"),
-    "memory_mb": ("memory for it (MB)", style.PURPLE, "^"),
 }
 TWO = "two threads"  # a method of its own here: the full-order run with two threads
 NAMES = {"fom": "full order", TWO: "full order, two threads", "ecsw": "POD subspace, ecsw"}
@@ -39,37 +34,33 @@ MARKERS = {"fom": "o", TWO: "s", "ecsw": ">"}
         "with one thread and with two, the same with only the local step reduced, and the "
         "hyper-reduced run in a position subspace, whose cost hardly depends on the mesh. Beside "
         "the ends of curves stands the exponent of a fitted power law, where there are three sizes "
-        "of the mesh or more. Below, the time of assembly and factorisation and the memory that "
-        "they take."
+        "of the mesh or more. Assembly and "
+        "factorisation before the first frame are in the table `scaling`."
     ),
     reads=(TableOf("scaling"), TableOf("scaling_fit")),
     options=Scenes,
 )
 def scaling(results: Results, options: Scenes) -> Figure:
-    """Draw a column per scene: above the time of an iteration by phase, below that before it."""
+    """Draw a panel per scene: the time of an iteration, by phase."""
     table = _two_threads_apart(results.table("scaling", COLUMNS))
     fits = _two_threads_apart(results.table("scaling_fit"))
     asked = options.scenes or tuple(dict.fromkeys(table.scene))
     scenes = [scene for scene in asked if (table.scene == scene).any()]
     if not scenes:
         raise NothingToDraw("no mesh sizes")
-    figure = style.new_figure(4.6)
-    times, offline = figure.subplots(
-        2, len(scenes), sharex=True, sharey="row", squeeze=False, height_ratios=(1.7, 1.0)
-    )
-    for ax, lower, scene in zip(times, offline, scenes, strict=True):
+    figure = style.new_figure(2.9)
+    times = figure.subplots(1, len(scenes), sharex=True, sharey=True, squeeze=False)[0]
+    for ax, scene in zip(times, scenes, strict=True):
         rows = table[table.scene == scene].sort_values("vertices")
         _draw_times(ax, rows, fits[fits.scene == scene])
-        _draw_offline(lower, rows[rows.method == "fom"])
         ax.set_title(style.words(scene))
-        lower.set_xlabel("vertices")
+        ax.set_xlabel("vertices")
     sizes = table[table.scene.isin(scenes)].vertices
     times[0].set_xlim(0.75 * sizes.min(), ROOM * sizes.max())
-    for axis in (times[0].xaxis, times[0].yaxis, offline[0].yaxis):  # shared by all panels
+    for axis in (times[0].xaxis, times[0].yaxis):  # shared by all panels
         low, high = np.log10(axis.get_view_interval())
         plain_ticks(axis, high - low)
     times[0].set_ylabel("time of an iteration (ms)")
-    offline[0].set_ylabel("before the first frame\n(ms or MB)")
     _legend(figure, results, list(dict.fromkeys(table.method)))
     return figure
 
@@ -101,15 +92,6 @@ def _draw_times(ax: Axes, rows: pd.DataFrame, fits: pd.DataFrame) -> None:
             )  # fmt: skip
 
 
-def _draw_offline(ax: Axes, rows: pd.DataFrame) -> None:
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    style.grid(ax)
-    for quantity, (label, colour, marker) in OFFLINE.items():
-        shown = rows[rows[quantity] > 0.0]
-        ax.plot(shown.vertices, shown[quantity], color=colour, marker=marker, label=label)
-
-
 def _style(method: str) -> tuple[str, str]:
     colour, marker = style.method_styles([method])[method]
     return COLOURS.get(method, colour), MARKERS.get(method, marker)
@@ -118,5 +100,4 @@ def _style(method: str) -> tuple[str, str]:
 def _legend(figure: Figure, results: Results, methods: list[str]) -> None:
     named = {NAMES.get(m) or results.method_title(m): _style(m) for m in methods}
     lines = [style.handle(label, color="#555555", linestyle=s) for label, s in PHASES.values()]
-    offline = {label: look for label, *look in OFFLINE.values()}
-    style.legend(figure, [*style.handles(named), *lines, *style.handles(offline)], 4)
+    style.legend(figure, [*style.handles(named), *lines], 4)

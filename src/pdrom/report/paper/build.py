@@ -20,8 +20,8 @@ from pdrom.report.paper.bibliography import bibliography
 from pdrom.report.paper.figuretex import captions
 from pdrom.report.paper.known import decisions, provenance
 from pdrom.report.paper.macros import keys_of, macros, number_of
-from pdrom.report.paper.source import whole_source
-from pdrom.report.paper.tex import build_pdf
+from pdrom.report.paper.source import DOCUMENTS, documents
+from pdrom.report.paper.tex import build_pdfs
 from pdrom.report.paper.textables import TEX_TABLES
 from pdrom.report.words.text import replaced
 
@@ -46,26 +46,28 @@ class Facts(BaseModel):
 def write_inputs(
     source: list[str], references: str, tables: list[str], machine: str, facts: Facts, folder: str
 ) -> None:
-    """Write macros.tex, figures.tex, the TeX tables and main.bbl into ``folder``.
+    r"""Write macros.tex, figures.tex, the TeX tables and the bibliographies into ``folder``.
 
     `NUMBERS` says of every ``\val`` key and TeX table where its numbers come from, and which blocks
-    of the text are shown (`decisions`).
+    of each document are shown (`decisions`).
     """
-    text = whole_source(Path(source[0]))
+    texts = documents(Path(source[0]).parent)
+    whole = "".join(texts.values())
     data = {Path(path).stem: read_table(path) for path in tables}
     data |= fact_tables(Path(machine), facts)
-    decided = decisions(text, data)
+    decided = {document: decisions(text, data) for document, text in texts.items()}
     known = provenance(decided, facts.part, facts.full_study)
-    outputs = {"macros.tex": macros(text, data) + known, "figures.tex": captions(facts.captions)}
+    outputs = {"macros.tex": macros(whole, data) + known, "figures.tex": captions(facts.captions)}
     watched = {name: _Watched(data) for name in TEX_TABLES}
     outputs |= {f"{name}.tex": make(watched[name]) for name, make in TEX_TABLES.items()}
+    for document, text in texts.items():
+        outputs[f"{document}.bbl"] = bibliography(text, Path(references))
     origins = {
         "known": decided,
-        "numbers": {key: asdict(number_of(key, data)) for key in keys_of(text)},
+        "numbers": {key: asdict(number_of(key, data)) for key in keys_of(whole)},
         "tables": {name: list(dict.fromkeys(one.read)) for name, one in watched.items()},
     }
     outputs[NUMBERS] = json.dumps(origins, indent=1, allow_nan=False) + "\n"
-    outputs["main.bbl"] = bibliography(text, Path(references))
     for name, content in outputs.items():
         write_text(content, Path(folder) / name)
 
@@ -103,12 +105,18 @@ def _machine_table(path: Path) -> pd.DataFrame:
     return pd.DataFrame([{**row, **words}])
 
 
-def build(source: list[str], figures: list[str], inputs: list[str], facts: Facts, out: str) -> None:
-    """Build the PDF of the manuscript from its figures and what `write_inputs` wrote."""
+def build(
+    source: list[str], figures: list[str], inputs: list[str], facts: Facts, outputs: list[str]
+) -> None:
+    """Build the PDFs of the paper and of its supplement from figures and what `write_inputs` wrote.
+
+    Each links into the other, as long as both lie in one folder.
+    """
     results = [Path(path) for path in (*figures, *inputs)]
     for path in results:
         require_intact(path)
-    build_pdf(Path(source[0]), Path(out), sorted({path.parent for path in results}))
+    made = {Path(text): Path(out) for text, out in zip(source, outputs, strict=False)}
+    build_pdfs(made, sorted({path.parent for path in results}))
 
 
 class _Inputs(Artifact):
@@ -123,17 +131,21 @@ class _Inputs(Artifact):
 
 
 class _Manuscript(Artifact):
-    """A file whose place the configuration decides."""
+    """Files whose place the configuration decides, one for each document."""
 
     def perform(
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
     ) -> None:
-        """Typeset it."""
-        self.function(**self.read(settings, inputs), out=str(outputs["out"]))
+        """Typeset them."""
+        files = [str(outputs[document]) for document in DOCUMENTS]
+        self.function(**self.read(settings, inputs), outputs=files)
 
 
 NUMBERS = "numbers.json"
-FILES = (NUMBERS, "macros.tex", "figures.tex", "main.bbl", *(f"{name}.tex" for name in TEX_TABLES))
+FILES = (
+    NUMBERS, "macros.tex", "figures.tex", *(f"{document}.bbl" for document in DOCUMENTS),
+    *(f"{name}.tex" for name in TEX_TABLES),
+)  # fmt: skip
 paper_inputs = _Inputs(
     "paper_inputs",
     "Numbers, tables and references of the manuscript",

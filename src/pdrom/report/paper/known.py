@@ -65,10 +65,11 @@ def decisions(source: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
     return made
 
 
-def provenance(decided: Sequence[str], part: str | None, full_study: str) -> str:
+def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_study: str) -> str:
     r"""TeX of ``\known`` and ``\row``, of the note, and of what a manuscript of a part says.
 
-    ``\ifpart`` is true where ``part`` names what the study was read from, ``\configuration``.
+    What was decided of the blocks of each document stands under its name, which is TeX's
+    ``\jobname``. ``\ifpart`` is true where ``part`` names what the study was read from, ``\configuration``.
     """
     note = (
         rf"The full study (\texttt{{{escape(full_study)}}}) holds the numbers of sentences that "
@@ -86,13 +87,15 @@ def provenance(decided: Sequence[str], part: str | None, full_study: str) -> str
         r"\let\known@shown\@firstofone",
         rf"\newcommand{{\known@noted}}[1]{{\textcolor{{okgrey}}{{[{note}]}}}}",
         r"\let\known@dropped\@gobble",
-        r"\newcommand{\known}[1]{\stepcounter{known}\csname known@\arabic{known}\endcsname{#1}}",
+        r"\newcommand{\known@next}{\csname known@\jobname @\arabic{known}\endcsname}",
+        r"\newcommand{\known}[1]{\stepcounter{known}\known@next{#1}}",
         # a row that is left out must not open a cell
-        r"\newcommand{\row}[1]{\noalign{\stepcounter{known}}"
-        r"\csname known@\arabic{known}\endcsname{#1}}",
+        r"\newcommand{\row}[1]{\noalign{\stepcounter{known}}\known@next{#1}}",
     ]
-    for number, decision in enumerate(decided, start=1):
-        lines.append(rf"\expandafter\let\csname known@{number}\endcsname\known@{decision}")
+    for document, made in decided.items():
+        for number, decision in enumerate(made, start=1):
+            name = f"known@{document}@{number}"
+            lines.append(rf"\expandafter\let\csname {name}\endcsname\known@{decision}")
     return "\n".join([*lines, r"\makeatother"]) + "\n"
 
 

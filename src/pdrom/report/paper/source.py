@@ -1,32 +1,47 @@
-r"""The manuscript's source: ``main.tex`` and, in a folder beside it, a file for each section."""
+r"""The manuscript's source: two documents, the paper and its supplement, with a file a section."""
 
 import re
 from pathlib import Path
 
 from pdrom.core.errors import PaperError
 
-_SECTION = re.compile(r"\\input\{(sections/[^{}]*\.tex)\}")
+DOCUMENTS = ("main", "supplement")
+_PART = re.compile(r"\\input\{((?:sections/|supplement/|preamble)[^{}]*\.tex)\}")
 
 
-def whole_source(main: Path) -> str:
-    r"""Text of ``main`` with its sections in place of their ``\input{sections/NAME.tex}``.
+def whole_source(document: Path) -> str:
+    r"""Text of a document with preamble and sections in place of their ``\input``.
 
     Raises
     ------
     PaperError
-        A section that has no file.
+        A part that has no file.
     """
 
-    def section(match: re.Match[str]) -> str:
-        path = main.parent / match[1]
+    def part(match: re.Match[str]) -> str:
+        path = document.parent / match[1]
         if not path.is_file():
-            raise PaperError(f"{main}: no file {path}")
+            raise PaperError(f"{document}: no file {path}")
         return path.read_text(encoding="utf-8")
 
-    return _SECTION.sub(section, main.read_text(encoding="utf-8"))
+    return _PART.sub(part, document.read_text(encoding="utf-8"))
+
+
+def documents(folder: Path) -> dict[str, str]:
+    """Whole source of each document of the manuscript in ``folder``, by its name.
+
+    Raises
+    ------
+    PaperError
+        A part that has no file.
+    """
+    return {name: whole_source(folder / f"{name}.tex") for name in DOCUMENTS}
 
 
 def source_files(root: Path) -> list[str]:
-    """Files of the source below ``root``, the main one first."""
-    sections = sorted((root / "paper" / "sections").glob("*.tex"))
-    return ["paper/main.tex", *(path.relative_to(root).as_posix() for path in sections)]
+    """Files of the source below ``root``, the documents first."""
+    folder = root / "paper"
+    files = [folder / f"{name}.tex" for name in (*DOCUMENTS, "preamble")]
+    for below in ("sections", "supplement"):
+        files += sorted((folder / below).glob("*.tex"))
+    return [path.relative_to(root).as_posix() for path in files]

@@ -1,4 +1,4 @@
-"""Building the PDF with a system TeX that has the packages, else with the pip-installed one."""
+"""Building PDFs with a system TeX that has the packages, else with the pip-installed one."""
 
 import logging
 import os
@@ -8,11 +8,13 @@ import stat
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
 from pdrom.core.errors import PaperError
 from pdrom.core.store import atomic_path
+from pdrom.report.paper.source import whole_source
 
 log = logging.getLogger(__name__)
 
@@ -73,11 +75,12 @@ def _tinytex(scratch: Path) -> Path:
     return copy
 
 
-def build_pdf(source: Path, output: Path, search: list[Path]) -> None:
-    """Compile ``source`` until its references are stable and move the PDF to ``output``.
+def build_pdfs(documents: Mapping[Path, Path], search: list[Path]) -> None:
+    """Compile sources until their references, to each other too, are stable, and move the PDFs.
 
     Parameters
     ----------
+    documents : PDF of each source; the sources lie in one folder
     search : folders in which \\input and \\includegraphics look, beside the source's own
 
     Raises
@@ -85,24 +88,32 @@ def build_pdf(source: Path, output: Path, search: list[Path]) -> None:
     PaperError
         With the first TeX error, undefined references and citations, or a box that leaves the page.
     """
-    text = source.read_text(encoding="utf-8")
+    sources = list(documents)
+    packages = packages_of("".join(map(whole_source, sources)))
     with tempfile.TemporaryDirectory(prefix="pdrom-tex-") as folder:
         scratch = Path(folder)
-        pdflatex = find_pdflatex(packages_of(text), scratch)
+        pdflatex = find_pdflatex(packages, scratch)
         log.info("TeX: %s", pdflatex.name)
         job = scratch / "job"
         job.mkdir()
-        environment = _environment([source.parent, *search])
-        previous = ""
+        environment = _environment([sources[0].parent, *search])
+        previous: list[str] = []
         for _ in range(MAX_RUNS):
-            _run(pdflatex, source, job, environment)
-            current = (job / f"{source.stem}.aux").read_text(encoding="utf-8", errors="replace")
+            for source in sources:
+                _run(pdflatex, source, job, environment)
+            current = [_auxiliary(job / f"{source.stem}.aux") for source in sources]
             if current == previous:
                 break
             previous = current
-        _check_log(job / f"{source.stem}.log", source)
-        with atomic_path(output) as temporary:
-            shutil.copyfile(job / f"{source.stem}.pdf", temporary)
+        for source in sources:
+            _check_log(job / f"{source.stem}.log", source)
+        for source, output in documents.items():
+            with atomic_path(output) as temporary:
+                shutil.copyfile(job / f"{source.stem}.pdf", temporary)
+
+
+def _auxiliary(path: Path) -> str:
+    return path.read_text(encoding="utf-8", errors="replace")
 
 
 def _environment(search: list[Path]) -> dict[str, str]:

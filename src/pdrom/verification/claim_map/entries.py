@@ -47,7 +47,7 @@ class Entry:
 
 def entries(root: Path = Path()) -> list[Entry]:
     """Claims, figures (those of the preprint first), tables, sections and the manuscript."""
-    return [*_claims(root), *_figures(), *_tables(), *_sections(root), _manuscript()]
+    return [*_claims(root), *_figures(), *_tables(), *_sections(root), *_manuscript()]
 
 
 def table_words(name: str) -> str:
@@ -99,7 +99,7 @@ def _sections(root: Path) -> Iterator[Entry]:
             yield Entry(
                 kind="section",
                 name=Path(path).stem,
-                title=found[1] if found else "Abstract",
+                title=_section(found[1] if found else "Abstract", Path(path)),
                 rule="paper_inputs",
                 files=tuple(TABLE.at(RESULTS, name=name) for name in held),
                 words=tuple(map(table_words, held)),
@@ -107,6 +107,10 @@ def _sections(root: Path) -> Iterator[Entry]:
             )
 
 
-def _manuscript() -> Entry:
-    file = Folders().manuscript
-    return Entry("manuscript", file, "The manuscript and all of the above", "paper", (file,), ())
+def _section(title: str, path: Path) -> str:
+    return f"{title} (supplement)" if path.parent.name == "supplement" else title
+
+
+def _manuscript() -> Iterator[Entry]:
+    for file in Folders().documents.values():
+        yield Entry("manuscript", file, "The manuscript and all of the above", "paper", (file,), ())

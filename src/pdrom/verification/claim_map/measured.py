@@ -67,7 +67,7 @@ def claim_map(
 
 
 def _files(entry: Entry, folders: Folders) -> list[str]:
-    own = {Folders().manuscript: folders.manuscript}
+    own = dict(zip(Folders().documents.values(), folders.documents.values(), strict=True))
     return [own.get(f, folders.results + f.removeprefix(RESULTS)) for f in entry.files]
 
 

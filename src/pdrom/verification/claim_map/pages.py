@@ -29,7 +29,7 @@ Every run of a whole study writes `results/claim_map.csv` (other configurations:
 (`minutes`) and of the last job (`minutes_alone`), the largest memory and the disk (MB).
 
 * Verdicts are the expected ones of the full study.
-* A dash: the figure is not in that document.
+* A number with S is one of the supplement. A dash: the figure is not in that document.
 * **columns**: the number of columns of each kind, which says how exactly `./reproduce verify`
   expects them ([how](verification.md)).
 * A figure is reproduced when the tables that it reads are, a claim when its verdict is the same.
@@ -73,7 +73,7 @@ def _page(listed: list[Entry], numbers: Mapping[str, Numbers], verdicts: Verdict
         "## Figures\n",
         section(
             "figure",
-            "| figure | main.pdf | preprint | command |",
+            "| figure | paper | preprint | command |",
             lambda e: (f"[{e.name}](figures.md)", *_places(numbers[e.name]), _command(e)),
         ),
         "## Tables\n",
@@ -112,7 +112,7 @@ def _short(listed: list[Entry], numbers: Mapping[str, Numbers], verdicts: Verdic
 
 
 def _places(numbers: Numbers) -> tuple[str, str]:
-    return str(numbers.manuscript or UNKNOWN), str(numbers.preprint or UNKNOWN)
+    return numbers.manuscript or UNKNOWN, str(numbers.preprint or UNKNOWN)
 
 
 def _tolerances(table: Table) -> str:

@@ -1,4 +1,4 @@
-"""Reconstruction error against the basis size, on well-posed scenes."""
+"""Reconstruction error against the basis size, on the scenes that the paper leaves out."""
 
 from pdrom.report.figures.kit.artists import Figure
 from pdrom.report.figures.kit.declaration import figure
@@ -8,14 +8,14 @@ from pdrom.report.figures.kit.results import Results
 
 
 @figure(
-    title="Reconstruction error of the well-posed scenes",
+    title="Reconstruction error of further scenes",
     caption=(
-        "As the figure for the preprint's scenes, for scenes whose motion is not decided by "
-        "round-off: horizontal sheets held on one side, and a sheet with a curved rest shape."
+        "As the figure of the paper, for the other scenes of the preprint and, last, for sheets "
+        "whose motion is not decided by round-off."
     ),
     reads=READS,
     options=Reconstruction,
 )
-def reconstruction_error_sound(results: Results, options: Reconstruction) -> Figure:
+def reconstruction_error_others(results: Results, options: Reconstruction) -> Figure:
     """Draw errors of reconstructed snapshots, see `draw_reconstruction`."""
     return draw_reconstruction(results, options)

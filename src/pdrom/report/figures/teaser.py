@@ -1,0 +1,112 @@
+"""The preprint's reduction, what mends it and what pays, in one scene at one instant."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from pdrom.artifact.reads import Chosen, TableOf
+from pdrom.core.paths import FULL_ORDER, SUBSPACES
+from pdrom.core.store import open_hdf5
+from pdrom.report.figures.kit import style
+from pdrom.report.figures.kit.artists import Figure
+from pdrom.report.figures.kit.declaration import figure
+from pdrom.report.figures.kit.experiment_rows import RUNS, experiment_rows
+from pdrom.report.figures.kit.floor import Floors
+from pdrom.report.figures.kit.options import ReducedRuns
+from pdrom.report.figures.kit.panels import RunPanel
+from pdrom.report.figures.kit.read import frame_numbers, positions_at
+from pdrom.report.figures.kit.results import NothingToDraw, Results, asked
+from pdrom.report.figures.kit.run_rows import Row, draw_rows
+
+COLUMNS = ["scene", "group", "method", "position_basis", "k", "r", "relative_error_within_horizon"]
+TOLERANCE = "ecsw-1e-02"
+
+
+class Options(ReducedRuns):
+    """Choices."""
+
+    modes: int = 20
+
+
+@figure(
+    title="The released bar under five reductions",
+    caption=(
+        "One instant of the motion that trained all of them. `deim-joint` is the preprint's "
+        "method: joint rows, a system for each axis. `deim` samples single entries, `block-deim` "
+        "whole elements, `gappy` three elements a mode, all with shared coefficients. `ecsw` "
+        "reduces positions and sums sampled elements with non-negative weights. $r$ and $k$ are "
+        "numbers of modes, errors are relative to the motion; the outline is the full order. "
+        "A framed picture is drawn to the smaller scale given below it."
+    ),
+    reads=(*RUNS, Chosen(SUBSPACES), TableOf("reduced_reruns")),
+    options=Options,
+)
+def teaser(results: Results, options: Options) -> Figure:
+    """Draw a row per experiment: the full order, a panel per method, a sampled subspace."""
+    experiments, floors = results.experiments(options), Floors(results)
+    if not experiments or not results.methods(options):
+        raise NothingToDraw(asked(options))
+    errors = results.table("reduced_reruns", COLUMNS)
+    rows = [
+        _merged(results, options, experiment_rows(results, options, floors, *each), errors, each)
+        for each in experiments
+    ]
+    return draw_rows(rows, options.camera)
+
+
+def _merged(
+    results: Results,
+    options: Options,
+    rows: list[Row],
+    errors: pd.DataFrame,
+    experiment: tuple[str, str],
+) -> Row:
+    """Rows of an experiment as one, its panels named by their methods."""
+    scene, group = experiment
+    first = rows[0]
+    panels = first.panels[:1]
+    if first.note is None:
+        own = errors[(errors.scene == scene) & (errors.group == group)]
+        for method, row in zip(results.methods(options), rows, strict=True):
+            found = own[(own.method == method) & (own.position_basis == "full")]
+            panels += [_with_error(p, method, found, p.title, "r") for p in row.panels[1:]]
+    subspace = _subspace(results, options, scene, first.panels[0])
+    if subspace is not None:
+        found = errors[(errors.scene == scene) & (errors.position_basis == "pod")]
+        found = found[found.method == TOLERANCE]
+        panels.append(_with_error(subspace, "ecsw", found, subspace.title, "k"))
+    label = f"{results.experiment_title(scene, group)}\n{first.label.splitlines()[-1]}"
+    ghosts = np.repeat(first.ghosts[:1], len(panels), axis=0)
+    windows = first.windows[:1] * len(panels)
+    return replace(first, label=label, panels=panels, windows=windows, ghosts=ghosts)
+
+
+def _with_error(
+    panel: RunPanel, method: str, rows: pd.DataFrame, title: str, size: str
+) -> RunPanel:
+    """A panel with its method in the title, and its error before the horizon below."""
+    number = int(title.split()[2])
+    error = rows[rows[size] == number].relative_error_within_horizon.dropna()
+    remark = f"error {error.iloc[0]:.2g}" if len(error) else panel.remark
+    return replace(panel, title=f"{method}, {size} = {number}", remark=remark)
+
+
+def _subspace(
+    results: Results, options: Options, scene: str, reference: RunPanel
+) -> RunPanel | None:
+    """Panel of the run with sampled elements; None where a configuration has none of that size."""
+    path = results.path(SUBSPACES, scene)
+    base = f"pod_k{options.modes:03d}"
+    if not Path(path).is_file():
+        return None
+    frames, _ = positions_at(results.path(FULL_ORDER, scene), options.frames[-1:])
+    with open_hdf5(path) as file:
+        run = file["models"].get(f"{base}_{TOLERANCE}")
+        if run is None:
+            return None
+        coordinates = run["train"]["coordinates"][frames[0]]
+        positions = file["columns"][base]["B"][...] @ coordinates
+    colour = style.surface_colour(style.GREEN)
+    return RunPanel(f"k = {options.modes}", colour, positions).seen_by(options.camera)
