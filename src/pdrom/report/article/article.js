@@ -42,7 +42,7 @@ function same(cell, value) {
 function matching(table, key) {
   const { filters } = asked(key), places = filters.map((filter) => table.head.indexOf(filter[0]));
   return table.rows.map((_, i) => i).filter((i) => filters.every(([, sign, value], f) =>
-    same(table.rows[i][places[f]] ?? "", value) === (sign === "=")));
+    same(filters[f][0] === "row" ? String(i + 1) : table.rows[i][places[f]] ?? "", value) === (sign === "=")));
 }
 
 async function unpacked(base64) {
@@ -78,8 +78,9 @@ async function showTable(name) {
     $("asked").textContent = column || places.length
       ? `${take ? `The ${take} of ` : ""}${column ?? "All"} ${places.length ? `where ${places.join(", ")}` : "over all rows"}.` : "";
     $("every").hidden = !location.hash;
-    for (const row of $("columns").querySelectorAll("tr[data-column]")) row.classList.toggle("asked", row.dataset.column === column);
-    $("columns").open = column !== null;
+    const about = column === null ? null : $("columns").querySelector(`tr[data-column="${column}"]`);
+    const [meaning, unit, kind, tolerance] = [...(about?.cells ?? [])].slice(1).map((cell) => cell.textContent);
+    $("column").textContent = about ? `${column}: ${meaning}${unit && `, ${unit}`}. Compared as ${kind}; tolerance: ${tolerance}.` : "";
     show();
   };
   const show = () => {

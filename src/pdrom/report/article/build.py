@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from pdrom.artifact.artifact import Artifact
 from pdrom.artifact.reads import Given, ProjectFile, Setting
 from pdrom.core.paths import ARTICLE
@@ -62,22 +64,23 @@ def write_article(
     """
     made = {Path(path).name: path for path in inputs}
     origins = Origins(**json.loads(read_text(made[NUMBERS])))
-    csv = contents(tables, fact_tables(Path(machine), facts))
+    known = fact_tables(Path(machine), facts)
+    csv = contents(tables, known)
+    known |= {Path(path).stem: read_table(path) for path in tables}
     for name, content in csv.items():
         text = table_page(name, content, assets["table"].read_text("utf-8"))
         write_text(text, outputs[f"table_{name}"])
     plain = assets["plain"].read_text("utf-8")
     write_text(list_page(sorted(csv), plain), outputs["tables"])
-    frames = {Path(path).stem: path for path in tables}
-    rules = load_claims(claims)
-    tests, verdicts = (read_table(frames[name]) for name in ("claims_tests", "claims"))
-    write_text(claims_page(rules, tests, verdicts, plain), outputs["claims"])
     for name in ("style", "script"):
         write_text(assets[name].read_text("utf-8"), outputs[name])
     texts = documents(Path(source[0]).parent)
     pages = _figure_pages(texts)
     sizes = _write_figures(figures, outputs)
-    files = _linked_inputs(made, origins)
+    rules = load_claims(claims)
+    found = claims_page(rules, known["claims_tests"], known["claims"], pages, plain)
+    write_text(found, outputs["claims"])
+    files = _linked_inputs(made, origins, known)
     labels: dict[str, tuple[str, str]] = {}
     trees: dict[str, Tree] = {}
     for stem, text in texts.items():
@@ -119,15 +122,15 @@ def _write_figures(
     return found
 
 
-def _linked_inputs(made: Mapping[str, str], origins: Origins) -> dict[str, str]:
+def _linked_inputs(
+    made: Mapping[str, str], origins: Origins, tables: Mapping[str, pd.DataFrame]
+) -> dict[str, str]:
     """TeX tables by file name, their numbers with links to rows."""
-    known = {name: table.column_names for name, table in declared().items()}
-    facts = {"scenes": ("scene",), "methods": ("method",)}
     return {
         f"{name}.tex": linked_table(
-            read_text(made[f"{name}.tex"]), origin, lambda table: {**facts, **known}.get(table, ())
+            read_text(made[f"{name}.tex"]), {table: tables[table] for table in read}
         )
-        for name, origin in origins.tables.items()
+        for name, read in origins.tables.items()
     }
 
 

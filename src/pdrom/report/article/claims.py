@@ -6,7 +6,6 @@ from html import escape
 import pandas as pd
 
 from pdrom.report.article.tables import argument
-from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.live.page import filled
 from pdrom.tables.claims.metrics import METRICS
 from pdrom.tables.claims.rules import ClaimRule, TestRule
@@ -15,20 +14,32 @@ PARTS = {"published": "As published", "beyond": "Beyond"}
 
 
 def claims_page(
-    claims: Mapping[str, ClaimRule], tests: pd.DataFrame, verdicts: pd.DataFrame, template: str
+    claims: Mapping[str, ClaimRule],
+    tests: pd.DataFrame,
+    verdicts: pd.DataFrame,
+    pages: Mapping[str, str],
+    template: str,
 ) -> str:
-    """HTML of all claims; ``tests`` and ``verdicts`` are the tables claims_tests and claims."""
+    """HTML of all claims.
+
+    Parameters
+    ----------
+    tests, verdicts : the tables claims_tests and claims
+    pages : of the figures by their names
+    """
     found = verdicts.set_index("claim")
     body = "".join(
-        _claim(name, rule, tests[tests.claim == name], found.loc[name])
+        _claim(name, rule, tests[tests.claim == name], found.loc[name], pages)
         for name, rule in claims.items()
     )
     return filled(template, {"TITLE": "Claims", "BODY": body})
 
 
-def _claim(name: str, rule: ClaimRule, tests: pd.DataFrame, verdict: pd.Series) -> str:
+def _claim(
+    name: str, rule: ClaimRule, tests: pd.DataFrame, verdict: pd.Series, pages: Mapping[str, str]
+) -> str:
     shown = rule.figure_or_table
-    place = f"index.html#fig:{shown}" if shown in declarations() else f"tables/{shown}.html"
+    place = f"{pages[shown]}#fig:{shown}" if shown in pages else f"tables/{shown}.html"
     history = "".join(
         f"<li>{c.date} ({'results were known' if c.after_data else 'before any result'}): "
         f"{escape(c.reason)}</li>"

@@ -5,9 +5,11 @@ Whatever the source reads or decides when TeX runs is put in its place here: ``\
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+import pandas as pd
 
 from pdrom.report.paper.build import Facts
 from pdrom.report.paper.known import SHOWN, closing, sentences
@@ -22,10 +24,14 @@ _FIGURE = re.compile(r"\\figureof\{(\w+)\}")
 _PART = re.compile(
     r"\\ifpart(?![A-Za-z])(.*?)(?:\\else(?![A-Za-z])(.*?))?\\fi(?![A-Za-z])", re.DOTALL
 )
-_DROPPED = re.compile(r"\\(?:tableofcontents|input\{\w+\.bbl\}|renewcommand\{.*)")
+_DROPPED = re.compile(
+    r"\\(?:tableofcontents|renewcommand\{.*)|(?:\{\\\w+\s*)?\\input\{\w+\.bbl\}\}?"
+)
 _HEAD = re.compile(r"\\endfirsthead.*?\\endhead\n", re.DOTALL)
 _SPEC = re.compile(r"\\(?:begin\{(?:tabular|longtable)\}|multicolumn\{\d+\})(?=\{)")
 _NUMBER = re.compile(r"(?:[^A-Za-z]|\\(?:ensuremath|cdot|infty|,|times)(?![A-Za-z]))*\d[^A-Za-z]*")
+_TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)(\)?)$")  # of "holds (20/20)", of "blow-up, 34"
+END = r" \\"
 # Of a preamble, pandoc reads short definitions; those that lay a page out are replaced.
 _SHORT = re.compile(r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile)\w+\}.*\}|newtheorem.*)$")
 REPLACED = r"""
@@ -110,37 +116,35 @@ def _plain_mathematics(text: str) -> str:
     return _ENSURED.sub(r"$\1$", text)
 
 
-def linked_table(text: str, tables: Sequence[str], columns: Callable[[str], Sequence[str]]) -> str:
+def linked_table(text: str, tables: Mapping[str, pd.DataFrame]) -> str:
     """Return a made TeX table whose numbers are links to the rows that they come from.
 
     Those rows are the ones of the first of ``tables`` that has a column of the name of the made
-    table's first one; they agree with its row in every column that both have.
-
-    Parameters
-    ----------
-    columns : names of the columns of a table of the study
+    table's first one; they agree with its row in every column that both have. Where there is no
+    such column, and each row of the first table has made a row, it is that row.
     """
     text = _HEAD.sub("", text).replace("\\captionrow\n", "").replace("longtable", "tabular")
-    text = text.replace(r"\noalign{\smallskip}", "")
-    lines = text.split("\n")
-    header = next(line for line in lines if line.endswith(r" \\")).removesuffix(r" \\").split(" & ")
-    origin = next((name for name in tables if header[0] in columns(name)), tables[0])
-    shared = [i for i, title in enumerate(header) if title in columns(origin)]
-    made, head = [], True
-    for line in lines:
-        cells = line.removesuffix(r" \\").split(" & ")
-        if not line.endswith(r" \\") or head or len(cells) != len(header):
-            head = head and not line.endswith(r" \\")
-            made.append(_plain_mathematics(line))
-            continue
-        key = "|".join([origin, *(f"{header[i]}={_plain(cells[i])}" for i in shared if cells[i])])
-        made.append(
-            " & ".join(
-                _link(key, c) if _NUMBER.fullmatch(c) else _plain_mathematics(c) for c in cells
-            )
-            + r" \\"
-        )
-    return plain_columns("\n".join(made))
+    lines = text.replace(r"\noalign{\smallskip}", "").split("\n")
+    split = [line.removesuffix(END).split(" & ") if line.endswith(END) else [] for line in lines]
+    first = next(place for place, cells in enumerate(split) if cells)
+    header = split[first]
+    body = [n for n, cells in enumerate(split) if n > first and len(cells) == len(header)]
+    origin = next((name for name in tables if header[0] in tables[name]), next(iter(tables)))
+    shared = [i for i, title in enumerate(header) if title in tables[origin]]
+    for row, line in enumerate(body, 1):
+        own = [f"{header[i]}={_plain(split[line][i])}" for i in shared if split[line][i]]
+        if not shared and len(body) == len(tables[origin]):
+            own = [f"row={row}"]
+        key = "|".join([origin, *own])
+        lines[line] = " & ".join(_linked_cell(cell, key) for cell in split[line]) + END
+    return plain_columns("\n".join(map(_plain_mathematics, lines)))
+
+
+def _linked_cell(cell: str, key: str) -> str:
+    """A cell whose number, or the one at its end behind words, is a link."""
+    if _NUMBER.fullmatch(cell):
+        return _link(key, cell)
+    return _TAIL.sub(lambda found: found[1] + _link(key, found[2]) + found[3], cell)
 
 
 def _plain(cell: str) -> str:

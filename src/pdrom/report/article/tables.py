@@ -14,6 +14,7 @@ from pdrom.report.live.page import filled
 from pdrom.tables import declared
 from pdrom.tables.kit.quantities import QUANTITIES
 
+NOT_JUDGED = ("timed", "skipped")
 FACTS = {
     "study": "Settings of the study that its text states",
     "methods": "Methods of the configuration",
@@ -30,7 +31,7 @@ def table_page(name: str, csv: bytes, template: str) -> str:
     )
     columns = "".join(
         f"<tr data-column='{escape(column)}'><th scope=row>{escape(column)}</th><td>{escape(meaning)}</td>"
-        f"<td>{escape(unit)}</td><td>{kind}: {escape(QUANTITIES[kind])}</td><td>{within:g}</td></tr>"
+        f"<td>{escape(unit)}</td><td>{kind}: {escape(QUANTITIES[kind])}</td><td>{'not judged' if kind in NOT_JUDGED else f'{within:g}'}</td></tr>"
         for column, (meaning, unit, kind, within) in kinds.items()
     )
     packed = gzip.compress(csv, 9, mtime=0)

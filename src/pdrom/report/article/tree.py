@@ -120,9 +120,10 @@ def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> 
             number = labels.next("figure", content[0][0])
             return shown(name, _captioned(node, f"Figure {number}. ", 1))
         if kind == "Div" and content[1] and content[1][0]["t"] == "Table":
-            table = _captioned(content[1][0], f"Table {labels.next('table', content[0][0])}. ", 1)
-            region = {"role": "region", "tabindex": "0", "aria_label": plain(table["c"][1])[:80]}
-            return {"t": "Div", "c": [attributes(content[0][0], "scroll", **region), [table]]}
+            return _table(content[0][0], content[1][0], labels)
+        if kind == "Div" and content[0][0] == "refs":
+            title = {"t": "Header", "c": [1, attributes("references"), words("References")]}
+            return [title, node]
         if kind == "Div" and (which := {"theorem", "proposition"} & set(content[0][1])):
             labels.next(which.pop(), content[0][0])
         if kind == "Math" and (found := _EQUATION.search(content[1])):
@@ -130,6 +131,16 @@ def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> 
         return None
 
     return changed(tree, visit)
+
+
+def _table(label: str, node: Node, labels: Labels) -> Node:
+    """A table that scrolls, below its caption, which does not."""
+    content = _captioned(node, f"Table {labels.next('table', label)}. ", 1)["c"]
+    caption = {"t": "Div", "c": [attributes("", "caption"), content[1][1]]}
+    region = {"role": "region", "tabindex": "0", "aria_label": plain(content[1])[:80]}
+    table = {"t": "Table", "c": [content[0], [None, []], *content[2:]]}
+    scroll = {"t": "Div", "c": [attributes("", "scroll", **region), [table]]}
+    return {"t": "Div", "c": [attributes(label), [caption, scroll]]}
 
 
 def _captioned(node: Node, opening: str, place: int) -> Node:
@@ -155,8 +166,9 @@ def _equation(node: Node, kind: str, labels: Labels) -> Node:
         }
         for label in found
     ]
+    numbers = {"t": "Span", "c": [attributes("", "numbers"), marks]}
     math = {"t": "Math", "c": [node["c"][0], _LABEL.sub("", tex)]}
-    return {"t": "Span", "c": [attributes("", "equation"), [math, *marks]]}
+    return {"t": "Span", "c": [attributes("", "equation"), [math, numbers]]}
 
 
 def resolved(tree: Tree, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Tree:
@@ -217,4 +229,5 @@ def address_of(key: str) -> str:
     """Address of the rows that a key names (`pdrom.report.paper.macros`) on the table's page."""
     table, _, rows = key.partition("|")
     signs = {"%": "%25", " ": "%20", '"': "%22", "<": "%3C", ">": "%3E", "#": "%23"}
-    return f"tables/{table}.html#{''.join(signs.get(sign, sign) for sign in rows)}"
+    place = "".join(signs.get(sign, sign) for sign in rows)
+    return f"tables/{table}.html" + (f"#{place}" if place else "")
