@@ -107,7 +107,7 @@ def own_files(plan: Plan, folders: Folders) -> set[str]:
     return {
         *folders.documents.values(), *plan.paper.files, *plan.table_paths,
         *plan.figures, *(job.png for job in plan.figure_jobs.values()),
-        *plan.measured, *plan.page.outputs.values(),
+        *plan.measured, *plan.page.outputs.values(), *plan.paper.article.outputs.values(),
     }  # fmt: skip
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pdrom.artifact.reads import Paths
+from pdrom.artifact.reads import Paths, ProjectFile
 from pdrom.core.paths import MACHINE, TABLE
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.pipeline.figures import FigureJob
@@ -12,6 +12,7 @@ from pdrom.pipeline.fingerprint import digest, fingerprint
 from pdrom.pipeline.full import FULL_STUDY, is_full
 from pdrom.pipeline.resolve import Job, listed
 from pdrom.pipeline.study import Study
+from pdrom.report.article.build import article
 from pdrom.report.paper.build import Facts, paper, paper_inputs
 from pdrom.report.paper.source import source_files
 from pdrom.report.words.text import require_typeset
@@ -24,10 +25,11 @@ REFERENCES = "paper/references.bib"
 
 @dataclass(frozen=True)
 class PaperJobs:
-    """The manuscript: the job of the files that its source reads, and its own."""
+    """The manuscript: the job of the files that its source reads, its own, that of its pages."""
 
     inputs: Job
     manuscript: Job
+    article: Job
 
     @property
     def files(self) -> list[str]:
@@ -83,7 +85,22 @@ def paper_jobs(
     pictures = [figure.pdf for figure in figures.values()]
     read = {"source": sources, "inputs": list(made.values()), "figures": pictures}
     content = digest(study.root, *sources)
-    return PaperJobs(inputs, Job(paper, {}, read, documents, settings, content, code))
+    manuscript = Job(paper, {}, read, documents, settings, content, code)
+    given = {
+        **inputs.inputs,
+        **read,
+        "figures": [f for one in figures.values() for f in (one.pdf, one.png)],
+    }
+    return PaperJobs(inputs, manuscript, _article(study, given, settings, results))
+
+
+def _article(study: Study, given: Mapping[str, Paths], settings: Row, results: str) -> Job:
+    """The manuscript as pages; ``given`` is what the plan names of its inputs."""
+    edited = {name: r.path for name, r in article.files.items() if isinstance(r, ProjectFile)}
+    places = {name: place.at(results) for name, place in article.writes.items()}
+    content = digest(study.root, *listed(given["source"]), REFERENCES, *edited.values())
+    read = {**given, **edited}
+    return Job(article, {}, read, places, settings, content, fingerprint(article.module))
 
 
 def check_texts(study: Study) -> None:

@@ -145,7 +145,7 @@ class Plan:
         return {
             "tables": [self.job(table) for table in self.tables.values()],
             "figures": [figure.job for figure in self.figure_jobs.values()],
-            "article": [self.page],
+            "article": [self.page, self.paper.article],
             "paper": [self.paper.inputs, self.paper.manuscript],
         }
 

@@ -50,6 +50,8 @@ def rules(plan: Plan, cores: int) -> Iterator[Rule]:
     files = paper.manuscript.outputs
     shown = {document: {"category": "Manuscript"} for document in files}
     yield _fixed(plan, paper.manuscript, "paper", f"Manuscript {', '.join(files.values())}", shown)
+    pages = paper.article
+    yield _fixed(plan, pages, "article", pages.artifact.title, {"main": {"category": "Page"}})
 
 
 def _experiment(plan: Plan, experiment: Experiment, cores: int) -> Rule:

@@ -1,6 +1,8 @@
 """Rules of the manuscript: tables -> macros, TeX tables, bibliography -> PDF."""
 
+import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,7 @@ from pdrom.core.yamlfile import describe
 from pdrom.report.paper.bibliography import bibliography
 from pdrom.report.paper.figuretex import captions
 from pdrom.report.paper.known import decisions, provenance
-from pdrom.report.paper.macros import macros
+from pdrom.report.paper.macros import keys_of, macros, number_of
 from pdrom.report.paper.source import DOCUMENTS, documents
 from pdrom.report.paper.tex import build_pdfs
 from pdrom.report.paper.textables import TEX_TABLES
@@ -46,22 +48,48 @@ class Facts(BaseModel):
 def write_inputs(
     source: list[str], references: str, tables: list[str], machine: str, facts: Facts, folder: str
 ) -> None:
-    """Write macros.tex, figures.tex, the TeX tables and the bibliographies into ``folder``."""
+    r"""Write macros.tex, figures.tex, the TeX tables and the bibliographies into ``folder``.
+
+    `NUMBERS` says of every ``\val`` key and TeX table where its numbers come from, and which blocks
+    of each document are shown (`decisions`).
+    """
     texts = documents(Path(source[0]).parent)
+    whole = "".join(texts.values())
     data = {Path(path).stem: read_table(path) for path in tables}
-    data |= {name: pd.DataFrame(rows) for name, rows in facts.tables.items()}
-    data["machine"] = _machine_table(Path(machine))
+    data |= fact_tables(Path(machine), facts)
     decided = {document: decisions(text, data) for document, text in texts.items()}
     known = provenance(decided, facts.part, facts.full_study)
-    outputs = {
-        "macros.tex": macros("".join(texts.values()), data) + known,
-        "figures.tex": captions(facts.captions),
-    }
-    outputs |= {f"{name}.tex": make(data) for name, make in TEX_TABLES.items()}
+    outputs = {"macros.tex": macros(whole, data) + known, "figures.tex": captions(facts.captions)}
+    watched = {name: _Watched(data) for name in TEX_TABLES}
+    outputs |= {f"{name}.tex": make(watched[name]) for name, make in TEX_TABLES.items()}
     for document, text in texts.items():
         outputs[f"{document}.bbl"] = bibliography(text, Path(references))
+    origins = {
+        "known": decided,
+        "numbers": {key: asdict(number_of(key, data)) for key in keys_of(whole)},
+        "tables": {name: list(dict.fromkeys(one.read)) for name, one in watched.items()},
+    }
+    outputs[NUMBERS] = json.dumps(origins, indent=1, allow_nan=False) + "\n"
     for name, content in outputs.items():
         write_text(content, Path(folder) / name)
+
+
+class _Watched(dict[str, pd.DataFrame]):
+    """Tables by name, which note those that are read."""
+
+    def __init__(self, tables: Mapping[str, pd.DataFrame]) -> None:
+        super().__init__(tables)
+        self.read: list[str] = []
+
+    def __getitem__(self, name: str) -> pd.DataFrame:
+        self.read.append(name)
+        return super().__getitem__(name)
+
+
+def fact_tables(machine: Path, facts: Facts) -> dict[str, pd.DataFrame]:
+    """Tables of the manuscript that are no results: of the configuration, and ``machine``."""
+    tables = {name: pd.DataFrame(rows) for name, rows in facts.tables.items()}
+    return {**tables, "machine": _machine_table(machine)}
 
 
 def _machine_table(path: Path) -> pd.DataFrame:
@@ -117,8 +145,9 @@ class _Manuscript(Artifact):
         self.function(**self.read(settings, inputs), outputs=files)
 
 
+NUMBERS = "numbers.json"
 FILES = (
-    "macros.tex", "figures.tex", *(f"{document}.bbl" for document in DOCUMENTS),
+    NUMBERS, "macros.tex", "figures.tex", *(f"{document}.bbl" for document in DOCUMENTS),
     *(f"{name}.tex" for name in TEX_TABLES),
 )  # fmt: skip
 paper_inputs = _Inputs(

@@ -41,7 +41,7 @@ def sentences(source: str) -> list[Sentence]:
     found: list[Sentence] = []
     opening = _OPENING.search(source)
     while opening:
-        end = _closing(source, opening.end())
+        end = closing(source, opening.end())
         text = source[opening.end() : end]
         if _OPENING.search(text):
             raise PaperError(f"{opening[0]}{text[:40]} ...: holds another one")
@@ -100,7 +100,7 @@ def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_stud
     return "\n".join([*lines, r"\makeatother"]) + "\n"
 
 
-def _closing(source: str, start: int) -> int:
+def closing(source: str, start: int) -> int:
     """Place of the brace that closes a block which begins at ``start``."""
     depth = 1
     for brace in _BRACE.finditer(source, start):

@@ -62,8 +62,31 @@ def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:
     return "\n".join(lines) + "\n"
 
 
+@dataclass(frozen=True)
+class Number:
+    """A number of the text, and where it stands.
+
+    text : as TeX
+    value : before it was rounded, None where there is none
+    rows : those of ``table`` that it is taken of, counted from 0
+    take : the aggregate, None for a single cell
+    """
+
+    text: str
+    value: str | float | None
+    table: str
+    rows: list[int]
+    column: str
+    take: str | None
+
+
 def resolve(key: str, tables: Mapping[str, pd.DataFrame]) -> str:
-    """TeX text of one key; `MISSING` where there is no such number.
+    """TeX text of one key, see `number_of`."""
+    return number_of(key, tables).text
+
+
+def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
+    """Number of one key; its text is `MISSING` where there is none.
 
     Raises
     ------
@@ -73,13 +96,19 @@ def resolve(key: str, tables: Mapping[str, pd.DataFrame]) -> str:
     parsed = _parse(key, tables)
     rows = _matching(tables[parsed.table], parsed.filters)
     cells = rows[parsed.column].dropna()
-    if parsed.aggregate in _COUNTS:
-        return str(AGGREGATES[parsed.aggregate](cells)) if is_held(key, tables) else MISSING
-    if parsed.aggregate is not None:
-        return format_number(AGGREGATES[parsed.aggregate](cells)) if len(cells) else MISSING
-    if len(rows) > 1:
+    if parsed.aggregate is None and len(rows) > 1:
         raise PaperError(f"\\val{{{key}}}: matches {len(rows)} rows of table '{parsed.table}'")
-    return format_number(cells.iloc[0]) if len(cells) else MISSING
+    counts = parsed.aggregate in _COUNTS
+    if not (is_held(key, tables) if counts else len(cells)):
+        text, value = MISSING, None
+    else:
+        take = AGGREGATES[parsed.aggregate] if parsed.aggregate else lambda column: column.iloc[0]
+        value = take(cells)
+        text = str(value) if counts else format_number(value)
+        value = value if isinstance(value, str) else float(value)
+        value = value if isinstance(value, str) or np.isfinite(value) else str(value)  # JSON
+    held = [int(row) for row in np.flatnonzero(tables[parsed.table].index.isin(cells.index))]
+    return Number(text, value, parsed.table, held, parsed.column, parsed.aggregate)
 
 
 def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:

@@ -1,0 +1,71 @@
+"""Pages of the tables: each holds its table as packed CSV, which a script shows and sorts."""
+
+import base64
+import gzip
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+
+import pandas as pd
+
+from pdrom.core.paths import RESULTS, TABLE
+from pdrom.report.figures.kit.catalogue import declarations
+from pdrom.report.live.page import filled
+from pdrom.tables import declared
+from pdrom.tables.kit.quantities import QUANTITIES
+
+NOT_JUDGED = ("timed", "skipped")
+FACTS = {
+    "study": "Settings of the study that its text states",
+    "methods": "Methods of the configuration",
+    "scenes": "Scenes of the configuration",
+    "machine": "The machine that the study ran on",
+}
+
+
+def table_page(name: str, csv: bytes, template: str) -> str:
+    """HTML of a table, with the command that makes it and the tolerance of every column."""
+    table = declared().get(name)
+    kinds = (
+        {c.name: (c.meaning, c.unit, c.quantity, c.within) for c in table.columns} if table else {}
+    )
+    columns = "".join(
+        f"<tr data-column='{escape(column)}'><th scope=row>{escape(column)}</th><td>{escape(meaning)}</td>"
+        f"<td>{escape(unit)}</td><td>{kind}: {escape(QUANTITIES[kind])}</td><td>{'not judged' if kind in NOT_JUDGED else f'{within:g}'}</td></tr>"
+        for column, (meaning, unit, kind, within) in kinds.items()
+    )
+    packed = gzip.compress(csv, 9, mtime=0)
+    parts = {
+        "NAME": name,
+        "TITLE": escape(table.title if table else FACTS[name]),
+        "COMMAND": escape(f"./reproduce {argument(name)}"),
+        "COLUMNS": columns
+        or "<tr><td colspan=5>facts of the configuration, compared with nothing</td></tr>",
+        "DATA": base64.b64encode(packed).decode(),
+    }
+    return filled(template, parts)
+
+
+def argument(name: str) -> str:
+    """Argument of ./reproduce that makes a table; facts are written with the numbers of the text."""
+    if name in FACTS:
+        return "paper_inputs"
+    return TABLE.at(RESULTS, name=name) if name in declarations() else name
+
+
+def contents(files: list[str], facts: Mapping[str, pd.DataFrame]) -> dict[str, bytes]:
+    """CSV of every table, results and facts, by name."""
+    found = {Path(path).stem: Path(path).read_bytes() for path in files}
+    plain = {name: facts[name].to_csv(index=False, lineterminator="\n").encode() for name in FACTS}
+    return found | plain
+
+
+def list_page(names: list[str], template: str) -> str:
+    """HTML with a line for each table."""
+    known = declared()
+    items = "".join(
+        f"<li><a href='tables/{name}.html'><code>{name}</code></a> "
+        f"{escape(known[name].title if name in known else FACTS[name])}</li>"
+        for name in names
+    )
+    return filled(template, {"TITLE": "Tables", "BODY": f"<ul>{items}</ul>"})

@@ -1,0 +1,233 @@
+"""Pandoc's syntax tree of a document: numbers of what is referred to, links, captions.
+
+Labels have the numbers that LaTeX gives them, since both count in the order of the source.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from pdrom.report.article.latex import ORIGIN
+from pdrom.report.article.pandoc import Tree
+
+Node = dict[str, Any]
+_LABEL = re.compile(r"\\label\{([^{}]*)\}")
+_EQUATION = re.compile(r"\\begin\{(equation|align)\}")
+_CLAIM = re.compile(r"(\W*)(C\d+)\b(.*)")
+_COLOUR = re.compile(r"color: (ok\w+)")
+PARAGRAPH = 4  # level of a heading that opens a paragraph
+
+
+@dataclass
+class Labels:
+    """Numbers of labels, and the pages that they are on."""
+
+    prefix: str
+    page: str
+    numbers: dict[str, tuple[str, str]] = field(default_factory=dict)
+    counts: Counter[str] = field(default_factory=Counter)
+
+    def next(self, kind: str, label: str = "") -> str:
+        """Number of the next figure, table ...; a ``label`` will stand for it."""
+        self.counts[kind] += 1
+        return self.note(label, f"{self.prefix}{self.counts[kind]}")
+
+    def section(self, level: int, appendix: bool, label: str) -> str:
+        """Number of the next section of a level; those of an appendix begin with a letter."""
+        if appendix and level == 1 and not self.counts["appendix"]:
+            self.counts["appendix"], self.counts["level1"] = 1, 0
+        self.counts[f"level{level}"] += 1
+        for deeper in range(level + 1, PARAGRAPH):
+            self.counts[f"level{deeper}"] = 0
+        parts = [self.counts[f"level{above}"] for above in range(1, level + 1)]
+        first = chr(64 + parts[0]) if self.counts["appendix"] else f"{self.prefix}{parts[0]}"
+        return self.note(label, ".".join([first, *map(str, parts[1:])]))
+
+    def note(self, label: str, number: str) -> str:
+        """Let a label stand for a number."""
+        if label:
+            self.numbers[label] = (number, self.page)
+        return number
+
+
+def attributes(identifier: str = "", classes: str = "", **keys: str) -> list[Any]:
+    """Attributes of a node."""
+    return [identifier, classes.split(), [[k.replace("_", "-"), v] for k, v in keys.items()]]
+
+
+def words(text: str) -> list[Node]:
+    """Plain text as inline nodes."""
+    return [{"t": "Str", "c": text}]
+
+
+def link(inlines: list[Node], address: str, classes: str = "") -> Node:
+    """Make a link."""
+    return {"t": "Link", "c": [attributes("", classes), inlines, [address, ""]]}
+
+
+def plain(node: Any) -> str:
+    """Text of a node without its marks."""
+    if isinstance(node, list):
+        return "".join(map(plain, node))
+    if not isinstance(node, dict):
+        return ""
+    kind, content = node.get("t"), node.get("c")
+    if kind in ("Space", "SoftBreak", "LineBreak"):
+        return " "
+    if kind == "Str":
+        return str(content)
+    return str(content[1]) if kind in ("Math", "Code") else plain(content)
+
+
+def changed(node: Any, visit: Callable[[Node], Any]) -> Any:
+    """Return a tree in which ``visit`` has replaced nodes; it returns None to leave one.
+
+    A replaced node is not looked into. A list of nodes replaces one among others.
+    """
+    if isinstance(node, list):
+        made: list[Any] = []
+        for each in node:
+            new = changed(each, visit)
+            many = isinstance(each, dict) and isinstance(new, list)
+            made += new if many else [new]
+        return made
+    if not isinstance(node, dict):
+        return node
+    new = visit(node) if "t" in node else None
+    return {k: changed(v, visit) for k, v in node.items()} if new is None else new
+
+
+def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> Tree:
+    """Number sections, figures, tables, equations and theorems, and lay them out.
+
+    Parameters
+    ----------
+    labels : gets the number of every label
+    shown : makes of a figure's name and its node, with the number in its caption, what is shown
+    """
+
+    def visit(node: Node) -> Any:
+        kind, content = node["t"], node.get("c")
+        if kind == "Header" and content[0] < PARAGRAPH:
+            level, attribute, inlines = content
+            appendix = "unnumbered" in attribute[1]
+            number = labels.section(level, appendix, attribute[0])
+            return {"t": kind, "c": [level, attribute, [*words(f"{number}\u2002"), *inlines]]}
+        if kind == "Figure":
+            name = re.sub(r"^fig:", "", content[0][0])
+            number = labels.next("figure", content[0][0])
+            return shown(name, _captioned(node, f"Figure {number}. ", 1))
+        if kind == "Div" and content[1] and content[1][0]["t"] == "Table":
+            return _table(content[0][0], content[1][0], labels)
+        if kind == "Div" and content[0][0] == "refs":
+            title = {"t": "Header", "c": [1, attributes("references"), words("References")]}
+            return [title, node]
+        if kind == "Div" and (which := {"theorem", "proposition"} & set(content[0][1])):
+            labels.next(which.pop(), content[0][0])
+        if kind == "Math" and (found := _EQUATION.search(content[1])):
+            return _equation(node, found[1], labels)
+        return None
+
+    return changed(tree, visit)
+
+
+def _table(label: str, node: Node, labels: Labels) -> Node:
+    """A table that scrolls, below its caption, which does not."""
+    content = _captioned(node, f"Table {labels.next('table', label)}. ", 1)["c"]
+    caption = {"t": "Div", "c": [attributes("", "caption"), content[1][1]]}
+    region = {"role": "region", "tabindex": "0", "aria_label": plain(content[1])[:80]}
+    table = {"t": "Table", "c": [content[0], [None, []], *content[2:]]}
+    scroll = {"t": "Div", "c": [attributes("", "scroll", **region), [table]]}
+    return {"t": "Div", "c": [attributes(label), [caption, scroll]]}
+
+
+def _captioned(node: Node, opening: str, place: int) -> Node:
+    """A figure or a table whose caption opens with its number."""
+    content = list(node["c"])
+    short, blocks = content[place]
+    first = blocks[0] if blocks else {"t": "Plain", "c": []}
+    strong = {"t": "Strong", "c": words(opening.strip())}
+    opened = {"t": "Plain", "c": [strong, {"t": "Space"}, *first["c"]]}
+    content[place] = [short, [opened, *blocks[1:]]]
+    return {"t": node["t"], "c": content}
+
+
+def _equation(node: Node, kind: str, labels: Labels) -> Node:
+    """An equation beside its number; one of several lines has a number for each."""
+    tex = node["c"][1]
+    lines = [tex] if kind == "equation" else re.split(r"\\\\", tex)
+    found = [(m[1] if (m := _LABEL.search(line)) else "") for line in lines]
+    marks = [
+        {
+            "t": "Span",
+            "c": [attributes(label, "number"), words(f"({labels.next('equation', label)})")],
+        }
+        for label in found
+    ]
+    numbers = {"t": "Span", "c": [attributes("", "numbers"), marks]}
+    math = {"t": "Math", "c": [node["c"][0], _LABEL.sub("", tex)]}
+    return {"t": "Span", "c": [attributes("", "equation"), [math, numbers]]}
+
+
+def resolved(tree: Tree, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Tree:
+    """Give references their numbers, numbers and claims their links; open paragraphs in bold.
+
+    Parameters
+    ----------
+    labels : number and page of each
+    claims : by name; the text names them
+    """
+
+    def visit(node: Node) -> Any:
+        kind, content = node["t"], node.get("c")
+        if kind == "Link":
+            return _resolved_link(node, labels)
+        if kind == "Str" and (found := _CLAIM.fullmatch(content)) and found[2] in claims:
+            here = link(words(found[2]), f"claims.html#{found[2]}", "claim")
+            return [*words(found[1]), here, *words(found[3])]
+        if kind == "Span" and (colour := _COLOUR.search(str(content[0][2]))):
+            return {"t": kind, "c": [attributes("", colour[1]), changed(content[1], visit)]}
+        return None
+
+    return {**changed(tree, visit), "blocks": _run_in(changed(tree["blocks"], visit))}
+
+
+def _run_in(blocks: list[Node]) -> list[Node]:
+    """Headings of paragraphs as the bold words that these begin with."""
+    made: list[Node] = []
+    heading: list[Node] = []
+    for block in blocks:
+        if block["t"] == "Header" and block["c"][0] >= PARAGRAPH:
+            heading = [{"t": "Strong", "c": block["c"][2]}, {"t": "Space"}]
+            continue
+        if heading and block["t"] == "Para":
+            block = {"t": "Para", "c": [*heading, *block["c"]]}
+        elif heading:
+            made.append({"t": "Para", "c": heading})
+        made.append(block)
+        heading = []
+    return made
+
+
+def _resolved_link(node: Node, labels: Mapping[str, tuple[str, str]]) -> Node | None:
+    attribute, inlines, (address, _) = node["c"]
+    keys = dict(attribute[2])
+    if address.startswith(ORIGIN):
+        return link(
+            inlines, address_of(bytes.fromhex(address.removeprefix(ORIGIN)).decode()), "val"
+        )
+    if "reference" in keys:
+        number, page = labels[keys["reference"]]
+        shown = f"({number})" if keys["reference-type"] == "eqref" else number
+        return link(words(shown), f"{page}#{keys['reference']}")
+    return None
+
+
+def address_of(key: str) -> str:
+    """Address of the rows that a key names (`pdrom.report.paper.macros`) on the table's page."""
+    table, _, rows = key.partition("|")
+    signs = {"%": "%25", " ": "%20", '"': "%22", "<": "%3C", ">": "%3E", "#": "%23"}
+    place = "".join(signs.get(sign, sign) for sign in rows)
+    return f"tables/{table}.html" + (f"#{place}" if place else "")

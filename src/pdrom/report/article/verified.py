@@ -1,0 +1,17 @@
+"""What the last ``./reproduce verify`` found, for the pages of the article."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from pdrom.core.store import write_text
+from pdrom.report.live.page import safe_json
+
+NAME = "verified.js"
+
+
+def write_verified(found: Mapping[str, str], folder: Path) -> None:
+    """Write the outcomes beside the pages, by kind and name as in ``table payoff``.
+
+    A page that is opened from a disk loads nothing but scripts, so that this is one.
+    """
+    write_text(f"window.pdromVerified={safe_json(dict(found))};\n", folder / NAME)
