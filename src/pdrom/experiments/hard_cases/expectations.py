@@ -14,7 +14,7 @@ FAILURES = ("refused", "singular", "blow-up", "distorted", "objective rises", "m
 
 
 class Expectation(ConfigModel):
-    """Where a reduction fails, and why.
+    """Cases in which a reduction fails, and why.
 
     fails : cases in which it must fail
     may_fail : cases in which round-off decides whether it fails

@@ -158,7 +158,7 @@ class _Modes:
 
 
 def _positive(values: np.ndarray) -> np.ndarray:
-    """Which of the ascending eigenvalues (n,) of a stiffness are not zero."""
+    """Mark those of the ascending eigenvalues (n,) of a stiffness that are not zero."""
     return values > ZERO * values[-1]
 
 

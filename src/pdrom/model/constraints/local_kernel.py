@@ -76,7 +76,7 @@ class LocalKernel:
 
     @property
     def address(self) -> int:
-        """Where the compiled function begins."""
+        """Address of the compiled function."""
         return self.function.address
 
     @classmethod

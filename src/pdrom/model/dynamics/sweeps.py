@@ -50,11 +50,11 @@ class _Panel:
         return self._spread(self._own, self._index(self.width + row * (row - 1) // 2 + column))
 
     def pointer(self, offset):
-        """Where a row of the right-hand side lies."""
+        """Address of a row of the right-hand side."""
         return self.builder.bitcast(self.builder.gep(self._x, [offset]), NUMBERS.as_pointer())
 
     def column(self, k):
-        """Where the row of the panel's own column lies."""
+        """Address of the row of the panel's own column."""
         return self.pointer(self.builder.add(self._first, self._index(WIDTH * k)))
 
     def load(self, pointer):
