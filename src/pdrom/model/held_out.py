@@ -35,7 +35,7 @@ class HeldOut(ConfigModel):
     def variant(
         self, effects: Sequence[EffectConfig], motion: HeldOutMotion = FIRST
     ) -> tuple[EffectConfig, ...]:
-        """Effects of a held-out trajectory, made from those of the training one."""
+        """Effects of the held-out ``motion``, made from the ``effects`` of the training one."""
         if motion == "kick":
             return (*effects, self._kick(self.kick or KICK, (self.seed + 1) % 2**63, len(effects)))
         if motion == "stiffness":

@@ -143,7 +143,11 @@ _backward = _panel_intrinsic(_write_backward)
 
 @compiled(nogil=True)
 def load(beside, indptr, indices, data, targets, loads):
-    """Write coupling times targets to the rows ``beside`` of ``loads``; the others stay zero."""
+    """Write coupling times targets to the rows ``beside`` of ``loads``; the others stay zero.
+
+    The coupling is a CSR matrix (``indptr``, ``indices``, ``data``), ``targets`` are (m, 3),
+    ``loads`` rows of four, flat.
+    """
     for i in beside:
         for axis in range(3):
             total = 0.0
