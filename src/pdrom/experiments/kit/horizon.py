@@ -34,13 +34,16 @@ def horizon(floor: np.ndarray, threshold: float) -> int:
 
 
 def horizons(table: pd.DataFrame, perturbation: float | str, threshold: float) -> dict[str, int]:
-    """`horizon` of every scene of the table; see `floor_of`."""
+    """`horizon` of every scene of the table by ``threshold``, see `floor_of` (``perturbation``)."""
     scenes = table.scene.unique()
     return {s: horizon(floor_of(table, s, perturbation), threshold) for s in scenes}
 
 
 def rms_within(difference: np.ndarray, norm: float, end: int) -> float | None:
-    """Root mean square over the frames before ``end``, over ``norm``; None as `error_within`."""
+    """Root mean square of ``difference`` (F,) before frame ``end``, over ``norm``.
+
+    None as `error_within`.
+    """
     if len(difference) < end or end == 0:
         return None
     return float(np.sqrt(np.mean(np.square(difference[:end] / norm))))
