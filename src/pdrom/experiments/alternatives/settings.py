@@ -116,7 +116,7 @@ class Comparison(Protocol):
         return [(n, k) for n, k in steps if self.affords(method, vertices * n * k)]
 
     def affords(self, method: str, work: int) -> bool:
-        """Whether a frame of a method may have ``work``: vertices times substeps times iterations."""
+        """Whether a frame of a method may have ``work``: vertices x substeps x iterations."""
         return work <= self.work.get(method, work)
 
 

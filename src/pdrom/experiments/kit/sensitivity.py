@@ -54,8 +54,8 @@ def sensitivities(
 ) -> pd.DataFrame:
     """Table of `COLUMNS`: ``perturbations`` of the start by ``seeds``, and other changes.
 
-    That is another solver, 4 K iterations, half the time step, and no effect of one name (label
-    `without`); the only constraint group cannot be left out.
+    The others are another solver, 4 K iterations, half the time step, and no effect of one name
+    (label `without`); the only constraint group cannot be left out.
     """
     base = trajectory(scene)
     parts = []
