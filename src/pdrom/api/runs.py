@@ -233,7 +233,7 @@ def _training_frames(scene: Scene, group: str) -> np.ndarray:
 
 @contextmanager
 def _place(out: str | os.PathLike[str] | None) -> Iterator[Path]:
-    """Where a run is written; a file that nobody asked for goes away."""
+    """File to which a run is written; one that nobody asked for goes away."""
     if out is not None:
         yield Path(out)
         return

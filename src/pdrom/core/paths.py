@@ -1,4 +1,4 @@
-"""Where results lie: the one module that knows the layout below a results folder, both ways.
+"""Layout below a results folder, both ways: the one module that knows where results lie.
 
 A `Place` is a kind of file. It turns labels (scene, group, method ...) into a path, and a path back
 into labels. The results folder itself is chosen by the pipeline, one for each configuration.

@@ -1,4 +1,4 @@
-"""Where a result comes from: what made it, with which settings, code and libraries.
+"""Provenance of a result: what made it, with which settings, code and libraries.
 
 A job states once what it is (`made_by`). Whatever `pdrom.core.store` writes meanwhile carries that:
 every file in its checksum, HDF5 files inside as well. Nothing in it differs

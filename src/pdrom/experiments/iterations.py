@@ -143,7 +143,10 @@ def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
 
 
 def stepper_of(scene: Scene, system: GlobalSystem, iterations: int, window: int) -> Stepper:
-    """Step loop of the full-order model with its own number of iterations and acceleration."""
+    """Step loop of ``scene`` in full order, with ``iterations`` and a ``window`` of acceleration.
+
+    ``system`` is the matrix of its global step.
+    """
     acceleration = Anderson(window) if window else None
     space = scene.space(system)
     return Stepper(

@@ -112,7 +112,10 @@ def kinds(scene: Scene) -> tuple[str, ...]:
 
 
 def roundoff_field(scene: Scene, axes: str, size: float, seed: int) -> np.ndarray:
-    """Displacement (N, 3) m of a start, zero where `kinds` says; the seed draws the vertex, too."""
+    """Displacement (N, 3) m of a start, zero where ``axes`` of `kinds` say.
+
+    ``scene``, ``size`` and ``seed`` as in `perturbation_field`; the seed draws the vertex, too.
+    """
     field = perturbation_field(scene, size, seed)
     if axes != ALL:
         still = np.ones(len(field), dtype=bool)

@@ -127,6 +127,9 @@ def _row(scene: Scene, model: SubspaceModel, k: int, tolerance: float) -> dict[s
 
 
 def relative_error(scene: Scene, model: SubspaceModel, reference: np.ndarray) -> float | None:
-    """Relative error of a run against ``reference`` (F + 1, N, 3); None if it blows up."""
+    """Relative error of a run of ``scene`` by ``model``, against ``reference`` (F + 1, N, 3).
+
+    None if it blows up.
+    """
     error = rerun_model(scene, model, reference).error(displacement_norms(reference))
     return error if error is not None and np.isfinite(error) else None

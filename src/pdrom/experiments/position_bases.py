@@ -90,14 +90,14 @@ def best_differences(columns: np.ndarray, positions: np.ndarray) -> np.ndarray:
 
 
 def flat_axis(points: np.ndarray) -> int | None:
-    """Axis in which the rest shape (N, 3) has no thickness; None if there is none."""
+    """Axis in which the rest shape ``points`` (N, 3) has no thickness; None if there is none."""
     sides = np.ptp(points, axis=0)
     thinnest = int(np.argmin(sides))
     return thinnest if sides[thinnest] <= FLAT * sides.max() else None
 
 
 def out_of_plane(positions: np.ndarray, normal: int | None, end: int) -> float | None:
-    """Share of the motion (F + 1, N, 3) along an axis, by its norm over the frames before ``end``.
+    """Share of ``positions`` (F + 1, N, 3) that move along ``normal``, by the norm before ``end``.
 
     None without an axis, a frame or a motion.
     """

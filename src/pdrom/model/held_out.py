@@ -41,7 +41,7 @@ class HeldOut(ConfigModel):
     def variant(
         self, effects: Sequence[EffectConfig], motion: HeldOutMotion = FIRST
     ) -> tuple[EffectConfig, ...]:
-        """Effects of a held-out trajectory, made from those of the training one."""
+        """Effects of the held-out ``motion``, made from the ``effects`` of the training one."""
         if motion == FIRST:
             return self._own(effects)
         if motion == "kick_stiffness":

@@ -121,7 +121,7 @@ class SceneConfig(_Model):
         )
 
     def heldout_variant(self, motion: HeldOutMotion = FIRST) -> Self:
-        """The scene of a held-out trajectory (see `HeldOut`)."""
+        """The scene of the held-out ``motion`` (see `HeldOut`)."""
         return self.model_copy(update={"effects": self.held_out.variant(self.effects, motion)})
 
 

@@ -1,4 +1,4 @@
-"""Where the results of a configuration lie: each one has a folder of its own."""
+"""Folders of the results: each configuration has one of its own."""
 
 import re
 import sys

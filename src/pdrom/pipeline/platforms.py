@@ -1,4 +1,4 @@
-"""Which machines the locked packages have wheels for, known before anything is downloaded.
+"""Machines that the locked packages have wheels for, known before anything is downloaded.
 
 ``./reproduce`` runs this file by its path with the machine's own Python, before any package is
 there: only the standard library may be imported.

@@ -72,7 +72,7 @@ def _pays_from(sizes: np.ndarray, speedups: np.ndarray) -> int | None:
 
 
 def _breaks_even(sizes: np.ndarray, speedups: np.ndarray) -> float | None:
-    """Where the line through the logarithms passes one, between two meshes that both reach it."""
+    """Size where the line through the logarithms passes one, between two meshes that reach it."""
     first = _first(speedups)
     if not 0 < first < len(sizes) or np.isnan(speedups[first - 1]):
         return None

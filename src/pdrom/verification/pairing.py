@@ -1,4 +1,4 @@
-"""Which row of a table belongs to which row of the expected one."""
+"""Rows of a table and of the expected one that belong together."""
 
 from collections.abc import Sequence
 

@@ -39,7 +39,7 @@ class Reference:
 
 
 def folder_of(results: str) -> Path:
-    """Where the expected tables of a results folder lie: in its folder ``tables``."""
+    """Folder of the expected tables of a folder of ``results``."""
     root = Path(RESULTS)
     return root / "reference" / Path(results).relative_to(root) / "tables"
 

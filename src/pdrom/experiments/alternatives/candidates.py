@@ -129,7 +129,7 @@ def _samples(training: Scene, columns: Columns, substeps: int, tau: float) -> di
 
 
 def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) -> Scene:
-    """The scene with shorter frames: the same schedules in seconds.
+    """The scene with ``substeps`` frames for one, of ``iterations``; schedules keep their seconds.
 
     ``window`` iterates accelerate the others.
     """

@@ -83,7 +83,7 @@ def alternatives(sources: list[Path], settings: Options, out: File) -> None:
 
 
 def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
-    """The scene on a finer mesh of the same mass, with all weights times ``stiffness``."""
+    """``config`` on a mesh ``factor`` times finer, of equal mass, weights times ``stiffness``."""
     finer = config.coarsened(factor, 1.0)
     counts = [c.mesh.build(Path()).vertices for c in (config, finer)]
     effects = tuple(
@@ -122,7 +122,7 @@ def _rows(config: SceneConfig, settings: Options) -> list[dict[str, Any]]:
 
 
 def references(scene: Scene, section: Comparison) -> References:
-    """Both references of a scene's own motion."""
+    """Both references of a scene's own motion, with the limits of a ``section``."""
     wanted = section.continuous
     limit = wanted.limit // scene.mesh.vertices
     exact = continuous(

@@ -112,12 +112,12 @@ class Comparison(Protocol):
         return self.stiffness.get(scene, (1.0,)) if size == 1.0 else (1.0,)
 
     def pairs(self, method: str, vertices: int) -> list[tuple[int, int]]:
-        """Substeps and iterations with which a method runs on a mesh of this size."""
+        """Substeps and iterations with which a method runs on a mesh of so many ``vertices``."""
         steps = self.steps.get(method, ())
         return [(n, k) for n, k in steps if self.affords(method, vertices * n * k)]
 
     def affords(self, method: str, work: int) -> bool:
-        """Whether a frame of a method may have so many vertices times substeps times iterations."""
+        """Whether a frame of a method may have ``work``: vertices x substeps x iterations."""
         return work <= self.work.get(method, work)
 
 

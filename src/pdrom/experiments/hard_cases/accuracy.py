@@ -30,7 +30,7 @@ def groups_on(manifold: str) -> list[str]:
 
 
 def unit_group(effect: str) -> ConstraintGroup:
-    """Group of one element whose rest edges are the unit vectors, so that S q holds q itself."""
+    """Group ``effect`` of one element with unit vectors as rest edges: S q holds q itself."""
     volume = EFFECTS.load(effect).rows_per_element == 3
     mesh = one_tetrahedron() if volume else one_triangle()
     return build(mesh, {"effect": effect, "weight": 1.0}, frames=1).groups[0]
@@ -47,7 +47,7 @@ REFERENCES = {"clamped": clamped, "size": sized}
 
 
 def matrix_error(group: ConstraintGroup, d: np.ndarray, unique: bool) -> tuple[float, float]:
-    """Relative error of p(d) and the condition number of the projection at d.
+    """Relative error of ``group``'s p(d) and the condition number of the projection at d.
 
     Where p is not unique any nearest point is right: the error is that of the distance |d - p|, or
     of the singular values of p (their product, where that is what is kept), whichever is larger,
@@ -82,7 +82,7 @@ def _outside(p: np.ndarray, low: float, high: float, size: bool) -> float:
 
 
 def spring_error(group: ConstraintGroup, d: np.ndarray) -> tuple[float, float]:
-    """Relative error of the projected edge d (1, 3); the condition number is 1."""
+    """Relative error of the edge d (1, 3) projected by ``group``; the condition number is 1."""
     with mp.workdps(digits_for(d, group.rest[0])):
         p = spring(d, group.rest[0])
         return float(mp.norm(exact(projected(group, d)) - p) / mp.norm(p)), 1.0
@@ -102,7 +102,10 @@ def _bending_states() -> dict[str, Any]:
 
 
 def bending_errors(cases: int, effect: str = "bending") -> Iterator[tuple[str, float, float]]:
-    """(class, relative error, condition number) of projected curvature vectors."""
+    """(class, relative error, condition number) of ``cases`` projected curvature vectors.
+
+    ``effect`` is the group that projects.
+    """
     scene = build(sheet(wave=0.1), {"effect": effect, "weight": 1.0}, frames=1)
     group, points = scene.groups[0], scene.mesh.points
     for name, state in _bending_states().items():

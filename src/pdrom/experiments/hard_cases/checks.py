@@ -1,4 +1,7 @@
-"""Named checks of a run; each returns what is wrong ("" if nothing is)."""
+"""Named checks of a run; each returns what is wrong ("" if nothing is).
+
+A check gets the ``case``, its ``scene`` and the record of the full-order ``run``.
+"""
 
 from collections.abc import Callable
 

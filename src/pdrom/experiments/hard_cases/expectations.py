@@ -14,7 +14,7 @@ FAILURES = ("refused", "singular", "blow-up", "distorted", "objective rises", "m
 
 
 class Expectation(ConfigModel):
-    """Where a reduction fails, and why.
+    """Cases in which a reduction fails, and why.
 
     fails : cases in which it must fail
     may_fail : cases in which round-off decides whether it fails
@@ -26,7 +26,7 @@ class Expectation(ConfigModel):
 
 
 def load_expectations(path: Path) -> dict[str, Expectation]:
-    """Content of config/hard_cases.yaml by reduction; one that is not named never fails.
+    """Content of ``path``, config/hard_cases.yaml, by reduction; one not named never fails.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def load_expectations(path: Path) -> dict[str, Expectation]:
 
 
 def surprise(outcome: str, case: str, expected: Expectation | None) -> str:
-    """Contradiction to the expectation, "" if there is none."""
+    """Contradiction of an ``outcome`` of ``case`` to what is ``expected``, "" if there is none."""
     failed = outcome in FAILURES
     must = expected is not None and case in expected.fails
     may = expected is not None and case in expected.may_fail

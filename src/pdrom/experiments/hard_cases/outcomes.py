@@ -24,12 +24,15 @@ BLOWUP, DISTORTED = 100.0, 3.0
 
 
 def scale_of(training: Training) -> float:
-    """Largest extent of the full-order run, of rest, start and held vertices, m."""
+    """Largest extent of the full-order run of ``training``, of rest, start and held vertices, m."""
     return max(training.run.extent, reach(training.scene, training.run))
 
 
 def outcome_of(case: HardCase, training: Training, reduced: ReducedRun) -> str:
-    """One of `HOLDS`, `NOTHING`, `FAILURES`: the first that applies."""
+    """One of `HOLDS`, `NOTHING`, `FAILURES`: the first that applies to ``reduced`` of ``case``.
+
+    ``training`` is its full-order run.
+    """
     run = reduced.run
     if run is None:
         return NOTHING
@@ -52,7 +55,10 @@ def outcome_of(case: HardCase, training: Training, reduced: ReducedRun) -> str:
 def rows(
     case: HardCase, methods: Mapping[str, MethodSpec], expected: Mapping[str, Expectation]
 ) -> Iterator[dict[str, Any]]:
-    """Rows of the table hard_cases: every reduction in ``case``."""
+    """Rows of the table hard_cases: every reduction of ``methods`` in ``case``.
+
+    ``expected`` says which of them fail.
+    """
     training = Training(case)
     bounded = largest_projections(training.group, training.scene.mesh.points) is not None
     for name in names(methods):
@@ -66,7 +72,10 @@ def row(
     methods: Mapping[str, MethodSpec],
     expected: Mapping[str, Expectation],
 ) -> dict[str, Any]:
-    """One reduction: sizes, what the run did, its outcome and, if it failed, why."""
+    """Row of the reduction ``name``: sizes, what the run did, its outcome and, if it failed, why.
+
+    ``training``, ``methods`` and ``expected`` as in `rows`.
+    """
     entry = expected.get(name)
     extent = scale_of(training)
     try:

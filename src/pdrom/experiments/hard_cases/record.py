@@ -46,12 +46,12 @@ class Watched:
         self._step, self._group = step, group
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Freeze the frame's data of the reduced step and of all elements."""
+        """Freeze the frame's data at ``q`` of the reduced step and of all elements."""
         self._step.begin_frame(q)
         self._group.begin_frame(q)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add the reduced right-hand side; return the energy of the full projections."""
+        """Add the reduced contribution at ``y`` to ``rhs``; the energy of the full projections."""
         self._step.accumulate(y, rhs)
         return self._group.accumulate(y, np.zeros_like(y))
 
@@ -69,6 +69,7 @@ def record(
 
     Parameters
     ----------
+    roundoff : what rounding explains of a rise of the objective
     positions : vertex positions (N, 3) of the coordinates of ``loop``
     limit : extent in metres at which the run ends as a blow-up
     observe : called with every frame and its last local iterate

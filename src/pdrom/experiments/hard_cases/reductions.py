@@ -74,7 +74,7 @@ class Training:
             self._roundoff.append(self.group.roundoff(y))
 
     def basis(self, spec: MethodSpec) -> Basis:
-        """Basis of the snapshots of the even frames."""
+        """Basis of the snapshots of the even frames, as ``spec`` asks."""
         if spec.basis_id not in self._bases:
             self._bases[spec.basis_id] = compute_basis(
                 np.stack(self._snapshots),
@@ -113,7 +113,9 @@ def names(methods: Mapping[str, MethodSpec]) -> list[str]:
 def reduced_run(
     training: Training, name: str, methods: Mapping[str, MethodSpec], limit: float
 ) -> ReducedRun:
-    """Run the case again with one reduction; ``limit`` is the extent of a blow-up, m.
+    """Run the case of ``training`` again with the reduction ``name`` of ``methods``.
+
+    ``limit`` is the extent of a blow-up, m.
 
     Raises
     ------

@@ -42,7 +42,7 @@ class Roundoff:
     def allowance(self, before: State, after: State, first: float) -> float:
         """Largest rise in joule that rounding explains, in a frame with first objective ``first``.
 
-        Coordinates of the frame's beginning and end bound those of the iterates.
+        Coordinates of the frame's beginning, ``before``, and end, ``after``, bound the iterates'.
         """
         h = self.loop.time_step
         acceleration = self.loop.space.acceleration(before.positions, before.velocities)

@@ -17,7 +17,7 @@ SEED = 7
 def sheet(
     plane: Literal["xy", "xz"] = "xz", wave: float = 0.0, rows: int = 6, columns: int = 6
 ) -> Mesh:
-    """A sheet of 36 vertices, 50 triangles."""
+    """A sheet of ``rows`` times ``columns`` vertices in ``plane``, with ``wave`` as in `cloth`."""
     return cloth(rows, columns, plane, wave=wave)
 
 
@@ -49,7 +49,7 @@ def shifted(mesh: Mesh, *offset: float) -> Mesh:
 
 
 def both(first: Mesh, second: Mesh) -> Mesh:
-    """Two meshes in one, not connected."""
+    """The meshes ``first`` and ``second`` in one, not connected."""
     n = first.vertices
     return Mesh(
         np.concatenate([first.points, second.points]),
@@ -71,12 +71,12 @@ def mapped(*rows: tuple[float, float, float]) -> Start:
 
 
 def scales(x: float, y: float, z: float) -> Start:
-    """The rest shape with its axes scaled about its centre (negative: mirrored)."""
+    """The rest shape scaled by ``x``, ``y``, ``z`` about its centre (negative: mirrored)."""
     return mapped((x, 0, 0), (0, y, 0), (0, 0, z))
 
 
 def still(positions: np.ndarray) -> State:
-    """A state without velocity."""
+    """A state at ``positions`` (N, 3) without velocity."""
     return State(positions, np.zeros_like(positions))
 
 
@@ -102,14 +102,14 @@ def noisy(start: Start, size: float) -> Start:
 
 
 def pairs_merged(scene: Scene) -> State:
-    """Every odd vertex lies on the vertex before it: edges of length zero."""
+    """Every odd vertex of ``scene`` lies on the vertex before it: edges of length zero."""
     points = scene.mesh.points.copy()
     points[1::2] = points[: len(points) - len(points) % 2 : 2]
     return still(points)
 
 
 def folded(scene: Scene) -> State:
-    """The half x > 0 lies on the half x < 0: vertices of different elements coincide."""
+    """The half x > 0 of ``scene`` lies on the half x < 0: vertices of its elements coincide."""
     points = scene.mesh.points.copy()
     centre = 0.5 * (points[:, 0].min() + points[:, 0].max())
     points[:, 0] = centre - np.abs(points[:, 0] - centre)

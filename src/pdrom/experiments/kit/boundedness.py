@@ -61,7 +61,7 @@ def largest_projections(group: ConstraintGroup, points: np.ndarray) -> np.ndarra
 
 
 def held_sets(scene: Scene) -> list[np.ndarray]:
-    """Vertices that are held, ascending, in each stretch of frames with the same ones."""
+    """Held vertices of ``scene``, ascending, in each stretch of frames with the same ones."""
     sets: list[np.ndarray] = []
     for frame in range(scene.config.frames):
         union = held_vertices(scene.boundaries, frame)
@@ -71,7 +71,10 @@ def held_sets(scene: Scene) -> list[np.ndarray]:
 
 
 def kept_velocity(scene: Scene) -> np.ndarray:
-    """Factor of a frame on a velocity, D = 1 - h c, (N,); ValueError for a force without rate."""
+    """Factor of a frame of ``scene`` on a velocity, D = 1 - h c, (N,).
+
+    ValueError for a force without rate.
+    """
     rates = np.zeros(scene.mesh.vertices)
     for force in scene.forces:
         if force.rate is None:
@@ -158,7 +161,7 @@ class _Modes:
 
 
 def _positive(values: np.ndarray) -> np.ndarray:
-    """Which of the ascending eigenvalues (n,) of a stiffness are not zero."""
+    """Mark those of the ascending eigenvalues (n,) of a stiffness that are not zero."""
     return values > ZERO * values[-1]
 
 

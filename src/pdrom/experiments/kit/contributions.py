@@ -35,7 +35,7 @@ class _Watched:
 
 
 def contributions(scene: Scene) -> pd.DataFrame:
-    """Table of `COLUMNS` of a run: norm of the force (N) and energy (J) of each effect and frame.
+    """Table of `COLUMNS` of a run of ``scene``: force (norm, N) and energy (J) by effect and frame.
 
     The energy of a group is W_j, that of a force its potential, with an arbitrary zero, and that
     of a start the kinetic energy that it brings. Where an effect has none it is nan.

@@ -133,7 +133,10 @@ class ConvergedStepper(Stepper):
         frame: int,
         on_last_iterate: Callable[[np.ndarray], None] | None = None,
     ) -> tuple[State, FrameReport]:
-        """Do one frame; see `Stepper.step`. The report holds the objective at the end only."""
+        """Do ``frame`` from ``state``, see `Stepper.step`, ``on_last_iterate`` included.
+
+        The report holds the objective at the end only.
+        """
         s, elimination, base = self._begin(state, frame)
         rhs = np.empty_like(s)
 
@@ -155,7 +158,7 @@ class ConvergedStepper(Stepper):
 
 
 def converged_run(scene: Scene, tolerance: float, limit: int) -> np.ndarray | None:
-    """Positions (F + 1, N, 3) m of a run of converged frames, the initial ones first.
+    """Positions (F + 1, N, 3) m of a run of ``scene`` in converged frames, the initial ones first.
 
     None where a frame does not reach the ``tolerance`` in ``limit`` evaluations.
     """

@@ -87,6 +87,12 @@ def effect_costs(
     vertices that a hold may ever hold, else all vertices. The shares add up to one. What the
     compiled loop does in each iteration has its time there, too; the right-hand side is what the
     loop's local steps take beside the groups.
+
+    Parameters
+    ----------
+    system : matrix of the global step of ``scene``
+    frames : of a timed run
+    warmup, repeats : runs before the timed ones, and timed ones
     """
     roles: list[Sequence[Effect]] = []
     roles += [scene.groups, scene.forces, scene.boundaries, scene.contacts]
@@ -158,7 +164,8 @@ def left_out(
     """Table of `LEFT_OUT`: time of the scene without some of its effects, built without them.
 
     ``saved_ms`` is the time of the whole scene minus that of the row, ``own_ms`` what the effects
-    cost inside the whole scene (``costs``, see `effect_costs`).
+    cost inside the whole scene (``costs``, see `effect_costs`). ``frames``, ``warmup`` and
+    ``repeats`` as there, ``solver`` is the name of the linear solver.
     """
     sets = left_out_sets(scene)
     variants = [_without(scene, names, frames, solver) for names in sets]

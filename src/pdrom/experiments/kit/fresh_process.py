@@ -53,7 +53,7 @@ class Subspaces(ConfigModel):
     chosen: tuple[tuple[str, str, int], ...] | None = None
 
     def wants(self, method: object, position_basis: object, k: object) -> bool:
-        """Whether a model is timed."""
+        """Whether the model of a ``method`` in ``position_basis`` of ``k`` modes is timed."""
         return self.chosen is None or (method, position_basis, k) in self.chosen
 
 
@@ -81,7 +81,7 @@ class Request(ConfigModel):
 
 
 def in_fresh_process(request: Request, folder: Path) -> pd.DataFrame:
-    """Rows of `COLUMNS` that a new process measures.
+    """Rows of `COLUMNS` that a new process measures; ``folder`` receives the ``request``.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def in_fresh_process(request: Request, folder: Path) -> pd.DataFrame:
 
 
 def timed(request: Request) -> pd.DataFrame:
-    """Time the loops in this process."""
+    """Time the loops of a ``request`` in this process."""
     variants = [variant for scene in request.scenes for variant in _variants(scene, request)]
     order = np.random.default_rng(request.seed).permutation(len(variants))
     timing = request.timing

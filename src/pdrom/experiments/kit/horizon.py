@@ -32,6 +32,6 @@ def horizon(floor: np.ndarray, threshold: float) -> int:
 
 
 def horizons(table: pd.DataFrame, perturbation: float | str, threshold: float) -> dict[str, int]:
-    """`horizon` of every scene of the table; see `floor_of`."""
+    """`horizon` of every scene of the table by ``threshold``, see `floor_of` (``perturbation``)."""
     scenes = table.scene.unique()
     return {s: horizon(floor_of(table, s, perturbation), threshold) for s in scenes}

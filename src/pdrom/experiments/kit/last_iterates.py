@@ -15,7 +15,7 @@ def last_iterates(
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """Positions (F + 1, N, 3) of a run, and what ``look`` returns for the last iterate of a frame.
 
-    ``start`` (N, 3) m is added to the initial positions.
+    ``loop`` is the step loop of ``scene``; ``start`` (N, 3) m is added to the initial positions.
     """
     state = scene.initial_state(start)
     positions, seen = [state.positions], []

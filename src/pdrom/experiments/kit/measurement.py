@@ -73,7 +73,13 @@ def measure(
     repeats: int,
     progress: Progress = lambda done, total: None,
 ) -> list[Measurement]:
-    """Time all variants; factorisations are cached by the first run, the warm-up."""
+    """Time all variants; factorisations are cached by the first run, the warm-up.
+
+    Parameters
+    ----------
+    warmup, repeats : runs of each variant before the timed ones, and timed ones
+    progress : called with the repeats that are done and all
+    """
     samples: list[list[np.ndarray]] = [[] for _ in variants]
     for repeat in range(-warmup, repeats):
         for index, variant in enumerate(variants):
@@ -87,7 +93,7 @@ def measure(
 def measure_calls(
     calls: Mapping[Hashable, Callable[[], object]], warmup: int, repeats: int
 ) -> dict[Hashable, float]:
-    """Median time of each call over the repeats, interleaved, in ms."""
+    """Median time in ms of each of ``calls`` over the repeats, interleaved; ``warmup`` before."""
     samples: dict[Hashable, list[float]] = {key: [] for key in calls}
     for repeat in range(-warmup, repeats):
         for key, call in calls.items():
@@ -100,7 +106,7 @@ def measure_calls(
 
 
 def clocked(made: Iterable[T]) -> Iterator[tuple[float, T]]:
-    """Every item with the processor time that it took to make, s."""
+    """Every item of ``made`` with the processor time that it took to make, s."""
     items = iter(made)
     while True:
         before = process_time()

@@ -19,16 +19,16 @@ class Motion(Yardstick):
         super().__init__(scene, positions_of(full_order))
 
     def run(self, model: SubspaceModel, limit: float) -> Rerun:
-        """Run a model; a blow-up ends the run and is recorded."""
+        """Run a model; a blow-up, an extent above ``limit`` m, ends the run and is recorded."""
         return rerun_model(self.scene, model, self.reference, blowup_extent=limit)
 
 
 def training_indices(scene: Scene) -> np.ndarray:
-    """Training frames (n,): the even ones that train the projections, too."""
+    """Training frames (n,) of ``scene``: the even ones that train the projections, too."""
     count = max(plan.train for plan in scene.config.reduce.values())
     return training_frames(scene.config.frames, count)
 
 
 def training_positions(motion: Motion) -> np.ndarray:
-    """Positions (n, N, 3) m after the training frames."""
+    """Positions (n, N, 3) m of ``motion`` after the training frames."""
     return motion.reference[1:][training_indices(motion.scene)]

@@ -89,7 +89,10 @@ class Repeater:
     def repeat(
         self, method: MethodSpec, sizes: Sequence[int], varied: Varied
     ) -> Iterator[Repetition]:
-        """Every repetition at every size that its basis has."""
+        """Every repetition of ``method`` at each of ``sizes`` that its basis has.
+
+        ``varied`` says what the seed draws: the start, or the training snapshots.
+        """
         for seed in range(1, self.asked.repetitions + 1):
             subset = None if varied == "start" else seed
             for r, reduction in self._reduced(method, sizes, subset).items():
@@ -146,7 +149,7 @@ class Repeater:
 
 
 def drawn(data: SnapshotSet, seed: int) -> np.ndarray:
-    """As many training snapshots (n, e p, 3) as there are, drawn from all of the run, in order."""
+    """As many snapshots (n, e p, 3) as train in ``data``, drawn by ``seed`` from all, in order."""
     frames = np.concatenate([data.frames["train"], data.frames["test"]])
     chosen = np.random.default_rng(seed).choice(len(frames), len(data.train), replace=False)
     chosen = chosen[np.argsort(frames[chosen])]

@@ -53,6 +53,9 @@ def sample(
 
     Parameters
     ----------
+    basis, data : of the group, from its training snapshots, and all of its snapshots
+    method : its rows and criterion of the selection
+    ranks : sizes of the reruns
     sampling, errors : files to write; their labels are the first columns of the table
     """
     labels = sampling.labels

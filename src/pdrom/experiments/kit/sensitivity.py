@@ -19,7 +19,7 @@ OTHER_SOLVERS = ("splu", "splu-columns")
 
 
 def relative_difference(other: np.ndarray, base: np.ndarray) -> np.ndarray:
-    """Per-frame difference of two trajectories (F + 1, N, 3), relative, (F,).
+    """Per-frame difference of ``other`` from ``base``, trajectories (F + 1, N, 3), relative, (F,).
 
     || Q'_f - Q_f ||_F over the root mean square of || Q_f - Q_0 ||_F over the run: one
     normalisation for all frames, so that a slow start is not divided by nothing.
@@ -31,13 +31,16 @@ def relative_difference(other: np.ndarray, base: np.ndarray) -> np.ndarray:
 
 
 def perturbation_field(scene: Scene, size: float, seed: int) -> np.ndarray:
-    """Random directions of length ``size`` times the extent, (N, 3) m."""
+    """Random directions by ``seed``, of length ``size`` times the extent of ``scene``, (N, 3) m."""
     field = np.random.default_rng(seed).standard_normal((scene.mesh.vertices, 3))
     return size * scene.mesh.extent * field / np.linalg.norm(field, axis=1, keepdims=True)
 
 
 def heldout_floor(heldout: Scene, motion: str, size: float, seeds: tuple[int, ...]) -> pd.DataFrame:
-    """Rows of a held-out motion, whose horizon is its own; its name stands as perturbation."""
+    """Rows of a held-out motion, whose horizon is its own; its name stands as perturbation.
+
+    ``size`` and ``seeds`` of the starts of ``heldout`` as in `perturbation_field`.
+    """
     base = trajectory(heldout)
     runs = [trajectory(heldout, perturbation_field(heldout, size, seed)) for seed in seeds]
     return pd.concat(
@@ -49,10 +52,10 @@ def heldout_floor(heldout: Scene, motion: str, size: float, seeds: tuple[int, ..
 def sensitivities(
     scene: Scene, perturbations: tuple[float, ...], seeds: tuple[int, ...]
 ) -> pd.DataFrame:
-    """Table of `COLUMNS`: perturbed starts, and the scene with something else changed.
+    """Table of `COLUMNS`: ``perturbations`` of the start by ``seeds``, and other changes.
 
-    That is another solver, 4 K iterations, half the time step, and no effect of one name (label
-    `without`); the only constraint group cannot be left out.
+    The others are another solver, 4 K iterations, half the time step, and no effect of one name
+    (label `without`); the only constraint group cannot be left out.
     """
     base = trajectory(scene)
     parts = []
@@ -75,7 +78,7 @@ def without(effect: str) -> str:
 
 
 def removable(config: SceneConfig) -> list[str]:
-    """Names of the effects without which the scene still is one, each once."""
+    """Names of the effects of ``config`` without which the scene still is one, each once."""
     names = dict.fromkeys(e.effect for e in config.effects)
     return [name for name in names if config.groups != [name]]
 

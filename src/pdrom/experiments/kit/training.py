@@ -25,7 +25,10 @@ class Training:
 
 
 def train(scene: Scene, system: GlobalSystem, frames: int) -> Training:
-    """The first frames of the full-order run; projections at the last local iterates."""
+    """First ``frames`` of the full-order run of ``scene`` with the matrix of ``system``.
+
+    The projections are those at the last local iterates.
+    """
     group = scene.groups[0]
     loop, state = scene.stepper(system, track_objective=False), scene.initial_state()
     positions, projections, roundoff = [], [], []

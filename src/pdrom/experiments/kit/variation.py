@@ -13,7 +13,7 @@ def varied(
     duration: float,
     frames: Sequence[int],
 ) -> SceneConfig:
-    """Configuration with time step h (s) and the reduced groups' weights times a factor.
+    """``config`` with ``time_step`` (s) and the reduced groups' weights times ``stiffness_ratio``.
 
     Schedules keep their times in seconds, so that their frame numbers change. The run takes
     ``duration`` seconds, but at least ``frames[0]`` and at most ``frames[1]`` frames. The other

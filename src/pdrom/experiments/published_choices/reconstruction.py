@@ -19,7 +19,10 @@ AT_REST = 1e-12
 
 
 def training_snapshots(projections: np.ndarray, count: int, taken: Set[Choice]) -> np.ndarray:
-    """``count`` of the projections (F, e p, 3): spread over the run, or every second one."""
+    """``count`` of the projections (F, e p, 3): spread over the run, or every second one.
+
+    The latter if the choice "frames" is ``taken``.
+    """
     if "frames" in taken:
         return projections[: 2 * count : 2]
     return projections[training_frames(len(projections), count)]
@@ -50,7 +53,7 @@ class Decomposed:
 
 
 def decompose(snapshots: np.ndarray, row_sizes: np.ndarray, taken: Set[Choice]) -> Decomposed:
-    """SVD of snapshots (n, e p, 3), whose rows weigh ``row_sizes`` (e p,) with "weighting"."""
+    """SVD of snapshots (n, e p, 3); rows weigh ``row_sizes`` (e p,) if "weighting" is ``taken``."""
     weights = np.sqrt(row_sizes) if "weighting" in taken else np.ones(len(row_sizes))
     weighted = (snapshots * weights[:, None]).reshape(len(snapshots), -1)
     first = weighted[0].copy()

@@ -84,7 +84,7 @@ def _trials(numbers: np.ndarray) -> Iterator[_Trial]:
 
 
 def caches(folder: Path = _CACHES) -> list[tuple[str, int]]:
-    """Names and bytes of the caches of data that the system reports, the smallest first."""
+    """Names and bytes of the caches of data that the system lists in ``folder``, smallest first."""
     found = []
     for index in sorted(folder.glob("index*")):
         kind, size, number = (
@@ -96,6 +96,6 @@ def caches(folder: Path = _CACHES) -> list[tuple[str, int]]:
 
 
 def level(size: int) -> str | None:
-    """The smallest cache that holds so many bytes; None where the system reports no cache."""
+    """The smallest cache that holds ``size`` bytes; None where the system reports no cache."""
     known = caches()
     return next((name for name, held in known if size <= held), MEMORY if known else None)

@@ -13,14 +13,14 @@ from pdrom.model.compiled.rows import INDICES, NUMBERS, ROW, WIDTH
 
 
 def spread(builder, number):
-    """LLVM vector with ``number`` in all lanes."""
+    """LLVM vector of a ``builder`` with ``number`` in all lanes."""
     undefined = ir.Constant(NUMBERS, ir.Undefined)
     first = builder.insert_element(undefined, number, ir.Constant(ir.IntType(32), 0))
     return builder.shuffle_vector(first, undefined, ir.Constant(INDICES, [0] * WIDTH))
 
 
 def multiply_add(builder, a, b, c):
-    """LLVM vector a b + c, rounded once where the processor can."""
+    """LLVM vector a b + c of a ``builder``, rounded once where the processor can."""
     kind = ir.FunctionType(NUMBERS, [NUMBERS] * 3)
     function = cgutils.get_or_insert_function(builder.module, kind, "llvm.fmuladd.v4f64")
     return builder.call(function, [a, b, c])

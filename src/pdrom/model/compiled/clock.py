@@ -18,6 +18,6 @@ def clock() -> np.ndarray:
 
 @compiled(nogil=True)
 def now(clock):
-    """Seconds since some moment."""
+    """Seconds since some moment, by the ``clock``."""
     _clock_gettime(_CLOCK, clock.ctypes)
     return clock[0] + 1e-9 * clock[1]

@@ -62,5 +62,5 @@ class Callback:
 
     @property
     def address(self):
-        """Where the compiled function begins."""
+        """Address of the compiled function."""
         return self._compiled.address

@@ -52,7 +52,7 @@ def zeros(numbers):
 
 @compiled
 def copied(numbers):
-    """A copy of a flat array."""
+    """A copy of the flat array ``numbers``."""
     return numbers.copy()
 
 
@@ -124,7 +124,7 @@ def at(_context, array, index):
 
 @intrinsic
 def load(_context, array, index):
-    """The row that begins at ``index``."""
+    """The row of the flat ``array`` that begins at ``index``."""
 
     def generate(context, builder, signature, arguments):
         return builder.load(_place(context, builder, signature.args[0], *arguments), align=8)
@@ -134,7 +134,7 @@ def load(_context, array, index):
 
 @intrinsic
 def store(_context, array, index, _row):
-    """Write a row to where ``index`` points."""
+    """Write a row to the flat ``array`` from ``index`` on."""
 
     def generate(context, builder, signature, arguments):
         array, index, row = arguments

@@ -7,7 +7,7 @@ from pdrom.model.compiled.rows import WIDTH, load
 
 @compiled(nogil=True)
 def dot(a, b):
-    """Inner product of two vectors (n,), in eight partial sums that do not wait for each other."""
+    """Inner product of ``a`` and ``b`` (n,), in eight sums that do not wait for each other."""
     first = second = constant(0.0)
     whole = len(a) - len(a) % (2 * WIDTH)
     for k in range(0, whole, 2 * WIDTH):

@@ -81,7 +81,7 @@ def _rotated(f0, f1, low, high):
 
 @lane_function
 def clamp_block(work, at_f, at_p, at_found, low, high):
-    """Write the matrices nearest to F with singular values in [low, high] to P.
+    """Write the matrices nearest to F with singular values in [low, high] to P, in ``work``.
 
     at_f, at_p, at_found : numbers of the working array at which F, P and marks of the lanes begin
 

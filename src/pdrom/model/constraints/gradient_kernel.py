@@ -31,7 +31,10 @@ def gradient_kernel(function):
 
 @intrinsic
 def call(typing_context, address, d, parameters, p, m):
-    """Call a gradient kernel by its address; arrays are given by the addresses of their data."""
+    """Call a gradient kernel by its ``address``.
+
+    ``d``, ``parameters`` and ``p``, see `gradient_kernel`, are addresses; ``m`` elements.
+    """
     integers = (types.intp,) * 5
 
     def generate(context, builder, signature, arguments):

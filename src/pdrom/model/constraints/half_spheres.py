@@ -41,7 +41,7 @@ ELEMENTS, COUNT, START, INDICES, DATA, SPHERES, WORK, SAMPLED, TAKEN, ARRAYS = r
 
 @kernel
 def put_poles(manifold, elements, side, normals):
-    """Write side times normal of some elements."""
+    """Write ``side`` (m,) times ``normals`` (m, 3) of some elements to the packed ``manifold``."""
     for e in elements:
         place = (e // LANES * MANIFOLD + POLE) * LANES + e % LANES
         save(manifold, 0, place, scaled(side[e], (normals[e, 0], normals[e, 1], normals[e, 2])))
@@ -134,7 +134,10 @@ def _spheres(record, part):
 
 @local_kernel
 def project_vertices(y_place, p_place, record, part):
-    """Projections (m, 3) of some elements."""
+    """Projections (m, 3) of some elements; the arguments are those of `local_kernel`.
+
+    Addresses: ``y_place``, ``p_place``, ``record``; ``part`` says which working array is used.
+    """
     y, start, indices, data = _operator(y_place, record)
     manifold, work = _spheres(record, part)
     entries = rows.indices(record, ARRAYS)
@@ -156,7 +159,10 @@ def project_vertices(y_place, p_place, record, part):
 
 @local_kernel
 def accumulate_vertices(y_place, rhs_place, record, part):
-    """Add S^T W p of a part's blocks to the right-hand side; their energy."""
+    """Add S^T W p of a part's blocks to the right-hand side; their energy.
+
+    ``y_place``, ``rhs_place`` and ``record`` are addresses, see `local_kernel`.
+    """
     entries = rows.indices(record, ARRAYS)
     y, start, indices, data = _operator(y_place, record)
     manifold, work = _spheres(record, part)
@@ -188,7 +194,10 @@ def accumulate_vertices(y_place, rhs_place, record, part):
 
 @gradient_kernel
 def project_gradients(d_pointer, manifold_pointer, p_pointer, m):
-    """Projections from S q and the packed manifold."""
+    """Projections (m, 3) from S q (m, 3) and the packed manifold.
+
+    They lie at ``p_pointer``, ``d_pointer`` and ``manifold_pointer``, see `gradient_kernel`.
+    """
     d, p = carray(d_pointer, (m, 3)), carray(p_pointer, (m, 3))
     blocks = (m + LANES - 1) // LANES
     manifold = carray(manifold_pointer, (blocks * MANIFOLD * LANES,))

@@ -25,7 +25,7 @@ def lane_function(function):
 
 
 def kernel(function):
-    """Compile a kernel that releases the interpreter lock."""
+    """Compile a ``function`` as a kernel that releases the interpreter lock."""
     return compiled(function, nogil=True)
 
 
@@ -54,7 +54,10 @@ def workspaces(numbers: int) -> np.ndarray:
 
 @lane_function
 def take(packed, numbers, elements, start, out):
-    """Copy one block of ``elements[start:]``, the last one repeated, to ``out``."""
+    """Copy one block of ``elements[start:]``, the last one repeated, to ``out``.
+
+    ``packed`` holds so many ``numbers`` an element, see `pack`.
+    """
     last = elements.shape[0] - 1
     for lane in range(LANES):
         e = elements[min(start + lane, last)]
@@ -65,7 +68,7 @@ def take(packed, numbers, elements, start, out):
 
 @lane_function
 def load(work, first, lane):
-    """Vector of the numbers ``first``, ``first + 1``, ``first + 2`` of a lane."""
+    """Vector of the numbers ``first``, ``first + 1``, ``first + 2`` of a ``lane`` of ``work``."""
     return (
         at(work, first * LANES + lane),
         at(work, (first + 1) * LANES + lane),
@@ -75,7 +78,7 @@ def load(work, first, lane):
 
 @lane_function
 def save(work, first, lane, vector):
-    """Opposite of `load`."""
+    """Opposite of `load`: write a ``vector`` to the numbers from ``first`` on of a ``lane``."""
     work[first * LANES + lane] = vector[0]
     work[(first + 1) * LANES + lane] = vector[1]
     work[(first + 2) * LANES + lane] = vector[2]
@@ -83,13 +86,13 @@ def save(work, first, lane, vector):
 
 @lane_function
 def dot(a, b):
-    """Inner product of two vectors."""
+    """Inner product of two vectors ``a`` and ``b`` of three numbers."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @lane_function
 def cross(a, b):
-    """Vector product."""
+    """Vector product of ``a`` and ``b``."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 

@@ -39,7 +39,7 @@ def local_kernel(function):
 
 @intrinsic
 def call(_context, _address, _y, _rhs, _record, _part):
-    """Call a local kernel by its address."""
+    """Call a local kernel by its address, with y, rhs, record and part as in `local_kernel`."""
 
     def generate(_target, builder, _signature, arguments):
         integer = ir.IntType(types.intp.bitwidth)
@@ -51,7 +51,10 @@ def call(_context, _address, _y, _rhs, _record, _part):
 
 @compiled(nogil=True)
 def add_part(addresses, records, part, y, rhs):
-    """Add a part of all kernels to ``rhs``; its energy. ``y`` and ``rhs`` are addresses."""
+    """Add a part of all kernels to ``rhs``; its energy.
+
+    ``y``, ``rhs`` and the ``records`` of the kernels are addresses.
+    """
     energy = 0.0
     for k in range(len(addresses)):
         energy += call(addresses[k], y, rhs, records[k], part)
@@ -76,7 +79,7 @@ class LocalKernel:
 
     @property
     def address(self) -> int:
-        """Where the compiled function begins."""
+        """Address of the compiled function."""
         return self.function.address
 
     @classmethod
@@ -144,7 +147,7 @@ class LocalPass:
         return 2 if self.touched else 1
 
     def add(self, y: np.ndarray, rhs: np.ndarray, threads: int) -> float:
-        """Add S^T W p(y) to ``rhs``, both flat padded vectors; the energy."""
+        """Add S^T W p(y) to ``rhs``, both flat padded, by one or two ``threads``; the energy."""
         places = y.ctypes.data, rhs.ctypes.data
         add_part(*self.preparing, PREPARE, *places)
         if not self.touched:
@@ -163,7 +166,7 @@ class LocalPass:
         return sum(energies)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray, threads: int) -> float:
-        """Do `add` for arrays (N, 3), which need not be views of padded rows."""
+        """Do `add` for ``y`` and ``rhs`` (N, 3) that need not be padded; ``threads`` as there."""
         right = rows.flat(rhs)
         if rows.shares(rhs, right):
             return self.add(rows.flat(y), right, threads)

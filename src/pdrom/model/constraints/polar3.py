@@ -93,6 +93,8 @@ def rotation_block(f, at_f, p, at_p, found):
 def within_range_block(f, at_f, p, at_p, low, high, found):
     """Copy F to P, and set ``found`` to 1 where its singular values surely lie in the range.
 
+    F and P begin at the numbers ``at_f`` of ``f`` and ``at_p`` of ``p``; the range is [low, high].
+
     Sufficient: |F^T F - I|_F bounds the distance of every squared singular value from 1, and
     det F > 0.
     """

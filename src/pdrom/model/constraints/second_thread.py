@@ -157,7 +157,7 @@ def _reaches(address, value, turns, more):
 
 @compiled(nogil=True)
 def publish(address, value):
-    """Write the number at ``address``, after everything that was written before."""
+    """Write the number ``value`` at ``address``, after everything that was written before."""
     _store(address, value)
 
 

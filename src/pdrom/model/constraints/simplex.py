@@ -105,6 +105,7 @@ class SimplexGroup(StencilGroup):
 def arguments(y, rhs, record, part, corners, numbers):
     """Unpack the record of a kernel whose elements have so many corners and numbers.
 
+    Addresses ``y``, ``rhs``, ``record`` and ``part`` as in `local_kernel`, to
     (y, rhs, corners, geometry, constants, work, first block, last block)
     """
     entries = rows.indices(record, ARRAYS)
@@ -125,7 +126,7 @@ def arguments(y, rhs, record, part, corners, numbers):
 
 @lane_function
 def samples(record, corners, numbers):
-    """Unpack what a kernel that projects some elements needs besides `arguments`.
+    """Unpack what a kernel that projects some elements needs besides `arguments`, as there.
 
     (elements, corners and geometry of a block of them), see `pdrom.model.constraints.lanes.take`
     """
@@ -139,7 +140,7 @@ def samples(record, corners, numbers):
 
 @lane_function
 def corner_rows(y, corners, place):
-    """Positions of four vertices."""
+    """Positions in ``y`` of the vertices ``corners[place:place + 4]``, as rows."""
     return (
         rows.load(y, WIDTH * at(corners, place)),
         rows.load(y, WIDTH * at(corners, place + 1)),
@@ -150,7 +151,7 @@ def corner_rows(y, corners, place):
 
 @lane_function
 def edge_columns(start, end):
-    """x, y and z of four edges, from four vertices each."""
+    """x, y and z of four edges, from the rows ``start`` of their first vertices to ``end``."""
     return transposed(
         subtract(end[0], start[0]),
         subtract(end[1], start[1]),
@@ -161,7 +162,7 @@ def edge_columns(start, end):
 
 @lane_function
 def gather_edges(y, corners, block, edges, work):
-    """Edges from corner 0 to the others."""
+    """Write the ``edges`` from corner 0 in ``y``, of a ``block`` of ``corners``, to ``work``."""
     for lane in range(0, LANES, WIDTH):
         base = block * (edges + 1) * LANES + lane
         start = corner_rows(y, corners, base)
@@ -176,7 +177,7 @@ def gather_edges(y, corners, block, edges, work):
 
 @lane_function
 def copy_rows(d, count, start, work, first):
-    """Copy S q (m count, 3) of the elements ``start``, ... of m, the last one repeated."""
+    """Copy S q, ``d`` (m count, 3), from ``start`` on to ``work``; the last one is repeated."""
     last = d.shape[0] // count - 1
     for lane in range(LANES):
         base = count * min(start + lane, last)
@@ -186,7 +187,7 @@ def copy_rows(d, count, start, work, first):
 
 @lane_function
 def add_to(rhs, corners, place, forces):
-    """Add four forces to four vertices, one after the other: two may be the same."""
+    """Add ``forces`` to ``rhs`` at ``corners[place:place + 4]``, in turn: two may be the same."""
     for lane in range(WIDTH):
         v = WIDTH * at(corners, place + lane)
         rows.store(rhs, v, add(rows.load(rhs, v), forces[lane]))
@@ -194,7 +195,7 @@ def add_to(rhs, corners, place, forces):
 
 @lane_function
 def take_from(rhs, corners, place, forces):
-    """Opposite of `add_to`."""
+    """Opposite of `add_to`: take ``forces`` from ``rhs`` at ``corners`` from ``place`` on."""
     for lane in range(WIDTH):
         v = WIDTH * at(corners, place + lane)
         rows.store(rhs, v, subtract(rows.load(rhs, v), forces[lane]))
@@ -202,9 +203,9 @@ def take_from(rhs, corners, place, forces):
 
 @lane_function
 def scatter(work, corners, block, edges, rhs):
-    """Add the forces of a block to the vertices.
+    """Add the forces of a block in ``work`` to ``rhs``, rows of four, flat.
 
-    Forces on the corners 1, 2, ... are given; corner 0 gets what makes their sum zero.
+    Forces on the corners 1, ..., ``edges`` are given; corner 0 gets what makes their sum zero.
     """
     none = constant(0.0)
     for lane in range(0, LANES, WIDTH):
@@ -222,14 +223,14 @@ def scatter(work, corners, block, edges, rhs):
 
 @lane_function
 def start_energy(work):
-    """Set the sums of w |S q - p|^2 to zero."""
+    """Set the sums of w |S q - p|^2 in ``work`` to zero."""
     for lane in range(LANES):
         work[ENERGY * LANES + lane] = 0.0
 
 
 @lane_function
 def energy(work):
-    """Energy of all blocks since `start_energy`."""
+    """Energy of all blocks done in ``work`` since `start_energy`."""
     total = 0.0
     for lane in range(LANES):
         total += work[ENERGY * LANES + lane]
@@ -238,7 +239,7 @@ def energy(work):
 
 @lane_function
 def store_projections(work, count, start, p):
-    """Copy the projections of a block to those of the elements ``start``, ``start + 1``, ...
+    """Copy the projections in ``work`` to those of the elements ``start``, ``start + 1``, ...
 
     p : flat, three numbers a row, ``count`` rows an element
     """

@@ -38,7 +38,14 @@ from pdrom.model.mesh.types import Mesh
 
 @template
 def project(y_place, p_place, record, part, rows, gradients, nearest):
-    """Write the projections of some elements of ``rows`` rows, see `local_kernel`."""
+    """Write the projections of some elements of ``rows`` rows, see `local_kernel`.
+
+    Parameters
+    ----------
+    y_place, p_place, record : addresses
+    part : which working array is used
+    gradients, nearest : functions of a block: S q from edges, p from S q and the allowed range
+    """
     corners, numbers = rows + 1, 1 + rows * rows
     y, _, packed, geometry, allowed, work, _, _ = arguments(
         y_place, p_place, record, part, corners, numbers
@@ -58,7 +65,13 @@ def project(y_place, p_place, record, part, rows, gradients, nearest):
 
 @template
 def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, forces):
-    """Add S^T W p of a part's blocks of elements of ``rows`` rows; their energy."""
+    """Add S^T W p of a part's blocks of elements of ``rows`` rows; their energy.
+
+    Parameters
+    ----------
+    y_place, rhs_place, record : addresses
+    gradients, nearest, forces : functions of a block, as in `project`, and the forces from p
+    """
     y, rhs, corners, geometry, allowed, work, first, last = arguments(
         y_place, rhs_place, record, part, rows + 1, 1 + rows * rows
     )
@@ -75,7 +88,14 @@ def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, force
 
 @template
 def project_gradients(d_pointer, range_pointer, p_pointer, m, rows, work_size, nearest):
-    """Write the projections of m elements from S q, with ``work_size`` numbers a lane."""
+    """Write the projections of m elements from S q, with ``work_size`` numbers a lane.
+
+    Parameters
+    ----------
+    d_pointer, p_pointer : S q and projections (rows m, 3)
+    range_pointer : least and greatest singular value
+    nearest : as in `project`
+    """
     d, p = carray(d_pointer, (rows * m, 3)), carray(p_pointer, (3 * rows * m,))
     allowed = carray(range_pointer, (2,))
     work = np.zeros(work_size * LANES)

@@ -69,6 +69,14 @@ def fan_normals(q, vertices, elements, start, fan, triangles, normals):
     """Write the area-weighted unit normals of the vertices of some elements to their rows.
 
     Zero where the fan has no area.
+
+    Parameters
+    ----------
+    q : (N, 3) positions
+    vertices : (m,) vertex of each element
+    elements : those whose row of ``normals`` (m, 3) is written
+    start, fan : the triangles at vertex v are ``fan[start[v]:start[v + 1]]``
+    triangles : (T, 3) vertices
     """
     for i in elements:
         first, last = start[vertices[i]], start[vertices[i] + 1]

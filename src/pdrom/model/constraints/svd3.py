@@ -43,7 +43,10 @@ SIGMA, FACTORS = 20, 23
 
 @lane_function
 def jacobi_rotation(a, b, done):
-    """Cosine, sine, |tangent| of the rotation that makes columns a and b orthogonal."""
+    """Cosine, sine, |tangent| of the rotation that makes columns a and b orthogonal.
+
+    It is none where the lane is ``done``.
+    """
     alpha, beta, gamma = dot(a, a), dot(b, b), dot(a, b)
     half = 0.5 * (beta - alpha)
     root = abs(half) + np.sqrt(half * half + gamma * gamma)
@@ -101,7 +104,7 @@ def _larger_first(a, v, b, w):
 
 @lane_function
 def orthonormal_pair(b0, b1):
-    """Directions and norms of two orthogonal columns, the longer first.
+    """Directions and norms of two orthogonal columns ``b0`` and ``b1``, the longer first.
 
     A column that vanishes gets a direction in a fixed way.
     """
@@ -181,7 +184,7 @@ def clamp_block(f, at_f, p, at_p, keep, low, high, work):
 def factor_block(f, at_f, keep, work):
     """Leave U in `B`, V in `V` and the signed singular values, largest first, in `SIGMA`.
 
-    The arguments are those of `clamp_block`, with `FACTORS` numbers a lane.
+    ``f``, ``at_f``, ``keep`` and ``work`` as in `clamp_block`, with `FACTORS` numbers a lane.
     """
     _diagonalise(f, at_f, keep, work)
     for lane in range(LANES):
@@ -194,7 +197,11 @@ def factor_block(f, at_f, keep, work):
 
 @lane_function
 def compose_block(sigma, at_sigma, p, at_p, keep, work):
-    """Write U diag(sigma) V^T to P, with the U and V that `factor_block` left."""
+    """Write U diag(sigma) V^T to P, with the U and V that `factor_block` left in ``work``.
+
+    P and sigma begin at the numbers ``at_p`` of ``p`` and ``at_sigma`` of ``sigma``; lanes to
+    ``keep`` are left as they are.
+    """
     for lane in range(LANES):
         u = load(work, B, lane), load(work, B + 3, lane), load(work, B + 6, lane)
         v = load(work, V, lane), load(work, V + 3, lane), load(work, V + 6, lane)

@@ -35,7 +35,7 @@ WORK = FOUND + 1
 
 @lane_function
 def gradients(work, geometry, block):
-    """S q = F^T of a block from its edges."""
+    """S q = F^T of a ``block`` of the packed ``geometry`` from its edges, in ``work``."""
     start = block * GEOMETRY + OPERATOR
     for lane in range(LANES):
         e0, e1, e2 = load(work, EDGE, lane), load(work, EDGE + 3, lane), load(work, EDGE + 6, lane)
@@ -61,7 +61,10 @@ def _nearest(work, low, high):
 
 @lane_function
 def forces(work, geometry, block):
-    """Weighted forces S^T W p on the corners, and w |S q - p|^2."""
+    """Weighted forces S^T W p on the corners, and w |S q - p|^2, in ``work``.
+
+    ``block`` and ``geometry`` as in `gradients`.
+    """
     weight, start = block * GEOMETRY + WEIGHT, block * GEOMETRY + OPERATOR
     for lane in range(LANES):
         p0, p1, p2 = load(work, P, lane), load(work, P + 3, lane), load(work, P + 6, lane)

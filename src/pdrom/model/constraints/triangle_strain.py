@@ -40,7 +40,7 @@ FOUND, WORK = SIZE, SIZE + 1
 
 @lane_function
 def gradients(work, geometry, block):
-    """S q = F^T of a block from its edges."""
+    """S q = F^T of a ``block`` of the packed ``geometry`` from its edges, in ``work``."""
     first = (block * GEOMETRY + OPERATOR) * LANES
     for lane in range(LANES):
         e0, e1 = load(work, EDGE, lane), load(work, EDGE + 3, lane)
@@ -52,7 +52,10 @@ def gradients(work, geometry, block):
 
 @lane_function
 def forces(work, geometry, block):
-    """Weighted forces S^T W p on the corners, and w |S q - p|^2."""
+    """Weighted forces S^T W p on the corners, and w |S q - p|^2, in ``work``.
+
+    ``block`` and ``geometry`` as in `gradients`.
+    """
     weight = (block * GEOMETRY + WEIGHT) * LANES
     first = (block * GEOMETRY + OPERATOR) * LANES
     for lane in range(LANES):

@@ -52,14 +52,14 @@ def _weights(gram, projection, count):
 
 @compiled
 def forget(history):
-    """Forget all iterates: another frame or substep begins."""
+    """Forget all iterates of ``history``: another frame or substep begins."""
     history[6][DIFFERENCES] = -1
     history[7][0] = np.inf
 
 
 @compiled
 def refuse(history, y, objective):
-    """See `Anderson.refuse`; ``y`` (n,) are all numbers of the iterate."""
+    """See `Anderson.refuse` of ``history``; ``y`` (n,) has this ``objective``."""
     start, _, image, _, _, _, numbers, last = history
     if numbers[DIFFERENCES] >= 1 and objective > last[0]:
         y[:] = image
@@ -73,7 +73,7 @@ def refuse(history, y, objective):
 
 @compiled
 def combine(history, image):
-    """See `Anderson.combine`; ``image`` (n,) are all numbers of G(y)."""
+    """See `Anderson.combine` of ``history``; ``image`` (n,) are all numbers of G(y)."""
     start, residual, last_image, residuals, images, gram, numbers, _ = history
     numbers[DIFFERENCES] += 1
     differences, window = numbers[DIFFERENCES], len(gram)

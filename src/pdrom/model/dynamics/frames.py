@@ -1,4 +1,8 @@
-"""Beginning and end of a frame for all vertices, each in one pass over them."""
+"""Beginning and end of a frame for all vertices, each in one pass over them.
+
+Rows of four (x, y, z, 0), flat: the iterate ``y``, the prediction ``s``. ``inertia`` (N,) is M/h^2,
+kg/s^2, ``time_step`` h, s.
+"""
 
 import numpy as np
 
@@ -8,7 +12,10 @@ from pdrom.model.compiled.rows import WIDTH
 
 @compiled(nogil=True)
 def predict(positions, velocities, acceleration, time_step):
-    """q + h v + h^2 a as rows of four, flat; ``acceleration`` is (N, 3), or (1, 3) for all."""
+    """q + h v + h^2 a as rows of four, flat, with h = ``time_step``.
+
+    ``positions`` q and ``velocities`` v are (N, 3), ``acceleration`` a too, or (1, 3) for all.
+    """
     s, square = np.empty(WIDTH * len(positions)), time_step**2
     for i in range(len(positions)):
         own = i if len(acceleration) > 1 else 0
@@ -21,7 +28,7 @@ def predict(positions, velocities, acceleration, time_step):
 
 @compiled(nogil=True)
 def weighted(inertia, s):
-    """(M/h^2) s as rows of four, flat as s is."""
+    """(M/h^2) s as rows of four, flat as s is; ``inertia`` is M/h^2 (N,)."""
     result = np.empty(len(s))
     for i in range(len(inertia)):
         for lane in range(WIDTH):
@@ -31,7 +38,10 @@ def weighted(inertia, s):
 
 @compiled(nogil=True)
 def end(y, before, time_step):
-    """Positions and velocities (N, 3) at the end of a frame, from rows of four, flat."""
+    """Positions and velocities (N, 3) at the end of a frame.
+
+    From ``y``, rows of four, flat, the positions ``before`` (N, 3) and ``time_step``.
+    """
     positions, velocities = np.empty_like(before), np.empty_like(before)
     for i in range(len(before)):
         for axis in range(3):
@@ -42,7 +52,7 @@ def end(y, before, time_step):
 
 @compiled(nogil=True)
 def inertia_energy(y, s, inertia):
-    """1/2 |(M/h^2)^1/2 (y - s)|^2 of rows of four, flat."""
+    """1/2 |(M/h^2)^1/2 (y - s)|^2 of rows of four, flat; ``inertia`` is M/h^2 (N,)."""
     energy = 0.0
     for i in range(len(inertia)):
         square = 0.0

@@ -50,7 +50,7 @@ class CompiledIterations:
         self._clock = clock()
 
     def takes(self, elimination: object) -> TypeGuard[Elimination]:
-        """Whether the system is solved by compiled code, too."""
+        """Whether the system of an ``elimination`` is solved by compiled code, too."""
         return isinstance(elimination, Elimination) and elimination.factor is not None
 
     @property
@@ -83,6 +83,7 @@ class CompiledIterations:
         objective : (K,) receives the objective at the iterates; empty if it is not tracked
         y, base : (N, 3) views of rows of four: iterate, (M/h^2) s
         s : (N, 3) prediction
+        elimination : the factored system, see `takes`
         seconds : (4,) times of the local and of the global steps are added to entries 1 and 2
         """
         count = len(which)
@@ -136,7 +137,19 @@ def all_iterations(
     first, end, iterations, y, s, base, rhs, inertia, tables, shared, places, assisted, factor,
     history, objective, seconds, watch,
 ):  # fmt: skip
-    """Do iterations of a frame in place, see `CompiledIterations.run`."""
+    """Do iterations of a frame in place, see `CompiledIterations.run`.
+
+    Parameters
+    ----------
+    first, end : those from ``first`` to before ``end`` of ``iterations``
+    y, s, base, rhs : rows of four, flat: iterate, prediction, (M/h^2) s, working array
+    inertia : (N,) M/h^2, kg/s^2
+    tables, shared, places : of the local steps, see `CompiledIterations.compiled_arguments`
+    assisted : whether a second thread does its parts
+    factor : of the system; ``history`` of the acceleration
+    objective, seconds : as there
+    watch : see `pdrom.model.compiled.clock`
+    """
     addresses, records, preparing, second = tables
     shared_energy, other, start, stop = shared
     given, done = places

@@ -58,7 +58,7 @@ class SparseSolver(ABC):
 
     @abstractmethod
     def set_targets(self, targets: np.ndarray) -> None:
-        """Positions (m, 3) of the held vertices for the solves that follow."""
+        """Hold the held vertices at ``targets`` (m, 3) in the solves that follow."""
 
     @abstractmethod
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
@@ -138,7 +138,7 @@ class SupernodalSolver(SparseSolver):
 
 
 def factored(matrix: sparse.csr_array, ordering: str) -> SuperLU:
-    """SuperLU of a matrix (n, n) without pivoting.
+    """SuperLU of a matrix (n, n) without pivoting; ``ordering`` as SuperLU's ``permc_spec``.
 
     Raises
     ------
@@ -162,5 +162,5 @@ def factored(matrix: sparse.csr_array, ordering: str) -> SuperLU:
 
 
 def solver_class(name: str) -> type[SparseSolver]:
-    """Class of a registered solver."""
+    """Class of the solver that is registered as ``name``."""
     return SOLVERS.load(name)

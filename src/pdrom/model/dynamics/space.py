@@ -24,39 +24,52 @@ class Solve(Protocol):
 
 
 class Space(ABC):
-    """Interface of the step loop to its coordinates. Arrays are (n, 3) with n coordinates."""
+    """Interface of the step loop to its coordinates.
+
+    Arrays are (n, 3) with n coordinates: ``positions`` and their ``velocities`` at the beginning of
+    a frame, the iterate ``y``, the prediction ``s``. ``h`` is the time step in seconds.
+    """
 
     def predict(self, positions: np.ndarray, velocities: np.ndarray, h: float) -> np.ndarray:
-        """Inertial prediction s = q + h v + h^2 a."""
+        """Inertial prediction s = q + h v + h^2 a of ``positions`` q and ``velocities`` v."""
         return positions + h * velocities + h**2 * self.acceleration(positions, velocities)
 
     def copy(self, s: np.ndarray) -> np.ndarray:
-        """A copy of what `predict` or `inertia` returned, to iterate on."""
+        """Copy ``s`` (n, 3), which `predict` or `inertia` returned, to iterate on."""
         return s.copy()
 
     def end(self, y: np.ndarray, before: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates and velocities at the end of a frame that began at ``before``."""
+        """Coordinates and velocities from ``y`` at the end of a frame that began at ``before``."""
         return y, (y - before) / h
 
     def compiled(
         self, local_steps: Sequence[Any], acceleration: Anderson | None = None
     ) -> CompiledIterations | None:
-        """Compiled iterations with these local steps, None if there are none."""
+        """Compiled iterations with ``local_steps`` and ``acceleration``, None if there are none."""
         return None
 
     def whole(
         self, local_steps: Sequence[Any], loop: Any, acceleration: Anderson | None
     ) -> WholeFrames | None:
-        """Whole frames in compiled code around a compiled ``loop``, None if there are none."""
+        """Whole frames in compiled code around a compiled ``loop``, None if there are none.
+
+        ``local_steps`` and ``acceleration`` are those of the loop, see `compiled`.
+        """
         return None
 
     @abstractmethod
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
-        """Acceleration of the frame by all forces, broadcastable to (n, 3), m/s^2."""
+        """Acceleration by all forces, broadcastable to (n, 3), m/s^2.
+
+        ``positions`` (m) and ``velocities`` (m/s) are those at the beginning of the frame.
+        """
 
     @abstractmethod
     def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates held in ``frame``, ascending (m,), and their values (m, 3)."""
+        """Coordinates held in ``frame``, ascending (m,), and their values (m, 3).
+
+        ``positions`` (n, 3) are those at its beginning.
+        """
 
     @abstractmethod
     def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
@@ -72,7 +85,7 @@ class Space(ABC):
 
     @abstractmethod
     def correct(self, y: np.ndarray, before: np.ndarray, frame: int) -> None:
-        """Contacts at the end of ``frame``, in place; ``before`` are its first coordinates."""
+        """Correct ``y`` by the contacts at the end of ``frame``, which began at ``before``."""
 
 
 class VertexSpace(Space):
@@ -98,7 +111,10 @@ class VertexSpace(Space):
         return held_targets(self._boundaries, frame, positions)
 
     def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates that are held in the first ``frames``, and their values (n, m, 3)."""
+        """Coordinates that are held in the first ``frames``, and their values (n, m, 3).
+
+        ``positions`` (N, 3) are those at the beginning of the first one.
+        """
         return held_path(self._boundaries, frames, positions)
 
     def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:

@@ -29,7 +29,7 @@ class LocalStep(Protocol):
     name: str
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Called once a frame with its first positions (N, 3)."""
+        """Called once a frame with its first positions ``q`` (N, 3)."""
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         """Add S^T W p(y) to ``rhs`` (N, 3); return the energy W(y), nan where it is not known."""
@@ -45,7 +45,7 @@ class WatchedStep(ABC):
 
     @abstractmethod
     def look(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """`accumulate` in these iterations."""
+        """Do `accumulate` (``y``, ``rhs``) in these iterations."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,15 @@ class CompiledFrames(Protocol):
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-        """Positions, velocities, objectives and seconds after some of ``frames``; None: not now."""
+        """Positions, velocities, objectives and seconds after some of ``frames``; None: not now.
+
+        Parameters
+        ----------
+        q, v : (N, 3) positions, m, and velocities, m/s, at the beginning
+        h : time step, s
+        iterations : of a frame
+        track : whether the objectives are wanted
+        """
 
 
 class Stepper:
@@ -109,7 +117,7 @@ class Stepper:
         frame: int,
         on_last_iterate: Callable[[np.ndarray], None] | None = None,
     ) -> tuple[State, FrameReport]:
-        """Do one frame (0-based ``frame``); ``on_last_iterate`` sees the last local iterate y."""
+        """Do ``frame`` (0-based) from ``state``; ``on_last_iterate`` sees the last iterate y."""
         if on_last_iterate is None:
             for done in self._at_once(state, range(frame, frame + 1)):
                 return done
@@ -124,7 +132,7 @@ class Stepper:
         return after, FrameReport(objective, seconds)
 
     def run(self, state: State, frames: range) -> Iterator[tuple[State, FrameReport]]:
-        """Do frames one after the other, as `step` without an observer; many in one compiled call.
+        """Do ``frames`` from ``state``, as `step` without an observer; many in one compiled call.
 
         What a caller does between two of them changes nothing in those that follow.
         """

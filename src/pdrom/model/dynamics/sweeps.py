@@ -50,11 +50,11 @@ class _Panel:
         return self._spread(self._own, self._index(self.width + row * (row - 1) // 2 + column))
 
     def pointer(self, offset):
-        """Where a row of the right-hand side lies."""
+        """Address of a row of the right-hand side."""
         return self.builder.bitcast(self.builder.gep(self._x, [offset]), NUMBERS.as_pointer())
 
     def column(self, k):
-        """Where the row of the panel's own column lies."""
+        """Address of the row of the panel's own column."""
         return self.pointer(self.builder.add(self._first, self._index(WIDTH * k)))
 
     def load(self, pointer):
@@ -143,7 +143,11 @@ _backward = _panel_intrinsic(_write_backward)
 
 @compiled(nogil=True)
 def load(beside, indptr, indices, data, targets, loads):
-    """Write coupling times targets to the rows ``beside`` of ``loads``; the others stay zero."""
+    """Write coupling times targets to the rows ``beside`` of ``loads``; the others stay zero.
+
+    The coupling is a CSR matrix (``indptr``, ``indices``, ``data``), ``targets`` are (m, 3),
+    ``loads`` rows of four, flat.
+    """
     for i in beside:
         for axis in range(3):
             total = 0.0

@@ -51,7 +51,7 @@ class Elimination:
         out[...] = y[self.free]
 
     def set_targets(self, targets: np.ndarray) -> None:
-        """Positions (n_fixed, 3) of the fixed vertices for the solves that follow."""
+        """Hold the fixed vertices at ``targets`` (n_fixed, 3) in the solves that follow."""
         if self._solver is not None:
             self._solver.set_targets(targets)
 
@@ -64,6 +64,7 @@ class Elimination:
 def require_accurate(matrix, solve: Callable[[np.ndarray, np.ndarray], object]) -> None:
     """Raise SolverError if the factored ``matrix`` (n, n) does not return a known solution.
 
+    ``solve`` takes a right-hand side (n, 3) and the array that receives the solution.
     The known solution is a translation: all springs and elements cancel in it and nothing but
     inertia (and pins) is left, which rounding in the matrix loses first.
     """

@@ -69,7 +69,10 @@ class WholeFrames:
         boundaries: Sequence[Boundary],
         contacts: Sequence[Contact],
     ) -> bool:
-        """Whether compiled code can do all of it; stand-ins that watch an effect cannot be."""
+        """Whether compiled code can do all local ``steps`` and effects of these roles.
+
+        Stand-ins that watch one of the ``forces``, ``boundaries`` or ``contacts`` cannot be.
+        """
         return (
             all(isinstance(force, Force) and force.rate is not None for force in forces)
             and all(isinstance(boundary, Boundary) for boundary in boundaries)
@@ -82,7 +85,8 @@ class WholeFrames:
     ) -> Blocks | None:
         """As many of ``frames`` as one call can do, from q and v (N, 3) with step h (s).
 
-        None where the iterations take two threads or another solver.
+        ``track`` asks for the objectives. None where the iterations take two threads or another
+        solver.
         """
         fixed, targets = self._space.held_path(frames[:BLOCK], q)
         system = self._space.system.eliminate(fixed)

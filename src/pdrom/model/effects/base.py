@@ -170,7 +170,7 @@ class Boundary(Effect):
         return True
 
     def path(self, frames: range, current: np.ndarray) -> np.ndarray:
-        """`targets` (f, n, 3) of frames, of which only the first may take hold."""
+        """`targets` (f, n, 3) of ``frames``; only the first may take hold of ``current``."""
         first = self.targets(frames.start, current)
         if not self.moves:
             return np.broadcast_to(first, (len(frames), *first.shape))

@@ -48,7 +48,10 @@ class Box(Obstacle):
     def entries(
         self, start: np.ndarray, end: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """A path enters where it has crossed the nearer faces of all three axes."""
+        """Entries of straight paths from ``start`` to ``end`` (n, 3), see `Obstacle.entries`.
+
+        A path enters where it has crossed the nearer faces of all three axes.
+        """
         path, rows = end - start, np.arange(len(start))
         near_face = np.where(path > 0.0, self._lower, self._upper)
         far_face = np.where(path > 0.0, self._upper, self._lower)

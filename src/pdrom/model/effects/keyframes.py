@@ -51,7 +51,7 @@ class Keyframes(Hold):
             return self
 
         def with_frames_scaled(self, factor: float) -> Self:
-            """Keys stay apart by one frame at least."""
+            """Scale the frames of the keys by ``factor``; they stay apart by one frame at least."""
             keys: list[Key] = []
             for key in self.keys:
                 first = keys[-1].at + 1 if keys else 1

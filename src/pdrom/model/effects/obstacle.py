@@ -77,7 +77,7 @@ class Obstacle(Contact):
     def entries(
         self, start: np.ndarray, end: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where straight paths from ``start`` to ``end`` (n, 3), begun outside, enter the body.
+        """Entry of straight paths from ``start`` to ``end`` (n, 3), begun outside, into the body.
 
         Returns
         -------

@@ -51,7 +51,10 @@ class SelfCollision(Contact):
         self._needed = COVER * np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1).max()
 
     def doubt(self, rest: np.ndarray, free: np.ndarray) -> str:
-        """Say which thickness nothing slips through, where the scene's is less."""
+        """Say which thickness nothing slips through, where the scene's is less.
+
+        ``rest`` and ``free`` as in `Contact.doubt`.
+        """
         if self._thickness >= self._needed:
             return ""
         # rounded up, so that what the message says is enough

@@ -8,7 +8,7 @@ from pdrom.core.errors import MeshError
 
 
 def turned_alike(triangles: np.ndarray, name: str) -> np.ndarray:
-    """Which triangles (T,) bool to turn over so that neighbours see a side from the same side.
+    """Mark the triangles (T,) bool to turn over so that neighbours see a side from the same side.
 
     In each connected part the fewer ones are turned. Two copies of every triangle, as it is and
     turned over, are joined with those of a neighbour that agree with them: a part of the surface

@@ -37,7 +37,11 @@ OPENINGS = {"ansys": b"(", "gmsh": b"$"}
 
 
 def main(path: str, formats: str, *numbers: str) -> int:
-    """Read the file and write its arrays; the exit status."""
+    """Read the file ``path`` and write its arrays; the exit status.
+
+    ``formats`` are meshio's names, separated by commas; ``numbers`` are the limits: seconds, bytes,
+    vertices, cells.
+    """
     seconds, memory, vertices, cells = map(int, numbers)
     _limit("RLIMIT_CPU", seconds)
     _limit("RLIMIT_AS", memory)
@@ -69,7 +73,12 @@ def _limit(name: str, value: int) -> None:
 
 
 def read(path: str, formats: list[str], max_vertices: int, max_cells: int) -> tuple:
-    """Points (N, 3) float64 and cells (E, 3 or 4) int64 of a file.
+    """Points (N, 3) float64 and cells (E, 3 or 4) int64 of the file ``path``.
+
+    Parameters
+    ----------
+    formats : names that meshio has for the format, the likeliest first
+    max_vertices, max_cells : more are refused
 
     Raises
     ------

@@ -94,7 +94,7 @@ KINDS = (
 
 
 def _tag(value: Any) -> str | None:
-    """Which of the forms of a selection ``value`` has; None if it has none."""
+    """Form of a selection that ``value`` has; None if it has none."""
     if isinstance(value, str):
         return "side"
     if isinstance(value, (list, tuple)):

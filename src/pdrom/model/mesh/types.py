@@ -46,7 +46,7 @@ class Mesh:
 
 
 def save_mesh(mesh: Mesh, path: str | os.PathLike[str], attributes: dict | None = None) -> None:
-    """Write ``mesh`` to an HDF5 file (points, triangles, tetrahedra) with ``attributes``."""
+    """Write ``mesh`` (points and cells) and ``attributes`` to the HDF5 file ``path``."""
     with write_hdf5(path) as file:
         store_mesh(mesh, file)
         file.attrs.update(attributes or {})

@@ -43,7 +43,7 @@ PASSED_OVER = {
 
 
 def check_before(name: str, content: bytes) -> None:
-    """Refuse a file that meshio's reader ``name`` would read wrong.
+    """Refuse a file with this ``content`` that meshio's reader ``name`` would read wrong.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def check_before(name: str, content: bytes) -> None:
 
 
 def check_after(name: str, content: bytes, mesh: Any) -> None:
-    """Refuse, or mend, what meshio has read from ``content``.
+    """Refuse, or mend, the ``mesh`` that meshio's reader ``name`` has read from ``content``.
 
     Raises
     ------

@@ -34,7 +34,7 @@ SECTIONS = {"VERTICES": 2, "LINES": 4, "TRIANGLE_STRIPS": 6, "POLYGONS": 7}
 
 @dataclass
 class _Cells:
-    """Where the corners of each cell begin in ``corners``, how many it has, and its type."""
+    """Start of the corners of each cell in ``corners``, their number, and its type."""
 
     starts: np.ndarray
     sizes: np.ndarray
@@ -177,7 +177,7 @@ def _count(word: str) -> int:
 
 
 def _starts(corners: np.ndarray, count: int) -> np.ndarray:
-    """Where each of ``count`` cells begins behind the number of its corners."""
+    """Start of each of ``count`` cells, behind the number of its corners."""
     width = len(corners) // count if count else 1
     if width * count == len(corners) and (corners[::width] == width - 1).all():
         return np.arange(count) * width + 1

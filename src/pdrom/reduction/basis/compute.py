@@ -128,7 +128,7 @@ def _mean_error(matrix: np.ndarray, spec: BasisSpec) -> float:
 
 
 def _active_axes(matrix: np.ndarray, roundoff: float) -> tuple[bool, ...]:
-    """Which axes hold more than round-off (of the data, or relative to the largest axis)."""
+    """Axes that hold more than round-off (of the data, or relative to the largest axis)."""
     norms = np.array([np.linalg.norm(matrix[axis::3]) for axis in range(3)])
     relative = max(matrix.shape) * np.finfo(float).eps * norms.max()
     return tuple(bool(norm > max(roundoff, relative)) for norm in norms)

@@ -157,7 +157,7 @@ class _Pattern:
 
 @lane_function
 def _place(indptr, indices, row, column):
-    """Where an entry of the pattern lies."""
+    """Place of an entry of the pattern."""
     low, high = indptr[row], indptr[row + 1]
     while low < high:
         middle = (low + high) // 2

@@ -49,7 +49,7 @@ def rows_of(matrix: sparse.csr_array) -> Matrix:
 
 @compiled(nogil=True)
 def add_projections(tables, y, rhs):
-    """Add S^T W p(y) of all groups to ``rhs``, both padded vectors, flat; the energy W(y)."""
+    """Add S^T W p(y) of all groups in ``tables`` to ``rhs``, both padded, flat; the energy W(y)."""
     kernels, preparing, second = tables
     y_place, rhs_place = y.ctypes.data, rhs.ctypes.data
     add_part(preparing[0], preparing[1], PREPARE, y_place, rhs_place)

@@ -98,7 +98,7 @@ class Alternative(Stepper):
         frame: int,
         on_last_iterate: Callable[[np.ndarray], None] | None = None,
     ) -> tuple[State, FrameReport]:
-        """Do one frame; there is no last local iterate to look at, and no objective."""
+        """Do ``frame`` from ``state``; no objective, and no iterate for ``on_last_iterate``."""
         started = perf_counter()
         q = state.positions
         fixed, targets = self.space.fixed(frame, q)
@@ -147,7 +147,7 @@ class Alternative(Stepper):
 
 
 def inverse_masses(masses: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-    """1 / M (N,), zero for held vertices: nothing moves them."""
+    """1 / M of ``masses`` (N,), zero for the held vertices ``fixed``: nothing moves them."""
     inverse = 1.0 / masses
     inverse[fixed] = 0.0
     return inverse
@@ -173,6 +173,6 @@ def begin(y, v, acceleration, step, fixed, targets, before, s):
 
 @compiled(nogil=True)
 def end(y, before, step, v):
-    """Velocities from the positions at both ends of a substep."""
+    """Velocities ``v`` from the positions ``y`` and ``before`` at both ends of a ``step``, s."""
     for k in range(len(y)):
         v[k] = (y[k] - before[k]) / step

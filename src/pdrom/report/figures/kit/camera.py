@@ -27,7 +27,7 @@ class Window(NamedTuple):
         return self.top - self.bottom
 
     def contains(self, flat: np.ndarray) -> np.ndarray:
-        """Which picture points (n, 2) lie inside, (n,) bool."""
+        """Mark the picture points (n, 2) that lie inside, (n,) bool."""
         x, y = flat.T
         return (x >= self.left) & (x <= self.right) & (y >= self.bottom) & (y <= self.top)
 

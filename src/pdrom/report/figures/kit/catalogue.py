@@ -1,4 +1,4 @@
-"""Which figures there are: every module of the package declares one."""
+"""Catalogue of the figures: every module of the package declares one."""
 
 from collections.abc import Iterator
 from functools import cache

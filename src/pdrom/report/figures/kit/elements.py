@@ -1,4 +1,4 @@
-"""Where the elements of a constraint group lie on the mesh, to colour them."""
+"""Places of the elements of a constraint group on the mesh, to colour them."""
 
 from dataclasses import dataclass
 
