@@ -37,16 +37,21 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def perform(arguments: argparse.Namespace) -> Status:
     """Read the tables that hold the scene and say what follows from them."""
-    from pdrom.report.advice import on_choices, on_effects, on_resolution
+    from pdrom.report.advice import on_asks, on_choices, on_effects, on_resolution
 
     scene, folder = _name(arguments.scene), arguments.results
     effects = _rows(folder, "effects_contribution", scene)
     lines = [f"{scene}: effects", *on_effects(effects)]
     fits = True
     if arguments.error is not None or arguments.ms is not None:
-        points = _rows(folder, "accuracy_cost", scene)
         lines.append(f"{scene}: {_wish(arguments.error, arguments.ms)}")
-        found, fits = on_choices(points, arguments.error, arguments.ms)
+        asked = _rows(folder, "asks", scene, required=False)
+        asked = asked[asked.asked <= arguments.error] if arguments.error and len(asked) else asked
+        if arguments.error is not None and arguments.ms is None and len(asked):
+            found, fits = on_asks(asked)
+        else:
+            points = _rows(folder, "accuracy_cost", scene)
+            found, fits = on_choices(points, arguments.error, arguments.ms)
         lines += found
         if arguments.ms is not None:
             scaling = _rows(folder, "scaling", scene, required=False)

@@ -25,6 +25,7 @@ from pdrom.model.masses import Mass, MassConfig, vertex_masses
 from pdrom.model.mesh.checks import check_mesh
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.mesh.types import Mesh
+from pdrom.model.plans import ReductionPlan, with_asked
 
 # Positions and velocities of a longer run fill disk and memory: 1600 vertices for 100,000 frames.
 MAX_VERTEX_FRAMES = 160_000_000
@@ -32,12 +33,6 @@ MAX_VERTEX_FRAMES = 160_000_000
 
 class _Model(ConfigModel):
     """Base of the sections of a scene."""
-
-
-class ReductionPlan(_Model):
-    """Experiments on one group: how many training snapshots its basis gets."""
-
-    train: Annotated[int, Field(ge=2, le=100_000)]
 
 
 class SceneConfig(_Model):
@@ -60,15 +55,7 @@ class SceneConfig(_Model):
     asked: float | str | None = None
     held_out: HeldOut = HeldOut()
 
-    @model_validator(mode="before")
-    @classmethod
-    def _with_asked(cls, keys: Any) -> Any:
-        """Take ``reduce.error``, the asked error of the whole scene, out of the groups' plans."""
-        plans = keys.get("reduce") if isinstance(keys, dict) else None
-        if not isinstance(plans, dict) or "error" not in plans:
-            return keys
-        groups = {name: plan for name, plan in plans.items() if name != "error"}
-        return {**keys, "reduce": groups, "asked": plans["error"]}
+    _asked = model_validator(mode="before")(with_asked)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -69,6 +69,36 @@ def on_choices(
     return lines, fits
 
 
+def on_asks(rows: pd.DataFrame) -> tuple[list[str], bool]:
+    """Outcome of ``pdrom reduce --error`` on motions of a scene, and whether all kept it.
+
+    Parameters
+    ----------
+    rows : the scene's rows of the table asks, at least one, with asks that are small enough; those
+        with the largest of them count
+    """
+    own = rows[rows.asked == rows.asked.max()]
+    kept = own[own.promised.astype(bool)]
+    lines = [f"pdrom reduce --error {own.asked.iloc[0]:g}, tried on {len(own)} held-out motions:"]
+    for step, part in kept.groupby("last_step", sort=False):
+        lines.append(
+            f"  {step}: error {_span(part.error)}, {_span(part[MS])} ms a frame, full order "
+            f"{_span(part.full_ms)} ({len(part)} of {len(own)} motions)"
+        )
+    if len(kept) < len(own):
+        lines.append(
+            f"  no promise on {len(own) - len(kept)} motions: full order, as well as it can"
+        )
+    broken = int(kept.broken.sum())
+    lines.append(f"  promises broken: {broken} of {len(kept)}")
+    return lines, len(kept) == len(own)
+
+
+def _span(values: pd.Series) -> str:
+    low, high = f"{values.min():.2g}", f"{values.max():.2g}"
+    return low if low == high else f"{low} to {high}"
+
+
 def _fitting(rows: pd.DataFrame, error: float | None, ms: float | None) -> tuple[list[str], bool]:
     accurate = rows[rows[ERROR] <= (np.inf if error is None else error)]
     both = accurate[accurate[MS] <= (np.inf if ms is None else ms)]

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import numpy as np
 import pandas as pd
 
 from pdrom.artifact.reads import Every, Setting
@@ -86,13 +87,14 @@ def risk_factor(
     -------
     The factor, the largest of the grid where none does, and the bound that holds for it.
     """
-    factor, bound = 1.0, 1.0
-    for factor in grid:
-        losses = [_loss(steps, errors, factor) for _, steps in scored.groupby("scene", sort=False)]
-        bound = (sum(losses) + 1.0) / (len(losses) + 1)
-        if bound <= risk:
-            break
-    return factor, bound
+    scenes = [steps for _, steps in scored.groupby("scene", sort=False)]
+    losses = np.array([[_loss(steps, errors, f) for steps in scenes] for f in grid])
+    # a larger factor may lead to a worse step: the worst of all larger ones cannot rise
+    worst = np.maximum.accumulate(losses[::-1], axis=0)[::-1]
+    bounds = (worst.sum(axis=1) + 1.0) / (len(scenes) + 1)
+    kept = np.flatnonzero(bounds <= risk)
+    taken = int(kept[0]) if len(kept) else len(grid) - 1
+    return grid[taken], float(bounds[taken])
 
 
 def _loss(steps: pd.DataFrame, errors: Sequence[float], factor: float) -> float:

@@ -96,3 +96,24 @@ def test_a_misspelt_key_of_a_scenes_file_gets_a_suggestion(results, tmp_path, ca
     path.write_text("name: sheet\ntitle: Sheet\nframe: 3\n", encoding="utf-8")
     assert run(["advise", str(path), "--results", results]) == Status.FAULTY
     assert "did you mean 'frames'?" in capsys.readouterr().err
+
+
+ASKS = pd.DataFrame(
+    {
+        "scene": "sheet", "motion": ["kick", "heldout"] * 2, "asked": [0.1, 0.1, 0.01, 0.01],
+        "promised": [True, True, True, False], "broken": False, "error": [0.02, 0.05, 0.004, 0.03],
+        "last_step": ["ecsw", "ecsw", "full order", "full order"], "ms_per_frame": [0.1, 0.2, 1, 1],
+        "full_ms": [0.5, 0.5, 1.0, 1.0],
+    }
+)  # fmt: skip
+
+
+def test_an_error_alone_is_answered_from_runs_that_were_asked(results, capsys):
+    write_table(ASKS, TABLE.at(results, name="asks"))
+    assert run(["advise", "sheet", "--error", "0.2", "--results", results]) == Status.DONE
+    said = capsys.readouterr().out
+    assert "--error 0.1, tried on 2" in said
+    assert "ecsw: error 0.02 to 0.05, 0.1 to 0.2 ms a frame, full order 0.5 (2 of 2" in said
+    asked = ["advise", "sheet", "--error", "0.05", "--results", results]
+    assert run(asked) == Status.NOTHING_FITS
+    assert "no promise on 1 motions" in capsys.readouterr().out

@@ -18,15 +18,15 @@ from typing import TypeGuard
 
 import numpy as np
 
-from pdrom.model.compiled.clock import clock, now
-from pdrom.model.compiled.functions import compiled
-from pdrom.model.constraints.gradient_kernel import call
-from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, combine, forget, refuse
+from pdrom.model.compiled.clock import clock
+from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson
 from pdrom.model.dynamics.space import Solve
 from pdrom.model.dynamics.stepper import LocalStep, Stepper
 from pdrom.model.dynamics.whole_frames import BLOCK, Blocks
 from pdrom.reduction.subspace.dense import blocks, product, read, vectors, write
 from pdrom.reduction.subspace.elimination import DenseElimination
+from pdrom.reduction.subspace.fused_frames import frames as run_frames
+from pdrom.reduction.subspace.fused_frames import iterations as run_iterations
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
 from pdrom.reduction.subspace.space import ReducedSpace
 
@@ -107,7 +107,7 @@ class _Fused:
         product(own.coupling, own.rows, len(elimination.fixed), own.nothing, targets, own.offset)
         write(elimination.solved(base), own.constant)
         write(s[free], own.z)
-        _iterations(
+        run_iterations(
             iterations, len(free), own.rows, own.iterated, sampled.arrays, self._history(free)
         )
         y = s.copy()
@@ -137,7 +137,7 @@ class _Fused:
         positions, velocities = np.empty((2, count + 1, *q.shape))
         positions[0], velocities[0] = q, v
         seconds = np.zeros((count, 4))
-        _frames(
+        run_frames(
             positions, velocities, *self._space.affine, h, elimination.fixed, elimination.free,
             targets, own.begun, iterations, own.rows, own.iterated, self._sampled.arrays,
             self._history(elimination.free), seconds, self._clock,
@@ -207,91 +207,3 @@ class _Operators:
         self.begun = (
             response, self.coupling, self.nothing, vectors(len(inertia)), vectors(len(fixed))
         )  # fmt: skip
-
-
-@compiled(nogil=True)
-def _iterations(count, size, rows, operators, sampled, history):
-    strain, lift, offset, constant, z, weights, inertia, start = operators
-    addresses, elements, starts, parameters, parameter_starts, d, p = sampled
-    y, accelerated = z[: 3 * size], len(history[5]) > 0
-    if accelerated:
-        start[:] = y
-        forget(history)
-    for k in range(count):
-        product(strain, rows, size, offset, z, d)
-        for g in range(len(addresses)):
-            call(
-                addresses[g],
-                d[3 * starts[g] :].ctypes.data,
-                parameters[parameter_starts[g] :].ctypes.data,
-                p[3 * starts[g] :].ctypes.data,
-                elements[g],
-            )
-        if accelerated and refuse(history, y, _objective(weights, d, p, inertia, y, start)):
-            continue
-        product(lift, size, rows, constant, p, z)
-        if accelerated and k < count - 1:
-            combine(history, y)
-
-
-@compiled(nogil=True)
-def _objective(weights, d, p, inertia, y, s):
-    """1/2 sum_i w_i |d_i - p_i|^2 + 1/2 (y - s)^T (M/h^2) (y - s)."""
-    total = 0.0
-    for i in range(len(weights)):
-        for axis in range(3):
-            total += weights[i] * (d[3 * i + axis] - p[3 * i + axis]) ** 2
-    for i in range(len(inertia)):
-        for axis in range(3):
-            moved = 0.0
-            for k in range(i):
-                moved += inertia[i, k] * (y[3 * k + axis] - s[3 * k + axis])
-            own = y[3 * i + axis] - s[3 * i + axis]
-            total += own * (2.0 * moved + inertia[i, i] * own)
-    return 0.5 * total
-
-
-@compiled(nogil=True)
-def _predict(z, v, acceleration, rate, rates, h, s):
-    """Write s = z + h v + h^2 (a + c v + C v)."""
-    for i in range(len(z)):
-        for axis in range(3):
-            total = acceleration[i, axis] + rate * v[i, axis]
-            for k in range(len(rates)):
-                total += rates[i, k] * v[k, axis]
-            s[3 * i + axis] = z[i, axis] + h * v[i, axis] + h**2 * total
-
-
-@compiled(nogil=True)
-def _frames(
-    positions, velocities, acceleration, rate, rates, h, fixed, free, targets, begun, iterations,
-    rows, operators, sampled, history, seconds, watch,
-):  # fmt: skip
-    response, coupling, nothing, s, held = begun
-    offset, constant, z = operators[2:5]
-    for f in range(len(targets)):
-        began = now(watch)
-        before, after, speeds = positions[f], positions[f + 1], velocities[f + 1]
-        _predict(before, velocities[f], acceleration, rate, rates, h, s)
-        for i in range(len(fixed)):
-            for axis in range(3):
-                s[3 * fixed[i] + axis] = held[3 * i + axis] = targets[f, i, axis]
-        product(response, len(free), len(before), nothing, s, constant)
-        # those that rest have done it in the first frame
-        if f == 0 or (targets[f] != targets[f - 1]).any():
-            product(coupling, rows, len(fixed), nothing, held, offset)
-        for i in range(len(free)):
-            for axis in range(3):
-                z[3 * i + axis] = s[3 * free[i] + axis]
-        between = now(watch)
-        _iterations(iterations, len(free), rows, operators, sampled, history)
-        ended = now(watch)
-        for i in range(len(free)):
-            for axis in range(3):
-                s[3 * free[i] + axis] = z[3 * i + axis]
-        for i in range(len(before)):
-            for axis in range(3):
-                after[i, axis] = s[3 * i + axis]
-                speeds[i, axis] = (after[i, axis] - before[i, axis]) / h
-        seconds[f, 0], seconds[f, 1] = between - began, ended - between
-        seconds[f, 3] = now(watch) - ended

@@ -1,0 +1,22 @@
+"""Section ``reduce`` of a scene: the groups that are reduced, and an error that is asked for."""
+
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from pdrom.core.yamlfile import ConfigModel
+
+
+class ReductionPlan(ConfigModel):
+    """Experiments on one group: how many training snapshots its basis gets."""
+
+    train: Annotated[int, Field(ge=2, le=100_000)]
+
+
+def with_asked(keys: Any) -> Any:
+    """Take ``reduce.error``, the asked error of the whole scene, out of the groups' plans."""
+    plans = keys.get("reduce") if isinstance(keys, dict) else None
+    if not isinstance(plans, dict) or "error" not in plans:
+        return keys
+    groups = {name: plan for name, plan in plans.items() if name != "error"}
+    return {**keys, "reduce": groups, "asked": plans["error"]}

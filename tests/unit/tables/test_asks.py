@@ -1,0 +1,62 @@
+"""Tables of asked errors, from rows worked out by hand."""
+
+import pandas as pd
+import pytest
+
+from pdrom.core.paths import ASK_SCORES, ASKS
+from pdrom.core.store import write_table
+from pdrom.experiments.asks import COLUMNS, SCORE_COLUMNS
+from pdrom.tables.asks import asks, risk_factor
+from pdrom.tables.asks_cost import asks_cost
+
+STEPS = ("ecsw, small", "full order, K = 5")
+
+
+def scores(scene: str, ratio: float) -> pd.DataFrame:
+    """A reduction that ends ``ratio`` times what is expected of it, and a sure full order."""
+    rows = [(scene, STEPS[0], 0.04, 0.04 * ratio), (scene, STEPS[1], 0.001, 0.001)]
+    return pd.DataFrame(rows, columns=SCORE_COLUMNS)
+
+
+def test_the_factor_is_the_smallest_whose_risk_is_borne():
+    found = pd.concat([scores(f"s{i}", 1.0 if i else 3.0) for i in range(19)])
+    # one scene of 19 breaks its ask: (1 + 1) / 20
+    assert risk_factor(found, [0.05], 0.1, [1.0, 2.0]) == (1.0, pytest.approx(0.1))
+    # with the larger factor nobody takes the reduction
+    assert risk_factor(found, [0.05], 0.06, [1.0, 2.0]) == (2.0, pytest.approx(0.05))
+    assert risk_factor(found, [0.05], 0.01, [1.0, 2.0]) == (2.0, pytest.approx(0.05))
+
+
+def test_no_full_order_no_promise_no_loss():
+    only = scores("s", 3.0).iloc[:1]
+    assert risk_factor(only, [0.05], 0.5, [1.0]) == (1.0, 0.5)
+
+
+@pytest.fixture
+def made(tmp_path) -> pd.DataFrame:
+    runs, scored = [], []
+    for i in range(12):
+        scene = f"s{i}"
+        row = {
+            "scene": scene, "motion": "kick", "asked": 0.05, "vertices": 10 if i else 5000,
+            "frames": 9, "promised": i != 1, "error": 0.06 if i == 2 else 0.04,
+            "reduced_frames": 9 if i < 6 else 0, "ms_per_frame": 0.1, "full_ms": 0.2,
+            "own_ms": 0.4, "full_error": 0.01, "oracle_ms": 0.05, "repairs": 0, "checks": 2,
+        }  # fmt: skip
+        rows = [row | {"factor": factor} for factor in (1.0, 2.0)]
+        runs.append(ASKS.file(ASKS.at(str(tmp_path), scene=scene)))
+        scored.append(ASK_SCORES.file(ASK_SCORES.at(str(tmp_path), scene=scene)))
+        write_table(pd.DataFrame(rows, columns=COLUMNS), runs[-1].path)
+        write_table(scores(scene, 1.0), scored[-1].path)
+    return asks.function(runs, scored, 0.1, [0.05])
+
+
+def test_each_scene_has_one_factor_and_broken_promises_are_counted(made):
+    assert made.factor.tolist() == [1.0] * 12
+    assert made.risk.tolist() == pytest.approx([1 / 12] * 12)
+    assert made[made.broken].scene.tolist() == ["s2"]
+    small, large = asks_cost.function(made).to_dict("records")
+    assert (small["asks"], small["promised"], small["broken"], small["reduced"]) == (11, 10, 1, 3)
+    assert small["worst"] == pytest.approx(1.2)
+    assert large["over_full"] == pytest.approx(0.5)
+    assert large["over_own"] == pytest.approx(0.25)
