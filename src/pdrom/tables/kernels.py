@@ -25,7 +25,7 @@ _PER_ELEMENT = {
         compared("exact", number("factor", "on the vertices along a side of the scene's own mesh")),
         VERTICES,
         ELEMENTS,
-        number("bytes_per_element", "read and written, each array once", "B"),
+        number("bytes_per_element", "arrays once, and lines that gathers fetch", "B"),
         compared(
             "timed",
             number("flops_per_element", "sums and products executed, idle lanes included"),

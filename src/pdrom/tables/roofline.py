@@ -14,7 +14,7 @@ from pdrom.tables.kit.vocabulary import SCENE, VERTICES
 
 WHOLE = "iteration"  # all phases together
 _MESH = ["scene", "factor"]
-_SUMS = ["bytes", "flops", "divisions", "roots", "bound_us", "measured_us"]
+_SUMS = ["bytes", "touches", "flops", "divisions", "roots", "bound_us", "measured_us"]
 
 
 @table(
@@ -25,7 +25,11 @@ _SUMS = ["bytes", "flops", "divisions", "roots", "bound_us", "measured_us"]
         VERTICES,
         text("phase", f"group, right-hand side, global solve; {WHOLE}: all of them"),
         integer("elements", "elements of a group, else vertices"),
-        number("bytes", "read and written, each array once", "B"),
+        number("bytes", "read and written: each array once, lines that gathers fetch", "B"),
+        compared(
+            "exact",
+            integer("touches", "vectors that gathers and scatters load and store, in their order"),
+        ),
         compared("timed", number("flops", "sums and products executed, idle lanes included")),
         compared("timed", number("divisions", "divisions executed")),
         compared("timed", number("roots", "square roots executed")),

@@ -13,21 +13,11 @@ from time import thread_time
 import numpy as np
 
 from pdrom.core.machine import Units
-from pdrom.experiments.roofline.throughput import AT_ONCE, products, read
-from pdrom.model.compiled.functions import compiled
+from pdrom.experiments.roofline.throughput import AT_ONCE, chain, products, read
 from pdrom.model.compiled.rows import WIDTH
 
 SCALAR_STEPS, VECTOR_TIMES, MEMORY_BYTES = 10**7, 10**6, 2**28
 REPEATS = 15
-
-
-@compiled(nogil=True)
-def chain(times):
-    """The end of so many ``times`` x <- a x + b."""
-    x = 0.0
-    for _ in range(times):
-        x = 0.5 * x + 1.0
-    return x
 
 
 def units(repeats: int = REPEATS, memory_bytes: int = MEMORY_BYTES) -> Units:

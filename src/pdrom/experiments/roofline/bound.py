@@ -3,6 +3,8 @@
 import numpy as np
 import pandas as pd
 
+from pdrom.model.compiled.rows import WIDTH
+
 # what rates are measured of
 READ, FLOPS, DIVISIONS, ROOTS = "bytes read", "sums and products", "divisions", "square roots"
 # what may decide
@@ -13,16 +15,19 @@ def bounds(work: pd.DataFrame, rates: pd.DataFrame) -> pd.DataFrame:
     """Columns ``bandwidth`` (1e9 B/s), ``bound_us`` and ``limit`` (what decides) for rows of work.
 
     Sums and products, and divisions with roots (which share a unit of the processor), need their
-    times at the measured rates, bytes theirs at the `bandwidth` of the iteration's working set. All
-    three may overlap, so the longest is the bound. Gathers, scatters and shuffles are not in it.
-    Of the bytes it is one of the iteration: a phase whose arrays the cache happens to prefer can be
+    times at the measured rates, bytes theirs at the `bandwidth` of the iteration's working set, and
+    the vectors that gathers and scatters load and store theirs at the rate of the nearest cache.
+    All three may overlap, so the longest is the bound. Shuffles and waiting are not in it. Of the
+    bytes it is one of the iteration: a phase whose arrays the cache happens to prefer can be
     somewhat faster.
     """
     speed = rates.set_index("quantity").rate
-    rate = bandwidth(work.working_set.to_numpy(float), rates[rates.quantity == READ])
+    read = rates[rates.quantity == READ]
+    nearest = read.rate[read.working_set.idxmin()]
+    rate = bandwidth(work.working_set.to_numpy(float), read)
     times = pd.DataFrame(
         {
-            MEMORY: work.bytes / rate,
+            MEMORY: work.bytes / rate + 8 * WIDTH * work.touches / nearest,
             ARITHMETIC: work.flops / speed[FLOPS],
             DIVIDER: work.divisions / speed[DIVISIONS] + work.roots / speed[ROOTS],
         }

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from llvmlite import binding as llvm
 from numba import cfunc
+from numba.core import config
 
 from pdrom.model.compiled.functions import Callback
 
@@ -47,8 +48,12 @@ class Counted(Callback):
         plain = cfunc(self.signature, error_model="numpy")(self.function)
         lines, contents = _with_counters(plain.inspect_llvm().splitlines())
         module = llvm.parse_assembly("\n".join(lines))
+        # the compiler's own target: the instructions were chosen for it
+        features = config.CPU_FEATURES
         machine = llvm.Target.from_default_triple().create_target_machine(
-            cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2
+            cpu=config.CPU_NAME or llvm.get_host_cpu_name(),
+            features=llvm.get_host_cpu_features().flatten() if features is None else features,
+            opt=2,
         )
         # the engine owns the code and the counters
         self._engine = llvm.create_mcjit_compiler(module, machine)

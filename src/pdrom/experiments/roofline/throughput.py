@@ -28,6 +28,15 @@ def read(numbers, times):
     return total(add(add(add(a, b), add(c, d)), add(add(e, f), add(g, h))))
 
 
+@compiled(nogil=True)
+def chain(times):
+    """The end of so many ``times`` x <- x / 2 + 1, each of which waits for the one before."""
+    x = 0.0
+    for _ in range(times):
+        x = 0.5 * x + 1.0
+    return x
+
+
 def _chains(step):
     """A function that takes ``step(x, one)`` so many times in `AT_ONCE` independent vectors."""
 

@@ -1,7 +1,8 @@
 """Work of one iteration of the full-order run: what each phase reads, writes and computes.
 
-Bytes are those of the arrays themselves, each counted once a phase: a vertex that several elements
-share stays in the nearest cache. Operations of a local kernel are counted while it runs
+Bytes are those of the arrays themselves, each counted once a phase, and of the lines that gathers
+and scatters fetch; their visits of vertices, which move a vector each, are counted beside
+(`pdrom.experiments.roofline.gathers`). Operations of a local kernel are counted while it runs
 (`pdrom.experiments.roofline.counters`), those of the sweeps follow from the factor.
 """
 
@@ -14,6 +15,7 @@ import numpy as np
 from pdrom.experiments.kit.names import GLOBAL, RIGHT
 from pdrom.experiments.roofline.counted_kernel import operations
 from pdrom.experiments.roofline.counters import Operations
+from pdrom.experiments.roofline.gathers import LINE, fetched, visits
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.constraints.local_kernel import LocalPass
@@ -22,8 +24,8 @@ from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene
 
 COLUMNS = [
-    "scene", "factor", "vertices", "phase", "elements", "bytes", "flops", "divisions", "roots",
-    "working_set",
+    "scene", "factor", "vertices", "phase", "elements", "bytes", "touches", "flops", "divisions",
+    "roots", "working_set",
 ]  # fmt: skip
 VECTOR = 8 * WIDTH  # bytes of a vertex
 # vectors an unknown that the sweeps read or write: right-hand side and load in, the working array
@@ -42,7 +44,8 @@ def work(scene: Scene, system: GlobalSystem, frames: int) -> Iterator[dict[str, 
     groups = [group for group in scene.groups if group.local_kernel is not None]
     counted = _counted(scene, system, groups, frames)
     phases = [
-        (g.name, g.elements, _local_bytes(g), o) for g, o in zip(groups, counted, strict=True)
+        (g.name, g.elements, _local_bytes(g), 3 * sum(map(len, visits(g))), o)
+        for g, o in zip(groups, counted, strict=True)
     ]
     phases.append((RIGHT, scene.mesh.vertices, *_right_hand_side(scene, groups)))
     if factor is not None:
@@ -52,8 +55,9 @@ def work(scene: Scene, system: GlobalSystem, frames: int) -> Iterator[dict[str, 
         "vertices": scene.mesh.vertices,
         "working_set": _working_set(scene, groups, factor),
     }
-    for phase, elements, size, own in phases:
-        yield {**labels, "phase": phase, "elements": elements, "bytes": size, **asdict(own)}
+    for phase, elements, size, touches, own in phases:
+        counts = {"elements": elements, "bytes": size, "touches": touches, **asdict(own)}
+        yield {**labels, "phase": phase, **counts}
 
 
 def _counted(
@@ -72,26 +76,32 @@ def _counted(
 
 
 def _local_bytes(group: ConstraintGroup) -> int:
-    """The group's own arrays; its vertices are read, their right-hand sides read and written."""
-    vertices = len(np.unique(group.S.indices))
-    return sum(array.nbytes for array in group.streamed) + 3 * VECTOR * vertices
+    """The group's own arrays; lines of positions are read, of the right-hand side written, too."""
+    read, changed = fetched(group)
+    return sum(array.nbytes for array in group.streamed) + LINE * (read + 2 * changed)
 
 
-def _right_hand_side(scene: Scene, groups: Sequence[ConstraintGroup]) -> tuple[int, Operations]:
+def _right_hand_side(
+    scene: Scene, groups: Sequence[ConstraintGroup]
+) -> tuple[int, int, Operations]:
     """(M/h^2) s is copied; second parts are cleared, read and added."""
     kernels = [group.local_kernel for group in groups if group.local_kernel is not None]
     touched = len(LocalPass(kernels).touched)
     size = VECTOR * (2 * scene.mesh.vertices + 4 * touched)
-    return size, Operations(WIDTH * touched, 0, 0)
+    return size, 0, Operations(WIDTH * touched, 0, 0)
 
 
-def _sweeps(factor: Factor) -> tuple[int, Operations]:
-    """The factor is read forward and backward, a product and a sum for each entry and lane."""
+def _sweeps(factor: Factor) -> tuple[int, int, Operations]:
+    """The factor is read forward and backward, a product and a sum for each entry and lane.
+
+    Rows below a panel are read and written forward, read backward.
+    """
     panels, vertices, _, _ = factor
     entries, unknowns = len(panels[-1]) - len(vertices), len(vertices)
     size = 2 * sum(array.nbytes for array in panels) + 2 * vertices.nbytes
     flops = WIDTH * (2 * 2 * entries + 2 * unknowns)
-    return size + _SWEPT * VECTOR * unknowns, Operations(flops, 0, 0)
+    touches = 3 * len(panels[-2])
+    return size + _SWEPT * VECTOR * unknowns, touches, Operations(flops, 0, 0)
 
 
 def _working_set(scene: Scene, groups: Sequence[ConstraintGroup], factor: Factor | None) -> int:

@@ -32,15 +32,16 @@ READS = RATES[RATES.quantity == READ]
 @pytest.mark.parametrize(
     ("work", "limit", "ns"),
     [
-        # bytes, flops, divisions, roots
-        ((5000.0, 100.0, 0.0, 0.0), MEMORY, 50.0),
-        ((500.0, 1000.0, 0.0, 0.0), ARITHMETIC, 20.0),
-        ((500.0, 100.0, 10.0, 20.0), DIVIDER, 25.0),
+        # bytes, touches, flops, divisions, roots
+        ((5000.0, 0, 100.0, 0.0, 0.0), MEMORY, 50.0),
+        ((5000.0, 100, 100.0, 0.0, 0.0), MEMORY, 82.0),
+        ((500.0, 0, 1000.0, 0.0, 0.0), ARITHMETIC, 20.0),
+        ((500.0, 0, 100.0, 10.0, 20.0), DIVIDER, 25.0),
     ],
 )
 def test_the_longest_time_is_the_bound(work, limit, ns):
-    rows = pd.DataFrame([(*work, 900.0)], columns=["bytes", "flops", "divisions", "roots",
-                                                   "working_set"])  # fmt: skip
+    columns = ["bytes", "touches", "flops", "divisions", "roots", "working_set"]
+    rows = pd.DataFrame([(*work, 900.0)], columns=columns)
     (found,) = bounds(rows, RATES).itertuples()
     assert found.limit == limit
     assert found.bandwidth == pytest.approx(100.0)

@@ -3,14 +3,16 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import sparse
 
-from builders import make_scene
+from builders import GROUPS, make_scene
 from pdrom.core.paths import File
 from pdrom.core.store import read_table, write_table
 from pdrom.experiments.kit.effect_costs import effect_costs
 from pdrom.experiments.kit.names import GLOBAL, RIGHT
 from pdrom.experiments.roofline.experiment import Options, Roofline
 from pdrom.experiments.roofline.experiment import roofline as experiment
+from pdrom.experiments.roofline.gathers import KEPT, LINE, _missed, fetched, visits
 from pdrom.experiments.roofline.work import COLUMNS, VECTOR, work
 from pdrom.model.mesh.types import save_mesh
 from pdrom.tables.kernels import kernels
@@ -32,7 +34,12 @@ def test_work_is_that_of_the_arrays():
     assert rows.bytes["right-hand side"] == 2 * VECTOR * n
     # an edge: two corners of four bytes, weight and length; blocks are filled up
     blocks = -(-scene.group("spring").elements // 32)
-    assert rows.bytes["spring"] == 32 * blocks * (2 * 4 + 2 * 8) + 3 * VECTOR * n
+    own = 32 * blocks * (2 * 4 + 2 * 8)
+    # everything stays in the nearest cache: a line of positions is read once, one of the right-hand
+    # side read and written once
+    assert rows.bytes["spring"] == own + 3 * LINE * -(-n // 2)
+    # two corners: gathered, then read and written
+    assert rows.touches["spring"] == 32 * blocks * 2 * 3
     assert rows.divisions["strain"] > 0
     assert rows.roots["spring"] > 0
     state = scene.initial_state()
@@ -43,6 +50,36 @@ def test_work_is_that_of_the_arrays():
     # forward and backward a product and a sum for each entry; a product and a difference each
     assert rows.flops[GLOBAL] == 4 * (4 * entries + 2 * len(unknowns))
     assert rows.bytes[GLOBAL] > 2 * panels[-1].nbytes
+
+
+@pytest.mark.parametrize("name", GROUPS)
+def test_every_corner_of_every_element_is_visited(name):
+    group = make_scene({"effect": name, "weight": 1.0}, mesh=GROUPS[name]).groups[0]
+    pieces = np.concatenate(visits(group))
+    found = np.bincount(pieces, minlength=group.S.shape[1])
+    corners = sparse.csr_array((np.ones(group.S.nnz), group.S.indices, group.S.indptr))
+    rows = group.rows_per_element
+    # an element's rows have the same vertices; the last block is filled up with its last element
+    once = np.asarray((corners[::rows] != 0).sum(axis=0)).ravel()
+    assert (found[: len(once)] >= once).all()
+    assert len(pieces) < once.sum() + 32 * 4
+
+
+def test_a_line_is_fetched_again_when_others_have_taken_its_place():
+    lines = [("y", k) for k in range(KEPT + 1)]
+    assert len(list(_missed(lines[:KEPT] * 3))) == KEPT
+    assert len(list(_missed(lines * 3))) == 3 * (KEPT + 1)
+
+
+def test_a_shuffled_mesh_fetches_more(rng):
+    """The order of the vertices is what decides how far apart the corners of an element lie."""
+    scene = make_scene(*EFFECTS[2:3], mesh={"kind": "cloth", "rows": 60, "columns": 60})
+    group = scene.groups[0]
+    ordered = fetched(group)
+    new = rng.permutation(scene.mesh.vertices)
+    packed = group.streamed[0]
+    packed[:] = new[packed]
+    assert min(fetched(group)) > 1.5 * max(ordered)
 
 
 def test_solvers_that_are_not_compiled_have_no_work():
