@@ -85,7 +85,8 @@ def write_article(
     trees: dict[str, Tree] = {}
     for stem, text in texts.items():
         tex = prepared(text, stem, origins, facts)
-        counted = Labels(found[1] if (found := _PREFIX.search(text)) else "", PAGES[stem], labels)
+        prefix = _PREFIX.search(text)
+        counted = Labels(prefix[1] if prefix else "", PAGES[stem], labels)
         trees[stem] = numbered(
             parsed(tex, files, Path(references)),
             counted,

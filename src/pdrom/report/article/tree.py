@@ -69,13 +69,17 @@ def link(inlines: list[Node], address: str, classes: str = "") -> Node:
     return {"t": "Link", "c": [attributes("", classes), inlines, [address, title * formula]]}
 
 
+def _content(node: Node) -> Any:
+    return node.get("c")
+
+
 def plain(node: Any) -> str:
     """Text of a node without its marks."""
     if isinstance(node, list):
         return "".join(map(plain, node))
     if not isinstance(node, dict):
         return ""
-    kind, content = node.get("t"), node.get("c")
+    kind, content = node.get("t"), _content(node)
     if kind in ("Space", "SoftBreak", "LineBreak"):
         return " "
     if kind == "Str":
@@ -111,7 +115,7 @@ def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> 
     """
 
     def visit(node: Node) -> Any:
-        kind, content = node["t"], node.get("c")
+        kind, content = node["t"], _content(node)
         if kind == "Header" and content[0] < PARAGRAPH:
             level, attribute, inlines = content
             appendix = "unnumbered" in attribute[1]
@@ -198,7 +202,7 @@ def resolved(tree: Tree, labels: Mapping[str, tuple[str, str]], claims: Mapping[
     """
 
     def visit(node: Node) -> Any:
-        kind, content = node["t"], node.get("c")
+        kind, content = node["t"], _content(node)
         if kind == "Link":
             return _resolved_link(node, labels)
         if kind == "Str" and (found := _CLAIM.fullmatch(content)) and found[2] in claims:
