@@ -9,7 +9,8 @@ from pathlib import Path
 
 from places import ROOT
 
-PAPER = ("paper/main.tex", "paper/sections", "paper/references.bib")
+DOCUMENTS = ("paper/main.tex", "paper/supplement.tex", "paper/preamble.tex")
+PAPER = (*DOCUMENTS, "paper/sections", "paper/supplement", "paper/references.bib")
 PARTS = ("Snakefile", "config", *PAPER, "src", "workflow")
 
 

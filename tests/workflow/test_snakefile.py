@@ -116,7 +116,7 @@ def test_a_fresh_clone_plans_the_whole_study_beside_a_run(
     os.close(descriptor)
     assert done.returncode == 0, done.stderr
     log = done.stdout + done.stderr
-    assert "Manuscript paper/main.pdf" in log
+    assert "Manuscript paper/main.pdf, paper/supplement.pdf" in log
     total = int(re.search(r"^total +(\d+)$", log, re.MULTILINE)[1])
     assert total > 100
     told = rf"^pdrom: {total} jobs, about \d+ min on 1 core, about \d+ min of processor time$"
@@ -125,7 +125,7 @@ def test_a_fresh_clone_plans_the_whole_study_beside_a_run(
     made = {path for files in missing for path in files.split(", ")}
     wanted = {f"results/tables/{name}.csv" for name in declared()}
     wanted |= {f"results/figures/{name}.pdf" for name in declarations()}
-    assert wanted | {"paper/main.pdf"} <= made
+    assert wanted | {"paper/main.pdf", "paper/supplement.pdf"} <= made
 
 
 def test_every_figure_is_made_for_pages_and_for_the_report(plan: dict[str, Made]) -> None:

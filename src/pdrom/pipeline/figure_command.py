@@ -1,4 +1,4 @@
-"""``./reproduce figure NUMBER|preprint:NUMBER|NAME ... [OPTIONS]``: figures as targets."""
+"""``./reproduce figure NUMBER|SNUMBER|preprint:NUMBER|NAME ... [OPTIONS]``: figures as targets."""
 
 from collections.abc import Sequence
 from itertools import takewhile
@@ -15,8 +15,8 @@ def figure_arguments(arguments: Sequence[str]) -> list[str]:
     """Options and targets for Snakemake, from what follows the word ``figure``.
 
     A number counts in the paper, one with an S before it in the supplement, ``preprint:NUMBER`` in
-    the preprint; every figure has its name, too. A target reads ``figure NAME`` (one word), which `pdrom.pipeline.targets.Names` turns
-    into its file.
+    the preprint; every figure has its name, too. A target reads ``figure NAME`` (one word), which
+    `pdrom.pipeline.targets.Names` turns into its file.
 
     Raises
     ------

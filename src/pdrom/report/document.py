@@ -15,7 +15,8 @@ Made from the declarations in `src/pdrom/report/figures` by `./reproduce pages`.
 
 `./reproduce figure NAME` draws a figure to `results/figures/NAME.pdf` and `.png`.
 The name may be replaced by the figure's number in `main.pdf` (`figure 5`) or in `supplement.pdf`
-(`figure S7`), or by the number of the figure of the preprint that it rebuilds (`figure preprint:8`).
+(`figure S7`), or by the number of the figure of the preprint that it rebuilds
+(`figure preprint:8`).
 The keys given here choose in `config/figures.yaml` what it shows.
 """
 

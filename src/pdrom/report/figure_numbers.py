@@ -43,7 +43,7 @@ def figure_numbers(root: Path) -> dict[str, Numbers]:
     PaperError
         A section of the manuscript has no file.
     """
-    counted = {}
+    counted: dict[str, str] = {}
     for prefix, source in zip(("", SUPPLEMENT), documents(root / "paper").values(), strict=True):
         placed = _PLACED.findall(_COMMENT.sub("", source))
         counted |= {name: f"{prefix}{number}" for number, name in enumerate(placed, 1)}

@@ -43,16 +43,20 @@ def test_names_become_files_and_it_is_said(capsys):
     assert capsys.readouterr().err == f"reproduce: scaling: {', '.join(made)}\n"
 
 
-@pytest.mark.parametrize("asked", ["main.pdf", "preprint:8", "reconstruction_error"])
-def test_a_figure_has_two_numbers_and_a_name(asked, capsys):
-    number = figure_numbers(ROOT)["reconstruction_error"].manuscript
-    word = str(number) if asked == "main.pdf" else asked
-    made = "results/figures/reconstruction_error.pdf"
+@pytest.mark.parametrize(
+    ("name", "document", "preprint"),
+    [("reconstruction_error", "main.pdf", 8), ("singular_values", "supplement.pdf", 9)],
+)
+@pytest.mark.parametrize("asked", ["own", "preprint", "name"])
+def test_a_figure_has_two_numbers_and_a_name(name, document, preprint, asked, capsys):
+    number = figure_numbers(ROOT)[name].manuscript
+    word = {"own": number, "preprint": f"preprint:{preprint}", "name": name}[asked]
+    made = f"results/figures/{name}.pdf"
     assert completed(["figure", word, "-n"]) == [
         "-n", "--cores", "all", *LINES, *OPTIONS, "--", made,
     ]  # fmt: skip
-    numbers = f"figure {number} of main.pdf, figure 8 of the preprint"
-    said = f"reproduce: figure reconstruction_error ({numbers}): {made}\n"
+    numbers = f"figure {number} of {document}, figure {preprint} of the preprint"
+    said = f"reproduce: figure {name} ({numbers}): {made}\n"
     assert capsys.readouterr().err == said
 
 

@@ -28,6 +28,7 @@ def test_files_of_the_study_and_what_was_asked_for_beside_them(plan, tmp_path, m
         paths.PAPER_INPUT.at("results", name="macros.tex"),
         "results/machine.json",
         "paper/main.pdf",
+        "paper/supplement.pdf",
     ]
     asked_for = [
         paths.TRAIN.at("results", scene="spring_oop"),

@@ -45,7 +45,7 @@ def test_a_whole_study():
     said = lines("--config", "ranks=[3]")
     assert said["configuration"] == "config/default.yaml, ranks=[3]"
     assert said["verdicts (as published / beyond)"] == "C1 holds / depends, C2 fails / x"
-    assert said["manuscript"] == "paper/main.pdf"
+    assert said["manuscript"] == "paper/main.pdf, paper/supplement.pdf"
     assert said["figures"] == "1 in results/figures"
     assert said["tables"] == "1 in results/tables"
     assert said["report"] == "./reproduce --report report.html"

@@ -29,6 +29,11 @@ TINY = Folders("results/studies/tiny", "results/studies/tiny/paper/main.pdf")
         ("results/fom/a.h5", ["results/fom/a.h5"], ["results/studies/tiny/fom/a.h5"]),
         ("results/studies/tiny/x", ["results/studies/tiny/x"], ["results/studies/tiny/x"]),
         ("paper/main.pdf", ["paper/main.pdf"], ["results/studies/tiny/paper/main.pdf"]),
+        (
+            "paper/supplement.pdf",
+            ["paper/supplement.pdf"],
+            ["results/studies/tiny/paper/supplement.pdf"],
+        ),
         ("figure_floor", ["figure_floor"], ["figure_floor"]),
         (
             "figure scaling",

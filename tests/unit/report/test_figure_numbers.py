@@ -8,45 +8,52 @@ from pdrom.core.errors import PaperError
 from pdrom.report.figure_numbers import Numbers, figure_numbers
 from pdrom.report.paper.figuretex import captions
 from pdrom.report.paper.known import sentences
-from pdrom.report.paper.source import whole_source
-from pdrom.report.paper.tex import build_pdf
+from pdrom.report.paper.source import documents
+from pdrom.report.paper.tex import build_pdfs
 from places import ROOT
 
-MAIN = ROOT / "paper" / "main.tex"
+PAPER = ROOT / "paper"
 
 
 def test_figures_are_numbered_as_the_source_places_them(tmp_path):
     (tmp_path / "paper" / "sections").mkdir(parents=True)
     text = "\\figureof{ladder}\n% \\figureof{bounds}\n\\input{sections/a.tex}\\figureof{scaling}"
     (tmp_path / "paper" / "main.tex").write_text(text)
+    (tmp_path / "paper" / "supplement.tex").write_text(r"\figureof{singular_values}")
     section = tmp_path / "paper" / "sections" / "a.tex"
     section.write_text(r"at 5\% \figureof{bar_runs}\figureof{strain_runs}")
     found = figure_numbers(tmp_path)
     numbers = {name: n.manuscript for name, n in found.items() if n.manuscript}
-    assert numbers == {"ladder": 1, "bar_runs": 2, "strain_runs": 3, "scaling": 4}
+    own = {"ladder": "1", "bar_runs": "2", "strain_runs": "3", "scaling": "4"}
+    assert numbers == own | {"singular_values": "S1"}
     assert found["strain_runs"].words == "figure 3 of main.pdf, figure 7 of the preprint"
-    assert found["singular_values"].words == "figure 9 of the preprint"
+    words = "figure S1 of supplement.pdf, figure 9 of the preprint"
+    assert found["singular_values"].words == words
+    assert found["bending_runs"].words == "figure 5 of the preprint"
     assert Numbers(None, None).label("a") == "a"
-    assert Numbers(4, None).label("a") == "a (figure 4 of main.pdf)"
+    assert Numbers("4", None).label("a") == "a (figure 4 of main.pdf)"
     section.unlink()
     with pytest.raises(PaperError, match=r"no file .*a\.tex"):
         figure_numbers(tmp_path)
 
 
 def test_nothing_but_figureof_makes_a_figure_and_every_configuration_has_all():
-    text = whole_source(MAIN)
-    assert len(re.findall(r"\\begin\{figure", text)) == 1, "the definition of \\figureof"
-    assert [s.text for s in sentences(text) if "figureof" in s.text] == []
+    for text in documents(PAPER).values():
+        assert len(re.findall(r"\\begin\{figure", text)) == 1, "the definition of \\figureof"
+        assert [s.text for s in sentences(text) if "figureof" in s.text] == []
 
 
-def test_latex_gives_the_same_numbers(tmp_path):
+@pytest.mark.parametrize("document", ["main", "supplement"])
+def test_latex_gives_the_same_numbers(tmp_path, document):
     r"""Every \figureof of the manuscript as it is defined there; LaTeX fails at a wrong number."""
     numbers = {k: n.manuscript for k, n in figure_numbers(ROOT).items() if n.manuscript}
-    source = whole_source(MAIN)
+    source = documents(PAPER)[document]
     definition = re.search(r"\\newcommand\{\\figureof\}.*?\\end\{figure\}\}", source, re.DOTALL)
     placed = re.findall(r"\\figureof\{(\w+)\}", source)
     assert definition
-    assert set(placed) == set(numbers)
+    prefix = "S" if document == "supplement" else ""
+    own = {name: n for name, n in numbers.items() if n.startswith("S") == bool(prefix)}
+    assert set(placed) == set(own)
     lines = [
         r"\documentclass{article}\usepackage[T1]{fontenc}\usepackage{lmodern}",
         r"\newcommand{\includegraphics}[2][]{}",
@@ -54,8 +61,8 @@ def test_latex_gives_the_same_numbers(tmp_path):
         definition[0],
         r"\newcommand{\due}[1]{\ifnum\value{figure}=#1\else\errmessage{not #1}\fi}",
         r"\begin{document}",
-        *(rf"\figureof{{{name}}}\due{{{numbers[name]}}}" for name in placed),
+        *(rf"\figureof{{{name}}}\due{{{own[name].removeprefix(prefix)}}}" for name in placed),
         r"\end{document}",
     ]
     (tmp_path / "main.tex").write_text("\n".join(lines))
-    build_pdf(tmp_path / "main.tex", tmp_path / "main.pdf", [])
+    build_pdfs({tmp_path / "main.tex": tmp_path / "main.pdf"}, [])

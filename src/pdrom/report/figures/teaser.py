@@ -16,7 +16,7 @@ from pdrom.report.figures.kit.experiment_rows import RUNS, experiment_rows
 from pdrom.report.figures.kit.floor import Floors
 from pdrom.report.figures.kit.options import ReducedRuns
 from pdrom.report.figures.kit.panels import RunPanel
-from pdrom.report.figures.kit.read import frame_numbers, positions_at
+from pdrom.report.figures.kit.read import positions_at
 from pdrom.report.figures.kit.results import NothingToDraw, Results, asked
 from pdrom.report.figures.kit.run_rows import Row, draw_rows
 
@@ -31,7 +31,7 @@ class Options(ReducedRuns):
 
 
 @figure(
-    title="The released bar under five reductions",
+    title="Two scenes under five reductions",
     caption=(
         "One instant of the motion that trained all of them. `deim-joint` is the preprint's "
         "method: joint rows, a system for each axis. `deim` samples single entries, `block-deim` "

@@ -25,6 +25,8 @@ from pdrom.report.paper.tex import build_pdfs
 from pdrom.report.paper.textables import TEX_TABLES
 from pdrom.report.words.text import replaced
 
+PAGES = {"main": 16}  # at most: all else belongs in the supplement
+
 
 class Facts(BaseModel):
     """Facts that the manuscript states beside results.
@@ -116,7 +118,7 @@ def build(
     for path in results:
         require_intact(path)
     made = {Path(text): Path(out) for text, out in zip(source, outputs, strict=False)}
-    build_pdfs(made, sorted({path.parent for path in results}))
+    build_pdfs(made, sorted({path.parent for path in results}), PAGES)
 
 
 class _Inputs(Artifact):

@@ -7,7 +7,7 @@ import pandas as pd
 
 from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.paper.macros import format_number
-from pdrom.report.paper.tabular import longtable, name
+from pdrom.report.paper.tabular import longtable, name, tabular
 from pdrom.report.words.text import escape
 
 Tables = Mapping[str, pd.DataFrame]
@@ -32,7 +32,7 @@ def claims(tables: Tables) -> str:
         rows.append([row.claim, escape(row.paper), *cells, _place(row.claim, row.figure_or_table)])
     header = ["claim", "the preprint says", "as published", "beyond", "shown in"]
     left = r">{\raggedright\arraybackslash}"
-    return longtable(header, rows, rf"l{left}p{{4.3cm}}{left}p{{3.2cm}}{left}p{{3.2cm}}l")
+    return tabular(header, rows, rf"l{left}p{{4.7cm}}{left}p{{3.2cm}}{left}p{{4.1cm}}l")
 
 
 def _verdict(verdict: str, tests: pd.DataFrame) -> str:

@@ -69,7 +69,8 @@ def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_stud
     r"""TeX of ``\known`` and ``\row``, of the note, and of what a manuscript of a part says.
 
     What was decided of the blocks of each document stands under its name, which is TeX's
-    ``\jobname``. ``\ifpart`` is true where ``part`` names what the study was read from, ``\configuration``.
+    ``\jobname``. ``\ifpart`` is true where ``part`` names what the study was read from,
+    ``\configuration``.
     """
     note = (
         rf"The full study (\texttt{{{escape(full_study)}}}) holds the numbers of sentences that "

@@ -11,6 +11,7 @@ import tempfile
 from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
+from types import MappingProxyType
 
 from pdrom.core.errors import PaperError
 from pdrom.core.store import atomic_path
@@ -75,18 +76,24 @@ def _tinytex(scratch: Path) -> Path:
     return copy
 
 
-def build_pdfs(documents: Mapping[Path, Path], search: list[Path]) -> None:
+def build_pdfs(
+    documents: Mapping[Path, Path],
+    search: list[Path],
+    most: Mapping[str, int] = MappingProxyType({}),
+) -> None:
     """Compile sources until their references, to each other too, are stable, and move the PDFs.
 
     Parameters
     ----------
     documents : PDF of each source; the sources lie in one folder
     search : folders in which \\input and \\includegraphics look, beside the source's own
+    most : pages that a document may have, by the name of its source
 
     Raises
     ------
     PaperError
-        With the first TeX error, undefined references and citations, or a box that leaves the page.
+        With the first TeX error, undefined references and citations, a box that leaves the page, or
+        a document with too many pages.
     """
     sources = list(documents)
     packages = packages_of("".join(map(whole_source, sources)))
@@ -106,7 +113,7 @@ def build_pdfs(documents: Mapping[Path, Path], search: list[Path]) -> None:
                 break
             previous = current
         for source in sources:
-            _check_log(job / f"{source.stem}.log", source)
+            _check_log(job / f"{source.stem}.log", source, most.get(source.stem))
         for source, output in documents.items():
             with atomic_path(output) as temporary:
                 shutil.copyfile(job / f"{source.stem}.pdf", temporary)
@@ -143,7 +150,7 @@ def _run(pdflatex: Path, source: Path, job: Path, environment: dict[str, str]) -
         raise PaperError(f"{source}: {first or output[-300:]} {place}".strip())
 
 
-def _check_log(path: Path, source: Path) -> None:
+def _check_log(path: Path, source: Path, most: int | None) -> None:
     text = path.read_text(encoding="utf-8", errors="replace")
     undefined = re.findall(r"(?:Reference|Citation) `([^']*)'[^\n]*undefined", text)
     if undefined:
@@ -152,3 +159,6 @@ def _check_log(path: Path, source: Path) -> None:
     overfull = [line for line in text.splitlines() if line.startswith("Overfull")]
     if overfull:
         raise PaperError(f"{source}: {len(overfull)} boxes do not fit: {'; '.join(overfull)}")
+    pages = re.search(r"Output written on .*\((\d+) pages?", text)
+    if most is not None and pages and int(pages[1]) > most:
+        raise PaperError(f"{source}: {pages[1]} pages, at most {most} are allowed")

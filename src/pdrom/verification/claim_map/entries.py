@@ -47,7 +47,7 @@ class Entry:
 
 def entries(root: Path = Path()) -> list[Entry]:
     """Claims, figures (those of the preprint first), tables, sections and the manuscript."""
-    return [*_claims(root), *_figures(), *_tables(), *_sections(root), *_manuscript()]
+    return [*_claims(root), *_figures(), *_tables(), *_sections(root), _manuscript()]
 
 
 def table_words(name: str) -> str:
@@ -111,6 +111,6 @@ def _section(title: str, path: Path) -> str:
     return f"{title} (supplement)" if path.parent.name == "supplement" else title
 
 
-def _manuscript() -> Iterator[Entry]:
-    for file in Folders().documents.values():
-        yield Entry("manuscript", file, "The manuscript and all of the above", "paper", (file,), ())
+def _manuscript() -> Entry:
+    files = tuple(Folders().documents.values())
+    return Entry("manuscript", files[0], "The manuscript and all of the above", "paper", files, ())

@@ -29,7 +29,8 @@ Every run of a whole study writes `results/claim_map.csv` (other configurations:
 (`minutes`) and of the last job (`minutes_alone`), the largest memory and the disk (MB).
 
 * Verdicts are the expected ones of the full study.
-* A number with S is one of the supplement. A dash: the figure is not in that document.
+* A number with S is one of the supplement.
+* A dash: the figure is not in that document.
 * **columns**: the number of columns of each kind, which says how exactly `./reproduce verify`
   expects them ([how](verification.md)).
 * A figure is reproduced when the tables that it reads are, a claim when its verdict is the same.
@@ -89,7 +90,11 @@ def _page(listed: list[Entry], numbers: Mapping[str, Numbers], verdicts: Verdict
         "## Numbers of the text\n\nTables from which each section reads its numbers.\n",
         section("section", "| section | tables |", lambda e: (e.title, _names(e.rests_on))),
         "## The manuscript\n",
-        section("manuscript", "| file | command |", lambda e: (f"`{e.name}`", _command(e))),
+        section(
+            "manuscript",
+            "| files | command |",
+            lambda e: (", ".join(f"`{file}`" for file in e.files), _command(e)),
+        ),
     ]
     return "\n".join(parts)
 

@@ -6,7 +6,7 @@ import pytest
 from pdrom.core.errors import PaperError
 from pdrom.report.paper.known import decisions, provenance, sentences
 from pdrom.report.paper.macros import is_held, macros
-from pdrom.report.paper.tex import build_pdf
+from pdrom.report.paper.tex import build_pdfs
 
 TABLES = {
     "runs": pd.DataFrame(
@@ -69,7 +69,7 @@ def test_what_a_configuration_holds(key, held):
 
 def pages(tmp_path, part):
     """Length of the document that TeX makes of the source."""
-    known = provenance(decisions(SOURCE, TABLES), part, "config/default.yaml")
+    known = provenance({"main": decisions(SOURCE, TABLES)}, part, "config/default.yaml")
     document = "\n".join(
         [r"\documentclass{article}", r"\usepackage[T1]{fontenc}\usepackage{lmodern,xcolor}",
          r"\definecolor{okgrey}{gray}{0.4}",
@@ -78,7 +78,7 @@ def pages(tmp_path, part):
          r"\end{document}"]
     )  # fmt: skip
     (tmp_path / "main.tex").write_text(document, encoding="utf-8")
-    build_pdf(tmp_path / "main.tex", tmp_path / "main.pdf", [])
+    build_pdfs({tmp_path / "main.tex": tmp_path / "main.pdf"}, [])
     return (tmp_path / "main.pdf").stat().st_size
 
 
@@ -88,8 +88,8 @@ def test_tex_accepts_what_is_left(tmp_path):
 
 
 def test_the_note_names_the_configuration_that_holds_the_numbers():
-    text = provenance(["noted"], "config/tiny.yaml", "config/default.yaml")
+    text = provenance({"main": ["noted"]}, "config/tiny.yaml", "config/default.yaml")
     assert r"\parttrue" in text
     assert r"\newcommand{\configuration}{\texttt{config/tiny.yaml}}" in text
     assert r"[The full study (\texttt{config/default.yaml}) holds" in text
-    assert r"\partfalse" in provenance([], None, "config/default.yaml")
+    assert r"\partfalse" in provenance({}, None, "config/default.yaml")

@@ -3,7 +3,7 @@
 import pytest
 
 from pdrom.report.paper.tabular import longtable, tabular
-from pdrom.report.paper.tex import build_pdf
+from pdrom.report.paper.tex import build_pdfs
 
 PAGE = r"""\documentclass{article}\usepackage[T1]{fontenc}\usepackage{lmodern}\usepackage{longtable}
 \newcommand{\captionrow}{\caption{Table}\\}\begin{document}%s\end{document}"""
@@ -14,5 +14,5 @@ PAGE = r"""\documentclass{article}\usepackage[T1]{fontenc}\usepackage{lmodern}\u
 def test_a_table_is_set(form, rows, tmp_path):
     """A table without rows is that of a configuration which holds nothing of what it shows."""
     (tmp_path / "main.tex").write_text(PAGE % form(["name", "number"], rows, "lr"))
-    build_pdf(tmp_path / "main.tex", tmp_path / "main.pdf", [])
+    build_pdfs({tmp_path / "main.tex": tmp_path / "main.pdf"}, [])
     assert (tmp_path / "main.pdf").read_bytes().startswith(b"%PDF")

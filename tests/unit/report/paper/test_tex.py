@@ -6,7 +6,7 @@ import pytest
 
 from pdrom.core.errors import PaperError
 from pdrom.core.store import checksum_path
-from pdrom.report.paper.tex import build_pdf, packages_of
+from pdrom.report.paper.tex import build_pdfs, packages_of
 
 DOCUMENT = r"""\documentclass{article}
 \usepackage[T1]{fontenc}
@@ -39,7 +39,7 @@ def built(tmp_path_factory):
         folder = tmp_path_factory.mktemp("tex") / name
         source = project(folder)
         output = folder / "out" / "main.pdf"
-        build_pdf(source, output, [folder / "generated"])
+        build_pdfs({source: output}, [folder / "generated"])
         outputs.append(output)
     return outputs
 
@@ -58,7 +58,7 @@ def test_bytes_do_not_depend_on_the_folder(built):
 
 def test_other_text_gives_other_bytes(built, tmp_path):
     source = project(tmp_path, DOCUMENT.replace("An entry", "Another entry"))
-    build_pdf(source, tmp_path / "main.pdf", [tmp_path / "generated"])
+    build_pdfs({source: tmp_path / "main.pdf"}, [tmp_path / "generated"])
     assert (tmp_path / "main.pdf").read_bytes() != built[0].read_bytes()
 
 
@@ -82,16 +82,56 @@ def test_faults_are_one_line_and_leave_the_old_pdf(tmp_path, old, new, message):
     output = tmp_path / "main.pdf"
     output.write_bytes(b"old")
     with pytest.raises(PaperError, match=message) as caught:
-        build_pdf(source, output, [tmp_path / "generated"])
+        build_pdfs({source: output}, [tmp_path / "generated"])
     assert str(source) in str(caught.value)
     assert output.read_bytes() == b"old"
+
+
+LINKED = r"""\documentclass{article}
+\usepackage[T1]{fontenc}
+\usepackage{lmodern}
+\usepackage{xr-hyper}
+\usepackage{hyperref}
+\externaldocument{%s}[%s.pdf]
+\pdftrailerid{}
+\pdfobjcompresslevel=0
+\begin{document}
+\section{Own}\label{sec:%s} See \ref{sec:%s}. %s
+\end{document}
+"""
+
+
+def linked(folder, end="End."):
+    """Two sources that refer to each other, and their PDFs."""
+    for own, other in (("main", "supplement"), ("supplement", "main")):
+        text = LINKED % (other, other, own, other, end if own == "main" else "End.")
+        (folder / f"{own}.tex").write_text(text)
+    return {folder / f"{n}.tex": folder / f"{n}.pdf" for n in ("main", "supplement")}
+
+
+def test_documents_refer_to_each_other(tmp_path):
+    documents = linked(tmp_path)
+    build_pdfs(documents, [])
+    for other, pdf in zip(("supplement", "main"), documents.values(), strict=True):
+        assert f"/F({other}.pdf)/S/GoToR".encode() in pdf.read_bytes()
+    before = [pdf.read_bytes() for pdf in documents.values()]
+    build_pdfs(documents, [])
+    assert [pdf.read_bytes() for pdf in documents.values()] == before
+
+
+def test_a_document_with_too_many_pages_is_refused_with_the_other(tmp_path):
+    documents = linked(tmp_path, r"\newpage Next.")
+    with pytest.raises(PaperError, match=r"main\.tex: 2 pages, at most 1 are allowed"):
+        build_pdfs(documents, [], {"main": 1})
+    assert not any(pdf.exists() for pdf in documents.values())
+    build_pdfs(documents, [], {"main": 2})
 
 
 def test_the_shell_is_out_of_reach(tmp_path):
     source = project(
         tmp_path, DOCUMENT.replace("Section", rf"\immediate\write18{{touch {tmp_path}/made}}")
     )
-    build_pdf(source, tmp_path / "main.pdf", [tmp_path / "generated"])
+    build_pdfs({source: tmp_path / "main.pdf"}, [tmp_path / "generated"])
     assert not (tmp_path / "made").exists()
 
 
@@ -99,7 +139,7 @@ def test_without_any_tex_the_reason_is_given(tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda name: None)
     monkeypatch.setattr("pdrom.report.paper.tex.find_spec", lambda name: None)
     with pytest.raises(PaperError, match="no pdflatex with the needed packages on PATH"):
-        build_pdf(project(tmp_path), tmp_path / "main.pdf", [])
+        build_pdfs({project(tmp_path): tmp_path / "main.pdf"}, [])
 
 
 def test_packages_of_a_source():

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 
 from pdrom.core.errors import ConfigurationError, PaperError
 from pdrom.report.figures.kit import style
-from pdrom.report.paper.tex import build_pdf
+from pdrom.report.paper.source import whole_source
+from pdrom.report.paper.tex import build_pdfs
 from pdrom.report.words.text import characters, escape, plain_words, replaced, require_typeset
 from places import ROOT
 
@@ -41,13 +42,13 @@ def test_all_that_is_let_through_is_typeset(tmp_path):
     """One document with every character, compiled without an error by the preamble's packages."""
     every = list(characters())
     assert len(every) > 350
-    preamble = (ROOT / "paper" / "main.tex").read_text(encoding="utf-8").split(r"\input{macros")[0]
+    preamble = whole_source(ROOT / "paper" / "main.tex").split(r"\input{macros")[0]
     lines = [rf"\noindent x{escape(c)}y \texttt{{x{escape(c)}y}}" + "\n" for c in every]
     lines += [escape(title) + "\n\n" for title in TITLES]
     document = [preamble, r"\begin{document}", *lines, r"\end{document}"]
     source = tmp_path / "all.tex"
     source.write_text("\n".join(document), encoding="utf-8")
-    build_pdf(source, tmp_path / "all.pdf", [])
+    build_pdfs({source: tmp_path / "all.pdf"}, [])
     assert (tmp_path / "all.pdf").read_bytes().startswith(b"%PDF")
 
 

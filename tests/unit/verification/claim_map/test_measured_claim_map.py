@@ -35,7 +35,8 @@ class Dag:
     """
 
     def __init__(self, subject: Subject) -> None:
-        files = [*subject.plan.table_paths, *subject.plan.figures, subject.folders.manuscript]
+        documents = subject.folders.documents.values()
+        files = [*subject.plan.table_paths, *subject.plan.figures, *documents]
         first, second = (Job((f"{name}.h5",), (f"logs/{name}.log",)) for name in ("run", "basis"))
         last = [Job((file,), (f"logs/{Path(file).stem}{i}.log",)) for i, file in enumerate(files)]
         self.dependencies = {first: {}, second: {first: {}}} | {job: {second: {}} for job in last}
