@@ -7,6 +7,7 @@ other result, so that it is not among the files that equal runs make equal.
 
 import json
 import mimetypes
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -100,6 +101,8 @@ def published(plan: Plan, folders: Folders, manifest: Manifest) -> list[Publishe
         for name in manifest.files
         if Path(name).parent == models
     }
+    pages = [os.path.relpath(path, folders.results) for path in plan.paper.article.outputs.values()]
+    titles |= {name: f"The manuscript as a page: {Path(name).name}" for name in pages}
     titles["machine.json"] = "The machine that the study ran on"
     documents = [Path(file).name for file in folders.documents.values()]
     found = []

@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pdrom.core.errors import ConfigurationError
+from pdrom.core.paths import ARTICLE
 from pdrom.core.store import write_text
+from pdrom.report.article.verified import INDEX, write_verified
 from pdrom.verification.examine import Examination
 from pdrom.verification.files import verify_files
-from pdrom.verification.lines import counted, page, status_of
+from pdrom.verification.lines import Line, counted, page, status_of
 from pdrom.verification.references import LOG, folder_of
 from pdrom.verification.status import Status
 from pdrom.verification.subject import Subject
@@ -76,9 +78,16 @@ def verify_tables(subject: Subject) -> Status:
         _say(str(line))
     written = Path(subject.results) / PAGE
     write_text(page(lines, _about(subject, folder)), written)
+    pages = Path(ARTICLE.at(subject.results, name=INDEX))
+    if pages.is_file():
+        write_verified({f"{line.kind} {line.name}": _short(line) for line in lines}, pages.parent)
     _say(counted(lines))
     _say(f"page: {written}")
     return status_of(lines)
+
+
+def _short(line: Line) -> str:
+    return f"{line.outcome}, {line.text}" if line.text else str(line.outcome)
 
 
 def _about(subject: Subject, folder: Path) -> list[str]:

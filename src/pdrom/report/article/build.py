@@ -18,7 +18,7 @@ from pdrom.report.article.pandoc import Tree, page, parsed
 from pdrom.report.article.pictures import copies_pdf, shown_figure, write_pdf, write_picture
 from pdrom.report.article.tables import FACTS, contents, list_page, table_page
 from pdrom.report.article.tree import Labels, numbered, resolved
-from pdrom.report.article.verified import write_verified
+from pdrom.report.article.verified import INDEX, write_verified
 from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.paper.build import NUMBERS, Facts, fact_tables
 from pdrom.report.paper.source import DOCUMENTS, documents
@@ -35,7 +35,7 @@ ASSETS = {
     "script": "article.js",
 }
 # Pages of the documents by the name of their source.
-PAGES = dict(zip(DOCUMENTS, ("index.html", "supplement.html"), strict=True))
+PAGES = dict(zip(DOCUMENTS, (INDEX, "supplement.html"), strict=True))
 TITLES = dict(zip(DOCUMENTS, ("Paper", "Supplement"), strict=True))
 LINKS = {"tables.html": "Tables", "claims.html": "Claims", "live.html": "A model, running"}
 _FIGURE = re.compile(r"\\figureof\{(\w+)\}")
@@ -85,7 +85,8 @@ def write_article(
     trees: dict[str, Tree] = {}
     for stem, text in texts.items():
         tex = prepared(text, stem, origins, facts)
-        counted = Labels(found[1] if (found := _PREFIX.search(text)) else "", PAGES[stem], labels)
+        prefix = _PREFIX.search(text)
+        counted = Labels(prefix[1] if prefix else "", PAGES[stem], labels)
         trees[stem] = numbered(
             parsed(tex, files, Path(references)),
             counted,

@@ -55,7 +55,8 @@ def _claim(
         f"Command: <code>./reproduce claims</code>. Shown in <a href='{place}'>{shown}</a>.</p>"
         f"{''.join(_tests(name, part, getattr(rule, part), tests) for part in PARTS)}"
         f"<h3>History of the rules</h3><ul>{history}</ul>"
-        f"<p><small>Rules: <code>config/claims.yaml</code>, fingerprint {rule.fingerprint}.</small></p></section>"
+        f"<p><small>Rules: <code>config/claims.yaml</code>, "
+        f"fingerprint {rule.fingerprint}.</small></p></section>"
     )
 
 
@@ -64,10 +65,15 @@ def _tests(name: str, part: str, rules: tuple[TestRule, ...], tests: pd.DataFram
     rows = "".join(
         f"<tr><td>{escape(rule.what)}{'' if rule.decides else ' (beside the verdict)'}</td>"
         f"<td>{_rule(rule)}</td><td>{_found(name, part, row)}</td>"
-        f"<td>{row.least:.2g} to {row.most:.2g}, median {row['median']:.2g}: {escape(row.verdict)}</td></tr>"
+        f"<td>{row.least:.2g} to {row.most:.2g}, "
+        f"median {row['median']:.2g}: {escape(row.verdict)}</td></tr>"
         for rule, (_, row) in _paired(rules, tests[tests.part == part])
     )
-    return f"<h3>{PARTS[part]}</h3><div class=scroll tabindex=0 role=region aria-label='Tests of {name}, {part}'><table>{head}{rows}</table></div>"
+    label = f"Tests of {name}, {part}"
+    return (
+        f"<h3>{PARTS[part]}</h3><div class=scroll tabindex=0 role=region aria-label='{label}'>"
+        f"<table>{head}{rows}</table></div>"
+    )
 
 
 def _paired(

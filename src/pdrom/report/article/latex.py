@@ -59,9 +59,7 @@ def prepared(source: str, document: str, origins: Origins, facts: Facts) -> str:
     text = _PART.sub(lambda found: (found[1] if facts.part else found[2]) or "", text)
     full = facts.full_study
     for name, words in {"configuration": facts.part or full, "fullstudy": full}.items():
-        text = re.sub(
-            rf"\\{name}(?![A-Za-z])(?:\{{\}})?", lambda _, w=words: rf"\texttt{{{w}}}", text
-        )
+        text = re.sub(rf"\\{name}(?![A-Za-z])(?:\{{\}})?", rf"\\texttt{{{words}}}", text)
     text = _VAL.sub(
         lambda found: _link(found[1], origins.numbers[found[1]]["text"]), _MATH.sub(_apart, text)
     )

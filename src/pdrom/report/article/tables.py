@@ -30,8 +30,10 @@ def table_page(name: str, csv: bytes, template: str) -> str:
         {c.name: (c.meaning, c.unit, c.quantity, c.within) for c in table.columns} if table else {}
     )
     columns = "".join(
-        f"<tr data-column='{escape(column)}'><th scope=row>{escape(column)}</th><td>{escape(meaning)}</td>"
-        f"<td>{escape(unit)}</td><td>{kind}: {escape(QUANTITIES[kind])}</td><td>{'not judged' if kind in NOT_JUDGED else f'{within:g}'}</td></tr>"
+        f"<tr data-column='{escape(column)}'><th scope=row>{escape(column)}</th>"
+        f"<td>{escape(meaning)}</td><td>{escape(unit)}</td>"
+        f"<td>{kind}: {escape(QUANTITIES[kind])}</td>"
+        f"<td>{'not judged' if kind in NOT_JUDGED else f'{within:g}'}</td></tr>"
         for column, (meaning, unit, kind, within) in kinds.items()
     )
     packed = gzip.compress(csv, 9, mtime=0)
@@ -47,7 +49,7 @@ def table_page(name: str, csv: bytes, template: str) -> str:
 
 
 def argument(name: str) -> str:
-    """Argument of ./reproduce that makes a table; facts are written with the numbers of the text."""
+    """Argument of ./reproduce that makes a table; facts come with the numbers of the text."""
     if name in FACTS:
         return "paper_inputs"
     return TABLE.at(RESULTS, name=name) if name in declarations() else name

@@ -63,8 +63,14 @@ def words(text: str) -> list[Node]:
 
 
 def link(inlines: list[Node], address: str, classes: str = "") -> Node:
-    """Make a link."""
-    return {"t": "Link", "c": [attributes("", classes), inlines, [address, ""]]}
+    """Make a link; one of a formula alone has it as its title, too, which screen readers read."""
+    formula = all(node["t"] == "Math" for node in inlines)
+    title = re.sub(r"\\cdot ?|[{}\\]", lambda m: "·" if "cdot" in m[0] else "", plain(inlines))
+    return {"t": "Link", "c": [attributes("", classes), inlines, [address, title * formula]]}
+
+
+def _content(node: Node) -> Any:
+    return node.get("c")
 
 
 def plain(node: Any) -> str:
@@ -73,7 +79,7 @@ def plain(node: Any) -> str:
         return "".join(map(plain, node))
     if not isinstance(node, dict):
         return ""
-    kind, content = node.get("t"), node.get("c")
+    kind, content = node.get("t"), _content(node)
     if kind in ("Space", "SoftBreak", "LineBreak"):
         return " "
     if kind == "Str":
@@ -109,7 +115,7 @@ def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> 
     """
 
     def visit(node: Node) -> Any:
-        kind, content = node["t"], node.get("c")
+        kind, content = node["t"], _content(node)
         if kind == "Header" and content[0] < PARAGRAPH:
             level, attribute, inlines = content
             appendix = "unnumbered" in attribute[1]
@@ -126,8 +132,8 @@ def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> 
             return [title, node]
         if kind == "Div" and (which := {"theorem", "proposition"} & set(content[0][1])):
             labels.next(which.pop(), content[0][0])
-        if kind == "Math" and (found := _EQUATION.search(content[1])):
-            return _equation(node, found[1], labels)
+        if kind == "Math" and content[0]["t"] == "DisplayMath":
+            return _equation(node, labels)
         return None
 
     return changed(tree, visit)
@@ -138,9 +144,23 @@ def _table(label: str, node: Node, labels: Labels) -> Node:
     content = _captioned(node, f"Table {labels.next('table', label)}. ", 1)["c"]
     caption = {"t": "Div", "c": [attributes("", "caption"), content[1][1]]}
     region = {"role": "region", "tabindex": "0", "aria_label": plain(content[1])[:80]}
-    table = {"t": "Table", "c": [content[0], [None, []], *content[2:]]}
+    head = changed(content[3], _headed)
+    for cell in (cell for row in head[1] for cell in row[1]):
+        cell[4] = cell[4] if plain(cell[4]).strip() else [{"t": "Plain", "c": [_heard("row")]}]
+    table = {"t": "Table", "c": [content[0], [None, []], content[2], head, *content[4:]]}
     scroll = {"t": "Div", "c": [attributes("", "scroll", **region), [table]]}
     return {"t": "Div", "c": [attributes(label), [caption, scroll]]}
+
+
+def _headed(node: Node) -> Node | None:
+    """A formula in a head, with its letters for those who listen."""
+    if node["t"] != "Math":
+        return None
+    return {"t": "Span", "c": [attributes(), [node, _heard(plain(node))]]}
+
+
+def _heard(text: str) -> Node:
+    return {"t": "Span", "c": [attributes("", "heard"), words(text)]}
 
 
 def _captioned(node: Node, opening: str, place: int) -> Node:
@@ -154,20 +174,21 @@ def _captioned(node: Node, opening: str, place: int) -> Node:
     return {"t": node["t"], "c": content}
 
 
-def _equation(node: Node, kind: str, labels: Labels) -> Node:
+def _equation(node: Node, labels: Labels) -> Node:
     """An equation beside its number; one of several lines has a number for each."""
-    tex = node["c"][1]
-    lines = [tex] if kind == "equation" else re.split(r"\\\\", tex)
-    found = [(m[1] if (m := _LABEL.search(line)) else "") for line in lines]
+    kind, tex = node["c"]
+    found = _EQUATION.search(tex)
+    lines = [] if found is None else [tex] if found[1] == "equation" else tex.split(r"\\")
+    names = [named[1] if (named := _LABEL.search(line)) else "" for line in lines]
     marks = [
         {
             "t": "Span",
-            "c": [attributes(label, "number"), words(f"({labels.next('equation', label)})")],
+            "c": [attributes(name, "number"), words(f"({labels.next('equation', name)})")],
         }
-        for label in found
+        for name in names
     ]
     numbers = {"t": "Span", "c": [attributes("", "numbers"), marks]}
-    math = {"t": "Math", "c": [node["c"][0], _LABEL.sub("", tex)]}
+    math = {"t": "Math", "c": [kind, _LABEL.sub("", tex)]}
     return {"t": "Span", "c": [attributes("", "equation"), [math, numbers]]}
 
 
@@ -181,7 +202,7 @@ def resolved(tree: Tree, labels: Mapping[str, tuple[str, str]], claims: Mapping[
     """
 
     def visit(node: Node) -> Any:
-        kind, content = node["t"], node.get("c")
+        kind, content = node["t"], _content(node)
         if kind == "Link":
             return _resolved_link(node, labels)
         if kind == "Str" and (found := _CLAIM.fullmatch(content)) and found[2] in claims:

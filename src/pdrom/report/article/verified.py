@@ -7,6 +7,7 @@ from pdrom.core.store import write_text
 from pdrom.report.live.page import safe_json
 
 NAME = "verified.js"
+INDEX = "index.html"
 
 
 def write_verified(found: Mapping[str, str], folder: Path) -> None:

@@ -26,8 +26,8 @@ ERRORS, GAINS = (1e-4, 1e2), (1.0, 1e5)  # limits; what lies outside is drawn on
         "whole elements with oversampling; below it each row takes a single ingredient away from "
         "the complete method or exchanges it. Left the error of the rerun within the horizon, "
         "right the gain of the interpolation; what blew up or is singular lies on the right rim. "
-        "Bars show the range over runs that are trained on as many resampled frames, on some scenes; "
-        "pale ones that over choices of the arbitrary signs of the singular vectors."
+        "Bars show the range over runs that are trained on as many resampled frames, on some "
+        "scenes; pale ones that over choices of the arbitrary signs of the singular vectors."
     ),
     reads=(TableOf("ladder"),),
     options=Scenes,
