@@ -20,7 +20,7 @@ from pdrom.report.figures.kit.read import positions_at
 from pdrom.report.figures.kit.results import NothingToDraw, Results, asked
 from pdrom.report.figures.kit.run_rows import Row, draw_rows
 
-COLUMNS = ["scene", "group", "method", "position_basis", "k", "r", "relative_error_within_horizon"]
+COLUMNS = ["scene", "group", "method", "position_basis", "r", "relative_error_within_horizon"]
 TOLERANCE = "ecsw-1e-02"
 
 
@@ -74,7 +74,8 @@ def _merged(
             panels += [_with_error(p, method, found, p.title, "r") for p in row.panels[1:]]
     subspace = _subspace(results, options, scene, first.panels[0])
     if subspace is not None:
-        found = errors[(errors.scene == scene) & (errors.position_basis == "pod")]
+        models = results.table("reduced_reruns", [*COLUMNS, "k"])
+        found = models[(models.scene == scene) & (models.position_basis == "pod")]
         found = found[found.method == TOLERANCE]
         panels.append(_with_error(subspace, "ecsw", found, subspace.title, "k"))
     label = f"{results.experiment_title(scene, group)}\n{first.label.splitlines()[-1]}"
