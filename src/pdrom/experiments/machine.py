@@ -4,7 +4,7 @@ from pdrom.core import machine as this
 from pdrom.core.paths import MACHINE, File
 from pdrom.core.store import write_text
 from pdrom.experiments.kit.declaration import experiment
-from pdrom.experiments.kit.units import units
+from pdrom.experiments.roofline.units import units
 
 
 @experiment(

@@ -1,9 +1,9 @@
 """Units of time that anyone can measure: seconds of processor time of three loops on one thread.
 
-``./reproduce run python -m pdrom.experiments.kit.units`` measures them in a few seconds: 1e9 steps
-x <- a x + b that wait for each other (scalar), 1e9 sums and products in independent vectors of four
-doubles (vector), 1e9 bytes read from an array of 256 MiB (memory). Each is the least of some
-repeats in turns, scaled from a smaller number of steps.
+``./reproduce run python -m pdrom.experiments.roofline.units`` measures them in a few seconds: 1e9
+steps x <- a x + b that wait for each other (scalar), 1e9 sums and products in independent vectors
+of four doubles (vector), 1e9 bytes read from an array of 256 MiB (memory). Each is the least of
+some repeats in turns, scaled from a smaller number of steps.
 """
 
 import sys
