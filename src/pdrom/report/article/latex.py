@@ -13,6 +13,7 @@ import pandas as pd
 
 from pdrom.report.paper.build import Facts
 from pdrom.report.paper.known import SHOWN, closing, sentences
+from pdrom.report.words.text import escape
 
 ORIGIN = "origin:"
 _COMMENT = re.compile(r"(?m)^[ \t]*%.*\n|(?<!\\)%.*$")
@@ -59,7 +60,8 @@ def prepared(source: str, document: str, origins: Origins, facts: Facts) -> str:
     text = _PART.sub(lambda found: (found[1] if facts.part else found[2]) or "", text)
     full = facts.full_study
     for name, words in {"configuration": facts.part or full, "fullstudy": full}.items():
-        text = re.sub(rf"\\{name}(?![A-Za-z])(?:\{{\}})?", rf"\\texttt{{{words}}}", text)
+        shown = rf"\texttt{{{escape(words)}}}".replace("\\", r"\\")
+        text = re.sub(rf"\\{name}(?![A-Za-z])(?:\{{\}})?", shown, text)
     text = _VAL.sub(
         lambda found: _link(found[1], origins.numbers[found[1]]["text"]), _MATH.sub(_apart, text)
     )

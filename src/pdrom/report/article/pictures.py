@@ -9,7 +9,7 @@ from PIL import Image
 
 from pdrom.artifact.reads import TableOf
 from pdrom.core.store import atomic_path, require_intact
-from pdrom.report.article.tree import Node, attributes, link, plain, words
+from pdrom.report.article.nodes import Node, attributes, link, plain, words
 from pdrom.report.figures.kit.catalogue import declarations
 
 # Bytes: a larger picture loses what nobody sees; a larger PDF is left to the command.

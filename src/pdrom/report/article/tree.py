@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from pdrom.report.article.latex import ORIGIN
+from pdrom.report.article.nodes import Node, attributes, changed, content_of, link, plain, words
 from pdrom.report.article.pandoc import Tree
 
-Node = dict[str, Any]
 _LABEL = re.compile(r"\\label\{([^{}]*)\}")
 _EQUATION = re.compile(r"\\begin\{(equation|align)\}")
 _CLAIM = re.compile(r"(\W*)(C\d+)\b(.*)")
@@ -52,59 +52,6 @@ class Labels:
         return number
 
 
-def attributes(identifier: str = "", classes: str = "", **keys: str) -> list[Any]:
-    """Attributes of a node."""
-    return [identifier, classes.split(), [[k.replace("_", "-"), v] for k, v in keys.items()]]
-
-
-def words(text: str) -> list[Node]:
-    """Plain text as inline nodes."""
-    return [{"t": "Str", "c": text}]
-
-
-def link(inlines: list[Node], address: str, classes: str = "") -> Node:
-    """Make a link; one of a formula alone has it as its title, too, which screen readers read."""
-    formula = all(node["t"] == "Math" for node in inlines)
-    title = re.sub(r"\\cdot ?|[{}\\]", lambda m: "·" if "cdot" in m[0] else "", plain(inlines))
-    return {"t": "Link", "c": [attributes("", classes), inlines, [address, title * formula]]}
-
-
-def _content(node: Node) -> Any:
-    return node.get("c")
-
-
-def plain(node: Any) -> str:
-    """Text of a node without its marks."""
-    if isinstance(node, list):
-        return "".join(map(plain, node))
-    if not isinstance(node, dict):
-        return ""
-    kind, content = node.get("t"), _content(node)
-    if kind in ("Space", "SoftBreak", "LineBreak"):
-        return " "
-    if kind == "Str":
-        return str(content)
-    return str(content[1]) if kind in ("Math", "Code") else plain(content)
-
-
-def changed(node: Any, visit: Callable[[Node], Any]) -> Any:
-    """Return a tree in which ``visit`` has replaced nodes; it returns None to leave one.
-
-    A replaced node is not looked into. A list of nodes replaces one among others.
-    """
-    if isinstance(node, list):
-        made: list[Any] = []
-        for each in node:
-            new = changed(each, visit)
-            many = isinstance(each, dict) and isinstance(new, list)
-            made += new if many else [new]
-        return made
-    if not isinstance(node, dict):
-        return node
-    new = visit(node) if "t" in node else None
-    return {k: changed(v, visit) for k, v in node.items()} if new is None else new
-
-
 def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> Tree:
     """Number sections, figures, tables, equations and theorems, and lay them out.
 
@@ -115,7 +62,7 @@ def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> 
     """
 
     def visit(node: Node) -> Any:
-        kind, content = node["t"], _content(node)
+        kind, content = node["t"], content_of(node)
         if kind == "Header" and content[0] < PARAGRAPH:
             level, attribute, inlines = content
             appendix = "unnumbered" in attribute[1]
@@ -202,7 +149,7 @@ def resolved(tree: Tree, labels: Mapping[str, tuple[str, str]], claims: Mapping[
     """
 
     def visit(node: Node) -> Any:
-        kind, content = node["t"], _content(node)
+        kind, content = node["t"], content_of(node)
         if kind == "Link":
             return _resolved_link(node, labels)
         if kind == "Str" and (found := _CLAIM.fullmatch(content)) and found[2] in claims:

@@ -1,4 +1,4 @@
-"""What the last ``./reproduce verify`` found, for the pages of the article."""
+"""Outcomes of the last ``./reproduce verify``, for the pages of the article."""
 
 from collections.abc import Mapping
 from pathlib import Path

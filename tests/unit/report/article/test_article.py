@@ -40,8 +40,9 @@ MAIN = r"""
 \section{First}\label{sec:first}
 On \scene{bar\_a} it is \val{payoff|method=pod|error_train}, at most \val{payoff|error_train|max} of
 $K = \val{payoff|scenes|max}$, named \val{payoff|method=pod|position_basis}; equation
-\eqref{eq:one}, figure~\ref{fig:ladder}, table~\ref{tab:payoff}, theorem~\ref{thm:s} and section~\ref{sec:more}
-\cite{Page63}. C1 holds. \known{Shown, \val{payoff|method=pod|scenes}.} \known{Left out, $x$.}
+\eqref{eq:one}, figure~\ref{fig:ladder}, table~\ref{tab:payoff}, theorem~\ref{thm:s},
+section~\ref{sec:more} \cite{Page63}. C1 holds.
+\known{Shown, \val{payoff|method=pod|scenes}.} \known{Left out, $x$.}
 \paragraph{Opening.} Words.
 \begin{equation}\label{eq:one} a = b \end{equation}
 \figureof{ladder}
@@ -302,6 +303,7 @@ def study_or_small(small: Path) -> list[Path]:
     return [small, *([made] if (made / "index.html").is_file() else [])]
 
 
+@pytest.mark.slow
 def test_the_article_of_the_study_has_no_broken_link(small):
     for pages in study_or_small(small):
         assert assert_links_resolve(pages) > 40
