@@ -171,10 +171,12 @@ class CheckedRun:
         return done, keeps
 
     def _check(self, step: Step) -> Rung:
-        """The cheapest full order whose frames are known to be much better than the step's."""
+        """The cheapest full order much better than the step, or for a reduction than the ask."""
         allowed = self._own.defect(step) / 3.0
         for other in self._full:
-            if self._own.defect(other) <= allowed:
+            reduced = step.rung.model is not None
+            sure = reduced and self._own.expected(other, self._ask) <= self._ask.error / 3.0
+            if sure or self._own.defect(other) <= allowed:
                 return other.rung
         return CONVERGED
 
