@@ -69,9 +69,13 @@ class Ladder:
         """Largest error of the step on the own motions; infinite where one has no frame."""
         return worst(step.tried, ask.quantity) if self.horizon else np.inf
 
+    def defect(self, step: Step) -> float:
+        """Largest defect of the step on the own motions, in units of the motion."""
+        return max(float(each.defects.max(initial=0.0)) for each in step.tried)
+
     def estimated(self, step: Step, ask: Ask, defect: float) -> float:
         """Error of a run of the step with a root mean square ``defect`` in units of the motion."""
-        known = max(each.defects.max(initial=0.0) for each in step.tried)
+        known = self.defect(step)
         return self.expected(step, ask) * max(1.0, defect / known if known > 0.0 else np.inf)
 
     def admissible(self, ask: Ask, factor: float) -> list[Step]:

@@ -171,12 +171,12 @@ class CheckedRun:
         return done, keeps
 
     def _check(self, step: Step) -> Rung:
-        """The cheapest full order that is known to be much more accurate than the step."""
-        allowed = self._ask.error
-        if step.rung.model is None:
-            allowed = min(allowed, self._own.expected(step, self._ask))
+        """The cheapest full order much better than the step, or for a reduction than the ask."""
+        allowed = self._own.defect(step) / 3.0
         for other in self._full:
-            if self._own.expected(other, self._ask) <= allowed / 3.0:
+            reduced = step.rung.model is not None
+            sure = reduced and self._own.expected(other, self._ask) <= self._ask.error / 3.0
+            if sure or self._own.defect(other) <= allowed:
                 return other.rung
         return CONVERGED
 
