@@ -9,7 +9,7 @@ from pdrom.api.records import AskedRun, FullRun
 from pdrom.core.errors import ConfigurationError
 from pdrom.model.scene import Scene
 from pdrom.reduction.asked.ask import Ask
-from pdrom.reduction.asked.ladder import AskSettings, ladder
+from pdrom.reduction.asked.hierarchy import AskSettings, hierarchy
 from pdrom.reduction.asked.run import CheckedRun
 
 
@@ -24,7 +24,7 @@ def asked_run(full: FullRun, ask: Ask, scene: Scene | None) -> AskedRun:
     if scene is not None:
         _require_alike(full.scene, require(Scene, scene, "scene", source="load_scene makes one"))
     settings, started = AskSettings(), perf_counter()
-    own, (training, _) = ladder(full.scene, settings)
+    own, (training, _) = hierarchy(full.scene, settings)
     run = CheckedRun(scene or full.scene, own, ask, settings)
     offline = perf_counter() - started
     outcome = run.outcome()

@@ -1,6 +1,6 @@
 """Runs that are asked for an error, on motions that no choice has seen.
 
-Everything is made here: the ladder of a scene from its training motion, its scores on a further
+Everything is made here: the hierarchy of a scene from its training motion, its scores on a further
 motion of one's own making, and then the asks on the held-out motions. Which factor multiplies the
 estimates of a scene is decided by the scores of the other scenes, in the table: runs are made for
 every factor of a grid.
@@ -22,11 +22,11 @@ from pdrom.experiments.kit.settings import Tolerance
 from pdrom.model.held_out import FIRST, MOTIONS
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.asked.ask import Ask
-from pdrom.reduction.asked.ladder import AskSettings, Ladder, ladder
+from pdrom.reduction.asked.hierarchy import AskSettings, Hierarchy, hierarchy
+from pdrom.reduction.asked.level import Level
 from pdrom.reduction.asked.measured import CONVERGED, Motion, Tried, tried
 from pdrom.reduction.asked.motions import CALIBRATION
 from pdrom.reduction.asked.run import Asked, CheckedRun
-from pdrom.reduction.asked.rung import Rung
 
 log = logging.getLogger(__name__)
 
@@ -71,9 +71,9 @@ class Asks(AskedErrors):
 def asks(
     sources: list[Path], config: SceneConfig, section: AskedErrors, out: File, scores: File
 ) -> None:
-    """Make the ladder of a scene, its scores, and every ask on every held-out motion."""
+    """Make the hierarchy of a scene, its scores, and every ask on every held-out motion."""
     training = Scene.build(config, config.mesh.build(Path()))
-    own, _ = ladder(training, section)
+    own, _ = hierarchy(training, section)
     found = list(_scores(own, Motion(CALIBRATION.of(training)), config.name))
     write_table(pd.DataFrame(found, columns=SCORE_COLUMNS), scores.path)
     rows: list[dict[str, Any]] = []
@@ -84,21 +84,23 @@ def asks(
     write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
 
 
-def _scores(own: Ladder, further: Motion, scene: str) -> Iterator[dict[str, Any]]:
+def _scores(own: Hierarchy, further: Motion, scene: str) -> Iterator[dict[str, Any]]:
     """Expected and true error of every step on a motion that is not part of the choice."""
     for step in own.steps:
-        reached = tried(step.rung, further, CONVERGED).errors["position"]
+        reached = tried(step.level, further, CONVERGED).errors["position"]
         expected = max(each.errors["position"] for each in step.tried)
-        yield dict(zip(SCORE_COLUMNS, (scene, step.rung.title, expected, reached), strict=True))
+        yield dict(zip(SCORE_COLUMNS, (scene, step.level.title, expected, reached), strict=True))
 
 
-def _asked(scene: Scene, name: str, own: Ladder, section: AskedErrors) -> Iterator[dict[str, Any]]:
+def _asked(
+    scene: Scene, name: str, own: Hierarchy, section: AskedErrors
+) -> Iterator[dict[str, Any]]:
     motion = Motion(scene)
     motion.end = min(motion.end, own.horizon)
     # every step on one motion, for the best choice with hindsight
     steps = own.steps if name == FIRST else []
-    every = {s.rung.title: tried(s.rung, motion, CONVERGED) for s in steps}
-    plain = tried(Rung(scene.config.iterations), motion, CONVERGED)
+    every = {s.level.title: tried(s.level, motion, CONVERGED) for s in steps}
+    plain = tried(Level(scene.config.iterations), motion, CONVERGED)
     known: dict[str, Tried] = {}
     for error in section.errors:
         good = {title: t.ms for title, t in every.items() if t.errors["position"] <= error}

@@ -8,7 +8,7 @@ import pandas as pd
 from pdrom.artifact.reads import Every, Setting
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.reduction.asked.rung import FULL_ORDER
+from pdrom.reduction.asked.level import FULL_ORDER
 from pdrom.tables.kit.declaration import compared, flag, integer, number, table, text, timed
 from pdrom.tables.kit.parts import joined
 from pdrom.tables.kit.vocabulary import MS_PER_FRAME, SCENE, VERTICES

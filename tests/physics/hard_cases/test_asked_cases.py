@@ -6,7 +6,7 @@ import pytest
 from hard_cases import training
 from pdrom.experiments.hard_cases.catalogue import reducible_cases
 from pdrom.reduction.asked.ask import Ask
-from pdrom.reduction.asked.ladder import AskSettings, ladder
+from pdrom.reduction.asked.hierarchy import AskSettings, hierarchy
 from pdrom.reduction.asked.run import CheckedRun
 
 SETTINGS = AskSettings(
@@ -22,7 +22,7 @@ CASES = [
 @pytest.mark.parametrize("name", CASES)
 def test_a_promise_holds_within_a_factor_of_two(name):
     scene = training(name).scene
-    own, (motion, _) = ladder(scene, SETTINGS)
+    own, (motion, _) = hierarchy(scene, SETTINGS)
     for error in (0.1, 0.01):
         done = CheckedRun(scene, own, Ask(error=error), SETTINGS).outcome()
         assert len(done.positions) == scene.config.frames + 1

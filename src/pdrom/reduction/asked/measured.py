@@ -1,8 +1,8 @@
-"""Rungs tried on motions of one's own: their errors, and what one of their frames misses.
+"""Levels tried on motions of one's own: their errors, and what one of their frames misses.
 
 The reference is the implicit step of each motion, here as many accelerated iterations as change
-nothing any more. From states of a rung's run one frame is done by the full order: the distance of
-its end to that of the rung's frame is the rung's defect there, exactly. A run adds up its defects
+nothing any more. From states of a level's run one frame is done by the full order: the distance of
+its end to that of the level's frame is the level's defect there, exactly. A run adds up its defects
 and the motion amplifies them: where the defects are no larger than those of motions that were
 tried, neither is the error, and where they are larger, it is taken to be larger by as much.
 """
@@ -17,11 +17,11 @@ from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.asked.ask import QUANTITIES, Quantity, relative_error
-from pdrom.reduction.asked.rung import WINDOW, Rung, Running
+from pdrom.reduction.asked.level import WINDOW, Level, Running
 
 # A full order whose frames are compared with those of others; references have as many iterations,
 # or twice as many, as long as these reach further.
-CONVERGED = Rung(80, WINDOW)
+CONVERGED = Level(80, WINDOW)
 MOST = 4 * CONVERGED.iterations
 # The frames of a motion count until starts this far apart (of the extent) and half the iterations
 # lead to positions that differ by more than this part of the motion: then round-off decides.
@@ -31,7 +31,7 @@ PROBED = 6
 
 
 class Motion:
-    """A motion that rungs are tried on, with its reference.
+    """A motion that levels are tried on, with its reference.
 
     iterations : of the reference
     end : frames before it count
@@ -62,7 +62,7 @@ class Motion:
 
 
 def _accelerated(scene: Scene, iterations: int, moved: np.ndarray | None = None) -> np.ndarray:
-    return trajectory(Rung(iterations, WINDOW).scene(scene), moved, track_objective=False)
+    return trajectory(Level(iterations, WINDOW).scene(scene), moved, track_objective=False)
 
 
 def _unit(reference: np.ndarray) -> float:
@@ -79,7 +79,7 @@ def _horizon(one: np.ndarray, other: np.ndarray, unit: float) -> int:
 
 @dataclass(frozen=True)
 class Tried:
-    """A rung on a motion.
+    """A level on a motion.
 
     errors : of each quantity
     defects : (n,) of some frames, in units of the motion
@@ -91,9 +91,9 @@ class Tried:
     ms: float
 
 
-def tried(rung: Rung, motion: Motion, check: Rung) -> Tried:
-    """Run ``rung`` on a motion; its defects are taken with ``check``."""
-    running = rung.on(motion.scene)
+def tried(level: Level, motion: Motion, check: Level) -> Tried:
+    """Run ``level`` on a motion; its defects are taken with ``check``."""
+    running = level.on(motion.scene)
     state = running.inside(motion.scene.initial_state())
     frames, started = motion.scene.config.frames, thread_time()
     states = [state, *running.run(state, range(frames))]
@@ -118,5 +118,5 @@ def defect(before: State, after: State, exact: Running, frame: int) -> float:
 
 
 def worst(found: Sequence[Tried], quantity: Quantity) -> float:
-    """Largest error of a rung on several motions."""
+    """Largest error of a level on several motions."""
     return max(each.errors[quantity] for each in found)

@@ -1,8 +1,9 @@
 """A run that keeps to an asked error: checked, repaired in time, ended in full order if it must.
 
-Some frames are done twice, by the rung and by the full order from the same state, which gives the
-rung's defect there exactly. Where the defects exceed those of the motions that the rung was tried
-XX while little is spent, and goes on with a more accurate rung. Nothing depends on the clock.
+Some frames are done twice, by the level and by the full order from the same state, which gives the
+level's defect there exactly. Defects beyond those of the motions that the level was tried on raise
+the estimate. When it leaves the ask the run goes back to its last checked state, or to the start
+while little is spent, and goes on with a more accurate level. Nothing depends on the clock.
 """
 
 import logging
@@ -14,9 +15,9 @@ import numpy as np
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.scene import Scene
 from pdrom.reduction.asked.ask import Ask
-from pdrom.reduction.asked.ladder import AskSettings, Ladder, Step, check_frames
+from pdrom.reduction.asked.hierarchy import AskSettings, Hierarchy, Step, check_frames
+from pdrom.reduction.asked.level import Level, Running
 from pdrom.reduction.asked.measured import CONVERGED, defect
-from pdrom.reduction.asked.rung import Rung, Running
 
 log = logging.getLogger(__name__)
 
@@ -34,7 +35,7 @@ class Asked:
     promised : whether the estimate keeps to the ask; False: nothing that was tried does
     expected : error on the motions that the choice was made on, times the factor
     estimate : estimated error of the run, times the factor; None without a check
-    changes : frames from which on another rung went on, and its title; the first one at frame 0
+    changes : frames from which on another level went on, and its title; the first one at frame 0
     checks : frames that were checked, of the run as it is
     repairs : how often the run went back
     reduced : frames that were done by a reduction
@@ -83,38 +84,38 @@ class _Done:
 
 
 class CheckedRun:
-    """A run of ``scene`` that keeps to ``ask``, with the rungs of a ladder of its mesh.
+    """A run of ``scene`` that keeps to ``ask``, with the levels of a hierarchy of its mesh.
 
     What is made before the first frame (operators, factors) is made here.
 
     Parameters
     ----------
     own : made of the training motion
-    settings : those that the ladder was made with
+    settings : those that the hierarchy was made with
     """
 
-    def __init__(self, scene: Scene, own: Ladder, ask: Ask, settings: AskSettings) -> None:
+    def __init__(self, scene: Scene, own: Hierarchy, ask: Ask, settings: AskSettings) -> None:
         self.scene, self._own, self._ask, self._settings = scene, own, ask, settings
         self._frames = scene.config.frames
         self._steps = own.admissible(ask, settings.factor)
-        full = [step for step in own.steps if step.rung.model is None]
+        full = [step for step in own.steps if step.level.model is None]
         best = min(full, key=lambda step: (own.expected(step, ask), step.work))
-        self._dear = next((s for s in self._steps if s.rung.model is None), best)
+        self._dear = next((s for s in self._steps if s.level.model is None), best)
         self._full, self._last = full, best
         self._running: dict[int, Running] = {}
         first = self._steps[0] if self._steps else best
-        for rung in (first.rung, self._check(first), self._dear.rung):
-            self._on(rung)
+        for level in (first.level, self._check(first), self._dear.level):
+            self._on(level)
 
     @property
-    def full_order(self) -> Rung:
+    def full_order(self) -> Level:
         """The cheapest full order that keeps to the ask; the most accurate one if none does."""
-        return self._dear.rung
+        return self._dear.level
 
-    def _on(self, rung: Rung) -> Running:
-        if id(rung) not in self._running:
-            self._running[id(rung)] = rung.on(self.scene)
-        return self._running[id(rung)]
+    def _on(self, level: Level) -> Running:
+        if id(level) not in self._running:
+            self._running[id(level)] = level.on(self.scene)
+        return self._running[id(level)]
 
     def outcome(self) -> Asked:
         """Do all frames; each call is a run of its own."""
@@ -123,7 +124,7 @@ class CheckedRun:
         step = self._steps[0] if promised else self._last
         expected = self._settings.factor * self._own.expected(step, self._ask)
         start = self.scene.initial_state()
-        whole, started = self._on(self._dear.rung), thread_time()
+        whole, started = self._on(self._dear.level), thread_time()
         kept = begun = _Done(((whole, start.positions),), start)
         while kept.frame < self._frames:
             done, keeps = self._advance(kept, step)
@@ -138,12 +139,12 @@ class CheckedRun:
             self._repairs += 1
             early = self._work <= EARLY * self._frames * self._dear.work
             kept, step = begun if early else kept, following
-            log.info("frame %d: goes on with %s", kept.frame, step.rung.title)
+            log.info("frame %d: goes on with %s", kept.frame, step.level.title)
         return self._told(kept, promised, expected, thread_time() - started)
 
     def _advance(self, kept: _Done, step: Step) -> tuple[_Done, bool]:
         """Frames up to the next check or the end; whether the estimate is within the ask."""
-        running, check = self._on(step.rung), self._check(step)
+        running, check = self._on(step.level), self._check(step)
         cost = check.work(self.scene) / self._dear.work
         share = self._settings.share * min(1.0, 0.01 / self._ask.error)
         left = [f for f in check_frames(self._frames, cost, share) if f >= kept.frame]
@@ -170,14 +171,14 @@ class CheckedRun:
         keeps = extent <= BLOWUP_EXTENT and (estimate is None or estimate <= self._ask.error)
         return done, keeps
 
-    def _check(self, step: Step) -> Rung:
+    def _check(self, step: Step) -> Level:
         """The cheapest full order much better than the step, or for a reduction than the ask."""
         allowed = self._own.defect(step) / 3.0
         for other in self._full:
-            reduced = step.rung.model is not None
+            reduced = step.level.model is not None
             sure = reduced and self._own.expected(other, self._ask) <= self._ask.error / 3.0
             if sure or self._own.defect(other) <= allowed:
-                return other.rung
+                return other.level
         return CONVERGED
 
     def _estimate(self, done: _Done) -> float | None:
@@ -198,12 +199,12 @@ class CheckedRun:
         out. None where no full order is better, either.
         """
         own, ask = self._own, self._ask
-        if step.rung.model is not None:
+        if step.level.model is not None:
             half = [s for s in self._steps if own.expected(s, ask) <= own.expected(step, ask) / 2]
             for other in half:
                 saved = (self._frames - frame) * (self._dear.work - other.work)
                 trial = self._check(other).work(self.scene) + self._frames / 2 * other.work
-                if other.rung.model is None or saved > trial:
+                if other.level.model is None or saved > trial:
                     return other
             return self._dear
         for other in self._full:
@@ -216,14 +217,14 @@ class CheckedRun:
         reduced = sum(
             end - begin
             for (begin, step), end in zip(done.changes, ends, strict=True)
-            if step.rung.model is not None
+            if step.level.model is not None
         )
         return Asked(
             np.stack([running.positions(y) for running, y in done.ends]),
             promised,
             expected,
             self._estimate(done),
-            [(frame, step.rung.title) for frame, step in done.changes],
+            [(frame, step.level.title) for frame, step in done.changes],
             [frame for frame, _, _ in done.parts],
             self._repairs,
             reduced,

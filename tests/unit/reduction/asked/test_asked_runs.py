@@ -11,10 +11,10 @@ from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.asked import run as checked
 from pdrom.reduction.asked.ask import Ask, read_ask, relative_error
-from pdrom.reduction.asked.ladder import AskSettings, Ladder, check_frames, ladder
+from pdrom.reduction.asked.hierarchy import AskSettings, Hierarchy, check_frames, hierarchy
+from pdrom.reduction.asked.level import Level
 from pdrom.reduction.asked.measured import CONVERGED, Motion, Tried
 from pdrom.reduction.asked.run import CheckedRun
-from pdrom.reduction.asked.rung import Rung
 
 EFFECTS = (
     {"effect": "gravity"},
@@ -31,13 +31,13 @@ def scene() -> Scene:
 
 
 @pytest.fixture(scope="module")
-def own(scene: Scene) -> Ladder:
-    return ladder(scene, SETTINGS)[0]
+def own(scene: Scene) -> Hierarchy:
+    return hierarchy(scene, SETTINGS)[0]
 
 
-def with_reductions_first(own: Ladder) -> Ladder:
-    """The ladder as if reductions cost nothing: on so small a mesh the full order is cheap."""
-    steps = [s if s.rung.model is None else replace(s, work=1.0) for s in own.steps]
+def with_reductions_first(own: Hierarchy) -> Hierarchy:
+    """The hierarchy as if reductions cost nothing: on so small a mesh the full order is cheap."""
+    steps = [s if s.level.model is None else replace(s, work=1.0) for s in own.steps]
     return replace(own, steps=sorted(steps, key=lambda step: step.work))
 
 
@@ -64,7 +64,7 @@ def test_the_cheapest_step_that_keeps_the_ask_is_taken(scene, own):
         assert [s.work for s in steps] == sorted(s.work for s in steps)
         assert all(1.25 * own.expected(s, Ask(error=error)) <= error for s in steps)
         done = CheckedRun(scene, own, Ask(error=error), SETTINGS).outcome()
-        assert done.changes[0] == (0, steps[0].rung.title)
+        assert done.changes[0] == (0, steps[0].level.title)
 
 
 def test_two_runs_are_the_same_to_the_last_bit(scene, own):
@@ -76,13 +76,13 @@ def test_two_runs_are_the_same_to_the_last_bit(scene, own):
     )  # fmt: skip
 
 
-def forgetful(own: Ladder) -> Ladder:
-    """The ladder with reductions that were never seen to miss anything: every check alarms."""
+def forgetful(own: Hierarchy) -> Hierarchy:
+    """The hierarchy with reductions that were never seen to miss anything: every check alarms."""
     return replace(
         own,
         steps=[
             s
-            if s.rung.model is None
+            if s.level.model is None
             else replace(s, tried=[replace(t, defects=t.defects * 1e-6) for t in s.tried])
             for s in own.steps
         ],
@@ -103,7 +103,7 @@ def test_an_early_repair_starts_anew_and_a_late_one_keeps_what_was_checked(scene
     monkeypatch.setattr(checked, "EARLY", 1.0)
     anew = CheckedRun(scene, chosen, Ask(error=0.05), SETTINGS).outcome()
     assert [frame for frame, _ in anew.changes] == [0]
-    exact = Rung(CONVERGED.iterations, CONVERGED.window).scene(scene)
+    exact = Level(CONVERGED.iterations, CONVERGED.window).scene(scene)
     assert relative_error(anew.positions, trajectory(exact), "position") <= 0.05
     monkeypatch.setattr(checked, "EARLY", 0.0)
     sizes = iter([0.0, 1.0, *[0.0] * 99])
@@ -134,15 +134,15 @@ def test_nothing_is_promised_where_the_full_order_fails_too(scene, own):
 
 def test_a_reduction_that_blows_up_is_replaced(scene, own):
     """Samples whose factors are wrong by far: the first check finds it."""
-    step = next(s for s in with_reductions_first(own).steps if s.rung.model is not None)
-    ((name, samples),) = step.rung.model.samples.items()
+    step = next(s for s in with_reductions_first(own).steps if s.level.model is not None)
+    ((name, samples),) = step.level.model.samples.items()
     broken = replace(samples, factors=samples.factors * 1e-6)
-    model = replace(step.rung.model, samples={name: broken})
+    model = replace(step.level.model, samples={name: broken})
     bad = replace(
         own,
         steps=[
-            replace(step, rung=replace(step.rung, model=model)),
-            *(s for s in own.steps if s.rung.model is None),
+            replace(step, level=replace(step.level, model=model)),
+            *(s for s in own.steps if s.level.model is None),
         ],
     )
     done = CheckedRun(scene, bad, Ask(error=0.05), SETTINGS).outcome()

@@ -1,4 +1,4 @@
-"""All rungs of a scene, tried on its training motion and one that is made from it."""
+"""All levels of a scene, tried on its training motion and one that is made from it."""
 
 import logging
 from collections.abc import Iterator, Sequence
@@ -12,9 +12,9 @@ from pdrom.core.errors import PdromError
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.scene import Scene
 from pdrom.reduction.asked.ask import Ask
+from pdrom.reduction.asked.level import WINDOW, Level
 from pdrom.reduction.asked.measured import CONVERGED, Motion, Tried, tried, worst
 from pdrom.reduction.asked.motions import VALIDATION
-from pdrom.reduction.asked.rung import WINDOW, Rung
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
 
 log = logging.getLogger(__name__)
@@ -23,7 +23,7 @@ Count = Annotated[int, Field(ge=1, le=10_000)]
 
 
 class AskSettings(ConfigModel):
-    """Rungs that are tried, and the factor of the estimates.
+    """Levels that are tried, and the factor of the estimates.
 
     modes, tolerances : of the reductions: k, tau
     frames : of the training motion that the elements are sampled for, at most
@@ -46,15 +46,15 @@ class AskSettings(ConfigModel):
 
 @dataclass(frozen=True)
 class Step:
-    """A rung with its outcome on each own motion, the training motion first."""
+    """A level with its outcome on each own motion, the training motion first."""
 
-    rung: Rung
+    level: Level
     work: float
     tried: list[Tried]
 
 
 @dataclass(frozen=True)
-class Ladder:
+class Hierarchy:
     """Steps of a scene, in the order of their work.
 
     unit : root mean square displacement of a frame of the training motion, m
@@ -85,59 +85,59 @@ class Ladder:
         than the first of these. Empty where even the full order would break the promise.
         """
         good = [s for s in self.steps if factor * self.expected(s, ask) <= ask.error]
-        full = [s for s in good if s.rung.model is None]
+        full = [s for s in good if s.level.model is None]
         if not full:
             return []
-        return [s for s in good if s.rung.model is None or s.work < full[0].work]
+        return [s for s in good if s.level.model is None or s.work < full[0].work]
 
 
-def ladder(training: Scene, settings: AskSettings) -> tuple[Ladder, list[Motion]]:
-    """Try every rung on the training motion and the validation motion.
+def hierarchy(training: Scene, settings: AskSettings) -> tuple[Hierarchy, list[Motion]]:
+    """Try every level on the training motion and the validation motion.
 
     Returns
     -------
-    The ladder, and the motions with their references.
+    The hierarchy, and the motions with their references.
     """
     motions = [Motion(training), Motion(VALIDATION.of(training))]
-    rungs = [*_full(settings, motions[0]), *_reduced(training, motions[0], settings)]
+    levels = [*_full(settings, motions[0]), *_reduced(training, motions[0], settings)]
     steps = []
-    for rung in rungs:
+    for level in levels:
         try:
-            found = [tried(rung, motion, CONVERGED) for motion in motions]
+            found = [tried(level, motion, CONVERGED) for motion in motions]
         except PdromError as error:
-            if rung.model is None:
+            if level.model is None:
                 raise
-            log.warning("%s: left out (%s)", rung.title, error)
+            log.warning("%s: left out (%s)", level.title, error)
             continue
-        steps.append(Step(rung, rung.work(training), found))
+        steps.append(Step(level, level.work(training), found))
         errors = [f"{each.errors['position']:.2e}" for each in found]
-        log.info("%s: errors %s", rung.title, ", ".join(errors))
+        log.info("%s: errors %s", level.title, ", ".join(errors))
     steps.sort(key=lambda step: step.work)
     horizon = min(motion.end for motion in motions)
-    return Ladder(steps, motions[0].unit, horizon), motions
+    return Hierarchy(steps, motions[0].unit, horizon), motions
 
 
-def _full(settings: AskSettings, motion: Motion) -> Iterator[Rung]:
+def _full(settings: AskSettings, motion: Motion) -> Iterator[Level]:
     """The full order; where its steps converge slowly, with half the reference's iterations too."""
     if motion.iterations > CONVERGED.iterations:
-        yield Rung(motion.iterations // 2, WINDOW)
-    yield from (Rung(count) for count in settings.plain)
-    yield from (Rung(count, WINDOW) for count in settings.accelerated)
+        yield Level(motion.iterations // 2, WINDOW)
+    yield from (Level(count) for count in settings.plain)
+    yield from (Level(count, WINDOW) for count in settings.accelerated)
 
 
-def _reduced(training: Scene, motion: Motion, settings: AskSettings) -> Iterator[Rung]:
+def _reduced(training: Scene, motion: Motion, settings: AskSettings) -> Iterator[Level]:
     """Reductions trained on converged frames; none where the scene does not take a subspace."""
     frames = np.arange(0, training.config.frames, 2)
     few = frames[:: -(-len(frames) // settings.frames)]
     # iterates of the samples' training run, in the subspace
-    scene = Rung(20).scene(training)
+    scene = Level(20).scene(training)
     try:
         for k in settings.modes:
             columns = make_columns(scene, motion.reference[1:][frames], "pod", k=k)
             found = sample_elements(scene, columns, few, tolerances=settings.tolerances)
             for tau, samples in zip(settings.tolerances, found, strict=True):
                 model = SubspaceModel("pod", columns, samples)
-                yield from (Rung(count, WINDOW, model, tau) for count in settings.iterations)
+                yield from (Level(count, WINDOW, model, tau) for count in settings.iterations)
     except PdromError as error:
         log.warning("%s: no reduction (%s)", training.config.name, error)
 

@@ -29,7 +29,7 @@ FULL_ORDER = "full order"
 
 
 @dataclass(frozen=True)
-class Rung:
+class Level:
     """A way to do a frame.
 
     iterations, window : of the step loop; a window of 0 accelerates nothing
@@ -51,7 +51,7 @@ class Rung:
         return f"ecsw, k = {self.model.columns.modes}, tau = {self.tau:g}, {count}"
 
     def scene(self, scene: Scene) -> Scene:
-        """The scene with the rung's iterations."""
+        """The scene with the level's iterations."""
         changes = {"iterations": self.iterations, "anderson_window": self.window}
         return replace(scene, config=scene.config.model_copy(update=changes))
 
@@ -72,20 +72,20 @@ class Rung:
         return (REDUCED_FRAME if lagged else alone) + self.iterations * iteration
 
     def on(self, scene: Scene) -> "Running":
-        """The rung on the motion of ``scene``."""
+        """The level on the motion of ``scene``."""
         return Running(self, scene)
 
 
 class Running:
-    """A rung's step loop on a motion; states outside are those of all vertices."""
+    """A level's step loop on a motion; states outside are those of all vertices."""
 
-    def __init__(self, rung: Rung, scene: Scene) -> None:
-        self._model = rung.model
+    def __init__(self, level: Level, scene: Scene) -> None:
+        self._model = level.model
         self._loop: Stepper
         if self._model is None:
-            self._loop = rung.scene(scene).stepper(track_objective=False)
+            self._loop = level.scene(scene).stepper(track_objective=False)
         else:
-            self._loop = self._model.loop(rung.scene(scene))[0]
+            self._loop = self._model.loop(level.scene(scene))[0]
             self._project = projector(self._model.columns, scene.masses)
 
     def inside(self, state: State) -> State:
