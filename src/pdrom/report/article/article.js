@@ -120,6 +120,8 @@ for (const place of document.querySelectorAll("[data-verified]")) {
 }
 const page = document.getElementById("table");
 if (page) showTable(page.dataset.name);
-for (const place of document.querySelectorAll(".equation")) if (place.scrollWidth > place.clientWidth) place.tabIndex = 0;
+for (const place of document.querySelectorAll('math[display="inline"]')) {
+  if (place.getBoundingClientRect().right > innerWidth) { place.classList.add("wide"); place.tabIndex = 0; }
+}
 const contents = document.querySelector(".toc details");
 if (contents && matchMedia("(max-width: 999px)").matches) contents.open = false;

@@ -136,7 +136,7 @@ def _equation(node: Node, labels: Labels) -> Node:
     ]
     numbers = {"t": "Span", "c": [attributes("", "numbers"), marks]}
     math = {"t": "Math", "c": [kind, _LABEL.sub("", tex)]}
-    return {"t": "Span", "c": [attributes("", "equation"), [math, numbers]]}
+    return {"t": "Span", "c": [attributes("", "equation", tabindex="0"), [math, numbers]]}
 
 
 def resolved(tree: Tree, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Tree:

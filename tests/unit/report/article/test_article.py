@@ -249,7 +249,7 @@ def test_columns_are_plain_letters():
 
 def assert_links_resolve(pages: Path) -> int:
     """Every link of every page leads to a file, and to a name in it; how many there are."""
-    found = {path: Links(path) for path in pages.rglob("*.html")}
+    found = {path: Links(path) for path in pages.resolve().rglob("*.html")}
     count = 0
     for path, page in found.items():
         for _, address, _ in page.links:
