@@ -31,7 +31,7 @@ NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
 EXAMPLES = {"config/scenes/my_sheet.yaml", "config/mine.yaml"}
 LINK = re.compile(r"\]\(([^)#]+)[^)]*\)")
 PATH = re.compile(r"`((?:config|docs|paper|src|tests|workflow)/[\w./-]+)`")
-BUILT = {"paper/main.pdf", "paper/supplement.pdf"}
+BUILT = {"paper/main.pdf", "paper/supplement.pdf", "paper/numbers.json"}
 COMMAND = re.compile(r"\./reproduce ([^`#\n]+)")
 
 

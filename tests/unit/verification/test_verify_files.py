@@ -236,7 +236,7 @@ def test_every_artifact_that_takes_seconds_is_made_again(subject, monkeypatch):
     pictures = [job.png for job in plan.figure_jobs.values()]
     wanted = [*plan.table_paths, *plan.figures, *pictures, *plan.paper.files]
     wanted += folders.documents.values()
-    wanted += plan.page.outputs.values()
+    wanted += [*plan.page.outputs.values(), *plan.paper.article.outputs.values()]
     assert sorted(made) == sorted(wanted)
 
 
