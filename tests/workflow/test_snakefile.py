@@ -33,7 +33,8 @@ MICRO = {
 }
 # Folders of results that belong to no single scene.
 SHARED = (
-    "tables", "figures", "paper", "hard_cases", "guard", "offline", "frame_times", "roofline",
+    "tables", "figures", "paper", "article", "hard_cases", "guard", "offline", "frame_times",
+    "roofline",
 )  # fmt: skip
 MICRO_FILE = "micro.yaml"
 EDITED = ("workflow", "config", "paper", "src", "Snakefile", MICRO_FILE)
@@ -41,7 +42,8 @@ DAY_NS = 86_400 * 10**9
 MICRO_ARGUMENTS = ("--configfile", MICRO_FILE)
 OUTSIDE = f"{MICRO_RESULTS}/fom/bar140/train.h5"
 PAGE = f"{MICRO_RESULTS}/article/live.html"
-TARGETS = (MICRO_MANUSCRIPT, PAGE, OUTSIDE)
+ARTICLE = f"{MICRO_RESULTS}/article/index.html"
+TARGETS = (MICRO_MANUSCRIPT, PAGE, ARTICLE, OUTSIDE)
 
 
 @pytest.fixture(scope="module")
@@ -212,7 +214,8 @@ def test_no_text_and_no_date_reruns_anything(finished: Checkout) -> None:
 
 def test_the_edited_script_reruns_every_job(finished: Checkout, plan: dict[str, Made]) -> None:
     finished.edit("workflow/scripts/artifact.py", "code=snakemake", "code='' or snakemake")
-    assert finished.planned(*MICRO_ARGUMENTS) == needed(plan, MICRO_MANUSCRIPT) | needed(plan, PAGE)
+    wanted = [needed(plan, target) for target in (MICRO_MANUSCRIPT, PAGE, ARTICLE)]
+    assert finished.planned(*MICRO_ARGUMENTS) == set[str]().union(*wanted)
 
 
 def test_a_kernel_reruns_the_scenes_that_use_it_and_what_follows(finished: Checkout) -> None:
@@ -231,7 +234,7 @@ def test_a_threshold_of_a_claim_reruns_verdicts_and_manuscript_only(finished: Ch
     finished.edit("config/claims.yaml", "threshold: 0.7", "threshold: 0.71")
     planned = finished.planned(*MICRO_ARGUMENTS)
     assert MICRO_MANUSCRIPT in planned
-    others = {p for p in planned if _stage(p) != "paper"}
+    others = {p for p in planned if _stage(p) not in ("paper", "article")}
     figure = {f"{MICRO_RESULTS}/figures/claims_sensitivity.{kind}" for kind in ("pdf", "png")}
     tables = {
         f"{MICRO_RESULTS}/tables/{name}.csv"
@@ -245,7 +248,7 @@ def test_a_caption_rerenders_its_figure_and_the_manuscript_only(finished: Checko
     finished.edit(source, 'Decay of the singular values"', 'Singular values"')
     planned = finished.planned(*MICRO_ARGUMENTS)
     figure = {f"{MICRO_RESULTS}/figures/singular_values.{kind}" for kind in ("pdf", "png")}
-    assert {path for path in planned if _stage(path) != "paper"} == figure
+    assert {path for path in planned if _stage(path) not in ("paper", "article")} == figure
     assert MICRO_MANUSCRIPT in planned
 
 
@@ -324,4 +327,4 @@ def _stage(path: str) -> str:
 
 def _scenes(paths: Iterable[str]) -> set[str]:
     """Names of the scenes that files belong to."""
-    return {Path(_below(path)[1]).stem for path in paths}
+    return {Path(_below(path)[1]).stem.removesuffix("_scores") for path in paths}
