@@ -22,16 +22,16 @@ from pdrom.experiments.kit.settings import Tolerance
 from pdrom.model.held_out import FIRST, MOTIONS
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.asked.ask import Ask
-from pdrom.reduction.asked.hierarchy import AskSettings, Hierarchy, hierarchy
+from pdrom.reduction.asked.hierarchy import JUDGED, AskSettings, Hierarchy, hierarchy
 from pdrom.reduction.asked.level import Level
-from pdrom.reduction.asked.measured import CONVERGED, Motion, Tried, tried
+from pdrom.reduction.asked.measured import Motion, Tried, tried
 from pdrom.reduction.asked.motions import CALIBRATION
 from pdrom.reduction.asked.run import Asked, CheckedRun
 
 log = logging.getLogger(__name__)
 
 COLUMNS = [
-    "scene", "motion", "asked", "factor", "vertices", "frames", "promised", "error",
+    "scene", "motion", "asked", "factor", "vertices", "frames", "judged", "promised", "error",
     "velocity_error", "expected", "estimate", "first_step", "last_step", "reduced_frames", "checks",
     "repairs", "ms_per_frame", "full_step", "full_error", "full_ms", "own_ms", "oracle_step",
     "oracle_ms",
@@ -45,7 +45,7 @@ class AskedErrors(AskSettings):
     """Every ask of ``errors``, run with every one of ``factors``."""
 
     errors: tuple[Tolerance, ...] = (0.1, 0.03, 0.01)
-    factors: Annotated[tuple[Factor, ...], Field(min_length=1)] = (1.25, 1.5, 2.0)
+    factors: Annotated[tuple[Factor, ...], Field(min_length=1)] = (2.0, 4.0, 6.0)
 
 
 class Asks(AskedErrors):
@@ -87,9 +87,9 @@ def asks(
 def _scores(own: Hierarchy, further: Motion, scene: str) -> Iterator[dict[str, Any]]:
     """Expected and true error of every step on a motion that is not part of the choice."""
     for step in own.steps:
-        reached = tried(step.level, further, CONVERGED).errors["position"]
-        expected = max(each.errors["position"] for each in step.tried)
-        yield dict(zip(SCORE_COLUMNS, (scene, step.level.title, expected, reached), strict=True))
+        reached = tried(step.level, further).errors["position"]
+        cells = (scene, step.level.title, own.expected(step, Ask(error=0.1)), reached)
+        yield dict(zip(SCORE_COLUMNS, cells, strict=True))
 
 
 def _asked(
@@ -99,8 +99,8 @@ def _asked(
     motion.end = min(motion.end, own.horizon)
     # every step on one motion, for the best choice with hindsight
     steps = own.steps if name == FIRST else []
-    every = {s.level.title: tried(s.level, motion, CONVERGED) for s in steps}
-    plain = tried(Level(scene.config.iterations), motion, CONVERGED)
+    every = {s.level.title: tried(s.level, motion) for s in steps}
+    plain = tried(Level(scene.config.iterations), motion)
     known: dict[str, Tried] = {}
     for error in section.errors:
         good = {title: t.ms for title, t in every.items() if t.errors["position"] <= error}
@@ -111,7 +111,7 @@ def _asked(
             )
             full = run.full_order
             if full.title not in known:
-                known[full.title] = every.get(full.title) or tried(full, motion, CONVERGED)
+                known[full.title] = every.get(full.title) or tried(full, motion)
             yield {
                 "scene": scene.config.name,
                 "motion": name,
@@ -119,6 +119,7 @@ def _asked(
                 "factor": factor,
                 "vertices": scene.mesh.vertices,
                 "frames": motion.end,
+                "judged": motion.end >= JUDGED * scene.config.frames,
                 **_reached([run.outcome() for _ in range(REPEATS)], motion),
                 "full_step": full.title,
                 "full_error": known[full.title].errors["position"],

@@ -22,6 +22,7 @@ from pdrom.tables.kit.vocabulary import MS_PER_FRAME, SCENE, VERTICES
         compared("exact", number("asked", "largest relative error of the positions asked for")),
         VERTICES,
         integer("frames", "frames before the horizon, which the promise is for"),
+        compared("error", flag("judged", "frames enough to tell a kept promise from a broken one")),
         compared("value", number("factor", "on estimates, by the scores of the other scenes")),
         compared("value", number("risk", "bound on the share of promises broken that it has")),
         compared("error", flag("promised", "the run says that it keeps to the ask")),
@@ -30,7 +31,7 @@ from pdrom.tables.kit.vocabulary import MS_PER_FRAME, SCENE, VERTICES
         number("velocity_error", "error of the velocities, likewise"),
         compared("error", number("expected", "error on own motions, times the factor")),
         compared("error", number("estimate", "estimate by the run's checks, times the factor")),
-        compared("error", flag("broken", "promised, and the error is above the ask")),
+        compared("error", flag("broken", "promised and judged, and the error is above the ask")),
         compared("error", text("first_step", "way to do a frame that the run began with")),
         compared("error", text("last_step", "the one it ended with")),
         compared("error", integer("reduced_frames", "frames done by a reduction")),
@@ -64,10 +65,8 @@ def asks(
         factor, bound = risk_factor(scored[scored.scene != scene], errors, risk=risk, grid=grid)
         parts.append(own[own.factor == factor].assign(risk=bound))
     made = pd.concat(parts, ignore_index=True)
-    promised = made.promised.astype(bool)
-    return made.assign(
-        broken=promised & ~(made.error <= made.asked), reduced=made.reduced_frames > 0
-    )
+    counts = made.promised.astype(bool) & made.judged.astype(bool)
+    return made.assign(broken=counts & ~(made.error <= made.asked), reduced=made.reduced_frames > 0)
 
 
 def risk_factor(

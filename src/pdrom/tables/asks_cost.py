@@ -18,10 +18,11 @@ LARGE = 2000  # vertices from which on a scene counts as large
         compared("exact", number("asked", "largest relative error asked for")),
         integer("asks", "scenes times motions"),
         compared("share", integer("promised", "of these, runs that say that they keep to it")),
-        compared("share", integer("broken", "promises whose error is above the ask")),
-        compared("share", integer("reduced", "promises kept with a reduction")),
+        compared("share", integer("judged", "of these, with frames enough to tell whether it holds")),
+        compared("share", integer("broken", "of these, runs whose error is above the ask")),
+        compared("share", integer("reduced", "judged promises kept with a reduction")),
         compared("share", integer("full_broken", "promises that the full order alone would break")),
-        compared("error", number("worst", "largest error of a promised run over the ask")),
+        compared("error", number("worst", "largest error of a judged promise over the ask")),
         timed(number("over_full", "median time over the cheapest full order of the same promise")),
         timed(number("over_full_most", "largest one")),
         timed(number("over_own", "median time over the scene's own iterations")),
@@ -41,15 +42,17 @@ def _rows(asks: pd.DataFrame) -> Iterator[dict[str, Any]]:
     for name, part in (("small", asks[~large]), ("large", asks[large])):
         for asked, own in part.groupby("asked", sort=False):
             promised = own[own.promised.astype(bool)]
+            judged = promised[promised.judged.astype(bool)]
             yield {
                 "scenes": name,
                 "asked": asked,
                 "asks": len(own),
                 "promised": len(promised),
-                "broken": int(promised.broken.sum()),
-                "reduced": int((promised.reduced & ~promised.broken).sum()),
-                "full_broken": int((promised.full_error > promised.asked).sum()),
-                "worst": (promised.error / promised.asked).max(),
+                "judged": len(judged),
+                "broken": int(judged.broken.sum()),
+                "reduced": int((judged.reduced & ~judged.broken).sum()),
+                "full_broken": int((judged.full_error > judged.asked).sum()),
+                "worst": (judged.error / judged.asked).max(),
                 "over_full": (promised.ms_per_frame / promised.full_ms).median(),
                 "over_full_most": (promised.ms_per_frame / promised.full_ms).max(),
                 "over_own": (promised.ms_per_frame / promised.own_ms).median(),

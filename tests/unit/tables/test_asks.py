@@ -39,7 +39,7 @@ def made(tmp_path) -> pd.DataFrame:
         scene = f"s{i}"
         row = {
             "scene": scene, "motion": "kick", "asked": 0.05, "vertices": 10 if i else 5000,
-            "frames": 9, "promised": i != 1, "error": 0.06 if i == 2 else 0.04,
+            "frames": 9, "judged": i != 3, "promised": i != 1, "error": 0.06 if i in (2, 3) else 0.04,
             "reduced_frames": 9 if i < 6 else 0, "ms_per_frame": 0.1, "full_ms": 0.2,
             "own_ms": 0.4, "full_error": 0.01, "oracle_ms": 0.05, "repairs": 0, "checks": 2,
         }  # fmt: skip
@@ -56,7 +56,8 @@ def test_each_scene_has_one_factor_and_broken_promises_are_counted(made):
     assert made.risk.tolist() == pytest.approx([1 / 12] * 12)
     assert made[made.broken].scene.tolist() == ["s2"]
     small, large = asks_cost.function(made).to_dict("records")
-    assert (small["asks"], small["promised"], small["broken"], small["reduced"]) == (11, 10, 1, 3)
+    assert (small["asks"], small["promised"], small["judged"]) == (11, 10, 9)
+    assert (small["broken"], small["reduced"]) == (1, 2)
     assert small["worst"] == pytest.approx(1.2)
     assert large["over_full"] == pytest.approx(0.5)
     assert large["over_own"] == pytest.approx(0.25)

@@ -19,6 +19,10 @@ from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_e
 
 log = logging.getLogger(__name__)
 
+# No promise is made where less than this part of a motion's frames can be judged: it would be kept
+# by next to nothing.
+JUDGED = 0.1
+
 Count = Annotated[int, Field(ge=1, le=10_000)]
 
 
@@ -40,7 +44,7 @@ class AskSettings(ConfigModel):
     iterations: tuple[Count, ...] = (5, 10, 20)
     plain: tuple[Count, ...] = (1, 2, 3, 5)
     accelerated: tuple[Count, ...] = (5, 10, 20, 40)
-    factor: Annotated[float, Field(ge=1.0, le=1e3)] = 1.5
+    factor: Annotated[float, Field(ge=1.0, le=1e3)] = 4.0
     share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.05
 
 
@@ -59,15 +63,18 @@ class Hierarchy:
 
     unit : root mean square displacement of a frame of the training motion, m
     horizon : frames that a promise can be made for
+    frames : of a motion
     """
 
     steps: list[Step]
     unit: float
     horizon: int
+    frames: int
 
     def expected(self, step: Step, ask: Ask) -> float:
-        """Largest error of the step on the own motions; infinite where one has no frame."""
-        return worst(step.tried, ask.quantity) if self.horizon else np.inf
+        """Largest error of the step on the own motions; infinite where too few frames count."""
+        judged = self.horizon >= JUDGED * self.frames
+        return worst(step.tried, ask.quantity) if judged else np.inf
 
     def defect(self, step: Step) -> float:
         """Largest defect of the step on the own motions, in units of the motion."""
@@ -103,7 +110,7 @@ def hierarchy(training: Scene, settings: AskSettings) -> tuple[Hierarchy, list[M
     steps = []
     for level in levels:
         try:
-            found = [tried(level, motion, CONVERGED) for motion in motions]
+            found = [tried(level, motion) for motion in motions]
         except PdromError as error:
             if level.model is None:
                 raise
@@ -114,7 +121,7 @@ def hierarchy(training: Scene, settings: AskSettings) -> tuple[Hierarchy, list[M
         log.info("%s: errors %s", level.title, ", ".join(errors))
     steps.sort(key=lambda step: step.work)
     horizon = min(motion.end for motion in motions)
-    return Hierarchy(steps, motions[0].unit, horizon), motions
+    return Hierarchy(steps, motions[0].unit, horizon, training.config.frames), motions
 
 
 def _full(settings: AskSettings, motion: Motion) -> Iterator[Level]:

@@ -1,4 +1,4 @@
-"""Ways to do a frame, from cheap to dear: full order with few or many iterations, and reductions.
+"""Ways to do a frame, from cheap to costly: full order with few or many iterations, and reductions.
 
 What a frame costs is counted, not timed, so that a choice is the same in every run. The constants
 are those of one thread of a processor of 2024; only their ratios matter.
@@ -16,14 +16,12 @@ from pdrom.reduction.subspace.space import projector
 
 WINDOW = 5  # differences of iterates that Anderson's acceleration combines
 # Nanoseconds: a projection by its rows squared, an entry of the factor, a vertex in accelerated
-# iterations, a number of a dense product, a frame that compiled code cannot do
-# alone, which takes a reduction longer.
-PROJECTION = 5.0
-ENTRY, ACCELERATED, DENSE, FRAME = 1.7, 20.0, 0.8, 1e5
-REDUCED_FRAME = 3e5
+# iterations, a number of a dense product; a frame with Python around it, and one of a reduction.
+PROJECTION, ENTRY, ACCELERATED, DENSE = 5.0, 1.7, 20.0, 0.8
+FRAME, REDUCED_FRAME = 1e5, 3e5
+COMPILED_FRAME = 2e3
 # Entries of the factor of a matrix with n entries and N rows: FILL n log2 N.
 FILL = 0.35
-
 
 FULL_ORDER = "full order"
 
@@ -58,18 +56,17 @@ class Level:
     def work(self, scene: Scene) -> float:
         """Estimated nanoseconds of a frame of ``scene``."""
         lagged = any(group.frame_lagged for group in scene.groups)
-        alone = FRAME / 50
         if self.model is None:
             vertices = scene.mesh.vertices
             iteration = ENTRY * FILL * scene.system.matrix.nnz * np.log2(vertices)
             iteration += ACCELERATED * vertices * (self.window > 0)
             iteration += sum(PROJECTION * g.rows_per_element**2 * g.elements for g in scene.groups)
-            return (FRAME if lagged else alone) + self.iterations * iteration
+            return (FRAME if lagged else COMPILED_FRAME) + self.iterations * iteration
         size, iteration = self.model.columns.B.shape[1], 0.0
         for group in scene.groups:
             count, rows = self.model.evaluated(group), group.rows_per_element
             iteration += count * rows * (PROJECTION * rows + DENSE * size)
-        return (REDUCED_FRAME if lagged else alone) + self.iterations * iteration
+        return (REDUCED_FRAME if lagged else COMPILED_FRAME) + self.iterations * iteration
 
     def on(self, scene: Scene) -> "Running":
         """The level on the motion of ``scene``."""

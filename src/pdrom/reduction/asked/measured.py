@@ -91,8 +91,8 @@ class Tried:
     ms: float
 
 
-def tried(level: Level, motion: Motion, check: Level) -> Tried:
-    """Run ``level`` on a motion; its defects are taken with ``check``."""
+def tried(level: Level, motion: Motion) -> Tried:
+    """Run ``level`` on a motion; its defects are taken with `exact_beside` it."""
     running = level.on(motion.scene)
     state = running.inside(motion.scene.initial_state())
     frames, started = motion.scene.config.frames, thread_time()
@@ -102,13 +102,23 @@ def tried(level: Level, motion: Motion, check: Level) -> Tried:
     errors = {q: motion.error(positions, q) for q in QUANTITIES}
     last = max(motion.end - 1, 0)
     probed = np.unique(np.linspace(0, last, PROBED + 1).round().astype(int)[1:])
-    exact = check.on(motion.scene)
+    exact = exact_beside(level).on(motion.scene)
     found = [
         defect(running.outside(states[f]), running.outside(states[f + 1]), exact, frame=int(f))
         for f in probed
         if np.isfinite(positions[f + 1]).all()
     ]
     return Tried(errors, np.array(found) / motion.unit, ms)
+
+
+def exact_beside(level: Level) -> Level:
+    """A full order that sees what a frame of ``level`` misses: its own iterations twice at least.
+
+    A check by fewer would call the better frame wrong, and none at all where both stop too soon.
+    """
+    if level.model is not None or level.iterations <= CONVERGED.iterations // 2:
+        return CONVERGED
+    return Level(2 * level.iterations, WINDOW)
 
 
 def defect(before: State, after: State, exact: Running, frame: int) -> float:

@@ -17,7 +17,7 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.asked.ask import Ask
 from pdrom.reduction.asked.hierarchy import AskSettings, Hierarchy, Step, check_frames
 from pdrom.reduction.asked.level import Level, Running
-from pdrom.reduction.asked.measured import CONVERGED, defect
+from pdrom.reduction.asked.measured import defect, exact_beside
 
 log = logging.getLogger(__name__)
 
@@ -179,7 +179,7 @@ class CheckedRun:
             sure = reduced and self._own.expected(other, self._ask) <= self._ask.error / 3.0
             if sure or self._own.defect(other) <= allowed:
                 return other.level
-        return CONVERGED
+        return exact_beside(step.level)
 
     def _estimate(self, done: _Done) -> float | None:
         """Estimated error of a run by its checks, times the factor."""

@@ -23,8 +23,8 @@ KINDS = {
 @figure(
     title="Asked and reached errors",
     caption=(
-        "A dot for each scene and held-out motion. Left: the error that a run reached against the "
-        "one that was asked for; promises above the line are broken. Right: its time over that of "
+        "A dot for each scene and held-out motion that can be judged. Left: the error that a run reached against the "
+        "one that was asked for; promises above its line are broken. Right: its time over that of "
         "a frame with the scene's own iterations, checks and repairs included; crosses are the "
         "fastest way that keeps to the ask, known by hindsight only. What lies outside is drawn on "
         "the rim."
@@ -35,7 +35,7 @@ KINDS = {
 def asks(results: Results, options: Options) -> Figure:
     """Draw errors and times beside each other."""
     table = results.table("asks")
-    table = table[table.error.notna()]
+    table = table[table.judged.astype(bool)]
     if table.empty:
         raise NothingToDraw("no ask was run")
     chart = style.new_figure(3.2)
@@ -50,7 +50,8 @@ def asks(results: Results, options: Options) -> Figure:
     _dots(right, 1.3 * best.asked, best.oracle_ms / best.own_ms, TIMES, "#333333", marker="x")
     log_axes(left, ERRORS, REACHED)
     log_axes(right, ERRORS, TIMES)
-    left.plot(ERRORS, ERRORS, color="#333333", linewidth=0.8)
+    for asked in table.asked.unique():
+        left.plot([0.78 * asked, 1.28 * asked], [asked, asked], color="#333333", linewidth=1.2)
     right.axhline(1.0, color="#333333", linewidth=0.8)
     left.set_ylabel("reached error")
     right.set_ylabel("time over that of own iterations")

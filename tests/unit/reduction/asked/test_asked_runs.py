@@ -13,7 +13,7 @@ from pdrom.reduction.asked import run as checked
 from pdrom.reduction.asked.ask import Ask, read_ask, relative_error
 from pdrom.reduction.asked.hierarchy import AskSettings, Hierarchy, check_frames, hierarchy
 from pdrom.reduction.asked.level import Level
-from pdrom.reduction.asked.measured import CONVERGED, Motion, Tried
+from pdrom.reduction.asked.measured import CONVERGED, Motion, Tried, exact_beside
 from pdrom.reduction.asked.run import CheckedRun
 
 EFFECTS = (
@@ -130,6 +130,20 @@ def test_nothing_is_promised_where_the_full_order_fails_too(scene, own):
     assert not done.promised
     assert done.reduced == 0
     assert np.isfinite(done.positions).all()
+
+
+def test_nothing_is_promised_where_next_to_nothing_can_be_judged(scene, own):
+    short = replace(own, horizon=scene.config.frames // 10 - 1)
+    assert not CheckedRun(scene, short, Ask(error=0.5), SETTINGS).outcome().promised
+    long = replace(own, horizon=scene.config.frames // 10)
+    assert CheckedRun(scene, long, Ask(error=0.5), SETTINGS).outcome().promised
+
+
+def test_a_full_order_is_never_checked_by_a_worse_one(own):
+    for step in own.steps:
+        if step.level.model is None:
+            assert exact_beside(step.level).iterations >= 2 * step.level.iterations
+    assert exact_beside(Level(160, 5)).iterations == 320
 
 
 def test_a_reduction_that_blows_up_is_replaced(scene, own):
