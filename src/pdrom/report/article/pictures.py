@@ -78,7 +78,9 @@ def _origin(name: str, with_pdf: bool, pages: Mapping[str, str]) -> list[Node]:
         made += [link(words("PDF"), f"figures/{name}.pdf"), *words(". ")]
     for place, other in enumerate(_kin(name, pages)):
         made += words(", " if place else "Other scenes: ")
-        made.append(link(words(other), f"{pages[other]}#fig:{other}"))
+        made.append(link(words(other), f"{pages[other]}#fig:{other}", "kin"))
+    if made[-1]["t"] == "Link":
+        made += words(".")
     mark = {
         "t": "Span",
         "c": [attributes("", "", data_verified=f"figure {name}"), words("not yet")],

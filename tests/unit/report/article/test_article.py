@@ -53,6 +53,8 @@ SUPPLEMENT = r"""
 \renewcommand{\thefigure}{S\arabic{figure}}
 \begin{document}
 \section{More}\label{sec:more} See \ref{sec:first}.
+\figureof{spring_runs}
+\figureof{bar_runs}
 \begin{theorem}\label{thm:s} Let $x$ be \val{study|scenes}. \end{theorem}
 \end{document}
 """
@@ -112,7 +114,11 @@ def write_study(folder: Path) -> dict[str, object]:
     for name, table in tables.items():
         write_table(table, folder / "tables" / f"{name}.csv")
     facts = Facts(
-        captions={"ladder": r"Steps. Errors of $r \le 6$ modes."},
+        captions={
+            "ladder": r"Steps. Errors of $r \le 6$ modes.",
+            "spring_runs": "Springs.",
+            "bar_runs": "Bars.",
+        },
         part=None,
         full_study="config/default.yaml",
         tables={name: [{"scenes": 2}] for name in FACTS if name != "machine"},
@@ -130,16 +136,21 @@ def write_study(folder: Path) -> dict[str, object]:
     write_text(TABLE, folder / "inputs" / "tab_payoff.tex")
     write_text(CLAIM, folder / "claims.yaml")
     write_text(machine().model_dump_json(), folder / "machine.json")
-    write_text("%PDF-1.4", folder / "figures" / "ladder.pdf")
-    with atomic_path(folder / "figures" / "ladder.png") as path:
-        Image.new("RGB", (40, 20), "white").save(path, "PNG")
+    for name in facts.captions:
+        write_text("%PDF-1.4", folder / "figures" / f"{name}.pdf")
+        with atomic_path(folder / "figures" / f"{name}.png") as path:
+            Image.new("RGB", (40, 20), "white").save(path, "PNG")
     return {
         "source": [str(folder / "paper" / "main.tex")],
         "references": str(ROOT / "paper" / "references.bib"),
         "tables": [str(folder / "tables" / f"{name}.csv") for name in tables],
         "machine": str(folder / "machine.json"),
         "inputs": [str(folder / "inputs" / n) for n in ("numbers.json", "tab_payoff.tex")],
-        "figures": [str(folder / "figures" / f"ladder.{end}") for end in ("pdf", "png")],
+        "figures": [
+            str(folder / "figures" / f"{name}.{end}")
+            for name in facts.captions
+            for end in ("pdf", "png")
+        ],
         "facts": facts,
         "claims": folder / "claims.yaml",
         "assets": {name: ROOT / FOLDER / file for name, file in ASSETS.items()},
@@ -342,6 +353,23 @@ def test_a_link_opens_its_rows(small):
                 for key, found in zip(keys, rows, strict=True):
                     assert set(numbers[key]["rows"]) <= set(found), key
                     assert numbers[key]["take"] or len(found) <= 1, key
+
+
+@pytest.mark.slow
+def test_a_figure_shows_the_scenes_of_another(small):
+    browser_or_skip()
+    with page_at((small / "supplement.html").as_uri(), 900, 700) as page:
+        figure = page.locator("figure", has_text="Springs.")
+        own = figure.locator("img").get_attribute("alt")
+        figure.locator("select").select_option("bar_runs")
+        other = page.locator("[id='fig:spring_runs']")
+        assert other.locator("img").get_attribute("src") == "figures/bar_runs.webp"
+        assert "./reproduce figure bar_runs" in other.inner_text()
+        assert "Springs." not in other.inner_text()
+        other.locator("select").select_option("spring_runs")
+        assert other.locator("img").get_attribute("alt") == own
+        assert "Springs." in other.inner_text()
+        assert page.said == []
 
 
 @pytest.mark.slow
