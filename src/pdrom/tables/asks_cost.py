@@ -18,7 +18,9 @@ LARGE = 2000  # vertices from which on a scene counts as large
         compared("exact", number("asked", "largest relative error asked for")),
         integer("asks", "scenes times motions"),
         compared("share", integer("promised", "of these, runs that say that they keep to it")),
-        compared("share", integer("judged", "of these, with frames enough to tell whether it holds")),
+        compared(
+            "share", integer("judged", "of these, with frames enough to tell whether it holds")
+        ),
         compared("share", integer("broken", "of these, runs whose error is above the ask")),
         compared("share", integer("reduced", "judged promises kept with a reduction")),
         compared("share", integer("full_broken", "promises that the full order alone would break")),

@@ -23,11 +23,11 @@ KINDS = {
 @figure(
     title="Asked and reached errors",
     caption=(
-        "A dot for each scene and held-out motion that can be judged. Left: the error that a run reached against the "
-        "one that was asked for; promises above its line are broken. Right: its time over that of "
-        "a frame with the scene's own iterations, checks and repairs included; crosses are the "
-        "fastest way that keeps to the ask, known by hindsight only. What lies outside is drawn on "
-        "the rim."
+        "A dot for each scene and held-out motion that can be judged. Left: the error that a run "
+        "reached against the one that was asked for; promises above its line are broken. Right: "
+        "its time over that of a frame with the scene's own iterations, checks and repairs "
+        "included; crosses are the fastest way that keeps to the ask, known by hindsight only. "
+        "What lies outside is drawn on the rim."
     ),
     reads=(TableOf("asks"),),
     options=Options,
