@@ -40,7 +40,8 @@ def made(tmp_path) -> pd.DataFrame:
         row = {
             "scene": scene, "motion": "kick", "asked": 0.05, "vertices": 10 if i else 5000,
             "frames": 9, "judged": i != 3, "promised": i != 1,
-            "error": 0.06 if i in (2, 3) else 0.04, "reduced_frames": 9 if i < 6 else 0, "ms_per_frame": 0.1, "full_ms": 0.2,
+            "error": 0.06 if i in (2, 3) else 0.04, "reduced_frames": 9 if i < 6 else 0,
+            "ms_per_frame": 0.1, "full_ms": 0.2,
             "own_ms": 0.4, "full_error": 0.01, "oracle_ms": 0.05, "repairs": 0, "checks": 2,
         }  # fmt: skip
         rows = [row | {"factor": factor} for factor in (1.0, 2.0)]
