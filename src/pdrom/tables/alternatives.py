@@ -6,7 +6,7 @@ from pdrom.artifact.reads import Every
 from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.experiments.alternatives.settings import ACCELERATED, CONVERGED, OWN, REDUCED
-from pdrom.tables.kit.declaration import compared, flag, integer, number, table, text
+from pdrom.tables.kit.declaration import compared, flag, integer, number, table, text, timed
 from pdrom.tables.kit.parts import joined
 from pdrom.tables.kit.vocabulary import ELEMENTS_SAMPLED, MS_PER_FRAME, SCENE, VERTICES, K
 
@@ -37,6 +37,8 @@ TRAINED_ON = text("trained_on", f"frames that a reduction is trained on: {OWN}, 
         integer("frames", "frames that errors are taken over"),
         compared("error", flag("finite", "no frame blew up")),
         MS_PER_FRAME,
+        timed(number("ms_low", "the same of the fastest repeat", "ms")),
+        timed(number("ms_high", "the same of the slowest repeat", "ms")),
         number("error_implicit", "error against the converged implicit step of the scene"),
         number("error_continuous", "error against the motion in continuous time: the total error"),
         number("reference_error", "estimated error of that motion"),

@@ -25,6 +25,8 @@ CASE = ["scene", "stiffness", "reference", "limit"]
         timed(integer("from_best", "vertices from which on it beats the best full-order method")),
         timed(number("breaks_even", "vertices where it would be as fast as that, interpolated")),
         timed(number("speedup", "over the best full-order method on the largest mesh")),
+        timed(number("speedup_low", "its least value that the repeats allow")),
+        timed(number("speedup_high", "its largest value that the repeats allow")),
         timed(integer("from_best_own", "from_best, trained on frames of the scene's iterations")),
         timed(number("speedup_own", "the same of their speed-up")),
     ),
@@ -52,6 +54,8 @@ def reduction_pays(rows: pd.DataFrame) -> pd.DataFrame:
                 "from_best": _pays_from(sizes, best),
                 "breaks_even": _breaks_even(sizes, best),
                 "speedup": best[-1],
+                "speedup_low": case.reduced_speedup_low.iloc[-1],
+                "speedup_high": case.reduced_speedup_high.iloc[-1],
                 "from_best_own": _pays_from(sizes, own),
                 "speedup_own": own[-1],
             }

@@ -39,6 +39,8 @@ LIMIT = compared("exact", number("limit", "error that is allowed"))
         timed(number("reduced_error", "smallest error of the reduction")),
         timed(number("reduced_ms", "time of a frame of the reduction, if it reaches it", "ms")),
         timed(number("reduced_speedup", "time of the first over that of the reduction")),
+        timed(number("reduced_speedup_low", "its fastest repeat over the slowest reduced one")),
+        timed(number("reduced_speedup_high", "its slowest repeat over the fastest reduced one")),
         timed(text("reduced_method", "the reduction that is the fastest to reach it")),
         timed(text("reduced_trained_on", "the frames that it is trained on")),
         timed(integer("reduced_iterations", "its iterations of a substep")),
@@ -88,7 +90,9 @@ def _best(rows: pd.DataFrame, limit: float) -> dict[str, object]:
         best = full.iloc[0]
         made |= best[["method", "substeps", "iterations", "error", "ms_per_frame"]].to_dict()
         if len(reduced):
-            made["reduced_speedup"] = best.ms_per_frame / reduced.ms_per_frame.iloc[0]
+            made["reduced_speedup"] = best.ms_per_frame / first.ms_per_frame
+            made["reduced_speedup_low"] = best.ms_low / first.ms_high
+            made["reduced_speedup_high"] = best.ms_high / first.ms_low
         others = full[full.method != best.method]
         if len(others):
             second = others.iloc[0]

@@ -109,10 +109,13 @@ def test_winners_are_the_cheapest_that_reach_the_error():
         trained_on=lambda t: t.method.map({"ecsw": "own iterations"}),
         scene="s", vertices=9, stiffness=1.0, substeps=1, iterations=1,
         error_continuous=lambda t: t.error_implicit, reference_error=1e-2,
+        ms_low=lambda t: 0.9 * t.ms_per_frame, ms_high=lambda t: 1.2 * t.ms_per_frame,
     )  # fmt: skip
     found = winners(rows, [0.1, 0.01]).set_index(["reference", "limit"])
     loose, strict = found.loc[("implicit", 0.1)], found.loc[("implicit", 0.01)]
     assert (loose.method, loose.second, loose.margin, loose.reduced_speedup) == ("a", "b", 2.0, 2.0)
+    assert loose.reduced_speedup_low == pytest.approx(0.9 * 1.0 / (1.2 * 0.5))
+    assert loose.reduced_speedup_high == pytest.approx(1.2 * 1.0 / (0.9 * 0.5))
     assert (strict.method, strict.second, strict.margin) == ("b", "a", 1.5)
     assert pd.isna(strict.reduced_ms)
     # the motion in continuous time is not known well enough for the smaller error
@@ -159,6 +162,8 @@ def test_the_size_from_which_a_reduction_pays():
             "reduced_ms": [1.0, 1.0, 1.0],
             "reduced_speedup": [0.25, 0.5, 50.0],
             "ms_per_frame": [0.25, 0.5, 50.0],
+            "reduced_speedup_low": [0.2, 0.4, 40.0],
+            "reduced_speedup_high": [0.3, 0.6, 60.0],
             # what is trained on the scene's own iterations is slower
             "own_ms": [1.0, 2.0, 2.0],
         }
@@ -177,6 +182,7 @@ def test_the_size_from_which_a_reduction_pays():
     crossing = 400 * (10_000 / 400) ** (np.log(2.0) / np.log(100.0))
     assert found.breaks_even[0.1] == pytest.approx(crossing)
     assert (found.from_best_own[0.1], found.speedup_own[0.1]) == (10_000, 25.0)
+    assert (found.speedup_low[0.1], found.speedup_high[0.1]) == (40.0, 60.0)
     assert found.from_best[0.01] == 10_000
     assert pd.isna(found.from_plain[0.01])
     assert pd.isna(found.breaks_even[0.01])

@@ -33,8 +33,8 @@ log = logging.getLogger(__name__)
 
 COLUMNS = [
     "scene", "factor", "vertices", "stiffness", "method", "substeps", "iterations", "trained_on",
-    "k", "elements_sampled", "frames", "finite", "ms_per_frame", "error_implicit",
-    "error_continuous", "reference_error",
+    "k", "elements_sampled", "frames", "finite", "ms_per_frame", "ms_low", "ms_high",
+    "error_implicit", "error_continuous", "reference_error",
 ]  # fmt: skip
 
 
@@ -117,7 +117,8 @@ def _rows(config: SceneConfig, settings: Options) -> list[dict[str, Any]]:
     # what the runs compiled and factorised is there when the clock starts
     times = measure([_variant(c, section.frames) for c in found], section.warmup, section.repeats)
     for row, candidate, time in zip(rows[1:], found, times, strict=True):
-        row["ms_per_frame"] = candidate.steps * time.frame
+        ms = {"ms_per_frame": time.frame, "ms_low": time.low, "ms_high": time.high}
+        row |= {key: candidate.steps * value for key, value in ms.items()}
     return rows
 
 

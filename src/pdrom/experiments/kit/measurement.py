@@ -53,7 +53,7 @@ class Measurement:
     assembly : product with S^T W, where an implementation does it apart from the projections
     lift : from coefficients to the right-hand side
     solve : global step
-    spread : interquartile range over the repeats of the mean time per frame
+    low, high : least and largest mean time per frame of a repeat
     """
 
     labels: dict[str, object]
@@ -63,7 +63,8 @@ class Measurement:
     assembly: float
     lift: float
     solve: float
-    spread: float
+    low: float
+    high: float
     repeats: int
 
 
@@ -151,10 +152,10 @@ def _inner(loop: Stepper, name: str) -> float:
 
 def _summary(labels: dict[str, object], samples: np.ndarray) -> Measurement:
     means = samples[:, :, 0].mean(axis=1)
-    spread = float(np.subtract(*np.percentile(means, [75, 25])))
     frame, inertia, local, assembly, lift, solve = median_frames(samples).tolist()
+    low, high = float(means.min()), float(means.max())
     return Measurement(
-        labels, frame, inertia, local, assembly, lift, solve, spread, repeats=len(samples)
+        labels, frame, inertia, local, assembly, lift, solve, low, high, repeats=len(samples)
     )
 
 

@@ -8,6 +8,7 @@ import pandas as pd
 from pdrom.report.paper.macros import format_number
 from pdrom.report.paper.tabular import name, tabular
 from pdrom.report.words.text import escape
+from pdrom.tables.kit.intervals import in_words
 
 Tables = Mapping[str, pd.DataFrame]
 FULL = "full"  # position basis of unreduced positions
@@ -68,7 +69,7 @@ def pays(tables: Tables) -> str:
             else f"{row.smallest} to {row.largest}",
             _size(row.from_plain),
             _size(row.from_best),
-            _number(row.speedup),
+            in_words(row.speedup, row.speedup_low, row.speedup_high),
         ]
         for row in tables["reduction_pays"].itertuples()
         if not pd.isna(row.speedup)
