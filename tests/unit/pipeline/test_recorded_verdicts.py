@@ -8,7 +8,7 @@ from pdrom.core.store import write_table
 from pdrom.pipeline.tracked import recorded_verdicts
 from pdrom.tables.claims import load_claims
 from pdrom.tables.claims.claims import claims
-from pdrom.tables.replication import MEASURED, RECORDED, RULES, replication
+from pdrom.tables.claims.replication import MEASURED, RECORDED, RULES, replication
 from places import ROOT
 
 
