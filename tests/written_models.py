@@ -19,9 +19,10 @@ from places import ROOT
 
 def write_page(folder: Path, models: list[Path]) -> Path:
     """The page of some files of models, which lie below its folder."""
-    assets = [ROOT / read.path for name, read in live_page.files.items() if name != "models"]
+    reads = live_page.files.items()
+    assets = {name: ROOT / read.path for name, read in reads if name != "models"}
     out = folder / "live.html"
-    live_page([File(str(path), {}) for path in models], *assets, str(out))
+    live_page([File(str(path), {}) for path in models], outputs={"out": str(out)}, **assets)
     return out
 
 

@@ -100,6 +100,8 @@ def _article(study: Study, given: Mapping[str, Paths], settings: Row, results: s
     places = {name: place.at(results) for name, place in article.writes.items()}
     content = digest(study.root, *listed(given["source"]), REFERENCES, *edited.values())
     read = {**given, **edited}
+    added = {name: list(scenes) for name, scenes in study.settings.claim_sets.items()}
+    settings = {**settings, "added": added}
     return Job(article, {}, read, places, settings, content, fingerprint(article.module))
 
 

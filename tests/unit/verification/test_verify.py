@@ -1,14 +1,17 @@
 """``./reproduce verify`` on a folder of results: outcomes, exit codes, the page."""
 
 import io
+import json
 from contextlib import redirect_stdout
 from pathlib import Path
 
 import pytest
 
 from pdrom.core.errors import ConfigurationError
-from pdrom.core.paths import TABLE
-from pdrom.core.store import read_table, write_table
+from pdrom.core.paths import ARTICLE, TABLE
+from pdrom.core.store import read_table, write_table, write_text
+from pdrom.report.article.verified import INDEX, NAME
+from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.tables import declared
 from pdrom.verification.again import made
 from pdrom.verification.command import parser, verify, verify_tables
@@ -38,6 +41,18 @@ def test_expected_results_hold(results, subject):
     assert {"claim C1", "claim C12", "figure singular_values"} <= names
     assert any(line.startswith("table effects_left_out: not comparable") for line in printed)
     assert "| C1 | reproduced |" in page
+
+
+def test_outcomes_reach_the_article_where_it_was_made(results, subject):
+    place = Path(ARTICLE.at(RESULTS, name=NAME))
+    verified(subject)
+    assert not place.exists()
+    write_text("<!DOCTYPE html>", place.with_name(INDEX))
+    *lines, _, _ = verified(subject)[1]
+    text = place.read_text(encoding="utf-8")
+    found = json.loads(text.removeprefix("window.pdromVerified=").removesuffix(";\n"))
+    assert found == dict(line.split(": ", 1) for line in lines)
+    assert {f"figure {name}" for name in declarations()} <= found.keys()
 
 
 def decide_again(subject):

@@ -34,6 +34,15 @@ function asked(key) {
   return found;
 }
 
+// Key in the address; none where that is cut off within a sign.
+function keyOfAddress() {
+  try {
+    return decodeURIComponent(location.hash.slice(1));
+  } catch {
+    return "";
+  }
+}
+
 function same(cell, value) {
   return cell === value || (cell !== "" && value !== "" && Number(cell) === Number(value));
 }
@@ -63,10 +72,8 @@ async function showTable(name) {
   const [head, ...rows] = parse(text), table = { head, rows };
   const $ = (id) => document.getElementById(id);
   let chosen = [], start = 0, order = null;
-  const state = () => asked(decodeURIComponent(location.hash.slice(1)));
   const choose = () => {
-    const words = $("filter").value.toLowerCase(), key = decodeURIComponent(location.hash.slice(1));
-    const { column, take, filters } = state();
+    const words = $("filter").value.toLowerCase(), key = keyOfAddress(), { column, take, filters } = asked(key);
     chosen = matching(table, key).filter((i) => rows[i].join(" ").toLowerCase().includes(words));
     if (order) {
       const value = (i) => rows[i][order.column], sign = order.down ? -1 : 1;
@@ -84,7 +91,7 @@ async function showTable(name) {
     show();
   };
   const show = () => {
-    const { column } = state(), body = document.createElement("tbody"), top = document.createElement("thead");
+    const { column } = asked(keyOfAddress()), body = document.createElement("tbody"), top = document.createElement("thead");
     const line = element("tr", "", top);
     element("th", "row", line).scope = "col";
     head.forEach((title, place) => {
@@ -92,7 +99,11 @@ async function showTable(name) {
       cell.scope = "col";
       cell.classList.toggle("asked", title === column);
       if (order?.column === place) cell.ariaSort = order.down ? "descending" : "ascending";
-      element("button", title, cell).onclick = () => { order = { column: place, down: order?.column === place && !order.down }; choose(); };
+      element("button", title, cell).onclick = () => {
+        order = { column: place, down: order?.column === place && !order.down };
+        choose();
+        $("rows").querySelectorAll("button")[place].focus(); // the one that was pressed is gone
+      };
     });
     for (const i of chosen.slice(start, start + SHOWN)) {
       const made = element("tr", "", body);
@@ -115,6 +126,10 @@ async function showTable(name) {
   choose();
 }
 
+function showVerified(place, name) {
+  place.textContent = window.pdromVerified?.[name] ?? "not yet";
+}
+
 // A list of the figures that show the same of other scenes: their pictures in place of one, with what belongs to them.
 function switchOfScene(figure) {
   const image = figure.querySelector("img"), origin = figure.querySelector(".origin"), caption = document.createElement("span");
@@ -122,6 +137,7 @@ function switchOfScene(figure) {
   caption.append(...[...origin.parentNode.childNodes].filter((node) => node !== origin));
   origin.before(caption);
   const kept = { caption: [...caption.childNodes], alt: image.alt, height: image.getAttribute("height") };
+  const verified = origin.querySelector("[data-verified]");
   const code = origin.querySelector("code"), pdf = origin.querySelector('a[href$=".pdf"]'), label = document.createElement("label");
   label.className = "switch";
   label.append("Scenes: ");
@@ -135,15 +151,14 @@ function switchOfScene(figure) {
     if (link) image.removeAttribute("height"); else image.setAttribute("height", kept.height);
     code.textContent = `./reproduce figure ${name}`;
     if (pdf) pdf.hidden = Boolean(link);
+    showVerified(verified, `figure ${name}`);
     if (!link) caption.replaceChildren(...kept.caption);
     else caption.replaceChildren(`The picture of ${name}, with `, Object.assign(link.cloneNode(), { textContent: "its caption" }), ".");
   };
 }
 
 for (const place of document.querySelectorAll("figure")) if (place.querySelector(".origin a.kin")) switchOfScene(place);
-for (const place of document.querySelectorAll("[data-verified]")) {
-  place.textContent = (window.pdromVerified ?? {})[place.dataset.verified] ?? "not yet";
-}
+for (const place of document.querySelectorAll("[data-verified]")) showVerified(place, place.dataset.verified);
 const page = document.getElementById("table");
 if (page) showTable(page.dataset.name);
 for (const place of document.querySelectorAll('math[display="inline"]')) {

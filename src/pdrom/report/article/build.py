@@ -3,19 +3,19 @@
 import json
 import re
 from collections.abc import Mapping
+from html import escape
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
-from pdrom.artifact.artifact import Artifact
+from pdrom.artifact.files import Files
 from pdrom.artifact.reads import Given, ProjectFile, Setting
-from pdrom.core.paths import ARTICLE
+from pdrom.core.paths import ARTICLE, Place
 from pdrom.core.store import read_table, read_text, write_text
 from pdrom.report.article.claims import claims_page
 from pdrom.report.article.latex import Origins, linked_table, prepared
 from pdrom.report.article.pandoc import Tree, page, parsed
-from pdrom.report.article.pictures import copies_pdf, shown_figure, write_pdf, write_picture
+from pdrom.report.article.pictures import copy_pdf, shown_figure, write_picture
 from pdrom.report.article.tables import FACTS, contents, list_page, table_page
 from pdrom.report.article.tree import Labels, numbered, resolved
 from pdrom.report.article.verified import INDEX, write_verified
@@ -23,7 +23,7 @@ from pdrom.report.figures.kit.catalogue import declarations
 from pdrom.report.paper.build import NUMBERS, Facts, fact_tables
 from pdrom.report.paper.source import DOCUMENTS, documents
 from pdrom.tables import declared
-from pdrom.tables.claims.rules import load_claims
+from pdrom.tables.claims.rules import Added, load_claims
 
 FOLDER = Path("src/pdrom/report/article")
 CLAIMS = "config/claims.yaml"
@@ -51,8 +51,9 @@ def write_article(
     figures: list[str],
     facts: Facts,
     claims: Path,
-    assets: Mapping[str, Path],
+    added: Added,
     outputs: Mapping[str, str],
+    **assets: Path,
 ) -> None:
     """Write every page of the article to its place among ``outputs``.
 
@@ -60,67 +61,57 @@ def write_article(
     ----------
     inputs : what the manuscript reads, with `NUMBERS`
     figures : PDF and PNG of each
-    assets : templates, style and script by the names of `ASSETS`
+    added : values that the study adds to sets of ``claims``, see `load_claims`
+    assets : templates, style and script, see `ASSETS`
     """
     made = {Path(path).name: path for path in inputs}
     origins = Origins(**json.loads(read_text(made[NUMBERS])))
     known = fact_tables(Path(machine), facts)
     csv = contents(tables, known)
     known |= {Path(path).stem: read_table(path) for path in tables}
-    for name, content in csv.items():
-        text = table_page(name, content, assets["table"].read_text("utf-8"))
-        write_text(text, outputs[f"table_{name}"])
-    plain = assets["plain"].read_text("utf-8")
-    write_text(list_page(sorted(csv), plain), outputs["tables"])
-    for name in ("style", "script"):
-        write_text(assets[name].read_text("utf-8"), outputs[name])
+    templates = {name: path.read_text("utf-8") for name, path in assets.items()}
     texts = documents(Path(source[0]).parent)
-    pages = _figure_pages(texts)
-    sizes = _write_figures(figures, outputs)
-    rules = load_claims(claims)
-    found = claims_page(rules, known["claims_tests"], known["claims"], pages, plain)
-    write_text(found, outputs["claims"])
+    pages = {name: PAGES[stem] for stem, text in texts.items() for name in _FIGURE.findall(text)}
+    rules, plain = load_claims(claims, added), templates["plain"]
+    written = {name: templates[name] for name in ("style", "script")}
+    for name, content in csv.items():
+        written[f"table_{name}"] = table_page(name, content, templates["table"])
+    written["tables"] = list_page(sorted(csv), plain)
+    written["claims"] = claims_page(rules, known["claims_tests"], known["claims"], pages, plain)
+    drawn = _write_figures(figures, outputs)
     files = _linked_inputs(made, origins, known)
     labels: dict[str, tuple[str, str]] = {}
     trees: dict[str, Tree] = {}
     for stem, text in texts.items():
         tex = prepared(text, stem, origins, facts)
         prefix = _PREFIX.search(text)
-        counted = Labels(prefix[1] if prefix else "", PAGES[stem], labels)
         trees[stem] = numbered(
             parsed(tex, files, Path(references)),
-            counted,
-            lambda name, node: shown_figure(name, node, *sizes[name], pages),
+            Labels(prefix[1] if prefix else "", PAGES[stem], labels),
+            lambda name, node: shown_figure(name, node, *drawn[name], pages),
         )
     for stem, tree in trees.items():
         others = {PAGES[other]: TITLES[other] for other in texts if other != stem}
-        write_text(
-            page(resolved(tree, labels, rules), assets["text"], _variables(others, facts)),
-            outputs[stem],
-        )
+        whole = resolved(tree, labels, rules)
+        written[stem] = page(whole, assets["text"], _variables(others, facts))
+    for name, text in written.items():
+        write_text(text, outputs[name])
     write_verified({}, Path(outputs["main"]).parent)
-
-
-def _figure_pages(texts: Mapping[str, str]) -> dict[str, str]:
-    return {name: PAGES[stem] for stem, text in texts.items() for name in _FIGURE.findall(text)}
 
 
 def _write_figures(
     figures: list[str], outputs: Mapping[str, str]
 ) -> dict[str, tuple[tuple[int, int], bool]]:
     """Write pictures and PDF files; return the size of each, and whether it has a PDF here."""
-    found = {}
-    for name in sorted({Path(path).stem for path in figures}):
-        pdf, png = (
-            next(Path(p) for p in figures if Path(p).name == f"{name}.{end}")
-            for end in ("pdf", "png")
+    made = {Path(path).name: Path(path) for path in figures}
+    folder = Path(outputs["main"]).parent / "figures"
+    return {
+        name: (
+            write_picture(made[f"{name}.png"], Path(outputs[f"picture_{name}"])),
+            copy_pdf(made[f"{name}.pdf"], folder / f"{name}.pdf"),
         )
-        size = write_picture(png, Path(outputs[f"picture_{name}"]))
-        with_pdf = copies_pdf(pdf)
-        if with_pdf:
-            write_pdf(pdf, Path(outputs["main"]).parent / "figures" / pdf.name)
-        found[name] = size, with_pdf
-    return found
+        for name in sorted({path.stem for path in made.values()})
+    }
 
 
 def _linked_inputs(
@@ -137,22 +128,10 @@ def _linked_inputs(
 
 def _variables(others: Mapping[str, str], facts: Facts) -> dict[str, str]:
     nav = [f'<a href="{address}">{words}</a>' for address, words in {**others, **LINKS}.items()]
-    return {"pages": " ".join(nav), **({"part": facts.part} if facts.part else {})}
+    return {"pages": " ".join(nav), **({"part": escape(facts.part)} if facts.part else {})}
 
 
-class _Article(Artifact):
-    """Many files of one folder."""
-
-    def perform(
-        self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
-    ) -> None:
-        """Write all of them."""
-        given = self.read(settings, inputs)
-        assets = {name: given.pop(name) for name in ASSETS}
-        self.function(**given, assets=assets, outputs=outputs)
-
-
-def _writes() -> dict[str, Any]:
+def _writes() -> dict[str, Place]:
     names = {**PAGES, "tables": "tables.html", "claims": "claims.html"}
     names |= {"style": "article.css", "script": "article.js"}
     names |= {f"table_{name}": f"tables/{name}.html" for name in (*declared(), *FACTS)}
@@ -160,7 +139,7 @@ def _writes() -> dict[str, Any]:
     return {key: ARTICLE.where(name=name) for key, name in names.items()}
 
 
-article = _Article(
+article = Files(
     "article",
     "The manuscript as a page",
     {
@@ -170,6 +149,7 @@ article = _Article(
         "claims": ProjectFile(CLAIMS),
         **{name: ProjectFile(str(FOLDER / file)) for name, file in ASSETS.items()},
         "facts": Setting("facts"),
+        "added": Setting("claim_sets"),
     },
     _writes(),
     write_article,

@@ -1,6 +1,6 @@
 """The page of the claims: rule, tests with what they found, history."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from html import escape
 
 import pandas as pd
@@ -65,9 +65,8 @@ def _tests(name: str, part: str, rules: tuple[TestRule, ...], tests: pd.DataFram
     rows = "".join(
         f"<tr><td>{escape(rule.what)}{'' if rule.decides else ' (beside the verdict)'}</td>"
         f"<td>{_rule(rule)}</td><td>{_found(name, part, row)}</td>"
-        f"<td>{row.least:.2g} to {row.most:.2g}, "
-        f"median {row['median']:.2g}: {escape(row.verdict)}</td></tr>"
-        for rule, (_, row) in _paired(rules, tests[tests.part == part])
+        f"<td>{_range(row)}{escape(row.verdict)}</td></tr>"
+        for rule, (_, row) in zip(rules, tests[tests.part == part].iterrows(), strict=True)
     )
     label = f"Tests of {name}, {part}"
     return (
@@ -76,10 +75,11 @@ def _tests(name: str, part: str, rules: tuple[TestRule, ...], tests: pd.DataFram
     )
 
 
-def _paired(
-    rules: tuple[TestRule, ...], tests: pd.DataFrame
-) -> Iterator[tuple[TestRule, tuple[int, pd.Series]]]:
-    return zip(rules, tests.iterrows(), strict=True)
+def _range(row: pd.Series) -> str:
+    """Range of the values of a test; nothing where it has no rows."""
+    if not row.of:
+        return ""
+    return f"{row.least:.2g} to {row.most:.2g}, median {row['median']:.2g}: "
 
 
 def _found(name: str, part: str, row: pd.Series) -> str:

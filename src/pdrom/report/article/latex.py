@@ -12,7 +12,8 @@ from typing import Any
 import pandas as pd
 
 from pdrom.report.paper.build import Facts
-from pdrom.report.paper.known import SHOWN, closing, sentences
+from pdrom.report.paper.known import NOTED, SHOWN, closing, note, sentences
+from pdrom.report.paper.macros import matching
 from pdrom.report.words.text import escape
 
 ORIGIN = "origin:"
@@ -30,8 +31,11 @@ _DROPPED = re.compile(
 )
 _HEAD = re.compile(r"\\endfirsthead.*?\\endhead\n", re.DOTALL)
 _SPEC = re.compile(r"\\(?:begin\{(?:tabular|longtable)\}|multicolumn\{\d+\})(?=\{)")
-_NUMBER = re.compile(r"(?:[^A-Za-z]|\\(?:ensuremath|cdot|infty|,|times)(?![A-Za-z]))*\d[^A-Za-z]*")
-_TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)(\)?)$")  # of "holds (20/20)", of "blow-up, 34"
+_NUMBER = re.compile(
+    r"(?:[^A-Za-z]|\\(?:ensuremath|cdot|infty|times|ge|le)(?![A-Za-z])|\b(?:to|of)\b)*\d"
+    r"(?:[^A-Za-z]|\bloses\b)*"
+)
+_TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # of "holds (20/20)", of "{blow-up, 34}"
 END = r" \\"
 # Of a preamble, pandoc reads short definitions; those that lay a page out are replaced.
 _SHORT = re.compile(r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile)\w+\}.*\}|newtheorem.*)$")
@@ -54,7 +58,8 @@ class Origins:
 def prepared(source: str, document: str, origins: Origins, facts: Facts) -> str:
     """Return the ``source`` of a ``document`` for pandoc."""
     preamble, begin, text = source.partition(r"\begin{document}")
-    text = _COMMENT.sub("", _decided(text, origins.known[document]))
+    left_out = rf"\emph{{[{note(facts.part, facts.full_study)}]}}"
+    text = _COMMENT.sub("", _decided(text, origins.known[document], left_out))
     text = _FIGURE.sub(_figure, text)
     text = _CAPTION.sub(lambda found: facts.captions[found[1]], text)
     text = _PART.sub(lambda found: (found[1] if facts.part else found[2]) or "", text)
@@ -79,14 +84,13 @@ def _title(preamble: str) -> str:
     return rf"\title{{{': '.join(words).replace('?:', '?')}}}"
 
 
-def _decided(source: str, known: Sequence[str]) -> str:
+def _decided(source: str, known: Sequence[str], left_out: str) -> str:
     r"""``source`` with its ``\known`` and ``\row`` blocks shown, noted or left out."""
-    note = r"\emph{[The full study holds the numbers of sentences that are left out here.]}"
     pieces, start = [], 0
     for sentence, decision in zip(sentences(source), known, strict=True):
         opening = (r"\row{" if sentence.is_row else r"\known{") + sentence.text + "}"
         place = source.index(opening, start)
-        shown = {SHOWN: sentence.text, "noted": note}.get(decision, "")
+        shown = {SHOWN: sentence.text, NOTED: left_out}.get(decision, "")
         pieces += [source[start:place], shown]
         start = place + len(opening)
     return "".join([*pieces, source[start:]])
@@ -119,9 +123,9 @@ def _plain_mathematics(text: str) -> str:
 def linked_table(text: str, tables: Mapping[str, pd.DataFrame]) -> str:
     """Return a made TeX table whose numbers are links to the rows that they come from.
 
-    Those rows are the ones of the first of ``tables`` that has a column of the name of the made
-    table's first one; they agree with its row in every column that both have. Where there is no
-    such column, and each row of the first table has made a row, it is that row.
+    They are in the one of ``tables`` that shares most columns with the made table. Where that has
+    as many rows, each has made one; else they agree in the columns that both have, as far as these
+    hold the same (a rounded number, a sum or a title is none of the table's own cells).
     """
     text = _HEAD.sub("", text).replace("\\captionrow\n", "").replace("longtable", "tabular")
     lines = text.replace(r"\noalign{\smallskip}", "").split("\n")
@@ -129,15 +133,26 @@ def linked_table(text: str, tables: Mapping[str, pd.DataFrame]) -> str:
     first = next(place for place, cells in enumerate(split) if cells)
     header = split[first]
     body = [n for n, cells in enumerate(split) if n > first and len(cells) == len(header)]
-    origin = next((name for name in tables if header[0] in tables[name]), next(iter(tables)))
-    shared = [i for i, title in enumerate(header) if title in tables[origin]]
+    origin = max(tables, key=lambda name: len({*header} & {*tables[name]}))
+    one_to_one = len(body) == len(tables[origin])
     for row, line in enumerate(body, 1):
-        own = [f"{header[i]}={_plain(split[line][i])}" for i in shared if split[line][i]]
-        if not shared and len(body) == len(tables[origin]):
-            own = [f"row={row}"]
+        own = [f"row={row}"] if one_to_one else _agreeing(tables[origin], header, split[line])
         key = "|".join([origin, *own])
         lines[line] = " & ".join(_linked_cell(cell, key) for cell in split[line]) + END
     return plain_columns("\n".join(map(_plain_mathematics, lines)))
+
+
+def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) -> list[str]:
+    """Filters by which rows of ``table`` agree with a made row."""
+    found = []
+    for title, cell in zip(header, cells, strict=True):
+        for value in (_plain(cell), _plain(cell).replace(" ", "_")) if title in table else ():
+            rows = matching(table, [(title, "=", value)])
+            if len(rows):
+                table = rows
+                found.append(f"{title}={value}")
+                break
+    return found
 
 
 def _linked_cell(cell: str, key: str) -> str:
@@ -148,7 +163,9 @@ def _linked_cell(cell: str, key: str) -> str:
 
 
 def _plain(cell: str) -> str:
-    return re.sub(r"\\texttt\{(.*)\}", r"\1", cell).replace("\\", "")
+    """A cell without TeX; of one that begins with a name, the name."""
+    name = re.match(r"\\texttt\{([^{}]*)\}", cell)
+    return (name[1] if name else cell).replace("\\", "")
 
 
 def plain_columns(text: str) -> str:

@@ -32,16 +32,14 @@ def write_picture(png: Path, out: Path) -> tuple[int, int]:
     return drawn.size
 
 
-def copies_pdf(pdf: Path) -> bool:
-    """Whether a figure's PDF is small enough to lie beside the page."""
-    return pdf.stat().st_size <= COPIED
-
-
-def write_pdf(pdf: Path, out: Path) -> None:
-    """Copy a figure's PDF beside the page."""
+def copy_pdf(pdf: Path, out: Path) -> bool:
+    """Copy a figure's PDF beside the page where it is small; whether it is."""
     require_intact(pdf)
-    with atomic_path(out) as temporary:
-        shutil.copyfile(pdf, temporary)
+    small = pdf.stat().st_size <= COPIED
+    if small:
+        with atomic_path(out) as temporary:
+            shutil.copyfile(pdf, temporary)
+    return small
 
 
 def shown_figure(

@@ -26,15 +26,12 @@ FACTS = {
 def table_page(name: str, csv: bytes, template: str) -> str:
     """HTML of a table, with the command that makes it and the tolerance of every column."""
     table = declared().get(name)
-    kinds = (
-        {c.name: (c.meaning, c.unit, c.quantity, c.within) for c in table.columns} if table else {}
-    )
     columns = "".join(
-        f"<tr data-column='{escape(column)}'><th scope=row>{escape(column)}</th>"
-        f"<td>{escape(meaning)}</td><td>{escape(unit)}</td>"
-        f"<td>{kind}: {escape(QUANTITIES[kind])}</td>"
-        f"<td>{'not judged' if kind in NOT_JUDGED else f'{within:g}'}</td></tr>"
-        for column, (meaning, unit, kind, within) in kinds.items()
+        f"<tr data-column='{c.name}'><th scope=row>{c.name}</th>"
+        f"<td>{escape(c.meaning)}</td><td>{escape(c.unit)}</td>"
+        f"<td>{c.quantity}: {escape(QUANTITIES[c.quantity])}</td>"
+        f"<td>{'not judged' if c.quantity in NOT_JUDGED else f'{c.within:g}'}</td></tr>"
+        for c in (table.columns if table else ())
     )
     packed = gzip.compress(csv, 9, mtime=0)
     parts = {

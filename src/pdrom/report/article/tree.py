@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from pdrom.core.errors import PaperError
 from pdrom.report.article.latex import ORIGIN
 from pdrom.report.article.nodes import Node, attributes, changed, content_of, link, plain, words
 from pdrom.report.article.pandoc import Tree
@@ -146,6 +147,11 @@ def resolved(tree: Tree, labels: Mapping[str, tuple[str, str]], claims: Mapping[
     ----------
     labels : number and page of each
     claims : by name; the text names them
+
+    Raises
+    ------
+    PaperError
+        The text refers to a label that no document has.
     """
 
     def visit(node: Node) -> Any:
@@ -159,7 +165,8 @@ def resolved(tree: Tree, labels: Mapping[str, tuple[str, str]], claims: Mapping[
             return {"t": kind, "c": [attributes("", colour[1]), changed(content[1], visit)]}
         return None
 
-    return {**changed(tree, visit), "blocks": _run_in(changed(tree["blocks"], visit))}
+    found = changed(tree, visit)
+    return {**found, "blocks": _run_in(found["blocks"])}
 
 
 def _run_in(blocks: list[Node]) -> list[Node]:
@@ -187,6 +194,8 @@ def _resolved_link(node: Node, labels: Mapping[str, tuple[str, str]]) -> Node | 
             inlines, address_of(bytes.fromhex(address.removeprefix(ORIGIN)).decode()), "val"
         )
     if "reference" in keys:
+        if keys["reference"] not in labels:
+            raise PaperError(f"manuscript: no label {keys['reference']}, which the text refers to")
         number, page = labels[keys["reference"]]
         shown = f"({number})" if keys["reference-type"] == "eqref" else number
         return link(words(shown), f"{page}#{keys['reference']}")

@@ -20,7 +20,7 @@ from pdrom.report.figures.kit.read import positions_at
 from pdrom.report.figures.kit.results import NothingToDraw, Results, asked
 from pdrom.report.figures.kit.run_rows import Row, draw_rows
 
-COLUMNS = ["scene", "group", "method", "position_basis", "r", "relative_error_within_horizon"]
+COLUMNS = ["scene", "group", "method", "position_basis", "k", "r", "relative_error_within_horizon"]
 TOLERANCE = "ecsw-1e-02"
 
 
@@ -71,43 +71,40 @@ def _merged(
         own = errors[(errors.scene == scene) & (errors.group == group)]
         for method, row in zip(results.methods(options), rows, strict=True):
             found = own[(own.method == method) & (own.position_basis == "full")]
-            panels += [_with_error(p, method, found, p.title, "r") for p in row.panels[1:]]
-    subspace = _subspace(results, options, scene, first.panels[0])
+            panels += [_with_error(p, method, found, "r") for p in row.panels[1:]]
+    subspace = _subspace(results, options, scene)
     if subspace is not None:
-        models = results.table("reduced_reruns", [*COLUMNS, "k"])
-        found = models[(models.scene == scene) & (models.position_basis == "pod")]
+        found = errors[(errors.scene == scene) & (errors.position_basis == "pod")]
         found = found[found.method == TOLERANCE]
-        panels.append(_with_error(subspace, "ecsw", found, subspace.title, "k"))
+        panels.append(_with_error(subspace, "ecsw", found, "k"))
     label = f"{results.experiment_title(scene, group)}\n{first.label.splitlines()[-1]}"
     ghosts = np.repeat(first.ghosts[:1], len(panels), axis=0)
     windows = first.windows[:1] * len(panels)
     return replace(first, label=label, panels=panels, windows=windows, ghosts=ghosts)
 
 
-def _with_error(
-    panel: RunPanel, method: str, rows: pd.DataFrame, title: str, size: str
-) -> RunPanel:
+def _with_error(panel: RunPanel, method: str, rows: pd.DataFrame, size: str) -> RunPanel:
     """A panel with its method in the title, and its error before the horizon below."""
-    number = int(title.split()[2])
+    number = int(panel.title.split()[2])
     error = rows[rows[size] == number].relative_error_within_horizon.dropna()
     remark = f"error {error.iloc[0]:.2g}" if len(error) else panel.remark
     return replace(panel, title=f"{method}, {size} = {number}", remark=remark)
 
 
-def _subspace(
-    results: Results, options: Options, scene: str, reference: RunPanel
-) -> RunPanel | None:
+def _subspace(results: Results, options: Options, scene: str) -> RunPanel | None:
     """Panel of the run with sampled elements; None where a configuration has none of that size."""
     path = results.path(SUBSPACES, scene)
     base = f"pod_k{options.modes:03d}"
     if not Path(path).is_file():
         return None
-    frames, _ = positions_at(results.path(FULL_ORDER, scene), options.frames[-1:])
+    title, colour = f"k = {options.modes}", style.surface_colour(style.GREEN)
+    (frame,), _ = positions_at(results.path(FULL_ORDER, scene), options.frames[-1:])
     with open_hdf5(path) as file:
         run = file["models"].get(f"{base}_{TOLERANCE}")
         if run is None:
             return None
-        coordinates = run["train"]["coordinates"][frames[0]]
-        positions = file["columns"][base]["B"][...] @ coordinates
-    colour = style.surface_colour(style.GREEN)
-    return RunPanel(f"k = {options.modes}", colour, positions).seen_by(options.camera)
+        stored = run["train"]["coordinates"]
+        if len(stored) <= frame:
+            return RunPanel(title, colour, None, "blew up")
+        positions = file["columns"][base]["B"][...] @ stored[frame]
+    return RunPanel(title, colour, positions).seen_by(options.camera)

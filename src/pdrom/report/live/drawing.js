@@ -3,7 +3,7 @@
 // positions (n, 3), or a basis (n, K) that its coordinates (K, 3) are lifted by: on the graphics card where there is one.
 const pdromDrawing = (() => {
   const WIDTH = 2048; // of a texture that holds a basis
-  const MOST = 200; // coordinates that are lifted on the graphics card
+  const MOST = 200; // coordinates that are lifted on the graphics card; more are lifted here
   const FOCUS = 2.4, NEAREST = 0.25, FARTHEST = 6; // cotangent of half the angle of view; distances over the radius
 
   // Viridis, by a polynomial of six degrees for each colour (Zucker's fit; errors below 0.01).
@@ -89,6 +89,7 @@ const pdromDrawing = (() => {
     move(z) {
       this.z = z;
       this.stale = true;
+      this.version++;
     }
 
     // Positions (n, 3); lifted here if nobody did so far.
@@ -207,7 +208,7 @@ const pdromDrawing = (() => {
           valued: -1 };
         gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, own.indices);
         gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, layer.indices, gl.STATIC_DRAW);
-        if (layer.basis) own.basis = this._texture(layer);
+        if (layer.basis?.K <= MOST) own.basis = this._texture(layer);
         this.buffers.set(layer, own);
       }
       return this.buffers.get(layer);
@@ -268,7 +269,7 @@ const pdromDrawing = (() => {
         gl.bindTexture(gl.TEXTURE_2D, own.basis.texture);
         gl.uniform1i(at("texels"), own.basis.texels);
         gl.uniform3fv(at("z"), layer.z);
-      } else this._attribute(1, own.positions, layer.positions, 3, own.version !== layer.version);
+      } else this._attribute(1, own.positions, layer.current, 3, own.version !== layer.version);
       own.version = layer.version;
       if (layer.values) this._attribute(0, own.values, layer.values, 1, own.valued !== layer.valued);
       else {
@@ -373,8 +374,9 @@ const pdromDrawing = (() => {
   // ---- a canvas with layers, a camera, and what pointers and keys do with it ----
 
   class Drawing {
-    // options: up and eye (directions); plain: whether to do without WebGL; grab(x, y, view): something with move([x, y,
-    // z] m) and end(), or null where the pointer turns the camera
+    // options: up and eye (directions); plain: whether to do without WebGL; grab(x, y, looking) at a place on the canvas,
+    // CSS pixels: something with move(right, down) and end(), or null where the pointer turns the camera; looking: whether
+    // it is only asked what is there
     constructor(canvas, { up = [0, 1, 0], eye = [0.85, 0.55, 1.45], plain = false, grab = () => null } = {}) {
       const gl = plain ? null : canvas.getContext("webgl2", { antialias: true, premultipliedAlpha: true });
       Object.assign(this, { canvas, grab, layers: [], views: 1, camera: new Camera(up, eye), accelerated: Boolean(gl) });
@@ -518,5 +520,5 @@ const pdromDrawing = (() => {
     return [1, 3, 5].map((at) => parseInt(text.slice(at, at + 2), 16) / 255);
   }
 
-  return { Drawing, Layer, ball, colour, viridis, edgesOf };
+  return { Drawing, Layer, ball, colour };
 })();

@@ -9,20 +9,22 @@
   const LAG = 0.1; // part of its way to the shape that the camera goes in a frame
   const SAMPLE = 400; // vertices that the size of the shape is looked at, at most
   const TOLD = 200; // ms between two updates of the numbers
+  const MOST_ITERATIONS = 40; // that a reader may choose, unless the scene has more
+  const EARLY = 4; // ms: screens do not keep time exactly
   const METHODS = { elements: "whole elements", joint: "joint rows" };
   const at = (id) => document.getElementById(id);
   const scenes = JSON.parse(at("scenes").textContent);
   const loaded = new Map(); // scene -> promise of its unpacked file
-  let waiting = null; // takes the file that is being loaded
+  const waiting = new Map(); // scene -> takes its file when that has come
   let shown = null; // {data, frames, bases}: the scene
   let run = null, companion = null, apart = null, handles = [], times = [], estimateSquares = 0, alarmed = "", dragging = false;
   let playing = true, told = 0, due = 0, drawing = null, layers = {};
 
-  window.pdromLive = (content) => waiting(content);
+  window.pdromLive = (content) => waiting.get(content.scene)(content);
 
   function load(index) {
     if (!loaded.has(index)) loaded.set(index, new Promise((resolve, reject) => {
-      waiting = (content) => resolve(content);
+      waiting.set(scenes[index].scene, resolve);
       const script = document.createElement("script");
       script.src = scenes[index].file;
       script.onerror = () => reject(new Error(`${scenes[index].file}: missing; it lies beside this page`));
@@ -65,13 +67,20 @@
 
   async function scene() {
     document.body.dataset.ready = "no";
-    try {
-      shown = await load(Number(at("scene").value));
-    } catch (error) {
-      say(error.message, true);
-      return;
+    const index = Number(at("scene").value);
+    const found = await load(index).catch((error) => {
+      loaded.delete(index); // it may be there the next time
+      return error;
+    });
+    if (index !== Number(at("scene").value)) return; // another one was chosen in the meantime
+    if (found instanceof Error) {
+      [run, handles] = [null, []];
+      buttons();
+      return say(found.message, true);
     }
-    at("iterations").value = shown.data.iterations;
+    shown = found;
+    const { iterations: own } = shown.data;
+    Object.assign(at("iterations"), { max: Math.max(MOST_ITERATIONS, own), value: own });
     const { models } = shown.data, sizes = distinct(models.filter((m) => m.tau).map((m) => m.k));
     chosen();
     if (sizes.includes(20)) at("k").value = 20;
@@ -367,8 +376,8 @@
   function beat(now) {
     requestAnimationFrame(beat);
     if (!run) return;
-    if (playing && now >= due) {
-      due = Math.max(due + 1000 * shown.data.timeStep, now) - 4;
+    if (playing && now >= due - EARLY) {
+      due = Math.max(due + 1000 * shown.data.timeStep, now);
       frame();
       show();
     }
@@ -382,11 +391,12 @@
   fill("scene", scenes.map((_, i) => i), (i) => scenes[i].scene.replaceAll("_", " "));
   at("choice").addEventListener("submit", (event) => event.preventDefault());
   at("scene").addEventListener("change", scene);
-  for (const id of ["method", "k", "tau", "estimate"]) at(id).addEventListener("change", start);
-  at("ghost").addEventListener("change", show);
-  at("iterations").addEventListener("input", iterations);
-  at("again").addEventListener("click", start);
-  at("play").addEventListener("click", () => {
+  const whileRunning = (id, event, action) => at(id).addEventListener(event, () => run && action());
+  for (const id of ["method", "k", "tau", "estimate"]) whileRunning(id, "change", start);
+  whileRunning("ghost", "change", show);
+  whileRunning("iterations", "input", iterations);
+  whileRunning("again", "click", start);
+  whileRunning("play", "click", () => {
     playing = !playing && run.finite;
     pressed();
   });

@@ -4,51 +4,33 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from pdrom.artifact.artifact import Artifact, declare
+from pdrom.artifact.artifact import declare
+from pdrom.artifact.files import Files
 from pdrom.artifact.reads import Every, ProjectFile
 from pdrom.core.errors import StorageError
 from pdrom.core.paths import LIVE_MODEL, LIVE_PAGE, File
-from pdrom.core.store import read_text, require_intact, write_text
+from pdrom.core.store import read_text, write_text
 
 # Folder of the models, from that of the page.
 MODELS = Path(LIVE_MODEL.pattern).parent.name
 HEAD = re.compile(r'pdromLive\(\{"format":1,"scene":("\w+"),"title":("(?:[^"\\]|\\.)*"),')
 
 
-def _write(
-    models: list[File],
-    html: Path,
-    style: Path,
-    packed: Path,
-    engine: Path,
-    drawing: Path,
-    script: Path,
-    out: str,
-) -> None:
-    """Write the page; it loads the models of a scene when a reader chooses it.
+def _write(models: list[File], html: Path, outputs: Mapping[str, str], **parts: Path) -> None:
+    """Write the page of its ``parts``; it loads the models of a scene when a reader chooses it.
 
     Raises
     ------
     StorageError
         A file of models is damaged, or none.
     """
-    parts = {
-        "STYLE": style,
-        "PACKED": packed,
-        "ENGINE": engine,
-        "DRAWING": drawing,
-        "SCRIPT": script,
-    }
-    texts = {name: path.read_text("utf-8") for name, path in parts.items()}
-    scenes = [_listed(file) for file in models]
-    texts["SCENES"] = safe_json(scenes)
-    write_text(filled(html.read_text("utf-8"), texts), out)
+    texts = {name.upper(): path.read_text("utf-8") for name, path in parts.items()}
+    texts["SCENES"] = safe_json([_listed(file) for file in models])
+    write_text(filled(html.read_text("utf-8"), texts), outputs["out"])
 
 
 def _listed(file: File) -> dict[str, str]:
-    require_intact(file.path)
     head = HEAD.match(read_text(file.path))
     if head is None:
         raise StorageError(f"{file.path}: no models for the page, or of another version")
@@ -75,18 +57,8 @@ def _asset(name: str) -> ProjectFile:
     return ProjectFile(f"src/pdrom/report/live/{name}")
 
 
-class _Page(Artifact):
-    """A file that may be made anywhere, to be compared with the study's."""
-
-    def perform(
-        self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
-    ) -> None:
-        """Write it."""
-        self.function(**self.read(settings, inputs), out=str(outputs["out"]))
-
-
 live_page = declare(
-    _Page(
+    Files(
         "live_page",
         "Page on which models run",
         {
@@ -101,5 +73,5 @@ live_page = declare(
         {"out": LIVE_PAGE},
         _write,
     ),
-    "out",
+    "outputs",
 )

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from pdrom.artifact.artifact import Artifact
+from pdrom.artifact.files import Files
 from pdrom.artifact.reads import Given, Setting
 from pdrom.core.errors import StorageError
 from pdrom.core.machine import Machine
@@ -46,9 +46,14 @@ class Facts(BaseModel):
 
 
 def write_inputs(
-    source: list[str], references: str, tables: list[str], machine: str, facts: Facts, folder: str
+    source: list[str],
+    references: str,
+    tables: list[str],
+    machine: str,
+    facts: Facts,
+    outputs: Mapping[str, str],
 ) -> None:
-    r"""Write macros.tex, figures.tex, the TeX tables and the bibliographies into ``folder``.
+    r"""Write macros.tex, figures.tex, the TeX tables and the bibliographies.
 
     `NUMBERS` says of every ``\val`` key and TeX table where its numbers come from, and which blocks
     of each document are shown (`decisions`).
@@ -59,19 +64,19 @@ def write_inputs(
     data |= fact_tables(Path(machine), facts)
     decided = {document: decisions(text, data) for document, text in texts.items()}
     known = provenance(decided, facts.part, facts.full_study)
-    outputs = {"macros.tex": macros(whole, data) + known, "figures.tex": captions(facts.captions)}
+    written = {"macros": macros(whole, data) + known, "figures": captions(facts.captions)}
     watched = {name: _Watched(data) for name in TEX_TABLES}
-    outputs |= {f"{name}.tex": make(watched[name]) for name, make in TEX_TABLES.items()}
+    written |= {name: make(watched[name]) for name, make in TEX_TABLES.items()}
     for document, text in texts.items():
-        outputs[f"{document}.bbl"] = bibliography(text, Path(references))
+        written[document] = bibliography(text, Path(references))
     origins = {
         "known": decided,
         "numbers": {key: asdict(number_of(key, data)) for key in keys_of(whole)},
         "tables": {name: list(dict.fromkeys(one.read)) for name, one in watched.items()},
     }
-    outputs[NUMBERS] = json.dumps(origins, indent=1, allow_nan=False) + "\n"
-    for name, content in outputs.items():
-        write_text(content, Path(folder) / name)
+    written[Path(NUMBERS).stem] = json.dumps(origins, indent=1, allow_nan=False) + "\n"
+    for name, content in written.items():
+        write_text(content, outputs[name])
 
 
 class _Watched(dict[str, pd.DataFrame]):
@@ -110,7 +115,11 @@ def _machine_table(path: Path) -> pd.DataFrame:
 
 
 def build(
-    source: list[str], figures: list[str], inputs: list[str], facts: Facts, outputs: list[str]
+    source: list[str],
+    figures: list[str],
+    inputs: list[str],
+    facts: Facts,
+    outputs: Mapping[str, str],
 ) -> None:
     """Build the PDFs of the paper and of its supplement from figures and what `write_inputs` wrote.
 
@@ -119,30 +128,9 @@ def build(
     results = [Path(path) for path in (*figures, *inputs)]
     for path in results:
         require_intact(path)
-    made = {Path(text): Path(out) for text, out in zip(source, outputs, strict=False)}
+    folder = Path(source[0]).parent
+    made = {folder / f"{name}.tex": Path(outputs[name]) for name in DOCUMENTS}
     build_pdfs(made, sorted({path.parent for path in results}), PAGES)
-
-
-class _Inputs(Artifact):
-    """Files of one folder."""
-
-    def perform(
-        self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
-    ) -> None:
-        """Write all of them."""
-        folder = Path(next(iter(outputs.values()))).parent
-        self.function(**self.read(settings, inputs), folder=str(folder))
-
-
-class _Manuscript(Artifact):
-    """Files whose place the configuration decides, one for each document."""
-
-    def perform(
-        self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
-    ) -> None:
-        """Typeset them."""
-        files = [str(outputs[document]) for document in DOCUMENTS]
-        self.function(**self.read(settings, inputs), outputs=files)
 
 
 NUMBERS = "numbers.json"
@@ -150,7 +138,7 @@ FILES = (
     NUMBERS, "macros.tex", "figures.tex", *(f"{document}.bbl" for document in DOCUMENTS),
     *(f"{name}.tex" for name in TEX_TABLES),
 )  # fmt: skip
-paper_inputs = _Inputs(
+paper_inputs = Files(
     "paper_inputs",
     "Numbers, tables and references of the manuscript",
     {
@@ -160,7 +148,7 @@ paper_inputs = _Inputs(
     {Path(name).stem: PAPER_INPUT.where(name=name) for name in FILES},
     write_inputs,
 )
-paper = _Manuscript(
+paper = Files(
     "paper",
     "Manuscript",
     {**dict.fromkeys(("source", "figures", "inputs"), Given()), "facts": Setting("facts")},

@@ -72,12 +72,6 @@ def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_stud
     ``\jobname``. ``\ifpart`` is true where ``part`` names what the study was read from,
     ``\configuration``.
     """
-    note = (
-        rf"The full study (\texttt{{{escape(full_study)}}}) holds the numbers of sentences that "
-        "are left out here."
-        if part is not None
-        else "Sentences are left out here whose numbers this study does not hold."
-    )
     lines = [
         r"\newif\ifpart",
         r"\parttrue" if part is not None else r"\partfalse",
@@ -86,7 +80,7 @@ def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_stud
         r"\makeatletter",
         r"\newcounter{known}",
         r"\let\known@shown\@firstofone",
-        rf"\newcommand{{\known@noted}}[1]{{\textcolor{{okgrey}}{{[{note}]}}}}",
+        rf"\newcommand{{\known@noted}}[1]{{\textcolor{{okgrey}}{{[{note(part, full_study)}]}}}}",
         r"\let\known@dropped\@gobble",
         r"\newcommand{\known@next}{\csname known@\jobname @\arabic{known}\endcsname}",
         r"\newcommand{\known}[1]{\stepcounter{known}\known@next{#1}}",
@@ -98,6 +92,14 @@ def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_stud
             name = f"known@{document}@{number}"
             lines.append(rf"\expandafter\let\csname {name}\endcsname\known@{decision}")
     return "\n".join([*lines, r"\makeatother"]) + "\n"
+
+
+def note(part: str | None, full_study: str) -> str:
+    """TeX in place of sentences that are left out, see `provenance`."""
+    if part is None:
+        return "Sentences are left out here whose numbers this study does not hold."
+    full = rf"\texttt{{{escape(full_study)}}}"
+    return f"The full study ({full}) holds the numbers of sentences that are left out here."
 
 
 def closing(source: str, start: int) -> int:

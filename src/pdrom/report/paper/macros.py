@@ -57,7 +57,8 @@ def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:
         r"{\csname val@#1\endcsname}}",
     ]
     for key in keys_of(source):
-        lines.append(rf"\expandafter\def\csname val@{key}\endcsname{{{resolve(key, tables)}}}")
+        text = number_of(key, tables).text
+        lines.append(rf"\expandafter\def\csname val@{key}\endcsname{{{text}}}")
     lines.append(r"\makeatother")
     return "\n".join(lines) + "\n"
 
@@ -80,11 +81,6 @@ class Number:
     take: str | None
 
 
-def resolve(key: str, tables: Mapping[str, pd.DataFrame]) -> str:
-    """TeX text of one key, see `number_of`."""
-    return number_of(key, tables).text
-
-
 def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
     """Number of one key; its text is `MISSING` where there is none.
 
@@ -94,7 +90,7 @@ def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
         An unknown table or column, or several rows without an aggregate.
     """
     parsed = _parse(key, tables)
-    rows = _matching(tables[parsed.table], parsed.filters)
+    rows = matching(tables[parsed.table], parsed.filters)
     cells = rows[parsed.column].dropna()
     if parsed.aggregate is None and len(rows) > 1:
         raise PaperError(f"\\val{{{key}}}: matches {len(rows)} rows of table '{parsed.table}'")
@@ -120,7 +116,7 @@ def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
     filters = parsed.filters
     if parsed.aggregate in _COUNTS:
         filters = [entry for entry in filters if entry[0] in _LABELS]
-    return len(_matching(tables[parsed.table], filters)) > 0
+    return len(matching(tables[parsed.table], filters)) > 0
 
 
 @dataclass(frozen=True)
@@ -152,7 +148,8 @@ def _filter(entry: str) -> Filter:
     return (parts[1], parts[2], parts[3]) if parts else (entry, "=", "")
 
 
-def _matching(rows: pd.DataFrame, filters: Sequence[Filter]) -> pd.DataFrame:
+def matching(rows: pd.DataFrame, filters: Sequence[Filter]) -> pd.DataFrame:
+    """Those ``rows`` whose cells agree with every filter."""
     for field, sign, value in filters:
         matches = rows[field].map(lambda cell, value=value: _same(cell, value))
         rows = rows[matches.astype(bool) != (sign == "!=")]

@@ -48,7 +48,7 @@ def _has_packages(packages: list[str]) -> bool:
         return False
     files = [f"{name}.sty" for name in packages]
     done = subprocess.run([kpsewhich, *files], capture_output=True, text=True, check=False)
-    return len(done.stdout.split()) == len(files)
+    return len(done.stdout.splitlines()) == len(files)
 
 
 def _tinytex(scratch: Path) -> Path:

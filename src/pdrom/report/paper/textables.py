@@ -22,8 +22,8 @@ def scenes(tables: Tables) -> str:
     horizon = tables["reduced_reruns"].groupby("scene").horizon_frame.first()
     rows = []
     for row in tables["scenes"].itertuples():
-        end = int(horizon[row.scene]) if row.scene in horizon else None
-        shown = "run" if end == row.frames else str(end)
+        end = horizon.get(row.scene)
+        shown = "--" if pd.isna(end) else "run" if end == row.frames else str(int(end))
         groups = _powers(escape(row.groups.replace("_", " ")))
         rows.append(
             [name(row.scene), groups, str(row.vertices), str(row.elements), str(row.frames), shown]

@@ -4,6 +4,7 @@ import re
 import shutil
 import tarfile
 import zlib
+from gzip import BadGzipFile
 from pathlib import Path, PurePosixPath
 
 from pdrom.core.errors import StorageError
@@ -37,7 +38,7 @@ def unpack(archive: Path, folder: Path) -> None:
                     target.parent.mkdir(exist_ok=True)
                     with open(target, "wb") as copy:
                         shutil.copyfileobj(content, copy)
-    except (tarfile.TarError, EOFError, zlib.error, ValueError) as error:
+    except (tarfile.TarError, EOFError, BadGzipFile, zlib.error, ValueError) as error:
         fault = " ".join(str(error).split())
         raise StorageError(f"{archive}: no archive of results, or cut off ({fault})") from error
 

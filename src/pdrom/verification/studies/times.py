@@ -44,9 +44,8 @@ def ratios(comparisons: Mapping[str, Comparison]) -> list[Ratio]:
 
 def _quotients(comparison: Comparison, column: str) -> pd.DataFrame:
     a, b = comparison.e[column].to_numpy(float), comparison.f[column].to_numpy(float)
-    scenes = comparison.e[[n for n in ("scene",) if n in comparison.e]]
     with np.errstate(all="ignore"):
-        rows = scenes.assign(ratio=b / a)
+        rows = comparison.e.filter(["scene"]).assign(ratio=b / a)
     return rows[np.isfinite(rows.ratio) & (rows.ratio > 0)]
 
 

@@ -4,8 +4,12 @@ import base64
 import gzip
 import io
 import json
+import os
 import re
+import subprocess
+from collections.abc import Mapping
 from dataclasses import asdict
+from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
@@ -16,21 +20,32 @@ from axe_playwright_python.sync_playwright import Axe
 from PIL import Image
 
 from browser import browser_or_skip, page_at
+from pdrom.core.errors import PaperError
 from pdrom.core.machine import machine
 from pdrom.core.store import atomic_path, write_table, write_text
-from pdrom.report.article.build import ASSETS, FOLDER, article
+from pdrom.report.article.build import ASSETS, FOLDER, PAGES, article
 from pdrom.report.article.latex import linked_table, plain_columns
 from pdrom.report.article.tables import FACTS
 from pdrom.report.article.verified import write_verified
 from pdrom.report.paper.build import Facts
-from pdrom.report.paper.macros import AGGREGATES, format_number, keys_of, number_of
+from pdrom.report.paper.figuretex import captions
+from pdrom.report.paper.known import provenance
+from pdrom.report.paper.macros import (
+    AGGREGATES,
+    MISSING,
+    format_number,
+    keys_of,
+    macros,
+    matching,
+    number_of,
+)
+from pdrom.report.paper.source import documents
+from pdrom.report.paper.tex import find_pdflatex, packages_of
 from places import ROOT
 
 SPECIAL = r"""
 \documentclass{article}
-\newcommand{\scene}[1]{\texttt{#1}}
-\newcommand{\longtableof}[4]{{#1\def\captionrow{\caption{#3}\label{#2}\\}\input{#4}}}
-\newtheorem{theorem}{Theorem}
+\input{preamble.tex}
 \title{One?\\[2pt] \large Two\ifpart\\ Part\fi}
 """
 MAIN = r"""
@@ -50,7 +65,9 @@ section~\ref{sec:more} \cite{Page63}. C1 holds.
 \end{document}
 """
 SUPPLEMENT = r"""
+\renewcommand{\thesection}{S\arabic{section}}
 \renewcommand{\thefigure}{S\arabic{figure}}
+\renewcommand{\thetheorem}{S\arabic{theorem}}
 \begin{document}
 \section{More}\label{sec:more} See \ref{sec:first}.
 \figureof{spring_runs}
@@ -74,6 +91,7 @@ reduction & error & in \\
 \end{longtable}
 """
 CLAIM = """
+sets: {own: [numpy]}
 C1:
   text: A <b> claim.
   source: Somebody
@@ -83,7 +101,7 @@ C1:
   qualifiers: none
   figure_or_table: ladder
   published:
-    - {what: all rows, metric: local_share, where: {implementation: [numpy]}, compare: ">=",
+    - {what: all rows, metric: local_share, where: {implementation: ["@own"]}, compare: ">=",
        threshold: 0.7}
   beyond: [{what: others, metric: local_share, compare: "<=", threshold: 0.7}]
   changes: [{date: 2026-11-21, after_data: true, reason: "First version of it."}]
@@ -124,16 +142,24 @@ def write_study(folder: Path) -> dict[str, object]:
         tables={name: [{"scenes": 2}] for name in FACTS if name != "machine"},
     )
     texts = {"main": SPECIAL + MAIN, "supplement": SPECIAL + SUPPLEMENT}
-    for name, text in texts.items():
+    preamble = (ROOT / "paper" / "preamble.tex").read_text(encoding="utf-8")
+    for name, text in {**texts, "preamble": preamble}.items():
         write_text(text, folder / "paper" / f"{name}.tex")
-    data = {**tables, "study": pd.DataFrame(facts.tables["study"])}
+    data, whole = {**tables, "study": pd.DataFrame(facts.tables["study"])}, "".join(texts.values())
+    known = {"main": ["shown", "dropped"], "supplement": []}
     origins = {
-        "known": {"main": ["shown", "dropped"], "supplement": []},
-        "numbers": {key: asdict(number_of(key, data)) for key in keys_of("".join(texts.values()))},
+        "known": known,
+        "numbers": {key: asdict(number_of(key, data)) for key in keys_of(whole)},
         "tables": {"tab_payoff": ["payoff"]},
     }
-    write_text(json.dumps(origins), folder / "inputs" / "numbers.json")
-    write_text(TABLE, folder / "inputs" / "tab_payoff.tex")
+    inputs = {
+        "numbers.json": json.dumps(origins),
+        "tab_payoff.tex": TABLE,
+        "macros.tex": macros(whole, data) + provenance(known, facts.part, facts.full_study),
+        "figures.tex": captions(facts.captions),
+    }
+    for name, text in inputs.items():
+        write_text(text, folder / "inputs" / name)
     write_text(CLAIM, folder / "claims.yaml")
     write_text(machine().model_dump_json(), folder / "machine.json")
     for name in facts.captions:
@@ -153,7 +179,8 @@ def write_study(folder: Path) -> dict[str, object]:
         ],
         "facts": facts,
         "claims": folder / "claims.yaml",
-        "assets": {name: ROOT / FOLDER / file for name, file in ASSETS.items()},
+        "added": {"own": ["compiled"]},
+        **{name: ROOT / FOLDER / file for name, file in ASSETS.items()},
     }
 
 
@@ -203,12 +230,21 @@ class Links(HTMLParser):
             self._open = None
 
 
-def table_of(pages: Path, name: str) -> pd.DataFrame:
-    """Table that a page holds."""
-    page = (pages / "tables" / f"{name}.html").read_text(encoding="utf-8")
+@cache
+def table_at(path: Path) -> pd.DataFrame:
+    """Table that a page holds, its rows counted."""
+    page = path.read_text(encoding="utf-8")
     packed = re.search(r'id="data">([^<]*)<', page)
     assert packed
-    return pd.read_csv(io.BytesIO(gzip.decompress(base64.b64decode(packed[1]))))
+    table = pd.read_csv(io.BytesIO(gzip.decompress(base64.b64decode(packed[1]))))
+    return table.assign(row=range(1, len(table) + 1))
+
+
+@cache
+def rows_at(path: Path, key: str) -> int:
+    """How many rows of a page's table agree with a key."""
+    parts = [re.fullmatch(r"(.*?)(!?=)(.*)", part) for part in key.split("|")]
+    return len(matching(table_at(path), [part.groups() for part in parts if part]))
 
 
 def as_shown(text: str) -> str:
@@ -229,7 +265,8 @@ def test_each_number_is_the_pdfs_and_leads_to_the_cells_that_it_was_rounded_from
             number = origins["numbers"][key]
             seen.add(key)
             assert words == as_shown(number["text"])
-            cells = table_of(small, number["table"])[number["column"]].iloc[number["rows"]]
+            table = table_at(small / "tables" / f"{number['table']}.html")
+            cells = table[number["column"]].iloc[number["rows"]]
             value = AGGREGATES[number["take"]](cells) if number["take"] else cells.iloc[0]
             assert format_number(value) == number["text"]
     assert seen == set(origins["numbers"])
@@ -245,12 +282,45 @@ def test_a_made_table_leads_to_its_rows(small):
     ]
 
 
-def test_rows_are_found_by_the_columns_that_both_tables_have():
-    text = "\\begin{tabular}{lr}\nscene & n \\\\\n\\texttt{a\\_b} & 3 \\\\\n\\end{tabular}\n"
-    made = linked_table(
-        text, {"other": pd.DataFrame({"x": [1]}), "runs": pd.DataFrame({"scene": []})}
-    )
-    assert f"{b'runs|scene=a_b'.hex()}}}{{3}}" in made
+RUNS = pd.DataFrame(
+    {"scene": ["a_b", "a_b", "c"], "group": ["x_y", "z", "z"], "error": [0.0123, 0.25, 0.5]}
+)
+
+
+@pytest.mark.parametrize(
+    ("cells", "key"),
+    [
+        (r"\texttt{a\_b} & x y & 3", "runs|scene=a_b|group=x_y"),
+        (r"\texttt{a\_b} $\times 4$ & z & 3", "runs|scene=a_b|group=z"),
+        (r"\texttt{a\_b} &  & 0.012", "runs|scene=a_b"),  # rounded
+        (r"\texttt{c} & full order & 0.50", "runs|scene=c|error=0.50"),
+        (r"\texttt{d} & z & 2 of 3", "runs|group=z"),
+    ],
+)
+def test_rows_agree_in_what_both_tables_have(cells, key):
+    text = rf"""\begin{{tabular}}{{llr}}
+scene & group & error \\
+{cells} \\
+\end{{tabular}}"""
+    made = linked_table(text, {"other": pd.DataFrame({"scene": ["c"]}), "runs": RUNS})
+    number = cells.rpartition(" & ")[2]
+    assert f"{key.encode().hex()}}}{{{number}}}" in made
+
+
+@pytest.mark.parametrize(
+    ("cell", "number"),
+    [
+        ("holds (2/3, 1/4)", "2/3, 1/4"),
+        (r"\textcolor{okred}{blow-up, 34}", "34"),
+        (r"$\ge$ 0.70", r"$\ge$ 0.70"),
+        ("3.4 (3.1 to 3.6) (loses)", "3.4 (3.1 to 3.6) (loses)"),
+        ("4 of 20", "4 of 20"),
+    ],
+)
+def test_a_number_among_words_is_a_link(cell, number):
+    made = linked_table(f"a & b \\\\\nnone & {cell} \\\\", {"runs": RUNS})
+    assert f"}}{{{number}}}" in made
+    assert "{none}" not in made
 
 
 def test_columns_are_plain_letters():
@@ -259,18 +329,21 @@ def test_columns_are_plain_letters():
 
 
 def assert_links_resolve(pages: Path) -> int:
-    """Every link of every page leads to a file, and to a name in it; how many there are."""
+    """Every link of every page leads to a file, and to a name or rows in it; how many there are."""
     found = {path: Links(path) for path in pages.resolve().rglob("*.html")}
     count = 0
     for path, page in found.items():
-        for _, address, _ in page.links:
+        for _, address, words in page.links:
             if re.match("https?:|data:", address):
                 continue
             file, _, name = unquote(address).partition("#")
             target = (path.parent / file).resolve() if file else path
             assert target.is_file(), f"{path.name}: {address}"
             count += 1
-            if name and target.suffix == ".html" and target.parent.name != "tables":
+            if name and target.parent.name == "tables":
+                none = words == MISSING or name.endswith(("|count", "|distinct"))
+                assert none or rows_at(target, name), f"{path.name}: {address}"
+            elif name and target.suffix == ".html":
                 assert name in found[target].names, f"{path.name}: {address}"
         assert len(set(page.names)) == len(page.names), path.name
     return count
@@ -280,13 +353,48 @@ def test_every_link_leads_somewhere(small):
     assert assert_links_resolve(small) > 40
 
 
-def test_references_have_the_numbers_of_the_pdf(small):
-    links = {address: words for _, address, words in Links(small / "index.html").links}
-    expected = {
-        "index.html#eq:one": "(1)", "index.html#fig:ladder": "1", "index.html#tab:payoff": "1",
-        "supplement.html#sec:more": "S1", "supplement.html#thm:s": "S1", "claims.html#C1": "C1",
-    }  # fmt: skip
-    assert {address: links.get(address) for address in expected} == expected
+def numbers_of_tex(sources: Mapping[str, str], inputs: Path, folder: Path) -> dict[str, str]:
+    """Number of every label, by its address in the article, as TeX counts; pictures are boxes."""
+    program = find_pdflatex(packages_of("".join(sources.values())), folder)
+    found = {}
+    for name, text in sources.items():
+        (folder / f"{name}.tex").write_text(rf"\PassOptionsToPackage{{demo}}{{graphicx}}{text}")
+        command = [program, "-interaction=nonstopmode", "-halt-on-error", f"{name}.tex"]
+        places = {**os.environ, "TEXINPUTS": f"{inputs.resolve()}:"}
+        done = subprocess.run(command, cwd=folder, env=places, capture_output=True, check=False)
+        assert done.returncode == 0, done.stdout[-500:]
+        labels = re.findall(
+            r"\\newlabel\{([^{}]+)\}\{\{([^{}]*)\}", (folder / f"{name}.aux").read_text("utf-8")
+        )
+        found |= {f"{PAGES[name]}#{label}": number for label, number in labels}
+    return found
+
+
+def test_references_have_the_numbers_of_the_pdf(small, tmp_path):
+    """Those of TeX's .aux files; of the full study, too, where a run has made its article."""
+    for pages in study_or_small(small):
+        paper, inputs = (
+            (pages.parent / "paper", pages.parent / "inputs")
+            if pages == small
+            else (ROOT / "paper", pages.parent / "paper")
+        )
+        (folder := tmp_path / str(pages == small)).mkdir()
+        numbers = numbers_of_tex(documents(paper), inputs, folder)
+        links = [link for page in PAGES.values() for link in Links(pages / page).links]
+        shown = {a: words.strip("()") for kind, a, words in links if a in numbers and not kind}
+        assert shown == {address: numbers[address] for address in shown}
+        kinds = {re.split("[#:]", address)[1] for address in shown}
+        assert {"eq", "fig", "tab", "thm", "sec"} <= kinds
+    assert ("claim", "claims.html#C1", "C1") in Links(small / "index.html").links
+
+
+def test_a_reference_to_nothing_is_named(tmp_path):
+    given = write_study(tmp_path)
+    path = tmp_path / "paper" / "main.tex"
+    write_text(path.read_text("utf-8").replace(r"\ref{thm:s}", r"\ref{thm:lost}"), path)
+    with pytest.raises(PaperError, match="no label thm:lost"):
+        write_pages(given, tmp_path)
+    assert not (tmp_path / "article" / "index.html").exists()
 
 
 def test_what_the_study_does_not_hold_is_left_out(small):
@@ -300,6 +408,7 @@ def test_what_the_study_does_not_hold_is_left_out(small):
     claims = (small / "claims.html").read_text(encoding="utf-8")
     assert "A &lt;b&gt; claim." in claims
     assert "First version of it." in claims
+    assert "(implementation: numpy, compiled)" in claims
 
 
 def test_the_same_bytes_again(small, tmp_path):
@@ -358,6 +467,7 @@ def test_a_link_opens_its_rows(small):
 @pytest.mark.slow
 def test_a_figure_shows_the_scenes_of_another(small):
     browser_or_skip()
+    write_verified({"figure spring_runs": "reproduced"}, small)
     with page_at((small / "supplement.html").as_uri(), 900, 700) as page:
         figure = page.locator("figure", has_text="Springs.")
         own = figure.locator("img").get_attribute("alt")
@@ -366,10 +476,13 @@ def test_a_figure_shows_the_scenes_of_another(small):
         assert other.locator("img").get_attribute("src") == "figures/bar_runs.webp"
         assert "./reproduce figure bar_runs" in other.inner_text()
         assert "Springs." not in other.inner_text()
+        assert "Last verification: not yet" in other.inner_text()
         other.locator("select").select_option("spring_runs")
         assert other.locator("img").get_attribute("alt") == own
         assert "Springs." in other.inner_text()
+        assert "Last verification: reproduced" in other.inner_text()
         assert page.said == []
+    write_verified({}, small)
 
 
 @pytest.mark.slow
@@ -387,4 +500,9 @@ def test_the_outcome_of_a_verification_is_shown(small, tmp_path):
         page.get_by_role("button", name="scenes").click()
         page.get_by_role("button", name="scenes").click()
         assert page.locator("#rows tbody tr").first.inner_text().startswith("2\tdeim")
+        assert page.evaluate("document.activeElement.textContent") == "scenes"
+        page.evaluate("location.hash = '#error_train%'")
+        page.wait_for_function("document.getElementById('every').hidden === false")
+        assert page.locator("#rows tbody tr").count() == 2
+        assert page.said == []
     write_verified({}, small)

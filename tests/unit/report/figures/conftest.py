@@ -306,7 +306,7 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for h, ratio in ((0.016, 1.0), (0.2, 1.0), (0.016, 100.0))
     ]  # fmt: skip
     reruns = [
-        (scene, group, method, r, "full", 1.0, *_outcome(scene, method, r), 0.2 * r)
+        (scene, group, method, r, "full", 1.0, *_outcome(scene, method, r), 0.2 * r, None)
         for scene, group in pairs
         if scene not in FLAT
         for method in methods
@@ -412,7 +412,7 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "machine_rates": (rates, "quantity working_set level rate low high"),
         "roofline": (phases, "scene phase working_set bound_us measured_us limit"),
         "reduced_reruns": (reruns, "scene group method r position_basis max_extent blowup_frame"
-         " relative_error relative_error_within_horizon ms_per_frame"),
+         " relative_error relative_error_within_horizon ms_per_frame k"),
         "gain_prediction": (predictions, "predictor lower upper runs failed_share threshold"),
         "noise": (noise, "scene group noisy_axes method r rank relative_error"),
         "claims_sensitivity": (variations, "claim part varied variation verdict_of_rules same"),

@@ -9,14 +9,15 @@ import warnings
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from pdrom.artifact.reads import Chosen, Every, TableOf
 from pdrom.core.errors import StorageError
-from pdrom.core.paths import MESH, RERUNS, TABLE
-from pdrom.core.store import checksum_path
+from pdrom.core.paths import MESH, RERUNS, SUBSPACES, TABLE
+from pdrom.core.store import checksum_path, write_hdf5
 from pdrom.core.store.block import write_block
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import save_mesh
@@ -26,7 +27,7 @@ from pdrom.report.figures.kit.output import draw_figure, write_figure
 from pdrom.report.figures.kit.results import Results
 from pdrom.report.figures.kit.style import note
 
-from .conftest import BLOWN_UP, BLOWUP_FRAME, ROOT, SCENES, SETTINGS, Study
+from .conftest import BLOWN_UP, BLOWUP_FRAME, FRAMES, ROOT, SCENES, SETTINGS, Study, mesh_of
 
 PICTURES = ("snapshots_and_modes", "deim_iterations", "cloth_all_grid", "bending_runs",
             "spring_runs", "strain_runs", "bar_runs", "teaser")  # fmt: skip
@@ -261,6 +262,18 @@ def test_experiments_of_round_off_only(small_study, figure_name):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert texts(draw(study, figure_name, scenes=("bend_fall",)))
+
+
+@pytest.mark.parametrize(("ran", "shown"), [(FRAMES, "ecsw, k = 20"), (2, "blew up")])
+def test_the_teaser_shows_a_sampled_subspace_as_far_as_it_ran(small_study, ran, shown):
+    study = small_study({"bar_release": ("deformation_gradient",)}, ["pod"])
+    assert not any("ecsw" in text for text in texts(draw(study, "teaser", methods=("pod",))))
+    points = mesh_of("bar_release").points
+    with write_hdf5(study.results.path(SUBSPACES, "bar_release")) as file:
+        file["columns/pod_k020/B"] = np.eye(len(points))
+        model = file.create_group("models/pod_k020_ecsw-1e-02")
+        model["train/coordinates"] = np.repeat(points[None], ran + 1, axis=0)
+    assert any(shown in text for text in texts(draw(study, "teaser", methods=("pod",))))
 
 
 def test_singular_values_below_round_off_are_hollow(study):

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pdrom.core.errors import PaperError
-from pdrom.report.paper.macros import MISSING, format_number, keys_of, macros, resolve
+from pdrom.report.paper.macros import MISSING, format_number, keys_of, macros, number_of
 
 TABLES = {
     "runs": pd.DataFrame(
@@ -51,7 +51,7 @@ TABLES = {
     ],
 )
 def test_keys_by_hand(key, expected):
-    assert resolve(key, TABLES) == expected
+    assert number_of(key, TABLES).text == expected
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,7 @@ def test_keys_by_hand(key, expected):
 )
 def test_faulty_keys_name_themselves(key, message):
     with pytest.raises(PaperError, match=message) as caught:
-        resolve(key, TABLES)
+        number_of(key, TABLES)
     assert rf"\val{{{key}}}" in str(caught.value)
 
 
@@ -113,8 +113,8 @@ def test_numbers_as_text(value, expected):
 
 def test_numpy_booleans_are_words():
     """A bool column gives numpy.bool_, which is no bool."""
-    assert resolve("runs|scene=b|r=20|finite", TABLES) == "yes"
-    assert resolve("runs|scene=bar_a|method=pod|finite", TABLES) == "no"
+    assert number_of("runs|scene=b|r=20|finite", TABLES).text == "yes"
+    assert number_of("runs|scene=bar_a|method=pod|finite", TABLES).text == "no"
 
 
 def test_minus_infinity_keeps_its_sign():

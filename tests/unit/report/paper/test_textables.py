@@ -391,6 +391,12 @@ def test_horizon_of_a_calm_scene_is_its_run():
     assert r"triangle strain ($10^{7}$)" in first
 
 
+def test_a_scene_without_a_run_has_no_horizon():
+    other = TABLES["reduced_reruns"][TABLES["reduced_reruns"].scene == "b"]
+    first, _ = rows(scene_table(TABLES | {"reduced_reruns": other}))
+    assert first.endswith(r"& 10 & -- \\")
+
+
 def test_hard_cases_show_failures_only():
     torn, kicked, folded = rows(TEX_TABLES["tab_hard_cases"](TABLES))
     assert r"\texttt{deim\_x}" in TEX_TABLES["tab_hard_cases"](TABLES)

@@ -1,5 +1,6 @@
 """``./reproduce compare A B``: exit codes, the page, one line for bad input, nothing touched."""
 
+import gzip
 import hashlib
 import io
 import json
@@ -76,6 +77,13 @@ def cut(folder, tmp_path):
     return packed, "no archive of results, or cut off"
 
 
+def with_junk(folder, tmp_path):
+    packed = archive(folder, tmp_path / "junk.tar.gz")
+    content = gzip.decompress(packed.read_bytes()).rstrip(b"\0")
+    packed.write_bytes(gzip.compress(content + bytes(-len(content) % 512)) + b"junk")
+    return packed, "no archive of results, or cut off"
+
+
 def foreign(folder, tmp_path):
     (tmp_path / "photos").mkdir()
     return tmp_path / "photos", "manifest.json: no such file"
@@ -130,8 +138,8 @@ def lost_from_the_archive(folder, tmp_path):
 
 @pytest.mark.parametrize(
     "fault",
-    [cut, foreign, other_manifest, edited, lost, damaged_record, no_tables, no_archive, unknown,
-     lost_from_the_archive],
+    [cut, with_junk, foreign, other_manifest, edited, lost, damaged_record, no_tables, no_archive,
+     unknown, lost_from_the_archive],
 )  # fmt: skip
 def test_bad_input_ends_in_one_line(fault, study, tmp_path, monkeypatch, capsys):
     a = study("a")
