@@ -73,7 +73,7 @@ class Yardstick:
         return {"extent_norm": extent, "time_step": self.scene.config.time_step}
 
     def deviations(self, outcome: Rerun) -> dict[str, np.ndarray]:
-        """Series of a run.
+        """Series of a run, its ``outcome``.
 
         Returns
         -------
@@ -96,7 +96,7 @@ class Yardstick:
         }
 
     def errors(self, outcome: Rerun) -> dict[str, float | None]:
-        """Errors of a whole run by the names of their columns, see `errors_within`."""
+        """Errors of a whole run ``outcome`` by the names of their columns, see `errors_within`."""
         end = len(self.displacement)
         return errors_within(self.deviations(outcome), self.series, end, **self.units)
 
@@ -142,7 +142,10 @@ def errors_within(
 
 
 def rms_within(difference: np.ndarray, norm: float, end: int) -> float | None:
-    """Root mean square over the frames before ``end``, over ``norm``; None as `error_within`."""
+    """Root mean square of ``difference`` (F',) m before frame ``end``, over ``norm`` m.
+
+    None as `error_within`.
+    """
     if len(difference) < end or end == 0:
         return None
     return float(np.sqrt(np.mean(np.square(difference[:end] / norm))))

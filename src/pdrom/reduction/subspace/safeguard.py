@@ -33,7 +33,7 @@ class ControlStepper(Stepper):
     local_steps: list[SubspaceLocalStep]  # type: ignore[assignment]
 
     def begin(self, state: State, frame: int) -> None:
-        """Prepare a frame."""
+        """Prepare a ``frame`` that begins in ``state``."""
         self._s, self._elimination, self._base = self._begin(state, frame)
 
     def objective(self, y: np.ndarray) -> float:
@@ -51,7 +51,10 @@ class ControlStepper(Stepper):
     def iterate(
         self, seconds: np.ndarray, on_last_iterate: Callable[[np.ndarray], None] | None
     ) -> np.ndarray:
-        """Coordinates (K, 3) after the frame's iterations."""
+        """Coordinates (K, 3) after the frame's iterations.
+
+        Their times are added to ``seconds`` (4,) s; ``on_last_iterate`` sees the last iterate.
+        """
         rest: Any = (self._s, self._base, self._elimination, seconds, on_last_iterate)
         return self._iterate(*rest)[0]
 

@@ -87,7 +87,7 @@ class ReducedSpace(Space):
         return held_targets(self._boundaries, frame, positions)
 
     def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates that are held in the first ``frames``, and their values (n, m, 3)."""
+        """Held coordinates in the first ``frames`` from ``positions`` (K, 3), values (n, m, 3)."""
         return held_path(self._boundaries, frames, positions)
 
     def elimination(self, fixed: np.ndarray) -> DenseElimination:
@@ -124,12 +124,12 @@ def _require_reducible(effects: Sequence[Effect]) -> None:
 
 
 def coordinates(columns: Columns, masses: np.ndarray, field: np.ndarray) -> np.ndarray:
-    """Mass-orthogonal projection of ``field`` (N, 3) on the span of ``columns``, (K, 3)."""
+    """Mass-orthogonal projection (K, 3) of ``field`` (N, 3) on ``columns``, ``masses`` (N,) kg."""
     return _mass_solve(columns, masses, columns.B.T @ (masses[:, None] * field))
 
 
 def projector(columns: Columns, masses: np.ndarray) -> np.ndarray:
-    """Matrix (K, N) of `coordinates`."""
+    """Matrix (K, N) of `coordinates` with ``columns`` and ``masses``."""
     return _mass_solve(columns, masses, (columns.B * masses[:, None]).T)
 
 
