@@ -72,7 +72,14 @@ class References:
     alone=True,
 )
 def alternatives(sources: list[Path], settings: Options, out: File) -> None:
-    """Compare all methods on one mesh: ``factor`` times the vertices along each side."""
+    """Compare all methods on one mesh: ``factor`` times the vertices along each side.
+
+    Parameters
+    ----------
+    sources : files of the mesh; the job depends on them
+    settings : scene, methods and limits
+    out : table, with the factor among its labels
+    """
     factor = float(out["factor"])
     rows = []
     for stiffness in settings.alternatives.factors(settings.scene.name, factor):

@@ -52,7 +52,7 @@ def heldout_floor(heldout: Scene, motion: str, size: float, seeds: tuple[int, ..
 def sensitivities(
     scene: Scene, perturbations: tuple[float, ...], seeds: tuple[int, ...]
 ) -> pd.DataFrame:
-    """Table of `COLUMNS`: ``perturbations`` of the start by ``seeds``, and other changes.
+    """Table of `COLUMNS` for ``scene``: ``perturbations`` of the start by ``seeds``, and others.
 
     The others are another solver, 4 K iterations, half the time step, and no effect of one name
     (label `without`); the only constraint group cannot be left out.

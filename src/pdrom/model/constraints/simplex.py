@@ -178,7 +178,7 @@ def gather_edges(y, corners, block, edges, work):
 
 @lane_function
 def copy_rows(d, count, start, work, first):
-    """Copy S q, ``d`` (m count, 3), from ``start`` on to ``first`` of ``work``; the last is repeated."""
+    """Copy S q, ``d`` (m count, 3), from ``start`` on to ``work[first:]``; the last is repeated."""
     last = d.shape[0] // count - 1
     for lane in range(LANES):
         base = count * min(start + lane, last)
