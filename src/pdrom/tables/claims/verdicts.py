@@ -34,7 +34,7 @@ class Outcome:
 
 
 def timed_columns(rule: ClaimRule) -> set[str]:
-    """Columns of a claim's row that depend on timing: two runs may differ there."""
+    """Columns of the row of a ``rule`` that depend on timing: two runs may differ there."""
     found: set[str] = set()
     for part, suffix in (("published", ""), ("beyond", "_beyond")):
         tests: Sequence[TestRule] = getattr(rule, part)
