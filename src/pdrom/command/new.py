@@ -63,7 +63,7 @@ ENOUGH = 3  # held vertices, with which a body does not turn about a line
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """The file to write, and the mesh in it."""
+    """Add to ``parser`` the file to write, and the mesh in it."""
     parser.add_argument("scene", metavar="SCENE", help="file to write; .yaml is added to a name")
     parser.add_argument("--mesh", metavar="FILE", help="mesh file (.obj, .vtu, .msh ...)")
 

@@ -51,7 +51,7 @@ def entries(root: Path = Path()) -> list[Entry]:
 
 
 def table_words(name: str) -> str:
-    """Argument that makes a table and nothing else."""
+    """Argument that makes the table ``name`` and nothing else."""
     return TABLE.at(RESULTS, name=name) if name in declarations() else name
 
 

@@ -50,7 +50,7 @@ def claim_pages(root: Path) -> dict[Path, str]:
 
 
 def expected_verdicts(root: Path) -> Verdicts:
-    """Verdicts of each claim as published and beyond, by the tables that the repository keeps."""
+    """Verdicts of each claim as published and beyond, by the tables that ``root`` keeps."""
     found = read_reference(declared()["claims"], root / folder_of(RESULTS))
     assert found, "the repository keeps no table claims"
     rows = found.frame.set_index("claim")
