@@ -69,7 +69,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Write a scene with comments; a file that is there is left alone."""
+    """Write the scene that ``arguments`` name, with comments; an existing file is left alone."""
     from pdrom.core.errors import ConfigurationError
     from pdrom.core.project import schema_line
     from pdrom.core.store.oserrors import reason

@@ -72,12 +72,12 @@ class Estimate:
             self._jobs[job].start = now
 
     def finish(self, job: int, now: float) -> None:
-        """A job has ended."""
+        """Note that ``job`` has ended at the time ``now``, s."""
         if job in self._jobs:
             self._jobs[job].end = now
 
     def left(self, now: float) -> float | None:
-        """Seconds that are left; None while too little is done."""
+        """Seconds that are left at the time ``now``, s; None while too little is done."""
         begun = [job for job in self._jobs.values() if job.start is not None]
         done = [job for job in begun if job.end is not None]
         total = sum(job.expected.seconds for job in self._jobs.values())
@@ -156,7 +156,7 @@ def _is_news(record: logging.LogRecord, event: LogEvent | None) -> bool:
 
 
 def rounded(seconds: float) -> str:
-    """A time in words, as roughly as it is known."""
+    """Time of so many ``seconds`` in words, as roughly as it is known."""
     minutes = seconds / 60
     if minutes < 1:
         return "less than a minute"

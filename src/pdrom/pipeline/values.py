@@ -134,7 +134,10 @@ def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...
 
 
 def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
-    """The methods that are timed on growing meshes; they need not be among the study's."""
+    """Methods that ``study`` times on growing meshes, the same for all ``labels``.
+
+    They need not be among its own.
+    """
     section = study.settings.scaling
     found = study.named_methods([section.method], "scaling.method")
     return found | study.named_methods(section.breakeven.methods, "scaling.breakeven.methods")

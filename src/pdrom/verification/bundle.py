@@ -73,7 +73,10 @@ def bundle(arguments: Sequence[str]) -> Status:
 
 
 def unfinished(subject: Subject, manifest: Manifest) -> Iterator[str]:
-    """Tables, figures and manuscript that are not in the manifest as today's code makes them."""
+    """Results of ``subject`` that ``manifest`` does not list as today's code makes them.
+
+    These are tables, figures and the manuscript.
+    """
     plan, folders = subject.plan, subject.folders
     jobs = [job for jobs in plan.fixed.values() for job in jobs]
     wanted = {path: job.code for job in jobs for path in job.outputs.values()}

@@ -98,7 +98,7 @@ def read_reference(table: Table, folder: Path) -> Reference | None:
 
 
 def note(folder: Path, reason: str, day: date, code: str) -> None:
-    """Add a line to the log of changes."""
+    """Add ``day``, hash of the ``code`` and ``reason`` to the log of changes in ``folder``."""
     path = folder / LOG
     text = path.read_text(encoding="utf-8") if path.is_file() else HEAD
     write_tracked(path, f"{text}- {day:%Y-%m-%d}, code {code}: {reason}\n".encode())
