@@ -58,8 +58,11 @@ def write_article(
 
     Parameters
     ----------
+    source, references : TeX sources of the manuscript and its bibliography
+    tables, machine : CSV of the tables and the record of the machine
     inputs : what the manuscript reads, with `NUMBERS`
     figures : PDF and PNG of each
+    facts, claims : stated beside results, and the file of the claims' rules
     assets : templates, style and script by the names of `ASSETS`
     """
     made = {Path(path).name: path for path in inputs}

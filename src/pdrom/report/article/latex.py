@@ -117,7 +117,7 @@ def _plain_mathematics(text: str) -> str:
 
 
 def linked_table(text: str, tables: Mapping[str, pd.DataFrame]) -> str:
-    """Return a made TeX table whose numbers are links to the rows that they come from.
+    """Return ``text``, a made TeX table, with numbers that link to the rows that they come from.
 
     Those rows are the ones of the first of ``tables`` that has a column of the name of the made
     table's first one; they agree with its row in every column that both have. Where there is no
@@ -152,7 +152,7 @@ def _plain(cell: str) -> str:
 
 
 def plain_columns(text: str) -> str:
-    """Return a source whose tables have columns of letters alone; pandoc knows no others."""
+    """Return ``text`` with tables whose columns are letters alone; pandoc knows no others."""
     pieces, start = [], 0
     for found in _SPEC.finditer(text):
         end = closing(text, found.end() + 1)

@@ -18,7 +18,7 @@ MANY = 4  # keys of options that say what is drawn
 
 
 def write_picture(png: Path, out: Path) -> tuple[int, int]:
-    """Write a figure's picture as WebP; return its width and height, pixels."""
+    """Write the picture ``png`` of a figure as WebP ``out``; return width and height, pixels."""
     require_intact(png)
     with Image.open(png) as image:
         drawn = image.convert("RGB")
@@ -33,12 +33,12 @@ def write_picture(png: Path, out: Path) -> tuple[int, int]:
 
 
 def copies_pdf(pdf: Path) -> bool:
-    """Whether a figure's PDF is small enough to lie beside the page."""
+    """Whether a figure's ``pdf`` is small enough to lie beside the page."""
     return pdf.stat().st_size <= COPIED
 
 
 def write_pdf(pdf: Path, out: Path) -> None:
-    """Copy a figure's PDF beside the page."""
+    """Copy a figure's ``pdf`` to ``out`` beside the page."""
     require_intact(pdf)
     with atomic_path(out) as temporary:
         shutil.copyfile(pdf, temporary)
@@ -51,7 +51,9 @@ def shown_figure(
 
     Parameters
     ----------
+    node : of the figure in the syntax tree
     size : of the picture, pixels
+    with_pdf : whether its PDF lies beside the page
     pages : of the figures that stand in the documents, by name
     """
     attribute, caption, _ = node["c"]

@@ -1,4 +1,4 @@
-"""Tables of the manuscript about hard cases, as TeX."""
+"""Tables of the manuscript about hard cases, as TeX, made of ``tables``."""
 
 from collections.abc import Mapping
 from typing import Any

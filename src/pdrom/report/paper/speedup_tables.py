@@ -1,4 +1,4 @@
-"""Tables of the manuscript about what reductions gain and cost, as TeX."""
+"""Tables of the manuscript about what reductions gain and cost, as TeX, of ``tables``."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,4 +1,4 @@
-"""Tables of the manuscript as TeX, generated from the tables of the study."""
+"""Tables of the manuscript as TeX, generated from ``tables`` of the study by name."""
 
 import re
 from collections.abc import Mapping

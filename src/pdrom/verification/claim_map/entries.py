@@ -46,7 +46,7 @@ class Entry:
 
 
 def entries(root: Path = Path()) -> list[Entry]:
-    """Claims, figures (those of the preprint first), tables, sections and the manuscript."""
+    """Claims, figures (the preprint's first), tables, sections, manuscript; read from ``root``."""
     return [*_claims(root), *_figures(), *_tables(), *_sections(root), _manuscript()]
 
 
