@@ -1,4 +1,4 @@
-"""How far a run has come: one line on stderr, rewritten on a terminal."""
+"""Progress of a run: one line on stderr, rewritten on a terminal."""
 
 import sys
 from time import monotonic

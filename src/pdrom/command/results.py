@@ -45,7 +45,7 @@ def viewed(arguments: argparse.Namespace) -> "list[ViewedScene]":
 
 
 def files_of(results: Sequence[str]) -> list[str]:
-    """Those of the arguments ``results`` that are files."""
+    """Arguments among ``results`` that are files."""
     return [name for name in results if _is_file(name)]
 
 

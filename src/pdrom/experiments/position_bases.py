@@ -1,4 +1,4 @@
-"""How well each position subspace could follow a motion, beside how well its run does."""
+"""Best approximation of a motion in each position subspace, beside the error of its run."""
 
 from collections.abc import Iterator
 from typing import Any

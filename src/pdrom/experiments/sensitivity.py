@@ -1,4 +1,4 @@
-"""How far runs of a scene drift apart that should be the same, and what its effects do in it."""
+"""Drift of runs of a scene that should be the same, and what its effects do in it."""
 
 from typing import Annotated, Self
 

@@ -1,4 +1,4 @@
-"""Why does block DEIM fail in a position subspace, and what mends it? Variants on one scene."""
+"""Ablation on one scene: why block DEIM fails in a position subspace, and what mends it."""
 
 import logging
 from collections.abc import Mapping

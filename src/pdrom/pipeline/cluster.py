@@ -65,7 +65,7 @@ class Demand:
     minutes: int
 
     def obstacle(self, nodes: Sequence[Node]) -> str | None:
-        """Why none of the ``nodes`` takes the job, with the remedy; None if one does."""
+        """Reason why none of ``nodes`` takes the job, with the remedy; None if one does."""
         own = [n for n in nodes if (n.partition == self.partition if self.partition else n.default)]
         if not own:
             known = ", ".join(dict.fromkeys(node.partition for node in nodes))

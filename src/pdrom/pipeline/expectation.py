@@ -28,7 +28,7 @@ def units_of(study: str, root: Path) -> Units:
 
 
 def slower_here(plan: Plan, study: str) -> float:
-    """How much longer this machine takes than that of `units_of` for ``study``; 1 if not known.
+    """Time of this machine over that of `units_of` for ``study``; 1 if not known.
 
     Its units stand in the record that ``plan`` names.
     """

@@ -67,7 +67,7 @@ class Failure:
 
 
 def cause(said: str, folder: Path) -> str:
-    """Why a job ended that wrote no error into its log.
+    """Reason for the end of a job that wrote no error into its log.
 
     Parameters
     ----------

@@ -127,7 +127,7 @@ def study_files(plan: Plan, folders: Folders) -> Iterator[str]:
 
 
 def asked_for(found: Iterable[str], plan: Plan, folders: Folders) -> Iterator[str]:
-    """Those of ``found`` paths that a target may name beside the study's own files.
+    """Paths among ``found`` that a target may name beside the study's own files.
 
     ``plan`` and ``folders`` are those of the study.
     """

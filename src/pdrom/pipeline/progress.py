@@ -67,7 +67,7 @@ class Estimate:
         self._jobs = {number: _Job(expected) for number, expected in jobs.items()}
 
     def start(self, job: int, now: float) -> None:
-        """A job starts, at ``now`` in seconds."""
+        """Note that ``job`` starts at the time ``now``, s."""
         if job in self._jobs:
             self._jobs[job].start = now
 
@@ -107,7 +107,7 @@ class Progress(logging.Handler):
     """Writes a line for each job that starts, and what Snakemake warns of."""
 
     def start(self, plans: bool = False) -> None:
-        """Nothing was seen yet; of a dry run, which ``plans``, no job is shown."""
+        """Begin with nothing seen; of a dry run, which ``plans``, no job is shown."""
         self._plans = plans
         self._started = self._total = 0
         self._messages: dict[int, str] = {}

@@ -113,7 +113,7 @@ def _large_scenes(study: Study, labels: Labels) -> tuple[NamedScene, ...]:
 
 
 def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
-    """Those whose models the study holds."""
+    """Cases whose models the study holds."""
     held = {labels["scene"] for labels in labels_of(study, paths.SUBSPACES)}
     models = study.settings.subspace
     return tuple(
@@ -124,7 +124,7 @@ def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
 
 
 def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...]:
-    """Those whose samplings the study holds."""
+    """Cases whose samplings the study holds."""
     held = labels_of(study, paths.SAMPLING)
     return tuple(
         case

@@ -1,4 +1,4 @@
-"""How far a run is from its full-order run in what users look at: by frame, and as errors.
+"""Deviations of a run from the full order in what users look at: by frame, and as errors.
 
 Beside the positions these are the velocities, the shape (what the best rigid motion of each frame,
 Kabsch 1976, leaves of the difference), the total energy, and when an obstacle is first touched.

@@ -1,4 +1,4 @@
-"""How far two values of a quantity are apart, in the measure in which its tolerance is given."""
+"""Distance of two values of a quantity, in the measure in which its tolerance is given."""
 
 import numpy as np
 import pandas as pd

@@ -84,7 +84,7 @@ def status_of(lines: Iterable[Line]) -> Status:
 
 
 def counted(lines: Sequence[Line]) -> str:
-    """How many ``lines`` of each kind have which outcome."""
+    """Counts of ``lines`` by kind and outcome."""
     parts = []
     for kind in dict.fromkeys(line.kind for line in lines):
         own = [line.outcome for line in lines if line.kind == kind]

@@ -68,7 +68,7 @@ def matrix_error(group: ConstraintGroup, d: np.ndarray, unique: bool) -> tuple[f
 
 
 def _outside(p: np.ndarray, low: float, high: float, size: bool) -> float:
-    """How far singular values of p, or their product, lie outside [low, high].
+    """Distance of singular values of p, or of their product, from [low, high].
 
     A wrong orientation counts fully. The product of what is long and thin is known only as exactly
     as its smallest value.

@@ -1,4 +1,4 @@
-"""How far bounded projections can carry a run.
+"""Reach of a run that bounded projections can carry.
 
 However many local/global iterations a frame has, its end obeys
 

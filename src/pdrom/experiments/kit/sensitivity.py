@@ -1,4 +1,4 @@
-"""How far two full-order runs drift apart that should be the same (docs/study.md).
+"""Drift of two full-order runs that should be the same (docs/study.md).
 
 What a run does when its start moves by 1e-10 of the extent bounds what any reduced model can be
 blamed for. Beside the start, the solver (another order of summation), the number of iterations and

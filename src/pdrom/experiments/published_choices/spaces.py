@@ -1,4 +1,4 @@
-"""How the published code holds vertices and lets them meet the floor."""
+"""Holding vertices, and letting them meet the floor, as the published code does."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""How the compiled functions of the model are compiled and kept."""
+"""Compiling the compiled functions of the model, and keeping them."""
 
 from functools import cache, cached_property
 from pathlib import Path

@@ -43,7 +43,7 @@ class ControlStepper(Stepper):
         return energy + self.space.inertia_energy(y - self._s)
 
     def rounding(self, y: np.ndarray, objective: float) -> float:
-        """How much an objective of this size may rise at y by rounding, J."""
+        """Largest rise of an objective of this size at y by rounding, J."""
         squares = sum(float(np.vdot(y, step.matrix @ y)) for step in self.local_steps)
         noise = 0.5 * ROUNDOFF**2 * squares
         return 2.0 * float(np.sqrt(objective * noise)) + noise

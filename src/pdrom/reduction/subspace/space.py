@@ -77,7 +77,7 @@ class ReducedSpace(Space):
         return all(contact.height is not None for contact in self._contacts)
 
     def free_frames(self, path: np.ndarray) -> int:
-        """How many frames of ``path`` (n, K, 3) come before the first that meets a floor."""
+        """Number of frames of ``path`` (n, K, 3) before the first that meets a floor."""
         first = len(path)
         for contact in self._contacts:
             first = contact.free_frames(path[:first])
@@ -229,7 +229,7 @@ class _ReducedContact:
         self._project = projector(columns, scene.masses)
 
     def free_frames(self, path: np.ndarray) -> int:
-        """How many frames of ``path`` (n, K, 3) come before the first with a probe in the floor."""
+        """Number of frames of ``path`` (n, K, 3) before the first with a probe in the floor."""
         lowest = (path[:, :, 1] @ self._probes.T).min(axis=1)
         # a frame that is not finite is left to the plain step
         above = lowest >= self.height

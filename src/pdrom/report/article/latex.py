@@ -52,7 +52,7 @@ class Origins:
 
 
 def prepared(source: str, document: str, origins: Origins, facts: Facts) -> str:
-    """Return the ``source`` of a ``document`` for pandoc."""
+    """Return the ``source`` of a ``document`` for pandoc, linked by ``origins`` and ``facts``."""
     preamble, begin, text = source.partition(r"\begin{document}")
     text = _COMMENT.sub("", _decided(text, origins.known[document]))
     text = _FIGURE.sub(_figure, text)

@@ -1,4 +1,4 @@
-"""How fragile verdicts are: the same tests with other thresholds, shares, rows."""
+"""Fragility of verdicts: the same tests with other thresholds, shares, rows."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 

@@ -121,7 +121,7 @@ def _places(numbers: Numbers) -> tuple[str, str]:
 
 
 def _tolerances(table: Table) -> str:
-    """How exactly a table is expected: the number of columns of each kind."""
+    """Exactness that is expected of a table: the number of columns of each kind."""
     held = Counter(column.quantity for column in table.columns)
     return ", ".join(f"{held[kind]} {kind}" for kind in QUANTITIES if held[kind])
 

@@ -60,7 +60,7 @@ class RunPanel:
         return both.resized(factor * window.width, factor * window.height)
 
     def scale(self, window: Window) -> float:
-        """How many times smaller than in ``window`` the run is drawn, at least 1."""
+        """Factor, at least 1, by which the run is drawn smaller than in ``window``."""
         return self.zoomed(window).width / window.width
 
 

@@ -95,7 +95,7 @@ def rerun_errors(path: str, info: RerunInfo) -> np.ndarray:
 
 
 def choose_ranks(infos: list[RerunInfo], asked: tuple[int | str, ...]) -> list[RerunInfo]:
-    """Those of ``infos`` with sizes ``asked`` for, in this order, none twice; all if none has."""
+    """Runs among ``infos`` of the sizes ``asked`` for, in this order, none twice, else all."""
     chosen: dict[str, RerunInfo] = {}
     for rank in asked:
         for info in infos:
