@@ -119,7 +119,7 @@ def _broken_down(test: TestRule, rows: pd.DataFrame, passed: np.ndarray) -> str:
 
 
 def _why_empty(test: TestRule, tables: Tables) -> str:
-    """Reason of a test without values: reruns that could not start, or none in the configuration."""
+    """Reason for a test without values: reruns that could not start, or none in this study."""
     if test.metric == "rerun_error":
         where = {k: v for k, v in test.where.items() if k != "r"}
         if len(filtered(tables["reduced_reruns"], where)):
