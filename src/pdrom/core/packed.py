@@ -21,7 +21,7 @@ def pack_array(values: np.ndarray, kind: str) -> dict[str, Any]:
 
 
 def pack_positions(positions: np.ndarray) -> dict[str, Any]:
-    """Positions (F, N, 3) as steps of a 65535th of their bounding box, and only their changes.
+    """``positions`` (F, N, 3) as steps of a 65535th of their bounding box, and only their changes.
 
     A coordinate is wrong by half a step at most; changes from frame to frame, modulo 2^16, compress
     better than the positions.

@@ -156,7 +156,7 @@ def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> 
 
     Parameters
     ----------
-    difference, displacement : norms by frame, see `pdrom.model.metrics.trajectory_error`
+    difference, displacement : (F',) m norms, see `pdrom.model.metrics.trajectory_error`
     """
     if len(difference) < end:
         return None

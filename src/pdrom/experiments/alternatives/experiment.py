@@ -58,7 +58,7 @@ class References:
     error: float
 
     def errors(self, run: np.ndarray | None) -> dict[str, float | None]:
-        """Relative errors of a run, empty if it blew up."""
+        """Relative errors of a ``run`` (F + 1, N, 3) m, empty if it blew up."""
         return {
             "error_implicit": _error(run, self.implicit),
             "error_continuous": _error(run, self.continuous),

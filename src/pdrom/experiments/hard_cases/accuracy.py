@@ -47,7 +47,7 @@ REFERENCES = {"clamped": clamped, "size": sized}
 
 
 def matrix_error(group: ConstraintGroup, d: np.ndarray, unique: bool) -> tuple[float, float]:
-    """Relative error of ``group``'s p(d) and the condition number of the projection at d.
+    """Relative error of ``group``'s p(d) at ``d`` (p, 3), and the condition number there.
 
     Where p is not unique any nearest point is right: the error is that of the distance |d - p|, or
     of the singular values of p (their product, where that is what is kept), whichever is larger,

@@ -21,7 +21,7 @@ def digits_for(*arrays: np.ndarray) -> int:
 
 
 def exact(a: np.ndarray) -> mpmath.matrix:
-    """A double array (n, m) as a matrix of the same numbers."""
+    """A double array ``a`` (n, m) as a matrix of the same numbers."""
     return mpmath.matrix(a.tolist())
 
 

@@ -37,13 +37,13 @@ class ControlStepper(Stepper):
         self._s, self._elimination, self._base = self._begin(state, frame)
 
     def objective(self, y: np.ndarray) -> float:
-        """Sampled objective of the frame at y (K, 3), J."""
+        """Sampled objective of the frame at ``y`` (K, 3), J."""
         unused = np.zeros_like(y)
         energy = sum(step.accumulate(y, unused) for step in self.local_steps)
         return energy + self.space.inertia_energy(y - self._s)
 
     def rounding(self, y: np.ndarray, objective: float) -> float:
-        """Largest rise of an objective of this size at y by rounding, J."""
+        """Largest rise of an objective of this size at ``y`` (K, 3) by rounding, J."""
         squares = sum(float(np.vdot(y, step.matrix @ y)) for step in self.local_steps)
         noise = 0.5 * ROUNDOFF**2 * squares
         return 2.0 * float(np.sqrt(objective * noise)) + noise

@@ -91,7 +91,7 @@ class ReducedSpace(Space):
         return held_path(self._boundaries, frames, positions)
 
     def elimination(self, fixed: np.ndarray) -> DenseElimination:
-        """The factored system without the ``fixed`` coordinates."""
+        """Factored system without the ``fixed`` coordinates (m,)."""
         key = fixed.tobytes()
         if key not in self._cache:
             self._cache[key] = DenseElimination(self.matrix, fixed)

@@ -147,7 +147,7 @@ class Alternative(Stepper):
 
 
 def inverse_masses(masses: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-    """1 / M of ``masses`` (N,), zero for the held vertices ``fixed``: nothing moves them."""
+    """1 / M of ``masses`` (N,) kg, zero for held vertices ``fixed`` (n,): nothing moves them."""
     inverse = 1.0 / masses
     inverse[fixed] = 0.0
     return inverse

@@ -63,7 +63,10 @@ def shade(normals: np.ndarray, camera: Camera) -> np.ndarray:
 
 
 def depth_order(points: np.ndarray, triangles: np.ndarray, camera: Camera) -> np.ndarray:
-    """Faces (T,) of ``triangles`` of ``points`` from far to near by ``camera``; ties keep order."""
+    """Faces (T,) of ``triangles`` (T, 3) from far to near by ``camera``; ties keep order.
+
+    ``points`` (N, 3) m are their vertices.
+    """
     return np.argsort(camera.depth(points)[triangles].mean(axis=1), kind="stable")
 
 

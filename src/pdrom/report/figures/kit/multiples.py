@@ -131,7 +131,7 @@ def rim_arrows(
 
 
 def clipped(values: np.ndarray, low: float, high: float) -> np.ndarray:
-    """``values`` moved to the nearest limit, ``low`` or ``high``; NaN stays NaN."""
+    """``values`` (n,) moved to the nearest limit, ``low`` or ``high``; NaN stays NaN."""
     return np.clip(values, low, high)
 
 
