@@ -204,7 +204,7 @@ def draw_lines(
 ) -> None:
     """Draw coloured ``segments`` (n, 2, 3) m on ``ax`` from far to near, as ``camera`` sees them.
 
-    ``colours`` (n, 3) are theirs, ``width`` is in points.
+    ``colours`` (n, 4) are theirs, RGBA, ``width`` is in points.
     """
     from matplotlib.collections import LineCollection
 
