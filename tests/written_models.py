@@ -13,23 +13,35 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
 from pdrom.reduction.subspace.store import store_columns, store_model
+from pdrom.report.live.page import live_page
+from places import ROOT
 
 
-def write_models(scene: Scene, folder: Path, every: int = 2) -> tuple[Path, SubspaceModel]:
-    """File of one model that samples some of the elements, and the model."""
+def write_page(folder: Path, models: list[Path]) -> Path:
+    """The page of some files of models, which lie below its folder."""
+    assets = [ROOT / read.path for name, read in live_page.files.items() if name != "models"]
+    out = folder / "live.html"
+    live_page([File(str(path), {}) for path in models], *assets, str(out))
+    return out
+
+
+def write_models(
+    scene: Scene, folder: Path, every: int = 2, k: int = 3
+) -> tuple[Path, SubspaceModel]:
+    """File of one model of ``k`` modes that samples some of the elements, and the model."""
     reference = trajectory(scene, track_objective=False)
     (group,) = scene.groups
     elements = np.arange(0, group.elements, every)
     samples = {group.name: Samples(elements, np.full(len(elements), float(every)))}
-    model = SubspaceModel("pod", make_columns(scene, reference[1:], "pod", 3), samples)
+    model = SubspaceModel("pod", make_columns(scene, reference[1:], "pod", k), samples)
     save_mesh(scene.mesh, folder / "mesh.h5")
     with write_hdf5(folder / "train.h5") as file:
         file["positions"] = reference
     with write_hdf5(folder / "models.h5") as file:
         store_columns(file.create_group("columns/own"), model.columns)
-        labels = {"method": "ecsw-1e-02", "position_basis": "pod", "k": 3, "base": "own"}
+        labels = {"method": "ecsw-1e-02", "position_basis": "pod", "k": k, "base": "own"}
         store_model(file.create_group("models/own"), labels, samples)
-    asked = LiveModels(sizes=(3,))
+    asked = LiveModels(sizes=(k,))
     options = Options(scene=scene.config, live=asked, guard=GuardSettings(), joint_rows=())
     mesh, train, models, out = (
         File(str(folder / name), {}) for name in ("mesh.h5", "train.h5", "models.h5", "test.js")

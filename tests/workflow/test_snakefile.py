@@ -238,7 +238,7 @@ def test_a_threshold_of_a_claim_reruns_verdicts_and_manuscript_only(finished: Ch
     figure = {f"{MICRO_RESULTS}/figures/claims_sensitivity.{kind}" for kind in ("pdf", "png")}
     tables = {
         f"{MICRO_RESULTS}/tables/{name}.csv"
-        for name in ("claims", "claims_sensitivity", "claims_tests")
+        for name in ("claims", "claims_sensitivity", "claims_tests", "replication")
     }
     assert others == tables | figure
 

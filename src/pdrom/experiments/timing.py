@@ -54,7 +54,7 @@ Alone = dict[tuple[str, str, int], ReducedLocalStep]
 COLUMNS = [
     "scene", "group", "method", "position_basis", "k", "r", "iterations", "vertices",
     "implementation", "ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms",
-    "global_ms", "spread_ms", "repeats",
+    "global_ms", "repeats",
 ]  # fmt: skip
 STATES = 5  # states of the full-order run at which local steps are timed alone
 
@@ -245,6 +245,5 @@ def _row(scene: Scene, measurement: Measurement) -> dict[str, Any]:
         "assembly_ms": measurement.assembly,
         "lift_ms": measurement.lift,
         "global_ms": measurement.solve,
-        "spread_ms": measurement.spread,
         "repeats": measurement.repeats,
     }

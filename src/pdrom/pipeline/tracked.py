@@ -1,4 +1,4 @@
-"""Measurements that git keeps: costs of jobs, and the winners on large meshes.
+"""Measurements that git keeps: costs of jobs, winners on large meshes, verdicts on another sample.
 
 ``./reproduce run python -m pdrom.pipeline.tracked costs`` writes `config/reference/job_costs.csv`
 again, from the logs of the full and of the tiny study in ``results``. It holds the mean processor
@@ -9,6 +9,9 @@ is named by below ``logs``: an experiment, or ``tables``, ``figures`` or ``paper
 ``./reproduce run python -m pdrom.pipeline.tracked meshes`` writes the file of the table
 `large_meshes` again, from a finished run of ``config/alternatives.yaml``, which takes too long for
 the default run. Its times are those of one machine, so that the record names both.
+
+``./reproduce run python -m pdrom.pipeline.tracked replication`` writes the file of the table
+`replication` again, from the table claims of ``config/replication.yaml``.
 """
 
 import sys
@@ -24,12 +27,16 @@ from pdrom.core.paths import TABLE
 from pdrom.core.store import atomic_path, read_table
 from pdrom.core.usage import usage_of
 from pdrom.pipeline.folders import folders
+from pdrom.tables.claims import load_claims
 from pdrom.tables.large_meshes import RECORDED
+from pdrom.tables.replication import MEASURED, RULES
+from pdrom.tables.replication import RECORDED as REPLICATED
 
 COSTS = Path("config/reference/job_costs.csv")
 COLUMNS = ["kind", "seconds", "coarse_seconds", "longest_s", "memory_mb"]
 COARSE = "config/tiny.yaml"
 LARGE = "config/alternatives.yaml"
+SAMPLE = "config/replication.yaml"
 
 
 def write_tracked(path: Path, content: bytes) -> None:
@@ -78,6 +85,25 @@ def recorded_meshes(winners: Path, processor: str) -> pd.DataFrame:
     return table.assign(processor=processor, date=day)
 
 
+def recorded_verdicts(claims: Path, rules: Path) -> pd.DataFrame:
+    """The verdicts of the table claims, the fingerprints of their rules, and the day.
+
+    Parameters
+    ----------
+    claims : the table of another sample
+    rules : the file of the rules
+
+    Raises
+    ------
+    StorageError
+        The table is missing or damaged.
+    """
+    table = read_table(claims)[["claim", *MEASURED]]
+    loaded = load_claims(rules)
+    day = datetime.fromtimestamp(claims.stat().st_mtime, UTC).date().isoformat()
+    return table.assign(rules=[loaded[claim].fingerprint for claim in table.claim], date=day)
+
+
 def _used(results: str) -> pd.DataFrame:
     rows = [
         {"kind": kind_of(str(log), results), **vars(used)}
@@ -98,7 +124,12 @@ def _meshes() -> tuple[Path, pd.DataFrame]:
     return Path(RECORDED), recorded_meshes(winners, machine().cpu)
 
 
-KEPT = {"costs": _costs, "meshes": _meshes}
+def _verdicts() -> tuple[Path, pd.DataFrame]:
+    claims = Path(TABLE.at(folders([SAMPLE], []).results, name="claims"))
+    return Path(REPLICATED), recorded_verdicts(claims, Path(RULES))
+
+
+KEPT = {"costs": _costs, "meshes": _meshes, "replication": _verdicts}
 
 
 def main(words: Sequence[str]) -> None:

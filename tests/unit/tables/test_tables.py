@@ -26,7 +26,7 @@ from pdrom.tables.singular_values import singular_values
 TIMING = [
     "scene", "group", "method", "position_basis", "k", "r", "iterations", "vertices",
     "implementation", "ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms",
-    "global_ms", "spread_ms", "repeats",
+    "global_ms", "repeats",
 ]  # fmt: skip
 SWEEP = [
     "scene", "iterations", "window", "frames", "error_converged", "error_scene", "residual",

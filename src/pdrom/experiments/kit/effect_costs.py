@@ -146,14 +146,18 @@ def _elements(scene: Scene, name: str) -> int:
 
 
 def left_out_sets(scene: Scene) -> list[tuple[str, ...]]:
-    """Effects to leave out in turn: none, every effect alone, all groups but one.
+    """Effects to leave out in turn: none, every effect of a frame alone, all groups but one.
 
-    Empty for a scene with a single group: without it there is nothing to project.
+    Empty for a scene with a single group: without it there is nothing to project. Effects of the
+    start, such as a kick, take no time of a frame.
     """
     groups = scene.config.groups
     if len(groups) < 2:
         return []
-    single = [(name,) for name in dict.fromkeys(e.effect for e in scene.config.effects)]
+    roles = (scene.groups, scene.forces, scene.boundaries, scene.contacts)
+    lasting = {effect.name for role in roles for effect in role}
+    listed = dict.fromkeys(e.effect for e in scene.config.effects)
+    single = [(name,) for name in listed if name in lasting]
     several = combinations(groups, len(groups) - 1) if len(groups) > 2 else ()
     return [(), *single, *several]
 

@@ -13,15 +13,7 @@ from pdrom.core.paths import File
 from pdrom.tables.kit.parts import joined
 
 NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # frame_times without a scene
-PHASES = (
-    "ms_per_frame",
-    "inertia_ms",
-    "local_ms",
-    "assembly_ms",
-    "lift_ms",
-    "global_ms",
-    "spread_ms",
-)
+PHASES = ("ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms", "global_ms")
 
 
 def in_one_time(

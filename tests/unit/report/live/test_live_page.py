@@ -2,7 +2,6 @@
 
 import io
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,19 +11,9 @@ from playwright.sync_api import Page
 from browser import browser_or_skip, page_at
 from builders import make_scene
 from pdrom.core.errors import StorageError
-from pdrom.core.paths import File
 from pdrom.core.store import write_text
-from pdrom.report.live.page import filled, live_page
-from places import ROOT
-from written_models import write_models
-
-
-def write_page(folder: Path, models: list[Path]) -> Path:
-    """The page of some files of models, which lie below its folder."""
-    assets = [ROOT / read.path for name, read in live_page.files.items() if name != "models"]
-    out = folder / "live.html"
-    live_page([File(str(path), {}) for path in models], *assets, str(out))
-    return out
+from pdrom.report.live.page import filled
+from written_models import write_models, write_page
 
 
 def test_what_is_filled_in_is_not_looked_at():
