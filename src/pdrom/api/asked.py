@@ -14,7 +14,7 @@ from pdrom.reduction.asked.run import CheckedRun
 
 
 def asked_run(full: FullRun, ask: Ask, scene: Scene | None) -> AskedRun:
-    """Choose on the motion of ``full``, then run ``scene`` (that motion without it).
+    """Choose on the motion of ``full`` for ``ask``, then run ``scene`` (that motion without it).
 
     Raises
     ------

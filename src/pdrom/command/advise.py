@@ -21,7 +21,7 @@ def _positive(text: str) -> float:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """The scene, the wishes, and where results lie."""
+    """Add to ``parser`` the scene, the wishes, and where results lie."""
     parser.add_argument("scene", metavar="SCENE", help="name of a scene, or its file")
     parser.add_argument(
         "--error", metavar="E", type=_positive, help="largest relative error allowed"
@@ -36,7 +36,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Read the tables that hold the scene and say what follows from them."""
+    """Read the tables that hold the scene of ``arguments`` and say what follows from them."""
     from pdrom.report.advice import on_asks, on_choices, on_effects, on_resolution
 
     scene, folder = _name(arguments.scene), arguments.results

@@ -33,7 +33,7 @@ class Command:
 
 
 def declare_unchecked(parser: argparse.ArgumentParser) -> None:
-    """The option of commands that read runs."""
+    """Add to ``parser`` the option of commands that read runs."""
     parser.add_argument(
         "--unchecked", action="store_true",
         help="read a run without a checksum inside (by an older pdrom) if it is sound",
@@ -41,12 +41,12 @@ def declare_unchecked(parser: argparse.ArgumentParser) -> None:
 
 
 def require_output(path: str | Path, reads: Sequence[str]) -> None:
-    """Whoever computes for long what a file is to hold asks this first.
+    """Check a ``path`` to write before anything long is computed for it.
 
     Raises
     ------
     StorageError
-        The file cannot be written, or it is one of those that the command reads.
+        The file cannot be written, or it is one of those that the command ``reads``.
     """
     from pdrom.core.errors import StorageError
     from pdrom.core.store import require_place

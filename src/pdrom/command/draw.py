@@ -11,7 +11,7 @@ from pdrom.core.project import checkout
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """The runs, what is made of them, and where."""
+    """Add to ``parser`` the runs, what is made of them, and where."""
     declare_results(parser)
     parser.add_argument(
         "--as", dest="kinds", metavar="KIND", nargs="+", default=[],
@@ -26,7 +26,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Write the files and say where they are."""
+    """Write the files that ``arguments`` ask for and say where they are."""
     from pdrom.core.store import require_place
     from pdrom.report.scenes.kinds import draw, require_kinds
 

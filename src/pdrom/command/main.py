@@ -49,7 +49,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Do what the command line asks; the exit code."""
+    """Do what the ``arguments`` of the command line ask; the exit code."""
     try:
         try:
             asked = _asked(arguments)

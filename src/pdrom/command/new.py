@@ -63,13 +63,13 @@ ENOUGH = 3  # held vertices, with which a body does not turn about a line
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """The file to write, and the mesh in it."""
+    """Add to ``parser`` the file to write, and the mesh in it."""
     parser.add_argument("scene", metavar="SCENE", help="file to write; .yaml is added to a name")
     parser.add_argument("--mesh", metavar="FILE", help="mesh file (.obj, .vtu, .msh ...)")
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Write a scene with comments; a file that is there is left alone."""
+    """Write the scene that ``arguments`` name, with comments; an existing file is left alone."""
     from pdrom.core.errors import ConfigurationError
     from pdrom.core.project import schema_line
     from pdrom.core.store.oserrors import reason

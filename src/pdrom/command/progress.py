@@ -1,4 +1,4 @@
-"""How far a run has come: one line on stderr, rewritten on a terminal."""
+"""Progress of a run: one line on stderr, rewritten on a terminal."""
 
 import sys
 from time import monotonic
@@ -45,7 +45,10 @@ class Progress:
 
 
 def line(name: str, done: int, frames: int, ms: float, left: float) -> str:
-    """The line of a run of which ``done`` frames are done, ``ms`` the last one's milliseconds."""
+    """Line of a run ``name`` of which ``done`` of ``frames`` are done.
+
+    ``ms`` are the last frame's milliseconds, ``left`` the seconds to its end.
+    """
     full = WIDTH * done // frames
     bar = "#" * full + "." * (WIDTH - full)
     return f"{name} [{bar}] frame {done} of {frames}, {ms:.2f} ms a frame, {left:.0f} s left"

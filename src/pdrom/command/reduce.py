@@ -21,7 +21,7 @@ def _size(text: str) -> int:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """The scene, what is reduced and how, and the file to write."""
+    """Add to ``parser`` the scene, what is reduced and how, and the file to write."""
     parser.add_argument("scene", metavar="SCENE.yaml", help="file of the scene")
     wish = parser.add_mutually_exclusive_group()
     wish.add_argument("--group", metavar="G", help="constraint group to reduce")
@@ -67,7 +67,10 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Run in full order unless that is done, reduce, run again, and say how it went."""
+    """Run in full order unless that is done, reduce, run again, and say how it went.
+
+    ``arguments`` are those of `declare`.
+    """
     if arguments.group is None:
         from pdrom.command.asked import perform_asked
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def declare_results(parser: argparse.ArgumentParser) -> None:
-    """The runs, and which configuration the pipeline made them with."""
+    """Add to ``parser`` the runs, and which configuration the pipeline made them with."""
     parser.add_argument(
         "results", metavar="RESULT", nargs="+",
         help="files of pdrom run and pdrom reduce, or names of scenes that ./reproduce has run",
@@ -28,7 +28,7 @@ def declare_results(parser: argparse.ArgumentParser) -> None:
 
 
 def viewed(arguments: argparse.Namespace) -> "list[ViewedScene]":
-    """Scenes with the runs that were named.
+    """Scenes with the runs that ``arguments`` name.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def viewed(arguments: argparse.Namespace) -> "list[ViewedScene]":
 
 
 def files_of(results: Sequence[str]) -> list[str]:
-    """Those of some arguments that are files."""
+    """Arguments among ``results`` that are files."""
     return [name for name in results if _is_file(name)]
 
 

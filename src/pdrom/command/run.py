@@ -8,7 +8,7 @@ from pdrom.command.base import Command, Status, require_output
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """The scene and the file to write."""
+    """Add to ``parser`` the scene and the file to write."""
     parser.add_argument("scene", metavar="SCENE.yaml", help="file of the scene")
     parser.add_argument(
         "--out", metavar="FILE", help="file to write (HDF5); SCENE.h5 beside the scene without it"
@@ -16,7 +16,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Run the scene with a line about its progress, and say what was written."""
+    """Run the scene of ``arguments`` with a line about its progress, and say what was written."""
     import numpy as np
 
     from pdrom.api import load_scene, run

@@ -13,7 +13,7 @@ LONGEST = 100  # characters of an attribute's value
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """The file."""
+    """Add to ``parser`` the file."""
     parser.add_argument("file", metavar="FILE", help="a result of the pipeline or of this command")
     parser.add_argument(
         "--configuration", action="store_true", help="the whole configuration, as YAML"
@@ -21,7 +21,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Say what a file holds; nothing is changed."""
+    """Say what the file of ``arguments`` holds; nothing is changed."""
     from pdrom.core.store import check_file
 
     path = Path(arguments.file)

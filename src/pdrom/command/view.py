@@ -10,14 +10,14 @@ from pdrom.command.results import declare_results, files_of, viewed
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """The runs, and the page to write."""
+    """Add to ``parser`` the runs, and the page to write."""
     declare_results(parser)
     parser.add_argument("--out", metavar="FILE", help="page to write; the first RESULT as .html")
     parser.add_argument("--open", action="store_true", help="open it in the browser")
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Write the page and say where it is."""
+    """Write the page of the runs in ``arguments`` and say where it is."""
     from pdrom.report.viewer.page import write_page
 
     first = Path(arguments.results[0])

@@ -1,4 +1,4 @@
-"""Who sets damaged files aside: a job of the workflow, whose next run makes them again.
+"""Setting damaged files aside: for jobs of the workflow alone, whose next run makes them again.
 
 Nobody else renames a file that it reads: it may be the only copy of somebody's run.
 """

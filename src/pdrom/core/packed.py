@@ -10,18 +10,18 @@ LEVELS = 65535  # of a quantised coordinate, over the run's bounding box
 
 
 def pack_text(values: np.ndarray) -> str:
-    """Bytes of an array, compressed, in base 64."""
+    """Bytes of an array ``values`` of any shape and type, compressed, in base 64."""
     return base64.b64encode(zlib.compress(np.ascontiguousarray(values).tobytes(), 9)).decode()
 
 
 def pack_array(values: np.ndarray, kind: str) -> dict[str, Any]:
-    """An array of any shape; ``kind`` is "f8", "f4", "u4" or "u1", little-endian."""
+    """An array ``values`` of any shape; ``kind`` is "f8", "f4", "u4" or "u1", little-endian."""
     shape, data = list(np.shape(values)), np.asarray(values).astype(f"<{kind}")
     return {"kind": kind, "shape": shape, "data": pack_text(data)}
 
 
 def pack_positions(positions: np.ndarray) -> dict[str, Any]:
-    """Positions (F, N, 3) as steps of a 65535th of their bounding box, and only their changes.
+    """``positions`` (F, N, 3) as steps of a 65535th of their bounding box, and only their changes.
 
     A coordinate is wrong by half a step at most; changes from frame to frame, modulo 2^16, compress
     better than the positions.

@@ -71,7 +71,15 @@ class Asks(AskedErrors):
 def asks(
     sources: list[Path], config: SceneConfig, section: AskedErrors, out: File, scores: File
 ) -> None:
-    """Make the hierarchy of a scene, its scores, and every ask on every held-out motion."""
+    """Make the hierarchy of a scene, its scores, and every ask on every held-out motion.
+
+    Parameters
+    ----------
+    sources : files of the mesh; the job depends on them
+    config : of the scene
+    section : errors and factors that are tried, and the levels
+    out, scores : tables of the asks and of the steps of the hierarchy
+    """
     training = Scene.build(config, config.mesh.build(Path()))
     own, _ = hierarchy(training, section)
     found = list(_scores(own, Motion(CALIBRATION.of(training)), config.name))

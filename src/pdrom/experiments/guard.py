@@ -112,7 +112,14 @@ def guard(
     settings: Options,
     out: File,
 ) -> None:
-    """Run every trial without a guard, watched, and with fall-back, and time all of them."""
+    """Run every trial without a guard, watched, and with fall-back, and time all of them.
+
+    Parameters
+    ----------
+    meshes, runs, bases, samplings, companions : files of each trial, in the order of the trials
+    settings : the trials and the guard
+    out : table
+    """
     rows = []
     files = zip(meshes, runs, bases, samplings, companions, strict=True)
     for case, paths in zip(settings.trials, files, strict=True):

@@ -95,6 +95,14 @@ def iterations(
     relative to the extent. If a frame stays above the tolerance there is no converged reference,
     and the errors against it are empty. The runs in position subspaces, whose iterations and
     training frames are those of the scene, have their error against it, too.
+
+    Parameters
+    ----------
+    mesh, fom, config : mesh, training run and configuration of the scene
+    sensitivity : table of its perturbed runs, which the ``horizon`` follows from
+    subspaces : files of the runs in position subspaces
+    sweep, solver : numbers of iterations and limits, and the sparse solver
+    out, models : tables of the K and of the runs in position subspaces
     """
     scene = scene_of(config, mesh)
     system = scene.system_with(solver)
@@ -137,7 +145,7 @@ def _subspaces(source: File, limit: np.ndarray, converged: bool) -> Iterator[tup
 
 
 def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
-    """(K, window) of all runs: plain ones, then accelerated ones where K lets two iterates mix."""
+    """(K, window) of all runs of ``counts`` K: plain ones, then those where two iterates mix."""
     plain = [(count, 0) for count in counts]
     return plain + [(count, window) for count in counts if window and count > 2]
 

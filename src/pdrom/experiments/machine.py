@@ -14,5 +14,5 @@ from pdrom.experiments.roofline.units import units
     alone=True,
 )
 def machine(out: File) -> None:
-    """Measure the units, and write them with what is known of the machine."""
+    """Measure the units, and write them to ``out`` with what is known of the machine."""
     write_text(this.machine(units()).model_dump_json(indent=2) + "\n", out.path)

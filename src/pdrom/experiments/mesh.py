@@ -16,6 +16,9 @@ from pdrom.model.mesh.types import save_mesh
     writes={"out": MESH},
 )
 def mesh(sources: list[Path], config: MeshConfig, out: File) -> None:
-    """Build, check and save a mesh; MeshError names the fault. Jobs run in the project's folder."""
+    """Build the mesh of ``config`` with its ``sources``, check it and save it to ``out``.
+
+    MeshError names the fault. Jobs run in the project's folder.
+    """
     made = check_mesh(config.build(Path()), config.label)
     save_mesh(made, out.path, {"label": config.label})

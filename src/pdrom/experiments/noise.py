@@ -74,7 +74,14 @@ class Options(ConfigModel):
     writes={"out": NOISE, "runs": NOISE_RUNS},
 )
 def noise(mesh: File, sensitivity: File, settings: Options, out: File, runs: File) -> None:
-    """Perturb, run, make bases without a cutoff, rerun; up to the scene's horizon."""
+    """Perturb, run, make bases without a cutoff, rerun; up to the scene's horizon.
+
+    Parameters
+    ----------
+    mesh, settings : of the scene
+    sensitivity : table of its perturbed runs, which the horizon follows from
+    out, runs : table, and file of the runs that a figure draws
+    """
     labels, asked = out.labels, settings.noise
     whole = scene_of(settings.scene, mesh)
     frames = min(whole.config.frames, max(2, settings.horizon.frames(sensitivity)))
@@ -106,8 +113,11 @@ def irregular(runs: Runs) -> bool:
 
 
 def kinds(scene: Scene) -> tuple[str, ...]:
-    """Axes that round-off may reach: all; of a flat mesh, too, those of its plane alone, and these
-    with the axis across it at a single vertex."""
+    """Axes of ``scene`` that round-off may reach: all.
+
+    Of a flat mesh, too, those of its plane alone, and these with the axis across it at a single
+    vertex.
+    """
     return (ALL, PLANE, VERTEX) if np.ptp(scene.mesh.points, axis=0).min() == 0.0 else (ALL,)
 
 
@@ -133,6 +143,11 @@ def noise_basis(
 
     A method with separate systems then has one for an axis in which nothing moves, as its text
     says; elsewhere in this study such an axis has none.
+
+    Parameters
+    ----------
+    projections : (n, e p, 3) snapshots
+    row_mass, rows_per_element : see `compute_basis`
     """
     basis = compute_basis(
         projections, row_mass, 0.0, rows_per_element=rows_per_element, spec=method

@@ -62,7 +62,7 @@ class Offline(ConfigModel):
     alone=True,
 )
 def offline(sizes: Offline, out: File) -> None:
-    """Time every algorithm."""
+    """Time every algorithm at the ``sizes`` of the section and write the table ``out``."""
     for _, *tasks in _tasks(sizes.small()):
         for task in filter(None, tasks):
             task()
@@ -113,7 +113,7 @@ def _tasks(sizes: Offline) -> Iterator[tuple[dict[str, Any], Task, Task | None]]
 
 
 def decaying(generator: np.random.Generator, n: int, m: int, rate: float = 1e-8) -> np.ndarray:
-    """Random matrix (n, m) whose singular values decay from about 1 to ``rate``."""
+    """Matrix (n, m), drawn by ``generator``, with singular values from about 1 to ``rate``."""
     factors = np.geomspace(1.0, rate, m)
     return generator.standard_normal((n, m)) / np.sqrt(n) * factors
 

@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
     writes={"out": BASIS},
 )
 def pod(snapshots: File, spec: BasisSpec, out: File) -> None:
-    """Compute and save a basis of the training snapshots."""
+    """Compute a basis ``spec`` of the training ``snapshots`` and save it to ``out``."""
     data = load_snapshots(snapshots.path)
     basis = compute_basis(
         data.train, data.row_mass, data.roundoff, rows_per_element=data.rows_per_element, spec=spec

@@ -1,4 +1,4 @@
-"""How well each position subspace could follow a motion, beside how well its run does."""
+"""Best approximation of a motion in each position subspace, beside the error of its run."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -47,7 +47,15 @@ def position_bases(
     horizon: Horizon,
     out: File,
 ) -> None:
-    """Compare the runs with full projections with the best positions in their subspace."""
+    """Compare the runs with full projections with the best positions in their subspace.
+
+    Parameters
+    ----------
+    mesh, config, full_order : of the scene; runs of all its motions
+    perturbed : table of its perturbed runs, which the ``horizon`` follows from
+    subspaces : file of the runs in position subspaces
+    out : table
+    """
     rows: list[dict[str, Any]] = []
     for run in full_order:
         split = run["run"]

@@ -1,4 +1,4 @@
-"""How far runs of a scene drift apart that should be the same, and what its effects do in it."""
+"""Drift of runs of a scene that should be the same, and what its effects do in it."""
 
 from typing import Annotated, Self
 
@@ -51,7 +51,14 @@ class Sensitivity(PerturbedRuns):
 def sensitivity(
     mesh: File, config: SceneConfig, chosen: PerturbedRuns, out: File, effects: File
 ) -> None:
-    """Write the differences of a scene's perturbed runs, and of its held-out motions."""
+    """Write the differences of a scene's perturbed runs, and of its held-out motions, to ``out``.
+
+    Parameters
+    ----------
+    mesh, config : of the scene
+    chosen : perturbations and seeds
+    effects : table of what the effects contribute
+    """
     scene = scene_of(config, mesh)
     table = sensitivities(scene, chosen.perturbations, chosen.seeds)
     heldout = [

@@ -1,4 +1,4 @@
-"""Why does block DEIM fail in a position subspace, and what mends it? Variants on one scene."""
+"""Ablation on one scene: why block DEIM fails in a position subspace, and what mends it."""
 
 import logging
 from collections.abc import Mapping
@@ -87,7 +87,14 @@ class Options(ConfigModel):
 def subspace_ablation(
     mesh: File, train: File, heldout: File, sensitivity: File, settings: Options, out: File
 ) -> None:
-    """Run every variant with all groups interpolated."""
+    """Run every variant with all groups interpolated and write the table ``out``.
+
+    Parameters
+    ----------
+    mesh, train, heldout : mesh and two runs of the scene
+    sensitivity : table of its perturbed runs, which the horizon follows from
+    settings : the variants
+    """
     runs = {"train": train, "heldout": heldout}
     trials = _Trials(settings, mesh, runs, sensitivity)
     motion = trials.motions["train"]

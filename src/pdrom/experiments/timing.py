@@ -111,7 +111,7 @@ def timing(
     effects: File,
     without: File,
 ) -> None:
-    """Measure one scene."""
+    """Measure frames (``out``), local steps alone, effects, and frames ``without`` each of them."""
     scene = scene_of(settings.scene, mesh, threads=settings.threads)
     system, asked = scene.system_with(settings.solver), settings.timing
     frames, name = min(asked.frames, scene.config.frames), scene.config.name

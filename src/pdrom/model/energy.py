@@ -74,7 +74,7 @@ class EnergyScale:
 
 
 def largest(energy: np.ndarray) -> float | None:
-    """Largest of `EnergyScale.relative`, None if there is none."""
+    """Largest of the values ``energy`` (n,) of `EnergyScale.relative`, None if there are none."""
     return float(energy.max()) if len(energy) else None
 
 

@@ -1,4 +1,4 @@
-"""How the held-out trajectories of a scene differ from the training one."""
+"""Held-out trajectories of a scene: what differs from the training one."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal, get_args

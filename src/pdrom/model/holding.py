@@ -107,7 +107,7 @@ def log_obstructed(
 def log_contacts(
     contacts: Sequence[Contact], boundaries: Sequence[Boundary], scene: str, rest: np.ndarray
 ) -> None:
-    """Warn of contacts that do not fit the rest shape (N, 3) m; held vertices do not count.
+    """Warn of contacts that do not fit the shape ``rest`` (N, 3) m; held vertices do not count.
 
     Parameters
     ----------

@@ -14,7 +14,10 @@ class ReductionPlan(ConfigModel):
 
 
 def with_asked(keys: Any) -> Any:
-    """Take ``reduce.error``, the asked error of the whole scene, out of the groups' plans."""
+    """Take ``reduce.error``, the asked error of the whole scene, out of the groups' plans.
+
+    ``keys`` are those of a scene file as read, and come back unchanged where no error is asked for.
+    """
     plans = keys.get("reduce") if isinstance(keys, dict) else None
     if not isinstance(plans, dict) or "error" not in plans:
         return keys

@@ -82,7 +82,7 @@ class SceneConfig(_Model):
         return [e.effect for e in self.effects if isinstance(e, GroupConfig)]
 
     def effects_without(self, *names: str) -> tuple[EffectConfig, ...]:
-        """The effects that are not called so, in their order."""
+        """Effects of the scene without those called one of ``names``, in their order."""
         return tuple(e for e in self.effects if e.effect not in names)
 
     @property

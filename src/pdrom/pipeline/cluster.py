@@ -65,7 +65,7 @@ class Demand:
     minutes: int
 
     def obstacle(self, nodes: Sequence[Node]) -> str | None:
-        """Why no node takes the job, with the remedy; None if one does."""
+        """Reason why none of ``nodes`` takes the job, with the remedy; None if one does."""
         own = [n for n in nodes if (n.partition == self.partition if self.partition else n.default)]
         if not own:
             known = ", ".join(dict.fromkeys(node.partition for node in nodes))
@@ -89,7 +89,7 @@ class Demand:
 
 
 def install_executor(arguments: Sequence[str]) -> None:
-    """Install the executor if the command asks for it and it is not there, then start again.
+    """Install the executor if ``arguments`` ask for it and it is not there, then start again.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def install_executor(arguments: Sequence[str]) -> None:
 
 
 def asked_executor(arguments: Sequence[str]) -> str | None:
-    """Executor that the command line names, or its profile; Snakemake's own parser may refuse it.
+    """Executor that ``arguments`` name, or their profile; Snakemake's own parser may refuse it.
 
     It knows only executors that are installed.
     """
@@ -130,7 +130,7 @@ def asked_executor(arguments: Sequence[str]) -> str | None:
 
 
 def check_nodes(dag: Any) -> None:
-    """Compare what Snakemake's jobs ask for with the nodes; ClusterError for one that none takes.
+    """Compare jobs of Snakemake's ``dag`` with the nodes; ClusterError for one that none takes.
 
     SLURM lets such a job wait without a word.
     """

@@ -57,7 +57,7 @@ class CommandLine:
 
     @classmethod
     def parse(cls, arguments: Sequence[str]) -> "CommandLine":
-        """By Snakemake's own parser, which ends the process for an option that it does not know.
+        """Parse ``arguments`` by Snakemake's parser, which ends the process for an unknown option.
 
         Raises
         ------
@@ -121,7 +121,7 @@ class CommandLine:
 
 
 def options(configfiles: Iterable[str], settings: Iterable[str]) -> list[str]:
-    """Options of the command line that name a configuration; none for the default one."""
+    """Options that name a configuration: ``configfiles``, ``settings``; none for the default."""
     files, pairs = list(configfiles), list(settings)
     return [*(["--configfile", *files] if files else []), *(["--config", *pairs] if pairs else [])]
 
@@ -148,7 +148,7 @@ def _report(found: dict[str, Any]) -> str | None:
 
 
 def check_files(paths: Iterable[str | Path]) -> None:
-    """Read every file; ConfigurationError for one that is no plain mapping of keys."""
+    """Read all ``paths``; ConfigurationError for one that is no plain mapping of keys."""
     for path in map(Path, paths):
         content = read_yaml(path)
         if not isinstance(content, dict):
@@ -186,7 +186,7 @@ def merged(default: Path, configfiles: Iterable[str], settings: Iterable[str]) -
 
 
 def check_or_exit(*paths: str | Path) -> None:
-    """`check_files`; a fault ends the process with one line."""
+    """Do `check_files` of ``paths``; a fault ends the process with one line."""
     try:
         check_files(paths)
     except ConfigurationError as error:
@@ -194,7 +194,7 @@ def check_or_exit(*paths: str | Path) -> None:
 
 
 def remember(command: CommandLine) -> None:
-    """Note which configuration runs."""
+    """Note which configuration runs, that of ``command``."""
     # late: it loads NumPy, which the environment is to be settled before
     from pdrom.core.store import atomic_path
 

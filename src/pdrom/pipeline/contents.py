@@ -17,13 +17,13 @@ Factors = dict[str, tuple[float, ...]]
 
 
 def labels_of(study: Study, place: Place) -> list[Labels]:
-    """Labels of every file of a kind, in the order of the configuration, without repetition."""
+    """Labels of every file of a kind, ``place``, in the order of ``study``, without repetition."""
     found = SOME[place](study) if place in SOME else _all(study, place)
     return list({tuple(labels.items()): labels for labels in found}.values())
 
 
 def paths_of(study: Study, place: Place, results: str) -> list[str]:
-    """Paths of every file of a kind below the folder ``results``."""
+    """Paths of every file of a kind, ``place``, of ``study`` below the folder ``results``."""
     return [place.at(results, **labels) for labels in labels_of(study, place)]
 
 

@@ -22,13 +22,16 @@ RUN_TIMES = Path("config/reference/run_times.csv")
 
 
 def units_of(study: str, root: Path) -> Units:
-    """Units of the machine on which a ``study``, full or tiny, was timed (`RUN_TIMES`)."""
+    """Units of the machine that timed a ``study``, full or tiny (`RUN_TIMES` below ``root``)."""
     row = read_table(root / RUN_TIMES, result=False).set_index("study").loc[study]
     return Units(**row[list(Units.model_fields)])
 
 
 def slower_here(plan: Plan, study: str) -> float:
-    """How much longer this machine takes than that of `units_of`; 1 where it is not known."""
+    """Time of this machine over that of `units_of` for ``study``; 1 if not known.
+
+    Its units stand in the record that ``plan`` names.
+    """
     try:
         record = (plan.root / MACHINE.at(plan.results)).read_bytes()
         here = Machine.model_validate_json(record).units
@@ -51,7 +54,9 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
 
 
 def tell_expectation(workflow: Any, plan: Plan) -> None:
-    """Log what every job of Snakemake's plan is expected to take; see `progress.Estimate.expect`.
+    """Log what every job of Snakemake's ``workflow`` is expected to take by ``plan``.
+
+    See `progress.Estimate.expect`.
 
     A job's share of this machine is 1 where it is alone, and where jobs run on a cluster.
     """

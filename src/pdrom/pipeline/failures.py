@@ -67,7 +67,7 @@ class Failure:
 
 
 def cause(said: str, folder: Path) -> str:
-    """Why a job ended that wrote no error into its log.
+    """Reason for the end of a job that wrote no error into its log.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ class Failures(logging.Handler):
         self._said: dict[int | None, str] = {}
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep what belongs to a failure."""
+        """Keep what belongs to a failure of a ``record``."""
         event = getattr(record, "event", None)
         text = record.getMessage()
         if event == LogEvent.GROUP_ERROR:

@@ -12,7 +12,7 @@ PREPRINT = "preprint:"
 
 
 def figure_arguments(arguments: Sequence[str]) -> list[str]:
-    """Options and targets for Snakemake, from what follows the word ``figure``.
+    """Options and targets for Snakemake, from the ``arguments`` that follow the word ``figure``.
 
     A number counts in the paper, one with an S before it in the supplement, ``preprint:NUMBER`` in
     the preprint; every figure has its name, too. A target reads ``figure NAME`` (one word), which

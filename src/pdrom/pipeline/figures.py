@@ -84,7 +84,7 @@ class _Sources(Resolver):
 
 
 def figure_jobs(study: Study, results: str) -> dict[str, FigureJob]:
-    """Every figure by name, with its paths below the folder ``results``.
+    """Every figure of ``study`` by name, with its paths below the folder ``results``.
 
     Raises
     ------

@@ -58,7 +58,7 @@ def fingerprint(*places: str) -> str:
 
 
 def closure(*places: str) -> list[str]:
-    """Names of the modules that `fingerprint` covers, sorted."""
+    """Names of the modules that `fingerprint` of ``places`` covers, sorted."""
     return sorted(_closure(tuple(place.partition(":")[0] for place in places)))
 
 
@@ -195,7 +195,7 @@ def _drop_others(entries: ast.Dict, module: str) -> None:
 
 
 def digest(root: Path, *names: str) -> str:
-    """Checksum of files that people edit, 16 hexadecimal digits.
+    """Checksum of the files ``names`` below ``root`` that people edit, 16 hexadecimal digits.
 
     Snakemake compares dates of files, which a copy, an archive or a wrong clock may set back; as a
     parameter of a rule, the content itself decides.

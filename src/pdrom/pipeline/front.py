@@ -41,7 +41,7 @@ HANDED_ON = {
 
 
 def completed(arguments: Sequence[str]) -> list[str]:
-    """Arguments for Snakemake.
+    """Complete the ``arguments`` of the command line for Snakemake.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
 
 
 def files_of(targets: Sequence[str], own: Folders) -> dict[str, list[str]]:
-    """Files to make for each target, see `Names.files`."""
+    """Files of the folders ``own`` to make for each of ``targets``, see `Names.files`."""
     # late: it loads the whole package
     from pdrom.pipeline.targets import Names
     from pdrom.report.figures.kit.catalogue import declarations

@@ -45,7 +45,7 @@ class Entry(_Record):
     environment: str | None = None
 
     def fits(self, path: Path) -> bool:
-        """Whether a file has the bytes that the entry records."""
+        """Whether the file ``path`` has the bytes that the entry records."""
         if self.sha256:
             with open(path, "rb") as handle:
                 return hashlib.file_digest(handle, "sha256").hexdigest() == self.sha256
@@ -68,7 +68,13 @@ class Manifest(_Record):
 
 
 def write_manifest(plan: Plan, folders: Folders, options: Iterable[str]) -> tuple[Manifest, bool]:
-    """Write the manifest of a study whose run has succeeded; say whether it is another now."""
+    """Write the manifest of a study whose run has succeeded; say whether it is another now.
+
+    Parameters
+    ----------
+    plan, folders : of the study
+    options : of the command line that name its configuration
+    """
     environments: dict[str, dict[str, str]] = {}
     files = {}
     for path in sorted(study_files(plan, folders)):
@@ -103,7 +109,7 @@ def read_manifest(results: str) -> Manifest:
 
 
 def own_files(plan: Plan, folders: Folders) -> set[str]:
-    """Files that a whole run of a study makes."""
+    """Files in ``folders`` that a whole run of a study makes by ``plan``."""
     return {
         *folders.documents.values(), *plan.paper.files, *plan.table_paths,
         *plan.figures, *(job.png for job in plan.figure_jobs.values()),
@@ -112,13 +118,19 @@ def own_files(plan: Plan, folders: Folders) -> set[str]:
 
 
 def study_files(plan: Plan, folders: Folders) -> Iterator[str]:
-    """Files on the disk that belong to a study: its own, and what was asked for beside them."""
+    """Files on the disk that belong to a study: its own, and what was asked for beside them.
+
+    ``plan`` and ``folders`` are those of the study.
+    """
     yield from (path for path in own_files(plan, folders) if Path(path).is_file())
     yield from asked_for(_visible(folders.results), plan, folders)
 
 
 def asked_for(found: Iterable[str], plan: Plan, folders: Folders) -> Iterator[str]:
-    """Those of some paths that a target may name beside the study's own files."""
+    """Paths among ``found`` that a target may name beside the study's own files.
+
+    ``plan`` and ``folders`` are those of the study.
+    """
     own = own_files(plan, folders)
     scenes, methods = set(scene_names(plan.root)), set(plan.study.methods)
     for path in found:

@@ -106,7 +106,7 @@ def _article(study: Study, given: Mapping[str, Paths], settings: Row, results: s
 
 
 def check_texts(study: Study) -> None:
-    """ConfigurationError for a text of the configuration that figures or TeX cannot typeset."""
+    """ConfigurationError for a text of ``study`` that figures or TeX cannot typeset."""
     folder = study.root / "config"
     for name, method in study.methods.items():
         require_typeset(method.title, f"{folder / 'methods.yaml'}: {name}.title")

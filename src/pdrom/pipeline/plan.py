@@ -39,10 +39,11 @@ def load_plan(
     folders: Folders = OF_STUDY,
     quiet: bool = False,
 ) -> "Plan":
-    """Plan of a configuration; a faulty one ends the process with one line, before any job.
+    """Plan of ``config``; a faulty one ends the process with one line, before any job.
 
     Parameters
     ----------
+    root : folder of the project
     files : where the configuration came from, for the messages
     folders : of its results
     quiet : whether warnings are dropped, see `pdrom.core.logs.planning_log`
@@ -80,7 +81,7 @@ class Plan:
         return self.study.settings
 
     def job(self, artifact: Artifact, labels: Labels = MappingProxyType({})) -> Job:
-        """The job of an experiment or table with these labels."""
+        """Job of an experiment or table, ``artifact``, with these ``labels``."""
         return self._resolver.job(artifact, labels)
 
     def check(self) -> None:

@@ -22,12 +22,12 @@ class Machine:
 
     @classmethod
     def here(cls) -> "Machine":
-        """This machine and this Python."""
+        """Machine and Python of this process."""
         libc = platform.libc_ver()[0] if platform.system() == "Linux" else ""
         return cls(platform.system(), platform.machine(), sys.version_info[:2], libc)
 
     def obstacle(self) -> str | None:
-        """Why the packages cannot be installed, with the remedy; None where they can."""
+        """Reason why the packages cannot be installed, with the remedy; None where they can."""
         version = ".".join(map(str, self.python))
         if not OLDEST <= self.python <= NEWEST:
             package = "immutables has no wheel for it" if self.python > NEWEST else "it is too old"

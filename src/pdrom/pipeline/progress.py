@@ -67,17 +67,17 @@ class Estimate:
         self._jobs = {number: _Job(expected) for number, expected in jobs.items()}
 
     def start(self, job: int, now: float) -> None:
-        """A job starts, at ``now`` in seconds."""
+        """Note that ``job`` starts at the time ``now``, s."""
         if job in self._jobs:
             self._jobs[job].start = now
 
     def finish(self, job: int, now: float) -> None:
-        """A job has ended."""
+        """Note that ``job`` has ended at the time ``now``, s."""
         if job in self._jobs:
             self._jobs[job].end = now
 
     def left(self, now: float) -> float | None:
-        """Seconds that are left; None while too little is done."""
+        """Seconds that are left at the time ``now``, s; None while too little is done."""
         begun = [job for job in self._jobs.values() if job.start is not None]
         done = [job for job in begun if job.end is not None]
         total = sum(job.expected.seconds for job in self._jobs.values())
@@ -107,7 +107,7 @@ class Progress(logging.Handler):
     """Writes a line for each job that starts, and what Snakemake warns of."""
 
     def start(self, plans: bool = False) -> None:
-        """Nothing was seen yet; of a dry run, which ``plans``, no job is shown."""
+        """Begin with nothing seen; of a dry run, which ``plans``, no job is shown."""
         self._plans = plans
         self._started = self._total = 0
         self._messages: dict[int, str] = {}
@@ -156,7 +156,7 @@ def _is_news(record: logging.LogRecord, event: LogEvent | None) -> bool:
 
 
 def rounded(seconds: float) -> str:
-    """A time in words, as roughly as it is known."""
+    """Time of so many ``seconds`` in words, as roughly as it is known."""
     minutes = seconds / 60
     if minutes < 1:
         return "less than a minute"

@@ -101,7 +101,10 @@ class Resolver:
     # What declarations ask for (`Sources`) --------------------------------------------------
 
     def file(self, place: Place, labels: Labels) -> str:
-        """Path of the file of a job; mesh and basis follow from its scene and method."""
+        """Path of the file ``place`` of a job with ``labels``.
+
+        Mesh and basis follow from its scene and method.
+        """
         found = dict(labels)
         if "mesh" in place.labels and "mesh" not in found:
             found["mesh"] = self.study.mesh_of(found["scene"])
@@ -110,7 +113,7 @@ class Resolver:
         return place.at(self.results, **{name: found[name] for name in place.labels})
 
     def files(self, place: Place, labels: Labels) -> list[str]:
-        """Paths of a kind whose labels agree with those of a job."""
+        """Paths of a kind, ``place``, whose labels agree with the ``labels`` of a job."""
         study = self.study.only(labels["scene"]) if "scene" in labels else self.study
         return [
             place.at(self.results, **held)
@@ -119,7 +122,10 @@ class Resolver:
         ]
 
     def first(self, place: Place, label: str, value: str) -> list[str]:
-        """One path for each set of the other labels: that with this value, else the first."""
+        """One path of ``place`` for each set of its other labels.
+
+        It is that whose ``label`` has this ``value``, else the first.
+        """
         chosen: dict[tuple[str, ...], Labels] = {}
         for labels in labels_of(self.study, place):
             others = tuple(other for name, other in labels.items() if name != label)
@@ -128,21 +134,24 @@ class Resolver:
         return [place.at(self.results, **labels) for labels in chosen.values()]
 
     def chosen(self, place: Place, first: bool) -> list[str]:
-        """Paths that the options of a figure choose; a study has no options."""
+        """Paths of ``place`` by the options of a figure; a study has none.
+
+        ``first`` limits them to the first of each experiment and method.
+        """
         raise NotImplementedError
 
     def published(self, name: str) -> list[str]:
-        """Tables of the published code that the options of a figure ask for."""
+        """Tables ``name`` of the published code that the options of a figure ask for."""
         raise NotImplementedError
 
     def table(self, name: str) -> str:
-        """File of a table; ConfigurationError if there is no such table."""
+        """File of the table ``name``; ConfigurationError if there is no such table."""
         if name not in declared():
             raise ConfigurationError(f"'{name}': unknown{choices(name, declared())}")
         return TABLE.at(self.results, name=name)
 
     def value(self, key: str, labels: Labels) -> Any:
-        """Value of the configuration by its key, or one derived from it (`DERIVED`)."""
+        """Value of the configuration by its ``key``, or one derived (`DERIVED`) for ``labels``."""
         head, *parts = key.split(".")
         if head in DERIVED:
             value = DERIVED[head](self.study, labels)
@@ -156,7 +165,7 @@ class Resolver:
         return value
 
     def per_scene(self, key: str) -> dict[str, Any]:
-        """Value of every scene by its name."""
+        """Value of ``key`` of every scene by its name."""
         if key not in SceneConfig.model_fields:
             known = choices(key, SceneConfig.model_fields)
             raise ConfigurationError(f"the key '{key}' of scenes: unknown{known}")
@@ -164,12 +173,12 @@ class Resolver:
 
 
 def listed(paths: Paths) -> list[str]:
-    """A path, or several, as a list."""
+    """List of one path, or of several, ``paths``."""
     return [paths] if isinstance(paths, str) else list(paths)
 
 
 def of_wildcards(
     resolver: Resolver, artifact: Artifact, value: Callable[[Job], Any]
 ) -> Callable[[Mapping[str, str]], Any]:
-    """``value`` of a job as the function of wildcards that the workflow calls."""
+    """``value`` of a job, ``artifact`` by ``resolver``, as the workflow's function of wildcards."""
     return lambda wildcards: value(resolver.job(artifact, wildcards))

@@ -33,7 +33,7 @@ class Rule:
 
 
 def rules(plan: Plan, cores: int) -> Iterator[Rule]:
-    """Yield the rule of every artifact; one that measures times claims all ``cores``."""
+    """Rule of every artifact of ``plan``; one that measures times claims all ``cores``."""
     for experiment in plan.experiments.values():
         yield _experiment(plan, experiment, cores)
     for table in plan.tables.values():

@@ -62,7 +62,8 @@ class Run:
     def check(self, plan: Plan, folders: Folders, rules: Iterable[Rule], cores: int) -> None:
         """End the process with one line if a target or a report cannot be made.
 
-        A dry run says at its end what it would take on so many ``cores``.
+        A dry run says at its end what it would take on so many ``cores``. ``plan``, ``folders`` and
+        ``rules`` are those of the workflow.
         """
         try:
             known(plan).check(self.command.targets, list(rules))
@@ -82,12 +83,15 @@ class Run:
             )
 
     def title(self, plan: Plan) -> str:
-        """Configuration of this run, and what tells its results from those of the full study."""
+        """Configuration of this run, and what tells results of ``plan`` from the full study's."""
         named, words = configuration(self.command), apart(plan.study)
         return f"{named} ({words})" if words else named
 
     def start(self, workflow: Any, plan: Plan) -> None:
-        """Before the first job: the process that jobs are forked from, or a look at the cluster."""
+        """Start the process that jobs are forked from, or look at the cluster, before all jobs.
+
+        ``workflow`` is Snakemake's, ``plan`` that of the study.
+        """
         # Jobs start without a limit of their rate. For one, Snakemake starts a timer after every
         # choice among the jobs, to choose again, and each such choice starts another one: towards
         # the end of a run they take a third of a core, and the process waits for the last one.
@@ -108,7 +112,7 @@ class Run:
                 sys.exit(f"pdrom: {error}")
 
     def succeed(self, plan: Plan, folders: Folders) -> None:
-        """End a run whose jobs all succeeded: it says what came of it."""
+        """End a run whose jobs all succeeded: it says what came of ``plan`` in ``folders``."""
         try:
             self._record(plan, folders)
         except PdromError as error:
@@ -134,7 +138,7 @@ class Run:
 
 
 def start_batch(workflow: Any) -> None:
-    """On a node of a cluster: the process that the jobs of a batch are forked from.
+    """Start the process that jobs of a batch are forked from, if ``workflow`` is on a node.
 
     Snakemake runs there twice. The first one hands the batch to the other (by `JOBSTEP`), which
     runs its jobs.

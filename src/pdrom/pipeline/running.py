@@ -83,7 +83,7 @@ def _open() -> int:
 
 
 def settle_dates(folders: Iterable[str | Path]) -> int:
-    """Move files dated in the future to just before now, in their order; say and return how many.
+    """Move files in ``folders`` dated in the future to just before now; say and return how many.
 
     The order is kept: what was newer than something else, and makes it run again, still is.
     """

@@ -36,7 +36,9 @@ class SceneOrder:
 
 
 def scene_order(arguments: Sequence[str], root: Path = Path()) -> SceneOrder:
-    """Jobs and pictures that ``scene`` or ``viewer`` and the words after it ask for.
+    """Jobs and pictures that ``arguments``, ``scene`` or ``viewer`` and words after it, ask for.
+
+    ``root`` is the folder of the project.
 
     Raises
     ------
@@ -73,7 +75,10 @@ def scene_order(arguments: Sequence[str], root: Path = Path()) -> SceneOrder:
 
 
 def viewer_scenes(root: Path, configfiles: Iterable[str], settings: Iterable[str]) -> list[str]:
-    """Scenes of the viewer: those that the configuration names, else its first ones."""
+    """Scenes of the viewer: those that the configuration names, else its first ones.
+
+    It is that of ``configfiles`` and ``settings`` over the default one below ``root``.
+    """
     whole = merged(root / DEFAULT, configfiles, settings)
     scenes = (whole.get("viewer") or {}).get("scenes") or whole["scenes"][:VIEWED]
     require_scenes(root, scenes, "viewer.scenes")
@@ -83,7 +88,9 @@ def viewer_scenes(root: Path, configfiles: Iterable[str], settings: Iterable[str
 def study_of(
     root: Path, scenes: Sequence[str], configfiles: Iterable[str], settings: Iterable[str]
 ) -> Study:
-    """Study of some scenes, which need not be named by its configuration.
+    """Study of some ``scenes``, which need not be named by its configuration.
+
+    That is as in `viewer_scenes`: ``root``, ``configfiles`` and ``settings``.
 
     Raises
     ------
@@ -96,7 +103,7 @@ def study_of(
 
 
 def scene_results(study: Study, scene: str, results: str) -> SceneResults:
-    """Results of a scene below the folder ``results``."""
+    """Results of a ``scene`` of ``study`` below the folder ``results``."""
     section = study.settings.sensitivity
     return SceneResults(
         folder=results,

@@ -76,12 +76,12 @@ UNCHANGED = Changes()
 
 
 def scene_names(root: Path) -> list[str]:
-    """Names of all scenes that have a file."""
+    """Names of all scenes that have a file below ``root``."""
     return sorted(path.stem for path in (root / "config" / "scenes").glob("*.yaml"))
 
 
 def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
-    """ConfigurationError, which ``key`` opens, for a name without a file in config/scenes."""
+    """ConfigurationError, which ``key`` opens, if one of ``names`` has no file below ``root``."""
     known = scene_names(root)
     for name in names:
         if name not in known:
@@ -89,12 +89,12 @@ def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
 
 
 def load_scene(root: Path, name: str, changes: Change = UNCHANGED) -> SceneConfig:
-    """Configuration of scene ``name``, see `load_bound_scene`."""
+    """Configuration of scene ``name``; ``root`` and ``changes`` as in `load_bound_scene`."""
     return load_bound_scene(root, name, changes).config
 
 
 def load_bound_scene(root: Path, name: str, changes: Change = UNCHANGED) -> Scene:
-    """Scene ``name`` from config/scenes, changed, and built to find every fault early.
+    """Scene ``name`` below ``root`` with ``changes``, built to find every fault early.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def load_bound_scene(root: Path, name: str, changes: Change = UNCHANGED) -> Scen
 
 
 def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
-    """Scene of a configuration; ``source`` opens the messages about its faults.
+    """Built ``scene``, whose files lie below ``root``; ``source`` opens messages about its faults.
 
     Raises
     ------
@@ -127,7 +127,10 @@ def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
 
 
 def read_scene(root: Path, name: str, changes: Change = UNCHANGED) -> SceneConfig:
-    """Configuration of scene ``name``, changed, without its mesh; ConfigurationError."""
+    """Configuration of scene ``name`` below ``root``, with ``changes``; ConfigurationError.
+
+    Its mesh is not built.
+    """
     require_scenes(root, [name], "scenes")
     path = scene_file(root, name)
     scene = validate(SceneConfig, named(read_yaml(path), name), str(path))
@@ -137,7 +140,7 @@ def read_scene(root: Path, name: str, changes: Change = UNCHANGED) -> SceneConfi
 
 
 def scene_file(root: Path, name: str) -> Path:
-    """The file of scene ``name``."""
+    """File of scene ``name`` below ``root``."""
     return root / "config" / "scenes" / f"{name}.yaml"
 
 

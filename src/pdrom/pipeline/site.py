@@ -20,7 +20,7 @@ LINK = re.compile(r"\]\(([^)#:\s]+)[^):]*\)")
 
 
 def collect(root: Path, target: Path) -> list[Path]:
-    """Copy README and every file that it leads to into a folder; their paths below ``root``.
+    """Copy README and every file that it leads to into ``target``; their paths below ``root``.
 
     Raises
     ------

@@ -143,7 +143,7 @@ class Study:
         root: Path | str = ".",
         source: str = "configuration (config/default.yaml)",
     ) -> "Study":
-        """Study of a (merged) configuration; ``source`` opens the messages about it.
+        """Study of a (merged) ``config`` below ``root``; ``source`` opens the messages about it.
 
         Raises
         ------
@@ -171,7 +171,7 @@ class Study:
         return load_methods(self.root / "config" / "methods.yaml")
 
     def scene(self, name: str) -> SceneConfig:
-        """Configuration of a scene; of one outside the study, too, if it has a file.
+        """Configuration of scene ``name``; of one outside the study, too, if it has a file.
 
         Raises
         ------
@@ -209,7 +209,7 @@ class Study:
         return {scene.mesh.identifier: scene.mesh for scene in self.scenes.values()}
 
     def mesh(self, identifier: str) -> MeshConfig:
-        """Configuration of a mesh; of one outside the study, too, if a scene has it.
+        """Configuration of mesh ``identifier``; of one outside the study, too, if a scene has it.
 
         Raises
         ------
@@ -225,13 +225,13 @@ class Study:
         raise ConfigurationError(f"no scene in config/scenes has the mesh '{identifier}'")
 
     def method(self, name: str) -> MethodSpec:
-        """A method of the study; ConfigurationError for another one."""
+        """Method ``name`` of the study; ConfigurationError for another one."""
         if name not in self.methods:
             raise ConfigurationError(f"unknown method '{name}'{choices(name, self.methods)}")
         return self.methods[name]
 
     def basis(self, identifier: str) -> BasisSpec:
-        """Specification of a basis by its first method; ConfigurationError if none uses it."""
+        """Specification of basis ``identifier`` by its first method, else ConfigurationError."""
         for method in self.methods.values():
             if method.basis_id == identifier:
                 return BasisSpec(**{key: getattr(method, key) for key in BasisSpec.model_fields})
@@ -239,7 +239,7 @@ class Study:
         raise ConfigurationError(f"unknown basis '{identifier}'{choices(identifier, known)}")
 
     def named_methods(self, names: Iterable[str], key: str) -> dict[str, MethodSpec]:
-        """Methods by name; ConfigurationError, which ``key`` opens, for an unknown one."""
+        """Methods by ``names``; ConfigurationError, which ``key`` opens, for an unknown one."""
         known = self.every_method
         for name in names:
             if name not in known:

@@ -10,7 +10,7 @@ log = logging.getLogger(__name__)
 
 
 def check_subspaces(study: Study) -> None:
-    """Say which scenes go without subspaces, auxiliary model and estimates.
+    """Say which scenes of ``study`` go without subspaces, auxiliary model and estimates.
 
     Raises
     ------

@@ -63,6 +63,7 @@ def summary(
 
     Parameters
     ----------
+    command, folders : line that started the run, and where its results lie
     figures, tables : files that the study has when it is complete
     apart : words that tell its verdicts from those of the full study, if it is another one
     """
@@ -93,7 +94,7 @@ def minutes(seconds: float) -> str:
 
 
 def configuration(command: CommandLine) -> str:
-    """Files and settings of a configuration, in one line."""
+    """Files and settings of the configuration of ``command``, in one line."""
     names = command.configfiles or ("config/default.yaml",)
     return ", ".join([*names, *command.settings])
 
@@ -128,7 +129,7 @@ class Preview(logging.Handler):
         self._ended = False
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Count a job."""
+        """Count the job of a ``record``."""
         self._ended = self._ended or END in record.getMessage()
         if getattr(record, "event", None) != LogEvent.JOB_INFO:
             return
@@ -157,14 +158,17 @@ class Preview(logging.Handler):
 
 
 def shortened(reason: str) -> set[str]:
-    """Reasons in a text of Snakemake's, which lists files and settings behind each."""
+    """Reasons in ``reason``, a text of Snakemake's, which lists files and settings behind each."""
     found = [text for text in REASONS if reason.startswith(text) or f"; {text}" in reason]
     own = [text for text in found if text != FOLLOWS] or found
     return {REASONS[text] for text in own}
 
 
 def preview(seconds: Callable[[str], float], cores: int) -> None:
-    """Have this process say at its end what its dry run has planned, see `Preview`."""
+    """Have this process say at its end what its dry run has planned.
+
+    ``seconds`` and ``cores`` are those of `Preview`.
+    """
     planned = Preview(seconds, cores)
     logging.getLogger("snakemake.logging").addHandler(planned)
     atexit.register(lambda: sys.stdout.write(planned.text()))

@@ -28,7 +28,7 @@ class Rule(Protocol):
         ...
 
     def is_producer(self, requested_output: str) -> bool:
-        """Whether it makes a file of that name."""
+        """Whether it makes a file of the name ``requested_output``."""
         ...
 
 
@@ -40,7 +40,7 @@ class Names:
     tables: Collection[str]
 
     def files(self, target: str, folders: Folders) -> list[str]:
-        """Files to make for a target; itself unless it is a name.
+        """Files in ``folders`` to make for a ``target``; itself unless it is a name.
 
         A file below ``results`` is the study's own, wherever that has its results; ``figure NAME``
         stands for that figure alone.
@@ -76,7 +76,10 @@ class Known:
     labels: dict[str, Callable[[dict[str, str]], Iterable[str]]]
 
     def check(self, targets: Iterable[str], rules: Sequence[Rule]) -> None:
-        """ConfigurationError for the first target that nobody makes, with a suggestion."""
+        """ConfigurationError for the first of ``targets`` that no one of ``rules`` makes.
+
+        It comes with a suggestion.
+        """
         for target in targets:
             named = [rule for rule in rules if rule.name == target]
             if named and not named[0].has_wildcards():

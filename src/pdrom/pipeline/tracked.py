@@ -40,7 +40,7 @@ SAMPLE = "config/replication.yaml"
 
 
 def write_tracked(path: Path, content: bytes) -> None:
-    """Write a file that git keeps: whole or not at all, without a checksum beside it."""
+    """Write ``content`` to ``path``, which git keeps: whole or not at all, without a checksum."""
     with atomic_path(path, with_checksum=False) as temporary:
         temporary.write_bytes(content)
 
@@ -73,7 +73,7 @@ def measured_costs(results: str, coarse: str) -> pd.DataFrame:
 
 
 def recorded_meshes(winners: Path, processor: str) -> pd.DataFrame:
-    """The table winners with the machine and the day on which it was made.
+    """Table ``winners`` with the machine, its ``processor``, and the day on which it was made.
 
     Raises
     ------
@@ -133,7 +133,7 @@ KEPT = {"costs": _costs, "meshes": _meshes, "replication": _verdicts}
 
 
 def main(words: Sequence[str]) -> None:
-    """Write the measurements that are named again.
+    """Write the measurements that ``words`` name again.
 
     Raises
     ------

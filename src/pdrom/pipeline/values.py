@@ -113,7 +113,7 @@ def _large_scenes(study: Study, labels: Labels) -> tuple[NamedScene, ...]:
 
 
 def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
-    """Those whose models the study holds."""
+    """Cases whose models the study holds."""
     held = {labels["scene"] for labels in labels_of(study, paths.SUBSPACES)}
     models = study.settings.subspace
     return tuple(
@@ -124,7 +124,7 @@ def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
 
 
 def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...]:
-    """Those whose samplings the study holds."""
+    """Cases whose samplings the study holds."""
     held = labels_of(study, paths.SAMPLING)
     return tuple(
         case
@@ -134,7 +134,10 @@ def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...
 
 
 def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
-    """The methods that are timed on growing meshes; they need not be among the study's."""
+    """Methods that ``study`` times on growing meshes, the same for all ``labels``.
+
+    They need not be among its own.
+    """
     section = study.settings.scaling
     found = study.named_methods([section.method], "scaling.method")
     return found | study.named_methods(section.breakeven.methods, "scaling.breakeven.methods")

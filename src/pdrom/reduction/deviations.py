@@ -1,4 +1,4 @@
-"""How far a run is from its full-order run in what users look at: by frame, and as errors.
+"""Deviations of a run from the full order in what users look at: by frame, and as errors.
 
 Beside the positions these are the velocities, the shape (what the best rigid motion of each frame,
 Kabsch 1976, leaves of the difference), the total energy, and when an obstacle is first touched.
@@ -73,7 +73,7 @@ class Yardstick:
         return {"extent_norm": extent, "time_step": self.scene.config.time_step}
 
     def deviations(self, outcome: Rerun) -> dict[str, np.ndarray]:
-        """Series of a run.
+        """Series of a run, its ``outcome``.
 
         Returns
         -------
@@ -96,7 +96,7 @@ class Yardstick:
         }
 
     def errors(self, outcome: Rerun) -> dict[str, float | None]:
-        """Errors of a whole run by the names of their columns, see `errors_within`."""
+        """Errors of a whole run ``outcome`` by the names of their columns, see `errors_within`."""
         end = len(self.displacement)
         return errors_within(self.deviations(outcome), self.series, end, **self.units)
 
@@ -142,7 +142,10 @@ def errors_within(
 
 
 def rms_within(difference: np.ndarray, norm: float, end: int) -> float | None:
-    """Root mean square over the frames before ``end``, over ``norm``; None as `error_within`."""
+    """Root mean square of ``difference`` (F',) m before frame ``end``, over ``norm`` m.
+
+    None as `error_within`.
+    """
     if len(difference) < end or end == 0:
         return None
     return float(np.sqrt(np.mean(np.square(difference[:end] / norm))))
@@ -153,7 +156,7 @@ def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> 
 
     Parameters
     ----------
-    difference, displacement : norms by frame, see `pdrom.model.metrics.trajectory_error`
+    difference, displacement : (F',) m norms, see `pdrom.model.metrics.trajectory_error`
     """
     if len(difference) < end:
         return None

@@ -20,7 +20,7 @@ Bounds = Literal["none", "training"]
 
 
 class BasisSpec(ConfigModel):
-    """How a basis is made from snapshots.
+    """Recipe of a basis from snapshots.
 
     weighting : "mass" makes the modes orthonormal in the lumped-mass inner product of the rows
     centring : "affine" subtracts the mean and adds it back online; "mean-in-modes" is the way of

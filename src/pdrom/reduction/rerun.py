@@ -89,7 +89,7 @@ def compare(
 
 
 def extent_norm(reference: np.ndarray, extent: float) -> float:
-    """Frobenius norm, m, of a frame of ``reference`` with every vertex off by the rest extent."""
+    """Norm, m, of a frame of ``reference`` (F + 1, N, 3) with each vertex off by ``extent`` m."""
     return extent * float(np.sqrt(reference.shape[1]))
 
 
@@ -108,5 +108,5 @@ def step_norms(positions: np.ndarray) -> np.ndarray:
 
 
 def mean_motion(reference: np.ndarray) -> float:
-    """Root mean square of `displacement_norms` over the frames of ``reference``, m."""
+    """Root mean square, m, of `displacement_norms` of ``reference`` (F + 1, N, 3) over frames."""
     return float(np.sqrt(np.mean(displacement_norms(reference) ** 2)))

@@ -76,7 +76,7 @@ def collect(
     ----------
     training_run, heldout_run : files of the two full-order runs
     masses : (N,) kg
-    train : frames that train, ascending
+    train : (n,) frames that train, ascending
 
     Raises
     ------

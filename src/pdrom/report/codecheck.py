@@ -37,7 +37,7 @@ _TITLE = re.compile(r"\\title\{([^\\}]*)")
 
 
 def codecheck(tables: Iterable[Table]) -> str:
-    """Content of ``codecheck.yml``, in the folder of the project."""
+    """Content of ``codecheck.yml``, in the folder of the project, with all ``tables``."""
     title = _TITLE.search(Path("paper/main.tex").read_text(encoding="utf-8"))
     assert title, "the manuscript has no title"
     authors = [_author(each) for each in read_yaml(Path("CITATION.cff"))["authors"]]

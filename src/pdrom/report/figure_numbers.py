@@ -31,7 +31,7 @@ class Numbers:
         return ", ".join(f"figure {n} of {place}" for place, n in places.items() if n is not None)
 
     def label(self, name: str) -> str:
-        """Name of the figure with its numbers behind it, if it has one."""
+        """Figure's ``name`` with its numbers behind it, if it has any."""
         return f"{name} ({self.words})" if self.words else name
 
 

@@ -51,7 +51,13 @@ def alarms(
 ) -> pd.DataFrame:
     """For each motion a row for the alarm of the reruns' guard and one for the estimate.
 
-    Both count the same runs. The estimates are those of the runs as they are, frame by frame.
+    Both count the same runs. The ``estimates`` are those of the runs as they are, frame by frame.
+
+    Parameters
+    ----------
+    estimates, reruns, heldout : tables estimates, reduced_reruns and heldout_reruns
+    guarded, guarded_heldout : tables of the reruns, with what their guard saw
+    threshold, alarm : of that guard
     """
     rows: list[dict[str, Any]] = []
     for split, runs, files in (

@@ -46,5 +46,5 @@ TRAINED_ON = text("trained_on", f"frames that a reduction is trained on: {OWN}, 
     reads={"parts": Every(paths.ALTERNATIVES)},
 )
 def alternatives(parts: list[File]) -> pd.DataFrame:
-    """Rows of all scenes and meshes, in order; the held-out motion."""
+    """Rows of all scenes and meshes, in the order of their ``parts``; the held-out motion."""
     return joined(parts)

@@ -55,7 +55,10 @@ from pdrom.tables.kit.vocabulary import MS_PER_FRAME, SCENE, VERTICES
 def asks(
     runs: list[File], scores: list[File], risk: float, errors: Sequence[float]
 ) -> pd.DataFrame:
-    """Rows of all scenes, each with the factor that the scores of the others give."""
+    """Rows of the ``runs`` of all scenes, each with the factor that ``scores`` of the others give.
+
+    The factor has this ``risk`` of broken promises, over the asked ``errors``.
+    """
     rows, scored = joined(runs), joined(scores)
     if rows.empty:
         return rows

@@ -35,7 +35,7 @@ LARGE = 2000  # vertices from which on a scene counts as large
     reads={"asks": TableOf("asks")},
 )
 def asks_cost(asks: pd.DataFrame) -> pd.DataFrame:
-    """A row for each size of scene and each ask."""
+    """A row for each size of scene and each ask of the table ``asks``."""
     return pd.DataFrame(list(_rows(asks)))
 
 

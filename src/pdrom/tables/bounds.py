@@ -54,7 +54,7 @@ _KEYS = ["scene", "group", "method", "r"]
     reads={"parts": Every(paths.BOUNDS), "reruns": TableOf("reduced_reruns")},
 )
 def bounds(parts: list[File], reruns: pd.DataFrame) -> pd.DataFrame:
-    """One row per scene, group, method and r with positions unreduced.
+    """One row of ``parts`` per scene, group, method and r, beside the run in ``reruns``.
 
     contraction and spectral_radius are the largest of two states of the full-order run; empty where
     several groups act, and for scenes too large for dense matrices. The bounds need that no

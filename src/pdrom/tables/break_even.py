@@ -40,6 +40,8 @@ OWN_MESH = "1"  # factor of a scene's own mesh, whose curve is measured with its
 def breakeven(own: list[File], sized: list[File]) -> pd.DataFrame:
     """One row per size; ``breakeven_r`` belongs to a whole curve, see `CURVE`.
 
+    Scenes have their ``own`` mesh and those of other sizes, ``sized``.
+
     It is empty where the reduction still pays at the largest size, the numerical rank, and the
     smallest size tried where it never pays.
     """

@@ -53,10 +53,11 @@ def effects_contribution(
     costs: pd.DataFrame,
     left_out: pd.DataFrame,
 ) -> pd.DataFrame:
-    """One row per scene and effect.
+    """One row per scene and effect of ``parts``.
 
     The only group of a scene cannot be left out: ``moved`` is empty. Times are those of the tables
-    effects_cost and effects_left_out, the latter of scenes with several groups only.
+    effects_cost and effects_left_out, the latter of scenes with several groups only: ``costs`` and
+    ``left_out``. ``sensitivity``, ``perturbation`` and ``threshold`` are those of `horizons`.
     """
     frames = joined(parts)
     if not len(frames):

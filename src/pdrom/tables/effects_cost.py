@@ -28,7 +28,7 @@ TIMES = ("ms_per_frame",)
     reads={"parts": Every(paths.EFFECTS), "frame_times": TableOf("frame_times")},
 )
 def effects_cost(parts: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
-    """The scenes' tables one after the other."""
+    """Tables of the scenes, ``parts``, one after the other, in the one time of ``frame_times``."""
     rows = joined(parts)
     if rows.empty:
         return rows

@@ -28,7 +28,10 @@ TIMES = ("ms_per_frame", "saved_ms", "own_ms")
     reads={"parts": Every(paths.LEFT_OUT), "frame_times": TableOf("frame_times")},
 )
 def effects_left_out(parts: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
-    """Scenes with several groups, as they are and without some of their effects."""
+    """Scenes with several groups, ``parts``: as they are and without some of their effects.
+
+    Times are brought to those of the table ``frame_times``.
+    """
     rows = joined(parts)
     if rows.empty:
         return rows

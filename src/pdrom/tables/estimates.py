@@ -56,10 +56,12 @@ MARGIN = 1.5  # an estimate above this multiple of the auxiliary model's own err
     },
 )
 def estimates(parts: list[File], times: list[File], reruns: pd.DataFrame) -> pd.DataFrame:
-    """One row per run whose positions are kept; no error where it ended before the horizon.
+    """One row of ``parts`` per run with kept positions; no error where it ended before the horizon.
 
     A resolved estimate differs from the error by at most the auxiliary model's own error over the
     motion: if that is no larger than ``floor``, the ratio lies between 0.6 and 3.
+
+    ``times`` are those of the auxiliary models, ``reruns`` is the table reduced_reruns.
     """
     rows = joined(parts)
     if rows.empty:

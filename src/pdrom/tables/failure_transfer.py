@@ -45,7 +45,8 @@ def failure_transfer(
     """Each scene is left out once; counted are the failed runs of `failure_predictors`.
 
     A predictor is of use in a new scene if its share of mistakes is below that of calling all runs
-    what most runs of the other scenes are.
+    what most runs of the other scenes are. ``bounds``, ``reruns`` and ``reconstruction`` are the
+    tables of `predicted_runs`.
     """
     runs = predicted_runs(bounds, reruns, reconstruction)["failed"]
     rows: list[dict] = []

@@ -35,7 +35,7 @@ TWIN = "_twin"
     reads={"parts": Every(paths.FRAME_TIMES)},
 )
 def frame_times(parts: list[File]) -> pd.DataFrame:
-    """One row per scene: medians over processes, ratios within a process."""
+    """One row per scene of ``parts``: medians over processes, ratios within a process."""
     rows = joined(parts)
     if rows.empty:
         return rows

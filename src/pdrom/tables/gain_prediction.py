@@ -47,6 +47,7 @@ def gain_prediction(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.Da
 
     Counted are the runs of sampled methods whose basis suffices: the orthogonal projection on it
     does not fail. A run fails if it ends before the horizon or its error there exceeds `FAILED`.
+    ``reruns`` and ``reconstruction`` are the tables reduced_reruns and reconstruction_error.
 
     runs, failed, failed_share, median_error : of a decade ``lower`` < gain <= ``upper``, or of all
     rank_correlation : of predictor and error (Spearman), early ends tied above all others
@@ -67,7 +68,7 @@ def gain_prediction(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.Da
 
 
 def judged_runs(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFrame:
-    """Runs that count, with the column ``failed``; see `gain_prediction`."""
+    """Runs that count, with ``failed``; ``reruns``, ``reconstruction``: see `gain_prediction`."""
     runs = reruns_with_gain(reruns, reconstruction)
     fine = (runs.orthogonal_error <= FAILED) & (runs.method != ORTHOGONAL) & runs.error.notna()
     runs = runs[fine & runs.gain.notna()].copy()

@@ -52,7 +52,7 @@ from pdrom.tables.kit.vocabulary import (
     reads={"parts": Every(paths.GUARD), "frame_times": TableOf("frame_times")},
 )
 def guard(parts: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
-    """Rows of all cases, each after its full-order run."""
+    """Rows of all cases, ``parts``, each after its full-order run; times as in ``frame_times``."""
     rows = joined(parts)
     if rows.empty:
         return rows

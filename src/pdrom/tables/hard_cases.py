@@ -38,5 +38,5 @@ FRAGILE = 0.005
     reads={"parts": Every(paths.HARD_CASES)},
 )
 def hard_cases(parts: list[File]) -> pd.DataFrame:
-    """Rows in the order of the cases and methods."""
+    """Rows of ``parts`` in the order of the cases and methods."""
     return joined(parts)

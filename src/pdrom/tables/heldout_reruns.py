@@ -34,7 +34,12 @@ def heldout_reruns(
     sensitivity: pd.DataFrame,
     threshold: float,
 ) -> pd.DataFrame:
-    """Runs judged by the horizon of their own motion, see `judged_reruns`."""
+    """Runs judged by the horizon of their own motion, see `judged_reruns`.
+
+    Parameters
+    ----------
+    runs, rows, subspaces, subspace_rows, sensitivity, threshold : as there
+    """
     found = [
         judged_reruns(
             runs,

@@ -27,5 +27,5 @@ from pdrom.tables.kit.vocabulary import ROUNDING
     reads={"parts": Every(paths.KERNEL_ACCURACY)},
 )
 def kernel_accuracy(parts: list[File]) -> pd.DataFrame:
-    """Rows by group and class."""
+    """Rows of ``parts`` by group and class."""
     return joined(parts)

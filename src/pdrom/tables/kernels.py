@@ -45,7 +45,10 @@ _PER_ELEMENT = {
     reads={"phases": TableOf("roofline"), "accuracy": TableOf("kernel_accuracy")},
 )
 def kernels(phases: pd.DataFrame, accuracy: pd.DataFrame) -> pd.DataFrame:
-    """One row per group, scene and mesh size; the accuracy is that of all matrices of the group."""
+    """One row per group, scene and mesh size of ``phases``, the table roofline.
+
+    The ``accuracy`` is that of all matrices of the group.
+    """
     rows = phases[~phases.phase.isin([RIGHT, GLOBAL, WHOLE])].rename(columns={"phase": "group"})
     for total, each in _PER_ELEMENT.items():
         rows[each] = rows[total] / rows.elements

@@ -42,5 +42,5 @@ from pdrom.tables.kit.vocabulary import BLOWUP_FRAME, ERROR_WITHIN, FINITE, GAIN
     reads={"parts": Every(paths.LADDER)},
 )
 def ladder(parts: list[File]) -> pd.DataFrame:
-    """Rows of all scenes, in order."""
+    """Rows of all scenes, in the order of their ``parts``."""
     return joined(parts)

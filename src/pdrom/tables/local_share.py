@@ -26,9 +26,9 @@ IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")
     reads={"timings": Every(paths.TIMINGS), "frame_times": TableOf("frame_times")},
 )
 def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
-    """One row per scene and implementation; assembly counts as a part of the local step.
+    """One row per scene and implementation of ``timings``, in the time of ``frame_times``.
 
-    Compiled kernels project and scatter in one pass: their assembly time is part of the local step.
+    Assembly counts as a part of the local step: compiled kernels project and scatter in one pass.
     """
     times = timings_in_one_time(timings, frame_times)
     full = times[times.method.isna()].copy()

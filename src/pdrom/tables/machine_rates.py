@@ -25,5 +25,5 @@ from pdrom.tables.kit.parts import joined
     reads={"parts": Every(paths.RATES)},
 )
 def machine_rates(parts: list[File]) -> pd.DataFrame:
-    """Bytes by working set, then operations."""
+    """Bytes by working set, then operations, of ``parts``."""
     return joined(parts)

@@ -36,5 +36,5 @@ from pdrom.tables.kit.vocabulary import BLOWUP_FRAME, FINITE, FRAMES, GAIN, GROU
     reads={"parts": Every(paths.NOISE)},
 )
 def noise(parts: list[File]) -> pd.DataFrame:
-    """Rows of all scenes, in order."""
+    """Rows of all scenes, in the order of their ``parts``."""
     return joined(parts)

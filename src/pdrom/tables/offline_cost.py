@@ -27,5 +27,5 @@ from pdrom.tables.kit.vocabulary import ROUNDING
     reads={"parts": Every(paths.OFFLINE)},
 )
 def offline_cost(parts: list[File]) -> pd.DataFrame:
-    """Rows by task and implementation."""
+    """Rows of ``parts`` by task and implementation."""
     return joined(parts)

@@ -50,7 +50,7 @@ _TIMES = ["ms_per_frame", "fom_ms_per_frame", "speedup", "speedup_low", "speedup
     },
 )
 def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.DataFrame:
-    """Rows of all scenes, in order, with their times."""
+    """Rows of all scenes, ``parts``, in order, with ``measured`` times, in the one of ``times``."""
     rows = joined(parts)
     if rows.empty:
         return rows

@@ -54,7 +54,8 @@ _ERROR = "relative_error_within_horizon"
 def payoff(reruns: pd.DataFrame, heldout: pd.DataFrame) -> pd.DataFrame:
     """One row per method, over all scenes and sizes; only what ran and was timed counts.
 
-    Sizes are chosen on the training motion and scored on held-out ones, see `with_held_out`.
+    Sizes are chosen on the training motion, ``reruns``, and scored on others, ``heldout``; see
+    `with_held_out`.
     """
     runs = with_held_out(reruns[reruns.speedup.notna() & reruns.max_extent.notna()], heldout)
     rows = []

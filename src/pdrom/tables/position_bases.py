@@ -51,7 +51,7 @@ _PAIR = ["scene", "split", "k"]
     reads={"parts": Every(paths.POSITION_BASES)},
 )
 def position_bases(parts: list[File]) -> pd.DataFrame:
-    """One row per motion, kind of basis and size; ``loses`` where both kinds have a run."""
+    """One row of ``parts`` per motion, kind of basis and size; ``loses`` where both have a run."""
     rows = joined(parts)
     if rows.empty:
         return rows

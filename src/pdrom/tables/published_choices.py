@@ -47,7 +47,7 @@ CHOICE = text("choice", "choice of the published code that is added, or the draw
     },
 )
 def published_choices(parts: list[File], stored: Path) -> pd.DataFrame:
-    """Rows of all cases, in order; without a reference where the stored output has none."""
+    """Rows of all cases, ``parts``, in order; without a reference where ``stored`` has none."""
     rows = joined(parts)
     if rows.empty:
         return rows

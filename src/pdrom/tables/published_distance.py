@@ -33,7 +33,7 @@ AGREE = np.log10(1.01)
     reads={"errors": TableOf("published_choices")},
 )
 def published_distance(errors: pd.DataFrame) -> pd.DataFrame:
-    """One row per variant, in order."""
+    """One row per variant of ``errors``, the table published_choices, in order."""
     rows = [
         {**dict(zip(KEYS, key, strict=True)), **_distance(rows)}
         for key, rows in errors.groupby(KEYS, sort=False)

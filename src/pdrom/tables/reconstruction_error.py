@@ -31,5 +31,5 @@ _SMALL = "empty at round-off level"
     reads={"parts": Every(paths.RECONSTRUCTION)},
 )
 def reconstruction_error(parts: list[File]) -> pd.DataFrame:
-    """Rows of all methods, in order."""
+    """Rows of all methods, in the order of their ``parts``."""
     return joined(parts)

@@ -37,7 +37,13 @@ def reduced_reruns(
     perturbation: float,
     threshold: float,
 ) -> pd.DataFrame:
-    """All runs with their times, see `judged_reruns`."""
+    """Runs of the training motion with their times; see `judged_reruns` for the rest.
+
+    Parameters
+    ----------
+    runs, rows, subspaces, subspace_rows, sensitivity, perturbation, threshold : as there
+    timings, frame_times : times of the jobs, and the one time of each scene
+    """
     judged = judged_reruns(
         runs,
         rows,

@@ -35,7 +35,7 @@ _CELL = ["scene", "group", "method", "r", "varied"]
     reads={"parts": Every(paths.REPETITIONS)},
 )
 def repetitions(parts: list[File]) -> pd.DataFrame:
-    """One row per repeated run, over its repetitions.
+    """One row per repeated run of ``parts``, over its repetitions.
 
     The range of n independent draws lies on one side of their distribution's median with the
     probability 2^(1 - n): five draws enclose it with 15/16, whatever the distribution is.

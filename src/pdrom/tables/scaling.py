@@ -43,7 +43,7 @@ from pdrom.tables.kit.vocabulary import (
     reads={"parts": Every(paths.SCALING)},
 )
 def scaling(parts: list[File]) -> pd.DataFrame:
-    """All scenes, one row per mesh size and method.
+    """All scenes of ``parts``, one row per mesh size and method.
 
     The speed-ups, of an iteration and of its local step, are over the full-order run on one thread.
     """

@@ -24,7 +24,7 @@ FEWEST = 3  # sizes
     reads={"scaling": TableOf("scaling")},
 )
 def scaling_fit(scaling: pd.DataFrame) -> pd.DataFrame:
-    """Exponents of power laws in the number of vertices, by least squares on the logarithms.
+    """Exponents of power laws in the number of vertices of ``scaling``, fitted to the logarithms.
 
     Any two points lie on a power law: a quantity with fewer than three sizes has no row, and one
     that was too small to be measured on so many has no exponent.

@@ -21,7 +21,7 @@ from pdrom.tables.kit.vocabulary import SCENE
     reads={"parts": Every(paths.SENSITIVITY)},
 )
 def sensitivity(parts: list[File]) -> pd.DataFrame:
-    """Largest difference over the seeds, per scene, perturbation and frame."""
+    """Largest difference of ``parts`` over the seeds, per scene, perturbation and frame."""
     keys = ["scene", "perturbation", "frame"]
     rows = joined(parts).groupby(keys, sort=False, as_index=False)
     return rows["relative_difference"].max()

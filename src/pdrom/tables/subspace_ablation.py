@@ -48,5 +48,5 @@ from pdrom.tables.kit.vocabulary import (
     reads={"parts": Every(paths.SUBSPACE_ABLATION)},
 )
 def subspace_ablation(parts: list[File]) -> pd.DataFrame:
-    """Rows of all scenes, in order."""
+    """Rows of all scenes, in the order of their ``parts``."""
     return joined(parts)

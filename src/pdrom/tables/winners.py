@@ -73,7 +73,7 @@ def winners(rows: pd.DataFrame, limits: Sequence[float]) -> pd.DataFrame:
 
 
 def _best(rows: pd.DataFrame, limit: float) -> dict[str, object]:
-    """Who reaches ``limit`` first, second and reduced; what nobody does is left out."""
+    """First, second and reduced one to reach ``limit``; what nobody does is left out."""
     reaching = rows[rows.error <= limit].sort_values("ms_per_frame", kind="stable")
     inside = reaching.method.isin(REDUCTIONS)
     full, reduced = reaching[~inside], reaching[inside]

@@ -49,6 +49,6 @@ def differing(job: Job) -> list[str]:
 
 
 def is_derived(name: str) -> bool:
-    """Whether a table is made from other tables alone."""
+    """Whether the table ``name`` is made from other tables alone."""
     reads = declared()[name].reads.values()
     return not any(isinstance(read, Every) for read in reads)

@@ -47,6 +47,8 @@ class Member:
 def bundle(arguments: Sequence[str]) -> Status:
     """Write the archive of a finished study; say what is missing of an unfinished one.
 
+    ``arguments`` are those of the command line.
+
     Raises
     ------
     ConfigurationError
@@ -71,7 +73,10 @@ def bundle(arguments: Sequence[str]) -> Status:
 
 
 def unfinished(subject: Subject, manifest: Manifest) -> Iterator[str]:
-    """Tables, figures and manuscript that are not in the manifest as today's code makes them."""
+    """Results of ``subject`` that ``manifest`` does not list as today's code makes them.
+
+    These are tables, figures and the manuscript.
+    """
     plan, folders = subject.plan, subject.folders
     jobs = [job for jobs in plan.fixed.values() for job in jobs]
     wanted = {path: job.code for job in jobs for path in job.outputs.values()}
@@ -84,7 +89,7 @@ def unfinished(subject: Subject, manifest: Manifest) -> Iterator[str]:
 
 
 def sources(root: Path) -> Iterator[Member]:
-    """Files that git tracks, as in the last commit."""
+    """Files that git tracks in the folder ``root``, as in the last commit."""
     changed = git(root, "status", "--porcelain", "--untracked-files=no").decode()
     if changed:
         files = ", ".join(line[3:] for line in changed.splitlines())
@@ -96,7 +101,7 @@ def sources(root: Path) -> Iterator[Member]:
 
 
 def results(subject: Subject, manifest: Manifest) -> Iterator[Member]:
-    """Everything that the crate names, with the crate."""
+    """Everything that the crate of ``subject`` and its ``manifest`` names, with the crate."""
     folder = Path(subject.results)
     names = [each.name for each in published(subject.plan, subject.folders, manifest)]
     copies = [p for p in (folder / COPIES).rglob("*") if p.is_file() and p.name[0] != "."]
@@ -108,7 +113,7 @@ def results(subject: Subject, manifest: Manifest) -> Iterator[Member]:
 
 
 def paper(subject: Subject) -> Iterator[Member]:
-    """The manuscript's source with all that it reads, in one folder."""
+    """Source of the manuscript of ``subject`` with all that it reads, in one folder."""
     plan = subject.plan
     files = [Path(path) for path in (*plan.paper.files, *plan.figures)]
     sources = [Path(path) for path in plan.paper.sources]
@@ -119,7 +124,7 @@ def paper(subject: Subject) -> Iterator[Member]:
 
 
 def write_archive(members: Sequence[Member], target: Path) -> int:
-    """Write a gzipped tar archive; return its size in bytes."""
+    """Write ``members`` to a gzipped tar archive ``target``; return its size in bytes."""
     date = int(os.environ.get("SOURCE_DATE_EPOCH", "0"))
     with (
         atomic_path(target) as temporary,
@@ -151,7 +156,7 @@ def _tables(subject: Subject) -> dict[str, str]:
 
 
 def git(root: Path, *arguments: str) -> bytes:
-    """Output of a command of git; ConfigurationError if there is no git or no clone."""
+    """Output of git with ``arguments`` in ``root``; ConfigurationError without git or a clone."""
     try:
         done = subprocess.run(["git", *arguments], cwd=root, capture_output=True, check=True)
     except (OSError, subprocess.CalledProcessError) as error:

@@ -42,7 +42,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def verify(arguments: Sequence[str]) -> Status:
-    """Do what the command line asks.
+    """Do what the ``arguments`` of the command line ask.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def verify(arguments: Sequence[str]) -> Status:
 
 
 def verify_tables(subject: Subject) -> Status:
-    """Compare the tables of a configuration with the expected ones, write the page of it.
+    """Compare the tables of ``subject`` with the expected ones, write the page of it.
 
     Raises
     ------

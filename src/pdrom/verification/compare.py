@@ -66,7 +66,7 @@ class Comparison:
         return limit
 
     def apart(self, column: Column) -> np.ndarray:
-        """Distance of each pair of cells."""
+        """Distance of each pair of cells of ``column``, in the measure of its quantity."""
         return distance(column.quantity, self.e[column.name], self.f[column.name])
 
     def unpaired(self) -> tuple[pd.DataFrame, pd.DataFrame]:

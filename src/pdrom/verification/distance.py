@@ -1,4 +1,4 @@
-"""How far two values of a quantity are apart, in the measure in which its tolerance is given."""
+"""Distance of two values of a quantity, in the measure in which its tolerance is given."""
 
 import numpy as np
 import pandas as pd
@@ -10,9 +10,10 @@ FLOOR = 1e-12
 
 
 def distance(quantity: Quantity, expected: pd.Series, found: pd.Series) -> np.ndarray:
-    """Distance of each pair of cells; 0 if they are equal, inf if only one has a value.
+    """Distance of each pair of cells of ``expected`` and ``found``.
 
-    Of shares the difference, of other numbers the difference over the larger of the two.
+    The difference where ``quantity`` is a share, of other numbers that over the larger of the two;
+    0 if the cells are equal, inf if only one has a value.
     """
     same = _same(expected, found)
     numbers = pd.api.types.is_numeric_dtype(expected) and pd.api.types.is_numeric_dtype(found)

@@ -45,14 +45,14 @@ class Examination:
         return [*self.claims(), *self._figures(tables), *tables]
 
     def condition(self, path: str) -> Condition | None:
-        """Condition of a file, None if it is not there."""
+        """Condition of the file ``path``, None if it is not there."""
         if path not in self.conditions:
             there = Path(path).is_file()
             self.conditions[path] = check_file(path) if there else None
         return self.conditions[path]
 
     def found(self, name: str) -> pd.DataFrame:
-        """A table that is there and intact.
+        """Table ``name``, which is there and intact.
 
         Raises
         ------
@@ -87,14 +87,14 @@ class Examination:
             return Context.of(tables)
 
     def judgement(self, name: str) -> Judgement:
-        """Judgement on a table that is there and expected."""
+        """Judgement on the table ``name``, which is there and expected."""
         frame, reference, table = self.found(name), self.expected[name], declared()[name]
         lacking = set(frame.columns) - set(reference.columns)
         known = table.checked(frame.assign(**dict.fromkeys(lacking, None)))
         return judge(Comparison(table, reference.frame, known, self.context))
 
     def again(self, name: str) -> pd.DataFrame | None:
-        """A table that is made from other tables alone, made again from those at hand.
+        """Table ``name``, made from other tables alone, made again from those at hand.
 
         None for other tables, and where one of those is not intact.
         """
@@ -109,7 +109,7 @@ class Examination:
         return self.made_again[name]
 
     def table(self, name: str) -> Line:
-        """Line of a table."""
+        """Line of the table ``name``."""
         missing = self._missing("table", name, [TABLE.at(self.subject.results, name=name)])
         if missing is not None:
             return missing
@@ -191,7 +191,7 @@ class Examination:
 def claim_line(
     name: str, expected: pd.DataFrame, found: pd.DataFrame, decided: pd.DataFrame
 ) -> Line:
-    """Line of a claim.
+    """Line of the claim ``name``.
 
     Parameters
     ----------

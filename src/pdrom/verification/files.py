@@ -30,7 +30,7 @@ SHOWN = 20
 
 
 def verify_files(subject: Subject) -> Status:
-    """Compare the files of a study with its manifest; say what makes a bad one again."""
+    """Compare the files of ``subject`` with its manifest; say what makes a bad one again."""
     place = Path(MANIFEST.at(subject.results))
     if not place.is_file():
         _say(f"{place}: not there; a run that succeeds writes it: {subject.command()}")
@@ -93,7 +93,7 @@ def _other(made: Iterable[Job], faulty: set[str]) -> list[str]:
 
 
 def command_for(subject: Subject, path: str) -> str:
-    """The command that makes one file again, whatever is in its place."""
+    """Command that makes the file ``path`` of ``subject`` again, whatever is in its place."""
     return shlex.join(["./reproduce", *subject.options, "--force", "--", path])
 
 

@@ -63,7 +63,7 @@ class Judgement:
 
 
 def judge(comparison: Comparison) -> Judgement:
-    """Judgement on a table."""
+    """Judgement on the table of a ``comparison``."""
     found = [*_rows(comparison)]
     compared, loose = 0, Counter[str]()
     for column in comparison.columns():
@@ -150,14 +150,14 @@ def _difference(comparison: Comparison, column: Column, row: int) -> Difference:
 
 
 def in_words(value: object) -> str:
-    """A cell as it stands in a message."""
+    """Cell ``value`` as it stands in a message."""
     if pd.isna(value):
         return "nothing"
     return f"{value:.6g}" if isinstance(value, float) else str(value)[:60]
 
 
 def row_in_words(table: Table, frame: pd.DataFrame, row: int) -> str:
-    """Name of a row: its words and sizes."""
+    """Name of a ``row`` of ``frame``, a ``table``: its words and sizes."""
     names = [c.name for c in table.columns if names_row(c) or c.quantity == "value"]
     cells = [(name, frame[name].iloc[row]) for name in names]
     named = [f"{name} {in_words(value)}" for name, value in cells if not pd.isna(value)]

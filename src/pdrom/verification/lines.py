@@ -44,7 +44,7 @@ class Line:
 
 
 def table_line(judgement: Judgement, measured: bool, lacking: Sequence[str] = ()) -> Line:
-    """Line of a table.
+    """Line of a table by the ``judgement`` on it.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def _cells(judgement: Judgement) -> str:
 
 
 def status_of(lines: Iterable[Line]) -> Status:
-    """The exit code: something is missing, else something differs, else all holds."""
+    """Exit code of ``lines``: something is missing, else something differs, else all holds."""
     outcomes = {line.outcome for line in lines}
     if Outcome.MISSING in outcomes:
         return Status.MISSING
@@ -84,7 +84,7 @@ def status_of(lines: Iterable[Line]) -> Status:
 
 
 def counted(lines: Sequence[Line]) -> str:
-    """How many of each kind have which outcome."""
+    """Counts of ``lines`` by kind and outcome."""
     parts = []
     for kind in dict.fromkeys(line.kind for line in lines):
         own = [line.outcome for line in lines if line.kind == kind]

@@ -15,7 +15,7 @@ def names_row(column: Column) -> bool:
 
 
 def pairs(table: Table, expected: pd.DataFrame, found: pd.DataFrame) -> Pairs:
-    """(row of ``expected``, row of ``found``) of all rows that belong together.
+    """(row of ``expected``, row of ``found``) of all rows of ``table`` that belong together.
 
     Rows with the same names and numbers of samples belong together; of those that are left, rows
     with the same names, in their order: a number of samples may differ where a fit leaves it.

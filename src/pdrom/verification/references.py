@@ -45,7 +45,7 @@ def folder_of(results: str) -> Path:
 
 
 def compact(table: Table, frame: pd.DataFrame) -> pd.DataFrame:
-    """Return the part of a table that is kept."""
+    """Return the part of ``frame``, a ``table``, that is kept."""
     columns = kept(table)
     return pd.DataFrame({n: _rounded(c, frame[n]) for n, c in columns.items()}, index=frame.index)
 
@@ -63,7 +63,7 @@ def _rounded(column: Column, values: pd.Series) -> pd.Series:
 
 
 def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
-    """Write the expected form of a table, packed if it is large."""
+    """Write the expected form of ``frame``, a ``table``, into ``folder``, packed if it is large."""
     plain = compact(table, frame).to_csv(
         index=False, float_format=f"%.{DIGITS}g", lineterminator="\n"
     )
@@ -76,7 +76,7 @@ def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
 
 
 def read_reference(table: Table, folder: Path) -> Reference | None:
-    """The expected form of a table; None if there is none.
+    """Expected form of a ``table`` in ``folder``; None if there is none.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def read_reference(table: Table, folder: Path) -> Reference | None:
 
 
 def note(folder: Path, reason: str, day: date, code: str) -> None:
-    """Add a line to the log of changes."""
+    """Add ``day``, hash of the ``code`` and ``reason`` to the log of changes in ``folder``."""
     path = folder / LOG
     text = path.read_text(encoding="utf-8") if path.is_file() else HEAD
     write_tracked(path, f"{text}- {day:%Y-%m-%d}, code {code}: {reason}\n".encode())

@@ -45,7 +45,7 @@ class Context:
         return cls(_chaotic(tables), _modes(tables), _gains(tables), ended)
 
     def loose(self, table: Table, column: Column, frame: pd.DataFrame) -> dict[str, np.ndarray]:
-        """Rows in which rounding decides about a column, by the reason."""
+        """Rows of ``frame``, a ``table``, in which rounding decides about ``column``, by reason."""
         if names_row(column):
             return {}
         chaotic = {"chaotic scene": self._of_chaotic_scene(frame)}
@@ -86,7 +86,7 @@ class Context:
 
 
 def of_wrong_runs(table: Table, frame: pd.DataFrame) -> np.ndarray:
-    """Rows of runs that are wrong: small changes grow in many of them."""
+    """Rows of ``frame``, a ``table``, of wrong runs: small changes grow in many of them."""
     found = np.zeros(len(frame), dtype=bool)
     for column in table.columns if table.name != RECONSTRUCTION else ():
         if column.quantity == "error" and column.kind == "number" and "error" in column.name:
@@ -95,7 +95,7 @@ def of_wrong_runs(table: Table, frame: pd.DataFrame) -> np.ndarray:
 
 
 def of_fitted_samples(frame: pd.DataFrame) -> np.ndarray:
-    """Rows of reductions whose number of samples is the outcome of a fit.
+    """Rows of ``frame`` of reductions whose number of samples is the outcome of a fit.
 
     A table that has its tolerance, ``tau``, and names no methods has no others.
     """
@@ -105,7 +105,7 @@ def of_fitted_samples(frame: pd.DataFrame) -> np.ndarray:
 
 
 def names(frame: pd.DataFrame, columns: Sequence[str] = SAMPLES) -> list[tuple]:
-    """Cells of each row that name its samples, or its run."""
+    """Cells in ``columns`` of each row of ``frame`` that name its samples, or its run."""
     return list(frame[list(columns)].astype(str).itertuples(index=False, name=None))
 
 

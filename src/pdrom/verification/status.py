@@ -4,7 +4,7 @@ from enum import IntEnum
 
 
 class Status(IntEnum):
-    """How a command ended; argparse ends with 2 for a command that it does not understand."""
+    """End of a command; argparse ends with 2 for a command that it does not understand."""
 
     HOLDS = 0
     FAULTY = 1

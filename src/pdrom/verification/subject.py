@@ -23,7 +23,7 @@ class Subject:
 
     @classmethod
     def of(cls, configfiles: Sequence[str], settings: Sequence[str]) -> "Subject":
-        """Subject of this configuration, else of that of the last run.
+        """Subject of the files ``configfiles`` with ``settings``, else of those of the last run.
 
         Raises
         ------

@@ -20,7 +20,7 @@ NOTHING = "Nothing to be done"
 
 
 def update(subject: Subject, reason: str) -> Path:
-    """Write the expected tables of a configuration again; the folder that holds them.
+    """Write the expected tables of ``subject`` again, for a ``reason``; the folder that holds them.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def update(subject: Subject, reason: str) -> Path:
 
 
 def write(results: str, frames: Mapping[str, pd.DataFrame], reason: str) -> Path:
-    """Write the expected form of tables and a line about it."""
+    """Write the expected form of ``frames`` of ``results`` and a line with the ``reason``."""
     folder = folder_of(results)
     for name, frame in frames.items():
         write_reference(declared()[name], frame, folder)

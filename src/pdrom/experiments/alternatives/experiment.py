@@ -58,7 +58,7 @@ class References:
     error: float
 
     def errors(self, run: np.ndarray | None) -> dict[str, float | None]:
-        """Relative errors of a run, empty if it blew up."""
+        """Relative errors of a ``run`` (F + 1, N, 3) m, empty if it blew up."""
         return {
             "error_implicit": _error(run, self.implicit),
             "error_continuous": _error(run, self.continuous),
@@ -72,7 +72,14 @@ class References:
     alone=True,
 )
 def alternatives(sources: list[Path], settings: Options, out: File) -> None:
-    """Compare all methods on one mesh: ``factor`` times the vertices along each side."""
+    """Compare all methods on one mesh: ``factor`` times the vertices along each side.
+
+    Parameters
+    ----------
+    sources : files of the mesh; the job depends on them
+    settings : scene, methods and limits
+    out : table, with the factor among its labels
+    """
     factor = float(out["factor"])
     rows = []
     for stiffness in settings.alternatives.factors(settings.scene.name, factor):

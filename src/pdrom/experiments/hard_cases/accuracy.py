@@ -47,7 +47,7 @@ REFERENCES = {"clamped": clamped, "size": sized}
 
 
 def matrix_error(group: ConstraintGroup, d: np.ndarray, unique: bool) -> tuple[float, float]:
-    """Relative error of ``group``'s p(d) and the condition number of the projection at d.
+    """Relative error of ``group``'s p(d) at ``d`` (p, 3), and the condition number there.
 
     Where p is not unique any nearest point is right: the error is that of the distance |d - p|, or
     of the singular values of p (their product, where that is what is kept), whichever is larger,
@@ -68,7 +68,7 @@ def matrix_error(group: ConstraintGroup, d: np.ndarray, unique: bool) -> tuple[f
 
 
 def _outside(p: np.ndarray, low: float, high: float, size: bool) -> float:
-    """How far singular values of p, or their product, lie outside [low, high].
+    """Distance of singular values of p, or of their product, from [low, high].
 
     A wrong orientation counts fully. The product of what is long and thin is known only as exactly
     as its smallest value.

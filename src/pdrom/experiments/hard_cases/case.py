@@ -66,7 +66,10 @@ def build(
     masses: np.ndarray | None = None,
     **settings: Any,
 ) -> Scene:
-    """Scene of ``effects`` on ``mesh``; ``masses`` (N,) kg in place of equal ones."""
+    """Scene of ``effects`` on ``mesh``, with so many ``frames``.
+
+    ``masses`` (N,) kg replace equal ones, ``settings`` are further keys of `SceneConfig`.
+    """
     config = validate(
         SceneConfig,
         {

@@ -442,10 +442,10 @@ CASES: dict[str, HardCase] = {case.name: case for part in PARTS for case in part
 
 
 def reducible_cases(slow: bool = False) -> list[str]:
-    """Names of the cases that a reduction can repeat: those that are not refused."""
+    """Names of the (``slow``) cases that a reduction can repeat: those that are not refused."""
     return [name for name, c in CASES.items() if c.slow == slow and c.holds != ("refused",)]
 
 
 def modules_of(names: Iterable[str]) -> list[str]:
-    """Places of the effects of some cases (for the code fingerprint), "module:attribute"."""
+    """Places of the effects of cases ``names`` (for the code fingerprint), "module:attribute"."""
     return sorted({module for name in names for module in CASES[name].scene.modules})

@@ -1,4 +1,4 @@
-"""How reductions are expected to fare in the hard cases (config/hard_cases.yaml)."""
+"""Outcomes that are expected of reductions in the hard cases (config/hard_cases.yaml)."""
 
 from pathlib import Path
 from typing import Annotated

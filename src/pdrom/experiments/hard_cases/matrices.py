@@ -23,7 +23,7 @@ class MatrixClass:
 
 
 def rotation(rng: np.random.Generator) -> np.ndarray:
-    """Uniformly distributed rotation (3, 3)."""
+    """Uniformly distributed rotation (3, 3), drawn by ``rng``."""
     q, r = np.linalg.qr(rng.standard_normal((3, 3)))
     q *= np.sign(np.diag(r))
     return q * np.sign(np.linalg.det(q))

@@ -1,4 +1,4 @@
-"""How a reduction fares in a hard case."""
+"""Outcome of a reduction in a hard case."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -46,12 +46,12 @@ class Watched:
         self._step, self._group = step, group
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Freeze the frame's data at ``q`` of the reduced step and of all elements."""
+        """Freeze the frame's data at ``q`` (N, 3) m of the reduced step and of all elements."""
         self._step.begin_frame(q)
         self._group.begin_frame(q)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add the reduced contribution at ``y`` to ``rhs``; the energy of the full projections."""
+        """Add the reduced S^T W p to ``rhs`` (N, 3) at ``y`` (N, 3) m; the full energy, J."""
         self._step.accumulate(y, rhs)
         return self._group.accumulate(y, np.zeros_like(y))
 

@@ -12,7 +12,7 @@ GRID = 60
 
 
 def digits_for(*arrays: np.ndarray) -> int:
-    """Digits that keep 50 of them after squares and differences of the entries."""
+    """Digits that keep 50 after squares and differences of the entries of ``arrays``."""
     entries = np.abs(np.concatenate([np.ravel(a) for a in arrays]))
     entries = entries[entries > 0.0]
     if len(entries) == 0:
@@ -21,7 +21,7 @@ def digits_for(*arrays: np.ndarray) -> int:
 
 
 def exact(a: np.ndarray) -> mpmath.matrix:
-    """A double array (n, m) as a matrix of the same numbers."""
+    """A double array ``a`` (n, m) as a matrix of the same numbers."""
     return mpmath.matrix(a.tolist())
 
 

@@ -1,4 +1,4 @@
-"""How much the computed objective of an iteration may rise by rounding alone.
+"""Largest rise of the computed objective in an iteration by rounding alone.
 
 In exact arithmetic 1/(2h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) falls in every iteration. What is
 computed differs in two ways (u = eps, c a small constant for the length of the sums):

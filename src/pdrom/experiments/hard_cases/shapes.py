@@ -59,7 +59,7 @@ def both(first: Mesh, second: Mesh) -> Mesh:
 
 
 def mapped(*rows: tuple[float, float, float]) -> Start:
-    """The rest shape under a linear map about its centre, at rest."""
+    """Rest shape under the linear map with these three ``rows`` about its centre, at rest."""
     matrix = np.array(rows)
 
     def start(scene: Scene) -> State:

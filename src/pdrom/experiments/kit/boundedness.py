@@ -1,4 +1,4 @@
-"""How far bounded projections can carry a run.
+"""Reach of a run that bounded projections can carry.
 
 However many local/global iterations a frame has, its end obeys
 
@@ -195,10 +195,10 @@ class ConstantProjections:
         self.name, self._force = name, force
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Nothing depends on the frame."""
+        """Do nothing with the positions ``q`` (N, 3) m: nothing depends on the frame."""
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add the force; the energy is unknown: nan."""
+        """Add the force to ``rhs`` (N, 3) N, whatever ``y`` is; the energy is unknown: nan."""
         rhs += self._force
         return float("nan")
 

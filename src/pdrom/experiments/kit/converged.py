@@ -47,6 +47,7 @@ def minimise(
     evaluate : y -> objective and the result G(y) of one local/global iteration; the gradient is
         A (y - G(y)), and G(y) equals y on fixed rows
     matrix : A, (n, n) symmetric positive definite
+    y : (n, 3) m where it starts
     tolerance : the end is reached when no entry of G(y) - y is larger, m
     limit : evaluations allowed
     """

@@ -21,6 +21,8 @@ def experiment(
 ) -> Callable[[Callable[..., None]], Experiment]:
     """Declare the function below as an experiment, see `Artifact`.
 
+    ``title`` names its jobs; nothing runs beside those of one that wants to be ``alone``.
+
     Raises
     ------
     TypeError

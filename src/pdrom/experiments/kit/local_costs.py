@@ -35,6 +35,7 @@ def local_costs(
 
     Parameters
     ----------
+    warmup, repeats : evaluations before the clock starts, and measured ones
     reduced : local steps by group, method and r, bound to the groups of ``scene``
     states : (n, N, 3) positions in m; frame-lagged data are those of the first
     """

@@ -17,7 +17,7 @@ from pdrom.model.scene import Scene
 
 
 def outside(scene: Scene) -> str | None:
-    """Why a scene does not satisfy the premise; None if it does, but for its contacts."""
+    """Reason why a scene does not satisfy the premise; None if it does, but for its contacts."""
     for force in scene.forces:
         if force.rate is None:
             return f"the force of effect '{force.name}' depends on the motion, not by a rate alone"

@@ -28,7 +28,7 @@ Varied = Literal["start", "training", "both"]
 
 
 class Repetitions(ConfigModel):
-    """How a run is repeated.
+    """Settings of repeated runs.
 
     repetitions : draws, each with a seed of its own, from 1
     perturbation : length by which a start is moved, over the extent

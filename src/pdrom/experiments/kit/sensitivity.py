@@ -1,4 +1,4 @@
-"""How far two full-order runs drift apart that should be the same (docs/study.md).
+"""Drift of two full-order runs that should be the same (docs/study.md).
 
 What a run does when its start moves by 1e-10 of the extent bounds what any reduced model can be
 blamed for. Beside the start, the solver (another order of summation), the number of iterations and
@@ -52,7 +52,7 @@ def heldout_floor(heldout: Scene, motion: str, size: float, seeds: tuple[int, ..
 def sensitivities(
     scene: Scene, perturbations: tuple[float, ...], seeds: tuple[int, ...]
 ) -> pd.DataFrame:
-    """Table of `COLUMNS`: ``perturbations`` of the start by ``seeds``, and other changes.
+    """Table of `COLUMNS` for ``scene``: ``perturbations`` of the start by ``seeds``, and others.
 
     The others are another solver, 4 K iterations, half the time step, and no effect of one name
     (label `without`); the only constraint group cannot be left out.

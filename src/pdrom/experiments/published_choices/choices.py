@@ -57,7 +57,11 @@ class Variant:
 
 
 def variants(applicable: tuple[Choice, ...], draws: int) -> Iterator[Variant]:
-    """All variants of a case, from this study's method to the published code's."""
+    """All variants of a case, from this study's method to the published code's.
+
+    ``applicable`` choices are taken one after the other, then alone; ``draws`` is the number of
+    seeds for signs, and for ties.
+    """
     taken: frozenset[Choice] = frozenset()
     yield Variant(CUMULATIVE, STUDY, taken)
     for choice in applicable:

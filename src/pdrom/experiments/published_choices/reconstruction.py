@@ -71,7 +71,8 @@ def errors(
 ) -> np.ndarray:
     """Relative errors (len(sizes), 3) of x, y and z at ``sizes`` of modes, ascending, n at most.
 
-    They are nan for an axis at rest, and where normal equations are exactly singular.
+    They are nan for an axis at rest, and where normal equations are exactly singular. The rows of
+    ``data`` are ``rows_per_element`` an element; ``variant`` says which choices are taken.
     """
     taken = variant.taken
     moving = ~idle_axes(data.snapshots)
@@ -94,10 +95,11 @@ def errors(
 def modes(
     data: Decomposed, axes: Sequence[bool], count: int, raw_signs: bool, seed: int | None
 ) -> np.ndarray:
-    """The first ``count`` modes (3 e p, count), be they round-off or not.
+    """The first ``count`` modes (3 e p, count) of ``data``, be they round-off or not.
 
     The first snapshot is added to every rescaled singular vector, then each of the ``axes`` is
-    orthonormalised by itself, still weighted.
+    orthonormalised by itself, still weighted. A ``seed`` draws the signs of the singular vectors;
+    ``raw_signs`` are those of LAPACK, otherwise they are fixed.
     """
     u = data.u[:, :count]
     if seed is not None:

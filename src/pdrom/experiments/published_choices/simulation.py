@@ -29,7 +29,7 @@ _ORDER = {0: (3, 4, 1, 2, 0), 1: (1, 4, 3, 2, 0)}
 
 
 def applicable(scene: Scene, group: ConstraintGroup) -> tuple[Choice, ...]:
-    """The choices that can change anything for a group, in order."""
+    """Choices that can change anything for a ``group`` of ``scene``, in order."""
     flat = float(np.ptp(scene.mesh.points, axis=0).min()) == 0.0
     applies: dict[Choice, bool] = {
         "pins": flat and any(isinstance(held, Pins) for held in scene.boundaries),
@@ -48,7 +48,8 @@ def applicable(scene: Scene, group: ConstraintGroup) -> tuple[Choice, ...]:
 def projections(scene: Scene, name: str, taken: Set[Choice]) -> tuple[np.ndarray, np.ndarray]:
     """Projections (F, e p, 3) of the last iterate of every frame, and weights (e p,) of the rows.
 
-    The weights are those of the choice "weighting".
+    They are those of group ``name`` in ``scene`` with the choices ``taken``; the weights are those
+    of the choice "weighting".
     """
     changed = _changed(scene, taken)
     group = changed.group(name)
@@ -59,7 +60,8 @@ def projections(scene: Scene, name: str, taken: Set[Choice]) -> tuple[np.ndarray
 def row_sizes(group: ConstraintGroup, mesh: Mesh) -> np.ndarray:
     """Sum of the areas or volumes of an element's vertices, for each of its rows (e p,), m2 or m3.
 
-    A vertex has a quarter of the tetrahedra around it, or the circumcentric area of a surface.
+    The elements are those of ``group`` on ``mesh``. A vertex has a quarter of the tetrahedra around
+    it, or the circumcentric area of a surface.
     """
     sizes = _volumes(mesh) if len(mesh.tetrahedra) else _areas(mesh)
     elements = sizes[group.element_vertices(mesh)].sum(axis=1)
@@ -123,16 +125,18 @@ class TurnedStep:
         self.name, self._group = group.name, group
 
     def begin_frame(self, q: np.ndarray) -> None:
+        """Begin a frame of the group at ``q`` (N, 3) m."""
         self._group.begin_frame(q)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
+        """Add S^T W p(y) of ``y`` (N, 3) m to ``rhs`` (N, 3); the energy is not known: nan."""
         group = self._group
         rhs += group.S.T @ (group.row_weights[:, None] * turned(group, y))
         return np.nan
 
 
 def turned(group: ConstraintGroup, y: np.ndarray) -> np.ndarray:
-    """Projections (e 3, 3) by the rule of `TurnedStep`."""
+    """Projections (e 3, 3) of ``group`` at ``y`` (N, 3) m by the rule of `TurnedStep`."""
     p = group.project(y)
     gradients = (group.S @ y).reshape(-1, 3, 3).transpose(0, 2, 1)
     folded = np.flatnonzero(np.linalg.det(gradients) < FLAT)

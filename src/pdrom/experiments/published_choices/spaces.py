@@ -1,4 +1,4 @@
-"""How the published code holds vertices and lets them meet the floor."""
+"""Holding vertices, and letting them meet the floor, as the published code does."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -40,7 +40,7 @@ class PublishedSpace(VertexSpace):
         return s
 
     def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Heavy vertices go on as they move: no force reaches them."""
+        """Heavy vertices of ``positions`` (N, 3) m go on as they move: no force reaches them."""
         held, targets = super().fixed(frame, positions)
         if not self._heavy:
             return held, targets

@@ -37,7 +37,7 @@ def bounds(work: pd.DataFrame, rates: pd.DataFrame) -> pd.DataFrame:
 
 
 def bandwidth(working_set: np.ndarray, read: pd.DataFrame) -> np.ndarray:
-    """The best rate (1e9 B/s) of going through working sets (bytes) over and over.
+    """Best rates (n,), 1e9 B/s, of going through sets of ``working_set`` (n,) bytes over and over.
 
     The rates ``read`` are those of plain repeated reading, which leaves nothing in a cache that is
     too small for it. At best a part S of the working set W stays where it is read as fast as a set

@@ -13,12 +13,12 @@ from pdrom.model.constraints.local_kernel import LocalKernel, LocalPass
 
 @cache
 def counting(function: Callback) -> Counted:
-    """A local kernel that counts."""
+    """Kernel that counts, made of the local kernel ``function``."""
     return Counted(function)
 
 
 def operations(kernel: LocalKernel, y: np.ndarray) -> Operations:
-    """Operations that one pass over all units executes at the positions y (N, 3)."""
+    """Operations that a pass of ``kernel`` over all units executes at positions ``y`` (N, 3) m."""
     counted = counting(kernel.function)
     counted.reset()
     places = rows.flat(y)

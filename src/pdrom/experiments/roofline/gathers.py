@@ -19,7 +19,7 @@ IN_LINE = LINE // (8 * WIDTH)  # vertices of a line
 
 
 def visits(group: ConstraintGroup) -> list[np.ndarray]:
-    """Vertices that are gathered, then scattered to, piece by piece.
+    """Vertices that ``group`` gathers from, then scatters to, piece by piece.
 
     A piece is four elements, corner by corner, or the row of an element whose rows differ.
     """
@@ -32,7 +32,7 @@ def visits(group: ConstraintGroup) -> list[np.ndarray]:
 
 
 def fetched(group: ConstraintGroup) -> tuple[int, int]:
-    """Lines of positions, and of the right-hand side, that a pass of the kernel fetches."""
+    """Lines of positions, and of the right-hand side, that a pass over ``group`` fetches."""
     pieces = visits(group)
     beside = sum(array.nbytes for array in group.streamed) / LINE / max(len(pieces), 1)
     found = {"y": 0, "rhs": 0, "own": 0}

@@ -45,7 +45,7 @@ class _Trial:
         return perf_counter() - before
 
     def times(self, least: float) -> int:
-        """How often it has to run to take ``least`` seconds."""
+        """Number of times that it has to run to take ``least`` seconds."""
         self.run(self.numbers, 1)  # compiles
         times = 1
         while self.seconds(times) < least:

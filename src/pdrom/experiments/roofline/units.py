@@ -25,6 +25,7 @@ def units(repeats: int = REPEATS, memory_bytes: int = MEMORY_BYTES) -> Units:
 
     Parameters
     ----------
+    repeats : measurements, of which the fastest counts
     memory_bytes : size of the array that is read, larger than every cache
     """
     numbers = np.ones(memory_bytes // 8)

@@ -1,4 +1,4 @@
-"""How the compiled functions of the model are compiled and kept."""
+"""Compiling the compiled functions of the model, and keeping them."""
 
 from functools import cache, cached_property
 from pathlib import Path
@@ -29,7 +29,10 @@ def _mark(function):
 
 
 def compiled(function=None, **options):
-    """Compile and keep a function: without division checks, without fast-math by default."""
+    """Compile and keep a ``function``: without division checks, without fast-math by default.
+
+    ``options`` are those of Numba's ``njit``; without a function this is a decorator with them.
+    """
     if function is None:
         return lambda wrapped: compiled(wrapped, **options)
     _mark(function)

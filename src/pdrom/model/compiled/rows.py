@@ -86,12 +86,12 @@ def flat(values: np.ndarray) -> np.ndarray:
 
 
 def unflat(rows: np.ndarray) -> np.ndarray:
-    """Flat rows of four as a view (N, 3), the opposite of `flat`."""
+    """Flat ``rows`` (4 N,) of four as a view (N, 3), the opposite of `flat`."""
     return rows.reshape(-1, WIDTH)[:, :3]
 
 
 def shares(values: np.ndarray, rows: np.ndarray) -> bool:
-    """Whether ``rows`` = `flat` (values) is no copy."""
+    """Whether ``rows`` = `flat` (``values`` (N, 3)) is no copy."""
     return len(values) > 0 and _same_start(values, rows)
 
 

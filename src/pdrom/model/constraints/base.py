@@ -120,7 +120,7 @@ class ConstraintGroup(Effect):
         return np.repeat(self.weights, self.rows_per_element)
 
     def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
-        """Freeze what depends on first positions q (N, 3) m of a frame, for ``elements`` or all."""
+        """Freeze what depends on first positions ``q`` (N, 3) m, for ``elements`` (m,) or all."""
 
     def kernel_parameters(self) -> np.ndarray:
         """Numbers that ``gradient_kernel`` needs beside S q, in the order that it expects.
@@ -135,7 +135,7 @@ class ConstraintGroup(Effect):
         return ()
 
     def project(self, y: np.ndarray) -> np.ndarray:
-        """Projections p(y) of all elements, (e p, 3)."""
+        """Projections p(y) of all elements at ``y`` (N, 3) m, (e p, 3)."""
         return self.project_elements(y, np.arange(self.elements))
 
     def sampler(self, elements: np.ndarray) -> LocalKernel:
@@ -151,7 +151,7 @@ class ConstraintGroup(Effect):
         return projections(self.sampler(elements), y, self.rows_per_element * len(elements))
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add S^T W p(y) to ``rhs`` (N, 3) in place and return the energy W(y)."""
+        """Add S^T W p(y) of ``y`` (N, 3) m to ``rhs`` (N, 3) in place; return the energy, J."""
         if self.local_kernel is None:
             raise NotImplementedError(f"{self.name} has neither a local kernel nor its own")
         if self._pass is None or self._pass.kernels != (self.local_kernel,):
@@ -160,7 +160,7 @@ class ConstraintGroup(Effect):
 
     @abstractmethod
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
-        """NumPy reference of the projection: ``d`` = S_e q -> p_e, both (len(elements), p, 3)."""
+        """NumPy reference: ``d`` = S_e q -> p_e, both (m, p, 3), of ``elements`` (m,)."""
 
     @abstractmethod
     def restricted(
@@ -184,7 +184,7 @@ class ConstraintGroup(Effect):
         return (self.S.T @ self.S.multiply(self.row_weights[:, None])).tocsr()
 
     def roundoff(self, q: np.ndarray) -> float:
-        """Size of the round-off in S q: eps times the norm of the terms that cancel, |S| |q|."""
+        """Round-off in S q of ``q`` (N, 3) m: eps times the norm of the cancelling |S| |q|."""
         return float(np.finfo(float).eps * np.linalg.norm(abs(self.S) @ np.abs(q)))
 
 
@@ -232,7 +232,7 @@ def require_cells(mesh: Mesh, kind: str, effect: str) -> np.ndarray:
 
 
 def directions(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors and lengths (..., 1) of the vectors (..., 3) of a; zero where one is zero."""
+    """Unit vectors and lengths (..., 1) of vectors ``a`` (..., 3); zero where one is zero."""
     # scaled: neither overflow nor underflow of the squares
     largest = np.abs(a).max(axis=-1, keepdims=True)
     part = a / np.where(largest > 0.0, largest, 1.0)

@@ -98,7 +98,7 @@ class VertexBending(ConstraintGroup):
         self.normals = normals
 
     def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
-        """Take the vertex normals of q; only curved vertices (of ``elements``) need them."""
+        """Take the vertex normals of ``q`` (N, 3) m; curved ``elements`` (m,) alone need them."""
         curved = self._curved
         if elements is not None:
             curved = elements[self.side[elements] != 0.0]

@@ -46,7 +46,7 @@ def _neighbours(stencil: np.ndarray, vertices: int) -> sparse.csr_array:
 
 
 def _corners(stencil: np.ndarray) -> int:
-    """How many vertices the blocks have, added up."""
+    """Number of vertices of the blocks, added up."""
     blocks = np.arange(len(stencil)) // LANES
     pairs = blocks[:, None] * (int(stencil.max()) + 1) + stencil
     return len(np.unique(pairs))

@@ -34,6 +34,7 @@ def call(typing_context, address, d, parameters, p, m):
     """Call a gradient kernel by its ``address``.
 
     ``d``, ``parameters`` and ``p``, see `gradient_kernel`, are addresses; ``m`` elements.
+    ``typing_context`` is Numba's own: callers leave it out.
     """
     integers = (types.intp,) * 5
 

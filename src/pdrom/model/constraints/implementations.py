@@ -40,6 +40,7 @@ class NumpyLocalStep(_Slower):
         self._lift = sparse.csr_array(group.S.T.multiply(group.row_weights[None, :]))
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
+        """Add S^T W p(y) of ``y`` (N, 3) m to ``rhs`` (N, 3) and return the energy, J."""
         d = self.group.S @ y
         p = self.group.reference_project(d.reshape(self._shape), self._all).reshape(d.shape)
         energy = 0.5 * float(np.sum(self._weights * (d - p) ** 2))
@@ -64,6 +65,7 @@ class InterpretedLocalStep(_Slower):
             self._blocks.append((columns, block.toarray()[:, columns], group.weights[e]))
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
+        """Add S^T W p(y) of ``y`` (N, 3) m to ``rhs`` (N, 3) and return the energy, J."""
         energy = 0.0
         for e, (columns, block, weight) in enumerate(self._blocks):
             d = block @ y[columns]

@@ -78,7 +78,7 @@ def load(work, first, lane):
 
 @lane_function
 def save(work, first, lane, vector):
-    """Opposite of `load`: write a ``vector`` to the numbers from ``first`` on of a ``lane``."""
+    """Opposite of `load`: write a ``vector`` to ``work`` from number ``first`` on of a ``lane``."""
     work[first * LANES + lane] = vector[0]
     work[(first + 1) * LANES + lane] = vector[1]
     work[(first + 2) * LANES + lane] = vector[2]

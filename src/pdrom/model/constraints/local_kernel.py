@@ -147,7 +147,7 @@ class LocalPass:
         return 2 if self.touched else 1
 
     def add(self, y: np.ndarray, rhs: np.ndarray, threads: int) -> float:
-        """Add S^T W p(y) to ``rhs``, both flat padded, by one or two ``threads``; the energy."""
+        """Add S^T W p(y) of ``y`` (4 N,) to ``rhs`` (4 N,) by so many ``threads``; energy, J."""
         places = y.ctypes.data, rhs.ctypes.data
         add_part(*self.preparing, PREPARE, *places)
         if not self.touched:

@@ -126,9 +126,10 @@ def arguments(y, rhs, record, part, corners, numbers):
 
 @lane_function
 def samples(record, corners, numbers):
-    """Unpack what a kernel that projects some elements needs besides `arguments`, as there.
+    """Unpack from ``record`` what a kernel that projects some elements needs besides `arguments`.
 
-    (elements, corners and geometry of a block of them), see `pdrom.model.constraints.lanes.take`
+    (elements, corners and geometry of a block of them, see `pdrom.model.constraints.lanes.take`),
+    for so many ``corners`` and ``numbers`` an element
     """
     entries = rows.indices(record, ARRAYS)
     return (
@@ -177,7 +178,7 @@ def gather_edges(y, corners, block, edges, work):
 
 @lane_function
 def copy_rows(d, count, start, work, first):
-    """Copy S q, ``d`` (m count, 3), from ``start`` on to ``work``; the last one is repeated."""
+    """Copy S q, ``d`` (m count, 3), from ``start`` on to ``work[first:]``; the last is repeated."""
     last = d.shape[0] // count - 1
     for lane in range(LANES):
         base = count * min(start + lane, last)

@@ -132,7 +132,7 @@ class Anderson:
 
     @property
     def refused(self) -> int:
-        """How many iterates were refused so far."""
+        """Number of iterates refused so far."""
         return int(self.history[6][REFUSED])
 
     def begin_frame(self, y: np.ndarray) -> None:

@@ -20,7 +20,7 @@ class Solve(Protocol):
     """A factored system with the fixed coordinates eliminated."""
 
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
-        """Overwrite the free coordinates of ``y`` by the solution for ``rhs``."""
+        """Overwrite the free coordinates of ``y`` (n, 3) by the solution for ``rhs`` (n, 3)."""
 
 
 class Space(ABC):

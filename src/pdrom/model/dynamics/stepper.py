@@ -32,7 +32,7 @@ class LocalStep(Protocol):
         """Called once a frame with its first positions ``q`` (N, 3)."""
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add S^T W p(y) to ``rhs`` (N, 3); return the energy W(y), nan where it is not known."""
+        """Add S^T W p(y) of ``y`` (N, 3) to ``rhs`` (N, 3); return the energy W(y), J, or nan."""
 
 
 class WatchedStep(ABC):

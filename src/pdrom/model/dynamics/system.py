@@ -102,7 +102,7 @@ class GlobalSystem:
 
     @property
     def factorisations(self) -> int:
-        """How many factorisations exist so far."""
+        """Number of factorisations so far."""
         return len(self._cache)
 
     def eliminate(self, fixed: np.ndarray) -> Elimination:

@@ -170,7 +170,7 @@ class Boundary(Effect):
         return True
 
     def path(self, frames: range, current: np.ndarray) -> np.ndarray:
-        """`targets` (f, n, 3) of ``frames``; only the first may take hold of ``current``."""
+        """`targets` (f, n, 3) of ``frames``; only the first may take hold of ``current`` (n, 3)."""
         first = self.targets(frames.start, current)
         if not self.moves:
             return np.broadcast_to(first, (len(frames), *first.shape))
@@ -215,7 +215,7 @@ class Contact(Effect):
         """
 
     def doubt(self, rest: np.ndarray, free: np.ndarray) -> str:
-        """Say what is odd about the rest shape (N, 3) m with its ``free`` vertices; "" if nothing.
+        """Say what is odd about ``rest`` (N, 3) m with its ``free`` vertices (n,); "" if nothing.
 
         By default: vertices that the first frame moves, whatever the forces.
         """

@@ -67,11 +67,11 @@ class Obstacle(Contact):
 
     @abstractmethod
     def depths(self, points: np.ndarray) -> np.ndarray:
-        """Distance (n,) of points (n, 3) inside to the surface; not positive outside."""
+        """Distance (n,) of ``points`` (n, 3) m inside to the surface; not positive outside."""
 
     @abstractmethod
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Outward unit normals (n, 3) at the surface points nearest to points inside."""
+        """Outward unit normals (n, 3) at the surface points nearest to ``points`` (n, 3) inside."""
 
     @abstractmethod
     def entries(

@@ -122,7 +122,7 @@ def _arrays(path: Path, digest: str, limits: MeshLimits) -> tuple[np.ndarray, np
 
 
 def _fault(ended: subprocess.CompletedProcess[bytes], limits: MeshLimits) -> str:
-    """Why a reader ended without a mesh."""
+    """Reason why a reader ended without a mesh."""
     status = ended.returncode
     if status == reader.REFUSED:
         return ended.stdout.decode(errors="replace")

@@ -149,7 +149,7 @@ _FINDERS: dict[type, Callable[[Mesh, Any], np.ndarray]] = {
 
 
 def farthest_points(points: np.ndarray, candidates: np.ndarray, count: int) -> np.ndarray:
-    """``count`` of ``candidates`` by farthest-point sampling, starting nearest to the centre.
+    """``count`` of ``candidates`` (n,) by farthest-point sampling, the first nearest the centre.
 
     Ties go to the smallest index, so that the order is deterministic.
 

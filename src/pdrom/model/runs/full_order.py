@@ -24,6 +24,7 @@ def simulate(
 
     Parameters
     ----------
+    stepper : options of `Scene.stepper`
     perturbation : (N, 3) m, added to the first positions
     """
     loop = scene.stepper(**stepper)
@@ -36,6 +37,7 @@ def trajectory(scene: Scene, perturbation: np.ndarray | None = None, **stepper: 
     Parameters
     ----------
     perturbation : (N, 3) m, added to the first positions
+    stepper : options of `Scene.stepper`
     """
     positions = [scene.initial_state(perturbation).positions]
     positions += [state.positions for state, _ in simulate(scene, perturbation, **stepper)]

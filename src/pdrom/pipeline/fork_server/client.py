@@ -45,7 +45,7 @@ def main() -> int:
 
 
 def connect(name: str) -> socket.socket | None:
-    """Connection to the server; None where nobody of the same user listens."""
+    """Connection to the server ``name``; None where nobody of the same user listens."""
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         connection.connect(place_of(name))
@@ -60,14 +60,17 @@ def place_of(name: str) -> bytes:
 
 
 def of_this_user(connection: socket.socket) -> bool:
-    """Whether the process at the other end is this user's; a name has no permissions of its own."""
+    """Whether the process at the other end of ``connection`` is this user's.
+
+    A name has no permissions of its own.
+    """
     reported = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
     _process, user, _group = struct.unpack("3i", reported)
     return bool(user == os.geteuid())
 
 
 def ask(connection: socket.socket) -> bytes:
-    """Request a fork and return its process number; nothing if the server is gone."""
+    """Request a fork by ``connection``; its process number, nothing if the server is gone."""
     environment = [f"{key}={value}" for key, value in os.environ.items() if key != ADDRESS]
     parts = [os.getcwd(), os.path.abspath(sys.argv[1]), *environment]
     request = "\0".join(parts).encode("utf-8", "surrogateescape")
@@ -80,7 +83,7 @@ def ask(connection: socket.socket) -> bytes:
 
 
 def receive(connection: socket.socket) -> bytes:
-    """One number of the server, a line of twenty characters; nothing if the server is gone."""
+    """Number, a line of twenty characters, from ``connection``; nothing if the server is gone."""
     text = b""
     while len(text) < 20:
         try:
@@ -94,7 +97,7 @@ def receive(connection: socket.socket) -> bytes:
 
 
 def forward(job: int, number: int) -> None:
-    """Hand a signal on to the job, which is in a session of its own."""
+    """Hand signal ``number`` on to the process ``job``, which is in a session of its own."""
     with suppress(ProcessLookupError):
         os.killpg(job, number)
 

@@ -38,7 +38,7 @@ class Job:
         self.client = client
 
     def end(self, status: int) -> None:
-        """Tell the client how the job ended; it may be gone."""
+        """Tell the client the exit ``status`` of the job; the client may be gone."""
         with suppress(OSError):
             self.client.sendall(NUMBER % status)
         self.client.close()

@@ -61,12 +61,12 @@ def hold_pipe(place: Path) -> None:
 
 
 def start_server(python: str = sys.executable, libraries: Sequence[str] = LIBRARIES) -> None:
-    """Start the server of this process; it ends when this process does.
+    """Start the server of this process by ``python``; it ends when this process does.
 
     The address goes into the environment, which jobs inherit. It is a name that Linux keeps beside
     the file system and forgets with the last process that listens there, so that nothing is left
-    of a run that was killed. Clients that come before the libraries are loaded wait in the socket's
-    queue.
+    of a run that was killed. Clients that come before the ``libraries`` are loaded wait in the
+    socket's queue.
     """
     if not SUPPORTED:
         return

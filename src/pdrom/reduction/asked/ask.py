@@ -55,10 +55,11 @@ def read_ask(wish: object, source: str = "error") -> Ask:
 
 
 def relative_error(run: np.ndarray, reference: np.ndarray, quantity: Quantity) -> float:
-    """Error of a run against a reference, both (F + 1, N, 3) m, relative to the reference's motion.
+    """Error of a ``run`` over the motion of its ``reference``, both positions (F + 1, N, 3) m.
 
-    Velocities are differences of the ends of frames: the step loop has no others. Infinite where
-    the run is not finite; zero where nothing moves and nothing is wrong.
+    ``quantity`` says of what: positions, or velocities, which are differences of the ends of
+    frames: the step loop has no others. Infinite where the run is not finite; zero where nothing
+    moves and nothing is wrong.
     """
     moved, wrong = reference - reference[0], run - reference
     if quantity == "velocity":

@@ -72,7 +72,10 @@ class Hierarchy:
     frames: int
 
     def expected(self, step: Step, ask: Ask) -> float:
-        """Largest error of the step on the own motions; infinite where too few frames count."""
+        """Largest error of the ``step`` on the own motions, in the quantity of the ``ask``.
+
+        Infinite where too few frames count.
+        """
         judged = self.horizon >= JUDGED * self.frames
         return worst(step.tried, ask.quantity) if judged else np.inf
 
@@ -81,7 +84,10 @@ class Hierarchy:
         return max(float(each.defects.max(initial=0.0)) for each in step.tried)
 
     def estimated(self, step: Step, ask: Ask, defect: float) -> float:
-        """Error of a run of the step with a root mean square ``defect`` in units of the motion."""
+        """Error, as the ``ask`` measures it, of a run of the ``step`` with this ``defect``.
+
+        The defect is a root mean square in units of the motion.
+        """
         known = self.defect(step)
         return self.expected(step, ask) * max(1.0, defect / known if known > 0.0 else np.inf)
 
@@ -99,7 +105,7 @@ class Hierarchy:
 
 
 def hierarchy(training: Scene, settings: AskSettings) -> tuple[Hierarchy, list[Motion]]:
-    """Try every level on the training motion and the validation motion.
+    """Try every level of ``settings`` on the ``training`` motion and the validation motion.
 
     Returns
     -------

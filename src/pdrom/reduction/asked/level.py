@@ -96,7 +96,7 @@ class Running:
         return State(self.positions(state.positions), self.positions(state.velocities))
 
     def positions(self, y: np.ndarray) -> np.ndarray:
-        """Coordinates of the loop at all vertices, (N, 3)."""
+        """Positions (N, 3) m of all vertices for coordinates ``y`` of the loop."""
         return y if self._model is None else self._model.columns.B @ y
 
     def run(self, state: State, frames: range) -> Iterator[State]:

@@ -56,7 +56,7 @@ class Motion:
             self.reference, self.iterations, self.end = further, count, end
 
     def error(self, positions: np.ndarray, quantity: Quantity) -> float:
-        """Error of a run (F + 1, N, 3) m before the end."""
+        """Error in ``quantity`` of a run with ``positions`` (F + 1, N, 3) m, before the end."""
         last = self.end + 1
         return relative_error(positions[:last], self.reference[:last], quantity)
 
@@ -122,11 +122,11 @@ def exact_beside(level: Level) -> Level:
 
 
 def defect(before: State, after: State, exact: Running, frame: int) -> float:
-    """Distance, m, of the end of ``frame`` to that which ``exact`` reaches from its beginning."""
+    """Distance, m, of the end ``after`` of ``frame`` to what ``exact`` reaches from ``before``."""
     (end,) = exact.run(before, range(frame, frame + 1))
     return float(np.linalg.norm(after.positions - end.positions))
 
 
 def worst(found: Sequence[Tried], quantity: Quantity) -> float:
-    """Largest error of a level on several motions."""
+    """Largest error in ``quantity`` of a level on the motions that it was tried on, ``found``."""
     return max(each.errors[quantity] for each in found)

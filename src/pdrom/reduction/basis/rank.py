@@ -4,7 +4,7 @@ import numpy as np
 
 
 def numerical_rank(singular_values: np.ndarray, shape: tuple[int, int], roundoff: float) -> int:
-    """Number of ``singular_values``, of a matrix of that ``shape``, above both round-off levels.
+    """Number of ``singular_values`` (n,) of a matrix of that ``shape`` above both round-off levels.
 
     The relative level max(shape) eps sigma_1 is the backward error of the SVD. The absolute level
     ``roundoff`` is the error of the data themselves: where a projection is the difference of

@@ -1,4 +1,4 @@
-"""When a reduced local step stops paying: its time against the full one, over r."""
+"""Break-even of a reduced local step: its time against the full one, over r."""
 
 from collections.abc import Sequence
 

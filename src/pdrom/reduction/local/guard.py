@@ -67,7 +67,7 @@ class Guard:
     record: GuardRecord = field(default_factory=GuardRecord)
 
     def run(self, state: State, frames: range) -> Iterator[tuple[State, FrameReport]]:
-        """Do frames one after the other; none before it is asked for."""
+        """Do ``frames`` from ``state`` one after the other; none before it is asked for."""
         return frame_by_frame(self.step)(state, frames)
 
     def step(self, state: State, frame: int) -> tuple[State, FrameReport]:

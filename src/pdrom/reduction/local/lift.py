@@ -97,7 +97,14 @@ class Lift:
 
 @compiled(nogil=True)
 def coefficients(sampled, starts, positions, packed, operators, shifts, limits, result):
-    """Write the coefficients of all sets that belong to the numbers of the sampled elements."""
+    """Write the coefficients of all sets that belong to the numbers of the sampled elements.
+
+    Parameters
+    ----------
+    sampled : projections of the sampled elements, one after the other
+    starts, positions, packed, operators, shifts, limits : see `Lift`
+    result : (sets, r) that is written
+    """
     sets, modes = shifts.shape
     for k in range(sets):
         first, last = starts[k], starts[k + 1]
@@ -127,7 +134,14 @@ def coefficients(sampled, starts, positions, packed, operators, shifts, limits, 
 
 @compiled(nogil=True)
 def lift(values, axes, own_sets, lifted, offset, first, last, rhs):
-    """Add S^T W (mean + V c) to the rows ``first`` to ``last`` - 1 of the right-hand side."""
+    """Add S^T W (mean + V c) to the rows ``first`` to ``last`` - 1 of the right-hand side.
+
+    Parameters
+    ----------
+    values : (sets, r) coefficients
+    axes, own_sets, lifted, offset : see `Lift`
+    rhs : (4 N,) right-hand side, padded vectors
+    """
     for i in range(WIDTH * first, WIDTH * last):
         rhs[i] += offset[i]
     columns, vertices, modes = lifted.shape

@@ -53,7 +53,7 @@ class ReducedLocalStep:
         self._group.begin_frame(q, None if self._everything else self._elements)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add the reduced S^T W p(y) to ``rhs`` (N, 3); the energy is unknown: nan."""
+        """Add the reduced S^T W p(y) of ``y`` (N, 3) m to ``rhs`` (N, 3); energy unknown: nan."""
         if self._pass is not None:
             return self._pass.accumulate(y, rhs, self.threads)
         self.solve(self.sample(y))

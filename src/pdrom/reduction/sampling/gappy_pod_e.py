@@ -38,7 +38,8 @@ def bound_gain(v: np.ndarray, size: int, elements: np.ndarray, bound: float) -> 
     """``elements`` followed by others until || (P^T V)^+ ||_2 <= ``bound``.
 
     It ends with all elements if even they do not meet the bound, which for orthonormal columns and
-    a bound of at least 1 cannot happen: their gain is 1. Parameters and errors as `oversample`.
+    a bound of at least 1 cannot happen: their gain is 1. Errors are those of
+    `oversample`, and so are ``v`` and ``size``.
     """
     growing = _Growing(v, size, elements)
     while growing.count < growing.total and growing.gain > bound:

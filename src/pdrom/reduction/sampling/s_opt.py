@@ -52,6 +52,7 @@ def extend(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np.nda
     Parameters
     ----------
     v : (rows, r) basis
+    elements : (m,) blocks to start with
     size : rows of a block
     """
     count = min(count, len(v) // size)

@@ -30,6 +30,7 @@ class Selection(ABC):
         Parameters
         ----------
         v : (rows, r) basis
+        chosen : (m,) blocks to start with
         size : rows of a block
         """
         return oversample(v, size, chosen, count=count)

@@ -124,7 +124,7 @@ def _atom_columns(
 
 
 def orthonormal(columns: np.ndarray) -> np.ndarray:
-    """Orthonormal columns with the span of ``columns``, dependent ones left out, in order."""
+    """Orthonormal columns with the span of ``columns`` (n, k), in order, no dependent ones."""
     kept: list[np.ndarray] = []
     for column in columns.T:
         norm = np.linalg.norm(column)

@@ -89,7 +89,7 @@ def _export_group(group: ConstraintGroup) -> dict[str, Any]:
 
 
 def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str, Any]:
-    """Columns of a subspace with everything that depends on nothing else.
+    """``columns`` of a subspace of ``scene`` with everything that depends on nothing else.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str
 
 
 def export_model(scene: Scene, model: SubspaceModel) -> dict[str, Any]:
-    """Samples of each group of a model."""
+    """Samples of each group of ``scene`` in a ``model``."""
     return {
         "evaluated": model.elements_evaluated(scene),
         "groups": {
@@ -157,7 +157,7 @@ def _stencil(group: ConstraintGroup) -> np.ndarray:
 
 
 def needed_vertices(scene: Scene, models: Iterable[SubspaceModel]) -> np.ndarray:
-    """Vertices (n,) of all elements that any of the models samples."""
+    """Vertices (n,) of all elements of ``scene`` that any of the ``models`` samples."""
     found = [np.empty(0, np.int64)]
     for model in models:
         for group in scene.groups:
@@ -168,7 +168,12 @@ def needed_vertices(scene: Scene, models: Iterable[SubspaceModel]) -> np.ndarray
 
 
 def trained_box(scene: Scene, columns: Columns, reference: np.ndarray) -> np.ndarray:
-    """Least and largest coordinates (2, K, 3) of a run (F + 1, N, 3), projected on a subspace."""
+    """Least and largest coordinates (2, K, 3) in ``columns`` of a run of ``scene``.
+
+    Parameters
+    ----------
+    reference : (F + 1, N, 3) m, positions of the run, which are projected on the subspace
+    """
     frames, n, _ = reference.shape
     together = coordinates(columns, scene.masses, reference.transpose(1, 0, 2).reshape(n, -1))
     z = together.reshape(-1, frames, 3)

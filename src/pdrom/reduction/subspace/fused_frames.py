@@ -9,6 +9,15 @@ from pdrom.reduction.subspace.dense import product
 
 @compiled(nogil=True)
 def iterations(count, size, rows, operators, sampled, history):
+    """Do ``count`` iterations of the ``size`` free coordinates z, in place.
+
+    Parameters
+    ----------
+    rows : of the sampled strain D
+    operators : see ``iterated`` of `_Operators`
+    sampled : arrays of `_Sampled`
+    history : of the acceleration, see `Anderson`; `NO_HISTORY` without one
+    """
     strain, lift, offset, constant, z, weights, inertia, start = operators
     addresses, elements, starts, parameters, parameter_starts, d, p = sampled
     y, accelerated = z[: 3 * size], len(history[5]) > 0
@@ -65,6 +74,20 @@ def frames(
     positions, velocities, acceleration, rate, rates, h, fixed, free, targets, begun, count,
     rows, operators, sampled, history, seconds, watch,
 ):  # fmt: skip
+    """Do a frame for each of ``targets``, with the iterations of `iterations`.
+
+    Parameters
+    ----------
+    positions, velocities : (F + 1, K, 3) coordinates, the first ones given, the others written
+    acceleration, rate, rates : by all forces, see `ReducedSpace.affine`
+    h : time step, s
+    fixed, free : (m,), (K',) held coordinates and the others
+    targets : (F, m, 3) of the held coordinates
+    begun : see `_Operators`
+    count, rows, operators, sampled, history : see `iterations`
+    seconds : (F, 4) s, times of the phases of each frame, written
+    watch : clock, see `pdrom.model.compiled.clock`
+    """
     response, coupling, nothing, s, held = begun
     offset, constant, z = operators[2:5]
     for f in range(len(targets)):

@@ -115,7 +115,7 @@ def projection_space(
 
 
 def element_centres(group: ConstraintGroup, points: np.ndarray) -> np.ndarray:
-    """Mean position (e, 3) m over ``points`` (N, 3) m of the vertices that each element touches."""
+    """Mean (e, 3) m of the ``points`` (N, 3) m that each element of ``group`` touches."""
     touched = sparse.csr_array((group.S != 0).astype(np.float64))
     by_element = sum(
         touched[row :: group.rows_per_element] for row in range(group.rows_per_element)

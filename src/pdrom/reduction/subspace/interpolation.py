@@ -121,5 +121,5 @@ def reduced_strain(group: ConstraintGroup, columns: Columns) -> tuple[np.ndarray
 
 
 def element_rows(elements: np.ndarray, size: int) -> np.ndarray:
-    """Rows (m size,) of elements with ``size`` rows each, in the order of the elements."""
+    """Rows (m size,) of ``elements`` (m,) with ``size`` rows each, in the order of the elements."""
     return (elements[:, None] * size + np.arange(size)).ravel()

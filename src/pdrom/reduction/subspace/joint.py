@@ -15,8 +15,9 @@ from pdrom.reduction.subspace.interpolation import Interpolation, element_rows, 
 def interpolation_of(
     group: ConstraintGroup, columns: Columns, reduction: Reduction
 ) -> Interpolation:
-    """Interpolation of a group's projections by a reduction without limits of its coefficients.
+    """Interpolation in ``columns`` of a group's projections by a reduction without limits.
 
+    Limits are those of the coefficients.
     Coefficients of blocks that serve one axis each stand below each other.
     """
     strain, stiffness = reduced_strain(group, columns)

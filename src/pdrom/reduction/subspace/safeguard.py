@@ -33,17 +33,17 @@ class ControlStepper(Stepper):
     local_steps: list[SubspaceLocalStep]  # type: ignore[assignment]
 
     def begin(self, state: State, frame: int) -> None:
-        """Prepare a frame."""
+        """Prepare a ``frame`` that begins in ``state``."""
         self._s, self._elimination, self._base = self._begin(state, frame)
 
     def objective(self, y: np.ndarray) -> float:
-        """Sampled objective of the frame at y (K, 3), J."""
+        """Sampled objective of the frame at ``y`` (K, 3), J."""
         unused = np.zeros_like(y)
         energy = sum(step.accumulate(y, unused) for step in self.local_steps)
         return energy + self.space.inertia_energy(y - self._s)
 
     def rounding(self, y: np.ndarray, objective: float) -> float:
-        """How much an objective of this size may rise at y by rounding, J."""
+        """Largest rise of an objective of this size at ``y`` (K, 3) by rounding, J."""
         squares = sum(float(np.vdot(y, step.matrix @ y)) for step in self.local_steps)
         noise = 0.5 * ROUNDOFF**2 * squares
         return 2.0 * float(np.sqrt(objective * noise)) + noise
@@ -51,7 +51,10 @@ class ControlStepper(Stepper):
     def iterate(
         self, seconds: np.ndarray, on_last_iterate: Callable[[np.ndarray], None] | None
     ) -> np.ndarray:
-        """Coordinates (K, 3) after the frame's iterations."""
+        """Coordinates (K, 3) after the frame's iterations.
+
+        Their times are added to ``seconds`` (4,) s; ``on_last_iterate`` sees the last iterate.
+        """
         rest: Any = (self._s, self._base, self._elimination, seconds, on_last_iterate)
         return self._iterate(*rest)[0]
 

@@ -77,7 +77,7 @@ class ReducedSpace(Space):
         return all(contact.height is not None for contact in self._contacts)
 
     def free_frames(self, path: np.ndarray) -> int:
-        """How many frames of ``path`` (n, K, 3) come before the first that meets a floor."""
+        """Number of frames of ``path`` (n, K, 3) before the first that meets a floor."""
         first = len(path)
         for contact in self._contacts:
             first = contact.free_frames(path[:first])
@@ -87,11 +87,11 @@ class ReducedSpace(Space):
         return held_targets(self._boundaries, frame, positions)
 
     def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates that are held in the first ``frames``, and their values (n, m, 3)."""
+        """Held coordinates in the first ``frames`` from ``positions`` (K, 3), values (n, m, 3)."""
         return held_path(self._boundaries, frames, positions)
 
     def elimination(self, fixed: np.ndarray) -> DenseElimination:
-        """The factored system without the ``fixed`` coordinates."""
+        """Factored system without the ``fixed`` coordinates (m,)."""
         key = fixed.tobytes()
         if key not in self._cache:
             self._cache[key] = DenseElimination(self.matrix, fixed)
@@ -124,12 +124,12 @@ def _require_reducible(effects: Sequence[Effect]) -> None:
 
 
 def coordinates(columns: Columns, masses: np.ndarray, field: np.ndarray) -> np.ndarray:
-    """Mass-orthogonal projection of ``field`` (N, 3) on the span of ``columns``, (K, 3)."""
+    """Mass-orthogonal projection (K, 3) of ``field`` (N, 3) on ``columns``, ``masses`` (N,) kg."""
     return _mass_solve(columns, masses, columns.B.T @ (masses[:, None] * field))
 
 
 def projector(columns: Columns, masses: np.ndarray) -> np.ndarray:
-    """Matrix (K, N) of `coordinates`."""
+    """Matrix (K, N) of `coordinates` with ``columns`` and ``masses``."""
     return _mass_solve(columns, masses, (columns.B * masses[:, None]).T)
 
 
@@ -229,7 +229,7 @@ class _ReducedContact:
         self._project = projector(columns, scene.masses)
 
     def free_frames(self, path: np.ndarray) -> int:
-        """How many frames of ``path`` (n, K, 3) come before the first with a probe in the floor."""
+        """Number of frames of ``path`` (n, K, 3) before the first with a probe in the floor."""
         lowest = (path[:, :, 1] @ self._probes.T).min(axis=1)
         # a frame that is not finite is left to the plain step
         above = lowest >= self.height

@@ -59,8 +59,11 @@ def write_article(
 
     Parameters
     ----------
+    source, references : TeX sources of the manuscript and its bibliography
+    tables, machine : CSV of the tables and the record of the machine
     inputs : what the manuscript reads, with `NUMBERS`
     figures : PDF and PNG of each
+    facts, claims : stated beside results, and the file of the claims' rules
     added : values that the study adds to sets of ``claims``, see `load_claims`
     assets : templates, style and script, see `ASSETS`
     """

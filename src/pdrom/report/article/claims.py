@@ -20,7 +20,7 @@ def claims_page(
     pages: Mapping[str, str],
     template: str,
 ) -> str:
-    """HTML of all claims.
+    """HTML of all ``claims``, rules by name, in ``template``.
 
     Parameters
     ----------

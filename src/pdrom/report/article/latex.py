@@ -56,7 +56,7 @@ class Origins:
 
 
 def prepared(source: str, document: str, origins: Origins, facts: Facts) -> str:
-    """Return the ``source`` of a ``document`` for pandoc."""
+    """Return the ``source`` of a ``document`` for pandoc, linked by ``origins`` and ``facts``."""
     preamble, begin, text = source.partition(r"\begin{document}")
     left_out = rf"\emph{{[{note(facts.part, facts.full_study)}]}}"
     text = _COMMENT.sub("", _decided(text, origins.known[document], left_out))
@@ -121,7 +121,7 @@ def _plain_mathematics(text: str) -> str:
 
 
 def linked_table(text: str, tables: Mapping[str, pd.DataFrame]) -> str:
-    """Return a made TeX table whose numbers are links to the rows that they come from.
+    """Return ``text``, a made TeX table, with numbers that link to the rows that they come from.
 
     They are in the one of ``tables`` that shares most columns with the made table. Where that has
     as many rows, each has made one; else they agree in the columns that both have, as far as these
@@ -169,7 +169,7 @@ def _plain(cell: str) -> str:
 
 
 def plain_columns(text: str) -> str:
-    """Return a source whose tables have columns of letters alone; pandoc knows no others."""
+    """Return ``text`` with tables whose columns are letters alone; pandoc knows no others."""
     pieces, start = [], 0
     for found in _SPEC.finditer(text):
         end = closing(text, found.end() + 1)

@@ -8,7 +8,7 @@ Node = dict[str, Any]
 
 
 def attributes(identifier: str = "", classes: str = "", **keys: str) -> list[Any]:
-    """Attributes of a node."""
+    """Attributes of a node: its ``identifier``, ``classes`` in a string, and further ``keys``."""
     return [identifier, classes.split(), [[k.replace("_", "-"), v] for k, v in keys.items()]]
 
 
@@ -18,7 +18,10 @@ def words(text: str) -> list[Node]:
 
 
 def link(inlines: list[Node], address: str, classes: str = "") -> Node:
-    """Make a link; one of a formula alone has it as its title, too, which screen readers read."""
+    """Make a link around ``inlines`` to an ``address``, of some ``classes``.
+
+    One of a formula alone has it as its title, too, which screen readers read.
+    """
     formula = all(node["t"] == "Math" for node in inlines)
     title = re.sub(r"\\cdot ?|[{}\\]", lambda m: "·" if "cdot" in m[0] else "", plain(inlines))
     return {"t": "Link", "c": [attributes("", classes), inlines, [address, title * formula]]}

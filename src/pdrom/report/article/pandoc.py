@@ -15,7 +15,7 @@ Tree = dict[str, Any]
 
 
 def parsed(text: str, files: Mapping[str, str], references: Path) -> Tree:
-    r"""Pandoc's syntax tree of a LaTeX source, with its bibliography.
+    r"""Pandoc's syntax tree of a LaTeX source ``text``, with its bibliography.
 
     Parameters
     ----------
@@ -37,7 +37,10 @@ def parsed(text: str, files: Mapping[str, str], references: Path) -> Tree:
 
 
 def page(tree: Tree, template: Path, variables: Mapping[str, str]) -> str:
-    """HTML of a syntax tree, with MathML and a table of contents; PaperError as in `parsed`."""
+    """HTML of ``tree`` by a ``template`` with ``variables``; PaperError as in `parsed`.
+
+    Formulas are MathML, a table of contents comes first.
+    """
     words = ["-f", "json", "-t", "html5", "--mathml", "--wrap=none", "--toc", "--toc-depth=2"]
     words += ["--standalone", "--shift-heading-level-by=1", f"--template={template.resolve()}"]
     words += [word for name, value in variables.items() for word in ("-V", f"{name}={value}")]

@@ -18,7 +18,7 @@ MANY = 4  # keys of options that say what is drawn
 
 
 def write_picture(png: Path, out: Path) -> tuple[int, int]:
-    """Write a figure's picture as WebP; return its width and height, pixels."""
+    """Write the picture ``png`` of a figure as WebP ``out``; return width and height, pixels."""
     require_intact(png)
     with Image.open(png) as image:
         drawn = image.convert("RGB")
@@ -33,7 +33,7 @@ def write_picture(png: Path, out: Path) -> tuple[int, int]:
 
 
 def copy_pdf(pdf: Path, out: Path) -> bool:
-    """Copy a figure's PDF beside the page where it is small; whether it is."""
+    """Copy a figure's ``pdf`` to ``out`` where it is small; whether it is."""
     require_intact(pdf)
     small = pdf.stat().st_size <= COPIED
     if small:
@@ -49,7 +49,9 @@ def shown_figure(
 
     Parameters
     ----------
+    node : of the figure in the syntax tree
     size : of the picture, pixels
+    with_pdf : whether its PDF lies beside the page
     pages : of the figures that stand in the documents, by name
     """
     attribute, caption, _ = node["c"]

@@ -24,7 +24,7 @@ FACTS = {
 
 
 def table_page(name: str, csv: bytes, template: str) -> str:
-    """HTML of a table, with the command that makes it and the tolerance of every column."""
+    """HTML of table ``name`` (``csv``) by ``template``: its command, tolerance of every column."""
     table = declared().get(name)
     columns = "".join(
         f"<tr data-column='{c.name}'><th scope=row>{c.name}</th>"
@@ -46,21 +46,21 @@ def table_page(name: str, csv: bytes, template: str) -> str:
 
 
 def argument(name: str) -> str:
-    """Argument of ./reproduce that makes a table; facts come with the numbers of the text."""
+    """Argument of ./reproduce that makes table ``name``; facts come with the text's numbers."""
     if name in FACTS:
         return "paper_inputs"
     return TABLE.at(RESULTS, name=name) if name in declarations() else name
 
 
 def contents(files: list[str], facts: Mapping[str, pd.DataFrame]) -> dict[str, bytes]:
-    """CSV of every table, results and facts, by name."""
+    """CSV of every table by name: results, which are ``files``, and ``facts``."""
     found = {Path(path).stem: Path(path).read_bytes() for path in files}
     plain = {name: facts[name].to_csv(index=False, lineterminator="\n").encode() for name in FACTS}
     return found | plain
 
 
 def list_page(names: list[str], template: str) -> str:
-    """HTML with a line for each table."""
+    """HTML by ``template`` with a line for each table of ``names``."""
     known = declared()
     items = "".join(
         f"<li><a href='tables/{name}.html'><code>{name}</code></a> "

@@ -31,12 +31,15 @@ class Labels:
     counts: Counter[str] = field(default_factory=Counter)
 
     def next(self, kind: str, label: str = "") -> str:
-        """Number of the next figure, table ...; a ``label`` will stand for it."""
+        """Number of the next figure, table ... (``kind``); a ``label`` will stand for it."""
         self.counts[kind] += 1
         return self.note(label, f"{self.prefix}{self.counts[kind]}")
 
     def section(self, level: int, appendix: bool, label: str) -> str:
-        """Number of the next section of a level; those of an appendix begin with a letter."""
+        """Number of the next section of a ``level``; a ``label`` will stand for it.
+
+        Those of an ``appendix`` begin with a letter.
+        """
         if appendix and level == 1 and not self.counts["appendix"]:
             self.counts["appendix"], self.counts["level1"] = 1, 0
         self.counts[f"level{level}"] += 1
@@ -54,7 +57,7 @@ class Labels:
 
 
 def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> Tree:
-    """Number sections, figures, tables, equations and theorems, and lay them out.
+    """Number sections, figures, tables, equations and theorems of ``tree``, and lay them out.
 
     Parameters
     ----------
@@ -142,6 +145,8 @@ def _equation(node: Node, labels: Labels) -> Node:
 
 def resolved(tree: Tree, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Tree:
     """Give references their numbers, numbers and claims their links; open paragraphs in bold.
+
+    ``tree`` is a document's.
 
     Parameters
     ----------

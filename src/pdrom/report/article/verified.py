@@ -11,7 +11,7 @@ INDEX = "index.html"
 
 
 def write_verified(found: Mapping[str, str], folder: Path) -> None:
-    """Write the outcomes beside the pages, by kind and name as in ``table payoff``.
+    """Write the outcomes ``found``, by kind and name as in ``table payoff``, into ``folder``.
 
     A page that is opened from a disk loads nothing but scripts, so that this is one.
     """

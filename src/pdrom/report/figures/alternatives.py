@@ -88,7 +88,7 @@ def _draw_case(pair: list[Axes], labels: tuple[str, int, float], case: pd.DataFr
 
 
 def best_points(rows: pd.DataFrame) -> pd.DataFrame:
-    """Points that no other one beats in time and error, from the cheapest to the most accurate."""
+    """Points that no other one of ``rows`` beats in time and error, from cheap to accurate."""
     ordered = rows.sort_values(["ms_per_frame", "error"], kind="stable")
     before = ordered.error.cummin().shift(fill_value=np.inf)
     return ordered[ordered.error < before]

@@ -85,7 +85,10 @@ def _at(samplings: list[SamplingView], ranks: tuple[int | str, ...]) -> Sampling
 
 
 def axes_hit(entries: np.ndarray, per_element: int) -> dict[int, str]:
-    """Element -> "x", "y", "z", or "several" when its entries belong to more than one axis."""
+    """Element -> "x", "y", "z", or "several" when its entries belong to more than one axis.
+
+    ``entries`` (n,) are vector indices, ``per_element`` are those of an element.
+    """
     hit: dict[int, str] = {}
     for entry in entries:
         element, axis = int(entry) // per_element, "xyz"[int(entry) % 3]

@@ -39,12 +39,12 @@ def _listed(file: File) -> dict[str, str]:
 
 
 def safe_json(value: object) -> str:
-    """JSON in which no text ends the element that holds it, or opens a comment."""
+    """JSON of ``value`` in which no text ends the element that holds it, or opens a comment."""
     return json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
 def filled(template: str, parts: dict[str, str]) -> str:
-    """Return a template with its ``{{NAME}}`` replaced; what is filled in is not looked at."""
+    """Return ``template`` with its ``{{NAME}}`` replaced by ``parts``, which are not looked at."""
     before, *rest = template.split("{{")
     pieces = [before]
     for piece in rest:

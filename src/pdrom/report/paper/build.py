@@ -55,6 +55,9 @@ def write_inputs(
 ) -> None:
     r"""Write macros.tex, figures.tex, the TeX tables and the bibliographies.
 
+    Made from TeX files ``source``, BibTeX ``references``, CSV ``tables``, the record of the
+    ``machine`` and ``facts``.
+
     `NUMBERS` says of every ``\val`` key and TeX table where its numbers come from, and which blocks
     of each document are shown (`decisions`).
     """
@@ -92,7 +95,7 @@ class _Watched(dict[str, pd.DataFrame]):
 
 
 def fact_tables(machine: Path, facts: Facts) -> dict[str, pd.DataFrame]:
-    """Tables of the manuscript that are no results: of the configuration, and ``machine``."""
+    """Tables of the manuscript that are no results: ``facts``, and the record ``machine``."""
     tables = {name: pd.DataFrame(rows) for name, rows in facts.tables.items()}
     return {**tables, "machine": _machine_table(machine)}
 
@@ -123,7 +126,8 @@ def build(
 ) -> None:
     """Build the PDFs of the paper and of its supplement from figures and what `write_inputs` wrote.
 
-    Each links into the other, as long as both lie in one folder.
+    Each links into the other, as long as both lie in one folder. ``source`` and ``outputs`` are TeX
+    and PDF of each, ``figures`` and ``inputs`` files that they read, with ``facts``.
     """
     results = [Path(path) for path in (*figures, *inputs)]
     for path in results:

@@ -1,4 +1,4 @@
-"""Tables of the manuscript about the claims of the preprint, as TeX."""
+"""Tables of the manuscript about claims of the preprint, as TeX, made of ``tables``."""
 
 from collections.abc import Mapping
 from typing import Any

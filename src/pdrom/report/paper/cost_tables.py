@@ -1,4 +1,4 @@
-"""Tables of the manuscript about what accuracy costs, as TeX."""
+"""Tables of the manuscript about what accuracy costs, as TeX, made of ``tables``."""
 
 from collections.abc import Callable, Mapping
 

@@ -1,4 +1,4 @@
-"""Tables of the manuscript about hard cases, as TeX."""
+"""Tables of the manuscript about hard cases, as TeX, made of ``tables``."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -28,7 +28,7 @@ def hard_cases(tables: Tables) -> str:
 
 
 def _failure(row: Any) -> str:
-    """How a reduction failed, with what tells it apart from others."""
+    """Failure of a reduction, with what tells it apart from others."""
     if row.outcome == "singular":
         return "singular"
     if row.outcome == "blow-up":

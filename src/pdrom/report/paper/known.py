@@ -52,7 +52,10 @@ def sentences(source: str) -> list[Sentence]:
 
 
 def decisions(source: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
-    """Decide for every block: shown, noted (left out with a note) or dropped."""
+    """Decide for every block of ``source``: shown, noted (left out with a note) or dropped.
+
+    ``tables`` by name tell what is held.
+    """
     made, noted = [], set()
     for sentence in sentences(source):
         if all(is_held(key, tables) for key in keys_of(sentence.text)):
@@ -70,7 +73,7 @@ def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_stud
 
     What was decided of the blocks of each document stands under its name, which is TeX's
     ``\jobname``. ``\ifpart`` is true where ``part`` names what the study was read from,
-    ``\configuration``.
+    ``\configuration``; ``full_study`` is the name of the full one.
     """
     lines = [
         r"\newif\ifpart",
@@ -103,7 +106,7 @@ def note(part: str | None, full_study: str) -> str:
 
 
 def closing(source: str, start: int) -> int:
-    """Place of the brace that closes a block which begins at ``start``."""
+    """Place in ``source`` of the brace that closes a block which begins at ``start``."""
     depth = 1
     for brace in _BRACE.finditer(source, start):
         depth += {"{": 1, "}": -1}.get(brace[0], 0)

@@ -43,7 +43,7 @@ def keys_of(source: str) -> list[str]:
 
 
 def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:
-    r"""TeX definitions for every \val key of ``source``.
+    r"""TeX definitions for every \val key of ``source``, with numbers of ``tables``.
 
     Raises
     ------
@@ -82,7 +82,7 @@ class Number:
 
 
 def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
-    """Number of one key; its text is `MISSING` where there is none.
+    """Number of one ``key`` of ``tables``; its text is `MISSING` where there is none.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
 
 
 def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
-    """Whether a configuration holds what ``key`` asks for, be its cell empty or not.
+    """Whether ``tables`` of a configuration hold what ``key`` asks for, be its cell empty or not.
 
     A count of none is a number where there are runs to count, whatever became of them.
     """
@@ -173,7 +173,7 @@ def _same(cell: Any, value: str) -> bool:
 
 
 def format_number(value: Any) -> str:
-    """A cell as TeX: text escaped, integers plain, other numbers with two significant digits."""
+    """Cell ``value`` as TeX: text escaped, integers plain, others with two significant digits."""
     if isinstance(value, str):
         return escape(value)
     if isinstance(value, bool | np.bool_):

@@ -1,4 +1,4 @@
-"""Tables of the manuscript about what reductions gain and cost, as TeX."""
+"""Tables of the manuscript about what reductions gain and cost, as TeX, of ``tables``."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -36,7 +36,7 @@ def speedups(tables: Tables) -> str:
 
 
 def payoff(tables: Tables) -> str:
-    """In how many scenes each reduction is accurate, pays, and loses."""
+    """Numbers of scenes in which each reduction is accurate, pays, and loses."""
     rows = [
         [
             name(_model(row)),
@@ -58,7 +58,7 @@ def payoff(tables: Tables) -> str:
 
 
 def pays(tables: Tables) -> str:
-    """From what mesh size on a reduction is faster than others, for each error that it reaches."""
+    """Mesh sizes from which a reduction is faster than others, for each error that it reaches."""
     rows = [
         [
             name(row.scene) + ("" if row.stiffness == 1.0 else rf" $\times {row.stiffness:g}$"),
@@ -79,7 +79,7 @@ def pays(tables: Tables) -> str:
 
 
 def large_meshes(tables: Tables) -> str:
-    """Who reaches each error first on which mesh; the scene and the weights are all the same."""
+    """First to reach each error on each mesh; the scene and the weights are all the same."""
     rows = [
         [
             str(row.vertices),

@@ -6,13 +6,16 @@ from pdrom.report.words.text import escape
 
 
 def tabular(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
-    """A tabular with a ruled head; cells are TeX already."""
+    """A tabular of ``rows`` with a ruled ``header``; cells are TeX already, as is ``columns``."""
     lines = [rf"\begin{{tabular}}{{{columns}}}", *_head(header), *map(_line, rows)]
     return "\n".join([*lines, r"\hline", r"\end{tabular}"]) + "\n"
 
 
 def longtable(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
-    r"""A table that may break across pages, below ``\captionrow``, which the text defines."""
+    r"""Table that may break across pages, below ``\captionrow``, which the text defines.
+
+    ``header``, ``rows`` and ``columns`` as in `tabular`.
+    """
     head = _head(header)
     lines = [rf"\begin{{longtable}}{{{columns}}}", r"\captionrow", *head, r"\endfirsthead"]
     lines += [*head, r"\endhead", *map(_line, rows)]
@@ -28,5 +31,5 @@ def _line(cells: Sequence[str]) -> str:
 
 
 def name(text: str) -> str:
-    """A scene, group or method name, in typewriter."""
+    """Name ``text`` of a scene, group or method, in typewriter."""
     return rf"\texttt{{{escape(text)}}}"

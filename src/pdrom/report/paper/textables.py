@@ -1,4 +1,4 @@
-"""Tables of the manuscript as TeX, generated from the tables of the study."""
+"""Tables of the manuscript as TeX, generated from ``tables`` of the study by name."""
 
 import re
 from collections.abc import Mapping
@@ -57,7 +57,7 @@ def methods(tables: Tables) -> str:
 
 
 def _samples(row: Any) -> str:
-    """How many samples a method takes."""
+    """Number of samples that a method takes."""
     if row.rows == "all":
         return "--"
     least = "one a mode" if row.oversampling == 1 else f"{row.oversampling} a mode"
@@ -129,7 +129,7 @@ _OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up")
 
 
 def stability(tables: Tables) -> str:
-    """How many runs of each method ended how: the study's reruns, then those at other settings."""
+    """Counts of runs by method and outcome: the study's reruns, then those at other settings."""
     table = tables["stability"]
     table = table[(table.outcome != "not run") & ~_full_order(table)]
     rows = []

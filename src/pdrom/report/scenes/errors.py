@@ -25,12 +25,12 @@ PROJECTIONS = "reconstruction_error"  # table, known of the pipeline's results
 
 
 def error_against_r(scene: ViewedScene, pdf: Path, png: Path) -> None:
-    """Write the picture."""
+    """Write the picture of ``scene`` to ``pdf`` and ``png``."""
     write_picture(_draw_against_r, scene, "errors against the basis size", pdf=pdf, png=png)
 
 
 def error_against_time(scene: ViewedScene, pdf: Path, png: Path) -> None:
-    """Write the picture."""
+    """Write the picture of ``scene`` to ``pdf`` and ``png``."""
     write_picture(_draw_against_time, scene, "error against time", pdf=pdf, png=png)
 
 

@@ -27,7 +27,10 @@ SAME = ["-threads", "1", "-x264-params", "threads=1", "-fflags", "+bitexact", "-
 
 
 def animation(scene: ViewedScene, film: Path) -> None:
-    """Write a film that common browsers and players show, by the ffmpeg that a package brings."""
+    """Write a ``film`` of ``scene`` that common browsers and players show.
+
+    It is made by the ffmpeg that a package brings.
+    """
     shots = pictures(scene, MP4_DPI)
     first = next(shots)
     with atomic_path(film, with_checksum=False) as path:
@@ -44,7 +47,7 @@ def animation(scene: ViewedScene, film: Path) -> None:
 
 
 def gif(scene: ViewedScene, film: Path) -> None:
-    """Write the film, without end; all pictures share the colours of the last one."""
+    """Write the ``film`` of ``scene``, without end; all pictures have the last one's colours."""
     shots = [Image.fromarray(picture) for picture in pictures(scene, GIF_DPI)]
     palette = shots[-1].quantize(COLOURS)
     first, *others = [p.quantize(palette=palette, dither=Image.Dither.NONE) for p in shots]
@@ -71,7 +74,10 @@ def durations(count: int, rate: float) -> list[int]:
 
 
 def pictures(scene: ViewedScene, dpi: int) -> Iterator[np.ndarray]:
-    """RGB pictures (height, width, 3) uint8 with even sides, one every few frames."""
+    """RGB pictures (height, width, 3) uint8 of ``scene``, with even sides, one every few frames.
+
+    ``dpi`` is their resolution, dots an inch.
+    """
     runs, stride = shown_runs(scene), _stride(scene)
     columns = min(COLUMNS, 1 + len(runs))
     rows = ceil((1 + len(runs)) / columns)

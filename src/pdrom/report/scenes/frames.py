@@ -19,7 +19,7 @@ NO_LIMIT = 100.0  # inches: the picture need not fit on a page
 
 
 def frames(scene: ViewedScene, pdf: Path, png: Path) -> None:
-    """Write the picture."""
+    """Write the picture of ``scene`` to ``pdf`` and ``png``."""
     write_picture(_draw, scene, "frames", pdf=pdf, png=png)
 
 

@@ -84,7 +84,7 @@ def require_kinds(names: Sequence[str], source: str) -> tuple[str, ...]:
 
 
 def draw(scene: ViewedScene, name: str, folder: Path) -> list[Path]:
-    """Write the files of a kind into the folder of a scene.
+    """Write the files of a kind, ``name``, into the ``folder`` of a ``scene``.
 
     Raises
     ------

@@ -7,5 +7,5 @@ from pdrom.report.viewer.runs import ViewedScene
 
 
 def viewer(scene: ViewedScene, page: Path) -> None:
-    """Write the page."""
+    """Write the ``page`` of ``scene``."""
     write_page([scene], page, with_checksum=False)

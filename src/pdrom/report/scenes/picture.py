@@ -22,19 +22,19 @@ def shown(sizes: Sequence[ViewedRun]) -> ViewedRun:
 
 
 def shown_runs(scene: ViewedScene) -> list[ViewedRun]:
-    """One run of each group and method, of the size that pictures show."""
+    """One run of each group and method of ``scene``, of the size that pictures show."""
     pairs = dict.fromkeys((run.group, run.method) for run in scene.runs)
     return [shown(scene.sizes(*pair)) for pair in pairs]
 
 
 def title_of(scene: ViewedScene, run: ViewedRun) -> str:
-    """Method and size, below the group where the scene reduces several."""
+    """Method and size of ``run``, below the group where ``scene`` reduces several."""
     group = f"{style.words(run.group)}\n" if len(scene.groups) > 1 else ""
     return f"{group}{plain_words(run.title)}\nr = {run.r}"
 
 
 def panel_of(run: ViewedRun, frame: int, title: str = "") -> RunPanel:
-    """A run at a frame, or at its last one with what went wrong."""
+    """Panel of ``run`` at ``frame``, or at its last one with what went wrong, with a ``title``."""
     last = len(run.positions) - 1
     failure = f"blew up at frame {run.blowup_frame}" if run.blowup_frame is not None else "ended"
     positions = run.positions[min(frame, last)].astype(float)
@@ -51,7 +51,10 @@ def _colour(group: str) -> tuple[float, float, float]:
 def write_picture(
     draw: Callable[[ViewedScene], Figure], scene: ViewedScene, title: str, pdf: Path, png: Path
 ) -> None:
-    """Draw in the style of the study's figures and write both files."""
+    """``draw`` the ``scene`` in the style of the study's figures; write ``pdf`` and ``png``.
+
+    The ``title`` is that of the PDF.
+    """
     with style.look():
         figure = draw(scene)
     write_figure(figure, f"{scene.name}: {title}", pdf, png=png, with_checksum=False)

@@ -7,11 +7,11 @@ from pdrom.report.viewer.runs import ViewedScene
 
 
 def runs(scene: ViewedScene, table: Path) -> None:
-    """Write errors, failures and samples; without a row where nothing is reduced."""
+    """Write errors, failures and samples of ``scene`` to ``table``; no row if none is reduced."""
     write_table(scene.tables["runs"](), table, with_checksum=False)
 
 
 def advice(scene: ViewedScene, effects: Path, costs: Path) -> None:
-    """Write what each effect does, and errors and times of every setting."""
+    """Write what each effect of ``scene`` does, ``effects``, and errors and times, ``costs``."""
     write_table(scene.tables["effects_contribution"](), effects)
     write_table(scene.tables["accuracy_cost"](), costs)

@@ -15,7 +15,7 @@ NAME = "frame_{:05d}.vtu"
 
 
 def vtk(scene: ViewedScene, collection: Path) -> None:
-    """Write the frames beside the collection, which is written last."""
+    """Write the frames of ``scene`` beside the ``collection``, which is written last."""
     names = [NAME.format(frame) for frame in range(len(scene.positions))]
     for frame, name in enumerate(names):
         data = point_data(scene, frame)
@@ -27,7 +27,7 @@ def vtk(scene: ViewedScene, collection: Path) -> None:
 
 
 def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
-    """Data of each vertex in a frame, (N, 3) float32 each.
+    """Data of each vertex of ``scene`` in a ``frame``, (N, 3) float32 each.
 
     Velocity (m/s, where it was stored) and displacement from the start (m) of the full-order run;
     for each reduced run the vector from the full order to it (m), by which ParaView warps the one

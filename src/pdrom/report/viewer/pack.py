@@ -43,10 +43,10 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
 def shown_region(
     positions: np.ndarray, effects: Sequence[EffectConfig]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of a cube about a run (F, N, 3), with room around it, m.
+    """Corners of a cube about ``positions`` (F, N, 3) of a run, with room around it, m.
 
     Obstacles that the run comes near to are shown whole, unless they are larger than the run; runs
-    and bodies that leave the cube are cut off.
+    and bodies that leave the cube are cut off. Obstacles are among the ``effects``.
     """
     low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
     size = float((high - low).max())

@@ -16,7 +16,7 @@ LARGEST = 25_000_000  # bytes
 def write_page(
     scenes: Sequence[ViewedScene], path: str | os.PathLike[str], with_checksum: bool = True
 ) -> None:
-    """Write the viewer of some scenes.
+    """Write the viewer of some ``scenes`` to ``path``.
 
     ``with_checksum`` as in `pdrom.core.store.atomic_path`.
 

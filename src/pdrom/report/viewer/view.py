@@ -12,7 +12,7 @@ EYE = np.array([0.85, 0.55, 1.45])  # where y points up
 
 
 def up_of(effects: Sequence[EffectConfig]) -> np.ndarray:
-    """Unit vector (3,) against the gravity of a scene; y where it has none."""
+    """Unit vector (3,) against the gravity among ``effects`` of a scene; y where it has none."""
     pull = sum(
         (np.array(e.acceleration) for e in effects if isinstance(e, Gravity.Config)), 0.0 * Y
     )

@@ -35,7 +35,7 @@ def filled(text: str, settings: Mapping[str, float]) -> str:
 
 
 def number(value: float) -> str:
-    """A number in mark-up: powers of ten as such."""
+    """Number ``value`` in mark-up: powers of ten as such."""
     mantissa, mark, exponent = f"{value:g}".partition("e")
     if not mark:
         return f"${mantissa}$"
@@ -44,12 +44,12 @@ def number(value: float) -> str:
 
 
 def to_tex(text: str) -> str:
-    """Mark-up as TeX; the mathematics is TeX already."""
+    """Mark-up ``text`` as TeX; the mathematics is TeX already."""
     return _converted(text, escape, lambda name: rf"\texttt{{{escape(name)}}}", lambda m: f"${m}$")
 
 
 def to_plain(text: str) -> str:
-    """Mark-up as plain words."""
+    """Mark-up ``text`` as plain words."""
     return _converted(text, str, str, _plain_mathematics)
 
 

@@ -38,6 +38,7 @@ def replication(claims: pd.DataFrame, rules: Path, recorded: Path) -> pd.DataFra
 
     Parameters
     ----------
+    claims, rules : the table claims, and the file of its rules
     recorded : file that `pdrom.pipeline.tracked` writes
     """
     loaded = load_claims(rules)

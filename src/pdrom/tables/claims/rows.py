@@ -17,6 +17,13 @@ AXES = ("x", "y", "z")
 
 
 def filtered(table: pd.DataFrame, where: Mapping[str, tuple[Value, ...]]) -> pd.DataFrame:
+    """Rows of ``table`` whose columns have the values that ``where`` allows.
+
+    Raises
+    ------
+    ConfigurationError
+        The table has no such column.
+    """
     for column, allowed in where.items():
         if column not in table.columns:
             raise ConfigurationError(

@@ -85,7 +85,7 @@ class TestRule(_Model):
 
 
 class Change(_Model):
-    """When and why the rules of a claim became what they are.
+    """Date and reason of a change in the rules of a claim.
 
     after_data : whether results that the rules decide on were known by then
     rules : fingerprint of the rules from then on, see `ClaimRule.fingerprint`

@@ -1,4 +1,8 @@
-"""Metrics of claims about reduced runs: a number for each chosen run, with its labels."""
+"""Metrics of claims about reduced runs: a number for each chosen run, with its labels.
+
+A metric gets ``tables`` by name, values that ``where`` allows in columns of theirs, and the largest
+error of an accurate run, ``accuracy``.
+"""
 
 from collections.abc import Callable
 

@@ -34,7 +34,7 @@ class Outcome:
 
 
 def timed_columns(rule: ClaimRule) -> set[str]:
-    """Columns of a claim's row that depend on timing: two runs may differ there."""
+    """Columns of the row of a ``rule`` that depend on timing: two runs may differ there."""
     found: set[str] = set()
     for part, suffix in (("published", ""), ("beyond", "_beyond")):
         tests: Sequence[TestRule] = getattr(rule, part)
@@ -110,7 +110,7 @@ def evaluate(test: TestRule, tables: Tables) -> Outcome:
 
 
 def _broken_down(test: TestRule, rows: pd.DataFrame, passed: np.ndarray) -> str:
-    """How many rows satisfy the comparison for each value of the column ``by``."""
+    """Number of rows that satisfy the comparison for each value of the column ``by``."""
     if test.by is None or test.by not in rows:
         return f"{int(passed.sum())} of {len(passed)}"
     counts = pd.Series(passed).groupby(rows[test.by].to_numpy(), sort=False)
@@ -119,7 +119,7 @@ def _broken_down(test: TestRule, rows: pd.DataFrame, passed: np.ndarray) -> str:
 
 
 def _why_empty(test: TestRule, tables: Tables) -> str:
-    """Why a test has no values: reruns that could not start, or none in this configuration."""
+    """Reason for a test without values: reruns that could not start, or none in this study."""
     if test.metric == "rerun_error":
         where = {k: v for k, v in test.where.items() if k != "r"}
         if len(filtered(tables["reduced_reruns"], where)):

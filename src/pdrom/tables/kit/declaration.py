@@ -52,12 +52,12 @@ class Column:
 
     @property
     def quantity(self) -> Quantity:
-        """How far two machines may differ in it."""
+        """Kind of difference that two machines may have in it."""
         return self.declared or usual_quantity(self.kind, self.name, self.timed)
 
     @property
     def within(self) -> float:
-        """How far a cell may be off; words, truth values and whole numbers are equal."""
+        """Tolerance of a cell; words, truth values and whole numbers are equal."""
         if self.tolerance is not None:
             return self.tolerance
         if self.kind == "integer":

@@ -40,5 +40,5 @@ def over_motions(heldout: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFr
 
 
 def with_held_out(runs: pd.DataFrame, heldout: pd.DataFrame) -> pd.DataFrame:
-    """``runs`` with the columns of `over_motions`, empty where a run has no held-out motion."""
+    """``runs`` with the columns of `over_motions` of ``heldout``, empty where it lacks the run."""
     return runs.astype(_WHOLE).merge(over_motions(heldout), on=KEYS, how="left")

@@ -39,7 +39,7 @@ def confirmed(low: float, high: float) -> bool:
 
 
 def in_words(median: float, low: float, high: float) -> str:
-    """A median and its interval as text."""
+    """``median`` and interval from ``low`` to ``high`` as text."""
     return f"{_rounded(median)} ({_rounded(low)} to {_rounded(high)})"
 
 

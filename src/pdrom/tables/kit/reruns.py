@@ -61,6 +61,7 @@ def judged_reruns(
 
     Parameters
     ----------
+    sensitivity, perturbation, threshold : see `horizons`
     runs, rows : HDF5 files of the runs and their tables of the motion, in the same order
     subspaces, subspace_rows : the same in position subspaces
     motion : "train" or a held-out one, whose rows are chosen from all of the tables

@@ -46,12 +46,12 @@ class Entry:
 
 
 def entries(root: Path = Path()) -> list[Entry]:
-    """Claims, figures (those of the preprint first), tables, sections and the manuscript."""
+    """Claims, figures (the preprint's first), tables, sections, manuscript; read from ``root``."""
     return [*_claims(root), *_figures(), *_tables(), *_sections(root), _manuscript()]
 
 
 def table_words(name: str) -> str:
-    """Argument that makes a table and nothing else."""
+    """Argument that makes the table ``name`` and nothing else."""
     return TABLE.at(RESULTS, name=name) if name in declarations() else name
 
 

@@ -24,7 +24,13 @@ COLUMNS = (
 
 
 def write_after(command: CommandLine, dag: Any, plan: Plan, folders: Folders) -> None:
-    """Write the map of a run that has made everything; one with targets leaves it as it is."""
+    """Write the map of a run that has made everything; one with targets leaves it as it is.
+
+    Parameters
+    ----------
+    command : line that started the run
+    dag, plan, folders : see `claim_map`
+    """
     if not command.targets:
         configuration = " ".join([*command.configfiles, *command.settings]) or DEFAULT
         made = claim_map(dag, plan, folders, options=recall(), configuration=configuration)
@@ -42,6 +48,7 @@ def claim_map(
 
     Parameters
     ----------
+    plan, folders : of the study
     dag : Snakemake's graph of all jobs of the study
     options : those of the command line that name the configuration
     configuration : the same in words

@@ -50,7 +50,7 @@ def claim_pages(root: Path) -> dict[Path, str]:
 
 
 def expected_verdicts(root: Path) -> Verdicts:
-    """Verdicts of each claim as published and beyond, by the tables that the repository keeps."""
+    """Verdicts of each claim as published and beyond, by the tables that ``root`` keeps."""
     found = read_reference(declared()["claims"], root / folder_of(RESULTS))
     assert found, "the repository keeps no table claims"
     rows = found.frame.set_index("claim")
@@ -121,7 +121,7 @@ def _places(numbers: Numbers) -> tuple[str, str]:
 
 
 def _tolerances(table: Table) -> str:
-    """How exactly a table is expected: the number of columns of each kind."""
+    """Exactness that is expected of a table: the number of columns of each kind."""
     held = Counter(column.quantity for column in table.columns)
     return ", ".join(f"{held[kind]} {kind}" for kind in QUANTITIES if held[kind])
 

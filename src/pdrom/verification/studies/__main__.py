@@ -34,7 +34,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def compare(arguments: Sequence[str]) -> int:
-    """Compare two studies, write the page; the exit code.
+    """Compare the two studies of the ``arguments``, write the page; the exit code.
 
     Raises
     ------

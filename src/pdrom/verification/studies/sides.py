@@ -67,7 +67,7 @@ class Side:
 
     @classmethod
     def read(cls, place: Path, room: Path) -> "Side":
-        """Read a folder, or an archive by way of the empty folder ``room``.
+        """Read ``place``: a folder, or an archive by way of the empty folder ``room``.
 
         Raises
         ------
@@ -100,14 +100,14 @@ class Side:
         return found
 
     def names(self, place: Place) -> Iterator[str]:
-        """Results of a kind."""
+        """Names of the results of a kind, ``place``."""
         for name in self.made:
             with suppress(StorageError):
                 if place.pattern.format(**place.file(name).labels) == name:
                     yield name
 
     def file(self, name: str) -> Path:
-        """Path of a result; StorageError if it is missing, or not what was written."""
+        """Path of the result ``name``; StorageError if it is missing, or not what was written."""
         path, entry = self.folder / name, self.manifest.files.get(name)
         if not path.is_file():
             raise StorageError(f"{self.name}/{name}: not there, and the manifest lists it")

@@ -30,7 +30,10 @@ class Ratio:
 
 
 def ratios(comparisons: Mapping[str, Comparison]) -> list[Ratio]:
-    """Ratios of every column of times that both have, that of all together first."""
+    """Ratios of every column of times that both have, that of all together first.
+
+    ``comparisons`` of the two studies' tables are by name.
+    """
     found = {
         (name, column.name): _quotients(comparison, column.name)
         for name, comparison in comparisons.items()

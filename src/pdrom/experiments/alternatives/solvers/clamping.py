@@ -114,7 +114,13 @@ def clamped(x, low, high):
 
 @lane_function
 def residual(u, v, sigma, p, low, high, r):
-    """Write D - P to the first p rows of ``r``; |D - P|^2."""
+    """Write D - P to the first p rows of ``r`` (3, 3); |D - P|^2.
+
+    Parameters
+    ----------
+    u, v, sigma : see `decompose`
+    low, high : range that singular values are clamped to
+    """
     square = 0.0
     r[:p] = 0.0
     for i in range(p):
@@ -151,6 +157,8 @@ def hessian(u, v, sigma, p, low, high, floor, values, modes):
 
     Parameters
     ----------
+    u, v, sigma : see `decompose`
+    low, high : range that singular values are clamped to
     floor : in [0, 1]; smaller eigenvalues are raised to it, those that stay zero left out. All are
         at most 1, so that a floor of 1 gives the identity: the Hessian of projective dynamics.
     values : (MODES,)

@@ -30,10 +30,11 @@ class Continuous:
 def continuous(
     scene: Scene, frames: int, tolerance: float, substeps: int, limit: int
 ) -> Continuous:
-    """Explicit steps, halved until the estimated error is below ``tolerance``.
+    """Explicit steps through so many ``frames`` of ``scene``, halved until the error is small.
 
     Parameters
     ----------
+    tolerance : estimated relative error that ends the halving
     substeps : of a frame, to begin with; an unstable run is halved like an inaccurate one
     limit : on the substeps; the last run is returned, whatever its error
     """

@@ -69,7 +69,7 @@ class Elements:
         return Elements(*(np.ascontiguousarray(getattr(self, f.name)[order]) for f in fields(self)))
 
     def around(self, vertices: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Elements at each vertex: starts (N + 1,), elements, and which corner the vertex is."""
+        """Elements at each of ``vertices`` N: starts (N + 1,), elements, and which corner it is."""
         used = np.arange(4) <= self.rows[:, None]
         element, corner = np.nonzero(used)
         vertex = self.corners[used]
@@ -122,6 +122,13 @@ def decompose_element(y, e, p, corners, operator, fallback, d, u, v, sigma):
 
     Arrays are passed one by one: taking them from a tuple for each element costs more than the
     decomposition, because compiled code counts who holds them.
+
+    Parameters
+    ----------
+    y : padded positions, flat, m
+    e, p : number of the element and of its rows
+    corners, operator, fallback : of all elements, see `Elements`
+    d, u, v, sigma : of `workspace`, written
     """
     d[:] = 0.0
     for corner in range(p + 1):

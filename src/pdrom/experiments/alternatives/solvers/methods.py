@@ -27,7 +27,9 @@ def alternative(
     iterations: int = 1,
     system: GlobalSystem | None = None,
 ) -> Alternative:
-    """Step loop of a scene by the method ``name``, see `Alternative`.
+    """Step loop of a scene by the method ``name``: so many ``substeps`` a frame, see `Alternative`.
+
+    Each of them does ``iterations``; ``system`` is a factored one of equal substeps, to be shared.
 
     Raises
     ------

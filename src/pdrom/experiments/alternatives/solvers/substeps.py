@@ -147,7 +147,7 @@ class Alternative(Stepper):
 
 
 def inverse_masses(masses: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-    """1 / M of ``masses`` (N,), zero for the held vertices ``fixed``: nothing moves them."""
+    """1 / M of ``masses`` (N,) kg, zero for held vertices ``fixed`` (n,): nothing moves them."""
     inverse = 1.0 / masses
     inverse[fixed] = 0.0
     return inverse
@@ -158,6 +158,13 @@ def begin(y, v, acceleration, step, fixed, targets, before, s):
     """A substep of an implicit method begins at its prediction s = y + step v + step^2 a.
 
     ``before`` receives the positions; held vertices of ``s`` and ``y`` go to their targets.
+
+    Parameters
+    ----------
+    y, v : padded positions m and velocities m/s, flat
+    acceleration : (3,) m/s^2
+    step : s
+    fixed, targets : held vertices (n,) and where they are at the end (n, 3) m
     """
     for i in range(len(y) // WIDTH):
         for axis in range(3):

@@ -27,12 +27,12 @@ class Window(NamedTuple):
         return self.top - self.bottom
 
     def contains(self, flat: np.ndarray) -> np.ndarray:
-        """Mark the picture points (n, 2) that lie inside, (n,) bool."""
+        """Mark the picture points ``flat`` (n, 2) that lie inside, (n,) bool."""
         x, y = flat.T
         return (x >= self.left) & (x <= self.right) & (y >= self.bottom) & (y <= self.top)
 
     def resized(self, width: float, height: float) -> "Window":
-        """Window of another size about the same centre."""
+        """Window of another ``width`` and ``height`` about the same centre."""
         x, y = 0.5 * (self.left + self.right), 0.5 * (self.bottom + self.top)
         return Window(x - 0.5 * width, x + 0.5 * width, y - 0.5 * height, y + 0.5 * height)
 
@@ -61,17 +61,17 @@ class Camera:
         return points @ self.basis[:2].T
 
     def depth(self, points: np.ndarray) -> np.ndarray:
-        """Distance towards the eye (n,), m: larger is nearer."""
+        """Distance of ``points`` (n, 3) m towards the eye (n,), m: larger is nearer."""
         return points @ self.basis[2]
 
 
 def bounds(flat: np.ndarray, margin: float = 0.08) -> Window:
-    """Smallest window that shows picture points (n, 2), with a relative margin on each side."""
+    """Smallest window of picture points ``flat`` (n, 2), with a relative ``margin`` around."""
     low, high = flat.min(axis=0), flat.max(axis=0)
     pad = margin * max(float((high - low).max()), 1e-12)
     return Window(low[0] - pad, high[0] + pad, low[1] - pad, high[1] + pad)
 
 
 def window_of(camera: Camera, clouds: Iterable[np.ndarray], margin: float = 0.08) -> Window:
-    """Window that shows all point clouds (n, 3), see `bounds`."""
+    """Window by ``camera`` that shows all ``clouds`` (n, 3); ``margin`` as in `bounds`."""
     return bounds(np.concatenate([camera.project(cloud) for cloud in clouds]), margin)

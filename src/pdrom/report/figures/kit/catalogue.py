@@ -55,7 +55,7 @@ def declaration(name: str) -> Declaration:
 
 
 def load_choices(path: Path | str) -> dict[str, Options]:
-    """Options of every figure: its defaults, and what a file (config/figures.yaml) chooses.
+    """Options of every figure: its defaults, and what ``path`` (config/figures.yaml) chooses.
 
     Raises
     ------

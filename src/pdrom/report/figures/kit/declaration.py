@@ -51,8 +51,9 @@ class Order(BaseModel):
 class Declaration(Artifact):
     """A figure, named as the function that draws it.
 
-    The function raises `NothingToDraw` where the configuration holds nothing of what the figure
-    shows, StorageError for a file that is missing or damaged or a table that lacks a column.
+    The function gets the ``results`` of the study and its own ``options``. It raises
+    `NothingToDraw` where the configuration holds nothing of what the figure shows, StorageError
+    for a file that is missing or damaged or a table that lacks a column.
 
     title, caption : in light mark-up (`pdrom.report.words.markup`); ``{key}`` stands for a setting
         of the configuration that the figure reads
@@ -102,7 +103,10 @@ def figure(
     options: type[OptionsT],
     number: int | None = None,
 ) -> Callable[[Callable[[Results, OptionsT], Figure]], Declaration]:
-    """Declare the function below as a figure, see `Declaration`."""
+    """Declare the function below as a figure.
+
+    ``title``, ``caption``, ``reads``, ``options`` and ``number`` are those of `Declaration`.
+    """
 
     def declare(function: Callable[[Results, OptionsT], Figure]) -> Declaration:
         name = function.__name__

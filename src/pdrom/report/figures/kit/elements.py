@@ -53,7 +53,7 @@ class ElementMap:
         return Surface(self.mesh.triangles, open=len(self.mesh.tetrahedra) == 0)
 
     def centres(self, points: np.ndarray) -> np.ndarray:
-        """Centre of each element (e, 3), m."""
+        """Centre of each element (e, 3), m, with vertices at ``points`` (N, 3) m."""
         return points[self.cells].mean(axis=1)
 
     def face_values(self, values: np.ndarray) -> np.ndarray:
@@ -83,7 +83,10 @@ class ElementMap:
         camera: Camera,
         colours: ScalarMappable,
     ) -> None:
-        """Draw the mesh at ``points`` (N, 3) m with ``values`` (e,) of its elements as colour."""
+        """Draw on ``ax``, by ``camera``, the mesh at ``points`` (N, 3) m.
+
+        Its elements have ``values`` (e,), which ``colours`` maps to colours.
+        """
         if self.kind == "edge" and self.surface.open:
             draw_surface(
                 ax, points, self.surface, camera=camera, colour="#FFFFFF", wire=0.0, contrast=0.15
@@ -123,7 +126,7 @@ def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMa
 def signed_entry(vector: np.ndarray, rows_per_element: int) -> tuple[np.ndarray, str]:
     """One of the 3 p entries of every element (e,), the one that is largest somewhere; its name.
 
-    vector : a vectorised quantity (3 e p,)
+    vector : a vectorised quantity (3 e p,) with p ``rows_per_element``
     """
     entries = vector.reshape(-1, 3 * rows_per_element)
     slot = int(np.argmax(np.abs(vector))) % (3 * rows_per_element)

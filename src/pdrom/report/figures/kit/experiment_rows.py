@@ -23,7 +23,11 @@ RowsOf = Callable[[Results, ReducedRuns, Floors, str, str], list[Row]]
 def experiment_rows(
     results: Results, options: ReducedRuns, floors: Floors, scene: str, group: str
 ) -> list[Row]:
-    """A row per method; a single one that says so where no method has anything to reduce."""
+    """A row per method; a single one that says so where no method has anything to reduce.
+
+    ``results`` and ``options`` are the figure's, ``floors`` those of `Floors`; the experiment is a
+    ``group`` of a ``scene``.
+    """
     camera = options.camera
     colour = style.surface_colour(style.group_looks(results.holdings)[group][0])
     frames, full = positions_at(results.path(FULL_ORDER, scene), options.frames[-1:])
@@ -63,7 +67,7 @@ def draw_experiments(
 
     All pictures of an experiment show the same instant, the last one of ``options.frames``,
     with the same camera; one that does not fit is framed and its scale is given. The grey outline
-    is the full-order run.
+    is the full-order run. Runs are those of ``results``.
 
     rows_of : rows of one experiment
     """

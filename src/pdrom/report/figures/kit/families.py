@@ -41,7 +41,10 @@ class Model:
         return self.position_basis == "skinning"
 
     def title(self, results: Results) -> str:
-        """Its name within its family, which models share that differ by tolerance or basis only."""
+        """Name within its family, which models share that differ by tolerance or basis only.
+
+        Titles of methods are those of ``results``.
+        """
         if self.position_basis == "full":
             return results.method_title(self.method)
         if self.method == "full":
@@ -49,7 +52,7 @@ class Model:
         return "ecsw, by tolerance" if self.method.startswith("ecsw") else self.method
 
     def family(self, results: Results) -> Family | None:
-        """Its family; None for a method that is not drawn."""
+        """Family of the model by ``results``; None for a method that is not drawn."""
         if self.method == FEWER:
             return ITERATIONS
         if self.position_basis != "full":
@@ -60,7 +63,7 @@ class Model:
 
 
 def markers(models: Sequence[Model], results: Results) -> dict[Model, str]:
-    """A marker for each title within a family, in the order in which its models come."""
+    """A marker for each title of ``models`` within a family, in their order, by ``results``."""
     found: dict[Model, str] = {}
     for family in FAMILIES[1:]:
         members = [model for model in models if model.family(results) == family]

@@ -31,14 +31,17 @@ class Floors:
         self._floors: dict[str, np.ndarray] = {}
 
     def of(self, scene: str) -> np.ndarray:
-        """Largest relative difference of all seeds by frame (F,); empty without perturbed runs."""
+        """Largest relative difference of all seeds of ``scene`` by frame (F,).
+
+        It is empty without perturbed runs.
+        """
         if scene not in self._floors:
             table = read_table(self._results.path(SENSITIVITY, scene), COLUMNS)
             self._floors[scene] = floor_of(table, scene, self.perturbation)
         return self._floors[scene]
 
     def horizon(self, scene: str) -> int | None:
-        """First frame at which the floor exceeds the threshold; None if it never does."""
+        """First frame at which the floor of ``scene`` exceeds the threshold; None if none does."""
         floor = self.of(scene)
         end = horizon(floor, self.threshold)
         return end if end < len(floor) else None

@@ -49,7 +49,7 @@ class Holdings(_Plain):
     groups: dict[str, GroupHolding]
 
     def experiments(self, options: Options) -> list[tuple[str, str]]:
-        """(scene, group) pairs that exist, in the order asked for."""
+        """(scene, group) pairs of ``options`` that exist, in the order asked for."""
         groups = options.names("groups")
         return [
             (scene, group)
@@ -59,11 +59,11 @@ class Holdings(_Plain):
         ]
 
     def reductions(self, options: Options) -> list[str]:
-        """Methods that exist, in the order asked for."""
+        """Methods of ``options`` that exist, in the order asked for."""
         return [m for m in (options.names("methods") or tuple(self.methods)) if m in self.methods]
 
     def first(self, options: Options) -> tuple[str, str, str] | None:
-        """First experiment and first method that exist, (scene, group, method)."""
+        """First experiment and method of ``options`` that exist, (scene, group, method)."""
         experiments, held = self.experiments(options), self.reductions(options)
         return (*experiments[0], held[0]) if experiments and held else None
 
@@ -78,7 +78,10 @@ class Holdings(_Plain):
         )
 
     def files(self, place: Place, options: Options, results: str, first: bool) -> Iterator[str]:
-        """Paths of a kind for the chosen scenes, groups and methods, or for the first of each."""
+        """Paths of ``place`` below ``results`` for scenes, groups and methods of ``options``.
+
+        With ``first`` they are those of the first of each.
+        """
         experiments, methods = self.experiments(options), self.reductions(options)
         if first:
             experiments, methods = experiments[:1], methods[:1]
@@ -89,7 +92,10 @@ class Holdings(_Plain):
     def path(
         self, place: Place, results: str, scene: str, group: str = "", method: str = ""
     ) -> str:
-        """Path of a file; labels that its kind does not have may stay away."""
+        """Path of the file of ``place`` below ``results``.
+
+        Labels (``scene``, ``group``, ``method``) that its kind does not have may stay away.
+        """
         basis = self.methods[method].basis if method else ""
         labels = {"scene": scene, "group": group, "method": method, "basis": basis}
         return place.at(results, mesh=self.scenes[scene].mesh, run="train", **labels)

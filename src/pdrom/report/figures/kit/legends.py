@@ -15,13 +15,13 @@ def _rows(blocks: Sequence[Block], columns: int) -> list[Sequence[Block]]:
 
 
 def legend_height(blocks: Sequence[Block], columns: int) -> float:
-    """Height of the legend, inches."""
+    """Height, inches, of the legend of ``blocks`` in ``columns``."""
     rows = _rows(blocks, columns)
     return sum(LINE * (1.3 + max(len(entries) for _, entries in row)) + _GAP for row in rows)
 
 
 def draw_legend(figure: SubFigure, blocks: Sequence[Block], columns: int) -> None:
-    """Draw titled blocks of entries in ``columns``, from left to right and from the top."""
+    """Draw titled ``blocks`` of entries on ``figure`` in ``columns``, row by row from the top."""
     height = legend_height(blocks, columns)
     top = 1.0
     for row in _rows(blocks, columns):

@@ -32,13 +32,16 @@ class Surface:
 
 
 def face_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (T, 3); zero for a face without area."""
+    """Unit normals (T, 3) of ``triangles`` (T, 3) of ``points`` (N, 3); zero without area."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     return _unit(np.cross(b - a, c - a))
 
 
 def smooth_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Face normals (T, 3) averaged over the neighbourhood of each face."""
+    """Face normals (T, 3) averaged over the neighbourhood of each face; as `face_normals`.
+
+    ``points`` are (N, 3), ``triangles`` (T, 3).
+    """
     a, b, c = (points[triangles[:, i]] for i in range(3))
     weighted = np.repeat(np.cross(b - a, c - a), 3, axis=0)
     vertex = np.zeros_like(points, dtype=float)
@@ -47,7 +50,10 @@ def smooth_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def shade(normals: np.ndarray, camera: Camera) -> np.ndarray:
-    """Brightness (T,) of faces with unit ``normals`` (T, 3), in [AMBIENT, 1], two-sided."""
+    """Brightness (T,) of faces with unit ``normals`` (T, 3), in [AMBIENT, 1], two-sided.
+
+    Lights go with the ``camera``.
+    """
     view = normals @ camera.basis.T
     lit = np.zeros(len(normals))
     for direction, strength in LIGHTS:
@@ -57,7 +63,10 @@ def shade(normals: np.ndarray, camera: Camera) -> np.ndarray:
 
 
 def depth_order(points: np.ndarray, triangles: np.ndarray, camera: Camera) -> np.ndarray:
-    """Faces from the farthest to the nearest (T,); ties keep their order."""
+    """Faces (T,) of ``triangles`` (T, 3) from far to near by ``camera``; ties keep order.
+
+    ``points`` (N, 3) m are their vertices.
+    """
     return np.argsort(camera.depth(points)[triangles].mean(axis=1), kind="stable")
 
 
@@ -70,7 +79,7 @@ def draw_surface(
     wire: float = 0.14,
     contrast: float = 1.0,
 ) -> PolyCollection:
-    """Draw a shaded surface.
+    """Draw a shaded surface on ``ax``, as ``camera`` sees it.
 
     Parameters
     ----------
@@ -108,9 +117,12 @@ def draw_surface(
 def draw_floor(
     ax: Axes, points: np.ndarray, surface: Surface, camera: Camera, window: Window
 ) -> bool:
-    """Draw the floor y = 0 under the mesh, with its shadow, where it is in view.
+    """Draw the floor y = 0 under the mesh, with its shadow, where it is in view; whether it is.
 
-    Returns whether it was drawn.
+    Parameters
+    ----------
+    ax, camera, window : picture and its view
+    points, surface : (N, 3) m of the mesh, and its triangles
     """
     from matplotlib.collections import PolyCollection
 
@@ -141,7 +153,10 @@ def draw_floor(
 
 
 def outline_edges(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Edges (n, 2) on the boundary of the surface, or between faces that meet sharply."""
+    """Edges (n, 2) on the boundary of the surface, or between faces that meet sharply.
+
+    ``points`` are (N, 3) m, ``triangles`` (T, 3).
+    """
     edges, first, second = _edges_between(triangles)
     normals = face_normals(points, triangles)
     turn = np.einsum("ij,ij->i", normals[first], normals[second])
@@ -149,7 +164,10 @@ def outline_edges(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def silhouette_edges(points: np.ndarray, triangles: np.ndarray, camera: Camera) -> np.ndarray:
-    """Edges (n, 2) between a face that is seen from the front and one from behind."""
+    """Edges (n, 2) between a face that ``camera`` sees from the front and one from behind.
+
+    ``points`` are (N, 3) m, ``triangles`` (T, 3).
+    """
     edges, first, second = _edges_between(triangles)
     a, b, c = np.moveaxis(camera.project(points)[triangles], 1, 0)
     (ux, uy), (vx, vy) = (b - a).T, (c - a).T
@@ -170,7 +188,10 @@ def _edges_between(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
 def draw_outline(
     ax: Axes, points: np.ndarray, edges: np.ndarray, camera: Camera, colour: str = "#4D4D4D"
 ) -> None:
-    """Thin outline, the ghost of a shape to compare with."""
+    """Draw a thin outline on ``ax``, the ghost of a shape to compare with.
+
+    ``points`` (N, 3) m are joined by ``edges`` (n, 2), as ``camera`` sees them, in one ``colour``.
+    """
     from matplotlib.collections import LineCollection
 
     lines = LineCollection(camera.project(points)[edges], colors=colour, linewidths=0.6)
@@ -181,7 +202,10 @@ def draw_outline(
 def draw_lines(
     ax: Axes, segments: np.ndarray, camera: Camera, colours: np.ndarray, width: float = 1.2
 ) -> None:
-    """Coloured segments (n, 2, 3) m, painted from far to near."""
+    """Draw coloured ``segments`` (n, 2, 3) m on ``ax`` from far to near, as ``camera`` sees them.
+
+    ``colours`` (n, 4) are theirs, RGBA, ``width`` is in points.
+    """
     from matplotlib.collections import LineCollection
 
     order = np.argsort(camera.depth(segments.mean(axis=1)), kind="stable")
@@ -195,7 +219,7 @@ def draw_lines(
 
 
 def set_window(ax: Axes, window: Window) -> None:
-    """Show ``window`` without axes, all directions to the same scale."""
+    """Show ``window`` on ``ax`` without axes, all directions to the same scale."""
     ax.set_xlim(window.left, window.right)
     ax.set_ylim(window.bottom, window.top)
     ax.set_aspect("equal")

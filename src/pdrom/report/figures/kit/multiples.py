@@ -14,21 +14,27 @@ NEAR = 0.05  # of the axis: markers closer than this share a label
 def small_multiples(
     count: int, columns: int, legend_rows: int = 1, height: float = PANEL_HEIGHT
 ) -> tuple[Figure, list[Axes]]:
-    """Figure with ``count`` panels that share the y axis; no empty panel is left over."""
+    """Figure with ``count`` panels in ``columns`` that share the y axis, none left over.
+
+    A row is ``height`` inches high; ``legend_rows`` are left for a legend.
+    """
     rows = rows_of(count, columns)
     figure = style.new_figure(rows * height + 0.2 * legend_rows + 0.35)
     return figure, panels(figure, count, columns, sharey=True)
 
 
 def rows_of(count: int, columns: int) -> int:
-    """Number of rows of ``count`` panels."""
+    """Number of rows of ``count`` panels in ``columns``."""
     return -(-count // min(columns, count))
 
 
 def panels(
     figure: Figure | SubFigure, count: int, columns: int, sharey: bool = False
 ) -> list[Axes]:
-    """Panels row by row, the last row perhaps shorter; a shared y axis has numbers on the left."""
+    """Add ``count`` panels to ``figure`` row by row in ``columns``, the last row perhaps shorter.
+
+    A shared y axis (``sharey``) has numbers on the left.
+    """
     columns = min(columns, count)
     grid = figure.subplots(rows_of(count, columns), columns, squeeze=False, sharey=sharey)
     axes = list(grid.ravel())
@@ -41,7 +47,7 @@ def panels(
 
 
 def label_outer(axes: list[Axes], columns: int, x: str, y: str) -> None:
-    """Axis labels on the left and on the lowest panel of each column."""
+    """Label ``axes`` in ``columns``: ``y`` on the left, ``x`` on the lowest panel of each one."""
     columns = min(columns, len(axes))
     for i, ax in enumerate(axes):
         if i % columns == 0:
@@ -51,7 +57,7 @@ def label_outer(axes: list[Axes], columns: int, x: str, y: str) -> None:
 
 
 def log_axis(ax: Axes, low: float, high: float) -> None:
-    """Logarithmic y axis from ``low`` to ``high`` with few ticks."""
+    """Make y of ``ax`` logarithmic from ``low`` to ``high`` with few ticks."""
     from matplotlib.ticker import LogLocator
 
     ax.set_yscale("log")
@@ -61,14 +67,14 @@ def log_axis(ax: Axes, low: float, high: float) -> None:
 
 
 def log_axes(ax: Axes, across: tuple[float, float], along: tuple[float, float]) -> None:
-    """Logarithmic axes with limits ``across`` in x and ``along`` in y."""
+    """Make ``ax`` logarithmic with limits ``across`` in x and ``along`` in y."""
     log_axis(ax, *along)
     ax.set_xscale("log")
     ax.set_xlim(*across)
 
 
 def time_axis(ax: Axes, times: np.ndarray) -> None:
-    """Logarithmic x axis around ``times``, with as many plain numbers as there is room for."""
+    """Make x of ``ax`` logarithmic around ``times``, with plain numbers as there is room."""
     ax.set_xscale("log")
     low, high = np.log10(np.nanmin(times)), np.log10(np.nanmax(times))
     pad = max(0.1, 0.08 * (high - low))
@@ -77,7 +83,7 @@ def time_axis(ax: Axes, times: np.ndarray) -> None:
 
 
 def no_minor_labels(ax: Axes) -> None:
-    """No numbers between the powers of ten of a logarithmic x axis."""
+    """Remove numbers between the powers of ten of a logarithmic x axis of ``ax``."""
     from matplotlib.ticker import NullFormatter
 
     ax.xaxis.set_minor_formatter(NullFormatter())
@@ -105,7 +111,10 @@ def rim_arrows(
     across: tuple[float, float],
     along: tuple[float, float],
 ) -> None:
-    """Arrows on the rim for points outside the axes, ``across`` in x and ``along`` in y."""
+    """Draw arrows on the rim of ``ax`` for points outside, ``across`` in x and ``along`` in y.
+
+    Points are at ``x``, ``y`` and have one ``colour``.
+    """
     inside_x, inside_y = clipped(x, *across), clipped(y, *along)
     outside = {
         "left": x < across[0],
@@ -122,7 +131,7 @@ def rim_arrows(
 
 
 def clipped(values: np.ndarray, low: float, high: float) -> np.ndarray:
-    """Values moved to the nearest limit; NaN stays NaN."""
+    """``values`` (n,) moved to the nearest limit, ``low`` or ``high``; NaN stays NaN."""
     return np.clip(values, low, high)
 
 
@@ -134,6 +143,8 @@ def label_counts(
     prefix: str = "",
 ) -> None:
     """A number below and left of each marker of a logarithmic x axis; near ones share a label.
+
+    ``ax`` has markers at ``x``, ``y``; a label is ``prefix`` with its number of ``counts``.
 
     x : ascending; the limits of the axis must be final
     """

@@ -74,7 +74,7 @@ class Columns(Options):
 
 
 class Count(Options):
-    """How many modes or iterations are drawn."""
+    """Number of modes or iterations that are drawn."""
 
     count: Annotated[int, Field(ge=1, le=12)] = 6
 

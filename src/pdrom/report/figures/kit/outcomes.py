@@ -51,7 +51,7 @@ def draw_cells(
     blocks: Sequence[Block],
     cell: Callable[[int, int, int], pd.Series | None],
 ) -> None:
-    """A cell for each row and each column of each block.
+    """Draw on ``ax`` a cell for each row and each column of each of ``blocks``.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
 
 
 def legend(figure: Figure, present: Sequence[str]) -> None:
-    """Legend of the outcomes that occur."""
+    """Legend on ``figure`` of the outcomes ``present``."""
     handles = [
         style.patch(_label(look), facecolor=look.face, edgecolor="#BBBBBB", linewidth=0.5)
         for outcome, look in LOOKS.items()

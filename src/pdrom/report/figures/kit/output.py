@@ -23,7 +23,7 @@ FULL_STUDY = "the full study (config/default.yaml) draws it"
 def draw_figure(
     declared: Artifact, results: Results, options: Options, full: bool = True
 ) -> Figure:
-    """Draw a figure, or a note where the configuration holds nothing of what it shows.
+    """Draw a figure as ``declared``, or a note where ``results`` hold nothing for its ``options``.
 
     ``full`` says that the configuration is that of the full study. Raises StorageError for a
     file that is missing or damaged.
@@ -45,7 +45,9 @@ def write_figure(
     png: str | os.PathLike[str],
     with_checksum: bool = True,
 ) -> None:
-    """Write ``figure`` as PDF (embedded TrueType fonts, no dates) and as its PNG twin.
+    """Write ``figure`` as ``pdf`` (embedded TrueType fonts, no dates) and as its twin ``png``.
+
+    The PDF has a ``title``.
 
     Either file appears only when complete. ``with_checksum`` as in `pdrom.core.store.atomic_path`.
     """

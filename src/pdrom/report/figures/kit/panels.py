@@ -60,7 +60,7 @@ class RunPanel:
         return both.resized(factor * window.width, factor * window.height)
 
     def scale(self, window: Window) -> float:
-        """How many times smaller than in ``window`` the run is drawn, at least 1."""
+        """Factor, at least 1, by which the run is drawn smaller than in ``window``."""
         return self.zoomed(window).width / window.width
 
 
@@ -72,7 +72,10 @@ def mesh_surface(mesh: Mesh) -> Surface:
 def shared_window(
     camera: Camera, reference: np.ndarray, panels: list[RunPanel], margin: float = 0.1
 ) -> Window:
-    """Window of the reference positions (N, 3), widened for runs of about the same size."""
+    """Window by ``camera`` of ``reference`` (N, 3) m, widened for ``panels`` of about its size.
+
+    ``margin`` as in `bounds`.
+    """
     base = window_of(camera, [reference], margin)
     size = SAME_SCALE * max(base.width, base.height)
     clouds = [reference]
@@ -104,6 +107,8 @@ def draw_run(
 
     Parameters
     ----------
+    ax, camera : picture and its view
+    mesh, panel : of the run
     ghost : (N, 3) m, positions whose outline is drawn for comparison
     """
     ax.set_title(panel.title, pad=3)
@@ -162,7 +167,7 @@ def _centre_note(ax: Axes, panel: RunPanel) -> None:
 
 
 def centre_note(ax: Axes, text: str, colour: str = "#666666") -> None:
-    """Boxed text in the middle of a panel."""
+    """Write boxed ``text`` of a ``colour`` in the middle of a panel ``ax``."""
     box = {"boxstyle": "round,pad=0.4", "facecolor": "white", "edgecolor": colour, "lw": 0.6}
     ax.text(
         0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center",

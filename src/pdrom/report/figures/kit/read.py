@@ -19,6 +19,9 @@ def positions_at(
 ) -> tuple[list[int], np.ndarray]:
     """Frame numbers and positions (n, N, 3) m of a run at fractions of it, or of its first frames.
 
+    Parameters
+    ----------
+    path : file of the run
     end : last of these frames; None for all
 
     Raises
@@ -60,7 +63,7 @@ class RerunInfo:
 
 
 def rerun_infos(path: str, inside: str = "") -> list[RerunInfo]:
-    """Basis sizes in a file of reduced runs, or in a group of it, ascending."""
+    """Basis sizes in a file ``path`` of reduced runs, or in its group ``inside``, ascending."""
     with open_hdf5(path) as file:
         sizes = [label for label in file[f"/{inside}"] if _is_size(label)]
         infos = [_info(f"{inside}/{label}", file[f"{inside}/{label}"]) for label in sizes]
@@ -86,13 +89,13 @@ def _info(label: str, group: h5py.Group) -> RerunInfo:
 
 
 def rerun_errors(path: str, info: RerunInfo) -> np.ndarray:
-    """Relative error of every frame that ran (F',)."""
+    """Relative error (F',) of every frame that ran, of the run ``info`` in the file ``path``."""
     with open_hdf5(path) as file:
         return file[info.label]["error"][...]
 
 
 def choose_ranks(infos: list[RerunInfo], asked: tuple[int | str, ...]) -> list[RerunInfo]:
-    """Runs of the requested sizes, in this order, none twice; all if none of them exists."""
+    """Runs among ``infos`` of the sizes ``asked`` for, in this order, none twice, else all."""
     chosen: dict[str, RerunInfo] = {}
     for rank in asked:
         for info in infos:
@@ -103,6 +106,8 @@ def choose_ranks(infos: list[RerunInfo], asked: tuple[int | str, ...]) -> list[R
 
 def rerun_positions(path: str, info: RerunInfo, frame: int) -> tuple[int, np.ndarray] | None:
     """Last finite positions (N, 3) m up to entry ``frame``, and their entry; None without any.
+
+    They are those of the run ``info`` in the file ``path``.
 
     A run that blew up holds fewer entries than the full-order run.
     """
@@ -132,7 +137,7 @@ class BasisView:
 
 
 def read_basis(path: str) -> BasisView:
-    """Basis of a group; StorageError if the file is damaged."""
+    """Basis of a group in the file ``path``; StorageError if that is damaged."""
     with open_hdf5(path) as file:
         return BasisView(
             V=file["V"][...],
@@ -153,7 +158,7 @@ class SamplingView:
 
 
 def read_samplings(path: str) -> list[SamplingView]:
-    """Selections of all basis sizes, ascending in r."""
+    """Selections of all basis sizes in the file ``path``, ascending in r."""
     with open_hdf5(path) as file:
         views = [
             SamplingView(int(label[1:]), group["entries"][...], group["elements"][...])

@@ -20,6 +20,8 @@ PUBLISHED_COLUMNS = ["experiment", "group", "split", "num_points", "relative_err
 def draw_reconstruction(results: Results, options: Reconstruction) -> Figure:
     """Draw a panel per experiment, a line per method and split; errors outside lie on the rim.
 
+    ``results`` and ``options`` are the figure's.
+
     An experiment without any error (its projections are round-off) has a panel that says so.
     """
     table = results.table("reconstruction_error", COLUMNS)
@@ -80,7 +82,7 @@ def _mark_clipped(ax: Axes, r: np.ndarray, error: np.ndarray, colour: str) -> No
 
 
 def style_note(ax: Axes, text: str) -> None:
-    """Grey remark in the middle of a panel."""
+    """Write a grey remark ``text`` in the middle of a panel ``ax``."""
     ax.text(
         0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color="#666666",
         bbox={"facecolor": "white", "edgecolor": "none", "pad": 2},

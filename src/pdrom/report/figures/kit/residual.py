@@ -35,7 +35,7 @@ def iterations(
 
     Parameters
     ----------
-    V : (3 e p, rank) modes
+    V : (3 e p, rank) modes, p ``rows_per_element``
     entries : vector indices as selected: one a step for ``rows`` "scalar" and "joint" (there the x
         entry of a row stands for the row), 3 p a step for "element"
 

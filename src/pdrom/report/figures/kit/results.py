@@ -46,15 +46,15 @@ class Results:
         self.published = published
 
     def experiments(self, options: Options) -> list[tuple[str, str]]:
-        """(scene, group) pairs that are drawn."""
+        """(scene, group) pairs of ``options`` that are drawn."""
         return self.holdings.experiments(options)
 
     def scenes(self, options: Options) -> list[str]:
-        """Scenes that are drawn and in which a group is reduced."""
+        """Scenes of ``options`` that are drawn and in which a group is reduced."""
         return list(dict.fromkeys(scene for scene, _ in self.experiments(options)))
 
     def methods(self, options: Options) -> list[str]:
-        """Methods that are drawn."""
+        """Methods of ``options`` that are drawn."""
         return self.holdings.reductions(options)
 
     def method_title(self, method: str) -> str:
@@ -69,7 +69,7 @@ class Results:
         return f"{name}: {group.replace('_', ' ')}" if several else name
 
     def scenes_of(self, table: pd.DataFrame, options: Options, nothing: str) -> list[str]:
-        """Scenes that are drawn and have a row in ``table``; without any, `NothingToDraw`.
+        """Scenes of ``options`` that have a row in ``table``; without any, `NothingToDraw`.
 
         nothing : its message
         """
@@ -79,7 +79,10 @@ class Results:
         return scenes
 
     def asked_rows(self, name: str, columns: Sequence[str], options: Options) -> pd.DataFrame:
-        """Rows of a table of the scenes and methods that the options name, or of all."""
+        """Rows of table ``name`` of the scenes and methods that ``options`` name, or of all.
+
+        StorageError if it lacks one of ``columns``.
+        """
         table = self.table(name, columns)
         for key, column in (("scenes", "scene"), ("methods", "method")):
             if names := options.names(key):
@@ -87,21 +90,21 @@ class Results:
         return table
 
     def held_rows(self, table: pd.DataFrame, options: Options) -> pd.DataFrame:
-        """Rows of the experiments and methods that are drawn."""
+        """Rows of ``table`` of the experiments and methods of ``options`` that are drawn."""
         pairs = pd.MultiIndex.from_frame(table[["scene", "group"]])
         held = pairs.isin(self.experiments(options))
         return table[held & table.method.isin(self.methods(options))]
 
     def path(self, place: Place, scene: str, group: str = "", method: str = "") -> str:
-        """Path of a result."""
+        """Path of a result of ``place`` with the labels ``scene``, ``group`` and ``method``."""
         return self.holdings.path(place, self.folder, scene, group, method)
 
     def table(self, name: str, columns: Sequence[str] = ()) -> pd.DataFrame:
-        """A table of the study; StorageError if it is missing or lacks one of ``columns``."""
+        """Table ``name``; StorageError if it is missing or lacks one of ``columns``."""
         return read_table(TABLE.at(self.folder, name=name), columns)
 
     def published_table(self, name: str, columns: Sequence[str]) -> pd.DataFrame | None:
-        """A table of the published code's own output; None where none of it is drawn."""
+        """Table ``name`` (``columns``) of the published code's own output; None if not drawn."""
         if self.published is None:
             return None
         return read_table(self.published / f"{name}.csv", columns, result=False)

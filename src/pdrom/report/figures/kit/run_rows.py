@@ -61,7 +61,10 @@ def run_panel(
     colour: tuple[float, float, float],
     title: str,
 ) -> RunPanel:
-    """Panel of a reduced run at ``frame``; what it says about a run that failed or never began."""
+    """Panel of a reduced run at ``frame``; what it says about a run that failed or never began.
+
+    The run is ``info`` in the file ``path``; ``colour`` and ``title`` are those of the panel.
+    """
     if info.marked:
         return RunPanel(title, colour, None, remark="not run: r exceeds\nthe numerical rank")
     blew_up = 0 <= info.blowup_frame < frame
@@ -78,9 +81,9 @@ def run_panel(
 def draw_rows(
     rows: list[Row], camera: Camera, height_limit: float = HEIGHT_LIMIT, footer: float = 0.0
 ) -> Figure:
-    """The figure of these rows, one below the other, no higher (inches) than a page.
+    """Figure of ``rows``, one below the other, as ``camera`` sees them.
 
-    ``footer`` inches at its lower end are left free.
+    It is no higher than ``height_limit``, inches; ``footer`` inches at its lower end are left free.
     """
     columns = max(len(row.panels) for row in rows)
     width = (style.WIDTH - LEFT) / columns

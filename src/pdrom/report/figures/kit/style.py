@@ -115,7 +115,7 @@ def scene_handles(scenes: Iterable[str]) -> list[Line2D]:
 
 
 def group_looks(holdings: Holdings) -> dict[str, tuple[str, str]]:
-    """(colour, marker) of every constraint group that is held, in the order of the groups."""
+    """(colour, marker) of every constraint group of ``holdings``, in the order of the groups."""
     held = sorted(holdings.groups.items(), key=lambda item: item[1].place)
     return {name: GROUP_LOOKS[group.place % len(GROUP_LOOKS)] for name, group in held}
 
@@ -134,35 +134,38 @@ def words(name: str) -> str:
 
 
 def new_figure(height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
-    """An empty figure of the manuscript's width, ``height`` inches high."""
+    """An empty figure of the manuscript's width, ``height`` inches high, with a ``layout``."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(WIDTH, height), layout=layout)
 
 
 def handle(label: str, **look: Any) -> Line2D:
-    """Entry of a legend: a line, or a marker, that looks so."""
+    """Entry ``label`` of a legend: a line, or a marker, with this ``look``."""
     from matplotlib.lines import Line2D
 
     return Line2D([], [], label=label, **look)
 
 
 def patch(label: str, **look: Any) -> Patch:
-    """Entry of a legend: a rectangle that looks so."""
+    """Entry ``label`` of a legend: a rectangle with this ``look``."""
     from matplotlib.patches import Patch
 
     return Patch(label=label, **look)
 
 
 def handles(looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
-    """Entries of a legend by their labels, each with its (colour, marker)."""
+    """Entries of a legend by their labels, each with its (colour, marker) of ``looks``.
+
+    What they have in ``common`` are keywords of `handle`.
+    """
     return [handle(label, color=c, marker=m, **common) for label, (c, m) in looks.items()]
 
 
 def method_handles(
     results: Results, styles: Mapping[str, tuple[str, str]], **common: Any
 ) -> list[Line2D]:
-    """Entries of a legend: methods in their ``styles``."""
+    """Entries of a legend: methods in their ``styles``, titled by ``results``; ``common`` looks."""
     return [
         handle(results.method_title(method), color=colour, marker=marker, **common)
         for method, (colour, marker) in styles.items()
@@ -170,28 +173,28 @@ def method_handles(
 
 
 def split_handles(splits: Iterable[str]) -> list[Line2D]:
-    """Entries of a legend: sets of snapshots by their lines."""
+    """Entries of a legend: sets of snapshots, ``splits``, by their lines."""
     return [handle(SPLIT_NAMES[s], color="#555555", linestyle=SPLITS[s]) for s in splits]
 
 
 def legend(figure: Figure, entries: Sequence[Artist], columns: int) -> None:
-    """Draw a legend below all panels."""
+    """Draw a legend of ``entries`` in ``columns`` below all panels of ``figure``."""
     figure.legend(handles=list(entries), loc="outside lower center", ncols=columns)
 
 
 def label_rows(ax: Axes, labels: Sequence[str]) -> None:
-    """Name rows at 0, 1, 2, ... from the top."""
+    """Name rows of ``ax`` at 0, 1, 2, ... from the top by ``labels``."""
     ax.set_yticks(range(len(labels)), labels)
     ax.set_ylim(len(labels) - 0.4, -0.6)
 
 
 def grid(ax: Axes) -> None:
-    """Light grid behind the data."""
+    """Draw a light grid behind the data of ``ax``."""
     ax.grid(True, which="major")
 
 
 def note(text: str) -> Figure:
-    """A figure that only says why there is nothing to draw."""
+    """A figure that only says in ``text`` why there is nothing to draw."""
     lines = [line for part in text.split("\n") for line in textwrap.wrap(part, NOTE)]
     figure = new_figure(0.3 + 0.15 * len(lines), None)
     figure.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", fontsize=9, color="#444444")

@@ -44,12 +44,12 @@ class TradeOffs:
     marker: dict[Model, str]
 
     def models(self, family: Family, results: Results) -> list[Model]:
-        """Models of a family, in the order of the table."""
+        """Models of a ``family`` by ``results``, in the order of the table."""
         return [model for model in self.marker if model.family(results) == family]
 
 
 def trade_offs(results: Results, options: Options) -> tuple[TradeOffs, list[str]]:
-    """The points of the scenes that are drawn, and these scenes.
+    """Points of the scenes of ``results`` that ``options`` choose, and these scenes.
 
     Raises
     ------
@@ -86,7 +86,9 @@ def _drawn(table: pd.DataFrame, results: Results) -> pd.DataFrame:
 def draw_panel(
     ax: Axes, found: TradeOffs, scene: str, results: Results, low: float = LOW, size: float = 3.0
 ) -> None:
-    """A scene's points with the front of each family, and the full-order run that they replace.
+    """Draw a scene's points, the front of each family, and the full-order run that they replace.
+
+    ``ax`` gets those ``found``, with markers of ``size`` and families by ``results``.
 
     An error below ``low`` or above `HIGH` is an arrow on the rim; a run that blew up, a cross on
     the upper one.
@@ -145,20 +147,23 @@ def _front(ax: Axes, rows: pd.DataFrame, colour: str, low: float) -> None:
 
 
 def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
-    """Number of iterations beside each run that stops earlier; near ones share a label."""
+    """Write the number of iterations beside each run of ``scene`` that stops earlier.
+
+    ``ax`` shows those ``found``; near ones share a label.
+    """
     rows = found.points[(found.points.scene == scene) & (found.points.method == FEWER)]
     rows = rows.sort_values(TIME)
     label_counts(ax, rows[TIME], rows[ERROR], counts=rows.iterations, prefix="K = ")
 
 
 def group_title(results: Results, scene: str) -> str:
-    """The constraint group that a scene reduces, in words."""
+    """Constraint group that ``scene`` of ``results`` reduces, in words."""
     groups = results.holdings.scenes[scene].groups
     return style.words(groups[0]) if len(groups) == 1 else "several groups"
 
 
 def handles(found: TradeOffs, results: Results) -> list[tuple[str, list[Line2D]]]:
-    """Legend entries by family: a colour each, and a marker for each title within it."""
+    """Legend entries of those ``found`` by family of ``results``: a colour, a marker a title."""
     common = {"linewidth": 1.0, "markersize": 4.0}
     entries = [
         ("full order", [
