@@ -109,10 +109,10 @@ class _Run:
         defect = _size(frames.defect) / own.unit
         return known | {
             "probed": len(probed),
-            "convex": (frames.least > 0.0).sum(),
-            "certified": frames.bound.notna().sum(),
+            "convex": (frames.least > 0.0).mean(),
+            "certified": frames.bound.notna().mean(),
             "slack": (frames.bound / frames.defect).median(),
-            "checks_certified": frames.beside.notna().sum(),
+            "checks_certified": frames.beside.notna().mean(),
             "checks_slack": (1.0 + frames.beside / frames.defect).median(),
             "held": not (frames.defect > frames.bound + frames.beside.fillna(0.0)).any(),
             "growth": frames.least.map(growth).median(),

@@ -20,12 +20,10 @@ from pdrom.tables.kit.vocabulary import SCENE
         compared("error", integer("frames", "before the horizon and before any contact")),
         number("error", "error of the positions in these, against the converged implicit step"),
         compared("error", integer("probed", "frames among them that the full order did, too")),
-        compared(
-            "share", integer("convex", "of these, with a contraction number below one at the end")
-        ),
-        compared("share", integer("certified", "of these, whose residual alone gives a bound")),
+        compared("share", number("convex", "share of these with a contraction number below one")),
+        compared("share", number("certified", "share whose residual alone gives a bound")),
         compared("error", number("slack", "that bound over the defect, median")),
-        compared("share", integer("checks_certified", "whose full-order frame has a bound")),
+        compared("share", number("checks_certified", "share whose full-order frame has a bound")),
         compared("error", number("checks_slack", "defect plus that bound over the defect, median")),
         flag("held", "no defect is above its bound"),
         compared("error", number("growth", "bound on that of an error in a frame, median")),
