@@ -28,9 +28,9 @@ from pdrom.core.store import atomic_path, read_table
 from pdrom.core.usage import usage_of
 from pdrom.pipeline.folders import folders
 from pdrom.tables.claims import load_claims
-from pdrom.tables.large_meshes import RECORDED
 from pdrom.tables.claims.replication import MEASURED, RULES
 from pdrom.tables.claims.replication import RECORDED as REPLICATED
+from pdrom.tables.large_meshes import RECORDED
 
 COSTS = Path("config/reference/job_costs.csv")
 COLUMNS = ["kind", "seconds", "coarse_seconds", "longest_s", "memory_mb"]
