@@ -82,7 +82,8 @@ def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> 
             title = {"t": "Header", "c": [1, attributes("references"), words("References")]}
             return [title, node]
         if kind == "Div" and (which := {"theorem", "proposition"} & set(content[0][1])):
-            labels.next(which.pop(), content[0][0])
+            # pandoc's heading has the name and a number without prefix
+            content[1][0]["c"][0]["c"][-1]["c"] = labels.next(which.pop(), content[0][0])
         if kind == "Math" and content[0]["t"] == "DisplayMath":
             return _equation(node, labels)
         return None

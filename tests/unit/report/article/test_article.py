@@ -405,6 +405,8 @@ def test_what_the_study_does_not_hold_is_left_out(small):
     assert "<strong>Opening.</strong> Words." in text
     assert "Full." in text
     assert "One? Two" in text
+    supplement = (small / "supplement.html").read_text(encoding="utf-8")
+    assert "<strong>Theorem S1</strong>" in supplement
     claims = (small / "claims.html").read_text(encoding="utf-8")
     assert "A &lt;b&gt; claim." in claims
     assert "First version of it." in claims
