@@ -102,7 +102,7 @@ class CheckedRun:
         best = min(full, key=lambda step: (own.expected(step, ask), step.work))
         self._dear = next((s for s in self._steps if s.level.model is None), best)
         self._full, self._last = full, best
-        self._running: dict[int, Running] = {}
+        self._running: dict[tuple[int, int, int], Running] = {}
         first = self._steps[0] if self._steps else best
         for level in (first.level, self._check(first), self._dear.level):
             self._on(level)
@@ -113,9 +113,10 @@ class CheckedRun:
         return self._dear.level
 
     def _on(self, level: Level) -> Running:
-        if id(level) not in self._running:
-            self._running[id(level)] = level.on(self.scene)
-        return self._running[id(level)]
+        key = level.iterations, level.window, id(level.model)  # models live as long as the run
+        if key not in self._running:
+            self._running[key] = level.on(self.scene)
+        return self._running[key]
 
     def outcome(self) -> Asked:
         """Do all frames; each call is a run of its own."""

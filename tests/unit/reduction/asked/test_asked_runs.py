@@ -146,6 +146,14 @@ def test_a_full_order_is_never_checked_by_a_worse_one(own):
     assert exact_beside(Level(160, 5)).iterations == 320
 
 
+def test_checks_of_other_iterations_run_on_a_loop_of_their_own(scene, own):
+    """A check's level may be gone by the next one: its place in memory says nothing."""
+    run = CheckedRun(scene, own, Ask(error=0.5), SETTINGS)
+    loops = [run._on(Level(count, 5)) for count in (80, 160, 80)]
+    assert loops[0] is loops[2]
+    assert loops[0] is not loops[1]
+
+
 def test_a_reduction_that_blows_up_is_replaced(scene, own):
     """Samples whose factors are wrong by far: the first check finds it."""
     step = next(s for s in with_reductions_first(own).steps if s.level.model is not None)
