@@ -6,8 +6,10 @@ import pytest
 from pdrom.core.paths import ASK_SCORES, ASKS
 from pdrom.core.store import write_table
 from pdrom.experiments.asks import COLUMNS, SCORE_COLUMNS
+from pdrom.reduction.asked.hierarchy import AskSettings
 from pdrom.tables.asks import asks, risk_factor
 from pdrom.tables.asks_cost import asks_cost
+from places import ROOT
 
 STEPS = ("ecsw, small", "full order, K = 5")
 
@@ -30,6 +32,11 @@ def test_the_factor_is_the_smallest_whose_risk_is_borne():
 def test_no_full_order_no_promise_no_loss():
     only = scores("s", 3.0).iloc[:1]
     assert risk_factor(only, [0.05], 0.5, [1.0]) == (1.0, 0.5)
+
+
+def test_the_default_factor_is_one_that_the_scores_of_the_study_give():
+    expected = pd.read_csv(ROOT / "results" / "reference" / "tables" / "asks.csv")
+    assert AskSettings().factor in set(expected.factor)
 
 
 @pytest.fixture
