@@ -47,8 +47,6 @@ class Member:
 def bundle(arguments: Sequence[str]) -> Status:
     """Write the archive of a finished study; say what is missing of an unfinished one.
 
-    ``arguments`` are those of the command line.
-
     Raises
     ------
     ConfigurationError
@@ -149,10 +147,6 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--configfile", nargs="+", default=[], metavar="FILE")
     made.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE")
     return made
-
-
-def _tables(subject: Subject) -> dict[str, str]:
-    return dict(zip(subject.plan.tables, subject.plan.table_paths, strict=True))
 
 
 def git(root: Path, *arguments: str) -> bytes:
