@@ -508,6 +508,30 @@ def test_progress_is_a_line_each_tenth_where_nobody_watches():
     )
 
 
+def test_progress_on_a_terminal_is_one_line_that_is_written_again(monkeypatch):
+    """A fifth of a second apart; the frame that may compile kernels is no measure of the others."""
+    stream = io.StringIO()
+    stream.isatty = lambda: True
+    times = iter([0.0, 50.0, *(50.0 + 0.125 * frame for frame in range(1, 10))])
+    monkeypatch.setattr("pdrom.command.progress.monotonic", lambda: next(times))
+    told = Progress("small", 10, stream)
+    for frame in range(10):
+        told(frame, FrameReport(np.zeros(0), np.full(4, 5e-4)))
+    shown = stream.getvalue()
+    assert shown.endswith("  \n")
+    assert shown.count("\n") == 1
+    frames = [text.split("frame ")[1].split(" of ")[0] for text in shown.split("\r")[1:]]
+    assert frames == ["1", "3", "5", "7", "9", "10"]
+    assert "frame 5 of 10, 2.00 ms a frame, 1 s left" in shown
+
+
+def test_a_page_without_a_browser_is_opened_by_hand(folder, finished, monkeypatch, capsys):
+    monkeypatch.setattr("webbrowser.open", lambda _: False)
+    shutil.copy(finished / "small.h5", folder)
+    assert run(["view", "small.h5", "--open"]) == Status.DONE
+    assert capsys.readouterr().err == "pdrom: no browser was found; open the file by hand\n"
+
+
 def test_the_module_is_the_program(tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "pdrom", "new", "x"],

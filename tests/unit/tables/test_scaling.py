@@ -19,7 +19,7 @@ JOINT = MethodSpec(title="joint DEIM", centring="affine", rows="joint")
 
 
 def power_laws(exponents, sizes=(100, 1000, 10000)):
-    columns = {q: 2.5 * np.power(sizes, e) for q, e in zip(QUANTITIES, exponents, strict=True)}
+    columns = {q: 0.25 * np.power(sizes, e) for q, e in zip(QUANTITIES, exponents, strict=True)}
     return pd.DataFrame({"scene": "a", "method": "fom", "threads": 1, "vertices": sizes, **columns})
 
 
