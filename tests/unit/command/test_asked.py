@@ -6,18 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pdrom.api import AskedRun, FullRun, build_scene
+from builders import SMALL
+from pdrom.api import AskedRun, FullRun, load_scene
 from pdrom.command.base import Status
 from pdrom.command.main import run
 from pdrom.reduction.asked.ask import Ask
 
-SCENE = """\
-name: small
-title: Small
-frames: 4
-mesh: {kind: cloth, rows: 3, columns: 3}
-effects: [{effect: spring, weight: 1.0}]
-"""
 COMMAND = ["reduce", "small.yaml", "--run", "small.h5", "--error", "0.05"]
 
 
@@ -25,10 +19,8 @@ COMMAND = ["reduce", "small.yaml", "--run", "small.h5", "--error", "0.05"]
 def full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FullRun:
     """A training run that is read from small.h5, of a scene in the folder of the command."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "small.yaml").write_text(SCENE)
-    mesh = {"kind": "cloth", "rows": 3, "columns": 3}
-    scene = build_scene(mesh=mesh, frames=4, effects=[{"effect": "spring", "weight": 1.0}])
-    found = FullRun(scene, np.zeros((5, 9, 3)), np.ones(4), {})
+    (tmp_path / "small.yaml").write_text(SMALL)
+    found = FullRun(load_scene("small.yaml"), np.zeros((5, 30, 3)), np.ones(4), {})
     monkeypatch.setattr("pdrom.api.load", lambda *_: found)
     return found
 
@@ -52,7 +44,7 @@ def done(full: FullRun, horizon: int = 4, error: float | None = None, **changes)
         ({"horizon": 2}, ", up to frame 2 (round-off decides after it): kept", Status.DONE),
         ({"promised": False}, ": nothing keeps to it for sure; run in", Status.NOTHING_FITS),
         (
-            {"promised": False, "positions": np.full((5, 9, 3), np.nan)},
+            {"promised": False, "positions": np.full((5, 30, 3), np.nan)},
             ": blew up, with the full order, too\n",
             Status.NOTHING_FITS,
         ),
