@@ -19,6 +19,17 @@ OBSTACLES = {
     "sphere": {"centre": [0.1, 0.2, 0.3], "radius": 0.7},
     "box": {"lower": [-0.4, -0.5, -0.6], "upper": [0.7, 0.6, 0.5]},
 }
+# File of a small sheet, for commands.
+SMALL = """\
+name: small
+title: Small
+frames: 12
+mesh: {kind: cloth, rows: 6, columns: 5, plane: xz}
+effects:
+  - {effect: gravity}
+  - {effect: pins, select: left}
+  - {effect: spring, weight: 1.0e+5}
+"""
 
 
 def make_scene(

@@ -15,7 +15,10 @@ ROOMS = (
 )  # fmt: skip
 NUMERICS = ROOMS[: ROOMS.index("report")]
 MODULE_LINES, CLASS_LINES = 250, 200
-BEGINNINGS = ("What ", "Where ", "Which ", "The same ", "That of ", "Of ")
+BEGINNINGS = (
+    "What ", "Where ", "Which ", "The same ", "That of ", "Of ", "How ", "Why ", "When ", "Who ",
+    "Those ", "As ",
+)  # fmt: skip
 # Words with which a docstring says why a module is longer.
 REASON = "one module because"
 

@@ -8,18 +8,8 @@ from zipfile import ZipFile
 
 import pytest
 
+from builders import SMALL
 from places import CONFIG, ROOT
-
-SCENE = """\
-name: small
-title: Small
-frames: 12
-mesh: {kind: cloth, rows: 6, columns: 5, plane: xz}
-effects:
-  - {effect: gravity}
-  - {effect: pins, select: left}
-  - {effect: spring, weight: 1.0e+5}
-"""
 
 
 def call(*command: object, folder: Path, **environment: str) -> str:
@@ -69,7 +59,7 @@ def test_installed_elsewhere_it_reduces(wheel: Path, tmp_path: Path) -> None:
     (packages / "locked.pth").write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")
 
     folder.mkdir()
-    (folder / "small.yaml").write_text(SCENE, encoding="utf-8")
+    (folder / "small.yaml").write_text(SMALL, encoding="utf-8")
     pdrom, home = environment / "bin" / "pdrom", {"HOME": str(tmp_path)}
     script = "import pdrom; print(pdrom.__file__)"
     assert call(python, "-c", script, folder=folder).startswith(str(environment))

@@ -15,10 +15,7 @@ OF_A_GROUP = ("guard", "alarm", "threshold", "plot")
 
 
 def perform_asked(arguments: argparse.Namespace) -> Status:
-    """Choose on the training run, run, and say what was done and what it cost.
-
-    ``arguments`` are those of ``pdrom reduce`` with an error.
-    """
+    """Choose on the training run, run, and say what was done and what it cost."""
     from pdrom.api import FullRun, load, load_scene, reduce, save
     from pdrom.core.errors import ConfigurationError, StorageError
     from pdrom.reduction.asked.ask import read_ask

@@ -67,10 +67,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Run in full order unless that is done, reduce, run again, and say how it went.
-
-    ``arguments`` are those of `declare`.
-    """
+    """Run in full order unless that is done, reduce, run again, and say how it went."""
     if arguments.group is None:
         from pdrom.command.asked import perform_asked
 

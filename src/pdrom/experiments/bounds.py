@@ -67,16 +67,7 @@ def bounds(
     settings: Options,
     out: File,
 ) -> None:
-    """One row for every group, method and size that the basis holds.
-
-    Parameters
-    ----------
-    mesh, fom : mesh and training run of the scene
-    perturbed : table of its perturbed runs, which the horizon follows from
-    bases, samplings : files of its groups, by method
-    settings : methods and sizes
-    out : table
-    """
+    """One row for every group, method and size that the basis holds."""
     scene = scene_of(settings.scene, mesh)
     if scene.mesh.vertices > MOST_VERTICES:
         log.warning("%d vertices: no bounds above %d", scene.mesh.vertices, MOST_VERTICES)

@@ -38,13 +38,7 @@ class Companion(CompanionSpec):
     writes={"out": COMPANION},
 )
 def companion(mesh: File, train: File, config: SceneConfig, spec: CompanionSpec, out: File) -> None:
-    """Make the auxiliary model of a scene and store it in ``out``.
-
-    Parameters
-    ----------
-    mesh, train, config : mesh, training run and configuration of the scene
-    spec : sizes of the model
-    """
+    """Make the auxiliary model of a scene and store it in ``out``."""
     motion = Motion(scene_of(config, mesh), train)
     frames, training = training_indices(motion.scene), training_positions(motion)
     model = companion_model(motion.scene, training, frames, spec=spec)

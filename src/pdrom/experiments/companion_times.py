@@ -28,14 +28,7 @@ COLUMNS = ["scene", "elements_sampled", "companion_ms", "full_ms"]
 def companion_times(
     mesh: File, companion: File, config: SceneConfig, timing: Protocol, out: File
 ) -> None:
-    """Time both in turn and write the table ``out``.
-
-    Parameters
-    ----------
-    mesh, config : of the scene
-    companion : file of its auxiliary model
-    timing : frames, warm-up and repeats
-    """
+    """Time both in turn and write the table ``out``."""
     scene = scene_of(config, mesh)
     ((_, model),) = load_models(companion.path)
     frames = min(timing.frames, scene.config.frames)

@@ -80,15 +80,6 @@ def estimates(
     """Run every motion with the auxiliary model and compare its runs with it.
 
     Those of reduced projections count where their positions are kept, see docs/formats.md.
-
-    Parameters
-    ----------
-    mesh, config : of the scene
-    train, full_order : its training run, and its runs of all motions
-    model : file of the auxiliary model
-    perturbed : table of the perturbed runs, which the ``horizon`` follows from
-    reruns, subspaces : files of the reduced runs
-    out : table
     """
     ((_, companion),) = load_models(model.path)
     unit = mean_motion(positions_of(train))

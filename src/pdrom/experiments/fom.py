@@ -24,12 +24,6 @@ def fom(mesh: File, config: SceneConfig, solver: Solver, threads: Threads, out: 
     """Simulate one of a scene's runs; the first held-out one stores the odd frames only.
 
     Of the other held-out ones nothing but the positions is used.
-
-    Parameters
-    ----------
-    mesh, config : of the scene
-    solver, threads : of the global step and of the local steps
-    out : file of the run, with its motion among the labels
     """
     motion = out["run"]
     scene = scene_of(config, mesh, motion, threads=threads)

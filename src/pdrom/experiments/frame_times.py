@@ -143,17 +143,7 @@ def frame_times(
     times: File,
     seconds: File,
 ) -> None:
-    """Start the processes one after the other, and join what they measured.
-
-    Parameters
-    ----------
-    meshes : of the study's scenes, whose full-order runs are timed
-    subspaces, bases, samplings : files of the quoted reductions
-    snapshots : of the quoted reduced projections, to time basis and sampling
-    large : files of the models of the large scenes
-    settings : cases, processes and protocol
-    times, seconds : tables of the frames and of the offline algorithms
-    """
+    """Start the processes one after the other, and join what they measured."""
     asked = settings.frame_times
     scenes = (
         *_small(settings, meshes, _projections(settings, bases, samplings), subspaces),

@@ -117,8 +117,6 @@ def guard(
     Parameters
     ----------
     meshes, runs, bases, samplings, companions : files of each trial, in the order of the trials
-    settings : the trials and the guard
-    out : table
     """
     rows = []
     files = zip(meshes, runs, bases, samplings, companions, strict=True)

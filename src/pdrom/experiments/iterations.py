@@ -95,14 +95,6 @@ def iterations(
     relative to the extent. If a frame stays above the tolerance there is no converged reference,
     and the errors against it are empty. The runs in position subspaces, whose iterations and
     training frames are those of the scene, have their error against it, too.
-
-    Parameters
-    ----------
-    mesh, fom, config : mesh, training run and configuration of the scene
-    sensitivity : table of its perturbed runs, which the ``horizon`` follows from
-    subspaces : files of the runs in position subspaces
-    sweep, solver : numbers of iterations and limits, and the sparse solver
-    out, models : tables of the K and of the runs in position subspaces
     """
     scene = scene_of(config, mesh)
     system = scene.system_with(solver)
@@ -151,10 +143,7 @@ def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
 
 
 def stepper_of(scene: Scene, system: GlobalSystem, iterations: int, window: int) -> Stepper:
-    """Step loop of ``scene`` in full order, with ``iterations`` and a ``window`` of acceleration.
-
-    ``system`` is the matrix of its global step.
-    """
+    """Full-order step loop of ``scene``, with ``iterations`` and a ``window`` of acceleration."""
     acceleration = Anderson(window) if window else None
     space = scene.space(system)
     return Stepper(

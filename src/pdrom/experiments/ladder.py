@@ -101,17 +101,7 @@ def ladder(
     blowup_extent: BlowupExtent,
     out: File,
 ) -> None:
-    """Reduce and rerun the scene with every rung.
-
-    Parameters
-    ----------
-    mesh, fom, config : mesh, training run and configuration of the scene
-    snapshots : of the group
-    sensitivity : table of the perturbed runs, which the ``horizon`` follows from
-    ladder : the rungs
-    blowup_extent : extent, over that at rest, at which a run ends
-    out : table
-    """
+    """Reduce and rerun the scene with every rung."""
     labels = out.labels
     scene, data = scene_of(config, mesh), load_snapshots(snapshots.path)
     reference = positions_of(fom)

@@ -125,11 +125,7 @@ def live(
 
     Parameters
     ----------
-    mesh, train : mesh and training run of the scene
-    subspaces, online, companions : files of its models, as far as the study has them
     bases, samplings : of the joint rows, in the order of the settings
-    settings : the models that the page offers, and the guard
-    out : script that a page loads
 
     Raises
     ------

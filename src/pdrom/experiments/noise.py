@@ -74,14 +74,7 @@ class Options(ConfigModel):
     writes={"out": NOISE, "runs": NOISE_RUNS},
 )
 def noise(mesh: File, sensitivity: File, settings: Options, out: File, runs: File) -> None:
-    """Perturb, run, make bases without a cutoff, rerun; up to the scene's horizon.
-
-    Parameters
-    ----------
-    mesh, settings : of the scene
-    sensitivity : table of its perturbed runs, which the horizon follows from
-    out, runs : table, and file of the runs that a figure draws
-    """
+    """Perturb, run, make bases without a cutoff, rerun; up to the scene's horizon."""
     labels, asked = out.labels, settings.noise
     whole = scene_of(settings.scene, mesh)
     frames = min(whole.config.frames, max(2, settings.horizon.frames(sensitivity)))

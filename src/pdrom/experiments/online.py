@@ -71,14 +71,7 @@ class Online(OnlineModels):
 def online(
     sources: list[Path], config: SceneConfig, asked: OnlineModels, out: File, models: File
 ) -> None:
-    """Reduce a scene by every model and run both motions with each.
-
-    Parameters
-    ----------
-    sources : files of the mesh; the job depends on them
-    config, asked : the scene, and the models
-    out, models : table, and file of the models
-    """
+    """Reduce a scene by every model and run both motions with each."""
     mesh = config.mesh.build(Path())
     train = Scene.build(config, mesh)
     heldout = Scene.build(config.heldout_variant(), mesh)

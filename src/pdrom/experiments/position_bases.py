@@ -47,15 +47,7 @@ def position_bases(
     horizon: Horizon,
     out: File,
 ) -> None:
-    """Compare the runs with full projections with the best positions in their subspace.
-
-    Parameters
-    ----------
-    mesh, config, full_order : of the scene; runs of all its motions
-    perturbed : table of its perturbed runs, which the ``horizon`` follows from
-    subspaces : file of the runs in position subspaces
-    out : table
-    """
+    """Compare the runs with full projections with the best positions in their subspace."""
     rows: list[dict[str, Any]] = []
     for run in full_order:
         split = run["run"]

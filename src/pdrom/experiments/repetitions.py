@@ -94,16 +94,7 @@ def repetitions(
     out: File,
     by_frame: File,
 ) -> None:
-    """Repeat every listed run of the scene and group.
-
-    Parameters
-    ----------
-    mesh, fom : mesh and training run of the scene
-    snapshots : of the group
-    sensitivity : table of the perturbed runs, which the horizon follows from
-    settings : runs, and what is varied
-    out, by_frame : tables of the runs and of their errors by frame
-    """
+    """Repeat every listed run of the scene and group."""
     labels = out.labels
     repeater = Repeater(
         scene_of(settings.scene, mesh),

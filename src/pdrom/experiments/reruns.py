@@ -116,15 +116,6 @@ def reruns(
 
     One job does all: starting another process takes longer than the sampling. The first held-out
     motion runs with the ``heldout_ranks``, the others with the full one if it is among them.
-
-    Parameters
-    ----------
-    mesh, fom, motions : mesh, training run and runs of all motions of the scene
-    snapshots, basis : of the group
-    companions : file of the auxiliary model, if a guard asks for it
-    settings : method, sizes and guard
-    sampling, errors, runs : samples, errors of the reconstruction, and runs, written
-    out, heldout_table : tables of the training and of the held-out motions
     """
     space, data = load_basis(basis.path), load_snapshots(snapshots.path)
     sample(

@@ -100,14 +100,7 @@ class Options(ConfigModel):
 def scaling(
     sources: list[Path], settings: Options, iterations: File, breakeven: File, effects: File
 ) -> None:
-    """Measure a scene on one mesh: ``factor`` times the vertices along each side.
-
-    Parameters
-    ----------
-    sources : files of the mesh; the job depends on them
-    settings : scene, methods, sizes and protocol
-    iterations, breakeven, effects : tables of frames, of local steps alone and of effects
-    """
+    """Measure a scene on one mesh: ``factor`` times the vertices along each side."""
     config, solver, sized = settings.scene, settings.solver, settings.scaling
     specs, alone = settings.scaled_methods, settings.scaling.breakeven
     factor = float(iterations["factor"])

@@ -51,14 +51,7 @@ class Sensitivity(PerturbedRuns):
 def sensitivity(
     mesh: File, config: SceneConfig, chosen: PerturbedRuns, out: File, effects: File
 ) -> None:
-    """Write the differences of a scene's perturbed runs, and of its held-out motions, to ``out``.
-
-    Parameters
-    ----------
-    mesh, config : of the scene
-    chosen : perturbations and seeds
-    effects : table of what the effects contribute
-    """
+    """Write differences of a scene's perturbed runs, and of its held-out motions, to ``out``."""
     scene = scene_of(config, mesh)
     table = sensitivities(scene, chosen.perturbations, chosen.seeds)
     heldout = [

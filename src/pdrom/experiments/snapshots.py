@@ -14,13 +14,7 @@ from pdrom.reduction.snapshots import collect, save_snapshots, training_frames
     writes={"out": SNAPSHOTS},
 )
 def snapshots(mesh: File, train: File, heldout: File, config: SceneConfig, out: File) -> None:
-    """Split the projections of a group that two runs stored and save them to ``out``.
-
-    Parameters
-    ----------
-    mesh, config : of the scene
-    train, heldout : the runs
-    """
+    """Split the projections of a group that two runs stored and save them to ``out``."""
     group = out["group"]
     scene = scene_of(config, mesh)
     frames = training_frames(scene.config.frames, scene.config.reduce[group].train)

@@ -116,15 +116,6 @@ def stability(
     """Run the full order, every local reduction and the largest subspaces at every setting.
 
     Bases and samplings are those of the scene's own setting: how far do they carry?
-
-    Parameters
-    ----------
-    mesh, config : of the scene
-    bases, samplings, subspaces : files of its reductions
-    methods, short : methods by name; settings, sizes and frames that are tried
-    blowup_extent : extent, over that at rest, at which a run ends
-    solver : of the full order
-    out : table
     """
     scene = scene_of(config, mesh)
     reductions = list(_reductions(methods, short.ranks, bases, samplings))

@@ -87,14 +87,7 @@ class Options(ConfigModel):
 def subspace_ablation(
     mesh: File, train: File, heldout: File, sensitivity: File, settings: Options, out: File
 ) -> None:
-    """Run every variant with all groups interpolated and write the table ``out``.
-
-    Parameters
-    ----------
-    mesh, train, heldout : mesh and two runs of the scene
-    sensitivity : table of its perturbed runs, which the horizon follows from
-    settings : the variants
-    """
+    """Run every variant with all groups interpolated and write the table ``out``."""
     runs = {"train": train, "heldout": heldout}
     trials = _Trials(settings, mesh, runs, sensitivity)
     motion = trials.motions["train"]

@@ -120,14 +120,7 @@ def subspaces(
     heldout_table: File,
     seconds_table: File,
 ) -> None:
-    """Build every model (bases, sizes, tolerances) and run all motions with it.
-
-    Parameters
-    ----------
-    mesh, full_order, settings : of the scene; its runs of all motions
-    out : file of the models and their runs
-    train_table, heldout_table, seconds_table : errors, and times of making the models
-    """
+    """Build every model (bases, sizes, tolerances) and run all motions with it."""
     motions = {
         run["run"]: Motion(scene_of(settings.scene, mesh, run["run"]), run) for run in full_order
     }

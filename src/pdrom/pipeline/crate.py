@@ -56,10 +56,7 @@ class Published:
 
 
 def write_crate(plan: Plan, folders: Folders, manifest: Manifest) -> None:
-    """Write ``ro-crate-metadata.json`` for the run of this process, which has succeeded.
-
-    ``plan``, ``folders`` and ``manifest`` are those of its study.
-    """
+    """Write ``ro-crate-metadata.json`` for the run of this process, which has succeeded."""
     crate = ROCrate(version="1.1")
     about = read_yaml(CITATION)
     author = _author(crate, about["authors"][0]["name"])
@@ -91,10 +88,7 @@ def write_crate(plan: Plan, folders: Folders, manifest: Manifest) -> None:
 
 
 def published(plan: Plan, folders: Folders, manifest: Manifest) -> list[Published]:
-    """Tables, figures, the manuscript with its inputs, and the record of the machine.
-
-    ``plan``, ``folders`` and ``manifest`` are those of the study.
-    """
+    """Tables, figures, the manuscript with its inputs, and the record of the machine."""
     tables, figures = declared(), plan.figure_jobs
     titles = {paths.TABLE.at("", name=n)[1:]: f"Table {n}: {t.title}" for n, t in tables.items()}
     for name, job in figures.items():

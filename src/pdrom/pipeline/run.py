@@ -88,10 +88,7 @@ class Run:
         return f"{named} ({words})" if words else named
 
     def start(self, workflow: Any, plan: Plan) -> None:
-        """Start the process that jobs are forked from, or look at the cluster, before all jobs.
-
-        ``workflow`` is Snakemake's, ``plan`` that of the study.
-        """
+        """Start the process that jobs are forked from, or look at the cluster, before all jobs."""
         # Jobs start without a limit of their rate. For one, Snakemake starts a timer after every
         # choice among the jobs, to choose again, and each such choice starts another one: towards
         # the end of a run they take a third of a core, and the process waits for the last one.

@@ -38,8 +38,6 @@ class SceneOrder:
 def scene_order(arguments: Sequence[str], root: Path = Path()) -> SceneOrder:
     """Jobs and pictures that ``arguments``, ``scene`` or ``viewer`` and words after it, ask for.
 
-    ``root`` is the folder of the project.
-
     Raises
     ------
     ConfigurationError
@@ -75,10 +73,7 @@ def scene_order(arguments: Sequence[str], root: Path = Path()) -> SceneOrder:
 
 
 def viewer_scenes(root: Path, configfiles: Iterable[str], settings: Iterable[str]) -> list[str]:
-    """Scenes of the viewer: those that the configuration names, else its first ones.
-
-    It is that of ``configfiles`` and ``settings`` over the default one below ``root``.
-    """
+    """Scenes of the viewer: those that the configuration names, else its first ones."""
     whole = merged(root / DEFAULT, configfiles, settings)
     scenes = (whole.get("viewer") or {}).get("scenes") or whole["scenes"][:VIEWED]
     require_scenes(root, scenes, "viewer.scenes")
@@ -89,8 +84,6 @@ def study_of(
     root: Path, scenes: Sequence[str], configfiles: Iterable[str], settings: Iterable[str]
 ) -> Study:
     """Study of some ``scenes``, which need not be named by its configuration.
-
-    That is as in `viewer_scenes`: ``root``, ``configfiles`` and ``settings``.
 
     Raises
     ------

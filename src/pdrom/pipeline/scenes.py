@@ -88,11 +88,6 @@ def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
             raise ConfigurationError(f"{key}: unknown scene '{name}'{choices(name, known)}")
 
 
-def load_scene(root: Path, name: str, changes: Change = UNCHANGED) -> SceneConfig:
-    """Configuration of scene ``name``; ``root`` and ``changes`` as in `load_bound_scene`."""
-    return load_bound_scene(root, name, changes).config
-
-
 def load_bound_scene(root: Path, name: str, changes: Change = UNCHANGED) -> Scene:
     """Scene ``name`` below ``root`` with ``changes``, built to find every fault early.
 

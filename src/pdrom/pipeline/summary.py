@@ -165,10 +165,7 @@ def shortened(reason: str) -> set[str]:
 
 
 def preview(seconds: Callable[[str], float], cores: int) -> None:
-    """Have this process say at its end what its dry run has planned.
-
-    ``seconds`` and ``cores`` are those of `Preview`.
-    """
+    """Have this process say at its end what its dry run has planned."""
     planned = Preview(seconds, cores)
     logging.getLogger("snakemake.logging").addHandler(planned)
     atexit.register(lambda: sys.stdout.write(planned.text()))

@@ -94,11 +94,6 @@ def accuracy_cost(
 
     Parameters
     ----------
-    reruns, heldout : the tables reduced_reruns and heldout_reruns
-    timings : timing tables of the scenes
-    frame_times : the table of that name
-    sweeps : tables of the scenes' full-order runs with other numbers of iterations
-    models : errors of the runs in position subspaces against the converged run
     iterations : scene -> its own local/global iterations K per frame
     """
     times = timings_in_one_time(timings, frame_times)

@@ -42,7 +42,6 @@ def budget(points: pd.DataFrame, budgets: Sequence[float]) -> pd.DataFrame:
 
     Parameters
     ----------
-    points : the table accuracy_cost
     budgets : milliseconds per frame
     """
     points = points.assign(reference=reference_of(points))

@@ -60,8 +60,6 @@ def estimates(parts: list[File], times: list[File], reruns: pd.DataFrame) -> pd.
 
     A resolved estimate differs from the error by at most the auxiliary model's own error over the
     motion: if that is no larger than ``floor``, the ratio lies between 0.6 and 3.
-
-    ``times`` are those of the auxiliary models, ``reruns`` is the table reduced_reruns.
     """
     rows = joined(parts)
     if rows.empty:

@@ -47,10 +47,6 @@ def failure_predictors(
     Counted are runs for which every predictor is known, the same ones for each. "failed" are runs
     of `pdrom.tables.gain_prediction` (the basis suffices) whose error exceeds its limit; "blown up"
     are those that ended early, among all runs of sampled methods.
-
-    Parameters
-    ----------
-    bounds, reruns, reconstruction : tables bounds, reduced_reruns and reconstruction_error
     """
     rows = []
     for target, runs in predicted_runs(bounds, reruns, reconstruction).items():
@@ -64,10 +60,7 @@ def failure_predictors(
 def predicted_runs(
     bounds: pd.DataFrame, reruns: pd.DataFrame, reconstruction: pd.DataFrame
 ) -> dict[str, pd.DataFrame]:
-    """Runs with all predictors and ``failed`` for each target, see `failure_predictors`.
-
-    ``bounds``, ``reruns`` and ``reconstruction`` are the tables that it reads.
-    """
+    """Runs with all predictors and ``failed`` for each target, see `failure_predictors`."""
     known = bounds[[*_KEYS, *PREDICTORS[1:]]].astype({"r": "int64"})
     judged = judged_runs(reruns, reconstruction)
     every = reruns_with_gain(reruns, reconstruction)

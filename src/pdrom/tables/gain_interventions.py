@@ -90,10 +90,6 @@ def gain_interventions(
     intervals draw whole families, the test counts them. Errors below the sensitivity floor count as
     the floor. A run that ended early has an infinite error; a pair of two such runs says nothing
     and is left out.
-
-    Parameters
-    ----------
-    reruns, reconstruction, ladder : tables reduced_reruns, reconstruction_error and ladder
     """
     runs = judged_runs(reruns, reconstruction)
     rows = []

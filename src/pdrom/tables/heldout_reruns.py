@@ -34,12 +34,7 @@ def heldout_reruns(
     sensitivity: pd.DataFrame,
     threshold: float,
 ) -> pd.DataFrame:
-    """Runs judged by the horizon of their own motion, see `judged_reruns`.
-
-    Parameters
-    ----------
-    runs, rows, subspaces, subspace_rows, sensitivity, threshold : as there
-    """
+    """Runs judged by the horizon of their own motion, see `judged_reruns`."""
     found = [
         judged_reruns(
             runs,

@@ -32,10 +32,5 @@ LATER = (
     reads={"recorded": ProjectFile(RECORDED)},
 )
 def large_meshes(recorded: Path) -> pd.DataFrame:
-    """The rows of the table winners of the study ``config/alternatives.yaml``.
-
-    Parameters
-    ----------
-    recorded : file that `pdrom.pipeline.tracked` writes
-    """
+    """The rows of the table winners of the study ``config/alternatives.yaml``."""
     return pd.read_csv(recorded)

@@ -67,11 +67,6 @@ def model_choice(
     Nothing of that motion's full order goes into the choice. Cheapest is the one that evaluates
     the fewest elements, then has the fewest modes: times differ from run to run. It is scored on
     the motion that it was chosen for, and on the other held-out ones.
-
-    Parameters
-    ----------
-    estimates, reruns, heldout : tables estimates, reduced_reruns and heldout_reruns
-    tolerances : errors that a user allows
     """
     chosen_on = estimates[(estimates.split == FIRST) & (estimates.position_basis != "full")]
     times = reruns[[*KEYS, "ms_per_frame"]].astype(_WHOLE).drop_duplicates(KEYS)

@@ -37,13 +37,7 @@ def reduced_reruns(
     perturbation: float,
     threshold: float,
 ) -> pd.DataFrame:
-    """Runs of the training motion with their times; see `judged_reruns` for the rest.
-
-    Parameters
-    ----------
-    runs, rows, subspaces, subspace_rows, sensitivity, perturbation, threshold : as there
-    timings, frame_times : times of the jobs, and the one time of each scene
-    """
+    """Runs of the training motion with their times; see `judged_reruns` for the rest."""
     judged = judged_reruns(
         runs,
         rows,

@@ -33,12 +33,7 @@ CASE = ["scene", "stiffness", "reference", "limit"]
     reads={"rows": TableOf("winners")},
 )
 def reduction_pays(rows: pd.DataFrame) -> pd.DataFrame:
-    """One row per scene, stiffness, reference and error; empty where it never reaches or pays.
-
-    Parameters
-    ----------
-    rows : the table winners
-    """
+    """One row per scene, stiffness, reference and error; empty where it never reaches or pays."""
     found = []
     for labels, case in rows.sort_values("vertices", kind="stable").groupby(CASE, sort=False):
         sizes = case.vertices.to_numpy(float)

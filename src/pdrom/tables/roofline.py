@@ -53,11 +53,6 @@ def roofline(
     """One row per scene, mesh size and phase; the bound of an iteration is the sum of its phases'.
 
     A phase that was not timed inside the compiled loop, and an iteration with one, has no share.
-
-    Parameters
-    ----------
-    rates, work : of the machine, and of every phase
-    own, sized : times of the phases on the scenes' own meshes and on those of other sizes
     """
     phases = joined(work)
     if phases.empty:

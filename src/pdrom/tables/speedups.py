@@ -86,14 +86,7 @@ def speedups(
     reruns: pd.DataFrame,
     heldout: pd.DataFrame,
 ) -> pd.DataFrame:
-    """One row per quoted reduction; a speed-up is a ratio of two times of one process.
-
-    Parameters
-    ----------
-    parts, times : of every process, and the table frame_times
-    projections, subspaces, large : seconds that the reductions took to make
-    reruns, heldout : tables reduced_reruns and heldout_reruns, for the errors
-    """
+    """One row per quoted reduction; a speed-up is a ratio of two times of one process."""
     rows = joined(parts)
     if rows.empty or not (rows.role == REDUCED).any():
         return pd.DataFrame()

@@ -90,11 +90,7 @@ def stability(
 
     Parameters
     ----------
-    full_order : full-order runs
-    reduced_reruns : the table, for the errors
-    reruns, subspaces, sweeps : tables of the reruns, of those in subspaces, of the short runs
     time_steps : scene -> h in seconds
-    wrong, departure : see `pdrom.experiments.stability.Stability`
     """
     runs = pd.concat(
         [_full_order_rows(full_order), _rerun_rows(reruns, subspaces, reduced_reruns)],

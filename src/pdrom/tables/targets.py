@@ -39,8 +39,6 @@ SIZES_FROM = 20  # basis sizes for which the target is set
 def targets(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFrame:
     """One row per run of a sampled method on a well-posed scene, compared with `ORTHOGONAL`.
 
-    ``reruns`` and ``reconstruction`` as in `reruns_with_gain`.
-
     Well-posed: round-off does not decide the motion before the run ends. ``ratio`` is the error
     over that of the orthogonal projection, both not below the scene's sensitivity floor, under
     which errors cannot be compared; inf for a run that ended early. ``within`` is ratio <= FACTOR,

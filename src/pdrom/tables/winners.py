@@ -52,11 +52,6 @@ def winners(rows: pd.DataFrame, limits: Sequence[float]) -> pd.DataFrame:
     """One row per scene, mesh, stiffness, reference and error; no method where none reaches it.
 
     Errors that are too small to be told from that of the motion in continuous time have no row.
-
-    Parameters
-    ----------
-    rows : the table alternatives
-    limits : relative errors
     """
     found = []
     for labels, case in rows.groupby(["scene", "vertices", "stiffness"], sort=False):

@@ -24,12 +24,12 @@ from pathlib import Path, PurePosixPath
 
 from pdrom import __version__
 from pdrom.core import paths
-from pdrom.core.errors import ConfigurationError, PdromError
+from pdrom.core.errors import ConfigurationError
 from pdrom.core.store import atomic_path
 from pdrom.pipeline.crate import COPIES, published
 from pdrom.pipeline.manifest import Manifest, read_manifest
 from pdrom.verification.files import verify_files
-from pdrom.verification.status import Status
+from pdrom.verification.status import Status, ended, say
 from pdrom.verification.subject import Subject
 
 NAME = f"pdrom-{__version__}"
@@ -47,8 +47,6 @@ class Member:
 def bundle(arguments: Sequence[str]) -> Status:
     """Write the archive of a finished study; say what is missing of an unfinished one.
 
-    ``arguments`` are those of the command line.
-
     Raises
     ------
     ConfigurationError
@@ -62,13 +60,13 @@ def bundle(arguments: Sequence[str]) -> Status:
     manifest = read_manifest(subject.results)
     missing = list(unfinished(subject, manifest))
     if missing:
-        _say(f"not there, or made by other code: {', '.join(missing)}")
-        _say(f"the study is not finished; finish it by {subject.command()}")
+        say(f"not there, or made by other code: {', '.join(missing)}")
+        say(f"the study is not finished; finish it by {subject.command()}")
         return Status.MISSING
     members = [*sources(Path()), *results(subject, manifest), *paper(subject)]
     target = Path(subject.results, f"{NAME}.tar.gz")
     size = write_archive(members, target)
-    _say(f"{target}: {len(members)} files, {size / 1e6:.1f} MB")
+    say(f"{target}: {len(members)} files, {size / 1e6:.1f} MB")
     return Status.HOLDS
 
 
@@ -151,10 +149,6 @@ def parser() -> argparse.ArgumentParser:
     return made
 
 
-def _tables(subject: Subject) -> dict[str, str]:
-    return dict(zip(subject.plan.tables, subject.plan.table_paths, strict=True))
-
-
 def git(root: Path, *arguments: str) -> bytes:
     """Output of git with ``arguments`` in ``root``; ConfigurationError without git or a clone."""
     try:
@@ -165,18 +159,5 @@ def git(root: Path, *arguments: str) -> bytes:
     return done.stdout
 
 
-def _say(line: str) -> None:
-    sys.stdout.write(f"{line}\n")
-
-
-def main() -> int:
-    """The exit code; faulty input ends with one line."""
-    try:
-        return bundle(sys.argv[1:])
-    except PdromError as error:
-        sys.stderr.write(f"pdrom: {error}\n")
-        return Status.FAULTY
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(ended(lambda: bundle(sys.argv[1:])))

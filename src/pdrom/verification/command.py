@@ -1,7 +1,6 @@
 """Command line of ``./reproduce verify``."""
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from pdrom.verification.examine import Examination
 from pdrom.verification.files import verify_files
 from pdrom.verification.lines import Line, counted, page, status_of
 from pdrom.verification.references import LOG, folder_of
-from pdrom.verification.status import Status
+from pdrom.verification.status import Status, say
 from pdrom.verification.subject import Subject
 from pdrom.verification.update import update
 
@@ -56,7 +55,7 @@ def verify(arguments: Sequence[str]) -> Status:
     if asked.files:
         return verify_files(subject)
     if asked.update:
-        _say(f"expected tables: {update(subject, asked.reason)}")
+        say(f"expected tables: {update(subject, asked.reason)}")
         return Status.HOLDS
     return verify_tables(subject)
 
@@ -75,14 +74,14 @@ def verify_tables(subject: Subject) -> Status:
         raise ConfigurationError(f"{folder}: no expected tables of this configuration; {hint}")
     lines = Examination(subject).lines()
     for line in lines:
-        _say(str(line))
+        say(str(line))
     written = Path(subject.results) / PAGE
     write_text(page(lines, _about(subject, folder)), written)
     pages = Path(ARTICLE.at(subject.results, name=INDEX))
     if pages.is_file():
         write_verified({f"{line.kind} {line.name}": _short(line) for line in lines}, pages.parent)
-    _say(counted(lines))
-    _say(f"page: {written}")
+    say(counted(lines))
+    say(f"page: {written}")
     return status_of(lines)
 
 
@@ -95,7 +94,3 @@ def _about(subject: Subject, folder: Path) -> list[str]:
         f"Results in `{subject.results}`, expected ones in `{folder}` (`{LOG}` says why).",
         "What is compared, and what the outcomes mean, is in `docs/verification.md`.",
     ]
-
-
-def _say(line: str) -> None:
-    sys.stdout.write(f"{line}\n")

@@ -6,7 +6,6 @@ made again from the others and compared (`pdrom.verification.again`).
 
 import os
 import shlex
-import sys
 from collections.abc import Iterable
 from itertools import chain
 from pathlib import Path
@@ -17,7 +16,7 @@ from pdrom.core.store import Condition, check_file
 from pdrom.pipeline.manifest import Entry, Manifest, asked_for, own_files, read_manifest
 from pdrom.pipeline.resolve import Job
 from pdrom.verification.again import differing
-from pdrom.verification.status import Status
+from pdrom.verification.status import Status, say
 from pdrom.verification.subject import Subject
 
 DAMAGED = "damaged (its checksum differs)"
@@ -33,12 +32,12 @@ def verify_files(subject: Subject) -> Status:
     """Compare the files of ``subject`` with its manifest; say what makes a bad one again."""
     place = Path(MANIFEST.at(subject.results))
     if not place.is_file():
-        _say(f"{place}: not there; a run that succeeds writes it: {subject.command()}")
+        say(f"{place}: not there; a run that succeeds writes it: {subject.command()}")
         return Status.MISSING
     try:
         manifest = read_manifest(subject.results)
     except StorageError as error:
-        _say(f"{error}; a run that succeeds writes it: {subject.command()}")
+        say(f"{error}; a run that succeeds writes it: {subject.command()}")
         return Status.DIFFERS
     return _compare(subject, manifest)
 
@@ -54,11 +53,11 @@ def _compare(subject: Subject, manifest: Manifest) -> Status:
     faults |= dict.fromkeys(_other(chain.from_iterable(plan.fixed.values()), set(faults)), OTHER)
     for path, fault in list(faults.items())[:SHOWN]:
         hint = "" if fault == FOREIGN else f"; make it again by {command_for(subject, path)}"
-        _say(f"{path}: {fault}{hint}")
+        say(f"{path}: {fault}{hint}")
     if len(faults) > SHOWN:
-        _say(f"and {len(faults) - SHOWN} more; finish the study by {subject.command()}")
+        say(f"and {len(faults) - SHOWN} more; finish the study by {subject.command()}")
     count = len(entries | faults)
-    _say(f"{count - len(faults)} of {count} files are as the last run left them")
+    say(f"{count - len(faults)} of {count} files are as the last run left them")
     if LOST in faults.values():
         return Status.MISSING
     return Status.DIFFERS if faults else Status.HOLDS
@@ -95,7 +94,3 @@ def _other(made: Iterable[Job], faulty: set[str]) -> list[str]:
 def command_for(subject: Subject, path: str) -> str:
     """Command that makes the file ``path`` of ``subject`` again, whatever is in its place."""
     return shlex.join(["./reproduce", *subject.options, "--force", "--", path])
-
-
-def _say(line: str) -> None:
-    sys.stdout.write(f"{line}\n")

@@ -5,14 +5,13 @@ The version stands in ``pdrom.__version__``; the citation and the list of change
 
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from pdrom import __version__
-from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.yamlfile import read_yaml
 from pdrom.verification.bundle import bundle, git
-from pdrom.verification.status import Status
+from pdrom.verification.status import Status, ended
 
 CHANGES, CITATION = Path("CHANGELOG.md"), Path("CITATION.cff")
 UNRELEASED = "Unreleased"
@@ -41,18 +40,13 @@ def unready(root: Path) -> Iterator[str]:
         yield f"files that are in no commit: {files}; commit or remove them"
 
 
-def main() -> int:
-    """The exit code; every reason against a release is a line."""
-    try:
-        reasons = list(unready(Path()))
-        for reason in reasons:
-            sys.stderr.write(f"pdrom: release: {reason}\n")
-        return Status.FAULTY if reasons else bundle(sys.argv[1:])
-    except (PdromError, OSError) as error:
-        reported = error if isinstance(error, PdromError) else ConfigurationError(str(error))
-        sys.stderr.write(f"pdrom: {reported}\n")
-        return Status.FAULTY
+def release(arguments: Sequence[str]) -> int:
+    """Do `bundle` of the ``arguments``, or print every reason against a release."""
+    reasons = list(unready(Path()))
+    for reason in reasons:
+        sys.stderr.write(f"pdrom: release: {reason}\n")
+    return Status.FAULTY if reasons else bundle(arguments)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(ended(lambda: release(sys.argv[1:])))

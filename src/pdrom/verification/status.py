@@ -1,6 +1,11 @@
-"""Exit codes of ``./reproduce verify``."""
+"""Ends of the commands of this package."""
 
+import sys
+from collections.abc import Callable
 from enum import IntEnum
+
+from pdrom.core.errors import PdromError
+from pdrom.core.logs import INTERRUPTED
 
 
 class Status(IntEnum):
@@ -10,3 +15,20 @@ class Status(IntEnum):
     FAULTY = 1
     DIFFERS = 3
     MISSING = 4
+
+
+def ended(command: Callable[[], int], faulty: int = Status.FAULTY) -> int:
+    """Exit code of ``command``; faulty input (code ``faulty``) and an interruption are one line."""
+    try:
+        return command()
+    except (PdromError, OSError) as error:
+        sys.stderr.write(f"pdrom: {error}\n")
+        return faulty
+    except KeyboardInterrupt:
+        sys.stderr.write("pdrom: interrupted\n")
+        return INTERRUPTED
+
+
+def say(line: str) -> None:
+    """Print a ``line``."""
+    sys.stdout.write(f"{line}\n")

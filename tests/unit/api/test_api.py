@@ -147,6 +147,25 @@ FAULTY = {
         lambda full, _: api.reduce(full, "spring", r=1, basis_of_group=np.eye(3)),
         "basis_of_group = array.*a Basis is required",
     ),
+    "error of a group": (
+        lambda full, _: api.reduce(full, "spring", error=0.1), "error: of the whole scene",
+    ),
+    "motion of a group": (
+        lambda full, _: api.reduce(full, "spring", scene=full.scene), "scene: only together with",
+    ),
+    "motion of another mesh": (
+        lambda full, _: api.reduce(full, error=0.1, scene=api.build_scene(
+            **(KEYS | {"mesh": {"kind": "cloth", "rows": 4, "columns": 4}}), effects=EFFECTS,
+        )), "another mesh or other constraint groups",
+    ),
+    "motion of other groups": (
+        lambda full, _: api.reduce(full, error=0.1, scene=api.build_scene(
+            **KEYS, effects=[*EFFECTS, {"effect": "strain", "weight": 1.0}],
+        )), "another mesh or other constraint groups",
+    ),
+    "motion that is none": (
+        lambda full, _: api.reduce(full, error=0.1, scene=full), "scene = FullRun.*a Scene is",
+    ),
     "guard a text": (lambda full, _: api.reduce(full, "spring", guard="stop"), "guard = 'stop'"),
     "guard NaN": (lambda *_: api.GuardSettings(threshold=np.nan), "threshold = nan"),
     "guard misspelt": (lambda *_: api.GuardSettings(action="halt"), "GuardSettings: action"),

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
+from builders import SMALL
 from pdrom.api import load_scene
 from pdrom.command.base import Status
 from pdrom.command.main import COMMANDS, parser, run
@@ -24,23 +25,12 @@ from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene, SceneConfig
 
-SCENE = """\
-name: small
-title: Small
-frames: 12
-mesh: {kind: cloth, rows: 6, columns: 5, plane: xz}
-effects:
-  - {effect: gravity}
-  - {effect: pins, select: left}
-  - {effect: spring, weight: 1.0e+5}
-"""
-
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder with a scene, in which the commands run."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "small.yaml").write_text(SCENE, encoding="utf-8")
+    (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")
     return tmp_path
 
 
@@ -63,7 +53,7 @@ def test_a_scene_is_run_reduced_and_shown(folder, capsys):
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the scene and its full-order run."""
     folder = tmp_path_factory.mktemp("finished")
-    (folder / "small.yaml").write_text(SCENE, encoding="utf-8")
+    (folder / "small.yaml").write_text(SMALL, encoding="utf-8")
     assert run(["run", str(folder / "small.yaml")]) == Status.DONE
     return folder
 
@@ -308,7 +298,7 @@ def test_a_mesh_without_a_whole_side_is_held_at_its_top(folder):
 
 
 def test_names_and_titles_follow_from_the_file(folder):
-    short = SCENE.partition("\n")[2].replace("title: Small\n", "")
+    short = SMALL.partition("\n")[2].replace("title: Small\n", "")
     (folder / "Two Words.yaml").write_text(short, encoding="utf-8")
     config = load_scene("Two Words.yaml").config
     assert (config.name, config.title) == ("two_words", "Two words")
@@ -319,7 +309,7 @@ def test_names_and_titles_follow_from_the_file(folder):
 def test_what_an_obstacle_moves_at_rest_is_said_once(folder, caplog):
     inside = "  - {effect: floor, height: 2.0}\n  - {effect: self_collision, thickness: 0.01}\n"
     held = "{kind: cloth, rows: 6, columns: 5, plane: xy}"
-    text = SCENE.replace("{kind: cloth, rows: 6, columns: 5, plane: xz}", held) + inside
+    text = SMALL.replace("{kind: cloth, rows: 6, columns: 5, plane: xz}", held) + inside
     (folder / "small.yaml").write_text(text, encoding="utf-8")
     assert run(["run", "small.yaml"]) == Status.DONE
     lies, thin = caplog.messages
@@ -401,12 +391,12 @@ def test_what_cannot_be_written_is_found_before_anything_runs(
     assert run(arguments) == Status.FAULTY
     (told,) = capsys.readouterr().err.splitlines()
     assert words in told
-    assert (folder / "small.yaml").read_text("utf-8") == SCENE
+    assert (folder / "small.yaml").read_text("utf-8") == SMALL
 
 
 def test_a_mesh_path_that_is_too_long_is_one_line(folder, capsys):
     mesh = f"{{kind: file, path: {'m' * 5000}.obj}}"
-    text = SCENE.replace("{kind: cloth, rows: 6, columns: 5, plane: xz}", mesh)
+    text = SMALL.replace("{kind: cloth, rows: 6, columns: 5, plane: xz}", mesh)
     Path("long.yaml").write_text(text, encoding="utf-8")
     assert run(["run", "long.yaml"]) == Status.FAULTY
     (told,) = capsys.readouterr().err.splitlines()
@@ -455,7 +445,7 @@ def test_a_misspelt_option_gets_a_suggestion(capsys):
 
 def test_a_run_of_another_scene_is_not_reduced(folder, capsys):
     run(["run", "small.yaml"])
-    (folder / "small.yaml").write_text(SCENE.replace("1.0e+5", "2.0e+5"))
+    (folder / "small.yaml").write_text(SMALL.replace("1.0e+5", "2.0e+5"))
     assert run(["reduce", "small.yaml", "--group", "spring", "--run", "small.h5"]) == Status.FAULTY
     assert "a run of another scene" in capsys.readouterr().err
 
@@ -506,6 +496,30 @@ def test_progress_is_a_line_each_tenth_where_nobody_watches():
         line("a", 1, 2, 1.0, 3.0)
         == f"a [{'#' * 12}{'.' * 12}] frame 1 of 2, 1.00 ms a frame, 3 s left"
     )
+
+
+def test_progress_on_a_terminal_is_one_line_that_is_written_again(monkeypatch):
+    """A fifth of a second apart; the frame that may compile kernels is no measure of the others."""
+    stream = io.StringIO()
+    stream.isatty = lambda: True
+    times = iter([0.0, 50.0, *(50.0 + 0.125 * frame for frame in range(1, 10))])
+    monkeypatch.setattr("pdrom.command.progress.monotonic", lambda: next(times))
+    told = Progress("small", 10, stream)
+    for frame in range(10):
+        told(frame, FrameReport(np.zeros(0), np.full(4, 5e-4)))
+    shown = stream.getvalue()
+    assert shown.endswith("  \n")
+    assert shown.count("\n") == 1
+    frames = [text.split("frame ")[1].split(" of ")[0] for text in shown.split("\r")[1:]]
+    assert frames == ["1", "3", "5", "7", "9", "10"]
+    assert "frame 5 of 10, 2.00 ms a frame, 1 s left" in shown
+
+
+def test_a_page_without_a_browser_is_opened_by_hand(folder, finished, monkeypatch, capsys):
+    monkeypatch.setattr("webbrowser.open", lambda _: False)
+    shutil.copy(finished / "small.h5", folder)
+    assert run(["view", "small.h5", "--open"]) == Status.DONE
+    assert capsys.readouterr().err == "pdrom: no browser was found; open the file by hand\n"
 
 
 def test_the_module_is_the_program(tmp_path):

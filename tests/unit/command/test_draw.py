@@ -4,19 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from builders import SMALL
 from pdrom.command.base import Status
 from pdrom.command.main import run
 from pdrom.command.results import files_of
 from pdrom.report.scenes.kinds import DEFAULT, KINDS
-
-SCENE = """\
-frames: 6
-mesh: {kind: cloth, rows: 5, columns: 4, plane: xz}
-effects:
-  - {effect: gravity}
-  - {effect: pins, select: left}
-  - {effect: spring, weight: 1.0e+5}
-"""
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +16,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with two reduced runs of a scene."""
     folder = tmp_path_factory.mktemp("runs")
     scene = folder / "small.yaml"
-    scene.write_text(SCENE, encoding="utf-8")
+    scene.write_text(SMALL, encoding="utf-8")
     run(["run", str(scene)])
     for r in ("1", "2"):
         asked = ["--group", "spring", "--r", r, "--run", str(folder / "small.h5")]
@@ -56,7 +48,7 @@ def test_without_a_folder_they_lie_beside_the_first_file(runs, capsys):
 def test_a_full_order_run_alone_is_drawn(runs, tmp_path):
     asked = ["draw", str(runs / "small.h5"), "--as", "frames", "vtk", "--out", str(tmp_path)]
     assert run(asked) == Status.DONE
-    assert len(list(tmp_path.rglob("*.vtu"))) == 7
+    assert len(list(tmp_path.rglob("*.vtu"))) == 13
 
 
 @pytest.mark.parametrize(
@@ -86,7 +78,7 @@ def test_what_cannot_be_drawn_is_one_line(runs, arguments, words, capsys):
 
 def test_two_scenes_of_one_name_are_not_mixed(runs, tmp_path, capsys):
     other = tmp_path / "small.yaml"
-    other.write_text(SCENE.replace("frames: 6", "frames: 5"), encoding="utf-8")
+    other.write_text(SMALL.replace("frames: 12", "frames: 5"), encoding="utf-8")
     run(["run", str(other)])
     for command in ("draw", "view"):
         assert run([command, reduced(runs)[0], str(tmp_path / "small.h5")]) == Status.FAULTY

@@ -6,7 +6,7 @@ import pytest
 from pdrom.model.effects.gravity import Gravity
 from pdrom.model.held_out import FASTER, MOTIONS, TILT, WIDE_MOTIONS
 from pdrom.model.scene import Scene
-from pdrom.pipeline.scenes import load_scene
+from pdrom.pipeline.scenes import read_scene
 from places import ROOT
 
 SCENES = [path.stem for path in sorted((ROOT / "config" / "scenes").glob("*.yaml"))]
@@ -25,7 +25,7 @@ def test_the_motions_of_the_tables_are_three_of_six():
 
 @pytest.mark.parametrize("name", SCENES)
 def test_every_scene_has_six_different_motions_of_its_own_length_and_groups(name):
-    scene = load_scene(ROOT, name)
+    scene = read_scene(ROOT, name)
     variants = [scene, *map(scene.heldout_variant, WIDE_MOTIONS)]
     assert all(a.effects != b.effects for i, a in enumerate(variants) for b in variants[:i])
     assert all((v.frames, v.groups, v.mesh) == (scene.frames, scene.groups, scene.mesh)
@@ -33,7 +33,7 @@ def test_every_scene_has_six_different_motions_of_its_own_length_and_groups(name
 
 
 def test_motions_change_one_thing_or_two():
-    scene = load_scene(ROOT, "bar_twist")
+    scene = read_scene(ROOT, "bar_twist")
     group = set(scene.groups)
     assert changed(scene, "speed") == {"rotate"}
     assert changed(scene, "gravity") == {"gravity"}
@@ -48,7 +48,7 @@ def test_motions_change_one_thing_or_two():
 
 @pytest.mark.parametrize(("name", "motion"), [("spring_oop", "speed"), ("bend_poke", "gravity")])
 def test_a_fast_kick_replaces_a_change_of_what_a_scene_does_not_have(name, motion):
-    scene = load_scene(ROOT, name)
+    scene = read_scene(ROOT, name)
     usual = scene.heldout_variant("kick").effects[-1]
     *same, kick = scene.heldout_variant(motion).effects
     assert tuple(same) == scene.effects
@@ -76,7 +76,7 @@ def test_gravity_that_cannot_be_turned_stays(own, axes):
 @pytest.mark.parametrize("name", ["cloth_all", "starfish_twist"])
 def test_schedules_that_follow_each_other_still_do(name):
     """A scene that held a vertex in two places could not be built."""
-    scene = load_scene(ROOT, name)
+    scene = read_scene(ROOT, name)
     mesh = scene.mesh.build(ROOT)
     for motion in WIDE_MOTIONS:
         Scene.build(scene.heldout_variant(motion), mesh)

@@ -14,7 +14,7 @@ from pdrom.model.compiled import rows
 from pdrom.model.constraints.local_kernel import OWN, LocalKernel, call, local_kernel
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs.full_order import run, trajectory
-from pdrom.pipeline.scenes import Coarsen, load_scene
+from pdrom.pipeline.scenes import Coarsen, load_bound_scene, read_scene
 from pdrom.pipeline.study import Study
 from places import ROOT
 
@@ -139,7 +139,7 @@ def test_contradictions_with_the_mesh_are_named(effects, message):
 
 
 def test_coarsening_scales_every_frame_number():
-    scene = load_scene(ROOT, "cloth_all", Coarsen(resolution=0.5, frames=0.25))
+    scene = read_scene(ROOT, "cloth_all", Coarsen(resolution=0.5, frames=0.25))
     assert (scene.mesh.rows, scene.frames) == (10, 60)
     pins = [e for e in scene.effects if e.effect == "pins"]
     assert [(p.start, p.until) for p in pins] == [(0, 15), (0, 5), (15, 35), (35, None)]
@@ -147,17 +147,17 @@ def test_coarsening_scales_every_frame_number():
 
 
 def test_held_out_run_differs_in_speed_direction_and_seed():
-    scene = load_scene(ROOT, "bar_twist")
+    scene = read_scene(ROOT, "bar_twist")
     held = scene.heldout_variant()
     turn = next(e for e in held.effects if e.effect == "rotate")
     assert (turn.degrees, turn.over) == (-90.0, 125)
     assert held.frames == scene.frames
-    assert load_scene(ROOT, "bar_release").heldout_variant().effects[-1].effect == "kick"
+    assert read_scene(ROOT, "bar_release").heldout_variant().effects[-1].effect == "kick"
 
 
 @pytest.mark.parametrize("name", ["bar_twist", "spring_oop"])
 def test_one_rule_gives_every_scene_a_kick_of_its_own_and_twice_the_stiffness(name):
-    scene = load_scene(ROOT, name)
+    scene = read_scene(ROOT, name)
     *same, kick = scene.heldout_variant("kick").effects
     assert tuple(same) == scene.effects
     assert (kick.effect, kick.speed, kick.seed) == ("kick", 0.5, 2)
@@ -168,7 +168,7 @@ def test_one_rule_gives_every_scene_a_kick_of_its_own_and_twice_the_stiffness(na
 
 def test_every_scene_file_is_valid():
     for path in sorted((ROOT / "config" / "scenes").glob("*.yaml")):
-        assert load_scene(ROOT, path.stem).name == path.stem
+        assert load_bound_scene(ROOT, path.stem).config.name == path.stem
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from test_bundle import git
 from pdrom import __version__
 from pdrom.core.yamlfile import read_yaml
 from pdrom.verification import release
-from pdrom.verification.status import Status
+from pdrom.verification.status import Status, ended
 from places import ROOT
 
 CHANGES = f"# Changes\n\n## Unreleased\n\n## {__version__}\n\n- one\n"
@@ -39,7 +39,7 @@ def test_the_version_has_one_source():
 
 def test_a_clone_that_is_ready_is_bundled(ready, monkeypatch):
     monkeypatch.setattr(release, "bundle", lambda arguments: Status.HOLDS)
-    assert release.main() == Status.HOLDS
+    assert release.release([]) == Status.HOLDS
 
 
 @pytest.mark.parametrize(
@@ -54,7 +54,7 @@ def test_what_speaks_against_a_release_is_named(ready, monkeypatch, capsys, file
     monkeypatch.setattr(release, "bundle", lambda arguments: pytest.fail("it was bundled"))
     (ready / file).write_text(text)
     git(ready, "commit", "-q", "-a", "-m", "second")
-    assert release.main() == Status.FAULTY
+    assert release.release([]) == Status.FAULTY
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"pdrom: release: {file} ")
     assert reason in line
@@ -63,12 +63,12 @@ def test_what_speaks_against_a_release_is_named(ready, monkeypatch, capsys, file
 @pytest.mark.parametrize("file", ["CITATION.cff", "new.txt"])
 def test_what_is_in_no_commit_is_named(ready, capsys, file):
     (ready / file).write_text(f"version: {__version__}\n# edited\n")
-    assert release.main() == Status.FAULTY
+    assert release.release([]) == Status.FAULTY
     assert f"in no commit: {file}; commit or remove" in capsys.readouterr().err
 
 
 def test_a_missing_file_is_one_line(ready, capsys):
     (ready / "CHANGELOG.md").unlink()
-    assert release.main() == Status.FAULTY
+    assert ended(lambda: release.release([])) == Status.FAULTY
     (line,) = capsys.readouterr().err.splitlines()
     assert "CHANGELOG.md" in line

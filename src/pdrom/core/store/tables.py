@@ -18,10 +18,7 @@ FLOAT_FORMAT = "%.10g"
 def write_table(
     table: pd.DataFrame, path: str | os.PathLike[str], with_checksum: bool = True
 ) -> None:
-    """Write a table as CSV to ``path``: fixed float format, an empty cell where there is no value.
-
-    ``with_checksum`` as in `atomic_path`.
-    """
+    """Write a table as CSV to ``path``: fixed float format, an empty cell for no value."""
     with atomic_path(path, with_checksum) as temporary:
         table.to_csv(temporary, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
 

@@ -61,15 +61,7 @@ def hard_cases(
     cases: File,
     kernels: File,
 ) -> None:
-    """Put every reduction through the cases; log what contradicts the expectations.
-
-    Parameters
-    ----------
-    expectations : file of the outcomes that are known
-    every_method : methods by name, with those that the study does not run
-    asked : the cases, and the number of matrices
-    cases, kernels : tables of the runs and of the kernels' accuracy
-    """
+    """Put every reduction through the cases; log what contradicts the expectations."""
     expected = load_expectations(expectations)
     found = []
     for name in asked.cases or reducible_cases():

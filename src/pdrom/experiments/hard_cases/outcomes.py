@@ -29,10 +29,7 @@ def scale_of(training: Training) -> float:
 
 
 def outcome_of(case: HardCase, training: Training, reduced: ReducedRun) -> str:
-    """One of `HOLDS`, `NOTHING`, `FAILURES`: the first that applies to ``reduced`` of ``case``.
-
-    ``training`` is its full-order run.
-    """
+    """One of `HOLDS`, `NOTHING`, `FAILURES`: the first that applies to ``reduced`` of ``case``."""
     run = reduced.run
     if run is None:
         return NOTHING
@@ -72,10 +69,7 @@ def row(
     methods: Mapping[str, MethodSpec],
     expected: Mapping[str, Expectation],
 ) -> dict[str, Any]:
-    """Row of the reduction ``name``: sizes, what the run did, its outcome and, if it failed, why.
-
-    ``training``, ``methods`` and ``expected`` as in `rows`.
-    """
+    """Row of the reduction ``name``: sizes, what the run did, its outcome, why it failed."""
     entry = expected.get(name)
     extent = scale_of(training)
     try:

@@ -149,7 +149,7 @@ class Repeater:
 
 
 def drawn(data: SnapshotSet, seed: int) -> np.ndarray:
-    """As many snapshots (n, e p, 3) as train in ``data``, drawn by ``seed`` from all, in order."""
+    """Snapshots (n, e p, 3), as many as train in ``data``, drawn by ``seed`` from all, in order."""
     frames = np.concatenate([data.frames["train"], data.frames["test"]])
     chosen = np.random.default_rng(seed).choice(len(frames), len(data.train), replace=False)
     chosen = chosen[np.argsort(frames[chosen])]

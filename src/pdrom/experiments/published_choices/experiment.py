@@ -66,15 +66,7 @@ def published_choices(
     published_experiment: str,
     out: File,
 ) -> None:
-    """Simulate, decompose and reconstruct with every variant.
-
-    Parameters
-    ----------
-    mesh, config : of the scene
-    runs : the section: sizes and draws
-    published_experiment : name of the scene in the stored output of the published code
-    out : table
-    """
+    """Simulate, decompose and reconstruct with every variant."""
     labels = out.labels
     scene = scene_of(config, mesh)
     rows = []

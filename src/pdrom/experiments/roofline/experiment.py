@@ -53,13 +53,7 @@ class Options(ConfigModel):
     alone=True,
 )
 def roofline(meshes: list[File], settings: Options, rates: File, work: File) -> None:
-    """Measure the machine, then count.
-
-    Parameters
-    ----------
-    meshes, settings : of all scenes
-    rates, work : tables of the machine and of the phases of an iteration
-    """
+    """Measure the machine, then count."""
     section = settings.roofline
     found = machine.rates(section.largest_mb * 2**20, 1e-3 * section.ms, section.repeats)
     write_table(pd.DataFrame(found, columns=machine.COLUMNS), rates.path)

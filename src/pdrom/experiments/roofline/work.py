@@ -36,8 +36,6 @@ _SWEPT = 9
 def work(scene: Scene, system: GlobalSystem, frames: int) -> Iterator[dict[str, Any]]:
     """Rows of `COLUMNS` but for the factor; operations are means over ``frames`` from the start.
 
-    ``scene`` is run with ``system``.
-
     Groups without a compiled local step have no row, other solvers than the compiled one none.
     """
     state = scene.initial_state()

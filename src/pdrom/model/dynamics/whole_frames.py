@@ -83,7 +83,7 @@ class WholeFrames:
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
     ) -> Blocks | None:
-        """As many of ``frames`` as one call can do, from q and v (N, 3) with step h (s).
+        """Run as many of ``frames`` as one call can do, from q and v (N, 3) with step h (s).
 
         ``track`` asks for the objectives. None where the iterations take two threads or another
         solver.

@@ -43,7 +43,7 @@ def select_vertices(mesh: Mesh, selection: kinds.Selection) -> np.ndarray:
 
 
 def _chosen(mesh: Mesh, selection: kinds.Selection) -> np.ndarray:
-    """As `select_vertices`, but a selection may be empty."""
+    """Vertices by `select_vertices`, but a selection may be empty."""
     if isinstance(selection, str):
         return _side(mesh, selection)
     if isinstance(selection, (tuple, list)):

@@ -15,7 +15,6 @@ from pdrom.reduction.local.alarm import Alarm
 from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.local.watched import WatchedLocalStep
 
-REASONS = ("not finite", "coefficients", "extent", "objective")
 # Rounding errors of the terms that cancel in the energy, relative to them.
 CANCELLATION = 1e-12
 

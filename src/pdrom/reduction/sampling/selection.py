@@ -16,7 +16,7 @@ class Selection(ABC):
 
     @abstractmethod
     def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
-        """As many distinct blocks as modes (all, if there are fewer) for every r of ``ranks``.
+        """Distinct blocks, as many as modes (all, if there are fewer) for every r of ``ranks``.
 
         Parameters
         ----------

@@ -124,7 +124,7 @@ class _Fused:
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
     ) -> Blocks | None:
-        """As many of ``frames`` as one call can do, see `WholeFrames.run`; nothing is tracked.
+        """Run as many of ``frames`` as one call can do, see `WholeFrames.run`; nothing is tracked.
 
         None in a frame that meets a floor, and for some frames after it: it is likely still there.
         """

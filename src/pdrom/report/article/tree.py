@@ -147,8 +147,6 @@ def _equation(node: Node, labels: Labels) -> Node:
 def resolved(tree: Tree, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Tree:
     """Give references their numbers, numbers and claims their links; open paragraphs in bold.
 
-    ``tree`` is a document's.
-
     Parameters
     ----------
     labels : number and page of each

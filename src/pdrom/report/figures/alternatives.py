@@ -19,10 +19,6 @@ from pdrom.report.figures.kit.multiples import (
 from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 
-COLUMNS = [
-    "scene", "vertices", "stiffness", "method", "substeps", "ms_per_frame", "error_implicit",
-    "error_continuous",
-]  # fmt: skip
 LOW, HIGH = 1e-4, 1.0  # errors outside are drawn on the limit
 PAIRS = 2  # cases side by side
 LOOKS = {
@@ -55,7 +51,7 @@ LOOKS = {
 )
 def alternatives(results: Results, options: Scenes) -> Figure:
     """Draw a pair of panels for each scene, mesh and stiffness."""
-    table = results.asked_rows("alternatives", COLUMNS, options)
+    table = results.asked_rows("alternatives", options)
     cases = list(table.groupby(["scene", "vertices", "stiffness"]))
     if not cases:
         raise NothingToDraw("no alternatives")

@@ -6,7 +6,7 @@ from pdrom.report.figures.kit.artists import Figure
 from pdrom.report.figures.kit.declaration import figure
 from pdrom.report.figures.kit.experiment_rows import RUNS, draw_experiments, experiment_rows
 from pdrom.report.figures.kit.floor import Floors
-from pdrom.report.figures.kit.noise_rows import COLUMNS, noise_rows
+from pdrom.report.figures.kit.noise_rows import noise_rows
 from pdrom.report.figures.kit.options import ReducedRuns
 from pdrom.report.figures.kit.results import Results
 from pdrom.report.figures.kit.run_rows import NOTHING_RAN, Row
@@ -28,7 +28,7 @@ from pdrom.report.figures.kit.run_rows import NOTHING_RAN, Row
 )
 def bending_runs(results: Results, options: ReducedRuns) -> Figure:
     """Draw reduced runs; where all projections are round-off, runs on bases of it, if any."""
-    noise = results.table("noise", COLUMNS)
+    noise = results.table("noise")
 
     def rows_of(
         results: Results, options: ReducedRuns, floors: Floors, scene: str, group: str

@@ -10,8 +10,6 @@ from pdrom.report.figures.kit.multiples import label_outer, small_multiples
 from pdrom.report.figures.kit.options import Columns, Experiments, Methods
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 
-COLUMNS = ["scene", "group", "method", "factor", "threads", "r", "ratio"]
-
 
 class Options(Experiments, Methods, Columns):
     """Choices."""
@@ -30,7 +28,7 @@ class Options(Experiments, Methods, Columns):
 )
 def break_even(results: Results, options: Options) -> Figure:
     """Draw a panel per constraint group, a line per scene and method; above 1 it costs more."""
-    table = results.held_rows(results.table("breakeven", COLUMNS), options)
+    table = results.held_rows(results.table("breakeven"), options)
     table = table[(table.factor == 1.0) & (table.threads == 1)]
     if table.empty:
         raise NothingToDraw("no reduced local step was timed")

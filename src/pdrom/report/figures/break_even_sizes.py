@@ -11,7 +11,6 @@ from pdrom.report.figures.kit.options import Columns, Methods, Scenes
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 from pdrom.tables.break_even import CURVE
 
-COLUMNS = [*CURVE, "vertices", "r", "ratio", "breakeven_r"]
 LINES = {1: "-", 2: "--"}
 PAYS, COSTS = "^", "v"
 
@@ -34,7 +33,7 @@ class Options(Scenes, Methods, Columns):
 )
 def break_even_sizes(results: Results, options: Options) -> Figure:
     """Draw a panel per scene, a line per method and number of threads over the meshes."""
-    points = _sizes(results.table("breakeven", COLUMNS))
+    points = _sizes(results.table("breakeven"))
     asked = options.scenes or tuple(dict.fromkeys(points.scene))
     scenes = [scene for scene in asked if (points.scene == scene).any()]
     if not scenes:

@@ -14,10 +14,6 @@ from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import Results
 from pdrom.tables.accuracy_cost import CONVERGED, FEWER, OWN
 
-COLUMNS = [
-    "scene", "budget_ms", "reference", "method", "position_basis", "k", "r", "iterations",
-    "relative_error_within_horizon",
-]  # fmt: skip
 LOW, HIGH = 1e-5, 3.0  # errors outside are drawn on the limit
 FULL = "full order fits"
 _FOM = {"color": style.FAILED, "marker": "d", "markerfacecolor": "white", "linestyle": "none"}
@@ -42,7 +38,7 @@ def budget(results: Results, options: Scenes) -> Figure:
     full-order run with the best K that fits, against the converged one. Where the scene's own run
     fits the budget, no reduction is needed, and the row says so.
     """
-    table = results.table("budget", COLUMNS)
+    table = results.table("budget")
     scenes = results.scenes_of(table, options, "no point of accuracy against time")
     table = table[table.scene.isin(scenes)].copy()
     named = table.method.notna()

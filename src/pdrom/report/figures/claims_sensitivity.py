@@ -9,7 +9,6 @@ from pdrom.report.figures.kit.options import Options
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 from pdrom.tables.claims.sensitivity import VARIED
 
-COLUMNS = ["claim", "part", "varied", "variation", "verdict_of_rules", "same"]
 PANELS = {"published": "as published", "beyond": "beyond"}
 
 
@@ -30,7 +29,7 @@ PANELS = {"published": "as published", "beyond": "beyond"}
 )
 def claims_sensitivity(results: Results, options: Options) -> Figure:
     """Draw two panels of cells."""
-    table = results.table("claims_sensitivity", COLUMNS)
+    table = results.table("claims_sensitivity")
     if table.empty:
         raise NothingToDraw("no verdict")
     claims = list(dict.fromkeys(table.claim))

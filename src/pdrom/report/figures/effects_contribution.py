@@ -12,7 +12,6 @@ from pdrom.report.figures.kit.declaration import figure
 from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import Results
 
-TABLE = ["scene", "effect", "role", "moved", "sensitivity_floor", "above_floor"]
 FRAMES = ["effect", "frame", "force"]
 SHOWN = 3  # scenes whose forces are drawn
 LOW, HIGH = 1e-12, 1e2
@@ -37,7 +36,7 @@ Looks = dict[str, tuple[str, str]]
 )
 def effects_contribution(results: Results, options: Scenes) -> Figure:
     """Draw the forces of the first scenes over time, and beside them every scene and effect."""
-    table = results.table("effects_contribution", TABLE)
+    table = results.table("effects_contribution")
     scenes = results.scenes_of(table, options, "no contributions of effects")
     rows = table[table.scene.isin(scenes)]
     drawn = sorted(scenes, key=lambda scene: -len(results.holdings.scenes[scene].groups))[:SHOWN]

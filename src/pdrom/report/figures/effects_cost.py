@@ -10,8 +10,6 @@ from pdrom.report.figures.kit.declaration import figure
 from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import Results
 
-COSTS = ["scene", "effect", "ms_per_frame", "share"]
-LEFT_OUT = ["scene", "left_out", "groups", "ms_per_frame", "own_ms"]
 OTHERS = "forces, holds, contacts"
 COLOURS = {OTHERS: style.VERMILLION, RIGHT: style.SKY, GLOBAL: "#3A5A78", REST: "#C9C4BA"}
 
@@ -33,8 +31,8 @@ def effects_cost(results: Results, options: Scenes) -> Figure:
     On the right a tick marks the time of the whole scene less what the missing effects cost in it.
     A bar that ends there pays nothing for what it does not list.
     """
-    costs = results.table("effects_cost", COSTS)
-    removed = results.table("effects_left_out", LEFT_OUT)
+    costs = results.table("effects_cost")
+    removed = results.table("effects_left_out")
     scenes = results.scenes_of(costs, options, "no timings of effects")
     several = [scene for scene in scenes if (removed.scene == scene).any()]
     rows = removed[removed.scene == several[0]] if several else removed[:0]

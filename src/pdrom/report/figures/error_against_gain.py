@@ -15,8 +15,6 @@ from pdrom.tables.gain_prediction import EVERY, FAILED, judged_runs
 ERRORS, GAINS = (1e-5, 1e2), (1.0, 1e5)  # limits; what lies outside is drawn on the rim
 ENDS = ("low", "median", "high")
 _KEYS = ["scene", "group", "method", "r"]
-RANGES = [*_KEYS, "varied", *(f"{q}_{e}" for q in ("error", "gain") for e in ENDS)]
-DECADES = ["predictor", "lower", "upper", "runs", "failed_share", "threshold"]
 
 
 class Options(Experiments, Methods):
@@ -47,14 +45,14 @@ def error_against_gain(results: Results, options: Options) -> Figure:
     Runs that ended before their horizon lie on the upper rim, singular interpolations on the right
     one. Shown are the runs that the table gain_prediction counts.
     """
-    prediction = results.table("gain_prediction", DECADES)
+    prediction = results.table("gain_prediction")
     runs = judged_runs(results.table("reduced_reruns"), results.table("reconstruction_error"))
     runs = results.held_rows(runs, options)
     if runs.empty:
         raise NothingToDraw("no run with a gain")
     figure = style.new_figure(3.0)
     left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
-    ranges = _ranges(results.table("repetitions", RANGES), runs)
+    ranges = _ranges(results.table("repetitions"), runs)
     methods = [m for m in results.holdings.methods if (runs.method == m).any()]
     styles = style.method_styles(methods)
     for method in methods:

@@ -19,7 +19,6 @@ from pdrom.report.figures.kit.options import Columns, Scenes
 from pdrom.report.figures.kit.results import Results
 
 ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
-COLUMNS = ["scene", "method", "iterations", ERROR, TIME]
 LOW, HIGH = 1e-5, 1e1
 RUNS = {
     FOM: ("plain iterations", style.BLACK, "o"),
@@ -44,7 +43,7 @@ class Options(Scenes, Columns):
 )
 def iterations(results: Results, options: Options) -> Figure:
     """Draw a panel per scene: error to the converged run over the time of a frame, a dot per K."""
-    table = results.table("accuracy_cost", COLUMNS).dropna(subset=[ERROR, TIME])
+    table = results.table("accuracy_cost").dropna(subset=[ERROR, TIME])
     table = table[table.method.isin(list(RUNS))]
     scenes = results.scenes_of(table, options, "no full-order run with both an error and a time")
     figure, axes = small_multiples(len(scenes), options.columns, height=1.6)

@@ -12,10 +12,6 @@ from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 from pdrom.report.words.text import plain_words
 
-COLUMNS = [
-    "scene", "direction", "rung", "gain", "relative_error_within_horizon", "error_low",
-    "error_high", "gain_low", "gain_high",
-]  # fmt: skip
 ERRORS, GAINS = (1e-4, 1e2), (1.0, 1e5)  # limits; what lies outside is drawn on the rim
 
 
@@ -40,7 +36,7 @@ def ladder(results: Results, options: Scenes) -> Figure:
     published method. Runs that blew up before their horizon, and singular interpolations, lie on
     the right rim.
     """
-    table = results.asked_rows("ladder", COLUMNS, options)
+    table = results.asked_rows("ladder", options)
     table = table[table.gain.notna() & (table.direction != "square")]
     if table.empty:
         raise NothingToDraw("no scene that climbs the ladder")

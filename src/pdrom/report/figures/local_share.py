@@ -16,7 +16,6 @@ PHASES = {
     "assembly_ms": ("local step: right-hand side", "#F7D08A"),
     "global_ms": ("global solve", style.BLUE),
 }
-COLUMNS = ["scene", "implementation", *PHASES, "local_share"]
 ORDER = ("interpreted", "numpy", "compiled")
 TITLES = {"interpreted": "interpreted loop", "numpy": "vectorised NumPy", "compiled": "compiled"}
 CLAIM = 70.0  # per cent, claim C1
@@ -37,7 +36,7 @@ CLAIM = 70.0  # per cent, claim C1
 )
 def local_share(results: Results, options: Scenes) -> Figure:
     """Draw a panel per implementation, a bar per scene with the time per frame at its end."""
-    table = results.table("local_share", COLUMNS)
+    table = results.table("local_share")
     scenes = results.scenes_of(table, options, "no timings")
     present = set(table[table.scene.isin(scenes)].implementation)
     implementations = [i for i in (*ORDER, *sorted(present - set(ORDER))) if i in present]

@@ -9,8 +9,6 @@ from pdrom.report.figures.kit.noise_rows import NOISY, WRONG
 from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 
-COLUMNS = ["scene", "group", "noisy_axes", "method", "r", "rank", "relative_error"]
-
 
 @figure(
     title="Reductions on bases of round-off",
@@ -28,7 +26,7 @@ COLUMNS = ["scene", "group", "noisy_axes", "method", "r", "rank", "relative_erro
 )
 def noise_runs(results: Results, options: Scenes) -> Figure:
     """Draw a table of cells."""
-    table = results.asked_rows("noise", COLUMNS, options)
+    table = results.asked_rows("noise", options)
     table = table[table.r <= table["rank"]]
     if table.empty:
         raise NothingToDraw("no basis of round-off")

@@ -10,8 +10,6 @@ from pdrom.report.figures.kit.multiples import label_outer, log_axis, small_mult
 from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 
-COLUMNS = ["scene", "group", "direction", "choice", "axis", "r", "error", "reference"]
-DISTANCES = ["scene", "group", "direction", "choice", "distance"]
 LOW, HIGH = 1e-2, 1e4  # limits of the axis
 PANELS = 3  # in a row
 
@@ -32,8 +30,8 @@ PANELS = 3  # in a row
 )
 def published_choices(results: Results, options: Scenes) -> Figure:
     """Draw a panel for each case, with the first and the last of its choices that add up."""
-    table = results.asked_rows("published_choices", COLUMNS, options)
-    distances = results.table("published_distance", DISTANCES)
+    table = results.asked_rows("published_choices", options)
+    distances = results.table("published_distance")
     table = table[table.axis == "x"]
     if table.empty:
         raise NothingToDraw("no scene that the published code's output is stored of")

@@ -13,8 +13,6 @@ from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 from pdrom.tables.roofline import WHOLE
 
-RATES = ["quantity", "working_set", "level", "rate", "low", "high"]
-PHASES = ["scene", "phase", "working_set", "bound_us", "measured_us", "limit"]
 OTHERS = {RIGHT: (style.GREY, "x"), GLOBAL: ("#3A5A78", "*")}
 SHARES = (1.0, 0.5, 0.2, 0.1)
 
@@ -36,8 +34,8 @@ SHARES = (1.0, 0.5, 0.2, 0.1)
 )
 def roofline(results: Results, options: Scenes) -> Figure:
     """Draw the bandwidth, and beside it measured times over bounds."""
-    rates = results.table("machine_rates", RATES)
-    phases = results.table("roofline", PHASES)
+    rates = results.table("machine_rates")
+    phases = results.table("roofline")
     phases = phases[phases.scene.isin(results.scenes(options))]
     timed = phases[(phases.phase != WHOLE) & (phases.measured_us > 0.0)]
     if timed.empty or rates.empty:

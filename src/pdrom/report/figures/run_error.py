@@ -73,7 +73,7 @@ def run_error(results: Results, options: Options) -> Figure:
 
 def _bands(results: Results, pairs: list[Pair]) -> dict[Pair, pd.DataFrame]:
     """Ranges over other training frames by method, size and frame, where runs were repeated."""
-    table = results.table("repetitions", ["scene", "group", "varied"])
+    table = results.table("repetitions")
     table = table[table.varied == TRAINED]
     repeated = set(zip(table.scene, table.group, strict=True))
     bands = {}

@@ -11,9 +11,6 @@ from pdrom.report.figures.kit.multiples import plain_ticks
 from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 
-COLUMNS = [
-    "scene", "method", "threads", "vertices", "ms_per_iteration", "local_ms", "global_ms",
-]  # fmt: skip
 PHASES = {
     "ms_per_iteration": ("whole iteration", "-"),
     "local_ms": ("local step", "--"),
@@ -42,7 +39,7 @@ MARKERS = {"fom": "o", TWO: "s", "ecsw": ">"}
 )
 def scaling(results: Results, options: Scenes) -> Figure:
     """Draw a panel per scene: the time of an iteration, by phase."""
-    table = _two_threads_apart(results.table("scaling", COLUMNS))
+    table = _two_threads_apart(results.table("scaling"))
     fits = _two_threads_apart(results.table("scaling_fit"))
     asked = options.scenes or tuple(dict.fromkeys(table.scene))
     scenes = [scene for scene in asked if (table.scene == scene).any()]

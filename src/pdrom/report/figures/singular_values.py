@@ -11,7 +11,6 @@ from pdrom.report.figures.kit.multiples import label_outer, log_axis, small_mult
 from pdrom.report.figures.kit.options import Beside, Columns, Experiments
 from pdrom.report.figures.kit.results import NothingToDraw, Results, asked
 
-COLUMNS = ["scene", "group", "component", "relative", "above_roundoff"]
 LOW, HIGH = 1e-17, 3.0
 PUBLISHED = "#B5B5B5"
 REGION = "#F1EFEB"
@@ -38,7 +37,7 @@ def singular_values(results: Results, options: Options) -> Figure:
 
     Values that are pure round-off are hollow, and the region below the round-off is shaded.
     """
-    table = results.table("singular_values", COLUMNS)
+    table = results.table("singular_values")
     pairs = [
         (scene, group, rows.sort_values("component"))
         for scene, group in results.experiments(options)

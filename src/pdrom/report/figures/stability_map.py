@@ -12,9 +12,6 @@ from pdrom.report.figures.kit.options import Experiments, Methods, Ranks
 from pdrom.report.figures.kit.outcomes import Block, draw_cells, legend
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 
-COLUMNS = [
-    "scene", "group", "method", "position_basis", "k", "r", "experiment", "outcome", "blowup_frame",
-]  # fmt: skip
 CELLS = 48  # of one strip; more blocks make another strip
 ROW = 0.145  # inches
 
@@ -41,7 +38,7 @@ def stability_map(results: Results, options: Options) -> Figure:
     Runs with unreduced positions come first, then those in position subspaces. Experiments in which
     nothing ran, because their projections are round-off, are left out.
     """
-    table = results.asked_rows("stability", COLUMNS, options)
+    table = results.asked_rows("stability", options)
     table = table[(table.experiment == "rerun") & (table.group.notna())]
     strips = _local_strips(table, results, options) + _subspace_strips(table)
     if not strips:

@@ -14,10 +14,6 @@ from pdrom.report.figures.kit.options import Methods, Scenes
 from pdrom.report.figures.kit.outcomes import Block, draw_cells, legend
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 
-COLUMNS = [
-    "scene", "group", "method", "position_basis", "k", "r", "experiment", "outcome", "blowup_frame",
-    "h", "stiffness_ratio",
-]  # fmt: skip
 ROW = 0.15  # inches
 
 
@@ -57,7 +53,7 @@ def stability_sweep(results: Results, options: Options) -> Figure:
 
     Bases and samplings are those of the scene's own setting, which is marked by an arrow head.
     """
-    table = results.asked_rows("stability", COLUMNS, options)
+    table = results.asked_rows("stability", options)
     table = table[table.experiment == "sweep"]
     if table.empty:
         raise NothingToDraw("no run over time step and stiffness")

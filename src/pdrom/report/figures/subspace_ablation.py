@@ -12,10 +12,6 @@ from pdrom.report.figures.kit.options import Scenes
 from pdrom.report.figures.kit.results import NothingToDraw, Results
 from pdrom.report.words.text import plain_words
 
-COLUMNS = [
-    "scene", "k", "r", "variant", "gain", "relative_error_within_horizon",
-    "relative_error_full_projections",
-]  # fmt: skip
 RATIOS = (0.5, 300.0)  # of errors; outside, and where a run blew up, points lie on the rim
 GAINS = (1.0, 40.0)
 
@@ -37,7 +33,7 @@ def subspace_ablation(results: Results, options: Scenes) -> Figure:
     The error is divided by that of the full projections in the same subspace. Rows with a plus in
     their name combine several changes and stand below the line.
     """
-    table = results.asked_rows("subspace_ablation", COLUMNS, options)
+    table = results.asked_rows("subspace_ablation", options)
     if table.empty:
         raise NothingToDraw("no scene of the ablation")
     # one size of the position basis is one picture

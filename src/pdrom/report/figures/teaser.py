@@ -20,7 +20,6 @@ from pdrom.report.figures.kit.read import positions_at
 from pdrom.report.figures.kit.results import NothingToDraw, Results, asked
 from pdrom.report.figures.kit.run_rows import Row, draw_rows
 
-COLUMNS = ["scene", "group", "method", "position_basis", "k", "r", "relative_error_within_horizon"]
 TOLERANCE = "ecsw-1e-02"
 
 
@@ -48,7 +47,7 @@ def teaser(results: Results, options: Options) -> Figure:
     experiments, floors = results.experiments(options), Floors(results)
     if not experiments or not results.methods(options):
         raise NothingToDraw(asked(options))
-    errors = results.table("reduced_reruns", COLUMNS)
+    errors = results.table("reduced_reruns")
     rows = [
         _merged(results, options, experiment_rows(results, options, floors, *each), errors, each)
         for each in experiments

@@ -52,10 +52,7 @@ def sentences(source: str) -> list[Sentence]:
 
 
 def decisions(source: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
-    """Decide for every block of ``source``: shown, noted (left out with a note) or dropped.
-
-    ``tables`` by name tell what is held.
-    """
+    """Decide for every block of ``source``: shown, noted (left out with a note) or dropped."""
     made, noted = [], set()
     for sentence in sentences(source):
         if all(is_held(key, tables) for key in keys_of(sentence.text)):

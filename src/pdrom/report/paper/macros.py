@@ -149,7 +149,7 @@ def _filter(entry: str) -> Filter:
 
 
 def matching(rows: pd.DataFrame, filters: Sequence[Filter]) -> pd.DataFrame:
-    """Those ``rows`` whose cells agree with every filter."""
+    """Rows of ``rows`` whose cells agree with every filter."""
     for field, sign, value in filters:
         matches = rows[field].map(lambda cell, value=value: _same(cell, value))
         rows = rows[matches.astype(bool) != (sign == "!=")]

@@ -12,10 +12,7 @@ def tabular(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) 
 
 
 def longtable(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
-    r"""Table that may break across pages, below ``\captionrow``, which the text defines.
-
-    ``header``, ``rows`` and ``columns`` as in `tabular`.
-    """
+    r"""Table that may break across pages, below ``\captionrow``, which the text defines."""
     head = _head(header)
     lines = [rf"\begin{{longtable}}{{{columns}}}", r"\captionrow", *head, r"\endfirsthead"]
     lines += [*head, r"\endhead", *map(_line, rows)]

@@ -18,8 +18,6 @@ def write_page(
 ) -> None:
     """Write the viewer of some ``scenes`` to ``path``.
 
-    ``with_checksum`` as in `pdrom.core.store.atomic_path`.
-
     Raises
     ------
     StorageError

@@ -53,8 +53,5 @@ def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
     timed_cells=_timed_cells,
 )
 def claims(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim, in the order of the file ``rules``; see `load_claims` and `claims_rows`.
-
-    ``added`` values join the conditions of the rules, ``tables`` are those that they read.
-    """
+    """One row per claim, in the order of the file ``rules``; see `claims_rows`."""
     return claims_rows(load_claims(rules, added), tables)

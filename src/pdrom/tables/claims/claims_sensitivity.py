@@ -49,8 +49,5 @@ def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
 def claims_sensitivity(
     rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame
 ) -> pd.DataFrame:
-    """One row per claim of the file ``rules``, part and variation; see `claims`.
-
-    ``added`` values join the conditions of the rules, ``tables`` are those that they read.
-    """
+    """One row per claim of the file ``rules``, part and variation; see `claims`."""
     return sensitivity_rows(load_claims(rules, added), tables)

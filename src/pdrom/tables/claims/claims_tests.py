@@ -54,8 +54,5 @@ def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
     timed_cells=_timed_cells,
 )
 def claims_tests(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim, part and test, in the order of the file ``rules``; see `claims`.
-
-    ``added`` values join the conditions of the rules, ``tables`` are those that they read.
-    """
+    """One row per claim, part and test, in the order of the file ``rules``; see `claims`."""
     return outcome_rows(load_claims(rules, added), tables)

@@ -34,13 +34,7 @@ MEASURED = [f"{name}{suffix}" for suffix in PARTS.values() for name in ("verdict
     },
 )
 def replication(claims: pd.DataFrame, rules: Path, recorded: Path) -> pd.DataFrame:
-    """One row per claim and part that the study decides and the record holds.
-
-    Parameters
-    ----------
-    claims, rules : the table claims, and the file of its rules
-    recorded : file that `pdrom.pipeline.tracked` writes
-    """
+    """One row per claim and part that the study decides and the record holds."""
     loaded = load_claims(rules)
     both = claims.merge(pd.read_csv(recorded), on="claim", suffixes=("", "_recorded"))
     rows = []

@@ -24,8 +24,6 @@ _Keep = Callable[[pd.DataFrame], pd.Series]
 def sensitivity_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
     """A row for every claim, part and variation of its deciding tests that can be made.
 
-    ``rules`` are by claim, ``tables`` by name.
-
     A variation that leaves a test without rows, or no test another, is none.
     """
     rows = []

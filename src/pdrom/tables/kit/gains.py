@@ -11,8 +11,6 @@ _TRAINING = ["gain", "elements_sampled", "relative_error"]
 def reruns_with_gain(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFrame:
     """Runs of ``reruns`` in which only projections are reduced, with three sorts of columns.
 
-    ``reruns`` is the table reduced_reruns, ``reconstruction`` the table reconstruction_error.
-
     gain, elements_sampled, reconstruction_error : of the reduction, on the training snapshots
     elements : all elements of the group
     error : of the run within the horizon; inf if it ended before, nan where there was no run

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from pdrom.core.errors import ConfigurationError, PdromError
-from pdrom.core.logs import INTERRUPTED
+from pdrom.core.errors import ConfigurationError
 from pdrom.core.store import require_place, write_text
 from pdrom.verification.lines import Outcome
+from pdrom.verification.status import ended
 from pdrom.verification.studies.findings import Findings
 from pdrom.verification.studies.page import page, verdict
 from pdrom.verification.studies.sides import Side, place_of
@@ -75,17 +75,5 @@ def _require_apart(places: Sequence[Path], page: Path) -> None:
     require_place(page)
 
 
-def main() -> int:
-    """The exit code; faulty input ends with one line."""
-    try:
-        return compare(sys.argv[1:])
-    except (PdromError, OSError) as error:
-        sys.stderr.write(f"pdrom: {error}\n")
-        return FAULTY
-    except KeyboardInterrupt:
-        sys.stderr.write("pdrom: interrupted\n")
-        return INTERRUPTED
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(ended(lambda: compare(sys.argv[1:]), FAULTY))

@@ -30,10 +30,7 @@ class Ratio:
 
 
 def ratios(comparisons: Mapping[str, Comparison]) -> list[Ratio]:
-    """Ratios of every column of times that both have, that of all together first.
-
-    ``comparisons`` of the two studies' tables are by name.
-    """
+    """Ratios of every column of times that both have, that of all together first."""
     found = {
         (name, column.name): _quotients(comparison, column.name)
         for name, comparison in comparisons.items()

@@ -14,7 +14,7 @@ from pdrom.model.effects import EFFECTS
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.fingerprint import closure
-from pdrom.pipeline.scenes import load_scene
+from pdrom.pipeline.scenes import read_scene
 from places import ROOT
 
 FRAMES = 12
@@ -132,7 +132,7 @@ def check_group(effect):
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_scene_depends_on_the_code_of_its_own_effects_only(scene):
     """Fingerprints of its jobs cover these modules; an edit of another effect reruns nothing."""
-    config = load_scene(ROOT, scene)
+    config = read_scene(ROOT, scene)
     covered = set(closure("pdrom.experiments.fom", *config.modules))
     listed = {EFFECTS.module(effect.effect) for effect in config.effects}
     needed = set(closure(*listed))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from builders import GROUPS, make_scene
 from pdrom.model.dynamics.stepper import FrameReport, State
@@ -292,3 +293,16 @@ def test_without_a_guard_a_rerun_is_as_before(spring):
     plain = rerun(spring.scene, spring.scene.system, [step], spring.reference, 50.0)
     again, _ = spring.run(reduction, action="none")
     np.testing.assert_array_equal(plain.positions, again.positions)
+
+
+def test_who_watched_and_saw_nothing_is_told_from_nobody():
+    counts = ("guard_count", "fallback_frames")
+    assert [GuardRecord().columns()[name] for name in counts] == [0, 0]
+    assert [GuardRecord.unwatched().columns()[name] for name in counts] == [None, None]
+
+
+@pytest.mark.parametrize("key", ["threshold", "margin", "extent", "rise"])
+@pytest.mark.parametrize("value", [-1.0, np.inf, np.nan])
+def test_limits_are_finite_and_not_negative(key, value):
+    with pytest.raises(ValidationError, match=key):
+        GuardSettings(**{key: value})

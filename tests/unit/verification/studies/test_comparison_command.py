@@ -9,15 +9,15 @@ import tarfile
 import pytest
 
 from pdrom.verification.bundle import Member, write_archive
-from pdrom.verification.studies import __main__ as command
+from pdrom.verification.status import ended
+from pdrom.verification.studies.__main__ import FAULTY, compare
 
 INSIDE = "published/results"
 
 
-def run(monkeypatch, capsys, *arguments):
+def run(capsys, *arguments):
     """Exit code and what was said."""
-    monkeypatch.setattr("sys.argv", ["compare", *map(str, arguments)])
-    status = command.main()
+    status = ended(lambda: compare([*map(str, arguments)]), FAULTY)
     said = capsys.readouterr()
     return status, said.out + said.err
 
@@ -41,32 +41,32 @@ def archive(folder, target):
     return target
 
 
-def test_equal_studies_agree_and_are_left_alone(study, tmp_path, monkeypatch, capsys):
+def test_equal_studies_agree_and_are_left_alone(study, tmp_path, capsys):
     a, b, page = study("a"), study("b"), tmp_path / "page.html"
     before = state(a), state(b)
-    status, said = run(monkeypatch, capsys, a, b, "--page", page)
+    status, said = run(capsys, a, b, "--page", page)
     assert (status, said) == (0, f"Nothing differs beyond tolerance.\npage: {page}\n")
     first = page.read_bytes()
-    assert run(monkeypatch, capsys, a, b, "--page", page)[0] == 0
+    assert run(capsys, a, b, "--page", page)[0] == 0
     assert page.read_bytes() == first
     assert (state(a), state(b)) == before
 
 
-def test_a_difference_is_named_and_has_its_code(study, frames, tmp_path, monkeypatch, capsys):
+def test_a_difference_is_named_and_has_its_code(study, frames, tmp_path, capsys):
     runs = frames["reduced_reruns"]
     other = runs.assign(relative_error_within_horizon=2 * runs.relative_error_within_horizon)
     a, b = study("a"), study("b", {"reduced_reruns": other})
-    status, said = run(monkeypatch, capsys, a, b, "--page", tmp_path / "page.html")
+    status, said = run(capsys, a, b, "--page", tmp_path / "page.html")
     assert status == 1
     assert "table reduced_reruns: differs, scene " in said
     assert "table singular_values" not in said
 
 
-def test_an_archive_is_as_good_as_its_folder(study, tmp_path, monkeypatch, capsys):
+def test_an_archive_is_as_good_as_its_folder(study, tmp_path, capsys):
     a = study("a")
     packed = archive(study("b"), tmp_path / "b.tar.gz")
     before = packed.read_bytes(), packed.stat().st_mtime_ns
-    status, said = run(monkeypatch, capsys, a, packed, "--page", tmp_path / "page.html")
+    status, said = run(capsys, a, packed, "--page", tmp_path / "page.html")
     assert status == 0, said
     assert (packed.read_bytes(), packed.stat().st_mtime_ns) == before
 
@@ -141,13 +141,13 @@ def lost_from_the_archive(folder, tmp_path):
     [cut, with_junk, foreign, other_manifest, edited, lost, damaged_record, no_tables, no_archive,
      unknown, lost_from_the_archive],
 )  # fmt: skip
-def test_bad_input_ends_in_one_line(fault, study, tmp_path, monkeypatch, capsys):
+def test_bad_input_ends_in_one_line(fault, study, tmp_path, capsys):
     a = study("a")
     b, message = fault(study("b"), tmp_path)
     before = state(tmp_path)
     page = tmp_path / "page.html"
     for pair in ((a, b), (b, a)):
-        status, said = run(monkeypatch, capsys, *pair, "--page", page)
+        status, said = run(capsys, *pair, "--page", page)
         assert status == 2
         assert message in said
         assert said.startswith("pdrom: ")
@@ -172,19 +172,19 @@ def member(name, kind=tarfile.REGTYPE, link=""):
     ],
     ids=["up", "absolute", "symbolic link", "hard link", "device"],
 )
-def test_an_archive_that_leads_out_of_it_is_refused(entry, study, tmp_path, monkeypatch, capsys):
+def test_an_archive_that_leads_out_of_it_is_refused(entry, study, tmp_path, capsys):
     packed = tmp_path / "b.tar.gz"
     with tarfile.open(packed, "w:gz") as members:
         members.addfile(entry, io.BytesIO())
     a = study("a")
     before = state(tmp_path)
-    status, said = run(monkeypatch, capsys, a, packed, "--page", tmp_path / "page.html")
+    status, said = run(capsys, a, packed, "--page", tmp_path / "page.html")
     assert status == 2
     assert f"b.tar.gz: '{entry.name}': a member that is no plain file inside it" in said
     assert state(tmp_path) == before
 
 
-def test_the_same_study_and_a_page_in_a_study_are_refused(study, tmp_path, monkeypatch, capsys):
+def test_the_same_study_and_a_page_in_a_study_are_refused(study, tmp_path, capsys):
     a, b = study("a"), study("b")
     (tmp_path / "link").symlink_to(a)
     before = state(tmp_path)
@@ -194,7 +194,7 @@ def test_the_same_study_and_a_page_in_a_study_are_refused(study, tmp_path, monke
         ((a, b, "--page", tmp_path / "tables.csv"), "has to end in .html"),
         ((a, b, "--page", a / "machine.json" / "page.html"), "of which nothing is changed"),
     ):
-        status, said = run(monkeypatch, capsys, *arguments)
+        status, said = run(capsys, *arguments)
         assert (status, said.count("\n")) == (2, 1)
         assert message in said
     assert state(tmp_path) == before

@@ -13,10 +13,7 @@ Cell = tuple[int, int]
 def draw_counts(
     ax: Axes, rows: Sequence[str], columns: Sequence[str], cells: Mapping[tuple[int, int], Cell]
 ) -> None:
-    """Draw on ``ax`` cells by (row, column): (a, b) with a of b; the more of them the darker.
-
-    ``rows`` and ``columns`` are their names.
-    """
+    """Draw on ``ax`` cells by (row, column): (a, b) with a of b; the more of them the darker."""
     from matplotlib.colors import LinearSegmentedColormap
 
     colours = LinearSegmentedColormap.from_list("counts", ["#FFFFFF", style.VERMILLION])

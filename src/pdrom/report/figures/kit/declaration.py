@@ -53,7 +53,7 @@ class Declaration(Artifact):
 
     The function gets the ``results`` of the study and its own ``options``. It raises
     `NothingToDraw` where the configuration holds nothing of what the figure shows, StorageError
-    for a file that is missing or damaged or a table that lacks a column.
+    for a file that is missing or damaged.
 
     title, caption : in light mark-up (`pdrom.report.words.markup`); ``{key}`` stands for a setting
         of the configuration that the figure reads
@@ -103,10 +103,7 @@ def figure(
     options: type[OptionsT],
     number: int | None = None,
 ) -> Callable[[Callable[[Results, OptionsT], Figure]], Declaration]:
-    """Declare the function below as a figure.
-
-    ``title``, ``caption``, ``reads``, ``options`` and ``number`` are those of `Declaration`.
-    """
+    """Declare the function below as a figure."""
 
     def declare(function: Callable[[Results, OptionsT], Figure]) -> Declaration:
         name = function.__name__

@@ -23,11 +23,7 @@ RowsOf = Callable[[Results, ReducedRuns, Floors, str, str], list[Row]]
 def experiment_rows(
     results: Results, options: ReducedRuns, floors: Floors, scene: str, group: str
 ) -> list[Row]:
-    """A row per method; a single one that says so where no method has anything to reduce.
-
-    ``results`` and ``options`` are the figure's, ``floors`` those of `Floors`; the experiment is a
-    ``group`` of a ``scene``.
-    """
+    """A row per method; a single one that says so where no method has anything to reduce."""
     camera = options.camera
     colour = style.surface_colour(style.group_looks(results.holdings)[group][0])
     frames, full = positions_at(results.path(FULL_ORDER, scene), options.frames[-1:])

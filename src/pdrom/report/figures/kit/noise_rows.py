@@ -15,7 +15,6 @@ from pdrom.report.figures.kit.read import positions_at, rerun_infos
 from pdrom.report.figures.kit.results import Results
 from pdrom.report.figures.kit.run_rows import Row, run_panel
 
-COLUMNS = ["scene", "group", "noisy_axes", "method", "r", "rank", "relative_error"]
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}
 WRONG = 0.1  # of the motion: a run whose error is larger has failed, as one that does not start
 

@@ -72,10 +72,7 @@ def mesh_surface(mesh: Mesh) -> Surface:
 def shared_window(
     camera: Camera, reference: np.ndarray, panels: list[RunPanel], margin: float = 0.1
 ) -> Window:
-    """Window by ``camera`` of ``reference`` (N, 3) m, widened for ``panels`` of about its size.
-
-    ``margin`` as in `bounds`.
-    """
+    """Window by ``camera`` of ``reference`` (N, 3) m, widened for ``panels`` of about its size."""
     base = window_of(camera, [reference], margin)
     size = SAME_SCALE * max(base.width, base.height)
     clouds = [reference]

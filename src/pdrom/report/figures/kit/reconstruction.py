@@ -11,7 +11,6 @@ from pdrom.report.figures.kit.options import Reconstruction
 from pdrom.report.figures.kit.results import NothingToDraw, Results, asked
 
 READS = (TableOf("reconstruction_error"), Published("reconstruction_error"))
-COLUMNS = ["scene", "group", "method", "r", "split", "relative_error"]
 LOW, HIGH = 1e-7, 1e3  # errors outside are drawn on the limit
 PUBLISHED = "#B5B5B5"
 PUBLISHED_COLUMNS = ["experiment", "group", "split", "num_points", "relative_error_x"]
@@ -20,11 +19,9 @@ PUBLISHED_COLUMNS = ["experiment", "group", "split", "num_points", "relative_err
 def draw_reconstruction(results: Results, options: Reconstruction) -> Figure:
     """Draw a panel per experiment, a line per method and split; errors outside lie on the rim.
 
-    ``results`` and ``options`` are the figure's.
-
     An experiment without any error (its projections are round-off) has a panel that says so.
     """
-    table = results.table("reconstruction_error", COLUMNS)
+    table = results.table("reconstruction_error")
     pairs = [
         (scene, group, rows)
         for scene, group in results.experiments(options)

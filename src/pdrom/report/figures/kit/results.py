@@ -78,12 +78,9 @@ class Results:
             raise NothingToDraw(nothing)
         return scenes
 
-    def asked_rows(self, name: str, columns: Sequence[str], options: Options) -> pd.DataFrame:
-        """Rows of table ``name`` of the scenes and methods that ``options`` name, or of all.
-
-        StorageError if it lacks one of ``columns``.
-        """
-        table = self.table(name, columns)
+    def asked_rows(self, name: str, options: Options) -> pd.DataFrame:
+        """Rows of table ``name`` of the scenes and methods that ``options`` name, or of all."""
+        table = self.table(name)
         for key, column in (("scenes", "scene"), ("methods", "method")):
             if names := options.names(key):
                 table = table[table[column].isin(names)]
@@ -99,9 +96,9 @@ class Results:
         """Path of a result of ``place`` with the labels ``scene``, ``group`` and ``method``."""
         return self.holdings.path(place, self.folder, scene, group, method)
 
-    def table(self, name: str, columns: Sequence[str] = ()) -> pd.DataFrame:
-        """Table ``name``; StorageError if it is missing or lacks one of ``columns``."""
-        return read_table(TABLE.at(self.folder, name=name), columns)
+    def table(self, name: str) -> pd.DataFrame:
+        """Table ``name`` with the columns of its declaration; StorageError if it is missing."""
+        return read_table(TABLE.at(self.folder, name=name))
 
     def published_table(self, name: str, columns: Sequence[str]) -> pd.DataFrame | None:
         """Table ``name`` (``columns``) of the published code's own output; None if not drawn."""

@@ -15,11 +15,6 @@ from pdrom.report.figures.kit.options import Options
 from pdrom.report.figures.kit.results import Results
 from pdrom.tables.accuracy_cost import FEWER, pareto
 
-COLUMNS = [
-    "scene", "method", "position_basis", "iterations", "relative_error_within_horizon",
-    "ms_per_frame",
-]  # fmt: skip
-RERUN_COLUMNS = ["scene", "method", "position_basis", "blowup_frame", *COLUMNS[-2:]]
 ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
 LOW, HIGH = 1e-4, 1e2  # errors outside are arrows on the rim
 ABOVE, BELOW, BLOWN_UP = 6, 7, "x"  # markers: carets, and a cross
@@ -58,8 +53,8 @@ def trade_offs(results: Results, options: Options) -> tuple[TradeOffs, list[str]
     StorageError
         A table is missing or lacks a column.
     """
-    table = results.table("accuracy_cost", COLUMNS).dropna(subset=[ERROR, TIME])
-    runs = results.table("reduced_reruns", RERUN_COLUMNS)
+    table = results.table("accuracy_cost").dropna(subset=[ERROR, TIME])
+    runs = results.table("reduced_reruns")
     own = (table.method == "full") & (table.position_basis == "full")
     full = table[own].set_index("scene")
     fom = table[table.method == FOM].set_index(["scene", "iterations"])[ERROR]

@@ -1,0 +1,69 @@
+"""``pdrom reduce --error``: what is said of a run, whatever became of it, and its exit code."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from builders import SMALL
+from pdrom.api import AskedRun, FullRun, load_scene
+from pdrom.command.base import Status
+from pdrom.command.main import run
+from pdrom.reduction.asked.ask import Ask
+
+COMMAND = ["reduce", "small.yaml", "--run", "small.h5", "--error", "0.05"]
+
+
+@pytest.fixture
+def full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FullRun:
+    """A training run that is read from small.h5, of a scene in the folder of the command."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "small.yaml").write_text(SMALL)
+    found = FullRun(load_scene("small.yaml"), np.zeros((5, 30, 3)), np.ones(4), {})
+    monkeypatch.setattr("pdrom.api.load", lambda *_: found)
+    return found
+
+
+def done(full: FullRun, horizon: int = 4, error: float | None = None, **changes) -> AskedRun:
+    """A run of four frames that keeps to its error, but for the ``changes`` of its outcome."""
+    outcome = {
+        "positions": full.positions, "promised": True, "reduced": 3, "checks": [0, 2],
+        "changes": [(0, "pod, k = 4")], "repairs": 1, "expected": 0.031, "estimate": None,
+        "work": 1.0, "full_work": 4.0,
+    }  # fmt: skip
+    made = SimpleNamespace(**(outcome | changes))
+    return AskedRun(full.scene, Ask(error=0.05), made, np.full(4, 2.0), 1.5, horizon, error)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words", "status"),
+    [
+        ({}, "implicit step: kept, by a reduction\n", Status.DONE),
+        ({"reduced": 0}, "kept, by the full order only\n", Status.DONE),
+        ({"horizon": 2}, ", up to frame 2 (round-off decides after it): kept", Status.DONE),
+        ({"promised": False}, ": nothing keeps to it for sure; run in", Status.NOTHING_FITS),
+        (
+            {"promised": False, "positions": np.full((5, 30, 3), np.nan)},
+            ": blew up, with the full order, too\n",
+            Status.NOTHING_FITS,
+        ),
+        ({}, "\n  error: expected at most 0.031\n", Status.DONE),
+        ({"estimate": 0.02, "error": 0.011}, "from the checks 0.02, reached 0.011\n", Status.DONE),
+        ({}, "3 of 4 frames reduced, 2 checked, 1 times gone back\n", Status.DONE),
+        ({}, "2.00 ms a frame, about 0.25 of the full order", Status.DONE),
+    ],
+)
+def test_what_became_of_a_run(full, monkeypatch, capsys, changes, words, status):
+    monkeypatch.setattr("pdrom.api.reduce", lambda *_, **__: done(full, **changes))
+    monkeypatch.setattr("pdrom.api.save", lambda *_: None)
+    assert run(COMMAND) == status
+    said = capsys.readouterr().out
+    assert said.startswith("small_asked.h5: 5 % of the positions against the converged implicit")
+    assert words in said
+
+
+def test_a_training_run_is_a_full_order_run(full, monkeypatch, capsys):
+    monkeypatch.setattr("pdrom.api.load", lambda *_: done(full))
+    assert run(COMMAND) == Status.FAULTY
+    assert capsys.readouterr().err == "pdrom: small.h5: no full-order run (pdrom run makes one)\n"
