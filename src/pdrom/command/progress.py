@@ -20,23 +20,22 @@ class Progress:
         self._name, self._frames = name, frames
         self._stream = stream or sys.stderr
         self._terminal = self._stream.isatty()
-        self._started = self._shown = monotonic()
-        self._first = self._started
+        self._shown = monotonic()
+        self._ends = [self._shown]
 
     def __call__(self, frame: int, report: FrameReport) -> None:
         """Frame number ``frame``, from 0, is done."""
         done, now = frame + 1, monotonic()
-        if done == 1:
-            self._first = now
+        self._ends.append(now)
         if self._terminal:
             if done < self._frames and now - self._shown < EVERY:
                 return
         elif done < self._frames and done % max(1, self._frames // 10):
             return
         self._shown = now
-        # the first frame may compile kernels, which no other does
-        each = (now - self._first) / (done - 1) if done > 1 else now - self._started
-        left = each * (self._frames - done)
+        # by the later half: kernels are compiled in the first frames and between them
+        half = done // 2
+        left = (now - self._ends[half]) / (done - half) * (self._frames - done)
         text = line(self._name, done, self._frames, ms=1e3 * float(report.seconds.sum()), left=left)
         self._stream.write(f"\r{text}  " if self._terminal else f"{text}\n")
         if self._terminal and done == self._frames:

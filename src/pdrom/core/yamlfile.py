@@ -70,7 +70,9 @@ def read_yaml(path: Path) -> Any:
     """Content of the YAML file ``path``; ConfigurationError if missing or not plain YAML."""
     try:
         if not path.is_file():
-            raise ConfigurationError(f"{path}: no such configuration file")
+            whole = Path(f"{path}.yaml")
+            meant = f", did you mean '{whole}'?" if whole.is_file() else ""
+            raise ConfigurationError(f"{path}: no such configuration file{meant}")
         if path.stat().st_size > MAX_BYTES:
             raise ConfigurationError(f"{path}: larger than {MAX_BYTES} bytes")
         # a byte order mark, as some editors write it, is no part of the text

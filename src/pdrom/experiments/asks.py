@@ -24,6 +24,7 @@ from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.asked.ask import Ask
 from pdrom.reduction.asked.hierarchy import JUDGED, AskSettings, Hierarchy, hierarchy
 from pdrom.reduction.asked.level import Level
+from pdrom.reduction.asked.loops import Remembered
 from pdrom.reduction.asked.measured import Motion, Tried, tried
 from pdrom.reduction.asked.motions import CALIBRATION
 from pdrom.reduction.asked.run import Asked, CheckedRun
@@ -105,21 +106,21 @@ def _asked(
 ) -> Iterator[dict[str, Any]]:
     motion = Motion(scene)
     motion.end = min(motion.end, own.horizon)
+    loops = Remembered(scene)
     # every step on one motion, for the best choice with hindsight
     steps = own.steps if name == FIRST else []
-    every = {s.level.title: tried(s.level, motion) for s in steps}
-    plain = tried(Level(scene.config.iterations), motion)
+    every = {s.level.title: tried(s.level, motion, loops) for s in steps}
+    plain = tried(Level(scene.config.iterations), motion, loops)
     known: dict[str, Tried] = {}
     for error in section.errors:
         good = {title: t.ms for title, t in every.items() if t.errors["position"] <= error}
         oracle = min(good, key=lambda title: good[title], default=None)
         for factor in section.factors:
-            run = CheckedRun(
-                scene, own, Ask(error=error), section.model_copy(update={"factor": factor})
-            )
+            settings = section.model_copy(update={"factor": factor})
+            run = CheckedRun(scene, own, Ask(error=error), settings, loops)
             full = run.full_order
             if full.title not in known:
-                known[full.title] = every.get(full.title) or tried(full, motion)
+                known[full.title] = every.get(full.title) or tried(full, motion, loops)
             yield {
                 "scene": scene.config.name,
                 "motion": name,

@@ -1,6 +1,6 @@
 """One large scene in position subspaces, against its own full-order run in the same job.
 
-Everything is made here: full-order runs of both motions, columns from training frames, element
+Everything is made here: full-order runs of all motions, columns from training frames, element
 sampling, reduced runs. Kept are the models, which `pdrom.experiments.frame_times` times, and a row
 for each.
 """
@@ -21,6 +21,7 @@ from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.measurement import clocked
 from pdrom.experiments.kit.motion import training_indices
 from pdrom.experiments.kit.settings import Modes, PositionBasis, Tolerance
+from pdrom.model.held_out import MOTIONS
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import displacement_norms
@@ -40,7 +41,8 @@ log = logging.getLogger(__name__)
 
 COLUMNS = [
     "scene", "vertices", "elements", "iterations", "position_basis", "k", "tau", "method",
-    "elements_sampled", "relative_error_train", "relative_error_heldout", "reduction_s",
+    "elements_sampled", "relative_error_train", "relative_error_heldout",
+    "relative_error_heldout_low", "relative_error_heldout_high", "reduction_s",
 ]  # fmt: skip
 
 
@@ -71,11 +73,15 @@ class Online(OnlineModels):
 def online(
     sources: list[Path], config: SceneConfig, asked: OnlineModels, out: File, models: File
 ) -> None:
-    """Reduce a scene by every model and run both motions with each."""
+    """Reduce a scene by every model and run the training and held-out motions with each.
+
+    The error held out is the median over the motions, between the least and the largest; a run that
+    blows up has an infinite one.
+    """
     mesh = config.mesh.build(Path())
     train = Scene.build(config, mesh)
-    heldout = Scene.build(config.heldout_variant(), mesh)
-    references = [trajectory(motion, track_objective=False) for motion in (train, heldout)]
+    motions = [train, *(Scene.build(config.heldout_variant(name), mesh) for name in MOTIONS)]
+    references = [trajectory(motion, track_objective=False) for motion in motions]
     log.info("%s: full-order runs of %d vertices", config.name, mesh.vertices)
     rows = []
     with write_hdf5(models.path) as file:
@@ -88,12 +94,12 @@ def online(
                 labels = {key: row[key] for key in ("method", "position_basis", "k")}
                 store = file.create_group(f"models/{base}_{row['method']}")
                 store_model(store, {**labels, "base": base}, samples)
-                errors = [
+                own, *errors = (
                     relative_error(motion, model, reference)
-                    for motion, reference in zip((train, heldout), references, strict=True)
-                ]
-                keys = ("relative_error_train", "relative_error_heldout", "reduction_s")
-                rows.append({**row, **dict(zip(keys, (*errors, seconds), strict=True))})
+                    for motion, reference in zip(motions, references, strict=True)
+                )
+                row |= {"relative_error_train": own, "reduction_s": seconds}
+                rows.append(row | _over_motions(errors))
                 log.info("%s k=%d tau=%g", base, k, tolerance)
     write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
 
@@ -123,6 +129,15 @@ def _row(scene: Scene, model: SubspaceModel, k: int, tolerance: float) -> dict[s
         "tau": tolerance,
         "method": ecsw_name(tolerance),
         "elements_sampled": model.elements_evaluated(scene),
+    }
+
+
+def _over_motions(errors: list[float | None]) -> dict[str, float]:
+    known = [np.inf if error is None else error for error in errors]
+    values = (np.median(known), min(known), max(known))
+    return {
+        f"relative_error_heldout{end}": v
+        for end, v in zip(("", "_low", "_high"), values, strict=True)
     }
 
 

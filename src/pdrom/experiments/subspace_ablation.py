@@ -4,17 +4,19 @@ import logging
 from collections.abc import Mapping
 from typing import Annotated, Any
 
+import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from pdrom.artifact.reads import Settings
+from pdrom.artifact.reads import Every, Settings
 from pdrom.core.errors import SamplingError
-from pdrom.core.paths import HELDOUT, MESH, SENSITIVITY, SUBSPACE_ABLATION, TRAIN, File
+from pdrom.core.paths import FULL_ORDER, MESH, SENSITIVITY, SUBSPACE_ABLATION, File
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.motion import Motion, training_positions
-from pdrom.experiments.kit.scenes import SPLITS, scene_of
+from pdrom.experiments.kit.scenes import TRAIN as TRAINING
+from pdrom.experiments.kit.scenes import scene_of
 from pdrom.experiments.kit.settings import BlowupExtent, Horizon, Modes
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.deviations import error_within
@@ -32,7 +34,8 @@ COLUMNS = [
     "scene", "group", "position_basis", "k", "r", "variant", "elements_sampled", "control_elements",
     "fallback_share", "heldout_fallback_share", "gain", "finite",
     "max_extent", "relative_error_within_horizon", "relative_error_full_projections",
-    "heldout_error_within_horizon", "heldout_error_full_projections",
+    "heldout_error_within_horizon", "heldout_error_low", "heldout_error_high",
+    "heldout_error_full_projections",
 ]  # fmt: skip
 Sizes = Annotated[tuple[Modes, ...], Field(min_length=1)]
 
@@ -77,20 +80,18 @@ class Options(ConfigModel):
     "Variants of block DEIM in a position subspace of {scene}",
     reads={
         "mesh": MESH,
-        "train": TRAIN,
-        "heldout": HELDOUT,
+        "full_order": Every(FULL_ORDER),
         "sensitivity": SENSITIVITY,
         "settings": Settings(Options),
     },
     writes={"out": SUBSPACE_ABLATION},
 )
 def subspace_ablation(
-    mesh: File, train: File, heldout: File, sensitivity: File, settings: Options, out: File
+    mesh: File, full_order: list[File], sensitivity: File, settings: Options, out: File
 ) -> None:
     """Run every variant with all groups interpolated and write the table ``out``."""
-    runs = {"train": train, "heldout": heldout}
-    trials = _Trials(settings, mesh, runs, sensitivity)
-    motion = trials.motions["train"]
+    trials = _Trials(settings, mesh, full_order, sensitivity)
+    motion = trials.motions[TRAINING]
     scene, training = motion.scene, training_positions(motion)
     rows = []
     for k in settings.ablation.sizes:
@@ -114,24 +115,21 @@ def subspace_ablation(
 
 
 class _Trials:
-    """Both motions of a scene with their horizons."""
+    """Motions of a scene with their horizons, the training one first."""
 
-    def __init__(
-        self, settings: Options, mesh: File, runs: dict[str, File], sensitivity: File
-    ) -> None:
+    def __init__(self, settings: Options, mesh: File, runs: list[File], sensitivity: File) -> None:
         self._limit = settings.blowup_extent
         self.motions = {
-            name: Motion(scene_of(settings.scene, mesh, name), run) for name, run in runs.items()
+            run["run"]: Motion(scene_of(settings.scene, mesh, run["run"]), run) for run in runs
         }
-        self._ends = {name: settings.horizon.frames(sensitivity, name) for name in SPLITS}
+        self._ends = {name: settings.horizon.frames(sensitivity, name) for name in self.motions}
 
     def full_projections(self, columns: Columns) -> dict[str, Any]:
         """Errors of the runs without interpolation: what the subspace itself leaves."""
         model = SubspaceModel(POSITION_BASIS, columns)
-        errors = {motion: self._run(motion, model)[1] for motion in SPLITS}
         return {
-            "relative_error_full_projections": errors["train"],
-            "heldout_error_full_projections": errors["heldout"],
+            "relative_error_full_projections": self._run(TRAINING, model)[1],
+            "heldout_error_full_projections": self._heldout(model)[1][0],
         }
 
     def outcome(
@@ -139,22 +137,31 @@ class _Trials:
     ) -> dict[str, Any]:
         """Outcome of a variant; a refused one has not run, and its cells are empty."""
         try:
-            found = interpolate(self.motions["train"].scene, columns, trained, spec=spec)
+            found = interpolate(self.motions[TRAINING].scene, columns, trained, spec=spec)
         except SamplingError as error:
             log.info("refused: %s", error)
             return {}
         model = SubspaceModel(POSITION_BASIS, columns, found)
-        outcome, within = self._run("train", model)
-        heldout, heldout_within = self._run("heldout", model)
+        outcome, within = self._run(TRAINING, model)
+        heldout, (middle, low, high) = self._heldout(model)
         return {
-            "elements_sampled": model.elements_evaluated(self.motions["train"].scene),
+            "elements_sampled": model.elements_evaluated(self.motions[TRAINING].scene),
             **_safeguard(found, outcome, heldout),
             "gain": max(chosen.gain for chosen in found.values()),
             "finite": outcome.finite,
             "max_extent": outcome.max_extent,
             "relative_error_within_horizon": within,
-            "heldout_error_within_horizon": heldout_within,
+            "heldout_error_within_horizon": middle,
+            "heldout_error_low": low,
+            "heldout_error_high": high,
         }
+
+    def _heldout(self, model: SubspaceModel) -> tuple[list[Rerun], list[float]]:
+        """Runs of the held-out motions that can be judged; median, least and largest error."""
+        chosen = [m for m, end in self._ends.items() if m != TRAINING and end != 0]
+        runs, errors = zip(*(self._run(motion, model) for motion in chosen), strict=True)
+        known = [np.inf if error is None else error for error in errors]
+        return list(runs), [float(np.median(known)), min(known), max(known)]
 
     def _run(self, motion: str, model: SubspaceModel) -> tuple[Rerun, float | None]:
         """A run and its error before the horizon; None if it did not get there."""
@@ -163,7 +170,9 @@ class _Trials:
         return outcome, error_within(outcome.difference, case.displacement, end)
 
 
-def _safeguard(found: Mapping[str, Interpolation], train: Rerun, heldout: Rerun) -> dict[str, Any]:
+def _safeguard(
+    found: Mapping[str, Interpolation], train: Rerun, heldout: list[Rerun]
+) -> dict[str, Any]:
     """Cells of a safeguard; empty without one."""
     control = [len(chosen.control) for chosen in found.values() if chosen.control is not None]
     if not control:
@@ -171,5 +180,6 @@ def _safeguard(found: Mapping[str, Interpolation], train: Rerun, heldout: Rerun)
     return {
         "control_elements": sum(control),
         "fallback_share": train.fallbacks / max(train.frames, 1),
-        "heldout_fallback_share": heldout.fallbacks / max(heldout.frames, 1),
+        "heldout_fallback_share": sum(run.fallbacks for run in heldout)
+        / max(sum(run.frames for run in heldout), 1),
     }

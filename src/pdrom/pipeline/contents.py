@@ -137,4 +137,5 @@ SOME: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     **dict.fromkeys([paths.ASKS, paths.ASK_SCORES], _asked),
     paths.CERTIFIED: _scenes(lambda study: tuple(study.settings.certified.scenes)),
     paths.ALTERNATIVES: _sized(lambda study: study.settings.alternatives.scenes),
+    paths.ALTERNATIVE_TIMES: _sized(lambda study: study.settings.alternatives.scenes),
 }

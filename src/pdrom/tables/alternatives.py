@@ -5,7 +5,14 @@ import pandas as pd
 from pdrom.artifact.reads import Every
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.experiments.alternatives.settings import ACCELERATED, CONVERGED, OWN, REDUCED
+from pdrom.experiments.alternatives.settings import (
+    ACCELERATED,
+    CONVERGED,
+    OWN,
+    REDUCED,
+    SETTING,
+)
+from pdrom.model.held_out import MOTIONS
 from pdrom.tables.kit.declaration import compared, flag, integer, number, table, text, timed
 from pdrom.tables.kit.parts import joined
 from pdrom.tables.kit.vocabulary import ELEMENTS_SAMPLED, MS_PER_FRAME, SCENE, VERTICES, K
@@ -14,6 +21,9 @@ STIFFNESS = compared("exact", number("stiffness", "factor on all weights of the 
 SUBSTEPS = integer("substeps", "steps that a frame is divided into")
 ITERATIONS = integer("iterations", "iterations of each substep")
 
+MOTION = text("motion", f"held-out motion, one of: {', '.join(MOTIONS)}")
+# What tells candidates apart, whatever the motion.
+CANDIDATE = ["scene", "factor", "stiffness", *SETTING]
 TRAINED_ON = text("trained_on", f"frames that a reduction is trained on: {OWN}, {CONVERGED}")
 
 
@@ -34,17 +44,40 @@ TRAINED_ON = text("trained_on", f"frames that a reduction is trained on: {OWN}, 
         TRAINED_ON,
         K,
         ELEMENTS_SAMPLED,
+        MOTION,
         integer("frames", "frames that errors are taken over"),
         compared("error", flag("finite", "no frame blew up")),
         MS_PER_FRAME,
-        timed(number("ms_low", "the same of the fastest repeat", "ms")),
-        timed(number("ms_high", "the same of the slowest repeat", "ms")),
+        timed(number("ms_low", "the same in the fastest process", "ms")),
+        timed(number("ms_high", "the same in the slowest process", "ms")),
+        integer("processes", "processes that timed it, all in the first motion"),
         number("error_implicit", "error against the converged implicit step of the scene"),
         number("error_continuous", "error against the motion in continuous time: the total error"),
         number("reference_error", "estimated error of that motion"),
     ),
-    reads={"parts": Every(paths.ALTERNATIVES)},
+    reads={"parts": Every(paths.ALTERNATIVES), "times": Every(paths.ALTERNATIVE_TIMES)},
 )
-def alternatives(parts: list[File]) -> pd.DataFrame:
-    """Rows of all scenes and meshes, in the order of their ``parts``; the held-out motion."""
-    return joined(parts)
+def alternatives(parts: list[File], times: list[File]) -> pd.DataFrame:
+    """Rows of all scenes and meshes, in the order of their ``parts``; held-out motions.
+
+    ``times`` are those of every process; their medians count.
+    """
+    rows = joined(parts)
+    if rows.empty:
+        return rows
+    rows, processes = beside(rows, joined(times))
+    ms = rows[processes]
+    return rows.assign(
+        ms_per_frame=ms.median(axis=1),
+        ms_low=ms.min(axis=1),
+        ms_high=ms.max(axis=1),
+        processes=ms.count(axis=1),
+    )
+
+
+def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[int]]:
+    """``rows`` with a column of ``times`` (ms) for each process, and the names of these columns."""
+    wide = times.set_index([*CANDIDATE, "process"]).ms_per_frame.unstack("process")
+    words = {"trained_on": object}  # where nothing is reduced, it would be a number
+    both = (table.astype(words) for table in (rows, wide.reset_index()))
+    return pd.merge(*both, on=CANDIDATE, how="left"), list(wide.columns)

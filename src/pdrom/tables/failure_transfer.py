@@ -9,6 +9,7 @@ from pdrom.artifact.reads import TableOf
 from pdrom.tables.failure_predictors import EVERY, PREDICTORS, WITHIN, predicted_runs
 from pdrom.tables.gain_prediction import best_threshold, failures_ordered
 from pdrom.tables.kit.declaration import compared, integer, number, table, text
+from pdrom.tables.kit.families import families
 
 
 @table(
@@ -16,12 +17,12 @@ from pdrom.tables.kit.declaration import compared, integer, number, table, text
     columns=(
         text("predictor", f"one of: {', '.join(PREDICTORS)}"),
         text("method", f"method of the runs; {EVERY}, or {WITHIN}: a limit for each method"),
-        text("scene", f"scene that is left out; {EVERY}: over all of them"),
+        text("scene", f"scene that is left out, with its twin; {EVERY}: over all of them"),
         compared("share", integer("runs", "runs of the scene that count")),
         compared("share", integer("failed", "runs among them that fail")),
         compared(
             "skipped",
-            number("threshold", "that separates the failed runs of the other scenes best"),
+            number("threshold", "that separates the failed runs of other families of scenes best"),
         ),
         compared("share", number("misclassified_share", "runs of the scene on its wrong side")),
         compared(
@@ -42,7 +43,7 @@ from pdrom.tables.kit.declaration import compared, integer, number, table, text
 def failure_transfer(
     bounds: pd.DataFrame, reruns: pd.DataFrame, reconstruction: pd.DataFrame
 ) -> pd.DataFrame:
-    """Each scene is left out once; counted are the failed runs of `failure_predictors`.
+    """Each scene is left out once, its twin with it; counted are the runs of `failure_predictors`.
 
     A predictor is of use in a new scene if its share of mistakes is below that of calling all runs
     what most runs of the other scenes are. ``bounds``, ``reruns`` and ``reconstruction`` are the
@@ -62,9 +63,10 @@ def failure_transfer(
 
 
 def _left_out(runs: pd.DataFrame, predictor: str) -> Iterator[dict]:
-    """A row for each scene, judged by the others."""
+    """A row for each scene, judged by those of other families."""
+    family = families(runs.scene)
     for scene, own in runs.groupby("scene", sort=False):
-        others = runs[runs.scene != scene]
+        others = runs[~family.isin(family[own.index])]
         if others.empty:
             continue
         threshold, _ = best_threshold(*_values(others, predictor))

@@ -16,6 +16,7 @@ import pandas as pd
 from pdrom.artifact.reads import TableOf
 from pdrom.tables.gain_prediction import judged_runs
 from pdrom.tables.kit.declaration import compared, integer, number, table, text
+from pdrom.tables.kit.families import families
 
 RESAMPLES, SEED = 2000, 1
 STEPS = {
@@ -37,7 +38,6 @@ KINDS = {
     "lower gain, separate coefficients": ("deim-joint", "published"),
 }
 _CELL = ["scene", "group", "r"]
-_FAMILY = "_twin"  # of a scene and its twin one is no news of the other
 
 
 @table(
@@ -151,7 +151,7 @@ def _summary(pairs: pd.DataFrame) -> Mapping[str, float]:
     from scipy.stats import binomtest
 
     by_scene = pairs.groupby("scene").error
-    by_family = pairs.groupby(pairs.scene.str.removesuffix(_FAMILY)).error
+    by_family = pairs.groupby(families(pairs.scene)).error
     fallen = int((by_family.median() < 1.0).sum())
     low, high = _interval([values.to_numpy(float) for _, values in by_family])
     known = len(pairs) > 2 and pairs.gain.nunique() > 1 and pairs.error.nunique() > 1

@@ -31,7 +31,6 @@ _REDUCTION = ["scene", "group", "method", "r"]
 _LABELS = ["scene", "group", "method", "position_basis", "k", "r"]
 _ERROR = "relative_error_within_horizon"
 UNCONFIRMED = "not confirmed by its control"
-_ONE_MOTION = {LOW: float("nan"), HIGH: float("nan")}  # of a large scene: there is no range
 
 
 @table(
@@ -151,8 +150,9 @@ def _errors(reruns: pd.DataFrame, heldout: pd.DataFrame, keys: list[str]) -> pd.
 
 
 def _large_errors(large: pd.DataFrame) -> pd.DataFrame:
-    names = {"relative_error_train": "error_train", "relative_error_heldout": "error_heldout"}
-    return large.reindex(columns=[*_MODEL, *names]).rename(columns=names).assign(**_ONE_MOTION)
+    names = {"relative_error_train": "error_train", "relative_error_heldout": MEDIAN}
+    names |= {"relative_error_heldout_low": LOW, "relative_error_heldout_high": HIGH}
+    return large.reindex(columns=[*_MODEL, *names]).rename(columns=names)
 
 
 def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -> pd.DataFrame:

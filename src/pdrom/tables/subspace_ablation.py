@@ -36,14 +36,19 @@ from pdrom.tables.kit.vocabulary import (
         compared(
             "error", number("fallback_share", "frames of the training motion that it repeats")
         ),
-        compared("error", number("heldout_fallback_share", "the same of the held-out motion")),
+        compared("error", number("heldout_fallback_share", "the same of the held-out motions")),
         GAIN,
         FINITE,
         MAX_EXTENT,
         ERROR_WITHIN,
         number("relative_error_full_projections", "the same with all elements evaluated"),
-        number("heldout_error_within_horizon", "error of the held-out motion before its horizon"),
-        number("heldout_error_full_projections", "the same with all elements evaluated"),
+        number(
+            "heldout_error_within_horizon",
+            "median of the errors of held-out motions before their horizons; inf where a run ended",
+        ),
+        number("heldout_error_low", "the least of them"),
+        number("heldout_error_high", "the largest"),
+        number("heldout_error_full_projections", "the median with all elements evaluated"),
     ),
     reads={"parts": Every(paths.SUBSPACE_ABLATION)},
 )

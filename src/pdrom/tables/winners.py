@@ -4,13 +4,19 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from pdrom.artifact.reads import Setting, TableOf
+from pdrom.artifact.reads import Every, Setting, TableOf
+from pdrom.core import paths
+from pdrom.core.paths import File
 from pdrom.experiments.alternatives.settings import OWN, REDUCED, REDUCTIONS
-from pdrom.tables.alternatives import ITERATIONS, STIFFNESS, SUBSTEPS
+from pdrom.tables.alternatives import ITERATIONS, MOTION, STIFFNESS, SUBSTEPS, beside
 from pdrom.tables.kit.declaration import compared, integer, number, table, text, timed
+from pdrom.tables.kit.intervals import median_interval
+from pdrom.tables.kit.parts import joined
 from pdrom.tables.kit.vocabulary import METHOD, MS_PER_FRAME, SCENE, VERTICES
 
 REFERENCES = ("implicit", "continuous")
+CASE = ["scene", "vertices", "stiffness", "motion"]
+SPEEDUP = ("reduced_speedup", "reduced_speedup_low", "reduced_speedup_high")
 PLAIN = "projective"
 KNOWN = 3.0  # a motion decides about an error only if it is known this many times better
 
@@ -25,6 +31,7 @@ LIMIT = compared("exact", number("limit", "error that is allowed"))
         SCENE,
         VERTICES,
         STIFFNESS,
+        MOTION,
         REFERENCE,
         LIMIT,
         timed(METHOD),
@@ -38,24 +45,33 @@ LIMIT = compared("exact", number("limit", "error that is allowed"))
         timed(number("plain_ms", "time of one-step projective dynamics, if it reaches it", "ms")),
         timed(number("reduced_error", "smallest error of the reduction")),
         timed(number("reduced_ms", "time of a frame of the reduction, if it reaches it", "ms")),
-        timed(number("reduced_speedup", "time of the first over that of the reduction")),
-        timed(number("reduced_speedup_low", "its fastest repeat over the slowest reduced one")),
-        timed(number("reduced_speedup_high", "its slowest repeat over the fastest reduced one")),
+        timed(
+            number("reduced_speedup", "time of the first over that of the reduction in a process")
+        ),
+        timed(number("reduced_speedup_low", "2.5 % quantile of this median (bootstrap)")),
+        timed(number("reduced_speedup_high", "97.5 % quantile")),
         timed(text("reduced_method", "the reduction that is the fastest to reach it")),
         timed(text("reduced_trained_on", "the frames that it is trained on")),
         timed(integer("reduced_iterations", "its iterations of a substep")),
         timed(number("own_ms", f"time of the fastest plain one trained on {OWN}", "ms")),
     ),
-    reads={"rows": TableOf("alternatives"), "limits": Setting("alternatives.errors")},
+    reads={
+        "rows": TableOf("alternatives"),
+        "times": Every(paths.ALTERNATIVE_TIMES),
+        "limits": Setting("alternatives.errors"),
+    },
 )
-def winners(rows: pd.DataFrame, limits: Sequence[float]) -> pd.DataFrame:
-    """One row per scene, mesh, stiffness, reference and error; no method where none reaches it.
+def winners(rows: pd.DataFrame, times: list[File], limits: Sequence[float]) -> pd.DataFrame:
+    """One row per scene, mesh, stiffness, motion, reference and error; no method where none does.
 
     Errors that are too small to be told from that of the motion in continuous time have no row.
+    Among the methods of the first motion are those that no other motion has.
     """
     found = []
-    for labels, case in rows.groupby(["scene", "vertices", "stiffness"], sort=False):
-        named = dict(zip(("scene", "vertices", "stiffness"), labels, strict=True))
+    if len(rows):
+        rows, processes = beside(rows, joined(times))
+    for labels, case in rows.groupby(CASE, sort=False):
+        named = dict(zip(CASE, labels, strict=True))
         for reference in REFERENCES:
             timed_rows = case[case.ms_per_frame.notna()]
             known = timed_rows.assign(error=timed_rows[f"error_{reference}"])
@@ -63,12 +79,15 @@ def winners(rows: pd.DataFrame, limits: Sequence[float]) -> pd.DataFrame:
                 if reference == "continuous" and not KNOWN * case.reference_error.max() <= limit:
                     continue
                 row = {**named, "reference": reference, "limit": limit}
-                found.append({**row, **_best(known, limit)})
+                found.append({**row, **_best(known, limit, processes)})
     return pd.DataFrame(found, columns=winners.column_names)
 
 
-def _best(rows: pd.DataFrame, limit: float) -> dict[str, object]:
-    """First, second and reduced one to reach ``limit``; what nobody does is left out."""
+def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, object]:
+    """First, second and reduced one to reach ``limit``; what nobody does is left out.
+
+    A speed-up is a ratio within each of the ``processes`` that timed both.
+    """
     reaching = rows[rows.error <= limit].sort_values("ms_per_frame", kind="stable")
     inside = reaching.method.isin(REDUCTIONS)
     full, reduced = reaching[~inside], reaching[inside]
@@ -85,9 +104,8 @@ def _best(rows: pd.DataFrame, limit: float) -> dict[str, object]:
         best = full.iloc[0]
         made |= best[["method", "substeps", "iterations", "error", "ms_per_frame"]].to_dict()
         if len(reduced):
-            made["reduced_speedup"] = best.ms_per_frame / first.ms_per_frame
-            made["reduced_speedup_low"] = best.ms_low / first.ms_high
-            made["reduced_speedup_high"] = best.ms_high / first.ms_low
+            ratios = (best[processes] / first[processes]).astype(float).dropna()
+            made |= zip(SPEEDUP, median_interval(ratios), strict=True)
         others = full[full.method != best.method]
         if len(others):
             second = others.iloc[0]

@@ -32,6 +32,14 @@ def test_a_name_that_no_system_takes_is_named(tmp_path):
         read_yaml(tmp_path / f"{130 * 'é'}.yaml")
 
 
+def test_a_name_without_its_ending_is_suggested_with_it(tmp_path):
+    (tmp_path / "flag.yaml").write_text("a: 1")
+    with pytest.raises(ConfigurationError, match=r"flag: no such .*did you mean '.*flag\.yaml'\?"):
+        read_yaml(tmp_path / "flag")
+    with pytest.raises(ConfigurationError, match=r"no such configuration file$"):
+        read_yaml(tmp_path / "other")
+
+
 GOOD = {"name": "n", "inner": {"size": 1}}
 
 

@@ -24,13 +24,13 @@ EFFECTS = (
     {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]},
     {"effect": "pins", "select": "top"},
 )
+CHANGES = {"reduce": {"spring": {"train": 5}}, "held_out": {"kick": 0.5}}
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     scene = make_scene(*EFFECTS, mesh={"kind": "cloth", "rows": 8, "columns": 7}, frames=10)
-    changes = {"reduce": {"spring": {"train": 5}}, "held_out": {"kick": 0.5}}
-    config = SceneConfig.model_validate(scene.config.model_dump(mode="json") | changes)
+    config = SceneConfig.model_validate(scene.config.model_dump(mode="json") | CHANGES)
     path = tmp_path_factory.mktemp("online") / "scene.csv"
     asked = OnlineModels(bases=("pod", "skinning"), sizes=(3,), tolerances=(0.3, 1e-2))
     models = path.with_suffix(".h5")
@@ -55,8 +55,11 @@ def test_rows_of_a_scene(written):
     assert (table.elements == scene.groups[0].elements).all()
     assert (table.elements_sampled > 0).all()
     assert (table.elements_sampled <= table.elements).all()
-    for column in ("relative_error_train", "relative_error_heldout"):
+    heldout = [f"relative_error_heldout{end}" for end in ("_low", "", "_high")]
+    for column in ("relative_error_train", *heldout):
         assert table[column].between(1e-6, 1.0).all()
+    # three motions: the median lies between the others
+    assert (table[heldout].diff(axis=1).iloc[:, 1:] > 0.0).all(axis=None)
     # the held-out motion starts with a kick that the training has not seen
     assert (table.relative_error_heldout > table.relative_error_train).any()
 
@@ -85,6 +88,18 @@ def test_a_process_that_fails_is_told(written, tmp_path):
     )  # fmt: skip
     with pytest.raises(PdromError, match=r"none\.h5"):
         in_fresh_process(request, tmp_path)
+
+
+def test_a_motion_that_blows_up_has_an_infinite_error(written, tmp_path, monkeypatch):
+    scene = written[0].config.model_dump(mode="json") | CHANGES
+    errors = iter((0.1, 0.2, None, 0.3))
+    monkeypatch.setattr(experiment, "relative_error", lambda *given: next(errors))
+    files = {key: File(str(tmp_path / key), {}) for key in ("out", "models")}
+    config = SceneConfig.model_validate(scene)
+    experiment.online(sources=[], config=config, asked=OnlineModels(sizes=(3,)), **files)
+    row = read_table(tmp_path / "out").iloc[0]
+    assert (row.relative_error_train, row.relative_error_heldout_low) == (0.1, 0.2)
+    assert (row.relative_error_heldout, row.relative_error_heldout_high) == (0.3, np.inf)
 
 
 def test_no_scene_leaves_an_empty_table():

@@ -12,6 +12,7 @@ from pdrom.core.yamlfile import read_yaml, validate
 from pdrom.experiments import subspace_ablation as experiment
 from pdrom.experiments.kit.settings import Horizon
 from pdrom.experiments.subspace_ablation import COLUMNS, Ablation, AblationFile
+from pdrom.model.held_out import MOTIONS
 from pdrom.model.mesh.types import save_mesh
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
@@ -69,13 +70,14 @@ def rows(tmp_path_factory) -> pd.DataFrame:
         return File(str(folder / name), {"scene": "test"})
 
     save_mesh(scene.mesh, folder / "mesh.h5")
-    motions = {"train": scene, "heldout": Scene.build(scene.config.heldout_variant(), scene.mesh)}
+    others = {m: Scene.build(scene.config.heldout_variant(m), scene.mesh) for m in MOTIONS}
+    motions = {"train": scene, **others}
     for motion, bound in motions.items():
         with write_hdf5(folder / f"{motion}.h5") as stored:
             stored["positions"] = trajectory(bound)
     floor = [
         ("test", label, seed, frame, 1.0 if label == "1e-10" and frame >= HORIZON else 1e-9)
-        for label in ("1e-10", "heldout")
+        for label in ("1e-10", *MOTIONS)
         for seed in (1, 2)
         for frame in range(60)
     ]
@@ -93,8 +95,7 @@ def rows(tmp_path_factory) -> pd.DataFrame:
     )
     experiment.subspace_ablation(
         mesh=file("mesh.h5"),
-        train=file("train.h5"),
-        heldout=file("heldout.h5"),
+        full_order=[File(str(folder / f"{motion}.h5"), {"run": motion}) for motion in motions],
         sensitivity=file("sensitivity.csv"),
         settings=experiment.Options(
             scene=scene.config,
@@ -136,9 +137,16 @@ def test_a_run_that_leaves_the_scene_before_the_horizon_has_no_error(rows):
     residual = rows.loc["residual"]
     assert residual.max_extent > 5.0
     assert not residual.finite
-    # it left after the horizon of the training motion; the held-out one is judged to its end
+    # it left after the horizon of the training motion; the held-out ones are judged to their ends
     assert residual.relative_error_within_horizon > 0.5
-    assert np.isnan(residual.heldout_error_within_horizon)
+    assert np.isinf(residual.heldout_error_within_horizon)
+
+
+def test_held_out_errors_are_those_of_three_motions(rows):
+    found = rows.loc[
+        "mended", ["heldout_error_low", "heldout_error_within_horizon", "heldout_error_high"]
+    ]
+    assert (found.astype(float).diff().iloc[1:] > 0.0).all()
 
 
 def test_table_joins_the_scenes(tmp_path, rows):

@@ -1,13 +1,16 @@
 """Tables of asked errors, from rows worked out by hand."""
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from pdrom.core.paths import ASK_SCORES, ASKS
 from pdrom.core.store import write_table
 from pdrom.experiments.asks import COLUMNS, SCORE_COLUMNS
+from pdrom.model.held_out import FIRST
 from pdrom.reduction.asked.hierarchy import AskSettings
 from pdrom.tables.asks import asks, risk_factor
+from pdrom.tables.asks_beside import asks_beside
 from pdrom.tables.asks_cost import asks_cost
 from places import ROOT
 
@@ -45,7 +48,7 @@ def made(tmp_path) -> pd.DataFrame:
     for i in range(12):
         scene = f"s{i}"
         row = {
-            "scene": scene, "motion": "kick", "asked": 0.05, "vertices": 10 if i else 5000,
+            "scene": scene, "motion": FIRST, "asked": 0.05, "vertices": 10 if i else 5000,
             "frames": 9, "judged": i != 3, "promised": i != 1,
             "error": 0.06 if i in (2, 3) else 0.04, "reduced_frames": 9 if i < 6 else 0,
             "ms_per_frame": 0.1, "full_ms": 0.2,
@@ -69,3 +72,33 @@ def test_each_scene_has_one_factor_and_broken_promises_are_counted(made):
     assert small["worst"] == pytest.approx(1.2)
     assert large["over_full"] == pytest.approx(0.5)
     assert large["over_own"] == pytest.approx(0.25)
+
+
+def test_other_ways_stand_on_the_same_axes(made):
+    choices = pd.DataFrame(
+        {
+            "scene": ["s0", "s1", "s2"], "tolerance": 0.05, "found": [True, True, False],
+            "relative_error_within_horizon": [0.01, 0.1, np.nan],
+            "error_heldout": [0.02, 0.01, np.nan], "ms_per_frame": [1.0, 3.0, np.nan],
+        }
+    )  # fmt: skip
+    guard = pd.DataFrame(
+        {
+            "action": ["none", "report", "fall-back"], "relative_error": [9.0, 9.0, 0.1],
+            "relative_cost": [1.0, 1.0, 2.0],
+        }
+    )  # fmt: skip
+    frames = pd.DataFrame({"scene": ["s0", "s1", "s2"], "ms_per_frame": [2.0, 2.0, 2.0]})
+    ways = asks_beside.function(made, choices, guard, frames).set_index("way")
+    assert (ways.error == 0.05).all()
+    # of twelve runs one is not judged, and one makes no promise
+    expected = {
+        "asked": (11, 10, 1, 1.2, 0.25),
+        "full order": (11, 10, 0, 0.2, 0.5),
+        "hindsight": (11, 11, 0, np.nan, 0.125),
+        "chosen": (3, 2, 1, 2.0, 1.0),
+        "fall-back": (1, 1, 1, 2.0, 2.0),
+    }
+    found = ways[["runs", "answers", "broken", "worst", "over_own"]]
+    assert list(found.index) == list(expected)
+    np.testing.assert_allclose(found.to_numpy(float), list(expected.values()))

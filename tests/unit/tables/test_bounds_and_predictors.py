@@ -100,3 +100,5 @@ def test_a_limit_is_learned_without_the_scene_that_it_judges(tables):
     assert over_all.failures_ordered == 1.0
     one = failure_transfer(*tables)
     assert len(one) == 0, "nothing can be learned from other scenes"
+    twins = [pd.concat([t, t.assign(scene="calm_twin")], ignore_index=True) for t in tables]
+    assert len(failure_transfer(*twins)) == 0, "a twin is no other scene"

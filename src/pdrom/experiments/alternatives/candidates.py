@@ -1,6 +1,6 @@
 """Step loops of all methods for one scene, ready to be run and timed."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -22,6 +22,15 @@ from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
+
+
+@dataclass(frozen=True)
+class Trained:
+    """A reduced ``model`` for frames of so many ``substeps``, and the frames it is trained on."""
+
+    trained_on: str
+    substeps: int
+    model: SubspaceModel
 
 
 @dataclass(frozen=True)
@@ -51,18 +60,20 @@ class Candidate:
         return None if run.blowup_frame is not None else np.stack(found)
 
 
-def candidates(scene: Scene, training: Scene, settings: Comparison) -> Iterator[Candidate]:
-    """Every method with each of its settings, on the motion of ``scene``.
+def candidates(
+    scene: Scene, models: Sequence[Trained], settings: Comparison, methods: Sequence[str]
+) -> Iterator[Candidate]:
+    """``methods`` with each of their settings, on the motion of ``scene``.
 
-    ``training`` is the motion that the reduction has seen.
+    ``models`` are what `trained` made of another motion.
     """
     systems: dict[int, GlobalSystem] = {}
     start = scene.initial_state()
-    reduced: dict[str, list[tuple[int, int]]] = {}
-    for method in settings.steps:
+    reduced: list[tuple[str, int, int]] = []
+    for method in methods:
         pairs = settings.pairs(method, scene.mesh.vertices)
         if method in REDUCTIONS:
-            reduced[method] = pairs
+            reduced += [(method, *pair) for pair in pairs]
             continue
         for substeps, iterations in pairs:
             if substeps not in systems:
@@ -72,41 +83,40 @@ def candidates(scene: Scene, training: Scene, settings: Comparison) -> Iterator[
             labels = {"method": method, "substeps": substeps, "iterations": iterations}
             loop = alternative(method, scene, substeps, iterations=iterations, system=system)
             yield Candidate(labels, loop, start)
-    if any(reduced.values()):
-        yield from _reduced(scene, training, settings, reduced)
+    for own in models:
+        for method, substeps, iterations in reduced:
+            if substeps == own.substeps:
+                yield _reduced(scene, own, method, iterations)
 
 
-def _reduced(
-    scene: Scene,
-    training: Scene,
-    settings: Comparison,
-    asked: Mapping[str, Sequence[tuple[int, int]]],
-) -> Iterator[Candidate]:
-    """Position subspace with sampled elements; columns and samples come from ``training``.
+def _reduced(scene: Scene, own: Trained, method: str, iterations: int) -> Candidate:
+    window = WINDOW if method == ACCELERATED else 0
+    loop, start = own.model.loop(substepped(scene, own.substeps, iterations, window))
+    labels: dict[str, object] = {
+        "method": method,
+        "substeps": own.substeps,
+        "iterations": iterations,
+        "trained_on": own.trained_on,
+        "k": own.model.columns.modes,
+        "elements_sampled": own.model.elements_evaluated(scene),
+    }
+    return Candidate(labels, loop, start, own.substeps, own.model.positions)
+
+
+def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
+    """Position subspaces with sampled elements; columns and samples come from ``training``.
 
     The columns hold its frames as they are, or converged. The samples are trained on iterates of
-    the training motion in these columns.
+    the training motion in these columns, for every number of substeps that a reduction takes.
     """
-    steps = [(m, n, count) for m, pairs in asked.items() for n, count in pairs]
-    for trained_on, seen in _training_frames(training, settings):
+    vertices = training.mesh.vertices
+    taken = sorted({n for m in REDUCTIONS for n, _ in settings.pairs(m, vertices)})
+    for trained_on, seen in _training_frames(training, settings) if taken else ():
         for k in settings.modes:
             columns = make_columns(training, seen, "pod", k=k)
-            samples: dict[int, dict[str, Samples]] = {}
-            for method, substeps, iterations in steps:
-                if substeps not in samples:
-                    samples[substeps] = _samples(training, columns, substeps, settings.tau)
-                model = SubspaceModel("pod", columns, samples[substeps])
-                window = WINDOW if method == ACCELERATED else 0
-                loop, start = model.loop(substepped(scene, substeps, iterations, window))
-                labels: dict[str, object] = {
-                    "method": method,
-                    "substeps": substeps,
-                    "iterations": iterations,
-                    "trained_on": trained_on,
-                    "k": columns.modes,
-                    "elements_sampled": model.elements_evaluated(scene),
-                }
-                yield Candidate(labels, loop, start, substeps, model.positions)
+            for substeps in taken:
+                samples = _samples(training, columns, substeps, settings.tau)
+                yield Trained(trained_on, substeps, SubspaceModel("pod", columns, samples))
 
 
 def _training_frames(training: Scene, settings: Comparison) -> Iterator[tuple[str, np.ndarray]]:

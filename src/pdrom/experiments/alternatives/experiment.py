@@ -2,10 +2,11 @@
 
 One is the implicit step of the scene, solved to convergence: what more iterations approach. The
 other is the motion in continuous time, which the implicit step itself misses: what a user wants.
-All run the held-out motion; only the reduction has a training motion.
+All run the held-out motions; only the reduction has a training motion.
 """
 
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,17 +15,18 @@ import numpy as np
 import pandas as pd
 
 from pdrom.artifact.reads import Settings, SourcesOf
-from pdrom.core.paths import ALTERNATIVES, File
+from pdrom.core.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.experiments.alternatives.candidates import Candidate, candidates
+from pdrom.experiments.alternatives.candidates import Trained, candidates, trained
+from pdrom.experiments.alternatives.processes import Case, in_processes
 from pdrom.experiments.alternatives.settings import CONVERGED, Comparison
 from pdrom.experiments.alternatives.solvers.continuous import continuous
 from pdrom.experiments.kit.converged import converged_run
 from pdrom.experiments.kit.declaration import experiment
-from pdrom.experiments.kit.measurement import Variant, measure
 from pdrom.experiments.kit.settings import BlowupExtent
 from pdrom.model.constraints.base import GroupConfig
+from pdrom.model.held_out import FIRST
 from pdrom.model.metrics import trajectory_error
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import displacement_norms
@@ -33,8 +35,8 @@ log = logging.getLogger(__name__)
 
 COLUMNS = [
     "scene", "factor", "vertices", "stiffness", "method", "substeps", "iterations", "trained_on",
-    "k", "elements_sampled", "frames", "finite", "ms_per_frame", "ms_low", "ms_high",
-    "error_implicit", "error_continuous", "reference_error",
+    "k", "elements_sampled", "motion", "frames", "finite", "error_implicit", "error_continuous",
+    "reference_error",
 ]  # fmt: skip
 
 
@@ -68,25 +70,36 @@ class References:
 @experiment(
     "Alternatives to projective dynamics in {scene} with {factor} times the vertices along a side",
     reads={"sources": SourcesOf("scene.mesh"), "settings": Settings(Options)},
-    writes={"out": ALTERNATIVES},
+    writes={"out": ALTERNATIVES, "times": ALTERNATIVE_TIMES},
     alone=True,
 )
-def alternatives(sources: list[Path], settings: Options, out: File) -> None:
+def alternatives(sources: list[Path], settings: Options, out: File, times: File) -> None:
     """Compare all methods on one mesh: ``factor`` times the vertices along each side.
 
     Parameters
     ----------
     sources : files of the mesh; the job depends on them
     settings : scene, methods and limits
-    out : table, with the factor among its labels
+    out, times : tables of the errors and of the times, with the factor among their labels
     """
-    factor = float(out["factor"])
-    rows = []
-    for stiffness in settings.alternatives.factors(settings.scene.name, factor):
-        for row in _rows(sized(settings.scene, factor, stiffness), settings):
-            rows.append({"factor": factor, "stiffness": stiffness, **row})
+    factor, section = float(out["factor"]), settings.alternatives
+    rows, cases = [], []
+    for stiffness in section.factors(settings.scene.name, factor):
+        config = sized(settings.scene, factor, stiffness)
+        config = config.model_copy(update={"frames": min(section.compared, config.frames)})
+        training = Scene.build(config, config.mesh.build(Path()))
+        models = tuple(trained(training, section))
+        own = {"scene": config.name, "factor": factor, "stiffness": stiffness}
+        for motion in section.motions:
+            scene = Scene.build(config.heldout_variant(motion), training.mesh)
+            methods = section.methods(decide=motion != FIRST)
+            for row in _rows(scene, models, methods, settings):
+                rows.append({**own, "motion": motion, **row})
+            if motion == FIRST:
+                cases.append(Case(own, scene, models))
         log.info("%s: stiffness %g done", settings.scene.name, stiffness)
     write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
+    write_table(in_processes(cases, section), times.path)
 
 
 def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
@@ -101,32 +114,23 @@ def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
     return finer.model_copy(update={"vertex_mass": mass, "effects": effects})
 
 
-def _rows(config: SceneConfig, settings: Options) -> list[dict[str, Any]]:
-    section = settings.alternatives
-    config = config.model_copy(update={"frames": min(section.compared, config.frames)})
-    training = Scene.build(config, config.mesh.build(Path()))
-    scene = Scene.build(config.heldout_variant(), training.mesh)
-    against = references(scene, section)
-    found = list(candidates(scene, training, section))
+def _rows(
+    scene: Scene, models: tuple[Trained, ...], methods: tuple[str, ...], settings: Options
+) -> Iterator[dict[str, Any]]:
+    """Errors of every candidate in the motion of ``scene``, those of the reference first."""
+    frames, against = scene.config.frames, references(scene, settings.alternatives)
     common = {
-        "scene": config.name,
         "vertices": scene.mesh.vertices,
-        "frames": config.frames,
+        "frames": frames,
         "reference_error": against.error,
     }
     implicit = against.errors(against.implicit)
-    rows = [{**common, "method": CONVERGED, "substeps": 1, "finite": True, **implicit}]
-    for candidate in found:
+    yield {**common, "method": CONVERGED, "substeps": 1, "finite": True, **implicit}
+    for candidate in candidates(scene, models, settings.alternatives, methods):
         with np.errstate(over="ignore", invalid="ignore"):
-            reached = candidate.run(config.frames, settings.blowup_extent, scene.mesh.extent)
+            reached = candidate.run(frames, settings.blowup_extent, scene.mesh.extent)
         made = {"finite": reached is not None, **against.errors(reached)}
-        rows.append({**common, **candidate.labels, **made})
-    # what the runs compiled and factorised is there when the clock starts
-    times = measure([_variant(c, section.frames) for c in found], section.warmup, section.repeats)
-    for row, candidate, time in zip(rows[1:], found, times, strict=True):
-        ms = {"ms_per_frame": time.frame, "ms_low": time.low, "ms_high": time.high}
-        row |= {key: candidate.steps * value for key, value in ms.items()}
-    return rows
+        yield {**common, **candidate.labels, **made}
 
 
 def references(scene: Scene, section: Comparison) -> References:
@@ -146,10 +150,6 @@ def references(scene: Scene, section: Comparison) -> References:
         if implicit is None:
             log.warning("%s: no convergence in %d evaluations", name, section.implicit.limit)
     return References(implicit, exact.positions, exact.error)
-
-
-def _variant(candidate: Candidate, frames: int) -> Variant:
-    return Variant({}, candidate.loop, candidate.start, candidate.steps * frames)
 
 
 def _error(run: np.ndarray | None, reference: np.ndarray | None) -> float | None:

@@ -1,6 +1,6 @@
 """Section ``alternatives``: methods, their steps, and what they are compared with."""
 
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, TypeVar
 
 from pydantic import AfterValidator, Field
 
@@ -9,18 +9,31 @@ from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.alternatives.solvers.methods import METHODS
 from pdrom.experiments.kit.measurement import Protocol
 from pdrom.experiments.kit.settings import Count, Modes, Repeats, Tolerance
+from pdrom.model.held_out import FIRST, MOTIONS, HeldOutMotion
 
 REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # the others are full-order ones
 OWN: Final = "own iterations"  # frames that a reduction may be trained on, beside converged ones
+# What the text says is decided by these: the best of the others at large errors, and reductions.
+DECIDING: Final = ("projective", "anderson", "chebyshev", *REDUCTIONS)
 CONVERGED: Final = "converged"  # the implicit step itself, however long it takes
 
+# What tells candidates of a scene apart.
+SETTING: Final = ["method", "substeps", "iterations", "trained_on", "k"]
+
+Named = TypeVar("Named", dict[str, Any], tuple[str, ...])
 Trained = Literal["own iterations", "converged"]
 Factors = Annotated[tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...], Field(min_length=1)]
 Work = Annotated[int, Field(ge=1, le=10**12, description="vertices times steps")]
 Steps = Annotated[tuple[Count, Count], Field(description="substeps of a frame, iterations of each")]
 
 
-def _known(by_method: dict[str, Any]) -> dict[str, Any]:
+def _with_the_first(motions: tuple[HeldOutMotion, ...]) -> tuple[HeldOutMotion, ...]:
+    if motions[:1] != (FIRST,):
+        raise ValueError(f"begins with '{FIRST}', which all methods run")
+    return motions
+
+
+def _known(by_method: Named) -> Named:
     allowed = (*METHODS, *REDUCTIONS, CONVERGED)
     for name in by_method:
         if name not in allowed:
@@ -45,7 +58,7 @@ def _small(*substeps: int) -> tuple[Steps, ...]:
 def default_steps() -> dict[str, tuple[Steps, ...]]:
     """More iterations of one step, and more steps of one iteration."""
     return {
-        "projective": (*_sweep(1, 2, 5, 10, 20, 40, 80), *_small(2, 5, 10, 20, 40), (5, 4)),
+        "projective": (*_sweep(1, 2, 3, 4, 5, 10, 20, 40, 80), *_small(2, 5, 10, 20, 40), (5, 4)),
         "anderson": (*_sweep(5, 10, 20, 40, 80), (5, 5), (10, 5)),
         "chebyshev": _sweep(10, 20, 40, 80),
         "l-bfgs": (*_sweep(5, 10, 20, 40, 80), (5, 5), (10, 5)),
@@ -53,8 +66,8 @@ def default_steps() -> dict[str, tuple[Steps, ...]]:
         "xpbd": (*_sweep(5, 10, 20, 50), *_small(5, 10, 20, 50, 100)),
         "vertex-descent": (*_sweep(10, 20, 50), *_small(10, 20, 50)),
         "explicit": _small(5, 10, 20, 40, 80, 160),
-        REDUCED: _sweep(10, 20, 40, 80, 160),
-        ACCELERATED: _sweep(10, 20),
+        REDUCED: _sweep(5, 10, 20, 40, 80, 160),
+        ACCELERATED: _sweep(5, 10, 20),
     }
 
 
@@ -84,15 +97,15 @@ class Comparison(Protocol):
 
     ``steps`` has pairs (substeps of a frame, iterations of each) for each method. Errors are taken
     over ``compared`` frames of the held-out motion, for each factor on all weights that
-    ``stiffness`` has for the scene (1 if none, and on other meshes than its own); ``frames`` of
-    them are timed. The reduction has each of ``modes`` and samples to ``tau``, trained on the
-    training motion, its frames as they are or converged (``trained_on``). ``work`` bounds the
+    ``stiffness`` has for the scene (1 if none, and on other meshes than its own); the ``deciding``
+    methods run all of ``motions``. Each of ``processes`` new ones times ``frames`` of the first
+    motion, the first process by all methods and the others by the deciding ones: a frame takes the
+    same work in all motions. The reduction has each of ``modes`` and samples to ``tau``, trained on
+    the training motion, its frames as they are or converged (``trained_on``). ``work`` bounds the
     vertices times substeps times iterations of a frame of a method: steps beyond are left out
-    (converged: the implicit reference, one step of one iteration). Runs for the errors come first,
-    so that timings need no warm-up.
+    (converged: the implicit reference, one step of one iteration).
     """
 
-    warmup: Annotated[int, Field(ge=0, le=1000)] = 0
     compared: Count = 20
     stiffness: dict[str, Factors] = Field(default_factory=dict)
     steps: Annotated[
@@ -104,8 +117,15 @@ class Comparison(Protocol):
     trained_on: Annotated[tuple[Trained, ...], Field(min_length=1)] = (OWN, CONVERGED)
     implicit: ImplicitReference = ImplicitReference()
     continuous: ContinuousReference = ContinuousReference()
-    frames: Count = 4
-    repeats: Repeats = 5
+    motions: Annotated[tuple[HeldOutMotion, ...], AfterValidator(_with_the_first)] = MOTIONS
+    deciding: Annotated[tuple[str, ...], AfterValidator(_known)] = DECIDING
+    frames: Count = 2
+    repeats: Repeats = 3
+    processes: Repeats = 10
+
+    def methods(self, decide: bool) -> tuple[str, ...]:
+        """Methods that are run; those that ``decide``, or all of them."""
+        return tuple(m for m in self.steps if not decide or m in self.deciding)
 
     def factors(self, scene: str, size: float) -> tuple[float, ...]:
         """Factors on all weights of a scene with ``size`` times the vertices along a side."""

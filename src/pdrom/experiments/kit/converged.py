@@ -94,7 +94,7 @@ class _Pair:
     @classmethod
     def of(cls, matrix: sparse.csr_array, step: np.ndarray, change: np.ndarray) -> "_Pair":
         both = matrix @ np.hstack([step, change])
-        a_step, a_change = both[:, :3], both[:, 3:]
+        a_step, a_change = both[:, :3].copy(), both[:, 3:].copy()  # in one piece: read often
         return cls(step, change, a_step, a_change, float(np.vdot(step, a_change)))
 
 

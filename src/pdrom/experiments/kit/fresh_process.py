@@ -81,23 +81,28 @@ class Request(ConfigModel):
 
 
 def in_fresh_process(request: Request, folder: Path) -> pd.DataFrame:
-    """Rows of `COLUMNS` that a new process measures; ``folder`` receives the ``request``.
+    """Rows of `COLUMNS` that a new process measures; ``folder`` receives the ``request``."""
+    file = folder / "request.json"
+    file.write_text(request.model_dump_json(), encoding="utf-8")
+    new_process("pdrom.experiments.kit.fresh_process", str(file))
+    return read_table(request.result)
+
+
+def new_process(module: str, *arguments: str) -> None:
+    """Run a ``module`` in a process of its own.
 
     Raises
     ------
     PdromError
         The process failed; the message ends with its last line.
     """
-    file = folder / "request.json"
-    file.write_text(request.model_dump_json(), encoding="utf-8")
-    command = [sys.executable, "-m", "pdrom.experiments.kit.fresh_process", str(file)]
     ended = subprocess.run(
-        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
-    )
+        [sys.executable, "-m", module, *arguments],
+        stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False,
+    )  # fmt: skip
     if ended.returncode:
         last = ended.stderr.strip().rpartition("\n")[2]
         raise PdromError(f"a process that times frames ended with {ended.returncode}: {last}")
-    return read_table(request.result)
 
 
 def timed(request: Request) -> pd.DataFrame:

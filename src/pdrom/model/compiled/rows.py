@@ -56,6 +56,17 @@ def copied(numbers):
     return numbers.copy()
 
 
+@compiled(nogil=True)
+def write(numbers, to):
+    """Copy the flat array ``numbers`` into ``to``, which is at least as long.
+
+    Compiled code assigns no array to a slice: the message about shapes that could differ takes
+    seconds to compile.
+    """
+    for i in range(len(numbers)):
+        to[i] = numbers[i]
+
+
 def vertices(count: int) -> np.ndarray:
     """Zeros (count, 3), a view of rows of four."""
     return unflat(zeros(WIDTH * count))

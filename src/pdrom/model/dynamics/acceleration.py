@@ -10,7 +10,7 @@ same.
 import numpy as np
 
 from pdrom.model.compiled.functions import compiled
-from pdrom.model.compiled.rows import flat
+from pdrom.model.compiled.rows import flat, write
 from pdrom.model.compiled.vectors import dot
 
 # Relative Tikhonov term of the small least-squares problem: nearly parallel residual differences
@@ -62,12 +62,12 @@ def refuse(history, y, objective):
     """See `Anderson.refuse` of ``history``; ``y`` (n,) has this ``objective``."""
     start, _, image, _, _, _, numbers, last = history
     if numbers[DIFFERENCES] >= 1 and objective > last[0]:
-        y[:] = image
+        write(image, y)
         numbers[DIFFERENCES] = -1
         numbers[REFUSED] += 1
         return True
     last[0] = objective
-    start[:] = y
+    write(y, start)
     return False
 
 

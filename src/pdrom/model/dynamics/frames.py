@@ -37,17 +37,15 @@ def weighted(inertia, s):
 
 
 @compiled(nogil=True)
-def end(y, before, time_step):
-    """Positions and velocities (N, 3) at the end of a frame.
+def end(y, before, time_step, positions, velocities):
+    """Write ``positions`` and ``velocities`` (N, 3) at the end of a frame.
 
     From ``y``, rows of four, flat, the positions ``before`` (N, 3) and ``time_step``.
     """
-    positions, velocities = np.empty_like(before), np.empty_like(before)
     for i in range(len(before)):
         for axis in range(3):
             positions[i, axis] = y[WIDTH * i + axis]
             velocities[i, axis] = (positions[i, axis] - before[i, axis]) / time_step
-    return positions, velocities
 
 
 @compiled(nogil=True)

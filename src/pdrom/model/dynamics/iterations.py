@@ -12,7 +12,7 @@ import numpy as np
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.clock import clock, now
 from pdrom.model.compiled.functions import compiled
-from pdrom.model.compiled.rows import WIDTH
+from pdrom.model.compiled.rows import WIDTH, write
 from pdrom.model.constraints.local_kernel import PARTS, PREPARE, LocalPass, add_part
 from pdrom.model.constraints.second_thread import LINE, both, publish, wait_for
 from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, combine, refuse
@@ -157,7 +157,7 @@ def all_iterations(
     window = len(history[5])
     for k in range(first, end):
         before = now(watch)
-        rhs[:] = base
+        write(base, rhs)
         add_part(preparing[0], preparing[1], PREPARE, y.ctypes.data, rhs.ctypes.data)
         if assisted:
             publish(given, k - first + 1)

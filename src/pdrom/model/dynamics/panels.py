@@ -124,10 +124,14 @@ def _fill(indptr, indices, data, inverse, first, row_start, value_start, rows, v
             row = indices[k]
             if row >= b and place[row] < 0:
                 place[row] = 0
-                rows[start + count] = row
+                # columns are sorted: few rows are not at the end (a compiled sort takes a second)
+                new = start + count
+                while new > start and rows[new - 1] > row:
+                    rows[new] = rows[new - 1]
+                    new -= 1
+                rows[new] = row
                 count += 1
         own = rows[start : start + count]
-        own.sort()
         for k in range(count):
             place[own[k]] = k
         triangle = value_start[panel] + width

@@ -130,7 +130,9 @@ class VertexSpace(Space):
         return unflat(copied(flat(s)))
 
     def end(self, y: np.ndarray, before: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
-        return end(flat(y), before, h)
+        positions, velocities = np.empty_like(before), np.empty_like(before)
+        end(flat(y), before, h, positions, velocities)
+        return positions, velocities
 
     def compiled(
         self, local_steps: Sequence[Any], acceleration: Anderson | None = None

@@ -13,7 +13,7 @@ import numpy as np
 
 from pdrom.model.compiled.clock import now
 from pdrom.model.compiled.functions import compiled
-from pdrom.model.compiled.rows import WIDTH, empty, unflat, zeros
+from pdrom.model.compiled.rows import WIDTH, empty, unflat, write, zeros
 from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, forget
 from pdrom.model.dynamics.frames import end, predict, weighted
 from pdrom.model.dynamics.iterations import CompiledIterations, all_iterations
@@ -149,7 +149,7 @@ def _frames(
                 s[WIDTH * fixed[i] + axis] = targets[f, i, axis]
         load(beside, indptr, indices, data, targets[f], factor[2])
         base = weighted(inertia, s)
-        y[:] = s
+        write(s, y)
         if len(history[5]):
             forget(history)
         seconds[f, 0] = now(watch) - began
@@ -160,6 +160,5 @@ def _frames(
         began = now(watch)
         if len(floors):
             _correct(y, floors, fixed, targets[f])
-        after, speeds = end(y, positions[f], h)
-        positions[f + 1], velocities[f + 1] = after, speeds
+        end(y, positions[f], h, positions[f + 1], velocities[f + 1])
         seconds[f, 3] = now(watch) - began

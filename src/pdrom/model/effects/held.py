@@ -54,5 +54,5 @@ def held_path(
         known += 1
     paths = [b.path(frames[:known], q) for b, q in zip(active, current, strict=True)]
     if single:
-        return vertices, np.ascontiguousarray(paths[0])
+        return vertices, np.array(paths[0], order="C")  # a view is another type, compiled again
     return vertices, np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]

@@ -80,7 +80,8 @@ class Running:
         self._model = level.model
         self._loop: Stepper
         if self._model is None:
-            self._loop = level.scene(scene).stepper(track_objective=False)
+            # one factorisation serves all levels on a motion
+            self._loop = level.scene(scene).stepper(scene.system, track_objective=False)
         else:
             self._loop = self._model.loop(level.scene(scene))[0]
             self._project = projector(self._model.columns, scene.masses)

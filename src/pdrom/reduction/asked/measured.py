@@ -7,17 +7,18 @@ and the motion amplifies them: where the defects are no larger than those of mot
 tried, neither is the error, and where they are larger, it is taken to be larger by as much.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from time import thread_time
+from functools import cached_property, partial
 
 import numpy as np
 
 from pdrom.model.dynamics.stepper import State
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.dynamics.whole_frames import BLOCK
 from pdrom.model.scene import Scene
 from pdrom.reduction.asked.ask import QUANTITIES, Quantity, relative_error
 from pdrom.reduction.asked.level import WINDOW, Level, Running
+from pdrom.reduction.asked.loops import Loops
 
 # A full order whose frames are compared with those of others; references have as many iterations,
 # or twice as many, as long as these reach further.
@@ -26,34 +27,42 @@ MOST = 4 * CONVERGED.iterations
 # The frames of a motion count until starts this far apart (of the extent) and half the iterations
 # lead to positions that differ by more than this part of the motion: then round-off decides.
 MOVED, HORIZON, SEED = 1e-10, 5e-3, 0
+# Twice the iterations are worth it where so many times the frames count then.
+FURTHER = 1.1
 # Frames of a run whose defects are taken.
 PROBED = 6
+# Frames of a run for its time, at least.
+TIMED = 20
 
 
 class Motion:
     """A motion that levels are tried on, with its reference.
+
+    Frames of a reference are done as far as they are looked at: those after the end are not, except
+    for one that is taken ``whole``.
 
     iterations : of the reference
     end : frames before it count
     unit : root mean square displacement of a frame, m
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, whole: bool = False) -> None:
         self.scene = scene
         hair = np.random.default_rng(SEED).standard_normal(scene.mesh.points.shape)
         moved = MOVED * scene.mesh.extent * hair
         count, frames = CONVERGED.iterations, scene.config.frames
-        less = _accelerated(scene, count // 2, moved)
-        self.reference, self.iterations = _accelerated(scene, count), count
-        self.unit = _unit(self.reference)
-        self.end = _horizon(less, self.reference, self.unit)
-        while self.end < frames and count < MOST:
+        reference = _Accelerated(scene, count)
+        self.unit = _unit(reference.until(frames))
+        self.end = _horizon(_Accelerated(scene, count // 2, moved), reference, self.unit)
+        while FURTHER * self.end < frames and count < MOST:
+            further = _Accelerated(scene, 2 * count, moved)
+            end = _horizon(reference, further, self.unit)
             count *= 2
-            further = _accelerated(scene, count, moved)
-            end = _horizon(self.reference, further, self.unit)
-            if end <= 1.1 * self.end:
+            if end <= FURTHER * self.end:
                 break
-            self.reference, self.iterations, self.end = further, count, end
+            reference, self.end = further, end
+        self.iterations = reference.iterations
+        self.reference = reference.until(frames if whole else self.end)
 
     def error(self, positions: np.ndarray, quantity: Quantity) -> float:
         """Error in ``quantity`` of a run with ``positions`` (F + 1, N, 3) m, before the end."""
@@ -61,8 +70,27 @@ class Motion:
         return relative_error(positions[:last], self.reference[:last], quantity)
 
 
-def _accelerated(scene: Scene, iterations: int, moved: np.ndarray | None = None) -> np.ndarray:
-    return trajectory(Level(iterations, WINDOW).scene(scene), moved, track_objective=False)
+class _Accelerated:
+    """A run of ``scene`` from a start ``moved`` by (N, 3) m, done frame by frame as needed."""
+
+    def __init__(self, scene: Scene, iterations: int, moved: np.ndarray | None = None) -> None:
+        self.iterations, self.frames = iterations, scene.config.frames
+        self._running, self._state = Level(iterations, WINDOW).on(scene), scene.initial_state(moved)
+        self._positions = [self._state.positions]
+
+    def at(self, frame: int) -> np.ndarray:
+        """Positions (N, 3) m before ``frame``."""
+        while (done := len(self._positions) - 1) < frame:
+            some = range(done, min(done + BLOCK, self.frames))
+            states = list(self._running.run(self._state, some))
+            self._positions += [state.positions for state in states]
+            self._state = states[-1]
+        return self._positions[frame]
+
+    def until(self, frame: int) -> np.ndarray:
+        """Positions (frame + 1, N, 3) m before ``frame`` and all others before it."""
+        self.at(frame)
+        return np.stack(self._positions[: frame + 1])
 
 
 def _unit(reference: np.ndarray) -> float:
@@ -70,11 +98,13 @@ def _unit(reference: np.ndarray) -> float:
     return float(np.sqrt(np.mean(moved**2)))
 
 
-def _horizon(one: np.ndarray, other: np.ndarray, unit: float) -> int:
-    """Frames (of F) before the first at which two runs are too far apart."""
-    apart = np.linalg.norm((one - other)[1:], axis=(1, 2))
-    late = np.flatnonzero(~(apart <= HORIZON * unit))
-    return int(late[0]) if len(late) else len(apart)
+def _horizon(one: _Accelerated, other: _Accelerated, unit: float) -> int:
+    """Frames before the first at which two runs are too far apart."""
+    for frame in range(1, one.frames + 1):
+        apart = np.linalg.norm((one.at(frame) - other.at(frame))[None], axis=(1, 2))[0]
+        if not apart <= HORIZON * unit:
+            return frame - 1
+    return one.frames
 
 
 @dataclass(frozen=True)
@@ -82,33 +112,48 @@ class Tried:
     """A level on a motion.
 
     errors : of each quantity
-    defects : (n,) of some frames, in units of the motion
     ms : processor time of a frame
+    probe : takes the defects, which cost more than the run and are wanted of few levels
     """
 
     errors: dict[Quantity, float]
-    defects: np.ndarray
     ms: float
+    probe: Callable[[], np.ndarray]
+
+    @cached_property
+    def defects(self) -> np.ndarray:
+        """Defects (n,) of some frames, in units of the motion."""
+        return self.probe()
 
 
-def tried(level: Level, motion: Motion) -> Tried:
-    """Run ``level`` on a motion; its defects are taken with `exact_beside` it."""
-    running = level.on(motion.scene)
+def tried(level: Level, motion: Motion, loops: Loops | None = None) -> Tried:
+    """Run ``level`` on a motion, up to its end; defects are taken with `exact_beside` it.
+
+    ``loops`` on the motion take the place of fresh ones.
+    """
+    loops = loops or Loops(motion.scene)
+    running = loops.on(level)
     state = running.inside(motion.scene.initial_state())
-    frames, started = motion.scene.config.frames, thread_time()
+    frames = min(max(motion.end, TIMED), motion.scene.config.frames)
+    started = loops.clock()
     states = [state, *running.run(state, range(frames))]
-    ms = 1e3 * (thread_time() - started) / frames
+    ms = 1e3 * (loops.clock() - started) / frames
     positions = np.stack([running.positions(each.positions) for each in states])
     errors = {q: motion.error(positions, q) for q in QUANTITIES}
     last = max(motion.end - 1, 0)
     probed = np.unique(np.linspace(0, last, PROBED + 1).round().astype(int)[1:])
-    exact = exact_beside(level).on(motion.scene)
-    found = [
-        defect(running.outside(states[f]), running.outside(states[f + 1]), exact, frame=int(f))
+    ends = {
+        int(f): (running.outside(states[f]), running.outside(states[f + 1]))
         for f in probed
         if np.isfinite(positions[f + 1]).all()
-    ]
-    return Tried(errors, np.array(found) / motion.unit, ms)
+    }
+    return Tried(errors, ms, partial(_defects, level, motion, ends))
+
+
+def _defects(level: Level, motion: Motion, ends: dict[int, tuple[State, State]]) -> np.ndarray:
+    exact = exact_beside(level).on(motion.scene)
+    found = [defect(*around, exact, frame) for frame, around in ends.items()]
+    return np.array(found) / motion.unit
 
 
 def exact_beside(level: Level) -> Level:

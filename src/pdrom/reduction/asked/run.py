@@ -8,7 +8,6 @@ while little is spent, and goes on with a more accurate level. Nothing depends o
 
 import logging
 from dataclasses import dataclass
-from time import thread_time
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.asked.ask import Ask
 from pdrom.reduction.asked.hierarchy import AskSettings, Hierarchy, Step, check_frames
 from pdrom.reduction.asked.level import Level, Running
+from pdrom.reduction.asked.loops import Loops
 from pdrom.reduction.asked.measured import defect, exact_beside
 
 log = logging.getLogger(__name__)
@@ -92,9 +92,18 @@ class CheckedRun:
     ----------
     own : made of the training motion
     settings : those that the hierarchy was made with
+    loops : on the motion of ``scene``, in place of fresh ones
     """
 
-    def __init__(self, scene: Scene, own: Hierarchy, ask: Ask, settings: AskSettings) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        own: Hierarchy,
+        ask: Ask,
+        settings: AskSettings,
+        loops: Loops | None = None,
+    ) -> None:
+        self._loops = loops or Loops(scene)
         self.scene, self._own, self._ask, self._settings = scene, own, ask, settings
         self._frames = scene.config.frames
         self._steps = own.admissible(ask, settings.factor)
@@ -115,7 +124,7 @@ class CheckedRun:
     def _on(self, level: Level) -> Running:
         key = level.iterations, level.window, id(level.model)  # models live as long as the run
         if key not in self._running:
-            self._running[key] = level.on(self.scene)
+            self._running[key] = self._loops.on(level)
         return self._running[key]
 
     def outcome(self) -> Asked:
@@ -125,7 +134,7 @@ class CheckedRun:
         step = self._steps[0] if promised else self._last
         expected = self._settings.factor * self._own.expected(step, self._ask)
         start = self.scene.initial_state()
-        whole, started = self._on(self._dear.level), thread_time()
+        whole, started = self._on(self._dear.level), self._loops.clock()
         kept = begun = _Done(((whole, start.positions),), start)
         while kept.frame < self._frames:
             done, keeps = self._advance(kept, step)
@@ -141,7 +150,7 @@ class CheckedRun:
             early = self._work <= EARLY * self._frames * self._dear.work
             kept, step = begun if early else kept, following
             log.info("frame %d: goes on with %s", kept.frame, step.level.title)
-        return self._told(kept, promised, expected, thread_time() - started)
+        return self._told(kept, promised, expected, self._loops.clock() - started)
 
     def _advance(self, kept: _Done, step: Step) -> tuple[_Done, bool]:
         """Frames up to the next check or the end; whether the estimate is within the ask."""

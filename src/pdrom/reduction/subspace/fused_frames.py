@@ -2,6 +2,7 @@
 
 from pdrom.model.compiled.clock import now
 from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.rows import write
 from pdrom.model.constraints.gradient_kernel import call
 from pdrom.model.dynamics.acceleration import combine, forget, refuse
 from pdrom.reduction.subspace.dense import product
@@ -22,7 +23,7 @@ def iterations(count, size, rows, operators, sampled, history):
     addresses, elements, starts, parameters, parameter_starts, d, p = sampled
     y, accelerated = z[: 3 * size], len(history[5]) > 0
     if accelerated:
-        start[:] = y
+        write(y, start)
         forget(history)
     for k in range(count):
         product(strain, rows, size, offset, z, d)

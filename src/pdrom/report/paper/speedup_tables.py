@@ -70,12 +70,13 @@ def pays(tables: Tables) -> str:
             _size(row.from_plain),
             _size(row.from_best),
             in_words(row.speedup, row.speedup_low, row.speedup_high),
+            f"{row.reached} of {row.motions}",
         ]
         for row in tables["reduction_pays"].itertuples()
         if not pd.isna(row.speedup)
     ]
-    header = ["scene", "against", "error", "vertices", "plain", "all", "speed-up"]
-    return tabular(header, rows, "lllrrrr")
+    header = ["scene", "against", "error", "vertices", "plain", "all", "speed-up", "motions"]
+    return tabular(header, rows, "lllrrrrr")
 
 
 def large_meshes(tables: Tables) -> str:

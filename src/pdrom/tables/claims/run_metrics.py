@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.tables.claims.rows import VALUE, Tables, filtered, labelled
+from pdrom.tables.kit.families import families
 from pdrom.tables.kit.held_out import MEDIAN, with_held_out
 
 Values = Callable[[Tables, dict, float], pd.DataFrame]
@@ -94,11 +95,13 @@ def error_trend(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
 
 
 def trend_p_value(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
-    """P-value of Page's test (1963) that errors rise with the sizes, over all experiments together.
+    """P-value of Page's test (1963) that errors rise with the sizes, over families of scenes.
 
-    An experiment (scene, group, method) is a block, the places of its sizes in ascending order are
-    the treatments; blow-ups share the highest rank. Blocks with the most common number of sizes
-    count; one value, or none with fewer than two blocks of three sizes.
+    The places of the sizes of an experiment (scene, group, method) in ascending order are the
+    treatments, and blow-ups share the highest rank of its errors. A scene, its twin and the methods
+    on both are no independent observations: the mean ranks of a family's experiments are one block.
+    Experiments with the most common number of sizes count; one value, or none with fewer than two
+    blocks of three sizes.
     """
     rows = _tried(filtered(_reruns(tables, where), where))
     return _page(rows, "relative_error_within_horizon")
@@ -111,19 +114,22 @@ def repeated_trend_p_value(tables: Tables, where: dict, accuracy: float) -> pd.D
 
 def _page(rows: pd.DataFrame, error: str) -> pd.DataFrame:
     """One p-value, or no row with fewer than two blocks of three sizes."""
-    blocks = [
-        run[error].rank(na_option="bottom").to_numpy(float)
-        for _, run in rows.sort_values("r").groupby(["scene", "group", "method"], sort=False)
+    runs = [
+        run for _, run in rows.sort_values("r").groupby(["scene", "group", "method"], sort=False)
     ]
-    lengths = [len(block) for block in blocks]
+    lengths = [len(run) for run in runs]
     common = max(set(lengths), key=lambda n: (lengths.count(n), n), default=0)
     # a second of every plan, which reads the claims but computes none, were it imported above
-    from scipy.stats import page_trend_test
+    from scipy.stats import page_trend_test, rankdata
 
-    ranks = [block for block in blocks if len(block) == common]
+    ranks: dict[str, list[np.ndarray]] = {}
+    for run in (run for run in runs if len(run) == common):
+        ranked = run[error].rank(na_option="bottom").to_numpy(float)
+        ranks.setdefault(families(run.scene).iloc[0], []).append(ranked)
     if len(ranks) < 2 or common < 3:
         return pd.DataFrame(columns=[VALUE])
-    return pd.DataFrame({VALUE: [float(page_trend_test(ranks, ranked=True).pvalue)]})
+    blocks = [rankdata(np.mean(own, axis=0)) for own in ranks.values()]
+    return pd.DataFrame({VALUE: [float(page_trend_test(blocks, ranked=True).pvalue)]})
 
 
 def noise_error(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:

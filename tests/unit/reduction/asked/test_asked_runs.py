@@ -1,6 +1,7 @@
 """Asked errors: what is promised is kept, what cannot be kept is said, and repairs come in time."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from pdrom.reduction.asked import run as checked
 from pdrom.reduction.asked.ask import Ask, read_ask, relative_error
 from pdrom.reduction.asked.hierarchy import AskSettings, Hierarchy, check_frames, hierarchy
 from pdrom.reduction.asked.level import Level
+from pdrom.reduction.asked.loops import Remembered
 from pdrom.reduction.asked.measured import CONVERGED, Motion, Tried, exact_beside
 from pdrom.reduction.asked.run import CheckedRun
 
@@ -76,6 +78,10 @@ def test_two_runs_are_the_same_to_the_last_bit(scene, own):
     )  # fmt: skip
 
 
+def tiny(found: Tried) -> np.ndarray:
+    return found.defects * 1e-6
+
+
 def forgetful(own: Hierarchy) -> Hierarchy:
     """The hierarchy with reductions that were never seen to miss anything: every check alarms."""
     return replace(
@@ -83,7 +89,7 @@ def forgetful(own: Hierarchy) -> Hierarchy:
         steps=[
             s
             if s.level.model is None
-            else replace(s, tried=[replace(t, defects=t.defects * 1e-6) for t in s.tried])
+            else replace(s, tried=[replace(t, probe=partial(tiny, t)) for t in s.tried])
             for s in own.steps
         ],
     )
@@ -96,6 +102,17 @@ def test_a_run_that_leaves_what_was_tried_ends_in_full_order(scene, own):
     assert done.promised
     assert done.changes[-1][1].startswith("full order")
     assert Motion(scene).error(done.positions, "position") <= 0.05
+
+
+def test_a_run_on_loops_that_remember_is_the_same(scene, own):
+    chosen, ask, loops = forgetful(with_reductions_first(own)), Ask(error=0.05), Remembered(scene)
+    alone = CheckedRun(scene, chosen, ask, SETTINGS).outcome()
+    for _ in range(2):
+        done = CheckedRun(scene, chosen, ask, SETTINGS, loops).outcome()
+        assert np.array_equal(done.positions, alone.positions)
+        assert (done.changes, done.estimate, done.work) == (
+            alone.changes, alone.estimate, alone.work,
+        )  # fmt: skip
 
 
 def test_an_early_repair_starts_anew_and_a_late_one_keeps_what_was_checked(scene, own, monkeypatch):
@@ -121,7 +138,7 @@ def test_nothing_is_promised_where_the_full_order_fails_too(scene, own):
         steps=[
             replace(
                 s,
-                tried=[Tried({"position": 1.0, "velocity": 1.0}, t.defects, 1.0) for t in s.tried],
+                tried=[replace(t, errors={"position": 1.0, "velocity": 1.0}) for t in s.tried],
             )
             for s in own.steps
         ],

@@ -267,9 +267,10 @@ def _write_tables(results, scenes, methods, rng) -> None:
     ]
     rungs = [("up", "published code"), ("up", "+ affine"), ("down", "- QR"), ("signs", "signs 1")]
     others = [
-        (scene, 400, stiffness, method, n, 0.1 * n, None if n > 4 else 0.1 / n, 0.3 / n)
+        (scene, 400, stiffness, motion, method, n, 0.1 * n, None if n > 4 else 0.1 / n, 0.3 / n)
         for scene in scenes
         for stiffness in (1.0, 100.0)
+        for motion in ("heldout", "kick")
         for method in ("converged", "projective", "newton", "ecsw")
         for n in (1, 2, 5)
     ]
@@ -418,7 +419,8 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "claims_sensitivity": (variations, "claim part varied variation verdict_of_rules same"),
         "subspace_ablation": (ablation, "scene position_basis k r variant gain"
          " relative_error_within_horizon relative_error_full_projections"),
-        "alternatives": (others, "scene vertices stiffness method substeps ms_per_frame"
+        "alternatives": (others, "scene vertices stiffness motion method substeps"
+         " ms_per_frame"
          " error_implicit error_continuous"),
         "bounds": (bounds, "scene group method r bound max_extent slack contraction finite"),
         "estimates": (estimates, "scene position_basis split relative_error_within_horizon"

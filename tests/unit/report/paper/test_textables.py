@@ -205,8 +205,8 @@ TABLES = {
     ),
     "reduction_pays": pd.DataFrame(
         [
-            ("s_one", 1.0, "implicit", 0.1, 400, 10_000, 400, 1600, 900.0, 17.0, 15.0, 20.0),
-            ("s_two", 100.0, "continuous", 0.01, 400, 400, *6 * [None]),
+            ("s_one", 1.0, "implicit", 0.1, 400, 10_000, 400, 1600, 900.0, 17.0, 15.0, 20.0, 3, 2),
+            ("s_two", 100.0, "continuous", 0.01, 400, 400, *6 * [None], 3, 0),
         ],
         columns=[
             "scene",
@@ -221,6 +221,8 @@ TABLES = {
             "speedup",
             "speedup_low",
             "speedup_high",
+            "motions",
+            "reached",
         ],
     ),
     "large_meshes": pd.DataFrame(
@@ -338,7 +340,7 @@ def test_exponents_of_one_thread():
 
 def test_errors_that_a_reduction_does_not_reach_are_left_out():
     assert rows(TEX_TABLES["tab_pays"](TABLES)) == [
-        r"\texttt{s\_one} & implicit & 0.10 & 400 to 10000 & 400 & 1600 & 17 (15 to 20) \\"
+        r"\texttt{s\_one} & implicit & 0.10 & 400 to 10000 & 400 & 1600 & 17 (15 to 20) & 2 of 3 \\"
     ]
 
 

@@ -203,6 +203,11 @@ def test_the_trend_of_all_experiments_together(monkeypatch):
     monkeypatch.setitem(globals(), "RERUNS", rising)
     where = {"method": "deim"}
     assert measured("trend_p_value", **where) == pytest.approx([1.0 / 216.0])
+    # a twin and another method add no block
+    more = [(f"{s}_twin", *rest) for s, *rest in rising]
+    more += [(*row[:2], "qdeim", *row[3:]) for row in rising]
+    monkeypatch.setitem(globals(), "RERUNS", [*rising, *more])
+    assert measured("trend_p_value") == pytest.approx([1.0 / 216.0])
     falling = [(*row[:8], 1.0 / row[8], 1.0) for row in rising]
     monkeypatch.setitem(globals(), "RERUNS", falling)
     assert measured("trend_p_value", **where) == pytest.approx([1.0])
