@@ -140,8 +140,6 @@ def make(
 
     Parameters
     ----------
-    settings : plain data
-    labels : those of the job
     code : fingerprint of the code that it runs
     inputs, outputs : paths by name
     rule : name of the workflow's rule, recorded in what is written

@@ -56,12 +56,7 @@ class Ladder(Repetitions):
     sizes: tuple[Modes, ...] = ()
 
     def rungs(self, p: int) -> list[tuple[str, MethodSpec, int | None, int]]:
-        """(direction, method, seed of the signs, size) of all rows of a group, in order.
-
-        Parameters
-        ----------
-        p : rows of an element
-        """
+        """(direction, method, seed of the signs, size) of all rows of a group, in order."""
         rows: list[tuple[str, MethodSpec, int | None, int]] = []
         rows += [("up", method, None, self.r) for method in self.up]
         rows += [("down", method, None, self.r) for method in self.down]

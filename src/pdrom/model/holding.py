@@ -22,14 +22,7 @@ NAMED = 10
 
 
 def check_holds(boundaries: Sequence[Boundary], scene: str, frames: int) -> None:
-    """SceneError for a vertex that is held twice at once, unless nothing that holds it moves.
-
-    Parameters
-    ----------
-    boundaries : holds of the scene
-    scene : its name
-    frames : their number
-    """
+    """SceneError for a vertex that is held twice at once, unless nothing that holds it moves."""
     for first, second in combinations(boundaries, 2):
         if not (first.moves or second.moves):
             continue
@@ -73,12 +66,6 @@ def log_obstructed(
 
     Vertices that are taken hold of later are taken to be where obstacles have pushed the mesh at
     rest, ``points`` (N, 3) m.
-
-    Parameters
-    ----------
-    boundaries, contacts : holds and obstacles of the scene
-    scene : its name
-    frames : their number
     """
     obstacles = [contact for contact in contacts if contact.each_alone]
     inside, blocked = np.zeros(len(points), dtype=bool), dict[str, None]()
@@ -107,13 +94,7 @@ def log_obstructed(
 def log_contacts(
     contacts: Sequence[Contact], boundaries: Sequence[Boundary], scene: str, rest: np.ndarray
 ) -> None:
-    """Warn of contacts that do not fit the shape ``rest`` (N, 3) m; held vertices do not count.
-
-    Parameters
-    ----------
-    contacts, boundaries : obstacles and holds of the scene
-    scene : its name
-    """
+    """Warn of contacts that do not fit the shape ``rest`` (N, 3) m; held vertices do not count."""
     free = np.ones(len(rest), dtype=bool)
     for boundary in boundaries:
         if boundary.active(0):

@@ -68,13 +68,7 @@ class Manifest(_Record):
 
 
 def write_manifest(plan: Plan, folders: Folders, options: Iterable[str]) -> tuple[Manifest, bool]:
-    """Write the manifest of a study whose run has succeeded; say whether it is another now.
-
-    Parameters
-    ----------
-    plan, folders : of the study
-    options : of the command line that name its configuration
-    """
+    """Write the manifest of a study whose run has succeeded; say whether it is another now."""
     environments: dict[str, dict[str, str]] = {}
     files = {}
     for path in sorted(study_files(plan, folders)):

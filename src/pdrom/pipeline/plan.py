@@ -43,9 +43,7 @@ def load_plan(
 
     Parameters
     ----------
-    root : folder of the project
     files : where the configuration came from, for the messages
-    folders : of its results
     quiet : whether warnings are dropped, see `pdrom.core.logs.planning_log`
     """
     names = [os.path.relpath(path, root) for path in files] or [FULL_STUDY]

@@ -137,12 +137,7 @@ def _method(row: pd.Series) -> str:
 
 
 def on_resolution(scaling: pd.DataFrame, iterations: int, ms: float) -> Iterator[str]:
-    """Largest meshes whose frames of so many iterations take at most ``ms``, by method.
-
-    Parameters
-    ----------
-    scaling : the scene's rows of the table scaling
-    """
+    """Largest meshes whose frames of so many iterations take at most ``ms``, by method."""
     yield f"resolution (K = {iterations}; the errors above are those of the scene's own mesh):"
     if not len(scaling):
         yield "  not measured for this scene (key scaling.scenes of the configuration)"

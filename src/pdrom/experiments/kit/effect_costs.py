@@ -90,8 +90,6 @@ def effect_costs(
 
     Parameters
     ----------
-    system : matrix of the global step of ``scene``
-    frames : of a timed run
     warmup, repeats : runs before the timed ones, and timed ones
     """
     roles: list[Sequence[Effect]] = []

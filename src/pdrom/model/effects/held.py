@@ -34,7 +34,6 @@ def held_path(
 
     Parameters
     ----------
-    boundaries : holds of the scene
     positions : (N, 3) m at the beginning of the first frame
     """
     active = [b for b in boundaries if b.active(frames.start)]

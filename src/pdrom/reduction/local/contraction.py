@@ -49,7 +49,6 @@ class Tangent:
         ----------
         matrix : (N, N) A
         held : vertices held in the frame, ascending
-        group : the reduced group
         """
         free = np.setdiff1d(np.arange(len(matrix)), held)
         inverse = np.zeros_like(matrix)

@@ -18,9 +18,6 @@ class EstimateAlarm(Alarm):
 
     Parameters
     ----------
-    scene : of the run
-    group : the reduced group
-    companion : auxiliary model of the scene
     motion : of the training run, see `RunningEstimate`
     """
 

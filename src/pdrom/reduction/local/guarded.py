@@ -36,12 +36,7 @@ class Trained:
 
     @classmethod
     def on(cls, reference: np.ndarray, companion: SubspaceModel | None = None) -> "Trained":
-        """Take them from the training run's positions ``reference``, (F + 1, N, 3) m.
-
-        Parameters
-        ----------
-        companion : auxiliary model that estimates the error
-        """
+        """Take them from the training run's positions ``reference``, (F + 1, N, 3) m."""
         return cls(largest_extent(reference), mean_motion(reference), companion)
 
 
@@ -58,9 +53,7 @@ def guarded(
     Parameters
     ----------
     scene, system : the run's scene and its global system
-    group, reduction : name of the reduced group, and its reduction
     settings : alarm and reaction
-    trained : facts about the training run
 
     Raises
     ------

@@ -22,7 +22,6 @@ def reach(
     ----------
     largest : (e,) bounds of | p_e |_F, see `pdrom.experiments.kit.boundedness.largest_projections`
     compliance : (N, N) K^+, m/N
-    group, reduction : constraint group and its reduction
     """
     mean = np.linalg.norm(reduction.basis.mean.reshape(group.elements, -1), axis=1)
     radii = np.repeat(largest + mean, 3 * group.rows_per_element)

@@ -51,10 +51,6 @@ def block_deim(
 ) -> Interpolation:
     """Interpolation of a group's projections with the first ``spec.modes`` modes of ``basis``.
 
-    Parameters
-    ----------
-    columns : position subspace
-
     Raises
     ------
     SamplingError

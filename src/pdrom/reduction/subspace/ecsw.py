@@ -41,7 +41,6 @@ def ecsw_elements(
     Parameters
     ----------
     tolerances : relative residuals tau of the training equations at which NNLS stops
-    columns : position subspace
     """
     count = CANDIDATES
     while True:
@@ -87,10 +86,6 @@ def training_equations(
     Many equations are hashed to `SKETCH` K rows with random signs (seeded), which keeps norms of
     combinations up to a few per cent (count sketch, Charikar et al. 2002) and never forms an e x e
     matrix.
-
-    Parameters
-    ----------
-    columns : position subspace
     """
     strain = np.ascontiguousarray(group.S @ columns.B)
     weighted = strain * group.row_weights[:, None]

@@ -25,8 +25,6 @@ def interpolate(
 
     Parameters
     ----------
-    columns : position subspace
-    training : states that train it
     spec : modes, states, oversampling, bounds
     """
     made = {g.name: block_deim(g, columns, training.basis(g, spec), spec) for g in scene.groups}

@@ -122,10 +122,6 @@ def sample_elements(
     They are trained on iterates of the subspace with all projections, in some of the training
     ``frames`` of a run that begins at ``start`` (coordinates) or where the scene does, and meet the
     tolerances in ``norm`` (see module `training`).
-
-    Parameters
-    ----------
-    columns : position subspace
     """
     chosen = frames[np.unique(np.linspace(0, len(frames) - 1, FRAMES).round().astype(int))]
     training = training_run(scene, columns, chosen, start, norm)

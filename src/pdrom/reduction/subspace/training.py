@@ -61,7 +61,6 @@ def training_run(
 
     Parameters
     ----------
-    columns : position subspace
     norm : in which the sampling's equations are measured
     """
     steps = [SubspaceLocalStep(group, columns) for group in scene.groups]

@@ -24,7 +24,6 @@ def claims_page(
 
     Parameters
     ----------
-    tests, verdicts : the tables claims_tests and claims
     pages : of the figures by their names
     """
     found = verdicts.set_index("claim")

@@ -66,7 +66,6 @@ def durations(count: int, rate: float) -> list[int]:
 
     Parameters
     ----------
-    count : number of pictures
     rate : pictures a second
     """
     ends = np.round(100.0 / rate * np.arange(count + 1))

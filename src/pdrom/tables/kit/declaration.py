@@ -83,12 +83,7 @@ def _flags(values: pd.Series) -> pd.Series:
 
 
 def text(name: str, meaning: str) -> Column:
-    """Column ``name`` of words.
-
-    Parameters
-    ----------
-    meaning : for readers, in a few words
-    """
+    """Column ``name`` of words; ``meaning`` tells readers what it holds, in a few words."""
     return Column(name, "text", meaning)
 
 
@@ -210,8 +205,6 @@ def table(
 
     Parameters
     ----------
-    title : for readers
-    columns : in their order
     timed_cells : see `Table`
 
     Raises

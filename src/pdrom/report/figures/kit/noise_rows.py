@@ -33,8 +33,6 @@ def noise_rows(
 
     Parameters
     ----------
-    results, options : of the figure
-    floors : of the scenes
     table : rows of the table ``noise`` of this scene and group
     """
     camera = options.camera
