@@ -1,6 +1,6 @@
 """Jobs of artifacts: what each reads, writes and depends on, from the declarations and a study."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -175,10 +175,3 @@ class Resolver:
 def listed(paths: Paths) -> list[str]:
     """List of one path, or of several, ``paths``."""
     return [paths] if isinstance(paths, str) else list(paths)
-
-
-def of_wildcards(
-    resolver: Resolver, artifact: Artifact, value: Callable[[Job], Any]
-) -> Callable[[Mapping[str, str]], Any]:
-    """``value`` of a job, ``artifact`` by ``resolver``, as the workflow's function of wildcards."""
-    return lambda wildcards: value(resolver.job(artifact, wildcards))

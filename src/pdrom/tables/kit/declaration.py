@@ -228,11 +228,6 @@ def declared(package: str = "pdrom.tables") -> dict[str, Table]:
     return declared_in(package, Table)
 
 
-def timing_columns() -> dict[str, tuple[str, ...]]:
-    """Return the columns of each table in which two runs on one machine may differ."""
-    return {name: t.timing_columns for name, t in declared().items() if t.timing_columns}
-
-
 def _require_distinct(made: Table) -> None:
     names = made.column_names
     twice = sorted({name for name in names if names.count(name) > 1})
