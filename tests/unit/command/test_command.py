@@ -1,6 +1,5 @@
 """The command line: each command does its work, says it in a line, and ends with its code."""
 
-import io
 import os
 import shutil
 import subprocess
@@ -18,9 +17,7 @@ from pdrom.api import load_scene
 from pdrom.command.base import Status
 from pdrom.command.main import COMMANDS, parser, run
 from pdrom.command.new import template
-from pdrom.command.progress import Progress, line
 from pdrom.core.store import check_file
-from pdrom.model.dynamics.stepper import FrameReport
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene, SceneConfig
@@ -482,37 +479,6 @@ def test_an_interrupt_is_said(folder, monkeypatch, capsys):
     monkeypatch.setattr("pdrom.api.run", interrupted)
     assert run(["run", "small.yaml"]) == 130
     assert capsys.readouterr().err == "\npdrom: interrupted\n"
-
-
-def test_progress_is_a_line_each_tenth_where_nobody_watches():
-    stream = io.StringIO()
-    told = Progress("small", 40, stream)
-    for frame in range(40):
-        told(frame, FrameReport(np.zeros(0), np.full(4, 5e-4)))
-    lines = stream.getvalue().splitlines()
-    assert len(lines) == 10
-    assert "frame 40 of 40, 2.00 ms a frame, 0 s left" in lines[-1]
-    assert (
-        line("a", 1, 2, 1.0, 3.0)
-        == f"a [{'#' * 12}{'.' * 12}] frame 1 of 2, 1.00 ms a frame, 3 s left"
-    )
-
-
-def test_progress_on_a_terminal_is_one_line_that_is_written_again(monkeypatch):
-    """A fifth of a second apart; the frame that may compile kernels is no measure of the others."""
-    stream = io.StringIO()
-    stream.isatty = lambda: True
-    times = iter([0.0, 50.0, *(50.0 + 0.125 * frame for frame in range(1, 10))])
-    monkeypatch.setattr("pdrom.command.progress.monotonic", lambda: next(times))
-    told = Progress("small", 10, stream)
-    for frame in range(10):
-        told(frame, FrameReport(np.zeros(0), np.full(4, 5e-4)))
-    shown = stream.getvalue()
-    assert shown.endswith("  \n")
-    assert shown.count("\n") == 1
-    frames = [text.split("frame ")[1].split(" of ")[0] for text in shown.split("\r")[1:]]
-    assert frames == ["1", "3", "5", "7", "9", "10"]
-    assert "frame 5 of 10, 2.00 ms a frame, 1 s left" in shown
 
 
 def test_a_page_without_a_browser_is_opened_by_hand(folder, finished, monkeypatch, capsys):
