@@ -19,7 +19,7 @@ from pdrom.core.paths import ASK_SCORES, ASKS, File
 from pdrom.core.store import write_table
 from pdrom.experiments.kit.declaration import experiment
 from pdrom.experiments.kit.settings import Tolerance
-from pdrom.model.held_out import FIRST, MOTIONS
+from pdrom.model.held_out import FIRST, MOTIONS, HeldOutMotion
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.asked.ask import Ask
 from pdrom.reduction.asked.hierarchy import JUDGED, AskSettings, Hierarchy, hierarchy
@@ -43,9 +43,10 @@ Factor = Annotated[float, Field(ge=1.0, le=100.0)]
 
 
 class AskedErrors(AskSettings):
-    """Every ask of ``errors``, run with every one of ``factors``."""
+    """Every ask of ``errors``, run on each of ``motions`` with every one of ``factors``."""
 
     errors: tuple[Tolerance, ...] = (0.1, 0.03, 0.01)
+    motions: Annotated[tuple[HeldOutMotion, ...], Field(min_length=1)] = MOTIONS
     factors: Annotated[tuple[Factor, ...], Field(min_length=1)] = (2.0, 4.0, 6.0)
 
 
@@ -86,7 +87,7 @@ def asks(
     found = list(_scores(own, Motion(CALIBRATION.of(training)), config.name))
     write_table(pd.DataFrame(found, columns=SCORE_COLUMNS), scores.path)
     rows: list[dict[str, Any]] = []
-    for name in MOTIONS:
+    for name in section.motions:
         variant = Scene.build(config.heldout_variant(name), training.mesh, masses=training.masses)
         rows += _asked(variant, name, own, section)
         log.info("%s: %s done", config.name, name)

@@ -211,11 +211,11 @@ class _Case:
         """Whether the guard sees a run, which doubles its time.
 
         One that acts sees all. One that only reports sees those whose alarms are counted: all of
-        the training motion, those of full rank of the first held-out one.
+        the training motion, those of full rank of the held-out ones.
         """
         if self.settings.guard.action not in ("none", "report") or self.motion == TRAINING:
             return True
-        return self.motion == FIRST and r == self.basis.rank
+        return r == self.basis.rank
 
 
 def _store(store: h5py.Group, outcome: Rerun, displacement: np.ndarray, seen: GuardRecord) -> None:

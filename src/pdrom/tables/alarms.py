@@ -8,18 +8,21 @@ import pandas as pd
 from pdrom.artifact.reads import Every, Setting, TableOf
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.model.held_out import FIRST
 from pdrom.tables.gain_prediction import FAILED
 from pdrom.tables.kit.declaration import compared, integer, number, table, text
 from pdrom.tables.kit.parts import joined
 
-_KEYS = ["scene", "group", "method", "r"]
+_KEYS = ["scene", "group", "method", "r", "motion"]
+_ERROR = "relative_error_within_horizon"
 
 
 @table(
     title="Alarms at run time: failures noticed, and false alarms",
     columns=(
-        text("split", "motion of the runs: train, heldout"),
+        text(
+            "split",
+            "motion of the runs: train; heldout, which counts those of all held-out motions",
+        ),
         text("alarm", "what gives it: trained-range, estimate"),
         compared("exact", number("threshold", "largest estimate that is no alarm")),
         compared("share", integer("runs", "runs with projections alone reduced")),
@@ -49,7 +52,8 @@ def alarms(
     threshold: float,
     alarm: str,
 ) -> pd.DataFrame:
-    """For each motion a row for the alarm of the reruns' guard and one for the estimate.
+    """For runs of the training and of held-out motions, a row for the reruns' guard and one for
+    the estimate.
 
     Both count the same runs. The ``estimates`` are those of the runs as they are, frame by frame.
 
@@ -59,14 +63,14 @@ def alarms(
     guarded, guarded_heldout : tables of the reruns, with what their guard saw
     threshold, alarm : of that guard
     """
+    seen = [joined(files) for files in (guarded, guarded_heldout)]
+    if any(table.empty for table in seen):
+        return pd.DataFrame()
+    parts = {"train": (reruns.assign(motion="train"), seen[0].assign(motion="train"))}
+    parts["heldout"] = (heldout, seen[1])
     rows: list[dict[str, Any]] = []
-    for split, runs, files in (
-        ("train", reruns, guarded),
-        (FIRST, heldout[heldout.motion == FIRST], guarded_heldout),
-    ):
-        watched = joined(files)
-        own = watched if watched.empty else watched[watched.guard_count.notna()]
-        own = own[own.motion == FIRST] if split == FIRST and len(own) else own
+    for split, (runs, watched) in parts.items():
+        own = watched[watched.guard_count.notna()]
         rows += _rows(split, runs, own, estimates, threshold, alarm)
     return pd.DataFrame(rows)
 
@@ -79,18 +83,18 @@ def _rows(
     threshold: float,
     alarm: str,
 ) -> Iterator[dict[str, Any]]:
-    own = estimates[(estimates.split == split) & (estimates.position_basis == "full")]
-    own = own[[*_KEYS, "largest_estimate"]].astype({"r": "int64"})
-    if own.empty or guarded.empty:
-        return
-    ends = runs.drop_duplicates("scene").set_index("scene").horizon_frame
+    known, judged = (
+        rows[rows.position_basis == "full"].astype({"r": "int64"})
+        for rows in (estimates.rename(columns={"split": "motion"}), runs)
+    )
     table = guarded[[*_KEYS, "relative_error", "guard_frame"]].astype({"r": "int64"})
-    judged = runs[[*_KEYS, "position_basis", "relative_error_within_horizon"]]
-    judged = judged[judged.position_basis == "full"].astype({"r": "int64"})
-    table = table.merge(judged, on=_KEYS).merge(own, on=_KEYS)
-    table = table[table.scene.map(ends) > 0]
-    failed = ~(table.relative_error_within_horizon <= FAILED)
-    noticed = table.guard_frame.astype(float) < table.scene.map(ends)
+    table = table.merge(judged[[*_KEYS, _ERROR, "horizon_frame"]], on=_KEYS)
+    table = table.merge(known[[*_KEYS, "largest_estimate"]], on=_KEYS)
+    table = table[table.horizon_frame > 0]
+    if table.empty:
+        return
+    failed = ~(table[_ERROR] <= FAILED)
+    noticed = table.guard_frame.astype(float) < table.horizon_frame
     # an estimate that is not finite is larger than any threshold
     estimated = ~(table.largest_estimate <= threshold)
     alarms = {alarm: (noticed, None), "estimate": (estimated, threshold)}

@@ -7,11 +7,10 @@ from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.experiments.kit.fresh_process import CONTROL, FULL
 from pdrom.tables.kit.declaration import flag, integer, number, table, timed
+from pdrom.tables.kit.families import TWIN
 from pdrom.tables.kit.intervals import confirmed, median_interval
 from pdrom.tables.kit.parts import joined
 from pdrom.tables.kit.vocabulary import MS_PER_FRAME, SCENE, VERTICES
-
-TWIN = "_twin"
 
 
 @table(

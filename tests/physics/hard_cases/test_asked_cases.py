@@ -15,7 +15,7 @@ SETTINGS = AskSettings(
 QUICK = ("scrambled_sheet", "bar_plane_rotation")
 CASES = [
     pytest.param(name, marks=() if name in QUICK else pytest.mark.slow)
-    for name in reducible_cases()
+    for name in (*reducible_cases(), *reducible_cases(slow=True))
 ]
 
 

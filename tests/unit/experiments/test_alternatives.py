@@ -24,6 +24,7 @@ STEPS = {
     "projective": ((1, 5), (1, 2000), (8, 1)),
     "newton": ((1, 20),),
     "explicit": ((1, 1), (64, 1)),
+    "two-level": ((1, 20),),
     "ecsw": ((1, 10), (4, 2)),
     "ecsw-anderson": ((1, 10),),
 }
@@ -66,15 +67,16 @@ def test_rows_of_a_scene(written, table):
     assert read_table(written[1].path).columns.tolist() == processes.COLUMNS
     assert len(table) == len(made)
     # a reduction is trained twice; Newton and explicit steps run one motion
-    all_of, deciding = sum(map(len, STEPS.values())), 3 + 2 + 1
+    all_of, deciding = sum(map(len, STEPS.values())), 3 + 1 + 2 + 1
     assert table[table.motion == "heldout"].shape[0] == 2 * (1 + all_of + 3)
     assert table[table.motion == "stiffness"].shape[0] == 2 * (1 + deciding + 3)
     reduced = table[table.trained_on.notna()]
-    assert reduced.groupby("trained_on").size().to_dict() == {"converged": 12, "own iterations": 12}
+    assert reduced.groupby("trained_on").size().to_dict() == {"converged": 16, "own iterations": 12}
     timed = table[table.method != "converged"].set_index("method")
     assert (timed.ms_per_frame > 0.0).all()
     assert timed.processes.groupby("method").unique().map(list).to_dict() == {
-        "projective": [2], "newton": [1], "explicit": [1], "ecsw": [2], "ecsw-anderson": [2],
+        "projective": [2], "newton": [1], "explicit": [1], "two-level": [2], "ecsw": [2],
+        "ecsw-anderson": [2],
     }  # fmt: skip
     stiffer = table[table.motion == "stiffness"].set_index(["method", "iterations"])
     own = table[table.motion == "heldout"].set_index(["method", "iterations"])

@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from pdrom.core.paths import COMPANION_TIMES, ESTIMATES, RERUNS_HELDOUT, RERUNS_TRAIN
-from pdrom.core.store import write_table
+from pdrom.core.store import read_table, write_table
 from pdrom.experiments.companion_times import COLUMNS as TIMES
 from pdrom.experiments.estimates import COLUMNS
 from pdrom.tables.alarms import alarms
@@ -20,6 +20,7 @@ RUNS = [
     ("ecsw", "pod", 10, 20, 0.08, 0.07, None),
     ("ecsw", "pod", 20, 40, 0.001, 0.01, None),
 ]
+ALARMS = ("trained-range", "estimate")
 KEYS = ["scene", "group", "method", "position_basis", "k", "r"]
 
 
@@ -73,6 +74,20 @@ def test_alarms_of_guard_and_estimate_are_counted_over_the_same_runs(read):
         assert (guard.runs, guard.failed, own.runs, own.failed) == (3, 2, 3, 2)
         assert (guard.detected_share, guard.false_share) == (0.5, 1.0)
         assert (own.detected_share, own.false_share) == (1.0, 0.0)
+
+
+def test_alarms_of_all_held_out_motions_are_counted_together(read):
+    made, reruns, (train, heldout) = read
+    kicked = made[made.split == "heldout"].assign(split="kick", largest_estimate=0.0)
+    both = pd.concat([made, kicked]), pd.concat([reruns, reruns.assign(motion="kick")])
+    rows = read_table(heldout[0].path)
+    write_table(pd.concat([rows, rows.assign(motion="kick", guard_frame=1)]), heldout[0].path)
+    found = alarms(both[0], reruns, both[1], train, heldout, 0.15, "trained-range")
+    guard, own = (found.set_index(["split", "alarm"]).loc[("heldout", a)] for a in ALARMS)
+    assert (guard.runs, guard.failed, own.runs, own.failed) == (6, 4, 6, 4)
+    # the kicked runs are all noticed by the guard, and none by the estimate
+    assert (guard.detected_share, guard.false_share) == (0.75, 1.0)
+    assert (own.detected_share, own.false_share) == (0.5, 0.0)
 
 
 def test_what_counts_is_the_largest_estimate_of_a_run(read):

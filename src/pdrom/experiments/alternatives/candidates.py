@@ -10,10 +10,13 @@ from pdrom.experiments.alternatives.settings import (
     CONVERGED,
     OWN,
     REDUCTIONS,
+    TRAINED,
+    TWO_LEVEL,
     Comparison,
 )
 from pdrom.experiments.alternatives.solvers.anderson import WINDOW
 from pdrom.experiments.alternatives.solvers.methods import alternative
+from pdrom.experiments.alternatives.solvers.two_level import TwoLevel
 from pdrom.experiments.kit.converged import converged_run
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.dynamics.system import GlobalSystem
@@ -26,11 +29,15 @@ from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns,
 
 @dataclass(frozen=True)
 class Trained:
-    """A reduced ``model`` for frames of so many ``substeps``, and the frames it is trained on."""
+    """A reduced ``model`` for frames of so many ``substeps``, and the frames it is trained on.
+
+    It is a ``coarse`` level, or a reduction.
+    """
 
     trained_on: str
     substeps: int
     model: SubspaceModel
+    coarse: bool = False
 
 
 @dataclass(frozen=True)
@@ -72,7 +79,7 @@ def candidates(
     reduced: list[tuple[str, int, int]] = []
     for method in methods:
         pairs = settings.pairs(method, scene.mesh.vertices)
-        if method in REDUCTIONS:
+        if method in TRAINED:
             reduced += [(method, *pair) for pair in pairs]
             continue
         for substeps, iterations in pairs:
@@ -85,13 +92,11 @@ def candidates(
             yield Candidate(labels, loop, start)
     for own in models:
         for method, substeps, iterations in reduced:
-            if substeps == own.substeps:
+            if substeps == own.substeps and own.coarse == (method == TWO_LEVEL):
                 yield _reduced(scene, own, method, iterations)
 
 
 def _reduced(scene: Scene, own: Trained, method: str, iterations: int) -> Candidate:
-    window = WINDOW if method == ACCELERATED else 0
-    loop, start = own.model.loop(substepped(scene, own.substeps, iterations, window))
     labels: dict[str, object] = {
         "method": method,
         "substeps": own.substeps,
@@ -100,6 +105,11 @@ def _reduced(scene: Scene, own: Trained, method: str, iterations: int) -> Candid
         "k": own.model.columns.modes,
         "elements_sampled": own.model.elements_evaluated(scene),
     }
+    if own.coarse:
+        level = TwoLevel(scene, own.substeps, iterations, own.model)
+        return Candidate(labels, level, scene.initial_state())
+    window = WINDOW if method == ACCELERATED else 0
+    loop, start = own.model.loop(substepped(scene, own.substeps, iterations, window))
     return Candidate(labels, loop, start, own.substeps, own.model.positions)
 
 
@@ -107,16 +117,23 @@ def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
     """Position subspaces with sampled elements; columns and samples come from ``training``.
 
     The columns hold its frames as they are, or converged. The samples are trained on iterates of
-    the training motion in these columns, for every number of substeps that a reduction takes.
+    the training motion in these columns, for every number of substeps that a reduction takes. Of
+    converged frames there is a coarse level, too, with more samples.
     """
     vertices = training.mesh.vertices
-    taken = sorted({n for m in REDUCTIONS for n, _ in settings.pairs(m, vertices)})
-    for trained_on, seen in _training_frames(training, settings) if taken else ():
+    taken, coarse = (
+        sorted({n for m in methods for n, _ in settings.pairs(m, vertices)})
+        for methods in (REDUCTIONS, (TWO_LEVEL,))
+    )
+    for trained_on, seen in _training_frames(training, settings) if taken or coarse else ():
         for k in settings.modes:
             columns = make_columns(training, seen, "pod", k=k)
-            for substeps in taken:
-                samples = _samples(training, columns, substeps, settings.tau)
-                yield Trained(trained_on, substeps, SubspaceModel("pod", columns, samples))
+            for substeps in sorted({*taken, *coarse}):
+                level = trained_on == CONVERGED and substeps in coarse
+                tolerances = [settings.tau, *([settings.coarse_tau] if level else [])]
+                for tau, samples in _samples(training, columns, substeps, tolerances).items():
+                    model = SubspaceModel("pod", columns, samples)
+                    yield Trained(trained_on, substeps, model, coarse=tau != settings.tau)
 
 
 def _training_frames(training: Scene, settings: Comparison) -> Iterator[tuple[str, np.ndarray]]:
@@ -131,11 +148,14 @@ def _training_frames(training: Scene, settings: Comparison) -> Iterator[tuple[st
                 yield kind, found[1:]
 
 
-def _samples(training: Scene, columns: Columns, substeps: int, tau: float) -> dict[str, Samples]:
+def _samples(
+    training: Scene, columns: Columns, substeps: int, tolerances: Sequence[float]
+) -> dict[float, dict[str, Samples]]:
+    """Samples of each group for each of ``tolerances``."""
     own = substepped(training, substeps, training.config.iterations)
     ends = np.arange(substeps - 1, own.config.frames, substeps)
-    (found,) = sample_elements(own, columns, ends, tolerances=[tau])
-    return found
+    found = sample_elements(own, columns, ends, tolerances=tolerances)
+    return dict(zip(tolerances, found, strict=True))
 
 
 def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) -> Scene:

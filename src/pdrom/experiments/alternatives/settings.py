@@ -14,7 +14,9 @@ from pdrom.model.held_out import FIRST, MOTIONS, HeldOutMotion
 REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # the others are full-order ones
 OWN: Final = "own iterations"  # frames that a reduction may be trained on, beside converged ones
 # What the text says is decided by these: the best of the others at large errors, and reductions.
-DECIDING: Final = ("projective", "anderson", "chebyshev", *REDUCTIONS)
+TWO_LEVEL: Final = "two-level"  # full order, with a trained subspace for its coarse level
+TRAINED: Final = (TWO_LEVEL, *REDUCTIONS)
+DECIDING: Final = ("projective", "anderson", "chebyshev", *TRAINED)
 CONVERGED: Final = "converged"  # the implicit step itself, however long it takes
 
 # What tells candidates of a scene apart.
@@ -34,7 +36,7 @@ def _with_the_first(motions: tuple[HeldOutMotion, ...]) -> tuple[HeldOutMotion, 
 
 
 def _known(by_method: Named) -> Named:
-    allowed = (*METHODS, *REDUCTIONS, CONVERGED)
+    allowed = (*METHODS, *TRAINED, CONVERGED)
     for name in by_method:
         if name not in allowed:
             raise ValueError(f"unknown method '{name}'{choices(name, allowed)}")
@@ -66,6 +68,7 @@ def default_steps() -> dict[str, tuple[Steps, ...]]:
         "xpbd": (*_sweep(5, 10, 20, 50), *_small(5, 10, 20, 50, 100)),
         "vertex-descent": (*_sweep(10, 20, 50), *_small(10, 20, 50)),
         "explicit": _small(5, 10, 20, 40, 80, 160),
+        TWO_LEVEL: _sweep(2, 3, 5, 10, 20),
         REDUCED: _sweep(5, 10, 20, 40, 80, 160),
         ACCELERATED: _sweep(5, 10, 20),
     }
@@ -101,7 +104,8 @@ class Comparison(Protocol):
     methods run all of ``motions``. Each of ``processes`` new ones times ``frames`` of the first
     motion, the first process by all methods and the others by the deciding ones: a frame takes the
     same work in all motions. The reduction has each of ``modes`` and samples to ``tau``, trained on
-    the training motion, its frames as they are or converged (``trained_on``). ``work`` bounds the
+    the training motion, its frames as they are or converged (``trained_on``); the coarse level of
+    two samples to ``coarse_tau`` and is trained on converged frames. ``work`` bounds the
     vertices times substeps times iterations of a frame of a method: steps beyond are left out
     (converged: the implicit reference, one step of one iteration).
     """
@@ -114,6 +118,7 @@ class Comparison(Protocol):
     work: Annotated[dict[str, Work], AfterValidator(_known)] = Field(default_factory=dict)
     modes: Annotated[tuple[Modes, ...], Field(min_length=1)] = (40,)
     tau: Tolerance = 1e-2
+    coarse_tau: Tolerance = 1e-3
     trained_on: Annotated[tuple[Trained, ...], Field(min_length=1)] = (OWN, CONVERGED)
     implicit: ImplicitReference = ImplicitReference()
     continuous: ContinuousReference = ContinuousReference()

@@ -111,7 +111,7 @@ def hierarchy(training: Scene, settings: AskSettings) -> tuple[Hierarchy, list[M
     -------
     The hierarchy, and the motions with their references.
     """
-    motions = [Motion(training, whole=True), Motion(VALIDATION.of(training))]
+    motions = [Motion(training), Motion(VALIDATION.of(training))]
     levels = [*_full(settings, motions[0]), *_reduced(training, motions[0], settings)]
     steps = []
     for level in levels:

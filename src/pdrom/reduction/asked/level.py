@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pdrom.model.dynamics.stepper import State, Stepper
+from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import projector
@@ -74,14 +75,17 @@ class Level:
 
 
 class Running:
-    """A level's step loop on a motion; states outside are those of all vertices."""
+    """A level's step loop on a motion; states outside are those of all vertices.
 
-    def __init__(self, level: Level, scene: Scene) -> None:
+    One factored ``system`` serves all levels on a motion, by default that of the ``scene``.
+    """
+
+    def __init__(self, level: Level, scene: Scene, system: GlobalSystem | None = None) -> None:
         self._model = level.model
         self._loop: Stepper
         if self._model is None:
-            # one factorisation serves all levels on a motion
-            self._loop = level.scene(scene).stepper(scene.system, track_objective=False)
+            system = system or scene.system
+            self._loop = level.scene(scene).stepper(system, track_objective=False)
         else:
             self._loop = self._model.loop(level.scene(scene))[0]
             self._project = projector(self._model.columns, scene.masses)

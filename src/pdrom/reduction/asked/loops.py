@@ -27,9 +27,10 @@ class Loops:
 class Remembered(Loops):
     """Loops that do no full-order frame twice: many runs of a motion have most of them in common.
 
-    A full-order frame depends on nothing but its number and the state before it. One that was done
-    before takes, by the clock, the time that it took then. Reductions are no part of this: where
-    they meet a floor, round-off depends on the frames before.
+    A full-order frame depends on nothing but its number, the state before it, and where vertices
+    were when they were taken hold of, which is noted again. One that was done before takes, by the
+    clock, the time that it took then. Reductions are no part of this: where they meet a floor,
+    round-off depends on the frames before.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -64,7 +65,9 @@ class _Remembering(Running):
         since, total, ends = self._loops.clock(), 0.0, []
         for frame in frames:
             key = frame, _digest(state)
-            if key not in self._known:
+            if key in self._known:
+                self._take_hold(state, frame)
+            else:
                 self._do(state, range(frame, frames.stop))
             state, seconds = self._known[key]
             ends.append(state)
@@ -80,6 +83,12 @@ class _Remembering(Running):
         for frame, after in zip(frames, ends, strict=True):
             self._known[frame, _digest(state)] = after, seconds
             state = after
+
+    def _take_hold(self, state: State, frame: int) -> None:
+        """Let the boundaries note what they note in ``frame`` when it is done from ``state``."""
+        for boundary in self._loops.scene.boundaries:
+            if boundary.active(frame) and boundary.takes_hold(frame):
+                boundary.targets(frame, state.positions[boundary.held(frame)])
 
 
 def _digest(state: State) -> bytes:

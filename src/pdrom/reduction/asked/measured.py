@@ -8,7 +8,8 @@ tried, neither is the error, and where they are larger, it is taken to be larger
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from copy import deepcopy
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -38,31 +39,35 @@ TIMED = 20
 class Motion:
     """A motion that levels are tried on, with its reference.
 
-    Frames of a reference are done as far as they are looked at: those after the end are not, except
-    for one that is taken ``whole``.
-
     iterations : of the reference
     end : frames before it count
     unit : root mean square displacement of a frame, m
     """
 
-    def __init__(self, scene: Scene, whole: bool = False) -> None:
+    def __init__(self, scene: Scene) -> None:
         self.scene = scene
         hair = np.random.default_rng(SEED).standard_normal(scene.mesh.points.shape)
         moved = MOVED * scene.mesh.extent * hair
         count, frames = CONVERGED.iterations, scene.config.frames
-        reference = _Accelerated(scene, count)
-        self.unit = _unit(reference.until(frames))
-        self.end = _horizon(_Accelerated(scene, count // 2, moved), reference, self.unit)
+        run = _Accelerated(scene, count)
+        self.reference, self.iterations = run.whole(), count
+        self.unit = _unit(self.reference)
+        self.end = self._horizon(_Accelerated(scene, count // 2, moved))
         while FURTHER * self.end < frames and count < MOST:
-            further = _Accelerated(scene, 2 * count, moved)
-            end = _horizon(reference, further, self.unit)
             count *= 2
+            run = _Accelerated(scene, count, moved)
+            end = self._horizon(run)
             if end <= FURTHER * self.end:
                 break
-            reference, self.end = further, end
-        self.iterations = reference.iterations
-        self.reference = reference.until(frames if whole else self.end)
+            self.reference, self.iterations, self.end = run.whole(), count, end
+
+    def _horizon(self, other: "_Accelerated") -> int:
+        """Frames before the first at which another run is too far from the reference."""
+        for frame, positions in enumerate(self.reference[1:]):
+            apart = np.linalg.norm((positions - other.after(frame))[None], axis=(1, 2))[0]
+            if not apart <= HORIZON * self.unit:
+                return frame
+        return len(self.reference) - 1
 
     def error(self, positions: np.ndarray, quantity: Quantity) -> float:
         """Error in ``quantity`` of a run with ``positions`` (F + 1, N, 3) m, before the end."""
@@ -71,40 +76,34 @@ class Motion:
 
 
 class _Accelerated:
-    """A run of ``scene`` from a start ``moved`` by (N, 3) m, done frame by frame as needed."""
+    """A run of ``scene`` from a start ``moved`` by (N, 3) m, whose frames are done as needed.
+
+    No other run of the scene may begin before its last one: boundaries note where they take hold.
+    """
 
     def __init__(self, scene: Scene, iterations: int, moved: np.ndarray | None = None) -> None:
-        self.iterations, self.frames = iterations, scene.config.frames
+        self._frames = scene.config.frames
         self._running, self._state = Level(iterations, WINDOW).on(scene), scene.initial_state(moved)
         self._positions = [self._state.positions]
 
-    def at(self, frame: int) -> np.ndarray:
-        """Positions (N, 3) m before ``frame``."""
-        while (done := len(self._positions) - 1) < frame:
-            some = range(done, min(done + BLOCK, self.frames))
+    def after(self, frame: int) -> np.ndarray:
+        """Positions (N, 3) m at the end of ``frame``."""
+        while (done := len(self._positions) - 1) <= frame:
+            some = range(done, min(done + BLOCK, self._frames))
             states = list(self._running.run(self._state, some))
             self._positions += [state.positions for state in states]
             self._state = states[-1]
-        return self._positions[frame]
+        return self._positions[frame + 1]
 
-    def until(self, frame: int) -> np.ndarray:
-        """Positions (frame + 1, N, 3) m before ``frame`` and all others before it."""
-        self.at(frame)
-        return np.stack(self._positions[: frame + 1])
+    def whole(self) -> np.ndarray:
+        """Positions (F + 1, N, 3) m of all frames, the initial ones first."""
+        self.after(self._frames - 1)
+        return np.stack(self._positions)
 
 
 def _unit(reference: np.ndarray) -> float:
     moved = np.linalg.norm(reference[1:] - reference[0], axis=(1, 2))
     return float(np.sqrt(np.mean(moved**2)))
-
-
-def _horizon(one: _Accelerated, other: _Accelerated, unit: float) -> int:
-    """Frames before the first at which two runs are too far apart."""
-    for frame in range(1, one.frames + 1):
-        apart = np.linalg.norm((one.at(frame) - other.at(frame))[None], axis=(1, 2))[0]
-        if not apart <= HORIZON * unit:
-            return frame - 1
-    return one.frames
 
 
 @dataclass(frozen=True)
@@ -147,11 +146,15 @@ def tried(level: Level, motion: Motion, loops: Loops | None = None) -> Tried:
         for f in probed
         if np.isfinite(positions[f + 1]).all()
     }
-    return Tried(errors, ms, partial(_defects, level, motion, ends))
+    # later runs take hold elsewhere
+    scene = replace(motion.scene, boundaries=deepcopy(motion.scene.boundaries))
+    return Tried(errors, ms, partial(_defects, level, motion, scene, ends))
 
 
-def _defects(level: Level, motion: Motion, ends: dict[int, tuple[State, State]]) -> np.ndarray:
-    exact = exact_beside(level).on(motion.scene)
+def _defects(
+    level: Level, motion: Motion, scene: Scene, ends: dict[int, tuple[State, State]]
+) -> np.ndarray:
+    exact = Running(exact_beside(level), scene, motion.scene.system)
     found = [defect(*around, exact, frame) for frame, around in ends.items()]
     return np.array(found) / motion.unit
 

@@ -203,18 +203,19 @@ class CheckedRun:
         return self._settings.factor * float(np.sqrt(squares / len(done.parts)))
 
     def _better(self, step: Step, frame: int) -> Step | None:
-        """The step to go on with from ``frame`` on: of at most half the error.
+        """The step to go on with from ``frame`` on.
 
-        A reduction that could save less than it would cost to find out that it fails, too, is left
-        out. None where no full order is better, either.
+        After a reduction: one of at most half the error, if that could save more than it would cost
+        to find out that it fails, too; else the cheapest full order that keeps to the ask. After a
+        full order: one of at most half the error, None where there is none.
         """
         own, ask = self._own, self._ask
         if step.level.model is not None:
             half = [s for s in self._steps if own.expected(s, ask) <= own.expected(step, ask) / 2]
-            for other in half:
+            for other in (s for s in half if s.level.model is not None):
                 saved = (self._frames - frame) * (self._dear.work - other.work)
                 trial = self._check(other).work(self.scene) + self._frames / 2 * other.work
-                if other.level.model is None or saved > trial:
+                if saved > trial:
                     return other
             return self._dear
         for other in self._full:

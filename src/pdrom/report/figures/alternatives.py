@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.artifact.reads import TableOf
-from pdrom.experiments.alternatives.settings import ACCELERATED, CONVERGED, REDUCED
+from pdrom.experiments.alternatives.settings import ACCELERATED, CONVERGED, REDUCED, TWO_LEVEL
 from pdrom.model.held_out import FIRST
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.artists import Axes, Figure
@@ -26,6 +26,7 @@ LOOKS = {
     "projective": ("projective dynamics", style.BLACK, "o"),
     "anderson": ("with Anderson acceleration", style.GREY, "s"),
     "chebyshev": ("with Chebyshev acceleration", style.GREY, "<"),
+    TWO_LEVEL: ("with a coarse level", style.GREY, ">"),
     "l-bfgs": ("L-BFGS", style.BLUE, "^"),
     "newton": ("projected Newton", style.PURPLE, "D"),
     "xpbd": ("XPBD", style.ORANGE, "v"),

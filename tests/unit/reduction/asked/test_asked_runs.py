@@ -10,12 +10,13 @@ from builders import make_scene
 from pdrom.core.errors import ConfigurationError
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
+from pdrom.reduction.asked import measured
 from pdrom.reduction.asked import run as checked
 from pdrom.reduction.asked.ask import Ask, read_ask, relative_error
 from pdrom.reduction.asked.hierarchy import AskSettings, Hierarchy, check_frames, hierarchy
 from pdrom.reduction.asked.level import Level
 from pdrom.reduction.asked.loops import Remembered
-from pdrom.reduction.asked.measured import CONVERGED, Motion, Tried, exact_beside
+from pdrom.reduction.asked.measured import CONVERGED, Motion, Tried, exact_beside, tried
 from pdrom.reduction.asked.run import CheckedRun
 
 EFFECTS = (
@@ -97,10 +98,12 @@ def forgetful(own: Hierarchy) -> Hierarchy:
 
 def test_a_run_that_leaves_what_was_tried_ends_in_full_order(scene, own):
     chosen = forgetful(with_reductions_first(own))
-    done = CheckedRun(scene, chosen, Ask(error=0.05), SETTINGS).outcome()
+    run = CheckedRun(scene, chosen, Ask(error=0.05), SETTINGS)
+    done = run.outcome()
     assert done.repairs >= 1
     assert done.promised
-    assert done.changes[-1][1].startswith("full order")
+    # the cheapest that keeps to the ask, not the first of half the error
+    assert done.changes[-1][1] == run.full_order.title
     assert Motion(scene).error(done.positions, "position") <= 0.05
 
 
@@ -154,6 +157,29 @@ def test_nothing_is_promised_where_next_to_nothing_can_be_judged(scene, own):
     assert not CheckedRun(scene, short, Ask(error=0.5), SETTINGS).outcome().promised
     long = replace(own, horizon=scene.config.frames // 10)
     assert CheckedRun(scene, long, Ask(error=0.5), SETTINGS).outcome().promised
+
+
+@pytest.mark.parametrize(
+    ("horizon", "end", "iterations"), [(1e-11, 0, 80), (3e-10, 30, 160), (5e-3, 30, 80)]
+)
+def test_a_motion_counts_until_half_the_iterations_lead_elsewhere(
+    scene, monkeypatch, horizon, end, iterations
+):
+    monkeypatch.setattr(measured, "HORIZON", horizon)
+    motion = Motion(scene)
+    assert (motion.end, motion.iterations) == (end, iterations)
+    assert len(motion.reference) == scene.config.frames + 1
+    exact = trajectory(Level(iterations, CONVERGED.window).scene(scene))
+    assert np.abs(motion.reference - exact).max() < 1e-8
+
+
+def test_defects_are_taken_where_they_are_wanted(scene, monkeypatch):
+    motion, wanted = Motion(scene), []
+    monkeypatch.setattr(measured, "defect", lambda *a: wanted.append(a) or 1.0)
+    found = tried(Level(3), motion)
+    assert not wanted
+    assert found.defects == pytest.approx(1.0 / motion.unit)
+    assert len(wanted) == len(found.defects) == measured.PROBED
 
 
 def test_a_full_order_is_never_checked_by_a_worse_one(own):

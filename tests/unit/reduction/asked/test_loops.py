@@ -21,7 +21,8 @@ def remembered(monkeypatch) -> Remembered:
     monkeypatch.setattr(loops, "thread_time", lambda: float(next(ticks)))
     spring = {"effect": "spring", "weight": 1e5}
     pins = {"effect": "pins", "select": "left"}
-    return Remembered(make_scene({"effect": "gravity"}, pins, spring, frames=len(FRAMES)))
+    late = {"effect": "pins", "select": "right", "start": 5}
+    return Remembered(make_scene({"effect": "gravity"}, pins, late, spring, frames=len(FRAMES)))
 
 
 def timed(remembered: Remembered, state: State, frames: range) -> tuple[list[State], float]:
@@ -53,6 +54,8 @@ def test_what_is_missing_is_done(remembered):
     start = remembered.scene.initial_state()
     alone = list(Level(3).on(remembered.scene).run(start, FRAMES))
     timed(remembered, start, HALF)
+    # a run between takes hold elsewhere
+    assert not same(list(Level(1).on(remembered.scene).run(start, FRAMES)), alone)
     whole, _ = timed(remembered, start, FRAMES)
     assert same(whole, alone)
     # an equal state of other arrays is the same state
