@@ -14,12 +14,16 @@ from bad_input.project import make_project
 from pdrom import api
 from pdrom.command import main
 from pdrom.core import paths
-from pdrom.core.paths import Place
+from pdrom.core.paths import File, Place
 from pdrom.core.store import open_hdf5, read_table
-from pdrom.core.yamlfile import read_yaml
+from pdrom.core.yamlfile import read_yaml, validate
+from pdrom.experiments.companion_times import companion_times
+from pdrom.experiments.kit.settings import Horizon
+from pdrom.experiments.ladder import LadderFile, ladder
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.mesh.types import Mesh, stored_mesh
 from pdrom.pipeline.study import Study
+from places import CONFIG
 from small_scene import run_jobs
 
 SCENE, GROUP, METHOD = "small", "spring", "block-deim"
@@ -46,11 +50,15 @@ PathOf = Callable[[Place], str]
 
 
 @pytest.fixture(scope="module")
-def at(tmp_path_factory: pytest.TempPathFactory) -> PathOf:
-    """Path of a finished file; of several of a kind that of `METHOD`."""
+def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
     root = make_project(tmp_path_factory.mktemp("study"), {})
-    study = Study.load({**read_yaml(root / "config" / "default.yaml"), **ASKED}, root)
-    results = str(root / "results")
+    return Study.load({**read_yaml(root / "config" / "default.yaml"), **ASKED}, root)
+
+
+@pytest.fixture(scope="module")
+def at(study: Study) -> PathOf:
+    """Path of a finished file; of several of a kind that of `METHOD`."""
+    results = str(study.root / "results")
     run_jobs(study, results, JOBS, SCENE)
     known = {
         "scene": SCENE, "group": GROUP, "method": METHOD, "run": "train",
@@ -273,6 +281,49 @@ def test_a_moved_start_changes_nothing_and_other_training_does(table):
     assert frames.frame.tolist() == 4 * [*range(1, 9)]  # two sizes, two kinds
     middle = frames[(frames.varied == "start") & (frames.r == 2)].error_median
     assert np.sqrt(np.mean(middle**2)) == pytest.approx(own, rel=1e-4)
+
+
+def test_every_rung_of_a_ladder_is_run_and_judged(study, at, array, tmp_path):
+    """Whole elements with shared coefficients are worse than the best by their gain at most."""
+    path = CONFIG / "ladder.yaml"
+    few = {"r": 2, "signs": 2, "repetitions": 3, "sizes": (2, 50), "repeated": (SCENE,)}
+    asked = validate(LadderFile, read_yaml(path), str(path)).model_copy(update=few)
+    section = study.settings.sensitivity
+    out = File(str(tmp_path / "ladder.csv"), {"scene": SCENE, "group": GROUP})
+    ladder(
+        mesh=paths.MESH.file(at(paths.MESH)),
+        fom=paths.TRAIN.file(at(paths.TRAIN)),
+        snapshots=paths.SNAPSHOTS.file(at(paths.SNAPSHOTS)),
+        sensitivity=paths.SENSITIVITY.file(at(paths.SENSITIVITY)),
+        config=study.scenes[SCENE],
+        ladder=asked,
+        horizon=Horizon(perturbation=section.reference, threshold=section.threshold),
+        blowup_extent=study.settings.blowup_extent,
+        out=out,
+    )
+    rows = read_table(out.path)
+    kinds = {"up": len(asked.up), "down": len(asked.down), "signs": 2, "square": len(asked.square)}
+    assert rows.direction.value_counts(sort=False).to_dict() == kinds  # none at 50: three modes
+    sigma, train = array(paths.BASIS, "singular_values"), array(paths.SNAPSHOTS, "train")
+    best = np.linalg.norm(sigma[2:]) / np.linalg.norm(train)
+    least = rows[rows.rung.isin(["- oversampling", asked.up[-1].title, "whole elements, shared"])]
+    assert len(least) == 3
+    assert least.error_train.between(0.999 * best, 1.001 * best * least.gain).all()
+    repeated = rows[rows.direction.isin(["up", "down"])]
+    assert (repeated.repetitions == 3).all()
+    assert (repeated.error_low <= repeated.error_median).all()
+    assert (repeated.error_median <= repeated.error_high).all()
+    assert rows.repetitions.notna().sum() == len(repeated)
+
+
+def test_an_auxiliary_model_is_timed_beside_the_full_order(study, at, mesh, tmp_path):
+    out = File(str(tmp_path / "times.csv"), {"scene": SCENE})
+    files = (place.file(at(place)) for place in (paths.MESH, paths.COMPANION))
+    companion_times(*files, study.scenes[SCENE], study.settings.timing, out)
+    (row,) = read_table(out.path).itertuples()
+    assert row.scene == SCENE
+    assert 0 < row.elements_sampled <= len(mesh.edges())
+    assert min(row.companion_ms, row.full_ms) > 0.0
 
 
 def test_a_guard_that_only_watches_changes_nothing_and_falling_back_helps(table):
