@@ -47,7 +47,7 @@ class AskedErrors(AskSettings):
 
     errors: tuple[Tolerance, ...] = (0.1, 0.03, 0.01)
     motions: Annotated[tuple[HeldOutMotion, ...], Field(min_length=1)] = MOTIONS
-    factors: Annotated[tuple[Factor, ...], Field(min_length=1)] = (2.0, 4.0, 6.0)
+    factors: Annotated[tuple[Factor, ...], Field(min_length=1)] = (4.0, 6.0)
 
 
 class Asks(AskedErrors):

@@ -10,6 +10,7 @@ from pdrom.core import paths
 from pdrom.core.paths import File
 from pdrom.reduction.asked.level import FULL_ORDER
 from pdrom.tables.kit.declaration import compared, flag, integer, number, table, text, timed
+from pdrom.tables.kit.families import families
 from pdrom.tables.kit.parts import joined
 from pdrom.tables.kit.vocabulary import MS_PER_FRAME, SCENE, VERTICES
 
@@ -23,7 +24,7 @@ from pdrom.tables.kit.vocabulary import MS_PER_FRAME, SCENE, VERTICES
         VERTICES,
         integer("frames", "frames before the horizon, which the promise is for"),
         compared("error", flag("judged", "frames enough to tell a kept promise from a broken one")),
-        compared("value", number("factor", "on estimates, by the scores of the other scenes")),
+        compared("value", number("factor", "on estimates, by the scores of other scenes")),
         compared("value", number("risk", "bound on the share of promises broken that it has")),
         compared("error", flag("promised", "the run says that it keeps to the ask")),
         compared("error", flag("reduced", "a reduction did at least one frame")),
@@ -55,7 +56,9 @@ from pdrom.tables.kit.vocabulary import MS_PER_FRAME, SCENE, VERTICES
 def asks(
     runs: list[File], scores: list[File], risk: float, errors: Sequence[float]
 ) -> pd.DataFrame:
-    """Rows of the ``runs`` of all scenes, each with the factor that ``scores`` of the others give.
+    """Rows of the ``runs`` of all scenes, each with the factor that ``scores`` of others give.
+
+    Others are neither the scene nor its twin.
 
     The factor has this ``risk`` of broken promises, over the asked ``errors``.
     """
@@ -63,11 +66,12 @@ def asks(
     if rows.empty:
         return rows
     parts = []
-    for scene, own in rows.groupby("scene", sort=False):
+    for family, own in rows.groupby(families(rows.scene), sort=False):
         grid = sorted(own.factor.unique())
-        factor, bound = risk_factor(scored[scored.scene != scene], errors, risk=risk, grid=grid)
+        others = scored[families(scored.scene) != family]
+        factor, bound = risk_factor(others, errors, risk=risk, grid=grid)
         parts.append(own[own.factor == factor].assign(risk=bound))
-    made = pd.concat(parts, ignore_index=True)
+    made = pd.concat(parts).sort_index().reset_index(drop=True)
     counts = made.promised.astype(bool) & made.judged.astype(bool)
     return made.assign(broken=counts & ~(made.error <= made.asked), reduced=made.reduced_frames > 0)
 
@@ -78,8 +82,9 @@ def risk_factor(
     """Smallest factor of a grid at which a new scene breaks a promise with probability ``risk``.
 
     Each scene's loss is the share of its asks that the chosen step would break on the motion that
-    the choice has not seen. With n scenes the mean of their losses and of a loss of 1 bounds the
-    expected loss of a new scene (conformal risk control, Angelopoulos et al. 2024).
+    the choice has not seen; a scene and its twin are one, with the mean of their losses. With n of
+    them the mean of all losses and of a loss of 1 bounds the expected loss of a new one (conformal
+    risk control, Angelopoulos et al. 2024).
 
     Parameters
     ----------
@@ -89,14 +94,19 @@ def risk_factor(
     -------
     The factor, the largest of the grid where none does, and the bound that holds for it.
     """
-    scenes = [steps for _, steps in scored.groupby("scene", sort=False)]
-    losses = np.array([[_loss(steps, errors, f) for steps in scenes] for f in grid])
+    alike = [own for _, own in scored.groupby(families(scored.scene), sort=False)]
+    losses = np.array([[_mean_loss(scenes, errors, f) for scenes in alike] for f in grid])
     # a larger factor may lead to a worse step: the worst of all larger ones cannot rise
     worst = np.maximum.accumulate(losses[::-1], axis=0)[::-1]
-    bounds = (worst.sum(axis=1) + 1.0) / (len(scenes) + 1)
+    bounds = (worst.sum(axis=1) + 1.0) / (len(alike) + 1)
     kept = np.flatnonzero(bounds <= risk)
     taken = int(kept[0]) if len(kept) else len(grid) - 1
     return grid[taken], float(bounds[taken])
+
+
+def _mean_loss(scenes: pd.DataFrame, errors: Sequence[float], factor: float) -> float:
+    losses = [_loss(steps, errors, factor) for _, steps in scenes.groupby("scene")]
+    return sum(losses) / len(losses)
 
 
 def _loss(steps: pd.DataFrame, errors: Sequence[float], factor: float) -> float:

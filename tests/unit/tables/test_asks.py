@@ -32,6 +32,14 @@ def test_the_factor_is_the_smallest_whose_risk_is_borne():
     assert risk_factor(found, [0.05], 0.01, [1.0, 2.0]) == (2.0, pytest.approx(0.05))
 
 
+def test_a_scene_and_its_twin_are_one():
+    good = pd.concat([scores(f"s{i}", 1.0) for i in range(8)])
+    both = pd.concat([good, scores("s8", 1.5), scores("s8_twin", 1.5)])
+    assert risk_factor(both, [0.05], 0.5, [1.0])[1] == pytest.approx((1 + 1) / 10)
+    one = pd.concat([good, scores("s8", 1.5), scores("s8_twin", 1.0)])
+    assert risk_factor(one, [0.05], 0.5, [1.0])[1] == pytest.approx((0.5 + 1) / 10)
+
+
 def test_no_full_order_no_promise_no_loss():
     only = scores("s", 3.0).iloc[:1]
     assert risk_factor(only, [0.05], 0.5, [1.0]) == (1.0, 0.5)

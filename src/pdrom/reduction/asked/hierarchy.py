@@ -44,7 +44,7 @@ class AskSettings(ConfigModel):
     iterations: tuple[Count, ...] = (5, 10, 20)
     plain: tuple[Count, ...] = (1, 2, 3, 5)
     accelerated: tuple[Count, ...] = (5, 10, 20, 40)
-    factor: Annotated[float, Field(ge=1.0, le=1e3)] = 4.0
+    factor: Annotated[float, Field(ge=1.0, le=1e3)] = 6.0
     share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.05
 
 
