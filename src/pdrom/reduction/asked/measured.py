@@ -49,13 +49,15 @@ class Motion:
         hair = np.random.default_rng(SEED).standard_normal(scene.mesh.points.shape)
         moved = MOVED * scene.mesh.extent * hair
         count, frames = CONVERGED.iterations, scene.config.frames
-        run = _Accelerated(scene, count)
-        self.reference, self.iterations = run.whole(), count
+        self.reference, self.iterations = _Accelerated(scene, count).whole(), count
         self.unit = _unit(self.reference)
         self.end = self._horizon(_Accelerated(scene, count // 2, moved))
+        start: np.ndarray | None = None
         while FURTHER * self.end < frames and count < MOST:
             count *= 2
-            run = _Accelerated(scene, count, moved)
+            # a start apart from the reference's, or both would take the same side of a bifurcation
+            start = moved if start is None else None
+            run = _Accelerated(scene, count, start)
             end = self._horizon(run)
             if end <= FURTHER * self.end:
                 break

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -171,6 +172,30 @@ def test_a_motion_counts_until_half_the_iterations_lead_elsewhere(
     assert len(motion.reference) == scene.config.frames + 1
     exact = trajectory(Level(iterations, CONVERGED.window).scene(scene))
     assert np.abs(motion.reference - exact).max() < 1e-8
+
+
+class Leaving:
+    """Runs that leave each other after as many frames as they have iterations over 20."""
+
+    begun: ClassVar[list[tuple[int, bool]]] = []
+
+    def __init__(self, scene: Scene, iterations: int, moved: np.ndarray | None = None) -> None:
+        self.begun.append((iterations, moved is not None))
+        frames = np.arange(scene.config.frames + 1)[:, None, None]
+        self._path = frames * (1.0 + iterations * (frames > iterations // 20))
+
+    def after(self, frame: int) -> np.ndarray:
+        return self._path[frame + 1]
+
+    def whole(self) -> np.ndarray:
+        return self._path
+
+
+def test_a_run_and_its_reference_never_begin_at_the_same_place(scene, monkeypatch):
+    monkeypatch.setattr(measured, "_Accelerated", Leaving)
+    motion = Motion(scene)
+    assert (motion.end, motion.iterations) == (8, 320)
+    assert Leaving.begun == [(80, False), (40, True), (160, True), (320, False)]
 
 
 def test_defects_are_taken_where_they_are_wanted(scene, monkeypatch):
