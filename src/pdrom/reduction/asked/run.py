@@ -218,8 +218,9 @@ class CheckedRun:
                 if saved > trial:
                     return other
             return self._dear
+        # dearer ones only: a run ends, also where no error is left to halve
         for other in self._full:
-            if own.expected(other, ask) <= own.expected(step, ask) / 2:
+            if other.work > step.work and own.expected(other, ask) <= own.expected(step, ask) / 2:
                 return other
         return None
 
