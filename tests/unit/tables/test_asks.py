@@ -9,9 +9,11 @@ from pdrom.core.store import write_table
 from pdrom.experiments.asks import COLUMNS, SCORE_COLUMNS
 from pdrom.model.held_out import FIRST
 from pdrom.reduction.asked.hierarchy import AskSettings
+from pdrom.tables import declared
 from pdrom.tables.asks import asks, risk_factor
 from pdrom.tables.asks_beside import asks_beside
 from pdrom.tables.asks_cost import asks_cost
+from pdrom.verification.references import read_reference
 from places import ROOT
 
 STEPS = ("ecsw, small", "full order, K = 5")
@@ -46,8 +48,9 @@ def test_no_full_order_no_promise_no_loss():
 
 
 def test_the_default_factor_is_one_that_the_scores_of_the_study_give():
-    expected = pd.read_csv(ROOT / "results" / "reference" / "tables" / "asks.csv")
-    assert AskSettings().factor in set(expected.factor)
+    expected = read_reference(declared()["asks"], ROOT / "results" / "reference" / "tables")
+    assert expected is not None
+    assert AskSettings().factor in set(expected.frame.factor)
 
 
 @pytest.fixture
