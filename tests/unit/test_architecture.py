@@ -17,7 +17,7 @@ NUMERICS = ROOMS[: ROOMS.index("report")]
 MODULE_LINES, CLASS_LINES = 250, 200
 BEGINNINGS = (
     "What ", "Where ", "Which ", "The same ", "That of ", "Of ", "How ", "Why ", "When ", "Who ",
-    "Those ", "As ",
+    "Those ", "As ", "From ", "While ",
 )  # fmt: skip
 # Words with which a docstring says why a module is longer.
 REASON = "one module because"

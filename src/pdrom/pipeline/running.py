@@ -100,7 +100,7 @@ def settle_dates(folders: Iterable[str | Path]) -> int:
 
 
 def end_at_sigterm() -> None:
-    """While no job runs: SIGTERM ends this process with one line."""
+    """Let SIGTERM end this process with one line, while no job runs."""
 
     def end(number: int, frame: object) -> None:
         _say(b"pdrom: ended by SIGTERM\n")
@@ -110,7 +110,7 @@ def end_at_sigterm() -> None:
 
 
 def stop_at_sigterm(note: Callable[[], None]) -> None:
-    """While jobs run: SIGTERM ends them, and then the run as Ctrl-C does; ``note`` is called."""
+    """Let SIGTERM end all jobs, and then the run as Ctrl-C does; ``note`` is called."""
 
     def stop(number: int, frame: object) -> None:
         _say(b"pdrom: SIGTERM: ending the jobs that run\n")

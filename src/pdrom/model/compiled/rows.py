@@ -60,8 +60,8 @@ def copied(numbers):
 def write(numbers, to):
     """Copy the flat array ``numbers`` into ``to``, which is at least as long.
 
-    Compiled code assigns no array to a slice: the message about shapes that could differ takes
-    seconds to compile.
+    The loops of every frame assign no array to a slice: the message about shapes that could differ
+    takes seconds to compile.
     """
     for i in range(len(numbers)):
         to[i] = numbers[i]

@@ -40,7 +40,7 @@ class Panels:
 
     @classmethod
     def of(cls, lower: sparse.csc_array, diagonal: np.ndarray) -> "Panels":
-        """From L = ``lower`` (n, n) with ascending row indices and D = ``diagonal`` (n,)."""
+        """Panels of L = ``lower`` (n, n) with ascending row indices and D = ``diagonal`` (n,)."""
         n = lower.shape[0]
         below = _rows_below(lower.indptr, lower.indices, n, int(WIDTHS.max()))
         ends = _partition(below, WIDTHS)

@@ -1,4 +1,4 @@
-"""From a method's specification to its sampling."""
+"""Sampling of a method, from its specification."""
 
 from collections.abc import Sequence
 
