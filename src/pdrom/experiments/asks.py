@@ -8,6 +8,7 @@ every factor of a grid.
 
 import logging
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -38,7 +39,7 @@ COLUMNS = [
     "oracle_ms",
 ]  # fmt: skip
 REPEATS = 2  # runs of an ask, for the time
-SCORE_COLUMNS = ["scene", "step", "expected", "error"]
+SCORE_COLUMNS = ["scene", "asked", "factor", "step", "error"]
 Factor = Annotated[float, Field(ge=1.0, le=100.0)]
 
 
@@ -47,7 +48,7 @@ class AskedErrors(AskSettings):
 
     errors: tuple[Tolerance, ...] = (0.1, 0.03, 0.01)
     motions: Annotated[tuple[HeldOutMotion, ...], Field(min_length=1)] = MOTIONS
-    factors: Annotated[tuple[Factor, ...], Field(min_length=1)] = (4.0, 6.0)
+    factors: Annotated[tuple[Factor, ...], Field(min_length=1)] = (4.0, 5.0, 6.0)
 
 
 class Asks(AskedErrors):
@@ -80,11 +81,11 @@ def asks(
     sources : files of the mesh; the job depends on them
     config : of the scene
     section : errors and factors that are tried, and the levels
-    out, scores : tables of the asks and of the steps of the hierarchy
+    out, scores : tables of the asks, and of the steps chosen for them on the further motion
     """
     training = Scene.build(config, config.mesh.build(Path()))
     own, _ = hierarchy(training, section)
-    found = list(_scores(own, Motion(CALIBRATION.of(training)), config.name))
+    found = list(_scores(own, Motion(CALIBRATION.of(training)), section))
     write_table(pd.DataFrame(found, columns=SCORE_COLUMNS), scores.path)
     rows: list[dict[str, Any]] = []
     for name in section.motions:
@@ -94,11 +95,18 @@ def asks(
     write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
 
 
-def _scores(own: Hierarchy, further: Motion, scene: str) -> Iterator[dict[str, Any]]:
-    """Expected and true error of every step on a motion that is not part of the choice."""
-    for step in own.steps:
-        reached = tried(step.level, further).errors["position"]
-        cells = (scene, step.level.title, own.expected(step, Ask(error=0.1)), reached)
+def _scores(own: Hierarchy, further: Motion, section: AskedErrors) -> Iterator[dict[str, Any]]:
+    """Errors on a motion that is not part of the choice of the steps chosen for every ask.
+
+    Steps and errors are missing where no promise is made.
+    """
+    scene, reached = own.training.config.name, dict[str, float]()
+    for asked, factor in product(section.errors, section.factors):
+        step = next(iter(own.admissible(Ask(error=asked), factor)), None)
+        if step and step.level.title not in reached:
+            reached[step.level.title] = tried(step.level, further).errors["position"]
+        title = step.level.title if step else None
+        cells = (scene, asked, factor, title, reached[title] if title else None)
         yield dict(zip(SCORE_COLUMNS, cells, strict=True))
 
 

@@ -1,14 +1,10 @@
 """Table asks: runs that were asked for an error, on motions that no choice has seen."""
 
-from collections.abc import Sequence
-
-import numpy as np
 import pandas as pd
 
 from pdrom.artifact.reads import Every, Setting
 from pdrom.core import paths
 from pdrom.core.paths import File
-from pdrom.reduction.asked.level import FULL_ORDER
 from pdrom.tables.kit.declaration import compared, flag, integer, number, table, text, timed
 from pdrom.tables.kit.families import families
 from pdrom.tables.kit.parts import joined
@@ -50,36 +46,28 @@ from pdrom.tables.kit.vocabulary import MS_PER_FRAME, SCENE, VERTICES
         "runs": Every(paths.ASKS),
         "scores": Every(paths.ASK_SCORES),
         "risk": Setting("asks.risk"),
-        "errors": Setting("asks.errors"),
     },
 )
-def asks(
-    runs: list[File], scores: list[File], risk: float, errors: Sequence[float]
-) -> pd.DataFrame:
+def asks(runs: list[File], scores: list[File], risk: float) -> pd.DataFrame:
     """Rows of the ``runs`` of all scenes, each with the factor that ``scores`` of others give.
 
-    Others are neither the scene nor its twin.
-
-    The factor has this ``risk`` of broken promises, over the asked ``errors``.
+    Others are neither the scene nor its twin. The factor has this ``risk`` of broken promises.
     """
     rows, scored = joined(runs), joined(scores)
     if rows.empty:
         return rows
     parts = []
     for family, own in rows.groupby(families(rows.scene), sort=False):
-        grid = sorted(own.factor.unique())
         others = scored[families(scored.scene) != family]
-        factor, bound = risk_factor(others, errors, risk=risk, grid=grid)
+        factor, bound = risk_factor(others, risk)
         parts.append(own[own.factor == factor].assign(risk=bound))
     made = pd.concat(parts).sort_index().reset_index(drop=True)
     counts = made.promised.astype(bool) & made.judged.astype(bool)
     return made.assign(broken=counts & ~(made.error <= made.asked), reduced=made.reduced_frames > 0)
 
 
-def risk_factor(
-    scored: pd.DataFrame, errors: Sequence[float], risk: float, grid: Sequence[float]
-) -> tuple[float, float]:
-    """Smallest factor of a grid at which a new scene breaks a promise with probability ``risk``.
+def risk_factor(scored: pd.DataFrame, risk: float) -> tuple[float, float]:
+    """Smallest factor at which a new scene breaks a promise with probability ``risk``.
 
     Each scene's loss is the share of its asks that the chosen step would break on the motion that
     the choice has not seen; a scene and its twin are one, with the mean of their losses. With n of
@@ -88,32 +76,19 @@ def risk_factor(
 
     Parameters
     ----------
-    scored : steps of scenes in the order of their work, with expected and true errors
+    scored : of every scene, ask and factor the error that was reached; nan without a promise
 
     Returns
     -------
-    The factor, the largest of the grid where none does, and the bound that holds for it.
+    The factor, the largest one where none does, and the bound that holds for it.
     """
-    alike = [own for _, own in scored.groupby(families(scored.scene), sort=False)]
-    losses = np.array([[_mean_loss(scenes, errors, f) for scenes in alike] for f in grid])
+    broken = scored.step.notna() & ~(scored.error <= scored.asked)
+    family = families(scored.scene).rename("family")
+    scenes = broken.groupby([scored.factor, family, scored.scene]).mean()
+    losses = scenes.groupby(level=["factor", "family"]).mean().unstack()
     # a larger factor may lead to a worse step: the worst of all larger ones cannot rise
-    worst = np.maximum.accumulate(losses[::-1], axis=0)[::-1]
-    bounds = (worst.sum(axis=1) + 1.0) / (len(alike) + 1)
-    kept = np.flatnonzero(bounds <= risk)
-    taken = int(kept[0]) if len(kept) else len(grid) - 1
-    return grid[taken], float(bounds[taken])
-
-
-def _mean_loss(scenes: pd.DataFrame, errors: Sequence[float], factor: float) -> float:
-    losses = [_loss(steps, errors, factor) for _, steps in scenes.groupby("scene")]
-    return sum(losses) / len(losses)
-
-
-def _loss(steps: pd.DataFrame, errors: Sequence[float], factor: float) -> float:
-    """Share of the asks whose cheapest step by the factor breaks them."""
-    broken = []
-    for asked in errors:
-        good = steps[factor * steps.expected <= asked]
-        kept = good.step.str.startswith(FULL_ORDER).any()
-        broken.append(bool(kept and not good.error.iloc[0] <= asked))
-    return sum(broken) / len(broken)
+    worst = losses[::-1].cummax()[::-1]
+    bounds = (worst.sum(axis=1) + 1.0) / (losses.shape[1] + 1)
+    kept = bounds.index[bounds <= risk]
+    factor = kept[0] if len(kept) else bounds.index[-1]
+    return float(factor), float(bounds[factor])

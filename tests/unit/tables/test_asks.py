@@ -16,35 +16,41 @@ from pdrom.tables.asks_cost import asks_cost
 from pdrom.verification.references import read_reference
 from places import ROOT
 
-STEPS = ("ecsw, small", "full order, K = 5")
 
-
-def scores(scene: str, ratio: float) -> pd.DataFrame:
-    """A reduction that ends ``ratio`` times what is expected of it, and a sure full order."""
-    rows = [(scene, STEPS[0], 0.04, 0.04 * ratio), (scene, STEPS[1], 0.001, 0.001)]
+def scores(scene: str, error: float, surer: float | None = 0.001) -> pd.DataFrame:
+    """What is reached where .05 is asked, with a factor of 1 and with one of 2."""
+    rows = [(scene, 0.05, 1.0, "ecsw, small", error), (scene, 0.05, 2.0, "full order", surer)]
+    if surer is None:
+        rows[1] = (scene, 0.05, 2.0, None, None)
     return pd.DataFrame(rows, columns=SCORE_COLUMNS)
 
 
 def test_the_factor_is_the_smallest_whose_risk_is_borne():
-    found = pd.concat([scores(f"s{i}", 1.0 if i else 3.0) for i in range(19)])
+    found = pd.concat([scores(f"s{i}", 0.04 if i else 0.12) for i in range(19)])
     # one scene of 19 breaks its ask: (1 + 1) / 20
-    assert risk_factor(found, [0.05], 0.1, [1.0, 2.0]) == (1.0, pytest.approx(0.1))
+    assert risk_factor(found, 0.1) == (1.0, pytest.approx(0.1))
     # with the larger factor nobody takes the reduction
-    assert risk_factor(found, [0.05], 0.06, [1.0, 2.0]) == (2.0, pytest.approx(0.05))
-    assert risk_factor(found, [0.05], 0.01, [1.0, 2.0]) == (2.0, pytest.approx(0.05))
+    assert risk_factor(found, 0.06) == (2.0, pytest.approx(0.05))
+    assert risk_factor(found, 0.01) == (2.0, pytest.approx(0.05))
+
+
+def test_what_a_larger_factor_breaks_counts_for_smaller_ones():
+    found = pd.concat([scores(f"s{i}", 0.04, 0.04 if i else 0.12) for i in range(19)])
+    assert risk_factor(found, 0.05) == (2.0, pytest.approx(0.1))
+    assert risk_factor(found, 0.1) == (1.0, pytest.approx(0.1))
 
 
 def test_a_scene_and_its_twin_are_one():
-    good = pd.concat([scores(f"s{i}", 1.0) for i in range(8)])
-    both = pd.concat([good, scores("s8", 1.5), scores("s8_twin", 1.5)])
-    assert risk_factor(both, [0.05], 0.5, [1.0])[1] == pytest.approx((1 + 1) / 10)
-    one = pd.concat([good, scores("s8", 1.5), scores("s8_twin", 1.0)])
-    assert risk_factor(one, [0.05], 0.5, [1.0])[1] == pytest.approx((0.5 + 1) / 10)
+    good = pd.concat([scores(f"s{i}", 0.04) for i in range(8)])
+    both = pd.concat([good, scores("s8", 0.06), scores("s8_twin", 0.06)])
+    assert risk_factor(both, 0.5)[1] == pytest.approx((1 + 1) / 10)
+    one = pd.concat([good, scores("s8", 0.06), scores("s8_twin", 0.04)])
+    assert risk_factor(one, 0.5)[1] == pytest.approx((0.5 + 1) / 10)
 
 
-def test_no_full_order_no_promise_no_loss():
-    only = scores("s", 3.0).iloc[:1]
-    assert risk_factor(only, [0.05], 0.5, [1.0]) == (1.0, 0.5)
+def test_no_promise_no_loss():
+    found = pd.concat([scores("s", np.inf, None), scores("t", 0.04, None)])
+    assert risk_factor(found, 0.4) == (2.0, pytest.approx(1 / 3))
 
 
 def test_the_default_factor_is_one_that_the_scores_of_the_study_give():
@@ -69,8 +75,8 @@ def made(tmp_path) -> pd.DataFrame:
         runs.append(ASKS.file(ASKS.at(str(tmp_path), scene=scene)))
         scored.append(ASK_SCORES.file(ASK_SCORES.at(str(tmp_path), scene=scene)))
         write_table(pd.DataFrame(rows, columns=COLUMNS), runs[-1].path)
-        write_table(scores(scene, 1.0), scored[-1].path)
-    return asks.function(runs, scored, 0.1, [0.05])
+        write_table(scores(scene, 0.04), scored[-1].path)
+    return asks.function(runs, scored, 0.1)
 
 
 def test_each_scene_has_one_factor_and_broken_promises_are_counted(made):

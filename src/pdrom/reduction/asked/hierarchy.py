@@ -12,7 +12,7 @@ from pdrom.core.errors import PdromError
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.scene import Scene
 from pdrom.reduction.asked.ask import Ask
-from pdrom.reduction.asked.level import WINDOW, Level
+from pdrom.reduction.asked.level import IN_PYTHON, WINDOW, Level
 from pdrom.reduction.asked.measured import CONVERGED, Motion, Tried, tried, worst
 from pdrom.reduction.asked.motions import VALIDATION
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
@@ -22,6 +22,10 @@ log = logging.getLogger(__name__)
 # No promise is made where less than this part of a motion's frames can be judged: it would be kept
 # by next to nothing.
 JUDGED = 0.1
+# A reduction is taken where it needs less than this part of the full order's time, its checks
+# included: counted work is no closer to the time.
+WORTH = 2.0 / 3.0
+CHECKS = 2  # of a reduction's run, at least
 
 Count = Annotated[int, Field(ge=1, le=10_000)]
 
@@ -44,13 +48,16 @@ class AskSettings(ConfigModel):
     iterations: tuple[Count, ...] = (5, 10, 20)
     plain: tuple[Count, ...] = (1, 2, 3, 5)
     accelerated: tuple[Count, ...] = (5, 10, 20, 40)
-    factor: Annotated[float, Field(ge=1.0, le=1e3)] = 6.0
+    factor: Annotated[float, Field(ge=1.0, le=1e3)] = 5.0
     share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.05
 
 
 @dataclass(frozen=True)
 class Step:
-    """A level with its outcome on each own motion, the training motion first."""
+    """A level with its outcome on each own motion, the training motion first.
+
+    work : estimated nanoseconds of a frame
+    """
 
     level: Level
     work: float
@@ -61,22 +68,27 @@ class Step:
 class Hierarchy:
     """Steps of a scene, in the order of their work.
 
-    unit : root mean square displacement of a frame of the training motion, m
+    training : the scene with its training motion
+    unit : root mean square displacement of a frame of that motion, m
     horizon : frames that a promise can be made for
-    frames : of a motion
     """
 
     steps: list[Step]
+    training: Scene
     unit: float
     horizon: int
-    frames: int
+
+    @property
+    def full(self) -> list[Step]:
+        """Steps of the full order."""
+        return [step for step in self.steps if step.level.model is None]
 
     def expected(self, step: Step, ask: Ask) -> float:
         """Largest error of the ``step`` on the own motions, in the quantity of the ``ask``.
 
         Infinite where too few frames count.
         """
-        judged = self.horizon >= JUDGED * self.frames
+        judged = self.horizon >= JUDGED * self.training.config.frames
         return worst(step.tried, ask.quantity) if judged else np.inf
 
     def defect(self, step: Step) -> float:
@@ -94,14 +106,25 @@ class Hierarchy:
     def admissible(self, ask: Ask, factor: float) -> list[Step]:
         """Steps that keep to the ask on the own motions when errors are ``factor`` times larger.
 
-        In the order of their work; the last one is a full-order step, and no reduction is dearer
-        than the first of these. Empty where even the full order would break the promise.
+        In the order of their work; the last one is a full-order step, and a reduction is taken if
+        it is `WORTH` it beside the first of these. Empty where even the full order would break the
+        promise.
         """
         good = [s for s in self.steps if factor * self.expected(s, ask) <= ask.error]
-        full = [s for s in good if s.level.model is None]
-        if not full:
+        full = next((s for s in good if s.level.model is None), None)
+        if full is None:
             return []
-        return [s for s in good if s.level.model is None or s.work < full[0].work]
+        checks = CHECKS * self.check_work(self.sure(ask)) / self.training.config.frames
+        return [s for s in good if s.level.model is None or s.work + checks < WORTH * full.work]
+
+    def sure(self, ask: Ask) -> Level:
+        """The cheapest full order that is much better than the ``ask``, to check reductions by."""
+        good = (s.level for s in self.full if self.expected(s, ask) <= ask.error / 3.0)
+        return next(good, CONVERGED)
+
+    def check_work(self, level: Level) -> float:
+        """Estimated nanoseconds of a check by the full-order ``level``, with Python around it."""
+        return level.work(self.training) + IN_PYTHON
 
 
 def hierarchy(training: Scene, settings: AskSettings) -> tuple[Hierarchy, list[Motion]]:
@@ -122,12 +145,12 @@ def hierarchy(training: Scene, settings: AskSettings) -> tuple[Hierarchy, list[M
                 raise
             log.warning("%s: left out (%s)", level.title, error)
             continue
-        steps.append(Step(level, level.work(training), found))
+        steps.append(Step(level, level.work(training, motions[0].touching), found))
         errors = [f"{each.errors['position']:.2e}" for each in found]
         log.info("%s: errors %s", level.title, ", ".join(errors))
     steps.sort(key=lambda step: step.work)
     horizon = min(motion.end for motion in motions)
-    return Hierarchy(steps, motions[0].unit, horizon, training.config.frames), motions
+    return Hierarchy(steps, training, motions[0].unit, horizon), motions
 
 
 def _full(settings: AskSettings, motion: Motion) -> Iterator[Level]:
@@ -156,9 +179,9 @@ def _reduced(training: Scene, motion: Motion, settings: AskSettings) -> Iterator
 
 
 def check_frames(frames: int, cost: float, share: float) -> Sequence[int]:
-    """Frames at which a run is checked: as many as cost the share of it, at least two.
+    """Frames at which a run is checked: as many as cost the share of it, at least `CHECKS`.
 
     cost : of a check, in frames
     """
-    count = min(max(2, int(share * frames / cost)), frames)
+    count = min(max(CHECKS, int(share * frames / cost)), frames)
     return sorted({int(f) for f in (np.arange(count) + 0.5) * frames / count})

@@ -16,11 +16,13 @@ from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import projector
 
 WINDOW = 5  # differences of iterates that Anderson's acceleration combines
-# Nanoseconds: a projection by its rows squared, an entry of the factor, a vertex in accelerated
-# iterations, a number of a dense product; a frame with Python around it, and one of a reduction.
-PROJECTION, ENTRY, ACCELERATED, DENSE = 5.0, 1.7, 20.0, 0.8
-FRAME, REDUCED_FRAME = 1e5, 3e5
-COMPILED_FRAME = 2e3
+# Nanoseconds of the full order: a projection by its rows squared, an entry of the factor, a vertex
+# in accelerated iterations; a frame in compiled code, and what Python adds to one that it does.
+PROJECTION, ENTRY, ACCELERATED = 5.0, 0.9, 6.5
+FRAME, IN_PYTHON = 2.3e4, 1.2e5
+# The same of a reduction: a projection, a number of a dense product, an iteration beside them.
+SAMPLED, DENSE, ITERATION = 12.5, 0.23, 1.2e3
+REDUCED_FRAME, REDUCED_IN_PYTHON = 4e4, 2.3e5
 # Entries of the factor of a matrix with n entries and N rows: FILL n log2 N.
 FILL = 0.35
 
@@ -54,24 +56,37 @@ class Level:
         changes = {"iterations": self.iterations, "anderson_window": self.window}
         return replace(scene, config=scene.config.model_copy(update=changes))
 
-    def work(self, scene: Scene) -> float:
-        """Estimated nanoseconds of a frame of ``scene``."""
-        lagged = any(group.frame_lagged for group in scene.groups)
+    def work(self, scene: Scene, touching: float = 0.0) -> float:
+        """Estimated nanoseconds of a frame of ``scene``.
+
+        ``touching`` is the share of frames with a contact, which a reduction resolves in Python.
+        """
+        slow = not _compiled(scene)
         if self.model is None:
             vertices = scene.mesh.vertices
             iteration = ENTRY * FILL * scene.system.matrix.nnz * np.log2(vertices)
             iteration += ACCELERATED * vertices * (self.window > 0)
             iteration += sum(PROJECTION * g.rows_per_element**2 * g.elements for g in scene.groups)
-            return (FRAME if lagged else COMPILED_FRAME) + self.iterations * iteration
-        size, iteration = self.model.columns.B.shape[1], 0.0
+            return FRAME + IN_PYTHON * slow + self.iterations * iteration
+        size, iteration = self.model.columns.B.shape[1], ITERATION
         for group in scene.groups:
             count, rows = self.model.evaluated(group), group.rows_per_element
-            iteration += count * rows * (PROJECTION * rows + DENSE * size)
-        return (REDUCED_FRAME if lagged else COMPILED_FRAME) + self.iterations * iteration
+            iteration += count * rows * (SAMPLED * rows + DENSE * size)
+        in_python = REDUCED_IN_PYTHON * max(touching, slow)
+        return REDUCED_FRAME + in_python + self.iterations * iteration
 
     def on(self, scene: Scene) -> "Running":
         """The level on the motion of ``scene``."""
         return Running(self, scene)
+
+
+def _compiled(scene: Scene) -> bool:
+    """Whether compiled code does whole frames of ``scene``, see `WholeFrames.suits`."""
+    return not (
+        any(group.frame_lagged for group in scene.groups)
+        or any(force.rate is None for force in scene.forces)
+        or any(contact.height is None for contact in scene.contacts)
+    )
 
 
 class Running:

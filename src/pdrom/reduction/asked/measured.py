@@ -25,8 +25,9 @@ from pdrom.reduction.asked.loops import Loops
 # or twice as many, as long as these reach further.
 CONVERGED = Level(80, WINDOW)
 MOST = 4 * CONVERGED.iterations
-# The frames of a motion count until starts this far apart (of the extent) and half the iterations
-# lead to positions that differ by more than this part of the motion: then round-off decides.
+# The frames of a motion count until half the iterations, from the same start or from one this far
+# apart (of the extent), lead to positions that differ by more than this part of the motion, in a
+# frame or on the whole: then round-off decides.
 MOVED, HORIZON, SEED = 1e-10, 5e-3, 0
 # Twice the iterations are worth it where so many times the frames count then.
 FURTHER = 1.1
@@ -49,27 +50,49 @@ class Motion:
         hair = np.random.default_rng(SEED).standard_normal(scene.mesh.points.shape)
         moved = MOVED * scene.mesh.extent * hair
         count, frames = CONVERGED.iterations, scene.config.frames
+        start: np.ndarray | None = None
         self.reference, self.iterations = _Accelerated(scene, count).whole(), count
         self.unit = _unit(self.reference)
         self.end = self._horizon(_Accelerated(scene, count // 2, moved))
-        start: np.ndarray | None = None
         while FURTHER * self.end < frames and count < MOST:
             count *= 2
             # a start apart from the reference's, or both would take the same side of a bifurcation
-            start = moved if start is None else None
-            run = _Accelerated(scene, count, start)
+            other = moved if start is None else None
+            run = _Accelerated(scene, count, other)
             end = self._horizon(run)
             if end <= FURTHER * self.end:
+                self.end = min(self.end, end)
                 break
-            self.reference, self.iterations, self.end = run.whole(), count, end
+            start, self.reference, self.iterations, self.end = other, run.whole(), count, end
+        same = _Accelerated(scene, self.iterations // 2, start)
+        self.end = min(self.end, self._horizon(same))
 
     def _horizon(self, other: "_Accelerated") -> int:
-        """Frames before the first at which another run is too far from the reference."""
+        """Frames in each of which, and on the whole, another run is close to the reference."""
+        squares = []
         for frame, positions in enumerate(self.reference[1:]):
-            apart = np.linalg.norm((positions - other.after(frame))[None], axis=(1, 2))[0]
+            apart = float(np.linalg.norm(positions - other.after(frame)))
             if not apart <= HORIZON * self.unit:
-                return frame
-        return len(self.reference) - 1
+                break
+            squares.append(apart**2)
+        moved = np.linalg.norm(self.reference[1:] - self.reference[0], axis=(1, 2))
+        allowed = HORIZON**2 * np.cumsum(moved[: len(squares)] ** 2)
+        close = np.flatnonzero(np.cumsum(squares) <= allowed)
+        return int(close[-1]) + 1 if len(close) else 0
+
+    @cached_property
+    def touching(self) -> float:
+        """Share of all frames at whose end a vertex that is not held touches a contact."""
+        frames = self.scene.config.frames
+        return sum(self._touches(frame) for frame in range(frames)) / frames
+
+    def _touches(self, frame: int) -> bool:
+        free = np.ones(self.scene.mesh.vertices, dtype=bool)
+        for boundary in self.scene.boundaries:
+            if boundary.active(frame):
+                free[boundary.held(frame)] = False
+        points = self.reference[frame + 1, free]
+        return any((contact.gaps(points) <= 0.0).any() for contact in self.scene.contacts)
 
     def error(self, positions: np.ndarray, quantity: Quantity) -> float:
         """Error in ``quantity`` of a run with ``positions`` (F + 1, N, 3) m, before the end."""

@@ -1,9 +1,10 @@
 """A run that keeps to an asked error: checked, repaired in time, ended in full order if it must.
 
-Some frames are done twice, by the level and by the full order from the same state, which gives the
-level's defect there exactly. Defects beyond those of the motions that the level was tried on raise
-the estimate. When it leaves the ask the run goes back to its last checked state, or to the start
-while little is spent, and goes on with a more accurate level. Nothing depends on the clock.
+Some frames of a reduction are done twice, by it and by the full order from the same state, which
+gives the reduction's defect there exactly. Defects beyond those of the motions that it was tried on
+raise the estimate. When it leaves the ask the run goes back to its last checked state, or to the
+start while little is spent, and goes on with a more accurate level. The full order is not checked:
+it is what a check would go on with. Nothing depends on the clock.
 """
 
 import logging
@@ -17,7 +18,7 @@ from pdrom.reduction.asked.ask import Ask
 from pdrom.reduction.asked.hierarchy import AskSettings, Hierarchy, Step, check_frames
 from pdrom.reduction.asked.level import Level, Running
 from pdrom.reduction.asked.loops import Loops
-from pdrom.reduction.asked.measured import defect, exact_beside
+from pdrom.reduction.asked.measured import defect
 
 log = logging.getLogger(__name__)
 
@@ -32,7 +33,8 @@ class Asked:
     """Outcome of a run with an asked error.
 
     positions : (F + 1, N, 3) m, the initial ones first
-    promised : whether the estimate keeps to the ask; False: nothing that was tried does
+    promised : whether the estimate keeps to the ask; False: nothing that was tried does, or the
+        full order blew up
     expected : error on the motions that the choice was made on, times the factor
     estimate : estimated error of the run, times the factor; None without a check
     changes : frames from which on another level went on, and its title; the first one at frame 0
@@ -77,11 +79,6 @@ class _Done:
         """The next frame."""
         return len(self.ends) - 1
 
-    @property
-    def finite(self) -> bool:
-        """Whether all vertices are at finite places."""
-        return bool(np.isfinite(self.state.positions).all())
-
 
 class CheckedRun:
     """A run of ``scene`` that keeps to ``ask``, with the levels of a hierarchy of its mesh.
@@ -107,13 +104,13 @@ class CheckedRun:
         self.scene, self._own, self._ask, self._settings = scene, own, ask, settings
         self._frames = scene.config.frames
         self._steps = own.admissible(ask, settings.factor)
-        full = [step for step in own.steps if step.level.model is None]
-        best = min(full, key=lambda step: (own.expected(step, ask), step.work))
+        best = min(own.full, key=lambda step: (own.expected(step, ask), step.work))
         self._dear = next((s for s in self._steps if s.level.model is None), best)
-        self._full, self._last = full, best
+        self._last = best
         self._running: dict[tuple[int, int, int], Running] = {}
         first = self._steps[0] if self._steps else best
-        for level in (first.level, self._check(first), self._dear.level):
+        checks = [] if first.level.model is None else [self._check(first)]
+        for level in (first.level, *checks, self._dear.level):
             self._on(level)
 
     @property
@@ -138,28 +135,19 @@ class CheckedRun:
         kept = begun = _Done(((whole, start.positions),), start)
         while kept.frame < self._frames:
             done, keeps = self._advance(kept, step)
-            if keeps or not promised:
-                kept = done
-                continue
-            following = self._better(step, kept.frame)
-            if following is None:
-                promised, kept = False, done if done.finite else kept
-                step = self._last
+            if keeps or step.level.model is None:
+                promised, kept = promised and keeps, done
                 continue
             self._repairs += 1
             early = self._work <= EARLY * self._frames * self._dear.work
-            kept, step = begun if early else kept, following
+            kept, step = begun if early else kept, self._better(step, kept.frame)
             log.info("frame %d: goes on with %s", kept.frame, step.level.title)
         return self._told(kept, promised, expected, self._loops.clock() - started)
 
     def _advance(self, kept: _Done, step: Step) -> tuple[_Done, bool]:
         """Frames up to the next check or the end; whether the estimate is within the ask."""
-        running, check = self._on(step.level), self._check(step)
-        cost = check.work(self.scene) / self._dear.work
-        share = self._settings.share * min(1.0, 0.01 / self._ask.error)
-        left = [f for f in check_frames(self._frames, cost, share) if f >= kept.frame]
-        checked = left[0] if left else None
-        until = self._frames if checked is None else checked + 1
+        running, planned = self._on(step.level), self._next_check(step, kept.frame)
+        until = self._frames if planned is None else planned[0] + 1
         state = running.inside(kept.state)
         before, ends = state, []
         for after in running.run(state, range(kept.frame, until)):
@@ -170,8 +158,9 @@ class CheckedRun:
         if not changes or changes[-1][1] is not step:
             changes = (*changes, (kept.frame, step))
         end = running.outside(state)
-        if checked is not None:
-            self._work += check.work(self.scene)
+        if planned is not None:
+            checked, check = planned
+            self._work += self._own.check_work(check)
             exact = self._on(check)
             size = defect(running.outside(before), end, exact, checked) / self._own.unit
             parts = (*parts, (checked, step, size))
@@ -181,15 +170,23 @@ class CheckedRun:
         keeps = extent <= BLOWUP_EXTENT and (estimate is None or estimate <= self._ask.error)
         return done, keeps
 
+    def _next_check(self, step: Step, frame: int) -> tuple[int, Level] | None:
+        """The next frame from ``frame`` on that is checked, and by what; None if there is none."""
+        if step.level.model is None:
+            return None
+        check = self._check(step)
+        cost = self._own.check_work(check) / self._dear.work
+        share = self._settings.share * min(1.0, 0.01 / self._ask.error)
+        left = [f for f in check_frames(self._frames, cost, share) if f >= frame]
+        return (left[0], check) if left else None
+
     def _check(self, step: Step) -> Level:
-        """The cheapest full order much better than the step, or for a reduction than the ask."""
-        allowed = self._own.defect(step) / 3.0
-        for other in self._full:
-            reduced = step.level.model is not None
-            sure = reduced and self._own.expected(other, self._ask) <= self._ask.error / 3.0
-            if sure or self._own.defect(other) <= allowed:
+        """The cheapest full order much better than the ask or than the reduction ``step``."""
+        own, sure = self._own, self._own.sure(self._ask)
+        for other in own.full:
+            if other.level is sure or own.defect(other) <= own.defect(step) / 3.0:
                 return other.level
-        return exact_beside(step.level)
+        return sure
 
     def _estimate(self, done: _Done) -> float | None:
         """Estimated error of a run by its checks, times the factor."""
@@ -202,27 +199,20 @@ class CheckedRun:
             squares += len(own) * self._own.estimated(step, self._ask, size) ** 2
         return self._settings.factor * float(np.sqrt(squares / len(done.parts)))
 
-    def _better(self, step: Step, frame: int) -> Step | None:
-        """The step to go on with from ``frame`` on.
+    def _better(self, step: Step, frame: int) -> Step:
+        """The step to go on with from ``frame`` on after the reduction ``step``.
 
-        After a reduction: one of at most half the error, if that could save more than it would cost
-        to find out that it fails, too; else the cheapest full order that keeps to the ask. After a
-        full order: one of at most half the error, None where there is none.
+        A reduction of at most half the error, if that could save more than it would cost to find
+        out that it fails, too; else the cheapest full order that keeps to the ask.
         """
         own, ask = self._own, self._ask
-        if step.level.model is not None:
-            half = [s for s in self._steps if own.expected(s, ask) <= own.expected(step, ask) / 2]
-            for other in (s for s in half if s.level.model is not None):
-                saved = (self._frames - frame) * (self._dear.work - other.work)
-                trial = self._check(other).work(self.scene) + self._frames / 2 * other.work
-                if saved > trial:
-                    return other
-            return self._dear
-        # dearer ones only: a run ends, also where no error is left to halve
-        for other in self._full:
-            if other.work > step.work and own.expected(other, ask) <= own.expected(step, ask) / 2:
+        half = [s for s in self._steps if own.expected(s, ask) <= own.expected(step, ask) / 2]
+        for other in (s for s in half if s.level.model is not None):
+            saved = (self._frames - frame) * (self._dear.work - other.work)
+            trial = own.check_work(self._check(other)) + self._frames / 2 * other.work
+            if saved > trial:
                 return other
-        return None
+        return self._dear
 
     def _told(self, done: _Done, promised: bool, expected: float, seconds: float) -> Asked:
         ends = [*(frame for frame, _ in done.changes[1:]), self._frames]
