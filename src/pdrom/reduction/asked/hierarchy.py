@@ -48,7 +48,7 @@ class AskSettings(ConfigModel):
     iterations: tuple[Count, ...] = (5, 10, 20)
     plain: tuple[Count, ...] = (1, 2, 3, 5)
     accelerated: tuple[Count, ...] = (5, 10, 20, 40)
-    factor: Annotated[float, Field(ge=1.0, le=1e3)] = 5.0
+    factor: Annotated[float, Field(ge=1.0, le=1e3)] = 4.0
     share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.05
 
 
@@ -135,7 +135,8 @@ def hierarchy(training: Scene, settings: AskSettings) -> tuple[Hierarchy, list[M
     The hierarchy, and the motions with their references.
     """
     motions = [Motion(training), Motion(VALIDATION.of(training))]
-    levels = [*_full(settings, motions[0]), *_reduced(training, motions[0], settings)]
+    most = max(motion.iterations for motion in motions)
+    levels = [*_full(settings, most), *_reduced(training, motions[0], settings)]
     steps = []
     for level in levels:
         try:
@@ -153,10 +154,11 @@ def hierarchy(training: Scene, settings: AskSettings) -> tuple[Hierarchy, list[M
     return Hierarchy(steps, training, motions[0].unit, horizon), motions
 
 
-def _full(settings: AskSettings, motion: Motion) -> Iterator[Level]:
-    """The full order; where its steps converge slowly, with half the reference's iterations too."""
-    if motion.iterations > CONVERGED.iterations:
-        yield Level(motion.iterations // 2, WINDOW)
+def _full(settings: AskSettings, most: int) -> Iterator[Level]:
+    """The full order; also with the ``most`` iterations of a reference, and with half of many."""
+    yield Level(most, WINDOW)
+    if most > CONVERGED.iterations:
+        yield Level(most // 2, WINDOW)
     yield from (Level(count) for count in settings.plain)
     yield from (Level(count, WINDOW) for count in settings.accelerated)
 

@@ -25,9 +25,8 @@ from pdrom.reduction.asked.loops import Loops
 # or twice as many, as long as these reach further.
 CONVERGED = Level(80, WINDOW)
 MOST = 4 * CONVERGED.iterations
-# The frames of a motion count until half the iterations, from the same start or from one this far
-# apart (of the extent), lead to positions that differ by more than this part of the motion, in a
-# frame or on the whole: then round-off decides.
+# The frames of a motion count as long as half the iterations, from the same start or from one this
+# far apart (of the extent), have at most this error over them: then round-off decides.
 MOVED, HORIZON, SEED = 1e-10, 5e-3, 0
 # Twice the iterations are worth it where so many times the frames count then.
 FURTHER = 1.1
@@ -68,17 +67,17 @@ class Motion:
         self.end = min(self.end, self._horizon(same))
 
     def _horizon(self, other: "_Accelerated") -> int:
-        """Frames in each of which, and on the whole, another run is close to the reference."""
-        squares = []
-        for frame, positions in enumerate(self.reference[1:]):
-            apart = float(np.linalg.norm(positions - other.after(frame)))
-            if not apart <= HORIZON * self.unit:
-                break
-            squares.append(apart**2)
+        """Most frames over which another run has at most the error `HORIZON`."""
         moved = np.linalg.norm(self.reference[1:] - self.reference[0], axis=(1, 2))
-        allowed = HORIZON**2 * np.cumsum(moved[: len(squares)] ** 2)
-        close = np.flatnonzero(np.cumsum(squares) <= allowed)
-        return int(close[-1]) + 1 if len(close) else 0
+        allowed = HORIZON**2 * np.cumsum(moved**2)
+        end, apart = 0, 0.0
+        for frame, positions in enumerate(self.reference[1:]):
+            apart += float(np.linalg.norm(positions - other.after(frame))) ** 2
+            if not apart <= allowed[-1]:
+                break
+            if apart <= allowed[frame]:
+                end = frame + 1
+        return end
 
     @cached_property
     def touching(self) -> float:

@@ -71,6 +71,8 @@ def _dots(
     colour: str,
     marker: str = "o",
 ) -> None:
+    if values.empty:  # dots that are none, and not clipped, would take all the room of the axes
+        return
     ax.plot(
         asked, clipped(np.asarray(values, float), *limits), marker,
         markersize=3.0, color=colour, alpha=0.7, clip_on=False,

@@ -211,7 +211,7 @@ def test_twice_the_iterations_that_leave_earlier_shorten_what_counts(scene, monk
 
 
 @pytest.mark.parametrize(("beside", "end"), [(0.004, 0), (0.001, 10)])
-def test_what_counts_is_close_on_the_whole(scene, monkeypatch, beside, end):
+def test_what_counts_is_close_over_all_frames_that_count(scene, monkeypatch, beside, end):
     """The reference moves by 1 a frame, 17.75 in the root mean square of 30 frames, 6.2 of ten."""
 
     class Beside(Leaving):
