@@ -166,13 +166,18 @@ def tried(level: Level, motion: Motion, loops: Loops | None = None) -> Tried:
     last = max(motion.end - 1, 0)
     probed = np.unique(np.linspace(0, last, PROBED + 1).round().astype(int)[1:])
     ends = {
-        int(f): (running.outside(states[f]), running.outside(states[f + 1]))
+        int(f): (_alone(running.outside(states[f])), _alone(running.outside(states[f + 1])))
         for f in probed
         if np.isfinite(positions[f + 1]).all()
     }
     # later runs take hold elsewhere
     scene = replace(motion.scene, boundaries=deepcopy(motion.scene.boundaries))
     return Tried(errors, ms, partial(_defects, level, motion, scene, ends))
+
+
+def _alone(state: State) -> State:
+    """A copy: the states of a loop are parts of blocks of many frames, which would stay, too."""
+    return State(state.positions.copy(), state.velocities.copy())
 
 
 def _defects(
