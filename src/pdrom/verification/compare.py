@@ -38,6 +38,7 @@ class Comparison:
         self.e = self.expected.iloc[[i for i, _ in self.pairs]].reset_index(drop=True)
         self.f = self.found.iloc[[j for _, j in self.pairs]].reset_index(drop=True)
         self.wrong = of_wrong_runs(self.table, self.e)
+        self._loose: dict[str, dict[str, np.ndarray]] = {}
 
     def columns(self) -> Iterator[Column]:
         """Columns that are compared."""
@@ -45,7 +46,9 @@ class Comparison:
 
     def loose(self, column: Column) -> dict[str, np.ndarray]:
         """Cells of a column that rounding decides about, by the reason."""
-        return self.context.loose(self.table, column, self.e)
+        if column.name not in self._loose:
+            self._loose[column.name] = self.context.loose(self.table, column, self.e)
+        return self._loose[column.name]
 
     def compared(self, column: Column) -> np.ndarray:
         """Cells of a column that are compared: those that do not depend on timing."""

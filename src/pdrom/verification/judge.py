@@ -125,9 +125,11 @@ def _loose(comparison: Comparison, column: Column, cells: np.ndarray) -> Iterato
     """
     rows = comparison.e[cells]
     run = [*SAMPLES, *({"seed"} & set(rows.columns))]
-    runs = names(rows, run) if set(run) <= set(rows.columns) else range(len(rows))
-    for share, wider, by in LOOSE if len(rows) else ():
+    for share, wider, by in LOOSE:
         other = comparison.beyond(column, wider if column.kind == "number" else 0.0)[cells]
+        if not other.any():
+            continue
+        runs = names(rows, run) if set(run) <= set(rows.columns) else range(len(rows))
         counted = pd.DataFrame({"run": runs, "other": other}, rows.index)
         named = [rows[name] for name in by if name in rows and "scene" in rows]
         all_rows = [pd.Series("all rows", rows.index)]

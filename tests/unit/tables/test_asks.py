@@ -65,10 +65,10 @@ def made(tmp_path) -> pd.DataFrame:
     for i in range(12):
         scene = f"s{i}"
         row = {
-            "scene": scene, "motion": FIRST, "asked": 0.05, "vertices": 10 if i else 5000,
+            "scene": scene, "motion": FIRST, "asked": 0.05, "vertices": 10 if i else 2000,
             "frames": 9, "judged": i != 3, "promised": i != 1,
             "error": 0.06 if i in (2, 3) else 0.04, "reduced_frames": 9 if i < 6 else 0,
-            "ms_per_frame": 0.1, "full_ms": 0.2,
+            "ms_per_frame": 0.9 if i == 5 else 0.1, "full_ms": 0.2,
             "own_ms": 0.4, "full_error": 0.01, "oracle_ms": 0.05, "repairs": 0, "checks": 2,
         }  # fmt: skip
         rows = [row | {"factor": factor} for factor in (1.0, 2.0)]
@@ -87,6 +87,9 @@ def test_each_scene_has_one_factor_and_broken_promises_are_counted(made):
     assert (small["asks"], small["promised"], small["judged"]) == (11, 10, 9)
     assert (small["broken"], small["reduced"]) == (1, 2)
     assert small["worst"] == pytest.approx(1.2)
+    assert (small["over_full"], small["over_full_most"]) == pytest.approx((0.5, 4.5))
+    assert (small["over_own"], small["over_own_most"]) == pytest.approx((0.25, 2.25))
+    assert (small["full_over_own"], small["oracle_over_own"]) == pytest.approx((0.5, 0.125))
     assert large["over_full"] == pytest.approx(0.5)
     assert large["over_own"] == pytest.approx(0.25)
 

@@ -73,13 +73,13 @@ class ConstraintGroup(Effect):
     """Compiled `accumulate`, for loops in compiled code; a group without one writes its own."""
     _pass: LocalPass | None = None
     manifold: ClassVar[str | None] = None
-    """What it projects on, if that is one of "clamped" (signed singular values in a range, which
+    """Set that it projects on, if it is one of "clamped" (signed singular values in a range, which
     are the `kernel_parameters`), "length" or "half sphere": kernels are then compared with its
     projection in high precision; or "size" (a volume or an area in a range), without a bound."""
     frame_lagged: bool = False
     """Whether ``begin_frame`` freezes anything."""
     cells: ClassVar[str]
-    """What an element lies on: a key of `CELLS`."""
+    """Place of an element: a key of `CELLS`."""
     unit: ClassVar[str] = ""
     """Unit of a projection; empty where it has none."""
 

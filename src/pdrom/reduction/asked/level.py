@@ -11,6 +11,7 @@ import numpy as np
 
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.dynamics.system import GlobalSystem
+from pdrom.model.dynamics.whole_frames import WholeFrames
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import projector
@@ -61,7 +62,8 @@ class Level:
 
         ``touching`` is the share of frames with a contact, which a reduction resolves in Python.
         """
-        slow = not _compiled(scene)
+        effects = scene.groups, scene.forces, scene.boundaries, scene.contacts
+        slow = not WholeFrames.suits(*effects)
         if self.model is None:
             vertices = scene.mesh.vertices
             iteration = ENTRY * FILL * scene.system.matrix.nnz * np.log2(vertices)
@@ -78,15 +80,6 @@ class Level:
     def on(self, scene: Scene) -> "Running":
         """The level on the motion of ``scene``."""
         return Running(self, scene)
-
-
-def _compiled(scene: Scene) -> bool:
-    """Whether compiled code does whole frames of ``scene``, see `WholeFrames.suits`."""
-    return not (
-        any(group.frame_lagged for group in scene.groups)
-        or any(force.rate is None for force in scene.forces)
-        or any(contact.height is None for contact in scene.contacts)
-    )
 
 
 class Running:

@@ -26,7 +26,7 @@ from pdrom.reduction.asked.loops import Loops
 CONVERGED = Level(80, WINDOW)
 MOST = 4 * CONVERGED.iterations
 # The frames of a motion count as long as half the iterations, from the same start or from one this
-# far apart (of the extent), have at most this error over them: then round-off decides.
+# far apart (of the extent), have at most this error over them: beyond, round-off decides.
 MOVED, HORIZON, SEED = 1e-10, 5e-3, 0
 # Twice the iterations are worth it where so many times the frames count then.
 FURTHER = 1.1

@@ -104,11 +104,11 @@ class CheckedRun:
         self.scene, self._own, self._ask, self._settings = scene, own, ask, settings
         self._frames = scene.config.frames
         self._steps = own.admissible(ask, settings.factor)
-        best = min(own.full, key=lambda step: (own.expected(step, ask), step.work))
+        # where no error can be told, the dearest
+        best = min(own.full, key=lambda step: (own.expected(step, ask), -step.work))
         self._dear = next((s for s in self._steps if s.level.model is None), best)
-        self._last = best
         self._running: dict[tuple[int, int, int], Running] = {}
-        first = self._steps[0] if self._steps else best
+        first = self._steps[0] if self._steps else self._dear
         checks = [] if first.level.model is None else [self._check(first)]
         for level in (first.level, *checks, self._dear.level):
             self._on(level)
@@ -128,7 +128,7 @@ class CheckedRun:
         """Do all frames; each call is a run of its own."""
         self._repairs, self._work = 0, 0.0
         promised = bool(self._steps)
-        step = self._steps[0] if promised else self._last
+        step = self._steps[0] if promised else self._dear
         expected = self._settings.factor * self._own.expected(step, self._ask)
         start = self.scene.initial_state()
         whole, started = self._on(self._dear.level), self._loops.clock()

@@ -42,12 +42,17 @@ def asks(results: Results, options: Options) -> Figure:
     left, right = chart.subplots(1, 2)
     promised, reduced = table.promised.astype(bool), table.reduced.astype(bool)
     parts = (promised & reduced, promised & ~reduced, ~promised)
-    for (colour, shift), chosen in zip(KINDS.values(), parts, strict=True):
+    looks = {}
+    for (kind, (colour, shift)), chosen in zip(KINDS.items(), parts, strict=True):
         own = table[chosen]
+        if not own.empty:
+            looks[kind] = (colour, "o")
         _dots(left, shift * own.asked, own.error, REACHED, colour)
         _dots(right, shift * own.asked, own.ms_per_frame / own.own_ms, TIMES, colour)
     best = table[table.oracle_ms.notna()]
     _dots(right, 1.3 * best.asked, best.oracle_ms / best.own_ms, TIMES, "#333333", marker="x")
+    if not best.empty:
+        looks["by hindsight"] = ("#333333", "x")
     log_axes(left, ERRORS, REACHED)
     log_axes(right, ERRORS, TIMES)
     for asked in table.asked.unique():
@@ -57,8 +62,6 @@ def asks(results: Results, options: Options) -> Figure:
     right.set_ylabel("time over that of own iterations")
     for ax in (left, right):
         ax.set_xlabel("asked error")
-    looks = {name: (colour, "o") for name, (colour, _) in KINDS.items()}
-    looks["by hindsight"] = ("#333333", "x")
     style.legend(chart, style.handles(looks, linestyle="none", markersize=4), 4)
     return chart
 

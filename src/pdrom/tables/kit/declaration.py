@@ -216,7 +216,9 @@ def table(
     def decorate(function: Callable[..., pd.DataFrame]) -> Table:
         name = function.__name__
         writes = {"table": TABLE.where(name=name)}
-        made = Table(name, title, reads, writes, function, False, tuple(columns), timed_cells)
+        made = Table(
+            name, title, reads, writes, function, columns=tuple(columns), timed_cells=timed_cells
+        )
         _require_distinct(made)
         return declare(made)
 

@@ -155,7 +155,10 @@ def test_nothing_is_promised_where_the_full_order_fails_too(scene, own):
 
 def test_nothing_is_promised_where_next_to_nothing_can_be_judged(scene, own):
     short = replace(own, horizon=scene.config.frames // 10 - 1)
-    assert not CheckedRun(scene, short, Ask(error=0.5), SETTINGS).outcome().promised
+    refused = CheckedRun(scene, short, Ask(error=0.5), SETTINGS).outcome()
+    assert not refused.promised
+    # as well as possible: with the iterations of the reference
+    assert refused.changes == [(0, "full order, Anderson, K = 80")]
     long = replace(own, horizon=scene.config.frames // 10)
     assert CheckedRun(scene, long, Ask(error=0.5), SETTINGS).outcome().promised
 

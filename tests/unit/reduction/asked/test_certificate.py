@@ -104,14 +104,19 @@ def test_what_is_not_convex_smooth_or_free_is_refused():
     assert np.isnan(step.certify(collapsed)).all()
     bent = make_scene({"effect": "bending", "weight": 1.0}, mesh=GROUPS["bending"])
     assert np.isnan(ImplicitStep(bent, bent.initial_state(), 0).certify(bent.mesh.points)).all()
-    low = float(rest[:, 1].min())
-    floor = make_scene(
-        {"effect": "spring", "weight": 1e4}, {"effect": "floor", "height": low},
-        mesh=GROUPS["spring"],
-    )  # fmt: skip
-    least, bound = ImplicitStep(floor, floor.initial_state(), 0).certify(rest)
-    assert least > 0.0
-    assert np.isnan(bound)
+    # a sheet that stands: its lowest vertices touch the floor, or none
+    for below in (0.0, 1.0):
+        floor = make_scene({"effect": "spring", "weight": 1e4}, mesh=GROUPS["spring"])
+        low = float(floor.mesh.points[:, 1].min())
+        floor = make_scene(
+            {"effect": "spring", "weight": 1e4}, {"effect": "floor", "height": low - below},
+            mesh=GROUPS["spring"],
+        )  # fmt: skip
+        standing = floor.mesh.points
+        assert np.ptp(standing[:, 1]) > 0.1
+        least, bound = ImplicitStep(floor, floor.initial_state(), 0).certify(standing)
+        assert least > 0.0
+        assert np.isnan(bound) == (below == 0.0)
 
 
 def test_growth_is_the_norm_over_all_modes():
