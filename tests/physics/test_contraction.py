@@ -84,6 +84,15 @@ def test_numbers_are_those_of_the_iteration(group, method):
     assert radius <= contraction * (1 + 1e-9)
 
 
+def test_what_is_frozen_is_that_of_the_frame():
+    """Curved bending elements are on the side of the frame's first normals."""
+    scene, _, positions = _case("bending", METHODS["pod"])
+    first = _tangent(scene, positions, 12)
+    scene.groups[0].begin_frame(positions[12] * [1.0, 1.0, -1.0])  # normals turn round
+    again = _tangent(scene, positions, 12)
+    np.testing.assert_array_equal(first.strain.toarray(), again.strain.toarray())
+
+
 @pytest.mark.parametrize("group", ["spring", "strain", "deformation_gradient"])
 def test_contraction_is_at_most_gain_times_stiff_share(group):
     """|T|_A <= gamma_W J theta: gain and derivative in the W norm, theta = h^2 w^2 / (1 + h^2 w^2).

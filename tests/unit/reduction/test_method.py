@@ -54,6 +54,7 @@ def test_methods_with_the_same_basis_share_its_name():
         {"rows": "scalar", "coefficients": "per-axis"},
         {"rows": "joint", "selection": "s-opt"},
         {"rows": "scalar", "solve": "square", "oversampling": 2},
+        {"rows": "joint", "solve": "square", "oversampling": 2},
         {"rows": "scalar", "solve": "square", "gain_bound": 2.0},
         {"rows": "all", "gain_bound": 2.0},
         {"rows": "joint", "gain_bound": 2.0},
@@ -71,6 +72,11 @@ def test_methods_with_the_same_basis_share_its_name():
 def test_combinations_that_do_not_exist_are_refused(fault):
     with pytest.raises(ValidationError):
         MethodSpec(title="t", **fault)
+
+
+@pytest.mark.parametrize("rows", ["scalar", "joint", "element"])
+def test_more_samples_than_modes_are_solved_by_least_squares(rows):
+    assert MethodSpec(title="t", rows=rows, solve="qr", oversampling=2).oversampling == 2
 
 
 def test_a_method_cannot_be_changed():

@@ -59,6 +59,7 @@ def test_estimates_stand_beside_the_errors(read):
     assert rows.loc[("ecsw", "pod", 20), "within"]
     assert not rows.loc[("ecsw", "pod", 40), "within"]
     assert not rows.loc[("ecsw", "pod", 40), "resolved"]
+    assert rows.loc[("ecsw", "pod", 20), "resolved"]
     assert pd.isna(rows.loc[("deim", "full", 10), "ratio"])
     assert pd.isna(rows.loc[("deim", "full", 10), "within"])
     assert made.overhead.tolist() == [2.0] * len(made)

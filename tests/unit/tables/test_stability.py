@@ -61,6 +61,7 @@ def test_every_run_has_its_row_and_outcome(files):
     ]  # fmt: skip
     assert table.experiment.tolist() == ["rerun"] * 6 + ["sweep"] * 2
     assert table.h.tolist() == [0.016] * 6 + [0.2] * 2
+    assert table.stiffness_ratio.tolist()[:6] == [1.0] * 6
     assert table.guard_count.tolist()[1:3] == [2, 2]
     assert table.guard_count.isna().tolist() == [True, False, False] + [True] * 5
     full = table[(table.method == "full") & (table.position_basis == "full")]

@@ -106,6 +106,11 @@ def test_a_part_of_a_large_group_stands_for_all(pulled, monkeypatch):
     assert np.linalg.norm(left) <= 3e-2 * np.linalg.norm(total)
 
 
+def test_an_element_is_a_candidate_once():
+    drawn = ecsw._eligible(100, 60)
+    assert len(np.unique(drawn)) == len(drawn) == 60
+
+
 def test_a_part_that_misses_the_tolerance_grows(pulled, monkeypatch):
     scene, _, columns = pulled
     group = scene.groups[0]

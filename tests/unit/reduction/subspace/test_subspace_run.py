@@ -37,6 +37,11 @@ SCENES = {
     "damped": partial(
         make_scene, SPRING, GRAVITY, {"effect": "damping", "rate": 2.0}, PINS, frames=6
     ),
+    "dragged": partial(
+        make_scene,
+        SPRING, GRAVITY, {"effect": "damping", "rate": 2.0}, {"effect": "drag", "coefficient": 5.0},
+        PINS, frames=6,
+    ),
     "bending": partial(
         make_scene,
         {"effect": "bending", "weight": 10.0}, GRAVITY, PINS, mesh=GROUPS["bending"], frames=6
@@ -221,7 +226,7 @@ def test_arrays_of_a_step_have_the_size_of_the_sample():
     assert sizes[0] == sizes[1]
 
 
-@pytest.mark.parametrize("name", ["free", "handles", "poke", "damped", "bending", "bar"])
+@pytest.mark.parametrize("name", ["free", "handles", "poke", "damped", "dragged", "bending", "bar"])
 def test_fused_iterations_are_the_plain_ones(name):
     """The compiled loop against the step loop with projections and solve one after the other."""
     scene = SCENES[name]()

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -529,20 +530,34 @@ def specs() -> dict[str, Options]:
 @pytest.fixture(scope="session")
 def study(tmp_path_factory, specs) -> Study:
     """An invented study with all methods."""
-    root = tmp_path_factory.mktemp("results")
-    holdings = make_results(root, SCENES, list(METHOD_ROWS))
-    return Study(root, Results(str(root), holdings, SETTINGS), specs)
+    return make_study(tmp_path_factory.mktemp("results"), specs, SCENES, list(METHOD_ROWS))
+
+
+def make_study(
+    root: Path, specs: dict[str, Options], scenes: dict[str, tuple[str, ...]], methods: list[str]
+) -> Study:
+    """An invented study of some scenes, with their groups, and methods, written below ``root``."""
+    return Study(root, Results(str(root), make_results(root, scenes, methods), SETTINGS), specs)
 
 
 @pytest.fixture
 def small_study(tmp_path, specs) -> Callable[..., Study]:
-    """Maker of a study with other scenes and methods."""
+    """Maker of a study with other scenes and methods, which a test may change."""
+    return partial(make_study, tmp_path, specs)
 
-    def make(scenes: dict[str, tuple[str, ...]], methods: list[str]) -> Study:
-        holdings = make_results(tmp_path, scenes, methods)
-        return Study(tmp_path, Results(str(tmp_path), holdings, SETTINGS), specs)
 
-    return make
+@pytest.fixture(scope="session")
+def strain_only(tmp_path_factory, specs) -> Study:
+    """A study without most scenes and methods."""
+    scenes = {"strain_oop": ("strain",)}
+    return make_study(tmp_path_factory.mktemp("strain"), specs, scenes, ["deim", "block-deim"])
+
+
+@pytest.fixture(scope="session")
+def round_off_only(tmp_path_factory, specs) -> Study:
+    """A study of which the snapshots are round-off."""
+    methods = ["deim", "deim-joint", "block-deim"]
+    return make_study(tmp_path_factory.mktemp("flat"), specs, {"bend_fall": ("bending",)}, methods)
 
 
 @pytest.fixture(params=list(declarations()))

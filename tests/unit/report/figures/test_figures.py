@@ -6,7 +6,10 @@ import shutil
 import subprocess
 import sys
 import warnings
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import h5py
 import numpy as np
@@ -25,7 +28,6 @@ from pdrom.model.mesh.types import save_mesh
 from pdrom.report.figures.asks import _dots as asked_dots
 from pdrom.report.figures.kit.catalogue import declaration
 from pdrom.report.figures.kit.multiples import log_axes
-from pdrom.report.figures.kit.options import Options
 from pdrom.report.figures.kit.output import draw_figure, write_figure
 from pdrom.report.figures.kit.results import Results
 from pdrom.report.figures.kit.style import new_figure, note
@@ -42,21 +44,38 @@ def draw(study: Study, name: str, **changes: object) -> Figure:
     )
 
 
-def make_figure(name: str, results: Results, options: Options, pdf: Path, png: Path) -> None:
-    write_figure(draw_figure(declaration(name), results, options), name, pdf, png)
-
-
 def texts(figure: Figure) -> list[str]:
     """Every text of a figure."""
     found = [t.get_text() for t in figure.findobj(lambda artist: hasattr(artist, "get_text"))]
     return [text for text in found if text]
 
 
-def test_draws_without_warnings_and_writes_both_files(study, figure_name, tmp_path):
+class Drawn(NamedTuple):
+    """A figure, and its texts before it was written (which adds those of ticks)."""
+
+    figure: Figure
+    texts: list[str]
+
+
+@pytest.fixture(scope="module")
+def whole(study) -> Callable[[str], Drawn]:
+    """Each figure of the whole study, drawn once and without warnings."""
+
+    @cache
+    def drawn(name: str) -> Drawn:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            figure = draw(study, name)
+        return Drawn(figure, texts(figure))
+
+    return drawn
+
+
+def test_both_files_are_written_without_warnings(whole, figure_name, tmp_path):
     pdf, png = tmp_path / "a.pdf", tmp_path / "a.png"
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        make_figure(figure_name, study.results, study.specs[figure_name], pdf, png)
+        write_figure(whole(figure_name).figure, figure_name, pdf, png)
     assert pdf.read_bytes().startswith(b"%PDF")
     assert png.read_bytes().startswith(b"\x89PNG")
     assert pdf.stat().st_size < 1_500_000
@@ -64,8 +83,8 @@ def test_draws_without_warnings_and_writes_both_files(study, figure_name, tmp_pa
     assert sorted(path.name for path in tmp_path.iterdir()) == [*checksums, "a.pdf", "a.png"]
 
 
-def test_every_panel_holds_data_and_axes_are_labelled(study, figure_name):
-    axes = draw(study, figure_name).axes
+def test_every_panel_holds_data_and_axes_are_labelled(whole, figure_name):
+    axes = whole(figure_name).figure.axes
     assert axes
     for ax in axes:
         assert ax.has_data() or ax.texts or ax.images, ax.get_title()
@@ -75,8 +94,8 @@ def test_every_panel_holds_data_and_axes_are_labelled(study, figure_name):
 
 
 @pytest.mark.parametrize(("name", "unit"), [("local_share", "(%)"), ("accuracy_cost", "(ms)")])
-def test_units_stand_on_the_axes(study, name, unit):
-    assert all(unit in ax.get_xlabel() for ax in draw(study, name).axes if ax.get_xlabel())
+def test_units_stand_on_the_axes(whole, name, unit):
+    assert all(unit in ax.get_xlabel() for ax in whole(name).figure.axes if ax.get_xlabel())
 
 
 DRAW_ALL = """
@@ -112,9 +131,9 @@ def test_bytes_are_equal_in_another_process(study, tmp_path):
     subprocess.run(
         [sys.executable, "-c", DRAW_ALL, config, *arguments], check=True, env=environment
     )
-    for name, spec in study.specs.items():
+    for name in study.specs:
         files = tmp_path / "own.pdf", tmp_path / "own.png"
-        make_figure(name, study.results, spec, *files)
+        write_figure(draw(study, name), name, *files)
         for file in files:
             assert file.read_bytes() == (tmp_path / f"{name}{file.suffix}").read_bytes(), name
 
@@ -133,7 +152,7 @@ def inputs(study: Study, name: str) -> list[Path]:
     return [Path(path) for path in paths]
 
 
-def test_reads_only_what_it_declares(study, figure_name, tmp_path):
+def test_reads_only_what_it_declares(study, whole, figure_name, tmp_path):
     options, holdings = study.specs[figure_name], study.results.holdings
     settings = {
         r.key: SETTINGS[r.key] for r in declaration(figure_name).reads.values() if hasattr(r, "key")
@@ -145,8 +164,7 @@ def test_reads_only_what_it_declares(study, figure_name, tmp_path):
             shutil.copy(file, target)
     chosen = Results(str(tmp_path), holdings.chosen(options), settings)
     figure = draw_figure(declaration(figure_name), chosen, options)
-    whole = draw_figure(declaration(figure_name), study.results, options)
-    assert texts(figure) == texts(whole) != []
+    assert texts(figure) == whole(figure_name).texts != []
 
 
 def test_a_missing_file_is_named(study, figure_name, tmp_path):
@@ -249,9 +267,8 @@ def test_a_note_fits_its_figure():
     assert text.get_text().splitlines()[-1] == "the full study draws it"
 
 
-def test_missing_scenes_and_methods_leave_their_panels_out(small_study, figure_name):
-    study = small_study({"strain_oop": ("strain",)}, ["deim", "block-deim"])
-    figure = draw(study, figure_name)
+def test_missing_scenes_and_methods_leave_their_panels_out(strain_only, figure_name):
+    figure = draw(strain_only, figure_name)
     for ax in figure.axes:
         assert "spring" not in ax.get_title()
     empty = {"cloth_all_grid", "bending_runs", "spring_runs", "strain_runs", "bar_runs",
@@ -260,11 +277,10 @@ def test_missing_scenes_and_methods_leave_their_panels_out(small_study, figure_n
     assert noted == (figure_name in empty)
 
 
-def test_experiments_of_round_off_only(small_study, figure_name):
-    study = small_study({"bend_fall": ("bending",)}, ["deim", "deim-joint", "block-deim"])
+def test_experiments_of_round_off_only(round_off_only, figure_name):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert texts(draw(study, figure_name, scenes=("bend_fall",)))
+        assert texts(draw(round_off_only, figure_name, scenes=("bend_fall",)))
 
 
 @pytest.mark.parametrize(("ran", "shown"), [(FRAMES, "ecsw, k = 20"), (2, "blew up")])

@@ -208,6 +208,10 @@ def test_the_trend_of_all_experiments_together(monkeypatch):
     more += [(*row[:2], "qdeim", *row[3:]) for row in rising]
     monkeypatch.setitem(globals(), "RERUNS", [*rising, *more])
     assert measured("trend_p_value") == pytest.approx([1.0 / 216.0])
+    # a run that ended early is the worst of its block
+    failed = [(*row[:8], np.nan if row[5] == 20 else row[8], 1.0) for row in rising]
+    monkeypatch.setitem(globals(), "RERUNS", failed)
+    assert measured("trend_p_value", **where) == pytest.approx([1.0 / 216.0])
     falling = [(*row[:8], 1.0 / row[8], 1.0) for row in rising]
     monkeypatch.setitem(globals(), "RERUNS", falling)
     assert measured("trend_p_value", **where) == pytest.approx([1.0])
