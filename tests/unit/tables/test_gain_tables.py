@@ -184,7 +184,7 @@ def test_scenes_count_once_however_many_sizes_they_have():
     for scene, ratio, sizes in (
         ("s", 0.5, 40),
         ("t", 2.0, 2),
-        ("u", 0.25, 2),
+        ("u", 0.25, 3),
         ("v", 0.1, 2),
         ("w", 1.0, 2),
     ):
@@ -192,7 +192,8 @@ def test_scenes_count_once_however_many_sizes_they_have():
             for method, gain, error in (
                 ("pod", 1, 1e-3),
                 ("block-deim", 8, 1e-2),
-                ("gappy", 4, 1e-2 * ratio),
+                # one error of "u" rises so much that its mean would rise, its median falls
+                ("gappy", 4, 1e-2 * (9.0 if (scene, r) == ("u", 3) else ratio)),
             ):
                 row = reruns.iloc[0].to_dict() | {"scene": scene, "r": r, "method": method}
                 row |= {"relative_error_within_horizon": error}
@@ -201,10 +202,11 @@ def test_scenes_count_once_however_many_sizes_they_have():
                 parts.append((row, gains))
     read = (pd.DataFrame(list(rows)) for rows in zip(*parts, strict=True))
     step, ordered = gain_interventions(*read, square()).itertuples()
-    assert (step.pairs, step.scenes, step.scenes_fallen, step.families) == (48, 5, 3, 5)
-    # the gain falls everywhere, the error not in the two pairs of t and of w
-    assert step.unexplained_share == pytest.approx(4 / 48)
-    assert (ordered.step, ordered.pairs) == ("lower gain, shared coefficients", 48)
+    assert (step.pairs, step.scenes, step.scenes_fallen, step.families) == (49, 5, 3, 5)
+    assert step.families_fallen == 3
+    # the gain falls everywhere, the error not in the two pairs of t and of w and in one of u
+    assert step.unexplained_share == pytest.approx(5 / 49)
+    assert (ordered.step, ordered.pairs) == ("lower gain, shared coefficients", 49)
     assert step.error_ratio == 0.5
     # sign test by hand, the tie of "w" counted as no fall: 2 (10 + 5 + 1) / 32
     assert step.p_value == pytest.approx(1.0)

@@ -62,6 +62,18 @@ def test_the_held_out_error_is_that_of_the_fastest_run():
     assert (row.error_train, row.error_heldout, row.heldout) == (0.025, 0.3, 1)
 
 
+def test_who_pays_is_scored_on_the_held_out_motions():
+    """Accurate and fast, accurate and slow, and fast but off by more than a tenth held out."""
+    runs = [("a", "deim", 0.01, 2.0, 0.05), ("b", "deim", 0.02, 0.5, 0.05)]
+    reruns, held = tables([*runs, ("c", "deim", 0.05, 4.0, 0.2)])
+    motions = [held.assign(**{ERROR: factor * held[ERROR]}) for factor in (0.5, 1.0, 1.5)]
+    (row,) = payoff(reruns, pd.concat(motions)).itertuples()
+    assert (row.accurate, row.pays, row.loses) == (3, 2, 1)
+    assert (row.accurate_heldout, row.pays_heldout, row.heldout) == (2, 1, 3)
+    found = (row.error_heldout_low, row.error_heldout, row.error_heldout_high)
+    assert found == pytest.approx((0.025, 0.05, 0.075))
+
+
 def test_what_did_not_run_does_not_count():
     reruns, held = tables([("a", "deim", 0.01, 2.0, None), ("b", "deim", 0.01, 2.0, None)])
     (row,) = payoff(reruns.assign(max_extent=[1.0, None]), held).itertuples()

@@ -24,7 +24,7 @@ FULL = {
 def files(tmp_path):
     """One scene with three sizes of one method, two subspace runs, and a sweep of two rows."""
     positions = np.zeros((4, 2, 3))
-    positions[:, 1, 0] = [1.0, 1.0, 1.2, 0.9]
+    positions[:, 1, 0] = [1.0, 1.1, 1.2, 0.9]
     fom = tmp_path / "fom" / "a" / "train.h5"
     with write_hdf5(fom) as file:
         file["positions"] = positions

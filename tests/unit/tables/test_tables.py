@@ -387,6 +387,11 @@ def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
         slow, unseen, timings, NOT_TIMED, [no_sweep(tmp_path)], [], {"a": 1, "b": 1}
     )
     assert table.pareto.tolist() == [True, False, True, False, False, False]
+    table = accuracy_cost(
+        runs, unseen.iloc[:0], timings, NOT_TIMED, [no_sweep(tmp_path)], [], {"a": 1, "b": 1}
+    )
+    # nothing is said of a reduction that no held-out motion judged
+    assert table.pareto_heldout.tolist() == [True, False, True, False, False, False]
 
 
 def sweep(folder, **changes) -> File:

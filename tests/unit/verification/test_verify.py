@@ -4,10 +4,12 @@ import io
 import json
 from contextlib import redirect_stdout
 from pathlib import Path
+from subprocess import CompletedProcess
+from types import SimpleNamespace
 
 import pytest
 
-from pdrom.core.errors import ConfigurationError
+from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.paths import ARTICLE, TABLE
 from pdrom.core.store import read_table, write_table, write_text
 from pdrom.report.article.verified import INDEX, NAME
@@ -16,8 +18,9 @@ from pdrom.tables import declared
 from pdrom.verification.again import made
 from pdrom.verification.command import parser, verify, verify_tables
 from pdrom.verification.lines import Line, Outcome, status_of
-from pdrom.verification.references import folder_of
+from pdrom.verification.references import LOG, folder_of
 from pdrom.verification.status import Status
+from pdrom.verification.update import NOTHING, update
 
 RESULTS = "results/studies/tiny"
 CLAIMS = ("claims", "claims_tests", "claims_sensitivity")
@@ -126,3 +129,35 @@ def test_update_goes_with_nothing_else():
     with pytest.raises(SystemExit):
         parser().parse_args(["--no-such-option"])
     assert parser().parse_args(["--update", "--reason", "why"]).reason == "why"
+
+
+def plan_says(monkeypatch, code: int, words: str) -> None:
+    """In place of Snakemake, which would plan the tables: its exit code and ``words``."""
+    done = CompletedProcess([], code, words, "")
+    run = SimpleNamespace(run=lambda *_, **__: done)
+    monkeypatch.setattr("pdrom.verification.update.subprocess", run)
+
+
+def test_an_update_writes_every_table_and_notes_the_reason(results, subject, monkeypatch):
+    plan_says(monkeypatch, 0, NOTHING)
+    folder = folder_of(RESULTS)
+    before = {path.name: path.read_bytes() for path in folder.glob("*.csv*")}
+    (folder / "ladder.csv").unlink()
+    (folder / "of_an_older_version.csv.xz").touch()
+    assert update(subject, " a new\n method ") == folder
+    assert (folder / LOG).read_text("utf-8").endswith("): a new method\n")
+    (folder / LOG).unlink()
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize(
+    ("code", "words", "fault"),
+    [(1, "", "the run cannot be planned"), (0, "Job stats", "older than what they are made from")],
+)
+def test_tables_that_a_run_would_make_again_are_not_expected(
+    results, subject, monkeypatch, code, words, fault
+):
+    plan_says(monkeypatch, code, words)
+    with pytest.raises(StorageError, match=fault):
+        update(subject, "a new method")
+    assert not (folder_of(RESULTS) / LOG).exists()
