@@ -30,10 +30,10 @@ for command in sys.argv[1:]:
 """
 
 
-def run(*commands: str, **options) -> subprocess.CompletedProcess[str]:
+def run(*commands: str, owner: str = OWNER, **options) -> subprocess.CompletedProcess[str]:
     """The owner with these commands, to its end."""
     return subprocess.run(
-        [sys.executable, "-c", OWNER, *commands],
+        [sys.executable, "-c", owner, *commands],
         capture_output=True, text=True, check=True, **options,
     )  # fmt: skip
 
@@ -57,6 +57,20 @@ print("a warning", file=sys.stderr)
     path = str(tmp_path / "a script é.py")
     assert done.stdout.splitlines() == [f"/ blue {[path]} hello", "__main__ True", "ended 0"]
     assert done.stderr == "a warning\n"
+
+
+def test_a_fork_has_what_numba_registers(tmp_path):
+    """What else each process that loads a compiled function would import anew."""
+    code = """
+import sys
+known = set(sys.modules)
+from numba.core.registry import cpu_target
+cpu_target.typing_context.refresh()
+cpu_target.target_context.refresh()
+print(sorted(set(sys.modules) - known))
+"""
+    done = run(script(tmp_path, code), owner=OWNER.replace("fractions", "numba"))
+    assert done.stdout.splitlines() == ["[]", "ended 0"]
 
 
 def test_jobs_do_not_see_each_other(tmp_path):

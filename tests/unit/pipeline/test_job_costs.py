@@ -75,8 +75,8 @@ def test_pages_say_the_times_of_the_record_and_the_unit(page):
     assert f"{times.cpu['full']} (unit {units_of('full', ROOT).unit_s:.3f} s" in text
     if page == "README.md":
         assert f"about {times.wall_s['full'] / 60:.0f} minutes" in text
-        tiny = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")[round(times.wall_s["tiny"] / 60)]
-        assert f"in {tiny} minutes" in text
+        words = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
+        assert f"in {words[round(times.wall_s['tiny'] / 60)]} minutes" in text
         return
     for study in times.itertuples():
         processor = f"({minutes(study.processor_s)} of processor time)"

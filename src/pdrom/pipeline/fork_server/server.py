@@ -18,6 +18,7 @@ import socket
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import NoReturn
 
@@ -183,12 +184,21 @@ class Server:
         sys.path[0] = os.path.dirname(script)
 
 
+def load(libraries: Sequence[str]) -> None:
+    """Import ``libraries``; with numba, register its own functions, which each fork would do."""
+    for library in libraries:
+        importlib.import_module(library)
+    if "numba" in libraries:
+        target = importlib.import_module("numba.core.registry").cpu_target
+        target.typing_context.refresh()
+        target.target_context.refresh()
+
+
 def main() -> None:
     """Load the libraries, serve; in a fork, run the job's script as a plain interpreter would."""
     listener = socket.socket(fileno=int(sys.argv[1]))
     owner = int(sys.argv[2])
-    for library in sys.argv[3:]:
-        importlib.import_module(library)
+    load(sys.argv[3:])
     gc.collect()
     gc.freeze()
     script = Server(listener, owner).serve()

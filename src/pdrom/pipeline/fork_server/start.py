@@ -15,15 +15,19 @@ from pdrom.pipeline.fork_server.client import ADDRESS, place_of
 # Forks of a process that has loaded system frameworks are unsafe on macOS.
 SUPPORTED = sys.platform == "linux"
 
-# Third-party libraries that most jobs need, and modules that every job begins with.
+# Third-party libraries that most jobs or all figures need, modules that every job begins with, and
+# the most frequent experiment.
 LIBRARIES = (
     "h5py",
+    "matplotlib.backends.backend_agg",
+    "matplotlib.backends.backend_pdf",
     "numba",
     "numpy",
     "pandas",
     "pdrom.core.logs",
     "pdrom.core.provenance",
     "pdrom.experiments.kit.declaration",
+    "pdrom.experiments.reruns",
     "pydantic",
     "scipy.linalg",
     "scipy.sparse.linalg",
