@@ -5,6 +5,7 @@ inputs give. The results of experiments take too long for that: of them only che
 """
 
 import filecmp
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,8 +29,11 @@ def made(job: Job) -> Iterator[dict[str, Path]]:
     StorageError
         It cannot be made from the files at hand.
     """
+    parents = [os.path.dirname(path) or os.curdir for path in job.outputs.values()]
+    root = os.path.commonpath(parents)  # two pages may have one name in different folders
     with TemporaryDirectory(prefix="pdrom-again-") as folder:
-        outputs = {name: str(Path(folder, Path(p).name)) for name, p in job.outputs.items()}
+        inside = {name: os.path.relpath(path, root) for name, path in job.outputs.items()}
+        outputs = {name: os.path.join(folder, path) for name, path in inside.items()}
         try:
             job.make(outputs)
         except FAULTS as error:

@@ -43,10 +43,19 @@ def _broken(table: File, out: File) -> None:
     raise KeyError("no such column")
 
 
+def _pages(page: File, other: File) -> None:
+    for file, text in ((page, "all"), (other, "one")):
+        write_text(text, file.path)
+
+
 TABLES = {"table": One(TABLE)}
 MANUSCRIPT = Artifact("MANUSCRIPT", "", TABLES, {"out": Place("main.pdf")}, _doubled)
 BROKEN = Artifact("BROKEN", "", TABLES, {"out": Place("main.pdf")}, _broken)
 MACROS = Artifact("MACROS", "", {}, {"out": Place("macros.tex")}, _macros)
+
+
+PLACES = {"page": Place("a.html"), "other": Place("tables/a.html")}
+PAGES = Artifact("PAGES", "", {}, PLACES, _pages)
 
 
 def job_of(artifact: Artifact) -> Job:
@@ -207,6 +216,16 @@ def test_an_edited_manifest_is_damaged_and_a_lost_one_missing():
 def figure_job(subject):
     """The job of a figure that reads one table."""
     return subject.plan.figure_jobs["singular_values"].job
+
+
+def test_outputs_of_one_name_stay_apart():
+    """A page of the article has the name of a table's page in a folder of its own."""
+    paths = {"page": "results/article/a.html", "other": "results/article/tables/a.html"}
+    job = Job(PAGES, {}, {}, paths, {}, "", "")
+    job.make(paths)
+    assert differing(job) == []
+    write_text("another", paths["other"])
+    assert differing(job) == [paths["other"]]
 
 
 def test_a_figure_is_drawn_again_to_the_byte(results, subject):
