@@ -43,7 +43,7 @@ def plot(*runs: ReducedRun) -> Figure:
     for run in runs:
         require(ReducedRun, run, "plot", source="pdrom.api.reduce makes one, load reads one")
     with style.look():
-        figure = Figure(figsize=(style.WIDTH, 3.0), layout="constrained")
+        figure = style.new_figure(3.0)
         ax = figure.subplots()
         log_axis(ax, LOW, HIGH)
         for i, reduced in enumerate(runs):

@@ -257,6 +257,16 @@ def test_asked_sizes_are_drawn_once(study, rank):
     assert len(figure.axes) == 2
 
 
+def test_positions_have_few_digits(whole, figure_name):
+    """Of the layout's solver the last bits differ from one drawing to the next."""
+    figure = whole(figure_name).figure
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        if figure.get_layout_engine() is not None:
+            place = ax.get_position(original=True).extents
+            np.testing.assert_array_equal(place, place.round(6))
+
+
 def test_a_note_fits_its_figure():
     """However many names it lists, and with the line on where the figure is drawn."""
     figure = note(f"no data: {', '.join(SCENES)}, {', '.join(SCENES)}\nthe full study draws it")

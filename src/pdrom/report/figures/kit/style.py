@@ -137,7 +137,10 @@ def new_figure(height: float, layout: Literal["constrained"] | None = "constrain
     """An empty figure of the manuscript's width, ``height`` inches high, with a ``layout``."""
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(WIDTH, height), layout=layout)
+    from pdrom.report.figures.kit.layout import RoundedLayout
+
+    engine = None if layout is None else RoundedLayout()
+    return Figure(figsize=(WIDTH, height), layout=engine)
 
 
 def handle(label: str, **look: Any) -> Line2D:
