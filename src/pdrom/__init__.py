@@ -4,4 +4,4 @@ Data flow, one direction only: scene -> mesh -> constraints -> full-order run ->
 -> sampling -> reduced run -> tables -> figures -> paper.
 """
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -1,0 +1,83 @@
+"""The size of the project: limits that a change may lower and never raise.
+
+Counted in what git tracks. Where a change meets a limit, delete what has no reader.
+"""
+
+import ast
+import re
+import subprocess
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from places import ROOT
+
+LIMITS = {
+    "lines of src": 56_200,
+    "modules of src": 590,
+    "lines of tests": 34_800,
+    "words of documentation": 54_600,
+    "tables": 53,
+    "figures": 37,
+    "experiments": 32,
+    "percent of src in decorators, signatures and imports": 24.0,
+}
+PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
+
+
+@cache
+def tracked(*patterns: str) -> list[str]:
+    """Texts of the files that git tracks; the test is left out where there is no clone."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--", *(f":(glob){pattern}" for pattern in patterns)],
+        cwd=ROOT, capture_output=True, check=False,
+    )  # fmt: skip
+    if listed.returncode:
+        pytest.skip("no clone of the repository")
+    paths = [ROOT / name for name in listed.stdout.decode().split("\0") if name]
+    return [path.read_text(encoding="utf-8") for path in paths if path.is_file()]
+
+
+def sources() -> list[str]:
+    return tracked("src/**/*.py")
+
+
+def lines(texts: list[str]) -> int:
+    return sum(text.count("\n") for text in texts)
+
+
+def declared(kind: str) -> int:
+    return sum(len(re.findall(rf"^@{kind}\(", text, re.MULTILINE)) for text in sources())
+
+
+def formal_lines(node: ast.AST) -> int:
+    """Lines of a node's decorators, its signature, or its import."""
+    if isinstance(node, (ast.Import, ast.ImportFrom)):
+        return node.end_lineno - node.lineno + 1
+    if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+        first = min(n.lineno for n in (node, *node.decorator_list))
+        return max(node.body[0].lineno - first, 1)
+    return 0
+
+
+def formal_percent() -> float:
+    formal = sum(formal_lines(node) for text in sources() for node in ast.walk(ast.parse(text)))
+    return 100 * formal / lines(sources())
+
+
+MEASURES = {
+    "lines of src": lambda: lines(sources()),
+    "modules of src": lambda: len(sources()),
+    "lines of tests": lambda: lines(tracked("tests/**/*.py")),
+    "words of documentation": lambda: sum(len(text.split()) for text in tracked(*PAGES)),
+    "tables": lambda: declared("table"),
+    "figures": lambda: declared("figure"),
+    "experiments": lambda: declared("experiment"),
+    "percent of src in decorators, signatures and imports": formal_percent,
+}
+
+
+@pytest.mark.parametrize("what", LIMITS)
+def test_no_limit_is_exceeded(what: str) -> None:
+    assert MEASURES[what]() <= LIMITS[what]
