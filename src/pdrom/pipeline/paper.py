@@ -153,6 +153,7 @@ def _study(study: Study) -> Row:
         "tolerance": settings.iterations.tolerance,
         "continuous_tolerance": settings.alternatives.continuous.tolerance,
         "compared_frames": settings.alternatives.compared,
+        "opponent_frames": settings.alternatives.frames,
     }
 
 
