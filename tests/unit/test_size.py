@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 56_200,
-    "modules of src": 590,
-    "lines of tests": 34_800,
-    "words of documentation": 54_600,
-    "tables": 53,
+    "lines of src": 55_740,
+    "modules of src": 586,
+    "lines of tests": 34_600,
+    "words of documentation": 53_740,
+    "tables": 52,
     "figures": 37,
-    "experiments": 32,
-    "percent of src in decorators, signatures and imports": 24.0,
+    "experiments": 31,
+    "percent of src in decorators, signatures and imports": 23.7,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

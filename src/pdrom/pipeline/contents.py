@@ -135,7 +135,6 @@ SOME: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.STABILITY: _scenes(lambda study: study.settings.stability.scenes),
     paths.SUBSPACE_ABLATION: _scenes(lambda study: study.ablation.scenes),
     **dict.fromkeys([paths.ASKS, paths.ASK_SCORES], _asked),
-    paths.CERTIFIED: _scenes(lambda study: tuple(study.settings.certified.scenes)),
     paths.ALTERNATIVES: _sized(lambda study: study.settings.alternatives.scenes),
     paths.ALTERNATIVE_TIMES: _sized(lambda study: study.settings.alternatives.scenes),
 }

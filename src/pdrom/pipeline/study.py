@@ -13,7 +13,6 @@ from pdrom.core.names import SceneName
 from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
 from pdrom.experiments.alternatives.settings import Alternatives
 from pdrom.experiments.asks import Asks
-from pdrom.experiments.certified import Certified
 from pdrom.experiments.companion import Companion
 from pdrom.experiments.frame_times import FrameTimes
 from pdrom.experiments.guard import GuardSection
@@ -92,7 +91,6 @@ class StudySettings(ConfigModel):
     live: Live = Live()
     alternatives: Alternatives = Alternatives()
     asks: Asks = Asks()
-    certified: Certified = Certified()
     viewer: Viewer = Viewer()
     variants: Variants = Variants()
     study: str | None = None
