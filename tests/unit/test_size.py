@@ -16,7 +16,7 @@ LIMITS = {
     "lines of src": 55_740,
     "modules of src": 586,
     "lines of tests": 34_600,
-    "words of documentation": 53_740,
+    "words of documentation": 53_800,
     "tables": 52,
     "figures": 37,
     "experiments": 31,
