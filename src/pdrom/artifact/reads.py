@@ -192,6 +192,20 @@ class ProjectFile(FileRead):
 
 
 @dataclass(frozen=True)
+class ProjectFiles(FileRead):
+    """Files that people edit, by their paths in the project."""
+
+    named: tuple[str, ...]
+    edited = True
+
+    def paths(self, sources: Sources, labels: Labels) -> Paths:
+        return list(self.named)
+
+    def content(self, paths: Any) -> Any:
+        return [Path(path) for path in paths]
+
+
+@dataclass(frozen=True)
 class SourcesOf(FileRead):
     """Files that people edit and that a setting names by its property ``sources``."""
 

@@ -17,9 +17,8 @@ TEMPLATE = """\
 name: {name} # this and the title may be left out: they follow from the file's name
 title: {title}
 
-# What moves. Also {{kind: bar, nx: 40, ny: 5, nz: 5}}, {{kind: disc, edge: 0.05, hole: 0.3}},
-# {{kind: solid, shape: torus, edge: 0.08}} (or ball, starfish; kind shell: their surface), or a
-# file with triangles or tetrahedra: {{kind: file, path: sheet.obj, scale: 1.0}}
+# What moves. Also {{kind: bar, nx: 40, ny: 5, nz: 5}}, or a file with triangles or tetrahedra:
+# {{kind: file, path: sheet.obj, scale: 1.0}}
 {about}mesh: {mesh}
 
 frames: 100 # to simulate

@@ -60,7 +60,7 @@ def test_a_full_order_run_alone_is_drawn(runs, tmp_path):
         (["none.h5"], "none.h5: no such file"),
         (["spring_opo"], "unknown scene 'spring_opo'"),
         (
-            ["torus_large", "--config", "study=nobody_ran_it"],
+            ["sheet200_strain", "--config", "study=nobody_ran_it"],
             "holds no run of it; ./reproduce scene",
         ),
         (["spring_oop", "--configfile", "none.yaml"], "none.yaml: no such configuration file"),

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from pdrom.core.project import config_file
 from pdrom.experiments.hard_cases.case import HardCase, Recipe
 from pdrom.experiments.hard_cases.shapes import (
     both,
@@ -25,8 +26,11 @@ from pdrom.experiments.hard_cases.shapes import (
     shifted,
     small_bar,
 )
-from pdrom.model.mesh import shapes
+from pdrom.model.mesh.files import read_mesh_file
 from pdrom.model.mesh.types import Mesh
+
+# Files in config/meshes, which the job names among its sources.
+MESHES = ("hard_disc.obj", "hard_starfish_shell.obj", "hard_starfish.vtu", "hard_torus.vtu")
 
 GRAVITY = {"effect": "gravity"}
 FLOOR = {"effect": "floor"}
@@ -387,11 +391,9 @@ def _obstacles() -> list[HardCase]:
 
 def _unstructured() -> list[HardCase]:
     """Meshes that are no grids: no two elements are alike, none lies along an axis."""
-    disc, shell, solid = shapes.disc, shapes.shell, shapes.solid
-    ring = partial(disc, 0.2, 0.3, "xz", 1.0, 2.0)
-    torus = partial(solid, "torus", 0.25, 1.0, 2.0)
-    starfish = partial(solid, "starfish", 0.2, 1.0, 2.0)
-    skin = partial(shell, "starfish", 0.22, 1.0, 2.0)
+    ring, skin, starfish, torus = (
+        partial(read_mesh_file, config_file(f"meshes/{name}").resolve()) for name in MESHES
+    )
     ball = {"effect": "sphere", "centre": [0, 1.6, 0.05], "radius": 0.3, "friction": 0.5}
     edge = {"effect": "box", "lower": [-0.02, 1.0, -2], "upper": [0.03, 1.7, 2], "friction": 0.5}
     storm = {"effect": "wind", "velocity": [3e3, 9e3, 3e3]}

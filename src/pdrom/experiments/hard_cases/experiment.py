@@ -7,13 +7,13 @@ from typing import Annotated
 import pandas as pd
 from pydantic import AfterValidator, Field
 
-from pdrom.artifact.reads import ProjectFile, Setting
+from pdrom.artifact.reads import ProjectFile, ProjectFiles, Setting
 from pdrom.core.errors import choices
 from pdrom.core.paths import HARD_CASES, KERNEL_ACCURACY, File
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.hard_cases.accuracy import kernel_accuracy
-from pdrom.experiments.hard_cases.catalogue import CASES, modules_of, reducible_cases
+from pdrom.experiments.hard_cases.catalogue import CASES, MESHES, modules_of, reducible_cases
 from pdrom.experiments.hard_cases.expectations import load_expectations, surprise
 from pdrom.experiments.hard_cases.outcomes import rows
 from pdrom.experiments.kit.declaration import experiment
@@ -49,6 +49,7 @@ class HardCases(ConfigModel):
     "Hard cases of every reduction, and accuracy of the kernels",
     reads={
         "expectations": ProjectFile("config/hard_cases.yaml"),
+        "meshes": ProjectFiles(tuple(f"config/meshes/{name}" for name in MESHES)),
         "every_method": Setting("every_method"),
         "asked": Setting("hard_cases"),
     },
@@ -56,12 +57,16 @@ class HardCases(ConfigModel):
 )
 def hard_cases(
     expectations: Path,
+    meshes: list[Path],
     every_method: dict[str, MethodSpec],
     asked: HardCases,
     cases: File,
     kernels: File,
 ) -> None:
-    """Put every reduction through the cases; log what contradicts the expectations."""
+    """Put every reduction through the cases; log what contradicts the expectations.
+
+    The cases find the ``meshes`` themselves.
+    """
     expected = load_expectations(expectations)
     found = []
     for name in asked.cases or reducible_cases():

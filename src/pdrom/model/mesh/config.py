@@ -19,7 +19,6 @@ from pdrom.model.mesh.lengths import Length, PositiveLength
 from pdrom.model.mesh.limits import MAX_VERTICES
 from pdrom.model.mesh.mesh_model import MeshModel
 from pdrom.model.mesh.orientation import turned_alike
-from pdrom.model.mesh.shape_config import DiscMesh, ShellMesh, SolidMesh
 from pdrom.model.mesh.types import Mesh
 
 log = logging.getLogger(__name__)
@@ -168,6 +167,6 @@ class MeshFile(MeshModel):
 
 
 MeshConfig = Annotated[
-    ClothMesh | BarMesh | DiscMesh | ShellMesh | SolidMesh | MeshFile | GivenMesh,
+    ClothMesh | BarMesh | MeshFile | GivenMesh,
     Field(discriminator="kind"),
 ]

@@ -22,7 +22,12 @@ def make(folder, expectations=ROOT / "config" / "hard_cases.yaml"):
     asked = HardCases(cases=("one_triangle", "flat_bending"), matrices=1)
     cases, kernels = (File(str(path), {}) for path in paths)
     hard_cases(
-        expectations=expectations, every_method=METHODS, asked=asked, cases=cases, kernels=kernels
+        expectations=expectations,
+        meshes=[],
+        every_method=METHODS,
+        asked=asked,
+        cases=cases,
+        kernels=kernels,
     )
     return paths
 

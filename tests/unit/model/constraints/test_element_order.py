@@ -11,9 +11,9 @@ from pdrom.model.constraints.local_kernel import projections
 from pdrom.model.mesh.generators import bar, cloth
 
 SHAPES = {
-    "strain": {"kind": "disc", "edge": 0.05},
-    "tetrahedron_strain": {"kind": "solid", "shape": "torus", "edge": 0.1},
-    "deformation_gradient": {"kind": "solid", "shape": "torus", "edge": 0.1},
+    "strain": "disc.obj",
+    "tetrahedron_strain": "torus.vtu",
+    "deformation_gradient": "torus.vtu",
 }
 
 
@@ -40,7 +40,8 @@ def test_a_shuffled_mesh_gets_neighbours_into_blocks(seed):
 
 @pytest.mark.parametrize("effect", SHAPES)
 def test_what_others_see_is_in_the_order_of_the_mesh(effect):
-    scene = make_scene({"effect": effect, "weight": 1e4}, mesh=SHAPES[effect])
+    mesh = {"kind": "file", "path": f"config/meshes/{SHAPES[effect]}"}
+    scene = make_scene({"effect": effect, "weight": 1e4}, mesh=mesh)
     group = scene.groups[0]
     order = visiting_order(group.stencil, scene.mesh.vertices)
     assert order is not None

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.paths import FULL_ORDER, RERUNS
+from pdrom.model.mesh.files import read_mesh_file
 from pdrom.model.mesh.generators import bar, cloth
-from pdrom.model.mesh.shapes import shell
 from pdrom.reduction.sampling.block import block_elements
 from pdrom.reduction.sampling.deim import deim_entries
 from pdrom.report.figures.kit import style
@@ -37,6 +37,7 @@ from pdrom.report.figures.kit.read import (
     rerun_positions,
 )
 from pdrom.report.figures.kit.residual import iterations
+from places import CONFIG
 
 from .conftest import BLOWN_UP, BLOWUP_FRAME
 
@@ -116,12 +117,13 @@ def test_outline_of_sheet_and_bar():
 
 
 def test_the_silhouette_of_a_round_body_is_a_closed_line_around_it():
-    ball = shell("ball", 0.1, 1.0, 0.0)
-    assert len(outline_edges(ball.points, ball.triangles)) == 0
+    ball = read_mesh_file(CONFIG / "meshes" / "ball.obj")
+    points = ball.points - [0.0, 2.0, 0.0]
+    assert len(outline_edges(points, ball.triangles)) == 0
     camera = Camera(30.0, 20.0)
-    edges = silhouette_edges(ball.points, ball.triangles, camera)
+    edges = silhouette_edges(points, ball.triangles, camera)
     assert (np.unique(edges, return_counts=True)[1] % 2 == 0).all()
-    radii = np.linalg.norm(camera.project(ball.points)[edges.ravel()], axis=1)
+    radii = np.linalg.norm(camera.project(points)[edges.ravel()], axis=1)
     assert radii.min() > 0.45
 
 
