@@ -28,7 +28,11 @@ PYTHON = """#!/bin/sh
 case "$*" in
 *print*version_info*) echo {version} ;;
 *"sys.exit(sys.version_info"*) exit {too_old} ;;
-*"import venv"*) exit {no_venv} ;;
+*"import venv"*)
+    touch searching
+    while [ -e hold-search ]; do sleep 0.05; done
+    exit {no_venv}
+    ;;
 *fcntl*) exec "{real}" "$@" ;;
 *platforms.py*)
     [ ! -e unsupported ] || {{ echo "no wheel for it" >&2; exit 1; }}
@@ -43,6 +47,10 @@ case "$*" in
     touch installing
     while [ -e hold ]; do sleep 0.05; done
     [ ! -e pip-fails ] || {{ cat pip-fails; exit 1; }}
+    ;;
+*soundness*)
+    echo "numpy 2.1.0: X.T @ X"
+    [ ! -e broken ] || kill -SEGV $$
     ;;
 *sysconfig*) echo "$PWD/.venv/{packages}" ;;
 *) echo "python $*" >>calls ;;
@@ -309,6 +317,22 @@ def test_a_full_disk_is_told_from_a_missing_network(folder: Folder) -> None:
     assert "no space left on the disk" in errors[-1]
 
 
+def test_broken_linear_algebra_is_named_and_the_environment_does_not_count(folder: Folder) -> None:
+    folder.add_python()
+    folder.path.joinpath("broken").touch()
+    for _ in range(2):
+        status, errors = folder.run()
+        assert status != 0
+        assert errors[-1] == (
+            "reproduce: linear algebra is broken on this machine: numpy 2.1.0: X.T @ X crashes "
+            f"(signal 11), see {folder.path}/.cache/setup.log"
+        )
+        assert folder.calls == []
+    folder.path.joinpath("broken").unlink()
+    assert folder.run()[0] == 0
+    assert folder.calls == [FRONT]
+
+
 @pytest.fixture
 def installing(folder: Folder) -> Iterator[tuple[Folder, subprocess.Popen[str]]]:
     """A set-up that stays at work."""
@@ -367,3 +391,27 @@ def test_a_signal_to_the_script_alone_ends_a_set_up(
     assert folder.path.joinpath("hold").exists()
     assert first.returncode == 130
     assert errors.splitlines()[-1] == "reproduce: interrupted"
+
+
+def test_no_number_of_a_process_stays_that_a_later_set_up_would_kill(folder: Folder) -> None:
+    folder.add_python()
+    folder.run()
+    assert not folder.path.joinpath(".cache/pip.pid").exists()
+
+
+def test_an_interrupted_set_up_kills_nothing_that_an_older_one_left(folder: Folder) -> None:
+    folder.add_python()
+    folder.path.joinpath("hold-search").touch()
+    with subprocess.Popen(["sleep", "600"]) as stranger:
+        folder.path.joinpath(".cache").mkdir()
+        folder.path.joinpath(".cache/pip.pid").write_text(f"{stranger.pid}\n")
+        process = folder.start()
+        while not folder.path.joinpath("searching").exists():
+            time.sleep(0.02)
+        process.send_signal(signal.SIGTERM)
+        folder.path.joinpath("hold-search").unlink()
+        process.communicate(timeout=60)
+        alive = stranger.poll() is None
+        stranger.kill()
+    assert process.returncode == 130
+    assert alive

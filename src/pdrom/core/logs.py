@@ -1,11 +1,13 @@
 """One log per job, and what the user sees when the job fails."""
 
 import errno
+import faulthandler
 import logging
 import sys
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from io import TextIOWrapper
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
@@ -21,6 +23,8 @@ FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
 class _LogFile(logging.FileHandler):
     """A log whose disk is full is cut short; the job's own files say that there is no space."""
 
+    stream: TextIOWrapper
+
     def handleError(self, record: logging.LogRecord) -> None:
         """Say nothing: the default prints a traceback for every message."""
 
@@ -35,7 +39,7 @@ def job_log(path: str) -> Iterator[logging.Logger]:
     A `PdromError` (a user's mistake) ends the job with one line on stderr; any other exception
     keeps its traceback in the log and one line on stderr that says where to look. Lack of memory or
     of space on the disk is reported in words. The last line of a job that ends well reports its
-    usage.
+    usage. Where a signal ends it, Python's own lines are the last.
 
     Damaged results that the job reads are set aside (`pdrom.core.aside`).
     """
@@ -50,6 +54,7 @@ def job_log(path: str) -> Iterator[logging.Logger]:
     previous = logger.level
     logger.addHandler(handler)
     logger.setLevel(logging.INFO)
+    faulthandler.enable(handler.stream)
     try:
         with threadpool_limits(limits=1), damaged_set_aside():
             yield logger
@@ -65,6 +70,7 @@ def job_log(path: str) -> Iterator[logging.Logger]:
         logger.error("%s (traceback in %s)\n%s", fault, path, traceback.format_exc())
         sys.exit(f"pdrom: {fault} (traceback in {path})")
     finally:
+        faulthandler.disable()
         logger.removeHandler(handler)
         logger.setLevel(previous)
         with suppress(OSError):

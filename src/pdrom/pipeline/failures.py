@@ -16,6 +16,11 @@ from pdrom.core.logs import INTERRUPTED
 ADVICE = "pdrom: what is finished is kept; the same command goes on from there"
 
 _ERROR = re.compile(r"^[-0-9]+ [0-9:,]+ ERROR +pdrom: (?P<text>.*)$", re.MULTILINE)
+# What Python leaves in a job's log when a signal ends it: the frames of the thread, the last first.
+_CRASH = re.compile(
+    r"^Fatal Python error: .*?^Current thread .*?\n(?P<frames>(?: +File .*\n?)+)", re.M | re.S
+)
+_FRAME = re.compile(r'^ +File "(?P<file>.*)", line (?P<line>\d+) in (?P<function>.*)$', re.M)
 _IN_RULE = re.compile(r"^\w+ in rule (?P<rule>\w+)\b.*\n(?P<text>.*)", re.MULTILINE)
 _ENDING = re.compile(r"died with <Signals\.(?P<signal>\w+)|exit status (?P<status>\d+)")
 # How SLURM says in a job's log, and its executor of a job, why it was ended.
@@ -45,17 +50,13 @@ class Failure:
     output: str
     said: str
 
-    def wrote_error(self, begun: float) -> bool:
-        """Whether its log, written since ``begun`` (seconds of the clock), holds an error."""
+    def written(self, begun: float) -> str:
+        """Text of its log if that was written since ``begun`` (seconds of the clock)."""
         path = Path(self.log)
-        return (
-            path.is_file()
-            and path.stat().st_mtime >= begun
-            and bool(_ERROR.search(_content(self.log)))
-        )
+        return _content(self.log) if path.is_file() and path.stat().st_mtime >= begun else ""
 
-    def line(self) -> str:
-        """Name of the job and cause."""
+    def line(self, begun: float) -> str:
+        """Name of the job, cause, and where it was if it crashed in a run since ``begun``."""
         folder = next((p for p in Path(self.output).parents if p.is_dir()), Path())
         errors = _ERROR.findall(_content(self.log))
         # the log of a job that did not even start is that of an older run
@@ -63,6 +64,7 @@ class Failure:
             return f"pdrom: job {self.rule} failed: {errors[-1]}"
         return (
             f"pdrom: job {self.rule} failed while making {self.output}: {cause(self.said, folder)}"
+            + crash(self.written(begun), self.log)
         )
 
 
@@ -88,6 +90,17 @@ def cause(said: str, folder: Path) -> str:
     if name:
         return _CAUSES.get(name, f"crashed ({name})")
     return _STATUSES.get(status, f"exit status {status}, without a word")
+
+
+def crash(written: str, log: str) -> str:
+    """Line of this project that a job was at when it crashed; nothing if its log has none."""
+    found = list(_CRASH.finditer(written))
+    if not found:
+        return ""
+    frames = list(_FRAME.finditer(found[-1]["frames"]))
+    own = [frame for frame in frames if "/pdrom/" in frame["file"]]
+    frame = (own or frames)[0]
+    return f" at {frame['file']}:{frame['line']} in {frame['function']} (log: {log})"
 
 
 def _signal(number: int) -> str:
@@ -135,7 +148,7 @@ class Failures(logging.Handler):
             log, output = (_first(getattr(record, name, ())) for name in ("log", "output"))
             failure = Failure(record.rule_name, log, output or "its result", said)
             # of a batch every job is named, also those that never started
-            if not getattr(record, "indent", False) or failure.wrote_error(self._begun):
+            if not getattr(record, "indent", False) or _ERROR.search(failure.written(self._begun)):
                 self.jobs.append(failure)
         elif event == LogEvent.ERROR:
             found = _IN_RULE.search(text)
@@ -156,7 +169,8 @@ class Failures(logging.Handler):
         Snakemake prints its own account after a job's message, so every failed job is named once
         more with the error in its log.
         """
-        lines = [failure.line() for failure in (*self.batches, *self.jobs)]
+        lines = [batch.line() for batch in self.batches]
+        lines += [job.line(self._begun) for job in self.jobs]
         if self.stopped:
             # jobs that were ended together with the run did not fail themselves
             lines = [line for line in lines if not line.endswith(tuple(_CAUSES.values()))]

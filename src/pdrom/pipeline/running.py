@@ -85,15 +85,16 @@ def _open() -> int:
 def settle_dates(folders: Iterable[str | Path]) -> int:
     """Move files in ``folders`` dated in the future to just before now; say and return how many.
 
-    The order is kept: what was newer than something else, and makes it run again, still is.
+    The order is kept: what was newer than something else, and makes it run again, still is. Of a
+    link its own date is moved: what it leads to may lie elsewhere.
     """
     now = time.time_ns()
     files = [path for folder in folders for path in Path(folder).rglob("*") if path.is_file()]
-    future = {path: date for path in files if (date := path.stat().st_mtime_ns) > now}
+    future = {path: date for path in files if (date := path.lstat().st_mtime_ns) > now}
     ranks = {date: rank for rank, date in enumerate(sorted(set(future.values()), reverse=True))}
     for path, date in future.items():
         settled = now - ranks[date] * STEP_NS
-        os.utime(path, ns=(settled, settled))
+        os.utime(path, ns=(settled, settled), follow_symlinks=False)
     if future:
         sys.stderr.write(f"pdrom: {len(future)} files were dated in the future (clock set back?)\n")
     return len(future)

@@ -1,6 +1,11 @@
 """The last lines of a failed run: every cause in words of its own."""
 
 import logging
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from snakemake_interface_logger_plugins.common import LogEvent
@@ -112,6 +117,44 @@ def test_the_log_of_an_earlier_run_is_not_the_cause(snakemake, tmp_path):
     _, lines = end(snakemake)
     assert lines == [
         "pdrom: job pod failed while making results/x.h5: its interpreter was not found"
+    ]
+
+
+CRASHING = """
+import ctypes, sys
+from pdrom.core.logs import job_log
+from pdrom.pipeline.fork_server.client import place_of
+def calculate():
+    place_of(Name())  # a function of the project calls what crashes
+class Name:
+    def __fspath__(self):
+        ctypes.string_at(0)
+with job_log(sys.argv[1]):
+    calculate()
+"""
+
+
+def test_a_job_that_crashes_is_named_with_the_line_it_was_at(snakemake, tmp_path):
+    log = tmp_path / "job.log"
+    done = subprocess.run([sys.executable, "-c", CRASHING, log], capture_output=True, check=False)
+    assert done.returncode == -signal.SIGSEGV
+    fail(snakemake, "fom", str(log), ENDED + "died with <Signals.SIGSEGV: 11>.")
+    _, (line,) = end(snakemake)
+    begin = "pdrom: job fom failed while making results/x.h5: crashed (SIGSEGV) at "
+    assert line.startswith(begin)
+    place, _, function = line.removeprefix(begin).partition(" in ")
+    assert function == f"place_of (log: {log})"
+    path, _, number = place.rpartition(":")
+    assert "os.fsencode" in Path(path).read_text().splitlines()[int(number) - 1]
+
+
+def test_the_crash_of_an_earlier_run_is_not_this_one(snakemake, tmp_path):
+    log = tmp_path / "job.log"
+    subprocess.run([sys.executable, "-c", CRASHING, log], capture_output=True, check=False)
+    os.utime(log, (1, 1))
+    fail(snakemake, "fom", str(log), ENDED + "died with <Signals.SIGKILL: 9>.")
+    assert end(snakemake)[1] == [
+        "pdrom: job fom failed while making results/x.h5: killed (SIGKILL): out of memory?"
     ]
 
 

@@ -111,6 +111,20 @@ def test_future_dates_come_before_now_in_their_order(tmp_path):
     assert settle_dates([tmp_path]) == 0
 
 
+def test_dates_of_what_a_link_leads_to_are_left_alone(tmp_path):
+    folder, elsewhere = tmp_path / "results", tmp_path / "elsewhere"
+    folder.mkdir()
+    elsewhere.write_text("not of this study")
+    later = time.time_ns() + DAY
+    os.utime(elsewhere, ns=(later, later))
+    link = folder / "link"
+    link.symlink_to(elsewhere)
+    os.utime(link, ns=(later, later), follow_symlinks=False)
+    assert settle_dates([folder]) == 1
+    assert elsewhere.stat().st_mtime_ns == later
+    assert link.lstat().st_mtime_ns <= time.time_ns()
+
+
 PLANS = """
 import signal
 from pdrom.pipeline.running import end_at_sigterm
