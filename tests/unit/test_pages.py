@@ -56,7 +56,9 @@ def test_anchors_are_headings(page: Path) -> None:
 
 @pytest.mark.parametrize("page", [*PAGES, ROOT / "CONTRIBUTING.md"], ids=[*NAMES, "CONTRIBUTING"])
 def test_paths_of_the_project_exist(page: Path) -> None:
-    """A recipe's own files stand before its code, with a colon."""
+    """A recipe's own files stand before its code, with a colon; what was given up is gone."""
+    if page.name == "0018-what-was-given-up.md":
+        return
     text = page.read_text("utf-8")
     made = set(re.findall(r"^`([^`]+)`:$", text, re.MULTILINE)) | EXAMPLES | BUILT
     assert [p for p in PATH.findall(text) if p not in made and not (ROOT / p).exists()] == []

@@ -70,7 +70,6 @@ def declare(parser: argparse.ArgumentParser) -> None:
 def perform(arguments: argparse.Namespace) -> Status:
     """Write the scene that ``arguments`` name, with comments; an existing file is left alone."""
     from pdrom.core.errors import ConfigurationError
-    from pdrom.core.project import schema_line
     from pdrom.core.store.oserrors import reason
 
     path = Path(arguments.scene)
@@ -78,7 +77,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     text = template(path.stem, *(_read(arguments.mesh, path) if arguments.mesh else ()))
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(schema_line(path) + text)
+            file.write(text)
     except FileExistsError:
         raise ConfigurationError(f"{path}: there is such a file already; name another") from None
     except OSError as error:

@@ -4,7 +4,6 @@ A wheel carries these files below ``pdrom/config`` (pyproject.toml says which), 
 package needs no checkout.
 """
 
-import os
 from importlib.resources import files
 from pathlib import Path
 
@@ -20,15 +19,3 @@ def config_file(name: str) -> Path:
     """File ``name`` of ``config``: of the checkout, which people edit, or of the package."""
     root = checkout() or Path(str(files("pdrom")))
     return root / "config" / name
-
-
-def schema_line(file: Path) -> str:
-    """First line of a scene's file, by which editors find its schema.
-
-    In the checkout it is a relative path, elsewhere the address of the package's own file.
-    """
-    schema, folder = config_file("schema/scene.json"), file.resolve().parent
-    root = checkout()
-    inside = root is not None and folder.is_relative_to(root)
-    address = os.path.relpath(schema, folder) if inside else schema.as_uri()
-    return f"# yaml-language-server: $schema={address}\n"

@@ -34,7 +34,6 @@ HANDED_ON = {
     "verify": "pdrom.verification",
     "compare": "pdrom.verification.studies",
     "bundle": "pdrom.verification.bundle",
-    "docs": "pdrom.pipeline.site",
     "release": "pdrom.verification.release",
     "pages": "pdrom.verification.pages.written",
 }

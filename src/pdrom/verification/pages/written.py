@@ -4,7 +4,6 @@ import sys
 from pathlib import Path
 
 from pdrom.core.errors import PdromError
-from pdrom.pipeline.schema import schemas
 from pdrom.pipeline.tracked import write_tracked
 from pdrom.report.codecheck import FILE as CODECHECK
 from pdrom.report.codecheck import codecheck
@@ -22,7 +21,6 @@ def pages() -> dict[Path, str]:
         Path("docs/tables.md"): document(tables),
         CODECHECK: codecheck(tables),
         **claim_pages(Path()),
-        **schemas(),
     }
 
 
