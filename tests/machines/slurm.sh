@@ -5,10 +5,8 @@
 #
 # RESULTS is the folder of the tiny study made without SLURM (.../results/studies/tiny). HEAD is cloned into FOLDER (else a temporary one) and
 # run there by the profile of the project. While the first command runs, one of its jobs is cancelled: the run, which may not
-# submit it again, has to say so. The same command goes on from there, with the profile's patch of the executor: another job is
-# cancelled, which has to be submitted again, and the controller is restarted. Tables (without what a clock says) and runs must
-# then be those of RESULTS, bit by bit; and jobs that no node can take must be refused. At last a controller without accounting
-# is away for longer than the executor asks: a run has to come to its end all the same.
+# submit it again, has to say so. The same command goes on from there; another job is cancelled, which has to be submitted again.
+# Tables (without what a clock says) and runs must then be those of RESULTS, bit by bit.
 set -euo pipefail
 
 project=$(cd "$(dirname "$0")/../.." && pwd -P)
@@ -47,20 +45,7 @@ cancel() {
     scancel "$victim"
     echo "cancelled job $victim"
 }
-restart() { # SECONDS
-    "$service" stop-controller
-    echo "the controller is gone for $1 s"
-    sleep "$1"
-    "$service" start-controller
-    echo "the controller is back"
-}
-
-step "jobs that no node can take"
-processors=$(sinfo --noheader --format=%c | tr -d +)
-if "${command[@]}" --cores $((processors + 1)) >too_many.log 2>&1; then fail "too many processors were not refused"; fi
-grep "it would wait for ever" too_many.log || fail "the refusal is missing: $(tail -n 5 too_many.log)"
-[ -z "$(squeue --noheader)" ] || fail "a job was submitted all the same"
-rm too_many.log
+./reproduce run pip install --quiet --no-deps --require-hashes -r requirements-cluster.lock
 
 step "a run, one job of which is cancelled"
 "${command[@]}" --retries 0 >"$folder/.cache/first.log" 2>&1 &
@@ -71,25 +56,15 @@ if wait "$run"; then fail "the run did not notice"; fi
 tail -n 6 "$folder/.cache/first.log"
 grep -q "cancelled" "$folder/.cache/first.log" || fail "the run does not say that a job was cancelled"
 
-step "the same command, a job that is cancelled, and a controller that is restarted"
-patch -p1 -d .venv/lib/python3.*/site-packages <workflow/profiles/slurm/executor.patch
+step "the same command, and a job that is cancelled"
 "${command[@]}" >"$folder/.cache/second.log" 2>&1 &
 run=$!
 wait_for_job "$run" "$folder/.cache/second.log"
 cancel
-restart 20
 wait "$run" || fail "the run failed: $(tail -n 20 "$folder/.cache/second.log")"
 tail -n 8 "$folder/.cache/second.log"
 
 step "against $expected"
 ./reproduce run python tests/machines/same_results.py "$expected" results/studies/tiny
 
-step "without accounting, a controller that is away"
-"$service" stop
-"$service" start-unaccounted
-"${command[@]}" --forcerun iterations -- iterations >"$folder/.cache/third.log" 2>&1 &
-run=$!
-wait_for_job "$run" "$folder/.cache/third.log"
-restart 60
-wait "$run" || fail "the run failed: $(tail -n 20 "$folder/.cache/third.log")"
 step "passed"

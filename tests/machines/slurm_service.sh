@@ -1,19 +1,15 @@
 #!/usr/bin/env bash
 # A real SLURM on this one machine: munge, a controller and a daemon, which `stop` ends again.
 #
-# usage (as root): tests/machines/slurm_service.sh start | start-unaccounted | stop | stop-controller | start-controller
+# usage (as root): tests/machines/slurm_service.sh start | stop
 #
-# With accounting (slurmdbd and a database of its own), unless it is started unaccounted.
-# Debian: apt-get install slurmctld slurmd slurm-client munge slurmdbd mariadb-server. The configuration goes to /etc/slurm,
+# Debian: apt-get install slurmctld slurmd slurm-client munge. The configuration goes to /etc/slurm,
 # where srun looks for it also inside a job; a configuration that this script has not written is left alone, and so it fails there.
 set -euo pipefail
 
 configuration=/etc/slurm/slurm.conf
-accounting=/etc/slurm/slurmdbd.conf
 mark="# written by slurm_service.sh of pdrom's tests"
 state=/var/tmp/pdrom-slurm
-# of the database
-port=33306
 
 fail() {
     echo "slurm_service: $*" >&2
@@ -34,11 +30,9 @@ own() { grep -qF "$mark" "$1"; }
 gone() { [ ! -e "$1" ] || ! kill -0 "$(cat "$1")" 2>/dev/null; }
 idle() { sinfo --noheader --format=%T | grep -qE '^(idle|mixed|allocated)$'; }
 
-write_configuration() { # TYPE OF ACCOUNTING
-    local node file
-    for file in "$configuration" "$accounting"; do
-        [ ! -e "$file" ] || own "$file" || fail "$file belongs to somebody else"
-    done
+write_configuration() {
+    local node
+    [ ! -e "$configuration" ] || own "$configuration" || fail "$configuration belongs to somebody else"
     node=$(slurmd -C | head -n 1)
     mkdir -p "$(dirname "$configuration")" "$state/spool"
     cat >"$configuration" <<EOF
@@ -57,52 +51,13 @@ TaskPlugin=task/none
 SelectType=select/cons_tres
 SelectTypeParameters=CR_Core_Memory
 JobAcctGatherType=jobacct_gather/linux
-AccountingStorageType=accounting_storage/$1
+AccountingStorageType=accounting_storage/none
 MailProg=/bin/true
 ReturnToService=2
 MinJobAge=600
 $node State=UNKNOWN
 PartitionName=main Nodes=ALL Default=YES MaxTime=4:00:00 State=UP
 EOF
-}
-
-start_accounting() {
-    local database=$state/database
-    (umask 077 && cat >"$accounting") <<EOF
-$mark
-DbdHost=localhost
-SlurmUser=root
-AuthType=auth/munge
-PidFile=$state/slurmdbd.pid
-LogFile=$state/slurmdbd.log
-StorageType=accounting_storage/mysql
-StorageHost=127.0.0.1
-StoragePort=$port
-StorageUser=slurm
-StoragePass=slurm
-StorageLoc=accounting
-EOF
-    install -d -o mysql -g mysql "$database"
-    mariadb-install-db --no-defaults --user=mysql --datadir="$database" >"$state/database.log"
-    setpriv --reuid=mysql --regid=mysql --clear-groups mariadbd --no-defaults --datadir="$database" \
-        --socket="$database/socket" --pid-file="$database/pid" --bind-address=127.0.0.1 --port="$port" \
-        </dev/null >>"$state/database.log" 2>&1 &
-    wait_until 60 "the database does not answer, see $state/database.log" mariadb-admin --socket="$database/socket" ping
-    mariadb --socket="$database/socket" <<EOF
-CREATE DATABASE accounting;
-CREATE USER slurm@'127.0.0.1' IDENTIFIED BY 'slurm';
-GRANT ALL ON accounting.* TO slurm@'127.0.0.1';
-EOF
-    slurmdbd
-    wait_until 60 "slurmdbd does not answer, see $state/slurmdbd.log" sacctmgr --noheader show cluster
-    sacctmgr --immediate --quiet add cluster one >/dev/null
-}
-
-stop_accounting() {
-    kill "$(cat "$state/slurmdbd.pid")"
-    wait_until 60 "slurmdbd does not end" gone "$state/slurmdbd.pid"
-    mariadb-admin --socket="$state/database/socket" shutdown
-    wait_until 60 "the database does not end" gone "$state/database/pid"
 }
 
 start_munge() {
@@ -114,42 +69,29 @@ start_munge() {
 }
 
 case "${1-}" in
-start | start-unaccounted)
-    packages="slurmctld slurmd slurm-client munge slurmdbd mariadb-server"
-    for program in munged slurmctld slurmd slurmdbd mariadbd sbatch setpriv; do
-        command -v "$program" >/dev/null || fail "$program is missing (Debian: $packages)"
+start)
+    for program in munged slurmctld slurmd sbatch setpriv; do
+        command -v "$program" >/dev/null || fail "$program is missing (Debian: slurmctld slurmd slurm-client munge)"
     done
     mkdir -p "$state"
-    case "$1" in
-    start) write_configuration slurmdbd ;;
-    *) write_configuration none ;;
-    esac
+    write_configuration
     start_munge
     wait_until 20 "munge does not answer" munge -n
-    [ "$1" = start-unaccounted ] || start_accounting
-    "$0" start-controller
+    slurmctld
+    wait_until 60 "the controller does not answer, see $state/slurmctld.log" scontrol ping
     slurmd
     wait_until 60 "the node does not become idle, see $state" idle
     sinfo
-    ;;
-start-controller)
-    slurmctld
-    wait_until 60 "the controller does not answer, see $state/slurmctld.log" scontrol ping
-    ;;
-stop-controller)
-    scontrol shutdown slurmctld
-    wait_until 60 "the controller does not end" gone "$state/slurmctld.pid"
     ;;
 stop)
     [ -e "$configuration" ] && own "$configuration" || fail "no SLURM of this script"
     scontrol shutdown || true
     wait_until 60 "the controller does not end" gone "$state/slurmctld.pid"
     wait_until 60 "the daemon does not end" gone "$state/slurmd.pid"
-    [ ! -e "$accounting" ] || stop_accounting
     if [ -e "$state/own-munge" ]; then
         setpriv --reuid=munge --regid=munge --clear-groups munged --stop
     fi
-    rm -rf "$state" "$configuration" "$accounting"
+    rm -rf "$state" "$configuration"
     ;;
-*) fail "start, start-unaccounted, stop, start-controller or stop-controller is asked for" ;;
+*) fail "start or stop is asked for" ;;
 esac

@@ -41,7 +41,6 @@ class CommandLine:
     looks_only : no job runs, nothing that a run makes is written
     plans : the jobs are listed, by ``-n``, and nothing else is looked at
     own_output, cores : what else decides about the options that `./reproduce` adds
-    executor : Snakemake's executor, of the command line or its profile; None runs jobs here
     """
 
     arguments: tuple[str, ...]
@@ -53,7 +52,6 @@ class CommandLine:
     plans: bool
     own_output: bool
     cores: bool
-    executor: str | None = None
 
     @classmethod
     def parse(cls, arguments: Sequence[str]) -> "CommandLine":
@@ -81,7 +79,6 @@ class CommandLine:
             plans=looks == ["dryrun"],
             own_output=any(found[name] is not None and found[name] for name in OWN_OUTPUT),
             cores=found["cores"] is not None or found["jobs"] is not None,
-            executor=found["executor"],
         )
         command._check_values()
         return command
@@ -132,7 +129,7 @@ def _of_profile(arguments: Sequence[str], profiles: Sequence[str]) -> dict[str, 
 
     options = list(arguments)[: [*arguments, "--"].index("--")]
     found = vars(get_argument_parser(profiles).parse_args(options))
-    return {name: found[name] for name in ("cores", "jobs", "executor")}
+    return {name: found[name] for name in ("cores", "jobs")}
 
 
 def _texts(values: Any) -> tuple[str, ...]:

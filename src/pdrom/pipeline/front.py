@@ -16,7 +16,6 @@ from typing import NoReturn
 
 from pdrom.core.errors import PdromError
 from pdrom.core.logs import INTERRUPTED
-from pdrom.pipeline.cluster import install_executor
 from pdrom.pipeline.commandline import CommandLine, check_files, recall
 from pdrom.pipeline.environment import settle
 from pdrom.pipeline.folders import Folders, folders
@@ -47,15 +46,12 @@ def completed(arguments: Sequence[str]) -> list[str]:
     ConfigurationError
         A configuration file is missing or no mapping; a target was taken for an option's value;
         there is no such figure.
-    ClusterError
-        The executor that the command asks for cannot be installed.
     """
     if arguments[:1] == ["figure"]:
         # late: it loads the whole package
         from pdrom.pipeline.figure_command import figure_arguments
 
         arguments = figure_arguments(arguments[1:])
-    install_executor(arguments)
     command = CommandLine.parse(arguments)
     if command.report and not command.configfiles and not command.settings and recall():
         _say(f"a report of the last run, {' '.join(recall())}")

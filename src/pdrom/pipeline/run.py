@@ -9,7 +9,6 @@ from typing import Any
 
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.paths import CRATE
-from pdrom.pipeline.cluster import EXECUTOR, JOBSTEP, check_nodes
 from pdrom.pipeline.commandline import CommandLine, options, recall, remember
 from pdrom.pipeline.expectation import expected_seconds, tell_expectation
 from pdrom.pipeline.failures import Failures, listen
@@ -31,6 +30,8 @@ from pdrom.pipeline.targets import Rule, known
 
 # What Snakemake compares by date.
 DATED = ("results", "paper", "config", "workflow")
+# Executor by which Snakemake runs the jobs of a batch on a node of a cluster.
+JOBSTEP = "slurm-jobstep"
 
 
 class Run:
@@ -88,7 +89,7 @@ class Run:
         return f"{named} ({words})" if words else named
 
     def start(self, workflow: Any, plan: Plan) -> None:
-        """Start the process that jobs are forked from, or look at the cluster, before all jobs."""
+        """Start the process that jobs are forked from, unless they run on a cluster."""
         # Jobs start without a limit of their rate. For one, Snakemake starts a timer after every
         # choice among the jobs, to choose again, and each such choice starts another one: towards
         # the end of a run they take a third of a core, and the process waits for the last one.
@@ -102,11 +103,6 @@ class Run:
             except OSError as error:
                 sys.exit(f"pdrom: {FOLDER}/run.pipe: cannot be made ({error.strerror})")
             start_server()
-        elif self.command.executor == EXECUTOR:
-            try:
-                check_nodes(workflow.dag)
-            except PdromError as error:
-                sys.exit(f"pdrom: {error}")
 
     def succeed(self, plan: Plan, folders: Folders) -> None:
         """End a run whose jobs all succeeded: it says what came of ``plan`` in ``folders``."""
