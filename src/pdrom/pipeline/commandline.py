@@ -41,6 +41,7 @@ class CommandLine:
     looks_only : no job runs, nothing that a run makes is written
     plans : the jobs are listed, by ``-n``, and nothing else is looked at
     own_output, cores : what else decides about the options that `./reproduce` adds
+    executor : Snakemake's executor, of the command line or its profile; None runs jobs here
     """
 
     arguments: tuple[str, ...]
@@ -52,6 +53,7 @@ class CommandLine:
     plans: bool
     own_output: bool
     cores: bool
+    executor: str | None = None
 
     @classmethod
     def parse(cls, arguments: Sequence[str]) -> "CommandLine":
@@ -79,6 +81,7 @@ class CommandLine:
             plans=looks == ["dryrun"],
             own_output=any(found[name] is not None and found[name] for name in OWN_OUTPUT),
             cores=found["cores"] is not None or found["jobs"] is not None,
+            executor=found["executor"],
         )
         command._check_values()
         return command
@@ -129,7 +132,7 @@ def _of_profile(arguments: Sequence[str], profiles: Sequence[str]) -> dict[str, 
 
     options = list(arguments)[: [*arguments, "--"].index("--")]
     found = vars(get_argument_parser(profiles).parse_args(options))
-    return {name: found[name] for name in ("cores", "jobs")}
+    return {name: found[name] for name in ("cores", "jobs", "executor")}
 
 
 def _texts(values: Any) -> tuple[str, ...]:
