@@ -58,10 +58,14 @@ def forget(history):
 
 
 @compiled
-def refuse(history, y, objective):
-    """See `Anderson.refuse` of ``history``; ``y`` (n,) has this ``objective``."""
+def refuse(history, y, objective, plain=1):
+    """See `Anderson.refuse` of ``history``; ``y`` (n,) has this ``objective``.
+
+    The first ``plain`` images after a start or a refusal are not compared: they are images of the
+    local/global iteration, which cannot rise.
+    """
     start, _, image, _, _, _, numbers, last = history
-    if numbers[DIFFERENCES] >= 1 and objective > last[0]:
+    if numbers[DIFFERENCES] >= plain and objective > last[0]:
         write(image, y)
         numbers[DIFFERENCES] = -1
         numbers[REFUSED] += 1

@@ -98,8 +98,9 @@ def _advance(
         for k in range(iterations):
             rhs[:] = base
             objective = add_projections(tables, y, rhs) + inertia_energy(y, s, inertia)
-            if refuse(history, y, objective):
-                y[:] = plain  # a corrected image may rise
+            # a corrected image may rise, also the first one
+            if refuse(history, y, objective, 0):
+                y[:] = plain
                 continue
             sweep(panels, vertices, loads, work, rhs, y)
             if k < iterations - 1:
