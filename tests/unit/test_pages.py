@@ -21,7 +21,6 @@ from pdrom.tables import declared
 from pdrom.verification.bundle import parser as bundle_parser
 from pdrom.verification.command import parser as verify_parser
 from pdrom.verification.references import folder_of, read_reference
-from pdrom.verification.studies.__main__ import parser as compare_parser
 from places import ROOT
 
 PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "docs").rglob("*.md")])
@@ -90,7 +89,7 @@ def commands() -> list[str]:
     texts = [path.read_text("utf-8").replace("\\\n", " ") for path in files]
     found = {line.split("  ")[0].strip() for text in texts for line in COMMAND.findall(text)}
     # names in capitals stand for others; a plugin of the executor need not be installed
-    left_out = re.compile(r"test|run |pages|docs|release|--help|--executor|--profile|.*[A-Z]{4}")
+    left_out = re.compile(r"test|run |pages|docs|--help|--executor|--profile|.*[A-Z]{4}")
     return sorted(command for command in found if command and not left_out.match(command))
 
 
@@ -100,7 +99,7 @@ def test_commands_are_understood(command: str, monkeypatch: pytest.MonkeyPatch) 
     # the scene and the study that a reader makes stand for any
     words = command.replace("my_sheet", "spring_oop").replace("mine.yaml", "tiny.yaml")
     first, *others = shlex.split(words)
-    parsers = {"verify": verify_parser, "compare": compare_parser, "bundle": bundle_parser}
+    parsers = {"verify": verify_parser, "bundle": bundle_parser}
     if first in parsers:
         assert parsers[first]().parse_args(others)
     elif first in ("scene", "viewer"):
@@ -165,6 +164,15 @@ def test_every_kind_of_selection_is_listed() -> None:
     assert sorted(
         re.findall(r"`\{kind: (\w+), (?:of|\w+)", page.split("### Selections")[1])
     ) == sorted(KINDS)
+
+
+def test_the_verdicts_of_the_readme_are_the_expected_ones() -> None:
+    text = (ROOT / "README.md").read_text("utf-8")
+    shown = re.findall(r"^\| (C\d+): [^|]* \| ([^|]*) \| ([^|]*) \|", text, re.MULTILINE)
+    found = read_reference(declared()["claims"], ROOT / folder_of(RESULTS))
+    assert found is not None
+    rows = found.frame[["claim", "verdict", "verdict_beyond"]]
+    assert shown == list(rows.itertuples(index=False, name=None))
 
 
 def test_the_numbers_of_the_readme_s_picture_are_those_of_the_expected_tables() -> None:

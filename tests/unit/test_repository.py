@@ -1,14 +1,15 @@
 """What git tracks: text and a few pictures, nothing large, nothing binary by accident."""
 
-import json
 import subprocess
 from pathlib import Path
 
 import pytest
-import yaml
 
+from pdrom.core.paths import FIGURE, RESULTS, TABLE
 from pdrom.core.yamlfile import read_yaml
-from pdrom.report.codecheck import FILE, SPECIFICATION, codecheck
+from pdrom.pipeline.folders import Folders
+from pdrom.report.figures.kit.catalogue import declarations
+from pdrom.tables import declared
 from places import ROOT
 
 LARGEST = 300_000
@@ -56,38 +57,18 @@ def test_a_wheel_and_a_large_table_would_be_refused(tmp_path, monkeypatch):
     assert [name for name in contents if offends(tmp_path / name)] == ["a.whl", "t.csv"]
 
 
-def test_the_manifest_for_codecheckers_follows_version_2():
+def test_the_manifest_for_codecheckers_follows_version_2_and_names_what_the_study_makes():
     """https://raw.githubusercontent.com/codecheckers/register/master/rules-2.0.yml"""
-    assert (ROOT / FILE).read_text("utf-8").startswith("---\n")
-    content = read_yaml(ROOT / FILE)
-    assert content["version"] == SPECIFICATION
+    path = ROOT / "codecheck.yml"
+    assert path.read_text("utf-8").startswith("---\n")
+    content = read_yaml(path)
+    assert content["version"] == "https://codecheck.org.uk/spec/config/2.0/"
     # the codechecker fills them in
     assert {"codechecker", "report", "summary", "certificate"} <= set(content)
-    assert content["paper"]["title"]
-    assert all(author["name"] for author in content["paper"]["authors"])
-    assert "Projective Dynamics. Preprint, Max Planck Institute" in content["paper"]["reference"]
-    assert all(set(entry) == {"file", "comment"} for entry in content["manifest"])
-    assert not any(Path(entry["file"]).is_absolute() for entry in content["manifest"])
-
-
-def test_an_author_has_the_orcid_of_the_citation_without_its_address(tmp_path, monkeypatch):
-    citation = (ROOT / "CITATION.cff").read_text("utf-8")
-    known = citation.replace(
-        "developers\n", "developers\n    orcid: https://orcid.org/0000-0002-1825-0097\n"
-    )
-    (tmp_path / "paper").symlink_to(ROOT / "paper")
-    (tmp_path / "CITATION.cff").write_text(known, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    (author,) = yaml.safe_load(codecheck([]))["paper"]["authors"]
-    assert author == {"name": "The pdrom developers", "ORCID": "0000-0002-1825-0097"}
-
-
-def test_the_record_for_zenodo_is_that_of_the_citation():
-    citation = read_yaml(ROOT / "CITATION.cff")
-    record = json.loads((ROOT / ".zenodo.json").read_text("utf-8"))
-    for key in ("title", "version", "license", "keywords"):
-        assert record[key] == citation[key]
-    assert record["creators"] == citation["authors"]
+    made = {TABLE.at(RESULTS, name=name) for name in declared()}
+    made |= {FIGURE.at(RESULTS, name=name) for name in declarations()}
+    made |= set(Folders().documents.values())
+    assert {entry["file"] for entry in content["manifest"]} <= made
 
 
 def test_the_catalogue_of_snakemake_workflows_finds_what_it_asks_for():

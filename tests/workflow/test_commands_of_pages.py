@@ -18,8 +18,7 @@ from pdrom.model.mesh.generators import cloth
 from places import ROOT
 
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "config" / "README.md"]
-# those of the claim map are planned by test_measured_claim_map.py
-PAGES += sorted(set((ROOT / "docs").rglob("*.md")) - {ROOT / "docs" / "claim_map.md"})
+PAGES += sorted((ROOT / "docs").rglob("*.md"))
 BLOCK = re.compile(r"^```sh\n(.*?)^```", re.MULTILINE | re.DOTALL)
 INLINE = re.compile(r"`((?:\./reproduce|\.venv/bin/\w+) [^`]+)`")
 COMMENT = re.compile(r"\s+#.*|\s*&&.*")  # of what && joins, the first one
@@ -32,7 +31,7 @@ LEFT_OUT = {
     r"^\.ci/run": "runs the tests itself",
     r"^\.venv/bin/(ruff|snakefmt|mypy)": "executed by .ci/run",
     r"^\./reproduce --report": "executed by test_report.py",
-    r"^\./reproduce (verify|compare|bundle|release)": "needs a study; has tests of its own",
+    r"^\./reproduce (verify|bundle)": "needs a study; has tests of its own",
     r"^\./reproduce (pages|docs)": "executed by tests/unit/verification",
     r"^pdrom advise": "reads a finished study; executed by tests/unit/command/test_advise.py",
     r"^\.venv/bin/python -m pdrom\.verification": "executed by tests/unit/verification",

@@ -4,7 +4,7 @@
 arguments were completed and the configuration files were checked. ``figure`` as the first argument
 names figures by their number in the manuscript or in the preprint; ``scene`` and ``viewer`` run the
 jobs of scenes and have ``pdrom`` draw what they made; ``verify`` compares what was made with what
-is expected, ``compare`` two studies; ``test`` hands the others to pytest, and ``run`` starts a
+is expected; ``test`` hands the others to pytest, and ``run`` starts a
 program of the environment.
 """
 
@@ -31,10 +31,7 @@ LINES = ("--logger", "pdrom")
 HANDED_ON = {
     "test": "pytest",
     "verify": "pdrom.verification",
-    "compare": "pdrom.verification.studies",
     "bundle": "pdrom.verification.bundle",
-    "release": "pdrom.verification.release",
-    "pages": "pdrom.verification.pages.written",
 }
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from pdrom.core.errors import ConfigurationError, PdromError
-from pdrom.core.paths import CRATE
 from pdrom.pipeline.commandline import CommandLine, options, recall, remember
 from pdrom.pipeline.expectation import expected_seconds, tell_expectation
 from pdrom.pipeline.failures import Failures, listen
@@ -116,12 +115,7 @@ class Run:
     def _record(self, plan: Plan, folders: Folders) -> None:
         """Write what there is now; a run that changed nothing leaves the account of an older."""
         named = options(self.command.configfiles, self.command.settings)
-        manifest, changed = write_manifest(plan, folders, named)
-        if changed or not Path(CRATE.at(folders.results)).is_file():
-            # late: the library that writes it loads for half a second
-            from pdrom.pipeline.crate import write_crate
-
-            write_crate(plan, folders, manifest)
+        write_manifest(plan, folders, named)
 
     def fail(self) -> None:
         """End a run that failed or was interrupted: it says why."""

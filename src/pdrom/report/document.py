@@ -1,4 +1,4 @@
-"""The list of figures for readers, docs/figures.md."""
+"""The list of figures for readers of results."""
 
 import re
 from pathlib import Path
@@ -11,8 +11,6 @@ from pdrom.report.words.markup import to_plain
 HEAD = """\
 # Figures
 
-Made from the declarations in `src/pdrom/report/figures` by `./reproduce pages`.
-
 `./reproduce figure NAME` draws a figure to `results/figures/NAME.pdf` and `.png`.
 The name may be replaced by the figure's number in `main.pdf` (`figure 5`) or in `supplement.pdf`
 (`figure S7`), or by the number of the figure of the preprint that it rebuilds
@@ -22,7 +20,7 @@ The keys given here choose in `config/figures.yaml` what it shows.
 
 
 def figures_page(root: Path = Path()) -> str:
-    """docs/figures.md, with numbers by the manuscript below ``root``."""
+    """All figures as Markdown, with numbers by the manuscript below ``root``."""
     parts = [HEAD]
     numbers = figure_numbers(root)
     for name, figure in declarations().items():

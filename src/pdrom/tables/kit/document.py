@@ -5,16 +5,14 @@ from collections.abc import Iterable
 from pdrom.artifact.reads import Every, PerScene, Preferred, ProjectFile, Read, Setting, TableOf
 from pdrom.tables.kit.declaration import Column, Table
 
-HEAD = """# Tables of the study
-
-Written by `./reproduce pages` from the declarations; not to be edited by hand.
+HEAD = """# Tables
 
 Tables are CSV with one row per observation, SI units unless a unit says otherwise, and an empty
 cell where there is no value.
 A column marked "timed" depends on timing or on the memory in use: only there may two runs on one
 machine differ (in `claims`, only in claims about times).
 "Compared as" is the kind for which `./reproduce verify` has a tolerance, followed by the column's
-own tolerance if it has one, see [verification.md](verification.md).
+own tolerance if it has one (docs/verification.md).
 """
 
 

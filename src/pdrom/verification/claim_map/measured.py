@@ -1,4 +1,4 @@
-"""Costs of each entry of the claim map, measured by the jobs of a run: results/claim_map.csv."""
+"""Costs of each entry of the claim map, as measured by a run: claim_map.csv and contents.md."""
 
 import shlex
 from collections.abc import Mapping, Sequence
@@ -9,14 +9,15 @@ import pandas as pd
 
 from pdrom.core.machine import Machine
 from pdrom.core.paths import MACHINE, RESULTS, TABLE, Place
-from pdrom.core.store import Condition, check_file, read_table, write_table
+from pdrom.core.store import Condition, check_file, read_table, write_table, write_text
 from pdrom.core.usage import MB, Usage, usage_of
 from pdrom.pipeline.commandline import CommandLine, recall
 from pdrom.pipeline.folders import DEFAULT, Folders
 from pdrom.pipeline.plan import Plan
 from pdrom.verification.claim_map.entries import Entry, entries
+from pdrom.verification.claim_map.pages import contents
 
-MAP = Place("claim_map.csv")
+MAP, CONTENTS = Place("claim_map.csv"), Place("contents.md")
 COLUMNS = (
     "kind", "name", "rule", "target", "command", "jobs", "minutes", "minutes_alone", "memory",
     "disk", "verdict", "verdict_beyond", "configuration", "machine",
@@ -35,6 +36,7 @@ def write_after(command: CommandLine, dag: Any, plan: Plan, folders: Folders) ->
         configuration = " ".join([*command.configfiles, *command.settings]) or DEFAULT
         made = claim_map(dag, plan, folders, options=recall(), configuration=configuration)
         write_table(made, MAP.at(folders.results))
+        write_text(contents(made, plan.root), CONTENTS.at(folders.results))
 
 
 def claim_map(

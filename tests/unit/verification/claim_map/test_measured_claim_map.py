@@ -12,8 +12,11 @@ from pdrom.core.usage import Usage
 from pdrom.pipeline.commandline import CommandLine
 from pdrom.pipeline.figure_command import figure_arguments
 from pdrom.pipeline.front import completed, files_of
+from pdrom.report.figures.kit.catalogue import declarations
+from pdrom.tables import declared
 from pdrom.verification.claim_map.entries import entries
 from pdrom.verification.claim_map.measured import claim_map
+from pdrom.verification.claim_map.pages import contents
 from pdrom.verification.subject import Subject
 from places import ROOT
 
@@ -89,3 +92,15 @@ def test_costs_are_those_of_all_jobs_that_are_needed(subject, tmp_path, monkeypa
     # one job that was not measured: nothing is claimed about what needs it
     Path("logs/run.log").write_text("interrupted\n")
     assert figures().loc["singular_values"][["minutes", "memory"]].isna().all()
+
+
+def test_the_contents_name_every_entry_and_describe_every_figure_and_column(subject, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    made = claim_map(Dag(subject), subject.plan, subject.folders, TINY, "config/tiny.yaml")
+    page = contents(made)
+    assert "run of config/tiny.yaml" in page
+    for entry in entries(ROOT):
+        assert f"| {entry.kind} | {entry.name} | `./reproduce " in page
+    assert [name for name in declarations() if f"## `{name}`" not in page] == []
+    for table in declared().values():
+        assert [c.name for c in table.columns if f"| {c.name} | {c.kind} |" not in page] == []

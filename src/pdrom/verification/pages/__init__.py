@@ -1,1 +1,0 @@
-"""Pages for readers that are made from declarations."""

@@ -1,1 +1,0 @@
-"""``./reproduce compare A B``: two studies side by side, as a page and an exit code."""
