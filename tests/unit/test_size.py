@@ -13,10 +13,10 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 53_920,
+    "lines of src": 53_960,
     "modules of src": 569,
-    "lines of tests": 33_640,
-    "words of documentation": 31_240,
+    "lines of tests": 33_720,
+    "words of documentation": 31_400,
     "tables": 52,
     "figures": 37,
     "experiments": 31,

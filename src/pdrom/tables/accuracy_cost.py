@@ -46,6 +46,7 @@ CONVERGED, OWN = "converged", "own iterations"
 
 @table(
     title="Every method and size as a point of accuracy and cost",
+    only_with_error=True,
     columns=(
         SCENE,
         GROUP,
@@ -64,6 +65,7 @@ CONVERGED, OWN = "converged", "own iterations"
                 "error against the run of converged frames: of the full order, whose error before "
                 "the horizon may have another reference, and in position subspaces",
             ),
+            tolerance=0.05,
         ),
         *COLUMNS,
         timed(flag("pareto_heldout", "the same by the error held out; full order as it is")),

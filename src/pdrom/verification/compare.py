@@ -37,7 +37,6 @@ class Comparison:
         self.pairs = pairs(self.table, self.expected, self.found)
         self.e = self.expected.iloc[[i for i, _ in self.pairs]].reset_index(drop=True)
         self.f = self.found.iloc[[j for _, j in self.pairs]].reset_index(drop=True)
-        self.wrong = of_wrong_runs(self.table, self.e)
         self._loose: dict[str, dict[str, np.ndarray]] = {}
 
     def columns(self) -> Iterator[Column]:
@@ -62,11 +61,14 @@ class Comparison:
     def limits(self, column: Column) -> np.ndarray:
         """Tolerance of each cell of a column."""
         limit = np.full(len(self.e), column.within)
-        if column.quantity == "value":
+        if column.quantity == "value" and column.kind == "integer":
             limit[of_fitted_samples(self.e)] = FITTED
-        if column.quantity == "error" and column.kind == "number":
-            limit[self.wrong] = max(column.within, OF_WRONG_RUNS)
+        limit[self.wrong(column)] = max(column.within, OF_WRONG_RUNS)
         return limit
+
+    def wrong(self, column: Column) -> np.ndarray:
+        """Cells of ``column`` that say by their own value that a wrong run is wrong."""
+        return of_wrong_runs(self.table, column, self.e)
 
     def apart(self, column: Column) -> np.ndarray:
         """Distance of each pair of cells of ``column``, in the measure of its quantity."""
@@ -75,19 +77,17 @@ class Comparison:
     def unpaired(self) -> tuple[pd.DataFrame, pd.DataFrame]:
         """Rows of the expected and of the found table without a partner.
 
-        Rows of runs that the other side says to have ended early are left out.
+        A table that lists only the runs that have an error (`Table.only_with_error`) lacks those
+        that have none on the other side, where they have one on this side.
         """
         missing, new = (
             frame[~np.isin(np.arange(len(frame)), [pair[side] for pair in self.pairs])]
             for side, frame in enumerate((self.expected, self.found))
         )
-        return self._not_ended(missing, 1), self._not_ended(new, 0)
-
-    def _not_ended(self, rows: pd.DataFrame, side: int) -> pd.DataFrame:
-        if not set(RUN) <= set(rows.columns):
-            return rows
-        ended = [name in self.context.ended[side] for name in names(rows, RUN)]
-        return rows[~np.array(ended, dtype=bool)]
+        if not self.table.only_with_error:
+            return missing, new
+        expected, found = self.context.ended
+        return _without(missing, found - expected), _without(new, expected - found)
 
     @cached_property
     def _timed(self) -> list[set[str]]:
@@ -97,3 +97,7 @@ class Comparison:
         reads = self.table.reads.items()
         files = {name: Path(r.path) for name, r in reads if isinstance(r, ProjectFile)}
         return [set(names) for names in self.table.timed_cells(self.e, **files)]
+
+
+def _without(rows: pd.DataFrame, runs: frozenset[tuple]) -> pd.DataFrame:
+    return rows[[name not in runs for name in names(rows, RUN)]]

@@ -14,8 +14,11 @@ from pdrom.verification.rows import SAMPLES, names
 
 # Columns of a row that say which one it is.
 NAMED = 6
-# Nine of ten cells of a column are closer than its tolerance, which ten cells or more can show.
-NINE, TEN = 1e-5, 10
+# So many cells of a column are far closer than the tolerance of one: nine of ten errors, half of
+# less than `TEN` and of other quantities, from `LEAST` cells on. Closer means this distance, or
+# that part of the tolerance which a column has of its own.
+MOST, HALF, TEN, LEAST = 0.9, 0.5, 10, 3
+CLOSE, OWN = 1e-5, 50
 # Of cells that rounding decides about, a tenth may have another outcome or another order of
 # magnitude, and half may be off by more than a factor of two; and by what they are counted.
 LOOSE = (
@@ -93,8 +96,8 @@ def _cells(comparison: Comparison, column: Column) -> Iterator[Difference]:
     firm = ~np.any([np.zeros(len(beyond)), *comparison.loose(column).values()], axis=0)
     for row in np.flatnonzero(beyond & firm):
         yield _difference(comparison, column, int(row))
-    if not (beyond & firm).any():
-        yield from _nine_of_ten(comparison, column, firm & ~comparison.wrong)
+    if not (beyond & firm).any() and column.kind in ("number", "integer"):
+        yield from _shifted(comparison, column, firm & ~comparison.wrong(column))
     yield from _loose(comparison, column, ~firm)
 
 
@@ -107,15 +110,19 @@ def _fragile(comparison: Comparison, column: Column, other: np.ndarray) -> Itera
         yield Difference(f"{column.name}, as of {place}", *words, float("inf"), allowed)
 
 
-def _nine_of_ten(comparison: Comparison, column: Column, firm: np.ndarray) -> Iterator[Difference]:
+def _shifted(comparison: Comparison, column: Column, firm: np.ndarray) -> Iterator[Difference]:
     """A small shift of all cells is noticed although one may be off by more."""
-    usual = column.quantity == "error" and column.kind == "number" and column.tolerance is None
-    if not usual or firm.sum() < TEN:
+    there = (comparison.e[column.name].fillna(0) != 0).to_numpy(dtype=bool)
+    cells = firm & there & comparison.compared(column)
+    if cells.sum() < LEAST:
         return
-    size = float(np.quantile(comparison.apart(column)[firm], 0.9))
-    if size > NINE:
-        words = f"nine of ten cells within {NINE:g}", f"within {size:.2g}"
-        yield Difference(column.name, *words, size, NINE)
+    own = column.tolerance
+    strict = column.quantity == "error" and own is None and cells.sum() >= TEN
+    share, close = MOST if strict else HALF, CLOSE if own is None else own / OWN
+    size = float(np.quantile(comparison.apart(column)[cells], share))
+    if size > close:
+        words = f"a share of {share:g} of the cells within {close:g}", f"within {size:.2g}"
+        yield Difference(column.name, *words, size, close)
 
 
 def _loose(comparison: Comparison, column: Column, cells: np.ndarray) -> Iterator[Difference]:

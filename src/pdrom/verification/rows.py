@@ -15,6 +15,8 @@ OF_RUNS, DIRECT = 1e2, 1e5
 RUNS, SPECTRA, RECONSTRUCTION = "reduced_reruns", "singular_values", "reconstruction_error"
 # A run with a larger error is wrong, as everywhere in the study.
 WRONG = 0.1
+# The error that says so, the first that a table has.
+OF_RUN = ("relative_error_within_horizon", "relative_error")
 # What names the samples of a reduction.
 SAMPLES = ("scene", "group", "method", "r")
 RUN = (*SAMPLES, "position_basis", "k")
@@ -85,13 +87,17 @@ class Context:
         return np.fmax.reduce(found)
 
 
-def of_wrong_runs(table: Table, frame: pd.DataFrame) -> np.ndarray:
-    """Rows of ``frame``, a ``table``, of wrong runs: small changes grow in many of them."""
-    found = np.zeros(len(frame), dtype=bool)
-    for column in table.columns if table.name != RECONSTRUCTION else ():
-        if column.quantity == "error" and column.kind == "number" and "error" in column.name:
-            found |= (frame[column.name] > WRONG).to_numpy(dtype=bool)
-    return found
+def of_wrong_runs(table: Table, column: Column, frame: pd.DataFrame) -> np.ndarray:
+    """Cells of a ``column`` of ``frame``, a ``table``, in which small changes may have grown.
+
+    The run is wrong, where the table says, and so is the cell, if it is an error, by its own value.
+    """
+    judged = [name for name in OF_RUN if name in frame][:1]
+    judged += [column.name] if "error" in column.name else []
+    number = column.quantity == "error" and column.kind == "number"
+    if not number or not judged or table.name == RECONSTRUCTION:
+        return np.zeros(len(frame), dtype=bool)
+    return (frame[judged] > WRONG).all(axis=1).to_numpy(dtype=bool)
 
 
 def of_fitted_samples(frame: pd.DataFrame) -> np.ndarray:
@@ -137,4 +143,4 @@ def _gains(tables: Mapping[str, pd.DataFrame]) -> dict[tuple, float]:
 def _ended(runs: pd.DataFrame | None) -> frozenset[tuple]:
     if runs is None:
         return frozenset()
-    return frozenset(names(runs[runs.relative_error_within_horizon.isna()], RUN))
+    return frozenset(names(runs[runs[OF_RUN[0]].isna()], RUN))

@@ -1,14 +1,17 @@
 """A number that moves by three times its tolerance is noticed; what rounding moves is not."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from pdrom.tables import declared
 from pdrom.tables.kit.quantities import QUANTITIES, TALLY, TOLERANCES
 from pdrom.verification.compare import FITTED, NOT_COMPARED, Comparison
-from pdrom.verification.judge import judge
+from pdrom.verification.judge import LEAST, judge
+from pdrom.verification.pairing import names_row
 from pdrom.verification.references import read_reference
 from pdrom.verification.rows import OF_RUNS, RUN, Context, names, of_fitted_samples
 from places import ROOT
@@ -199,3 +202,92 @@ def test_messages_name_the_row_and_how_far_it_is_off(tiny):
     text = str(judged(tables, context, "singular_values", found)[0])
     assert text.startswith("scene ")
     assert text.endswith("(off by 0.5, allowed 0.0001)")
+
+
+def good(comparison, column):
+    """Rows in which rounding decides nothing about the cells of ``column``, and no run is wrong."""
+    firm = ~np.any([np.zeros(len(comparison.e)), *comparison.loose(column).values()], axis=0)
+    return firm & ~comparison.wrong(column) & comparison.compared(column)
+
+
+def noticed(table, context, expected, found):
+    return judge(Comparison(table, expected, table.checked(found), context)).differences != ()
+
+
+def every_column(tables, context):
+    for name, frame in tables.items():
+        alone = Comparison(declared()[name], frame, frame, context)
+        for column in alone.columns():
+            yield declared()[name], column, frame, alone
+
+
+def test_any_column_of_numbers_that_moves_by_four_per_cent_is_noticed(tiny):
+    missed, tried, (tables, context) = [], 0, tiny
+    for table, column, frame, alone in every_column(tables, context):
+        if column.kind not in ("number", "integer"):
+            continue
+        values = frame[column.name].to_numpy(dtype=float, na_value=np.nan)
+        moved = 1.04 * values if column.kind == "number" else np.ceil(1.04 * values)
+        rows = good(alone, column) & np.isfinite(values) & (np.abs(values) > SMALL)
+        if rows.sum() < LEAST:
+            continue
+        tried += 1
+        found = frame.assign(**{column.name: np.where(rows, moved, values)})
+        read = [
+            c for c in table.columns if names_row(c) or c.quantity == "value" or "error" in c.name
+        ]
+        alone = replace(table, columns=tuple(dict.fromkeys([*read, column])))
+        if not noticed(alone, context, frame, found):
+            missed.append((table.name, column.name, int(rows.sum())))
+    assert tried > 100
+    assert missed == []
+
+
+def test_any_column_of_outcomes_that_changes_is_noticed(tiny):
+    missed, (tables, context) = [], tiny
+    for table, column, frame, alone in every_column(tables, context):
+        if column.kind not in ("text", "flag") or column.quantity != "error":
+            continue
+        rows = good(alone, column) & frame[column.name].notna().to_numpy()
+        values = frame[column.name]
+        other = ~values.fillna(False).astype(bool) if column.kind == "flag" else "another"
+        if rows.any() and not noticed(
+            table, context, frame, frame.assign(**{column.name: values.mask(rows, other)})
+        ):
+            missed.append((table.name, column.name, int(rows.sum())))
+    assert missed == []
+
+
+def edited_rows(frame, row):
+    """Edits of one row: invented, doubled, deleted, swapped with another, renamed."""
+    last = len(frame) - 1
+    renamed = frame.copy()
+    word = next(name for name in frame if frame[name].dtype.kind not in "fiub")
+    renamed[word] = renamed[word].astype(object)
+    renamed.loc[row, word] = "another"
+    yield "invented", pd.concat([frame, renamed.iloc[[row]]])
+    yield "doubled", pd.concat([frame, frame.iloc[[row]]])
+    yield "deleted", frame.drop(index=row)
+    yield "renamed", renamed
+    if len(frame) > 1:
+        order = np.arange(len(frame))
+        order[[0, last]] = last, 0
+        yield "swapped", frame.iloc[order]
+
+
+def test_rows_that_are_invented_doubled_deleted_swapped_or_renamed_are_noticed(tiny, rng):
+    missed, (tables, context) = [], tiny
+    for name, frame in tables.items():
+        for edit, found in edited_rows(frame, int(rng.integers(len(frame)))):
+            if not noticed(declared()[name], context, frame, found.reset_index(drop=True)):
+                missed.append((name, edit))
+    assert missed == []
+
+
+def test_runs_that_a_table_leaves_out_for_want_of_an_error_are_no_difference(tiny):
+    tables, context = tiny
+    table, frame = declared()["accuracy_cost"], tables["accuracy_cost"]
+    first = frame[frame.group.notna()].index[:1]
+    ended = replace(context, ended=(frozenset(), frozenset(names(frame.loc[first], RUN))))
+    assert noticed(table, context, frame, frame.drop(index=first).reset_index(drop=True))
+    assert not noticed(table, ended, frame, frame.drop(index=first).reset_index(drop=True))

@@ -123,10 +123,12 @@ class Table(Artifact):
     """A table of the study; calling it makes it.
 
     timed_cells : columns of each row that depend on timing, where that differs from row to row
+    only_with_error : the table lists only the runs that have an error before their horizon
     """
 
     columns: tuple[Column, ...] = ()
     timed_cells: TimedCells | None = None
+    only_with_error: bool = False
 
     def __call__(self, *arguments: Any, **named: Any) -> pd.DataFrame:
         """Make the table from what it reads, see `checked`."""
@@ -200,12 +202,13 @@ def table(
     columns: Sequence[Column],
     reads: Mapping[str, Read],
     timed_cells: TimedCells | None = None,
+    only_with_error: bool = False,
 ) -> Callable[[Callable[..., pd.DataFrame]], Table]:
     """Declare the function below as the one that makes the table of its name.
 
     Parameters
     ----------
-    timed_cells : see `Table`
+    timed_cells, only_with_error : see `Table`
 
     Raises
     ------
@@ -217,8 +220,9 @@ def table(
         name = function.__name__
         writes = {"table": TABLE.where(name=name)}
         made = Table(
-            name, title, reads, writes, function, columns=tuple(columns), timed_cells=timed_cells
-        )
+            name, title, reads, writes, function, columns=tuple(columns), timed_cells=timed_cells,
+            only_with_error=only_with_error,
+        )  # fmt: skip
         _require_distinct(made)
         return declare(made)
 
