@@ -331,7 +331,7 @@ OTHER_CASES = [
     other("method with a control character", METHODS, "title: POD projection",
           'title: "POD\\u0007"', "pod.title", "U+0007", "cannot be typeset"),
     other("method that is a number", METHODS, "pod: {", "7: {", "method 7", "letters"),
-    Case("figures as a list", {FIGURES: "- run_error\n"}, (FIGURES, "a mapping of figure names")),
+    Case("figures as a list", {FIGURES: "- ladder\n"}, (FIGURES, "a mapping of figure names")),
     other("unknown figure", FIGURES, "singular_values:", "singular_value:", "'singular_value'",
           "did you mean 'singular_values'?"),
     other("unknown key of a figure", FIGURES, "  count: 4\n", "  cuont: 4\n",

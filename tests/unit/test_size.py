@@ -13,12 +13,12 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 53_960,
-    "modules of src": 569,
-    "lines of tests": 33_720,
-    "words of documentation": 31_400,
+    "lines of src": 53_140,
+    "modules of src": 559,
+    "lines of tests": 33_700,
+    "words of documentation": 31_380,
     "tables": 52,
-    "figures": 37,
+    "figures": 28,
     "experiments": 31,
     "percent of src in decorators, signatures and imports": 24.0,
 }

@@ -36,7 +36,7 @@ TIMED_FOLDERS = (
     "timings", "frame_times", "seconds", "breakeven", "effects", "left_out", "guard", "offline",
     "logs",
 )  # fmt: skip
-TIMED_FIGURES = ("local_share", "accuracy_cost", "accuracy_cost_all", "alternatives")
+TIMED_FIGURES = ("local_share", "accuracy_cost", "alternatives")
 SHIM = '#!/bin/sh\nPYTHONPATH="{hooks}" exec "{python}" {module} "$@"\n'
 
 

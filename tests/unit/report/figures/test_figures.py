@@ -368,34 +368,11 @@ def test_rates_out_of_reach_are_named(study):
     assert ax.get_xlim()[1] < 1e3 / 60.0
 
 
-def test_a_budget_says_what_it_buys(study):
-    figure = draw(study, "budget", scenes=("strain_oop",))
-    found = texts(figure)
-    assert [ax.get_title() for ax in figure.axes] == [
-        "0.1 ms a frame", "1 ms a frame", "3 ms a frame", "10 ms a frame",
-    ]  # fmt: skip
-    assert found.count("nothing fits") == 1
-    assert found.count("full order fits") == 1
-    assert {"r=14", "k=8, 33 el.", "K=2", "K=5", "K=10"} <= set(found)
-
-
 def test_break_even_has_a_panel_per_group(study):
     figure = draw(study, "break_even")
     assert {ax.get_title() for ax in figure.axes} == {
         "bending", "spring", "strain", "tetrahedron strain", "deformation gradient",
     }  # fmt: skip
-
-
-def test_break_even_over_mesh_sizes(study):
-    figure = draw(study, "break_even_sizes", methods=("deim-joint", "block-deim", "qdeim"))
-    assert [ax.get_title() for ax in figure.axes] == ["strain oop", "bar release"]
-    lines = [line for line in figure.axes[0].get_lines() if line.get_marker() == "None"]
-    drawn = {(*line.get_ydata(), line.get_linestyle()) for line in lines}
-    sizes = ((20, "-"), (10, "--"), (40, "-"), (40, "--"), (6, "-"), (6, "--"))
-    assert drawn == {(size, size, size, style) for size, style in sizes}
-    points = [line for line in figure.axes[0].get_lines() if line.get_marker() != "None"]
-    marks = {line.get_ydata()[0]: line.get_marker() for line in points}
-    assert (marks[40], marks[6]) == ("^", "v")
 
 
 def test_what_an_effect_moves_stands_beside_the_floor(study):
