@@ -23,7 +23,7 @@ from pdrom.model.mesh.types import Mesh
 # other: what a run depends on is this one file, which is hashed and lies in the project. Not among
 # them are formats that keep data in further files (.xdmf, .pvd, .ele and .node, dolfin's .xml),
 # include others (.inp) or link to others (all that are HDF5 or netCDF inside: .med, .h5m, .hmf,
-# .cgns, .e).
+# .cgns, .e). Of Kratos's .mdpa meshio takes quadrilaterals for tetrahedra.
 FORMATS = {
     ".avs": ("avsucd",),
     ".bdf": ("nastran",),
@@ -31,7 +31,6 @@ FORMATS = {
     ".dato": ("permas",),
     ".f3grid": ("flac3d",),
     ".fem": ("nastran",),
-    ".mdpa": ("mdpa",),
     ".mesh": ("medit",),
     ".meshb": ("medit",),
     ".msh": ("gmsh", "ansys"),
@@ -71,8 +70,9 @@ def read_mesh_file(path: Path) -> Mesh:
         raise MeshError(f"{path}: no such mesh file")
     if path.suffix.lower() not in FORMATS:
         raise MeshError(
-            f"{path}: no format that keeps the whole mesh in one file (allowed: "
-            f"{', '.join(FORMATS)}), `meshio convert {path.name} {path.stem}.vtu` makes one"
+            f"{path}: no format that keeps the whole mesh in one file and that is read right "
+            f"(allowed: {', '.join(FORMATS)}); save it as .vtu, .msh or .obj, or try "
+            f"`meshio convert {path.name} {path.stem}.vtu`"
         )
     limits = mesh_limits()
     if path.stat().st_size > limits.file_bytes:

@@ -15,10 +15,10 @@ import io
 import os
 import sys
 from contextlib import redirect_stderr, redirect_stdout
-from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
+from pdrom.model.meshfiles import obj
 from pdrom.model.meshfiles.faults import (
     CORNERS,
     CutError,
@@ -30,8 +30,6 @@ from pdrom.model.meshfiles.faults import (
 
 REFUSED = 3
 NO_MEMORY = 4
-# Formats with a reader of our own: meshio's refuses ordinary files of them.
-OWN = ("obj", "off", "ply", "vtk")
 # How a file begins whose extension leaves two formats.
 OPENINGS = {"ansys": b"(", "gmsh": b"$"}
 
@@ -91,10 +89,7 @@ def read(path: str, formats: list[str], max_vertices: int, max_cells: int) -> tu
         begins = file.read(64).lstrip()[:1]
     name = next((name for name in formats if OPENINGS.get(name) == begins), formats[0])
     try:
-        if name in OWN:
-            points, cells = import_module(f"pdrom.model.meshfiles.{name}").read(Path(path))
-        else:
-            points, cells = _by_meshio(path, name)
+        points, cells = obj.read(Path(path)) if name == "obj" else _by_meshio(path, name)
         # of a damaged file they may be no arrays, which the conversion refuses
         _check_size("vertices", len(np.atleast_1d(points)), max_vertices)
         _check_size("cells", len(cells), max_cells)
@@ -105,7 +100,11 @@ def read(path: str, formats: list[str], max_vertices: int, max_cells: int) -> tu
     except RefusedError as error:
         raise ValueError(f"{error}{_last_line(path)}") from error
     except (SystemExit, Exception) as error:
-        hint = "" if isinstance(error, CutError) else _last_line(path)
+        hint = _last_line(path)
+        if isinstance(error, CutError):
+            hint = ""
+        elif name != "obj":
+            hint += f"; of {name} files the plain form is read: save it as .vtu, .msh or .obj"
         raise ValueError(f"not a readable mesh ({reason(error)}{hint})") from error
     for array, what, widths in ((points, "points", (3,)), (cells, "cells", (3, 4))):
         if array.ndim != 2 or array.shape[1] not in widths:
@@ -118,21 +117,29 @@ def _by_meshio(path: str, name: str) -> tuple:
     """Points and cells that meshio's reader finds, where they are those of the file."""
     import meshio
     import numpy as np
+    from meshio.gmsh import _gmsh40
+    from meshio.gmsh import main as gmsh
     from meshio.ugrid import _ugrid
 
-    from pdrom.model.meshfiles.guards import check_after, check_before, ends_noticed
+    from pdrom.model.meshfiles.guards import check_after, check_before, ends_noticed, without_faces
 
     _ugrid.file_types["ascii"]["float_type"] = "f8"  # meshio rounds what is text to single
+    gmsh._readers["4"] = _gmsh40  # as Gmsh calls 4.0; meshio takes it for 4.1
     content = Path(path).read_bytes()
     check_before(name, content)
     with ends_noticed():
         raw = meshio.read(path, file_format=name)
     check_after(name, content, raw)
-    kind = only_kind(block.type for block in raw.cells if block.type not in ("vertex", "line"))
-    cells = np.concatenate([block.data for block in raw.cells if block.type == kind])
-    if cells.shape[1:] != (CORNERS[kind],):
-        raise UnreadableError(f"{kind} with a shape of {cells.shape[1:]}")
-    return raw.points, cells
+    blocks: dict[str, list] = {}
+    for block in raw.cells:
+        if block.type not in ("vertex", "line"):
+            blocks.setdefault(block.type, []).append(block.data)
+    found = without_faces({kind: np.concatenate(data) for kind, data in blocks.items()})
+    kind = only_kind(found)
+    if found[kind].shape[1:] != (CORNERS[kind],):
+        raise UnreadableError(f"{kind} with a shape of {found[kind].shape[1:]}")
+    flat = raw.points.ndim == 2 and raw.points.shape[1] == 2
+    return np.pad(raw.points, ((0, 0), (0, 1))) if flat else raw.points, found[kind]
 
 
 def _last_line(path: str) -> str:

@@ -3,8 +3,6 @@
 import re
 from collections.abc import Iterable
 
-import numpy as np
-
 # Kinds of cells that are wanted, and how many corners they have.
 CORNERS = {"triangle": 3, "tetra": 4}
 _LAST_NUMBER = re.compile(rb"(?:^|\s)([-+]?[\d.]+(?:[eE][-+]?\d*)?)\Z")
@@ -33,31 +31,6 @@ def only_kind(kinds: Iterable[str]) -> str:
             f"holds cells {found or 'of no kind'}, allowed: only one of {', '.join(CORNERS)}"
         )
     return found[0]
-
-
-def kind_of_face(corners: int) -> str:
-    """Kind of a face with so many corners."""
-    return {3: "triangle", 4: "quad"}.get(corners, "polygon")
-
-
-def numbers(rows: list[bytes], columns: int, what: str) -> np.ndarray:
-    """First ``columns`` numbers of every row, (rows, columns) float64; ``what`` names a fault."""
-    if not rows:
-        return np.empty((0, columns))
-    try:
-        return np.loadtxt(rows, usecols=range(columns), ndmin=2, encoding="latin-1")
-    except (ValueError, IndexError) as error:
-        raise UnreadableError(f"{what}: {error}") from error
-
-
-def whole(array: np.ndarray, what: str) -> np.ndarray:
-    """``array`` as integers; `UnreadableError`, which names ``what``, for one that is none."""
-    if not (np.isfinite(array).all() and (np.abs(array) < 2**53).all()):
-        raise UnreadableError(f"{what} that are no whole numbers")
-    integers = array.astype(np.int64)
-    if (integers != array).any():
-        raise UnreadableError(f"{what} that are no whole numbers")
-    return integers
 
 
 def check_last_number(content: bytes, vertices: int) -> None:

@@ -6,6 +6,7 @@ here; where it takes the end of a file for the end of its mesh, the end is looke
 
 import builtins
 import io
+import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,10 +22,9 @@ PIECE, PATIENCE = 4096, 100
 ENDS = {
     "ansys": rb"\)\s*\Z",
     "gmsh": rb"^\$End\w+\s*\Z",
-    "mdpa": rb"^\s*End \w+\s*\Z",
     "medit": rb"\A\x01\0\0\0|^\s*End\s*\Z",  # a binary one ends with a number
     "nastran": rb"^ENDDATA",
-    "netgen": rb"^\s*endmesh\s*\Z",
+    "netgen": rb"^\s*endmesh\s*$",  # the geometry may follow
     "permas": rb"^\s*\$FIN",
     "stl": rb"^\s*endsolid[^\n]*\s*\Z",
     "vtu": rb"</VTKFile>\s*\Z",
@@ -32,10 +32,15 @@ ENDS = {
 }
 # Lines that meshio passes over, and what they would change.
 PASSED_OVER = {
-    "mdpa": (rb"^[ \t]*Begin Nodes\b.*?^[ \t]*(Begin Nodes)\b", "one block of nodes is read"),
     "nastran": (
         rb"^[ \t]*(GRDSET|INCLUDE|(?:CTRI|CTETRA)\w*\*)",
         "no other coordinate systems and files are read, and no elements in large fields",
+    ),
+    "ply": (
+        rb"\A(?:ply\s.*?^(element face)\b.*?^element vertex\b"
+        rb"|ply\s+format binary.*?^element face\b[^\n]*\n"
+        rb"(?:property list [^\n]*\n(property)|(property) (?!list)))",
+        "vertices, then faces that are corners alone, are read",
     ),
     "su2": (rb"^[ \t]*(NZONE[ \t]*=[ \t]*0*(?:[2-9]|1\d))", "one zone is read"),
     "tecplot": (rb"^[ \t]*ZONE\b.*?^[ \t]*(ZONE)\b", "one zone is read"),
@@ -62,7 +67,7 @@ def check_before(name: str, content: bytes) -> None:
         pattern, why = PASSED_OVER[name]
         found = re.search(pattern, content, re.M | re.S | re.I)
         if found:
-            raise UnreadableError(f"{found[1].decode()}: {why}")
+            raise UnreadableError(f"{next(filter(None, found.groups())).decode()}: {why}")
     if name == "su2":
         _check_order(content)
 
@@ -79,13 +84,17 @@ def check_after(name: str, content: bytes, mesh: Any) -> None:
     """
     if name == "nastran" and np.any(mesh.point_data.get("nastran:ref", 0)):
         raise UnreadableError("GRID with a coordinate system (CP): only the basic one is read")
-    if name == "mdpa":
-        _count_by_numbers(content, mesh)
+    there = sum(len(cells.data) for cells in mesh.cells)
+    announced = {there}
     if name == "su2":
         counts = re.findall(rb"^[ \t]*(?:NELEM|MARKER_ELEMS)[ \t]*=[ \t]*(\d+)", content, re.M)
-        announced, there = sum(map(int, counts)), sum(len(cells.data) for cells in mesh.cells)
-        if there != announced:
-            raise CutError(f"{announced} elements are announced, {there} are there")
+        announced = {sum(map(int, counts))}
+    elif name == "vtk":
+        offsets = content.startswith(b"# vtk DataFile Version 5")  # one more than there are cells
+        counts = re.findall(rb"^(CELLS|CELL_TYPES)[ \t]+(\d+)", content, re.M)
+        announced = {int(count) - (offsets and word == b"CELLS") for word, count in counts}
+    if announced - {there}:
+        raise CutError(f"{min(announced - {there})} elements are announced, {there} are there")
     if name not in ENDS and b"\0" not in content:
         check_last_number(content, len(mesh.points))
 
@@ -103,18 +112,22 @@ def _check_order(content: bytes) -> None:
         raise UnreadableError("NPOIN: vertices are numbered in another order than 0, 1, 2 ...")
 
 
-def _count_by_numbers(content: bytes, mesh: Any) -> None:
-    """Let cells of .mdpa, which name vertices by number, name them by place."""
-    block = content.partition(b"Begin Nodes")[2].partition(b"End Nodes")[0]
-    numbers = np.array(block.split()[::4], dtype=np.int64)
-    order = np.argsort(numbers)
-    if len(numbers) != len(mesh.points) or (np.diff(numbers[order]) == 0).any():
-        raise UnreadableError("nodes with equal numbers")
-    for cells in mesh.cells:
-        found = np.searchsorted(numbers[order], cells.data + 1).clip(max=len(numbers) - 1)
-        if (numbers[order[found]] != cells.data + 1).any():
-            raise UnreadableError("an element names a node that is not there")
-        cells.data = order[found]
+def without_faces(cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """``cells`` by kind; without triangles that are faces of tetrahedra beside them, if all are.
+
+    Meshers write the boundary of a volume, which says no more than the tetrahedra do.
+    """
+    if cells.keys() != {"triangle", "tetra"}:
+        return cells
+    faces = cells["tetra"][:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3)
+    size = max(int(corners.max(initial=0)) for corners in cells.values()) + 1
+
+    def number(triangles: np.ndarray) -> np.ndarray:
+        a, b, c = np.sort(triangles.astype(np.int64), axis=1).T
+        return (a * size + b) * size + c  # a million vertices leave it in 64 bits
+
+    known = np.isin(number(cells["triangle"]), number(faces)).all()
+    return {"tetra": cells["tetra"]} if known else cells
 
 
 @contextmanager
@@ -134,8 +147,10 @@ def ends_noticed() -> Iterator[None]:
         return file if mode == "rb" else _Text(file, ends)
 
     def whole(file: Any, *more: Any, **named: Any) -> np.ndarray:
-        array = fromfile(file, *more, **named)
         count = named.get("count", more[1] if len(more) > 1 else -1)
+        if count > os.fstat(file.fileno()).st_size:  # before as much memory is taken
+            raise CutError(f"{count} numbers that follow each other, the file is shorter")
+        array = fromfile(file, *more, **named)
         if len(array) < count:
             raise CutError(f"{count} numbers that follow each other, {len(array)} are there")
         return array

@@ -19,7 +19,7 @@ VARIANTS = [
     ("ansys", ".msh", {}), ("ansys", ".msh", {"binary": False}), ("avsucd", ".avs", {}),
     ("flac3d", ".f3grid", {}), ("flac3d", ".f3grid", {"binary": True}),
     ("gmsh", ".msh", {}), ("gmsh", ".msh", {"binary": False}), ("gmsh22", ".msh", {}),
-    ("gmsh22", ".msh", {"binary": False}), ("mdpa", ".mdpa", {}), ("medit", ".mesh", {}),
+    ("gmsh22", ".msh", {"binary": False}), ("medit", ".mesh", {}),
     ("medit", ".meshb", {}), ("nastran", ".nas", {}),
     ("nastran", ".bdf", {"point_format": "fixed-small"}), ("netgen", ".vol", {}),
     ("obj", ".obj", {}), ("off", ".off", {}), ("permas", ".dato", {}), ("ply", ".ply", {}),
@@ -90,8 +90,7 @@ def test_what_is_written_is_read_and_what_is_cut_is_not(tmp_path, writer, suffix
         elif content[:cut].endswith(b"\n") and suffix in ENDLESS:
             continue
         else:
-            known = ("cut off", "of no kind", "the first line", "with ASCII or BINARY")
-            assert any(words in said for words in known), said
+            assert said.startswith(("not a readable mesh (", "holds cells ")), said
             assert "\n" not in said
 
 
@@ -110,12 +109,6 @@ def listed(numbers: list[int], line: str) -> str:
 def text(suffix: str, numbers: list[int]) -> str:
     """A file of the format, by hand, in which the vertices have these numbers."""
     match suffix:
-        case ".mdpa":
-            nodes = numbered(numbers, "{} {} {} {}\n")
-            faces = listed(numbers, "{} 0 {} {} {}\n")
-            return (
-                f"Begin Nodes\n{nodes}End Nodes\nBegin Elements Triangle3D3\n{faces}End Elements\n"
-            )
         case ".nas":
             grid = numbered(numbers, "GRID,{},,{},{},{}\n")
             return f"BEGIN BULK\n{grid}" + listed(numbers, "CTRIA3,{},1,{},{},{}\n") + "ENDDATA\n"
@@ -145,7 +138,7 @@ def text(suffix: str, numbers: list[int]) -> str:
 
 
 @pytest.mark.parametrize("numbers", [[1, 2, 3, 4], [4, 2, 1, 3], [70, 8, 900, 15]])
-@pytest.mark.parametrize("suffix", [".mdpa", ".nas", ".avs", ".dato", ".f3grid", ".msh"])
+@pytest.mark.parametrize("suffix", [".nas", ".avs", ".dato", ".f3grid", ".msh"])
 def test_numbers_of_vertices_are_not_their_places(tmp_path, suffix, numbers):
     (tmp_path / f"a{suffix}").write_text(text(suffix, numbers))
     points, triangles = read(tmp_path / f"a{suffix}")
@@ -190,10 +183,6 @@ TECPLOT = (
         (".dat", TECPLOT[:-3], "cut off"),
         (".su2", replaced(".su2", "NDIME", "NZONE= 2\nNDIME"), "NZONE= 2: one zone is read"),
         (".su2", replaced(".su2", "NELEM= 2", "NELEM= 5"), "not a readable mesh"),
-        (".mdpa", text(".mdpa", [1, 2, 2, 4]), "nodes with equal numbers"),
-        (".mdpa", replaced(".mdpa", "1 0 1 2 3\n", "1 0 1 2 9\n"), "a node that is not there"),
-        (".mdpa", replaced(".mdpa", "End Elements", "End Elements\nBegin Nodes\nEnd Nodes"),
-         "Begin Nodes: one block of nodes is read"),
         (".msh", replaced(".msh", "$EndElements\n", ""), "cut off"),
         (".wkt", "TIN (((0 0 0, 1 0 0, 1 1 0, 0 0 0)), ((0 0 0)", "brackets that are not closed"),
         (".stl", "solid\n" + "facet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "does not end as"),
