@@ -1,6 +1,6 @@
 """Damaged mesh files of every format: read, or refused with a named error on one line.
 
-The limits of `pdrom.model.mesh.limits` bound each file, 10 s and 1 GB; here the time is a fifth of
+The limits of `pdrom.model.mesh.files` bound each file, 10 s and 1 GB; here the time is a fifth of
 it, as several formats have cuts that are read for ever.
 """
 
@@ -15,7 +15,7 @@ from mesh_files import KINDS, write_mesh
 from pdrom.core.errors import PdromError
 from pdrom.model.mesh import files
 from pdrom.model.mesh.config import MeshFile
-from pdrom.model.mesh.limits import MeshLimits
+from pdrom.model.mesh.files import MeshLimits
 
 CUTS, FLIPS, HOLES = 40, 8, 4
 

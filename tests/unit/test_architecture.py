@@ -14,7 +14,7 @@ ROOMS = (
     "verification", "api", "command",
 )  # fmt: skip
 NUMERICS = ROOMS[: ROOMS.index("report")]
-MODULE_LINES, CLASS_LINES = 250, 200
+MODULE_LINES, CLASS_LINES = 500, 200
 BEGINNINGS = (
     "What ", "Where ", "Which ", "The same ", "That of ", "Of ", "How ", "Why ", "When ", "Who ",
     "Those ", "As ", "From ", "While ",

@@ -8,7 +8,7 @@ from pdrom.api.arguments import file_path
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.names import named
 from pdrom.core.yamlfile import read_yaml, validate
-from pdrom.model.mesh.given import GivenMesh, given_mesh
+from pdrom.model.mesh.config import GivenMesh, given_mesh
 from pdrom.model.scene import Scene, SceneConfig
 
 SCENES = Path("config", "scenes")

@@ -15,7 +15,7 @@ from pdrom.command.base import Command, Status
 from pdrom.core.errors import PdromError, choices
 from pdrom.core.logs import INTERRUPTED
 from pdrom.core.project import checkout
-from pdrom.core.store.oserrors import reason
+from pdrom.core.store.checksum import reason
 from pdrom.pipeline.environment import settle
 
 COMMANDS = ("new", "run", "reduce", "show", "draw", "view", "advise")

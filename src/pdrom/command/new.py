@@ -70,7 +70,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 def perform(arguments: argparse.Namespace) -> Status:
     """Write the scene that ``arguments`` name, with comments; an existing file is left alone."""
     from pdrom.core.errors import ConfigurationError
-    from pdrom.core.store.oserrors import reason
+    from pdrom.core.store.checksum import reason
 
     path = Path(arguments.scene)
     path = path if path.suffix in (".yaml", ".yml") else path.with_name(f"{path.name}.yaml")

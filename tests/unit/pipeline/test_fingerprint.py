@@ -200,7 +200,7 @@ def prints(tmp_path_factory):
         "spring": edited("model/constraints/spring.py", "\nADDED = 1\n"),
         "bending": edited("model/constraints/bending.py", "\nADDED = 1\n"),
         "mesh": edited("model/mesh/generators.py", "\nADDED = 1\n"),
-        "store": edited("core/store/tables.py", "\nADDED = 1\n"),
+        "store": edited("core/store/text.py", "\nADDED = 1\n"),
     }
 
 

@@ -2,24 +2,23 @@
 
 A result is written to a temporary file beside its target and renamed when complete, so that an
 interrupted job never leaves a half-written file and never damages an older one. An HDF5 file has
-its checksum inside (`block`), every other result in a hidden file beside it (`checksum`); every
-reader compares them (`condition`). A job of the workflow sets a damaged one aside: the next run
-finds it missing and makes it again. Nobody else moves a file that it reads.
+its checksum inside, every other result in a hidden file beside it; every reader compares them. A
+job of the workflow sets a damaged one aside: the next run finds it missing and makes it again.
+Nobody else moves a file that it reads.
 """
 
 from pdrom.core.store.atomic import atomic_path, require_place
-from pdrom.core.store.checksum import Checksum, checksum_path
-from pdrom.core.store.condition import (
+from pdrom.core.store.checksum import (
+    Checksum,
     Condition,
     check_file,
+    checksum_path,
     provenance_of,
     read_checksum,
     require_intact,
 )
-from pdrom.core.store.finite import require_finite
 from pdrom.core.store.hdf5 import open_hdf5, write_hdf5
-from pdrom.core.store.tables import read_table, write_table
-from pdrom.core.store.text import read_text, write_text
+from pdrom.core.store.text import read_table, read_text, require_finite, write_table, write_text
 
 __all__ = [
     "Checksum",

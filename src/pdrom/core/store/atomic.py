@@ -8,8 +8,13 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from pdrom.core.errors import StorageError
-from pdrom.core.store.checksum import CHECKSUM_SUFFIX, checksum_path, digest_of, new_checksum
-from pdrom.core.store.oserrors import reason
+from pdrom.core.store.checksum import (
+    CHECKSUM_SUFFIX,
+    checksum_path,
+    digest_of,
+    new_checksum,
+    reason,
+)
 
 
 @contextmanager

@@ -1,20 +1,48 @@
-"""Checksums of results, with what made the result.
+"""Checksums of results, with what made the result, and the comparison of a file with its own.
 
-An HDF5 file has its checksum inside (`pdrom.core.store.block`). Beside every other result lies a
-hidden checksum file: that of ``t.csv`` is ``.t.csv.blake2b``, in the format of the program
-``b2sum``: the BLAKE2b digest of the file's bytes and the file's name. The line before it is a
-comment to that program; it holds the provenance (`pdrom.core.provenance`) with a digest of its own.
+An HDF5 file has its checksum inside, in its first bytes, which HDF5 leaves to its users (the user
+block): a line that names the format, the checksum of all bytes behind the block, and zeros. So a
+copy of the file, wherever it lies, shows by itself whether it is whole, before HDF5 reads any of
+it; every reader of HDF5 skips the block.
+
+Beside every other result lies a hidden checksum file: that of ``t.csv`` is ``.t.csv.blake2b``, in
+the format of the program ``b2sum``: the BLAKE2b digest of the file's bytes and the file's name. The
+line before it is a comment to that program; it holds the provenance (`pdrom.core.provenance`) with
+a digest of its own.
+
+The checksum is compared whole with the one that the file's bytes give now. Whatever differs, in the
+file or in its checksum, is damage; a changed file whose checksum changed with it would have to meet
+a digest of 512 bits.
 """
 
+import errno
 import hashlib
+import json
 import os
+import re
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 
+from pdrom.core.aside import sets_aside
+from pdrom.core.errors import StorageError
 from pdrom.core.provenance import as_text, provenance
 
 CHECKSUM_SUFFIX = ".blake2b"
 _SHORT = 16  # hexadecimal digits of the checksum of a comment
+SUFFIXES = (".h5", ".hdf5")
+BLOCK = 2048  # bytes; HDF5 allows powers of two from 512 on
+_LINE = b"pdrom: BLAKE2b of the bytes behind the first 2048, and what made them\n"
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+BLOCK_NAME = "-"  # of what `tail -c +2049 FILE | b2sum` reads
+UNCHECKED = "--unchecked (in Python unchecked=True) reads it if it is sound"
+
+
+def reason(error: OSError) -> str:
+    """Words of the operating system for ``error``; HDF5 hides the number in a long text."""
+    hidden = re.search(r"errno = (\d+)", str(error))
+    number = error.errno or (int(hidden[1]) if hidden else 0)
+    return os.strerror(number) if number in errno.errorcode else " ".join(str(error).split())[:200]
 
 
 @dataclass(frozen=True)
@@ -58,3 +86,128 @@ def digest_of(path: Path, start: int = 0) -> str:
 def new_checksum(digest: str, name: str) -> Checksum:
     """Checksum of a file ``name`` that is made now, with the ``digest`` of its bytes."""
     return Checksum(digest, name, as_text(provenance()))
+
+
+def is_hdf5(path: Path) -> bool:
+    """Whether the file ``path`` is HDF5, by its name or its beginning, with a block or without."""
+    with open(path, "rb") as handle:
+        head = handle.read(BLOCK + len(_SIGNATURE))
+    named = path.suffix in SUFFIXES or head.startswith((_SIGNATURE, _LINE))
+    return named or head[BLOCK:] == _SIGNATURE
+
+
+def write_block(path: Path) -> None:
+    """Checksum a complete HDF5 file ``path`` that begins with ``BLOCK`` bytes of no meaning."""
+    content = _LINE + new_checksum(digest_of(path, start=BLOCK), BLOCK_NAME).content
+    if len(content) > BLOCK:
+        raise ValueError(f"{path}: a checksum of {len(content)} bytes, allowed: at most {BLOCK}")
+    with open(path, "r+b") as handle:
+        handle.write(content.ljust(BLOCK, b"\0"))
+
+
+def read_block(path: Path) -> bytes | None:
+    """Checksum's bytes in the HDF5 file ``path``, b"" if damaged; None without a block."""
+    with open(path, "rb") as handle:
+        block = handle.read(BLOCK)
+    if block.startswith(_SIGNATURE):
+        return None
+    return block.removeprefix(_LINE).rstrip(b"\0") if block.startswith(_LINE) else b""
+
+
+class Condition(StrEnum):
+    """Result of comparing a file with its checksum."""
+
+    INTACT = "intact"
+    DAMAGED = "damaged"
+    NO_CHECKSUM = "no checksum"
+
+
+def read_checksum(path: str | os.PathLike[str]) -> Checksum | None:
+    """Checksum of the file ``path``; None where there is none or it is damaged itself."""
+    path = Path(path)
+    content = _checksum_bytes(path) if path.is_file() else None
+    if content is None:
+        return None
+    checksum = Checksum.parse(content)
+    return checksum if checksum.content == content else None
+
+
+def provenance_of(path: str | os.PathLike[str]) -> dict[str, str]:
+    """Provenance of the file ``path``, kept with its checksum; empty where there is none."""
+    checksum = read_checksum(path)
+    return json.loads(checksum.provenance) if checksum and checksum.provenance else {}
+
+
+def check_file(path: str | os.PathLike[str]) -> Condition:
+    """Whether the bytes of the result ``path`` of any kind are as written; changes nothing.
+
+    Raises
+    ------
+    StorageError
+        There is no such file, or it may not be read.
+    """
+    path = Path(path)
+    try:
+        if not path.is_file():
+            raise StorageError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}")
+        if _checksum_bytes(path) is None:
+            return Condition.NO_CHECKSUM
+        start, name = (BLOCK, BLOCK_NAME) if is_hdf5(path) else (0, path.name)
+        checksum = read_checksum(path)
+        fits = checksum is not None and (checksum.digest, checksum.name) == (
+            digest_of(path, start),
+            name,
+        )
+        return Condition.INTACT if fits else Condition.DAMAGED
+    except OSError as error:
+        if error.errno == errno.EIO:  # the disk has lost some of it
+            return Condition.DAMAGED
+        raise StorageError(f"{path}: cannot be read ({reason(error)})") from error
+
+
+def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> None:
+    """Refuse a result ``path`` that is not what was written; every reader calls this first.
+
+    Parameters
+    ----------
+    unchecked : whether a file without a checksum will do
+
+    Raises
+    ------
+    StorageError
+        The file is missing or may not be read; or it is damaged or has no checksum. In a job of the
+        workflow it was then set aside as ``*.damaged``, so that the next run finds it missing and
+        makes it again; everywhere else it stays where it is.
+    """
+    path = Path(path)
+    condition = check_file(path)
+    if condition is Condition.INTACT or (unchecked and condition is Condition.NO_CHECKSUM):
+        return
+    if condition is Condition.DAMAGED:
+        fault = "damaged, its content and its checksum differ (a disk fault, an edit?)"
+    elif is_hdf5(path):
+        fault = "no checksum inside (written by an older pdrom, or by another program?)"
+    else:
+        fault = f"its checksum {checksum_path(path).name} is missing (copied without it?)"
+    if sets_aside():
+        raise _set_aside(path, fault)
+    way = f"; {UNCHECKED}" if condition is Condition.NO_CHECKSUM and is_hdf5(path) else ""
+    raise StorageError(f"{path}: {fault}{way}")
+
+
+def _checksum_bytes(path: Path) -> bytes | None:
+    if is_hdf5(path):
+        return read_block(path)
+    place = checksum_path(path)
+    return place.read_bytes() if place.is_file() else None
+
+
+def _set_aside(path: Path, fault: str) -> StorageError:
+    damage = fault if fault.startswith("damaged") else f"damaged, {fault}"
+    aside = path.with_name(f"{path.name}.damaged")
+    try:
+        os.replace(path, aside)
+        checksum_path(path).unlink(missing_ok=True)
+    except OSError:
+        return StorageError(f"{path}: {damage}; delete it, the next run makes it again")
+    return StorageError(f"{path}: {damage}; set aside as {aside.name}, the next run makes it again")

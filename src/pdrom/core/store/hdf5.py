@@ -10,9 +10,7 @@ import h5py
 from pdrom.core.errors import StorageError
 from pdrom.core.provenance import attributes
 from pdrom.core.store.atomic import atomic_path
-from pdrom.core.store.block import SIZE, write_block
-from pdrom.core.store.condition import require_intact
-from pdrom.core.store.oserrors import reason
+from pdrom.core.store.checksum import BLOCK, reason, require_intact, write_block
 
 
 @contextmanager
@@ -24,7 +22,7 @@ def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
     with atomic_path(path, with_checksum=False) as temporary:
         with open(temporary, "w+b", buffering=0) as handle:
             sink = _Sink(handle)
-            with h5py.File(sink, "w", track_order=True, userblock_size=SIZE) as file:
+            with h5py.File(sink, "w", track_order=True, userblock_size=BLOCK) as file:
                 file.attrs.update(attributes())
                 yield file
             if sink.error is not None:

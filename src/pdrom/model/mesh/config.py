@@ -1,28 +1,49 @@
-"""Typed configuration of a mesh: a generator with its parameters, or a file."""
+"""Typed configuration of a mesh: a generator with its parameters, a file, or given arrays."""
 
+import hashlib
+import json
 import logging
 import re
 from math import prod
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from pdrom.core.errors import MeshError
 from pdrom.core.names import check_lengths
-from pdrom.model.mesh.checks import check_mesh, check_range
-from pdrom.model.mesh.files import read_mesh_file
-from pdrom.model.mesh.generators import Plane, bar, cloth
-from pdrom.model.mesh.given import GivenMesh
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.model.mesh.checks import check_indices, check_mesh, check_range, turned_alike
+from pdrom.model.mesh.files import MAX_VERTICES, read_mesh_file
+from pdrom.model.mesh.generators import Plane, bar, boundary, cloth, orient
 from pdrom.model.mesh.lengths import Length, PositiveLength
-from pdrom.model.mesh.limits import MAX_VERTICES
-from pdrom.model.mesh.mesh_model import MeshModel
-from pdrom.model.mesh.orientation import turned_alike
 from pdrom.model.mesh.types import Mesh
 
 log = logging.getLogger(__name__)
 
+
+class MeshModel(ConfigModel):
+    """A generator with its parameters, or a file."""
+
+    @property
+    def label(self) -> str:
+        """Name of the mesh in messages and file names."""
+        raise NotImplementedError(f"{type(self).__name__} has no label")
+
+    @property
+    def identifier(self) -> str:
+        """File name of the mesh: readable, and different for different parameters."""
+        canonical = json.dumps(self.model_dump(mode="json"), sort_keys=True)
+        return f"{self.label}_{hashlib.sha256(canonical.encode()).hexdigest()[:8]}"
+
+    @property
+    def sources(self) -> list[str]:
+        """Files of the project that the mesh is read from; none for one that is generated."""
+        return []
+
+
+_DIGITS = 32  # of a digest
 Count = Annotated[int, Field(ge=2, le=2000)]
 
 
@@ -164,6 +185,81 @@ class MeshFile(MeshModel):
     def label(self) -> str:
         """Readable part of the mesh's file name."""
         return re.sub(r"[^A-Za-z0-9_-]", "_", Path(self.path).stem)[:40]
+
+
+class GivenMesh(MeshModel):
+    """Arrays that were given from Python; the file of a run holds them, beside the configuration.
+
+    blake2b : digest of the arrays, so that two meshes have two configurations
+    """
+
+    kind: Literal["given"]
+    blake2b: Annotated[str, Field(pattern=rf"^[0-9a-f]{{{_DIGITS}}}$")]
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> Self:
+        """The configuration of a mesh."""
+        digest = hashlib.blake2b(digest_size=_DIGITS // 2)
+        for array in (mesh.points, mesh.triangles, mesh.tetrahedra):
+            digest.update(f"{array.shape}".encode())
+            digest.update(np.ascontiguousarray(array).tobytes())
+        return cls(kind="given", blake2b=digest.hexdigest())
+
+    def coarsened(self, factor: float) -> Self:
+        """The arrays themselves, whatever ``factor``: they have one resolution."""
+        return self
+
+    def build(self, root: Path) -> Mesh:
+        """MeshError, whatever ``root``: there are no arrays in a configuration."""
+        raise MeshError("mesh.kind = 'given': its arrays come from Python (pdrom.api.build_scene)")
+
+    @property
+    def label(self) -> str:
+        """Readable part of the mesh's file name."""
+        return "given"
+
+
+def given_mesh(points: Any, cells: Any, name: str) -> Mesh:
+    """Mesh of points (N, 3) m and of triangles (T, 3) or tetrahedra (E, 4); ``name`` opens errors.
+
+    Triangles that face the other way than their neighbours, and corners of tetrahedra, are put
+    into order. What else a mesh has to satisfy is checked when a scene is built.
+
+    Parameters
+    ----------
+    cells : (T, 3) or (E, 4), counted from 0
+
+    Raises
+    ------
+    MeshError
+        Arrays of another shape or kind, an index out of range, a surface with one side only.
+    """
+    points = _array(points, f"{name}: points", np.float64, (3,))
+    cells = _array(cells, f"{name}: cells", np.int64, (3, 4))
+    if not len(points) or not len(cells):
+        raise MeshError(f"{name}: {len(points)} points and {len(cells)} cells, both are required")
+    check_range(points, 1.0, name)
+    if cells.shape[1] == 4:
+        check_indices(cells, len(points), "tetrahedron", name=name)
+        tetrahedra = orient(points, cells)
+        return Mesh(points, boundary(tetrahedra), tetrahedra)
+    check_indices(cells, len(points), "triangle", name=name)
+    turned = turned_alike(cells, name)
+    triangles = np.where(turned[:, None], cells[:, ::-1], cells)
+    return Mesh(points, triangles.astype(np.int32))
+
+
+def _array(values: Any, name: str, kind: type[np.generic], widths: tuple[int, ...]) -> np.ndarray:
+    """A copy of ``values`` as an array; whole numbers stay whole."""
+    required = " or ".join(f"(n, {width})" for width in widths)
+    try:
+        array = np.array(values)
+        if array.ndim != 2 or array.shape[1] not in widths:
+            raise MeshError(f"{name} of shape {array.shape}, required: {required}")
+        return np.ascontiguousarray(array.astype(kind, casting="same_kind"))
+    except (TypeError, ValueError) as error:
+        fault = " ".join(str(error).split())
+        raise MeshError(f"{name}: an array {required} is required ({fault})") from error
 
 
 MeshConfig = Annotated[

@@ -2,22 +2,72 @@
 
 import hashlib
 import io
+import math
 import os
 import signal
 import subprocess
 import sys
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from pdrom.core.errors import MeshError
+from pdrom.core.errors import ConfigurationError, MeshError
 from pdrom.core.yamlfile import shown
 from pdrom.model.mesh import reader
 from pdrom.model.mesh.checks import check_indices
 from pdrom.model.mesh.generators import boundary, orient
-from pdrom.model.mesh.limits import VARIABLE, MeshLimits, mesh_limits
 from pdrom.model.mesh.types import Mesh
+
+# A cloth of this size needs about 1 GB while its operators are built.
+MAX_VERTICES = 1_000_000
+VARIABLE = "PDROM_MESH_LIMITS"
+MAX_FACTOR = 1000.0
+
+
+@dataclass(frozen=True)
+class MeshLimits:
+    """Limits on one mesh file; `mesh_limits` returns those in force.
+
+    file_bytes : size of the file
+    seconds : processor time to read it
+    deadline : seconds after which a reader is ended that waits instead of computing; also the limit
+        of time where a process has none. Far above ``seconds``, so that a busy machine does not
+        decide which meshes are read.
+    memory : bytes of address space of the process that reads it
+    vertices, cells : size of the mesh inside
+    """
+
+    file_bytes: int = 500_000_000
+    seconds: int = 10
+    deadline: int = 100
+    memory: int = 1_000_000_000
+    vertices: int = MAX_VERTICES
+    cells: int = 6 * MAX_VERTICES
+
+
+def mesh_limits() -> MeshLimits:
+    """The limits, multiplied by the environment variable PDROM_MESH_LIMITS if it is set.
+
+    Raises
+    ------
+    ConfigurationError
+        The variable is no number from 1 to 1000.
+    """
+    text = os.environ.get(VARIABLE, "1")
+    try:
+        factor = float(text)
+    except ValueError:
+        factor = math.nan
+    if not 1.0 <= factor <= MAX_FACTOR:
+        raise ConfigurationError(
+            f"environment variable {VARIABLE} = '{text}': a number from 1 to {MAX_FACTOR:g} is "
+            "required"
+        )
+    plain = MeshLimits()
+    return MeshLimits(**{f.name: int(factor * getattr(plain, f.name)) for f in fields(plain)})
+
 
 # Extension -> readers, of which the file's beginning chooses one. Each opens the mesh file and no
 # other: what a run depends on is this one file, which is hashed and lies in the project. Not among

@@ -19,13 +19,17 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from pdrom.model.meshfiles import obj
-from pdrom.model.meshfiles.faults import (
+from pdrom.model.meshfiles.guards import (
     CORNERS,
     CutError,
     RefusedError,
     UnreadableError,
+    check_after,
+    check_before,
+    ends_noticed,
     only_kind,
     reason,
+    without_faces,
 )
 
 REFUSED = 3
@@ -120,8 +124,6 @@ def _by_meshio(path: str, name: str) -> tuple:
     from meshio.gmsh import _gmsh40
     from meshio.gmsh import main as gmsh
     from meshio.ugrid import _ugrid
-
-    from pdrom.model.meshfiles.guards import check_after, check_before, ends_noticed, without_faces
 
     _ugrid.file_types["ascii"]["float_type"] = "f8"  # meshio rounds what is text to single
     gmsh._readers["4"] = _gmsh40  # as Gmsh calls 4.0; meshio takes it for 4.1

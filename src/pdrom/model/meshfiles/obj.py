@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pdrom.model.meshfiles.faults import UnreadableError, check_last_number, only_kind
+from pdrom.model.meshfiles.guards import UnreadableError, check_last_number, only_kind
 
 # Statements that say nothing about the positions of vertices or the corners of faces. All others
 # (free-form surfaces, `call` of another file) are refused: without them a part would be missing.

@@ -14,7 +14,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pdrom import __version__
-from pdrom.core.aside import damaged_set_aside
 from pdrom.core.errors import StorageError
 from pdrom.core.store import (
     check_file,
@@ -28,7 +27,8 @@ from pdrom.core.store import (
     write_table,
     write_text,
 )
-from pdrom.core.store.block import SIZE
+from pdrom.core.aside import damaged_set_aside
+from pdrom.core.store.checksum import BLOCK
 
 
 def write_one(path: Path) -> None:
@@ -72,7 +72,7 @@ def hidden(path: Path) -> list[str]:
 
 def checksum_of(path: Path) -> bytes:
     """The bytes of a result's checksum, inside it or beside it."""
-    return path.read_bytes()[:SIZE] if path.suffix == ".h5" else checksum_path(path).read_bytes()
+    return path.read_bytes()[:BLOCK] if path.suffix == ".h5" else checksum_path(path).read_bytes()
 
 
 def places(checksum: bytes) -> list[int]:
@@ -90,7 +90,7 @@ def noticed(path: Path, content: bytes | None = None, checksum: bytes | None = N
     if content is not None:
         path.write_bytes(content)
     if checksum is not None and path.suffix == ".h5":
-        path.write_bytes(checksum + path.read_bytes()[SIZE:])
+        path.write_bytes(checksum + path.read_bytes()[BLOCK:])
     elif checksum is not None:
         checksum_path(path).write_bytes(checksum)
     changed = {p: p.read_bytes() for p in path.parent.iterdir()}
@@ -263,7 +263,7 @@ def test_only_what_the_disk_lost_is_set_aside(tmp_path, monkeypatch, number, asi
 def test_the_checksum_is_what_b2sum_checks(result):
     folder = result.parent
     if result.suffix == ".h5":
-        behind = result.read_bytes()[SIZE:]
+        behind = result.read_bytes()[BLOCK:]
         done = subprocess.run(["b2sum"], input=behind, capture_output=True, check=True)
         assert done.stdout in checksum_of(result)
         return

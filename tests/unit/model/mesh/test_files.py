@@ -11,8 +11,7 @@ import pytest
 from mesh_files import KINDS, write_mesh, zeros_vtu
 from pdrom.core.errors import ConfigurationError, MeshError
 from pdrom.model.mesh import files, reader
-from pdrom.model.mesh.files import read_mesh_file
-from pdrom.model.mesh.limits import MeshLimits, mesh_limits
+from pdrom.model.mesh.files import MeshLimits, mesh_limits, read_mesh_file
 from pdrom.model.mesh.types import Mesh
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nf 1 2 3\nf 1 3 4\n"

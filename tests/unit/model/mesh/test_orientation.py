@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pdrom.core.errors import MeshError
+from pdrom.model.mesh.checks import turned_alike
 from pdrom.model.mesh.config import MeshFile
 from pdrom.model.mesh.generators import bar, cloth
-from pdrom.model.mesh.orientation import turned_alike
 
 SHEET = cloth(4, 5).triangles
 CLOSED = bar(3, 3, 4).triangles

@@ -22,7 +22,7 @@ from pdrom.artifact.reads import Chosen, Every, TableOf
 from pdrom.core.errors import StorageError
 from pdrom.core.paths import MESH, RERUNS, SUBSPACES, TABLE
 from pdrom.core.store import checksum_path, write_hdf5
-from pdrom.core.store.block import write_block
+from pdrom.core.store.checksum import write_block
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import save_mesh
 from pdrom.report.figures.asks import _dots as asked_dots
