@@ -13,10 +13,10 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 53_140,
-    "modules of src": 559,
-    "lines of tests": 33_700,
-    "words of documentation": 31_380,
+    "lines of src": 52_680,
+    "modules of src": 546,
+    "lines of tests": 33_660,
+    "words of documentation": 31_220,
     "tables": 52,
     "figures": 28,
     "experiments": 31,

@@ -12,7 +12,16 @@ def choices(value: object, allowed: Iterable[object]) -> str:
 
 
 class PdromError(Exception):
-    """Base of every error that a user's input can cause; shown to the user without a traceback."""
+    """Base of every error that a user's input can cause; shown to the user without a traceback.
+
+    Its text is one line, whatever names it quotes: other separators of lines are escaped.
+    """
+
+    def __str__(self) -> str:
+        text = super().__str__()
+        return "".join(
+            character if character.isprintable() else ascii(character)[1:-1] for character in text
+        )
 
 
 class ConfigurationError(PdromError):

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from pdrom.core.errors import PdromError
 from pdrom.core.aside import damaged_set_aside
+from pdrom.core.errors import PdromError
 from pdrom.core.usage import Meter
 
 INTERRUPTED = 130  # exit status of a program that ends by Ctrl-C

@@ -8,9 +8,9 @@ import pytest
 import scipy.linalg  # noqa: F401  -- loads libraries that have threads
 from threadpoolctl import threadpool_info, threadpool_limits
 
+from pdrom.core.aside import sets_aside
 from pdrom.core.errors import MeshError
 from pdrom.core.logs import INTERRUPTED, job_log, planning_log
-from pdrom.core.aside import sets_aside
 
 LOGGER = logging.getLogger("pdrom")
 

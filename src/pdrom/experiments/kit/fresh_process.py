@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pdrom.core.aside import damaged_set_aside
 from pdrom.core.errors import PdromError
 from pdrom.core.store import read_table, write_table
-from pdrom.core.aside import damaged_set_aside
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.experiments.kit.measurement import Protocol, Variant, measure
 from pdrom.experiments.kit.settings import Solver, Threads

@@ -9,9 +9,9 @@ import h5py
 import numpy as np
 import pytest
 
+from pdrom.core.aside import damaged_set_aside
 from pdrom.core.errors import StorageError
 from pdrom.core.store import check_file, checksum_path, open_hdf5, write_hdf5
-from pdrom.core.aside import damaged_set_aside
 
 
 def test_failed_hdf5_leaves_the_old_file(tmp_path):
