@@ -43,7 +43,9 @@ def write_models(
         labels = {"method": "ecsw-1e-02", "position_basis": "pod", "k": k, "base": "own"}
         store_model(file.create_group("models/own"), labels, samples)
     asked = LiveModels(sizes=(k,))
-    options = Options(scene=scene.config, live=asked, guard=GuardSettings(), joint_rows=())
+    options = Options(
+        scene=scene.config, title="A title", live=asked, guard=GuardSettings(), joint_rows=()
+    )
     mesh, train, models, out = (
         File(str(folder / name), {}) for name in ("mesh.h5", "train.h5", "models.h5", "test.js")
     )

@@ -48,7 +48,7 @@ def scene(name: str, old: str, new: str, *parts: str) -> Case:
 def mesh(name: str, content: Content, *parts: str, path: str = MESH) -> Case:
     """A mesh file with broken content."""
     use = Replace("{kind: cloth, rows: 5, columns: 4, plane: xz}", f"{{kind: file, path: {path}}}")
-    return Case(name, {SCENE: use, path: content}, (SCENE, path, *parts))
+    return Case(name, {SCENE: use, f"config/scenes/{path}": content}, (SCENE, path, *parts))
 
 
 def mesh_path(name: str, path: str, *parts: str, **changes: Content) -> Case:
@@ -230,7 +230,7 @@ SCENE_CASES = [
 ]  # fmt: skip
 
 MESH_CASES = [
-    mesh("missing mesh", None, "no such mesh file", path="meshes/none.obj"),
+    mesh("missing mesh", None, "no such mesh file (looked in /", path="meshes/none.obj"),
     mesh("empty mesh", "", "not a readable mesh|of no kind"),
     mesh("mesh without cells", GROUND, "of no kind"),
     mesh("mesh of quadrilaterals", GROUND + "f 1 2 3 4\n", "['quad']", "triangle, tetra"),
@@ -290,7 +290,7 @@ MESH_CASES = [
          TETRAHEDRA.format(n=5, nodes=CORNERS + "\n5 0 0 -1", m=2,
                            elements="1 4 2 0 1 1 2 3 4\n2 2 2 0 1 1 2 5"),
          "tetra", "triangle", "only one of", path="meshes/a.msh"),
-    mesh_path("absolute mesh path", "/etc/passwd", "/etc/passwd", "below the project's folder"),
+    mesh_path("absolute mesh path", "/etc/passwd", "/etc/passwd", "below the folder"),
     mesh_path("mesh path that leaves the project", "../../square.obj", "../../square.obj",
               "without '..'"),
     mesh_path("mesh path that leaves it in the middle", "meshes/../../x.obj", "..", "below"),
@@ -302,9 +302,9 @@ MESH_CASES = [
               "4095 bytes"),
     mesh_path("mesh path of a folder", "meshes", "meshes", "no such mesh file"),
     mesh_path("link out of the project", "meshes/out.obj", "meshes/out.obj", "leads out",
-              **{"meshes/out.obj": LinkTo("/etc/passwd")}),
+              **{"config/scenes/meshes/out.obj": LinkTo("/etc/passwd")}),
     mesh_path("link to itself", "meshes/me.obj", "meshes/me.obj",
-              **{"meshes/me.obj": LinkTo("me.obj")}),
+              **{"config/scenes/meshes/me.obj": LinkTo("me.obj")}),
     mesh_path("negative scale", 'x.obj", scale: -1, path2: "', "path2|scale"),
 ]  # fmt: skip
 

@@ -16,7 +16,7 @@ from places import CONFIG, ROOT
 
 STUDY = "config/default.yaml"
 SCENE = "config/scenes/small.yaml"
-MESH = "meshes/square.obj"
+MESH = "meshes/square.obj"  # as the scene's file names it
 
 SMALL_SCENE = """\
 name: small
@@ -72,7 +72,7 @@ def make_project(folder: Path, changes: Mapping[str, Content]) -> Path:
     shutil.copytree(CONFIG, folder / "config", dirs_exist_ok=True)
     if not (folder / "paper").exists():
         (folder / "paper").symlink_to(ROOT / "paper")  # its sources number the figures
-    files = {STUDY: SMALL_STUDY, SCENE: SMALL_SCENE, MESH: SQUARE}
+    files = {STUDY: SMALL_STUDY, SCENE: SMALL_SCENE, f"config/scenes/{MESH}": SQUARE}
     for path, content in [*files.items(), *changes.items()]:
         _write(folder / path, content)
     return folder

@@ -21,7 +21,6 @@ from bad_input.project import (
     MESH,
     SCENE,
     SMALL_SCENE,
-    SQUARE,
     STUDY,
     load_project,
     make_project,
@@ -118,7 +117,7 @@ def _mutate(draw: Callable, owner: Any, key: Any) -> None:
 @pytest.fixture(scope="module")
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A project whose files each example overwrites."""
-    return make_project(tmp_path_factory.mktemp("fuzz"), {MESH: SQUARE})
+    return make_project(tmp_path_factory.mktemp("fuzz"), {})
 
 
 @pytest.fixture(autouse=True)

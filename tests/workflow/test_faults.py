@@ -443,7 +443,7 @@ def test_dates_in_no_order(undisturbed: Sandbox, sandbox: Sandbox) -> None:
     assert sandbox.results() == undisturbed.results()
 
 
-MESH = "meshes/sheet.obj"
+MESH = "config/scenes/sheet.obj"
 
 
 def sheet(height: float) -> str:
@@ -462,9 +462,8 @@ def test_a_changed_mesh_file_reruns_what_follows(tmp_path: Path, date: float | N
     first, second = (Sandbox.make(tmp_path / name) for name in ("first", "second"))
     for sandbox, height in ((first, 0.0), (second, 0.1)):
         scene = sandbox.path("config/scenes/spring_oop.yaml")
-        text = re.sub("mesh: .*", f"mesh: {{kind: file, path: {MESH}}}", scene.read_text())
+        text = re.sub("mesh: .*", "mesh: {kind: file, path: sheet.obj}", scene.read_text())
         scene.write_text(text)
-        sandbox.path("meshes").mkdir()
         sandbox.path(MESH).write_text(sheet(height))
         sandbox.finish(TABLE)
     flat = first.results()

@@ -16,6 +16,7 @@ from pdrom.core.errors import StorageError
 from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5, require_finite, write_hdf5
 from pdrom.core.yamlfile import validate
+from pdrom.model.mesh.config import MeshConfig, MeshFile
 from pdrom.model.mesh.types import store_mesh, stored_mesh
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.local.guard import GuardRecord
@@ -175,4 +176,12 @@ def _scene(file: h5py.File, path: Path) -> Scene:
     scene = validate(SceneConfig, settings.get("config") or settings["scene"], str(path))
     if "mesh" in file:
         return Scene.build(scene, stored_mesh(file["mesh"]))
-    return bound(scene, Path(), str(path))
+    return bound(scene, _project(path, scene.mesh), str(path))
+
+
+def _project(path: Path, mesh: MeshConfig) -> Path:
+    """Folder that the file of a ``mesh`` is named from: of those above the run's file, ``path``."""
+    if not isinstance(mesh, MeshFile):
+        return Path()
+    above = path.resolve().parents
+    return next((folder for folder in above if (folder / mesh.path).is_file()), Path())

@@ -11,14 +11,11 @@ from pdrom.core.yamlfile import read_yaml, validate
 from pdrom.model.mesh.config import GivenMesh, given_mesh
 from pdrom.model.scene import Scene, SceneConfig
 
-SCENES = Path("config", "scenes")
-
 
 def load_scene(path: str | os.PathLike[str]) -> Scene:
     """Scene of a YAML file, bound to its mesh.
 
-    A mesh file is looked for from the folder of the scene's file on; for a scene below
-    ``config/scenes``, as in the project, from the folder that holds ``config``.
+    A mesh file is looked for from the folder of the scene's file on.
 
     Parameters
     ----------
@@ -31,13 +28,7 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
     """
     path = file_path(path)
     config = validate(SceneConfig, named(read_yaml(path), path.stem), str(path))
-    return bound(config, folder_of_meshes(path), str(path))
-
-
-def folder_of_meshes(path: Path) -> Path:
-    """Folder from which the mesh file of the scene in ``path`` is looked for."""
-    folder = path.resolve().parent
-    return folder.parents[1] if folder.parts[-2:] == SCENES.parts else folder
+    return bound(config, path.parent, str(path))
 
 
 def build_scene(folder: str | os.PathLike[str] = ".", mesh: Any = None, **keys: Any) -> Scene:

@@ -106,12 +106,11 @@ def template(stem: str, file: str | None = None, mesh: "Mesh | None" = None) -> 
 
 def _read(file: str, scene: Path) -> "tuple[str, Mesh]":
     """The mesh file as the scene's file names it, and its mesh."""
-    from pdrom.api.scenes import folder_of_meshes
     from pdrom.core.errors import ConfigurationError
     from pdrom.core.yamlfile import validate
     from pdrom.model.mesh.config import MeshFile
 
-    folder = folder_of_meshes(scene)
+    folder = scene.resolve().parent
     try:
         inside = (Path(file).parent.resolve() / Path(file).name).relative_to(folder)
     except ValueError:

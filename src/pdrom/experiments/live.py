@@ -91,6 +91,7 @@ class Options(ConfigModel):
     """Settings of the models of a scene."""
 
     scene: SceneConfig
+    title: str
     live: LiveModels
     guard: GuardSettings
     joint_rows: tuple[JointRows, ...]
@@ -145,7 +146,7 @@ def live(
     content = {
         "format": FORMAT,
         "scene": settings.scene.name,
-        "title": settings.scene.title,
+        "title": settings.title,
         **export_scene(scene),
         **_models(scene, chosen, reference),
         "shown": _shown(scene, reference),

@@ -23,7 +23,7 @@ from pdrom.pipeline.paper import PaperJobs, check_texts, paper_jobs
 from pdrom.pipeline.resolve import Job, Resolver
 from pdrom.pipeline.scenes import require_scenes
 from pdrom.pipeline.study import Study, StudySettings
-from pdrom.pipeline.subspace_scenes import check_subspaces
+from pdrom.pipeline.subspace_scenes import check_live, check_subspaces
 from pdrom.pipeline.values import scaled_methods
 from pdrom.report.live.page import live_page
 from pdrom.tables import declared
@@ -89,6 +89,7 @@ class Plan:
         load_expectations(folder / "hard_cases.yaml")
         self._check_scenes(folder)
         check_subspaces(self.study)
+        check_live(self.study)
         self.figure_jobs  # noqa: B018 : every figure and text is checked
         check_texts(self.study)
         scaled_methods(self.study, {})

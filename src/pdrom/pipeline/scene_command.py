@@ -100,7 +100,7 @@ def scene_results(study: Study, scene: str, results: str) -> SceneResults:
     section = study.settings.sensitivity
     return SceneResults(
         folder=results,
-        scene=study.scene(scene),
+        scene=study.scene(scene).model_copy(update={"title": study.titles[scene]}),
         methods={name: method.title for name, method in study.methods.items()},
         reference=section.reference,
         threshold=section.threshold,

@@ -18,6 +18,7 @@ from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import Seed
 from pdrom.model.effects.entries import effect_config
+from pdrom.model.mesh.config import MeshFile
 from pdrom.model.scene import Scene, SceneConfig
 
 Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
@@ -124,13 +125,16 @@ def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
 def read_scene(root: Path, name: str, changes: Change = UNCHANGED) -> SceneConfig:
     """Configuration of scene ``name`` below ``root``, with ``changes``; ConfigurationError.
 
-    Its mesh is not built.
+    Its mesh is not built; a mesh file is named from ``root`` on.
     """
     require_scenes(root, [name], "scenes")
     path = scene_file(root, name)
     scene = validate(SceneConfig, named(read_yaml(path), name), str(path))
     if scene.name != name:
         raise ConfigurationError(f"{path}: name = '{scene.name}', required: '{name}', as the file")
+    if isinstance(scene.mesh, MeshFile):
+        folder = path.parent.relative_to(root).as_posix()
+        scene = scene.model_copy(update={"mesh": scene.mesh.below(folder)})
     return changes.of(scene)
 
 

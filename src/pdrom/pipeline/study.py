@@ -124,15 +124,15 @@ class Study:
     def __init__(self, settings: StudySettings, root: Path) -> None:
         self.settings = settings
         self.root = root
+        self.titles: dict[str, str] = {}  # for what prints them
+        self.vertices: dict[str, int] = {}
         self.bound: dict[str, Scene] = {
             name: load_bound_scene(root, name, settings.changes) for name in settings.scenes
         }
         for config in settings.variants.of(partial(read_scene, root, changes=settings.changes)):
             self.bound[config.name] = bind(root, config, "variants")
-        self.scenes: dict[str, SceneConfig] = {n: s.config for n, s in self.bound.items()}
-        self.online: dict[str, SceneConfig] = {
-            name: self._loaded(name) for name in settings.online.scenes
-        }
+        self.scenes = {name: self._physics(s) for name, s in self.bound.items()}
+        self.online = {name: self._loaded(name) for name in settings.online.scenes}
         self._others: dict[str, SceneConfig] = {}
         self.methods: dict[str, MethodSpec] = self.named_methods(settings.methods, "methods")
 
@@ -186,7 +186,13 @@ class Study:
 
     def _loaded(self, name: str) -> SceneConfig:
         """Configuration of a scene that the study does not keep bound to its mesh."""
-        return load_bound_scene(self.root, name, self.settings.changes).config
+        return self._physics(load_bound_scene(self.root, name, self.settings.changes))
+
+    def _physics(self, scene: Scene) -> SceneConfig:
+        """The scene under its name instead of its title, so that no job depends on the title."""
+        config = scene.config
+        self.titles[config.name], self.vertices[config.name] = config.title, scene.mesh.vertices
+        return config.model_copy(update={"title": config.name})
 
     def only(self, scene: str) -> "Study":
         """Return a study of one scene, which need not be held."""

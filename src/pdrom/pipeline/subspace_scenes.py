@@ -2,9 +2,13 @@
 
 import logging
 
-from pdrom.core.errors import ConfigurationError
+from pdrom.core.errors import ConfigurationError, SceneError
+from pdrom.core.paths import LIVE_MODEL
+from pdrom.experiments.live import LARGEST
+from pdrom.pipeline.contents import labels_of
 from pdrom.pipeline.scenes import not_taken
 from pdrom.pipeline.study import Study
+from pdrom.reduction.subspace.exported import DOUBLES, require_known
 
 log = logging.getLogger(__name__)
 
@@ -49,3 +53,29 @@ def _asking(study: Study) -> dict[str, tuple[str, ...]]:
         "guard.cases": tuple(case.scene for case in guard.cases),
         "guard.alarm = 'estimate'": tuple(study.scenes) if estimated else (),
     }
+
+
+def check_live(study: Study) -> None:
+    """ConfigurationError for a scene that the page with running models cannot hold."""
+    for name in (labels["scene"] for labels in labels_of(study, LIVE_MODEL)):
+        try:
+            require_known(study.scene(name))
+        except SceneError as error:
+            raise ConfigurationError(f"live.scenes: {error}") from error
+        size = _live_bytes(study, name)
+        if size > LARGEST:
+            raise ConfigurationError(
+                f"live.scenes: scene '{name}' takes at least {size / 1e6:.1f} MB of models on "
+                f"{study.vertices[name]} vertices, allowed are {LARGEST / 1e6:.1f}: choose fewer "
+                f"modes (live.sizes = {list(study.settings.live.sizes)})"
+            )
+
+
+def _live_bytes(study: Study, name: str) -> float:
+    """Size of the vertices, masses and bases of a scene in the file of its models."""
+    settings, vertices = study.settings, study.vertices[name]
+    section = settings.subspace if name in study.scenes else settings.online
+    sizes = [k for k in settings.live.sizes if k in section.sizes and "pod" in section.bases]
+    entries = [vertices * (k + 4) for k in sizes]  # affine columns stand beside the modes
+    bases = sum(count * (8 if count <= DOUBLES else 4) for count in entries)
+    return (vertices * 32 + bases) * 4 / 3  # written in base 64

@@ -30,6 +30,10 @@ def _scene(study: Study, labels: Labels) -> SceneConfig:
     return study.scene(labels["scene"])
 
 
+def _title(study: Study, labels: Labels) -> str:
+    return study.titles[study.scene(labels["scene"]).name]
+
+
 def _mesh(study: Study, labels: Labels) -> MeshConfig:
     return study.mesh(labels["mesh"])
 
@@ -183,6 +187,7 @@ def _heldout_ranks(study: Study, labels: Labels) -> tuple[Rank, ...]:
 
 DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "scene": _scene,
+    "title": _title,
     "mesh": _mesh,
     "method": _method,
     "methods": lambda study, labels: study.methods,

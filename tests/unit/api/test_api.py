@@ -14,6 +14,7 @@ from pdrom import api
 from pdrom.core.errors import ConfigurationError, PdromError, RankError, StorageError
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
+from pdrom.pipeline.scenes import load_bound_scene
 from pdrom.reduction.snapshots import training_frames
 from places import CONFIG, ROOT
 
@@ -104,15 +105,27 @@ def test_a_file_without_a_run_is_refused(tmp_path):
         api.load(tmp_path / "none.h5")
 
 
-def test_a_scene_of_the_project_and_one_with_its_mesh_beside_it(tmp_path):
+def test_a_scene_of_the_project():
     assert api.load_scene(CONFIG / "scenes" / "spring_oop.yaml").mesh.vertices == 400
-    (tmp_path / "square.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nf 1 2 3\nf 1 3 4\n")
-    path = tmp_path / "own.yaml"
+
+
+@pytest.mark.parametrize("folder", ["own", "config/scenes"])
+def test_the_path_of_a_mesh_means_the_same_in_every_folder(tmp_path, monkeypatch, folder):
+    own = tmp_path / folder
+    own.mkdir(parents=True)
+    monkeypatch.chdir(tmp_path)
+    (own / "square.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nf 1 2 3\nf 1 3 4\n")
+    path = Path(folder, "own.yaml")
     path.write_text(
         "name: own\ntitle: Own\nframes: 4\nmesh: {kind: file, path: square.obj}\n"
         "effects: [{effect: spring, weight: 1.0}]\n"
     )
     assert api.load_scene(path).mesh.vertices == 4
+    if folder == "config/scenes":
+        assert load_bound_scene(Path(), "own").mesh.vertices == 4
+    (own / "square.obj").rename(tmp_path / "square.obj")
+    with pytest.raises(ConfigurationError, match=rf"no such mesh file \(looked in {own}\)"):
+        api.load_scene(path)
 
 
 @pytest.mark.parametrize(

@@ -141,7 +141,7 @@ def test_projections_are_the_nearest_matrices(name, rows, low, high):
 def test_the_file_says_what_it_is(tmp_path):
     file, _ = write_models(scene_with("spring"), tmp_path)
     text = file.read_text("utf-8")
-    assert text.startswith('pdromLive({"format":1,"scene":"test","title":"test",')
+    assert text.startswith('pdromLive({"format":1,"scene":"test","title":"A title",')
     content = json.loads(text.removeprefix("pdromLive(").removesuffix(");\n"))
     assert {model["family"] for model in content["models"]} == {"elements"}
     assert content["shown"]["full"]["frames"] == FRAMES + 1

@@ -24,5 +24,5 @@ def test_an_edited_mesh_has_another_checksum(tmp_path: Path, experiment) -> None
 
     before = content()
     assert before == content()
-    (root / MESH).write_text(SQUARE.replace("v 1 0 1", "v 1 0 2"))
+    (root / "config" / "scenes" / MESH).write_text(SQUARE.replace("v 1 0 1", "v 1 0 2"))
     assert content() != before

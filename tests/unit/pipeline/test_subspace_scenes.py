@@ -10,7 +10,7 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.experiments.kit.declaration import experiments
 from pdrom.pipeline.contents import labels_of
 from pdrom.pipeline.study import Study
-from pdrom.pipeline.subspace_scenes import check_subspaces
+from pdrom.pipeline.subspace_scenes import check_live, check_subspaces
 from places import ROOT
 
 # What only a position subspace, or an auxiliary model, has.
@@ -87,3 +87,20 @@ def test_where_a_subspace_is_asked_for_the_scene_is_refused(root, key, section):
 
 def test_a_guard_that_does_not_act_needs_no_companion(root):
     check_subspaces(study(root, guard={"action": "none", "alarm": "estimate"}))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"anderson_window": 3}, "anderson_window = 3: the page's engine has no acceleration"),
+        ({"effects": [{"effect": "bending", "weight": 1.0}], "reduce": {}}, "has no 'bending'"),
+        ({"mesh": {"kind": "cloth", "rows": 150, "columns": 150}}, r"10.8 MB .* allowed are 3.0"),
+    ],
+)
+def test_a_scene_that_the_page_cannot_hold_is_refused_by_the_plan(root, changes, words):
+    path = root / "config" / "scenes" / "spring_oop.yaml"
+    check_live(study(root, live={"scenes": ["spring_oop"]}))
+    path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | changes))
+    check_live(study(root, live={"scenes": []}))
+    with pytest.raises(ConfigurationError, match=f"^live.scenes: scene 'spring_oop'.*{words}"):
+        check_live(study(root, live={"scenes": ["spring_oop"]}))

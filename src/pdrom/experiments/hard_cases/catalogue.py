@@ -29,7 +29,7 @@ from pdrom.experiments.hard_cases.shapes import (
 from pdrom.model.mesh.files import read_mesh_file
 from pdrom.model.mesh.types import Mesh
 
-# Files in config/meshes, which the job names among its sources.
+# Files in config/scenes/meshes, which the job names among its sources.
 MESHES = ("hard_disc.obj", "hard_starfish_shell.obj", "hard_starfish.vtu", "hard_torus.vtu")
 
 GRAVITY = {"effect": "gravity"}
@@ -392,7 +392,7 @@ def _obstacles() -> list[HardCase]:
 def _unstructured() -> list[HardCase]:
     """Meshes that are no grids: no two elements are alike, none lies along an axis."""
     ring, skin, starfish, torus = (
-        partial(read_mesh_file, config_file(f"meshes/{name}").resolve()) for name in MESHES
+        partial(read_mesh_file, config_file(f"scenes/meshes/{name}").resolve()) for name in MESHES
     )
     ball = {"effect": "sphere", "centre": [0, 1.6, 0.05], "radius": 0.3, "friction": 0.5}
     edge = {"effect": "box", "lower": [-0.02, 1.0, -2], "upper": [0.03, 1.7, 2], "friction": 0.5}

@@ -49,7 +49,7 @@ class HardCases(ConfigModel):
     "Hard cases of every reduction, and accuracy of the kernels",
     reads={
         "expectations": ProjectFile("config/hard_cases.yaml"),
-        "meshes": ProjectFiles(tuple(f"config/meshes/{name}" for name in MESHES)),
+        "meshes": ProjectFiles(tuple(f"config/scenes/meshes/{name}" for name in MESHES)),
         "every_method": Setting("every_method"),
         "asked": Setting("hard_cases"),
     },

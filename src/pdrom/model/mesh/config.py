@@ -118,7 +118,10 @@ class BarMesh(MeshModel):
 
 
 class MeshFile(MeshModel):
-    """A mesh file below the project's folder, of a format that keeps it in one file."""
+    """A mesh file, of a format that keeps it in one file, in the folder of its scene or below.
+
+    path : from that folder on; `below` names it from another one on
+    """
 
     kind: Literal["file"]
     path: str
@@ -128,11 +131,15 @@ class MeshFile(MeshModel):
     @classmethod
     def _inside(cls, value: str) -> str:
         if Path(value).is_absolute() or ".." in Path(value).parts:
-            raise ValueError("a path below the project's folder is required, without '..'")
+            raise ValueError("a path below the folder of the scene is required, without '..'")
         if not value.strip() or not value.isprintable():
             raise ValueError("a path of printable characters is required")
         check_lengths(value)
         return value
+
+    def below(self, folder: str) -> Self:
+        """The mesh of a scene that lies in ``folder``, named from where that begins."""
+        return self.model_copy(update={"path": f"{folder}/{self.path}"})
 
     def coarsened(self, factor: float) -> Self:
         """The mesh itself, whatever ``factor``: a mesh file has one resolution."""
@@ -171,14 +178,14 @@ class MeshFile(MeshModel):
         return [self.path]
 
     def file(self, root: Path) -> Path:
-        """The mesh file below ``root``; MeshError if a link leads out of the project's folder."""
+        """The mesh file below ``root``; MeshError if a link leads out of it."""
         path = root / self.path
         try:
             inside = path.resolve().is_relative_to(root.resolve())
         except (OSError, RuntimeError) as error:  # a circle of links
             raise MeshError(f"mesh.path = '{self.path}': leads nowhere") from error
         if not inside:
-            raise MeshError(f"mesh.path = '{self.path}': a link that leads out of the project")
+            raise MeshError(f"mesh.path = '{self.path}': a link that leads out of {root.resolve()}")
         return path
 
     @property

@@ -117,7 +117,7 @@ def read_mesh_file(path: Path) -> Mesh:
     except OSError as error:  # a name that is too long
         raise MeshError(f"{shown(str(path), 60)}: no mesh file ({error.strerror})") from error
     if not there:
-        raise MeshError(f"{path}: no such mesh file")
+        raise MeshError(f"{path}: no such mesh file (looked in {path.parent.resolve()})")
     if path.suffix.lower() not in FORMATS:
         raise MeshError(
             f"{path}: no format that keeps the whole mesh in one file and that is read right "

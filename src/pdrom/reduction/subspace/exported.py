@@ -12,9 +12,11 @@ import numpy as np
 from pdrom.core.errors import SceneError, choices
 from pdrom.core.packed import pack_array
 from pdrom.model.constraints.base import ConstraintGroup, StencilGroup
+from pdrom.model.effects import EFFECTS
+from pdrom.model.effects.base import Force, Start
 from pdrom.model.effects.floor import Floor
 from pdrom.model.effects.hold import Pins
-from pdrom.model.scene import Scene
+from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.model import Samples, SubspaceModel
@@ -39,7 +41,7 @@ def export_scene(scene: Scene) -> dict[str, Any]:
     SceneError
         The engine has no kernel for a group, or does not know an effect.
     """
-    _require_known(scene)
+    require_known(scene.config)
     floors = [contact.config.height for contact in scene.contacts]
     return {
         "timeStep": scene.config.time_step,
@@ -62,19 +64,21 @@ def export_scene(scene: Scene) -> dict[str, Any]:
     }
 
 
-def _require_known(scene: Scene) -> None:
-    for effect in (*scene.groups, *scene.contacts, *scene.boundaries):
-        projected = isinstance(effect, StencilGroup) and effect.manifold in MANIFOLDS
-        if not (projected or isinstance(effect, (Floor, Pins))):
+def require_known(config: SceneConfig) -> None:
+    """SceneError if the engine of the page cannot run a scene."""
+    for name in (each.effect for each in config.effects):
+        effect = EFFECTS.load(name)
+        projected = issubclass(effect, StencilGroup) and effect.manifold in MANIFOLDS
+        if not (projected or issubclass(effect, (Floor, Pins, Force, Start))):
             allowed = ("spring", "strain", "tetrahedron_strain", "deformation_gradient")
             raise SceneError(
-                f"scene '{scene.config.name}': the page's engine has no '{effect.name}'"
-                f"{choices(effect.name, (*allowed, 'floor', 'pins'))}"
+                f"scene '{config.name}': the page's engine has no '{name}'"
+                f"{choices(name, (*allowed, 'floor', 'pins'))}"
             )
-    if scene.config.anderson_window:
+    if config.anderson_window:
         raise SceneError(
-            f"scene '{scene.config.name}': anderson_window = {scene.config.anderson_window}: the "
-            "page's engine has no acceleration (allowed: 0)"
+            f"scene '{config.name}': anderson_window = {config.anderson_window}: the page's engine "
+            "has no acceleration (allowed: 0)"
         )
 
 

@@ -40,7 +40,7 @@ def test_a_shuffled_mesh_gets_neighbours_into_blocks(seed):
 
 @pytest.mark.parametrize("effect", SHAPES)
 def test_what_others_see_is_in_the_order_of_the_mesh(effect):
-    mesh = {"kind": "file", "path": f"config/meshes/{SHAPES[effect]}"}
+    mesh = {"kind": "file", "path": f"config/scenes/meshes/{SHAPES[effect]}"}
     scene = make_scene({"effect": effect, "weight": 1e4}, mesh=mesh)
     group = scene.groups[0]
     order = visiting_order(group.stencil, scene.mesh.vertices)
