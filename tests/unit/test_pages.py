@@ -27,7 +27,7 @@ PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "doc
 ADDING = ROOT / "docs" / "adding.md"
 NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
 # Examples of names that a reader chooses.
-EXAMPLES = {"config/scenes/my_sheet.yaml", "config/mine.yaml"}
+EXAMPLES = {"config/scenes/my_sheet.yaml", "config/mine.yaml", "config/scenes/meshes/sheet.obj"}
 LINK = re.compile(r"\]\(([^)#]+)[^)]*\)")
 PATH = re.compile(r"`((?:config|docs|paper|src|tests|workflow)/[\w./-]+)`")
 BUILT = {"paper/main.pdf", "paper/supplement.pdf", "paper/numbers.json"}
