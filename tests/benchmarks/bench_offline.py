@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from pdrom.experiments.offline import decaying
 from pdrom.reduction.basis.pod import pod
 from pdrom.reduction.sampling.block import block_elements
 from pdrom.reduction.sampling.deim import deim_entries, tie_weights
@@ -12,9 +11,15 @@ from pdrom.reduction.sampling.joint import joint_rows
 from pdrom.reduction.sampling.qdeim import qdeim_elements
 from pdrom.reduction.sampling.s_opt import s_opt_path
 
-# a sheet's strains, the bar of the study, and the size of the table offline_cost
+# a sheet's strains, the bar of the study, and a size that no scene has
 SIZES = {"2166x100": (2166, 100), "28080x70": (28_080, 70), "100000x200": (100_000, 200)}
 ROUNDS = {"2166x100": 20, "28080x70": 5, "100000x200": 3}
+
+
+def decaying(generator: np.random.Generator, n: int, m: int, rate: float = 1e-8) -> np.ndarray:
+    """Matrix (n, m) with singular values from about 1 to ``rate``."""
+    factors = np.geomspace(1.0, rate, m)
+    return generator.standard_normal((n, m)) / np.sqrt(n) * factors
 
 
 def pod_by_reflections(matrix: np.ndarray) -> np.ndarray:

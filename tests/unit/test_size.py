@@ -13,13 +13,13 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 52_680,
-    "modules of src": 546,
-    "lines of tests": 33_660,
+    "lines of src": 52_380,
+    "modules of src": 542,
+    "lines of tests": 33_640,
     "words of documentation": 31_220,
-    "tables": 52,
+    "tables": 50,
     "figures": 28,
-    "experiments": 31,
+    "experiments": 29,
     "percent of src in decorators, signatures and imports": 24.0,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")

@@ -33,7 +33,7 @@ MICRO = {
 }
 MICRO_FILE = "micro.yaml"
 TIMED_FOLDERS = (
-    "timings", "frame_times", "seconds", "breakeven", "effects", "left_out", "guard", "offline",
+    "timings", "frame_times", "seconds", "breakeven", "effects", "left_out", "guard",
     "logs",
 )  # fmt: skip
 TIMED_FIGURES = ("local_share", "accuracy_cost", "alternatives")

@@ -33,7 +33,7 @@ MICRO = {
 }
 # Folders of results that belong to no single scene.
 SHARED = (
-    "tables", "figures", "paper", "article", "hard_cases", "guard", "offline", "frame_times",
+    "tables", "figures", "paper", "article", "hard_cases", "guard", "frame_times",
     "roofline",
 )  # fmt: skip
 MICRO_FILE = "micro.yaml"

@@ -119,7 +119,6 @@ _sizes = _sized(lambda study: study.settings.scaling.scenes)
 _online = [paths.ONLINE, paths.ONLINE_MODELS]
 _in_subspaces = [
     paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,
-    paths.POSITION_BASES,
 ]  # fmt: skip
 
 SOME: dict[Place, Callable[[Study], Iterator[Labels]]] = {

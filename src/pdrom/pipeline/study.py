@@ -23,7 +23,6 @@ from pdrom.experiments.kit.settings import BlowupExtent, Solver, Threads
 from pdrom.experiments.ladder import LadderFile
 from pdrom.experiments.live import Live
 from pdrom.experiments.noise import Noise
-from pdrom.experiments.offline import Offline
 from pdrom.experiments.online import Online
 from pdrom.experiments.published_choices.experiment import PublishedChoices
 from pdrom.experiments.repetitions import RepetitionSection
@@ -78,7 +77,6 @@ class StudySettings(ConfigModel):
     budgets: tuple[Annotated[float, Field(gt=0.0)], ...] = (0.1, 1.0, 10.0)
     subspace: Subspace = Subspace()
     scaling: Scaling = Scaling()
-    offline: Offline = Offline()
     roofline: Roofline = Roofline()
     stability: Stability = Stability()
     noise: Noise = Noise()

@@ -42,7 +42,7 @@ ASKED = {
 }
 JOBS = (
     "mesh", "fom", "sensitivity", "subspaces", "iterations", "snapshots", "pod", "companion",
-    "reruns", "bounds", "estimates", "position_bases", "repetitions", "guard", "timing",
+    "reruns", "bounds", "estimates", "repetitions", "guard", "timing",
 )  # fmt: skip
 STEP, GRAVITY, VERTEX_MASS = 0.016, 9.81, 10.0
 
@@ -238,17 +238,11 @@ def test_runs_in_subspaces_are_their_coordinates(array, table, split):
     heldout = table(paths.SUBSPACES_HELDOUT).query("motion == @split")
     rows = table(paths.SUBSPACES_TRAIN) if split == "train" else heldout
     rows = rows.set_index(["k", "method"])
-    held = table(paths.POSITION_BASES).query("split == @split").set_index("k")
     for k, method in rows.index:
         columns = array(paths.SUBSPACES, f"columns/pod_k{k:03d}/B")
         z = array(paths.SUBSPACES, f"models/pod_k{k:03d}_{method}/{split}/coordinates")
         difference = norms(np.einsum("nk,fka->fna", columns, z)[1:] - reference[1:])
         assert rows.relative_error[k, method] == pytest.approx(whole(difference, moved), rel=1e-6)
-        flat = reference[1:].transpose(1, 0, 2).reshape(len(columns), -1)
-        rest = flat - columns @ np.linalg.lstsq(columns, flat, rcond=None)[0]
-        best = held.best_approximation[k]
-        assert best == pytest.approx(whole(rest, moved), rel=1e-6)
-        assert best <= rows.relative_error[k, method]
     full = rows.xs("full", level="method")
     assert (np.diff(full.relative_error) < 0.0).all()
     sampled = rows.drop("full", level="method").reset_index("method").r
@@ -395,4 +389,4 @@ def test_every_result_is_shown_with_all_that_it_holds(at, capsys):
                 names = [*file, *file.attrs["configuration"].split('"')[1:2]]
         assert all(f"  {name}" in told for name in names), path
         assert "provenance:\n" in told
-        assert "config: small (A small sheet)" in told or "fom" not in path.parts
+        assert "config: small (small)" in told or "fom" not in path.parts

@@ -16,7 +16,7 @@ from places import ROOT
 # What only a position subspace, or an auxiliary model, has.
 INSIDE = (
     paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,
-    paths.POSITION_BASES, paths.COMPANION, paths.ESTIMATES, paths.COMPANION_TIMES,
+    paths.COMPANION, paths.ESTIMATES, paths.COMPANION_TIMES,
 )  # fmt: skip
 
 
