@@ -13,11 +13,11 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 52_380,
-    "modules of src": 542,
-    "lines of tests": 33_640,
-    "words of documentation": 31_220,
-    "tables": 50,
+    "lines of src": 51_740,
+    "modules of src": 534,
+    "lines of tests": 33_200,
+    "words of documentation": 30_360,
+    "tables": 48,
     "figures": 28,
     "experiments": 29,
     "percent of src in decorators, signatures and imports": 24.0,

@@ -68,4 +68,3 @@ def test_installed_elsewhere_it_reduces(wheel: Path, tmp_path: Path) -> None:
     assert Path(first.partition("=file://")[2]).is_file()
     said = call(pdrom, "reduce", "small.yaml", "--group", "spring", "--r", 2, folder=folder, **home)
     assert said.startswith("small_spring_gappy_2.h5: spring, gappy, r = 2: relative error")
-    assert "(results)" in " ".join(call(pdrom, "advise", "--help", folder=folder, **home).split())

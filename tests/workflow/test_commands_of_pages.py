@@ -33,7 +33,6 @@ LEFT_OUT = {
     r"^\./reproduce --report": "executed by test_report.py",
     r"^\./reproduce (verify|bundle)": "needs a study; has tests of its own",
     r"^\./reproduce (pages|docs)": "executed by tests/unit/verification",
-    r"^pdrom advise": "reads a finished study; executed by tests/unit/command/test_advise.py",
     r"^\.venv/bin/python -m pdrom\.verification": "executed by tests/unit/verification",
     r"^\./reproduce (figure [^8]|reduced_reruns)": "planned by test_measured_claim_map.py",
     r"rest_shapes|mesh_sizes|rest_lengths|leverage": "recipes, executed by test_recipes.py",

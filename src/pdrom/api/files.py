@@ -67,11 +67,10 @@ def save(reduced: ReducedRun | AskedRun, path: str | os.PathLike[str]) -> None:
 
 def _save_asked(asked: AskedRun, path: Path) -> None:
     config, done = asked.scene.config.model_dump(mode="json"), asked.outcome
-    wish = {"quantity": asked.ask.quantity, "asked_error": asked.ask.error}
+    wish = {"quantity": asked.request.quantity, "requested_error": asked.request.error}
     with made_by("pdrom.api.save", {"scene": config, **wish}), write_hdf5(path) as file:
-        file.attrs.update({**wish, "promised": done.promised, "expected": done.expected})
-        file.attrs["steps"] = [f"from frame {frame}: {title}" for frame, title in done.changes]
-        file.attrs["repairs"] = done.repairs
+        file.attrs.update({**wish, "frames_met": done.frames, "limit": done.limit})
+        file.attrs.update({"level": done.level, "failed": done.failed, "expected": done.expected})
         if done.estimate is not None:
             file.attrs["estimate"] = done.estimate
         store_mesh(asked.scene.mesh, file.create_group("mesh"))

@@ -7,10 +7,10 @@ import numpy as np
 
 from pdrom.core.brief import brief
 from pdrom.model.scene import Scene
-from pdrom.reduction.asked.ask import Ask
-from pdrom.reduction.asked.run import Asked
 from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.local.guard import GuardRecord
+from pdrom.reduction.requested.calibration import Request
+from pdrom.reduction.requested.run import Outcome
 from pdrom.reduction.rerun import Rerun, mean_motion
 
 
@@ -90,30 +90,28 @@ class ReducedRun:
 
 @dataclass(frozen=True)
 class AskedRun:
-    """A run that keeps to an asked error.
+    """A run within a requested tolerance.
 
     scene : its motion
-    ask : the wish
-    outcome : positions (F + 1, N, 3) m, what was done, and what it is estimated to have reached
-    ms : (F,) milliseconds a frame, checks and repairs shared out evenly
-    offline_s : seconds that the choice took before the run
-    horizon : frames of the own motions that an error can be known for; the promise ends there
-    error : true error against the converged implicit step, on the motion that the choice was made
-        on; None on another one, where it is not known
+    request : the tolerance
+    outcome : positions (F + 1, N, 3) m, for how many frames the tolerance counts as met, what ran
+    ms : (F,) milliseconds a frame, all checks and levels that failed shared out evenly
+    offline_s : seconds that the calibration took before the run
+    error : true error over these frames against the converged implicit step, if the motion is that
+        of the calibration; None on another one, where it is not known
     """
 
     scene: Scene
-    ask: Ask
-    outcome: Asked
+    request: Request
+    outcome: Outcome
     ms: np.ndarray
     offline_s: float
-    horizon: int
     error: float | None
 
     def __repr__(self) -> str:
-        kept = "kept" if self.outcome.promised else "not promised"
-        steps = ", ".join(f"from {frame} {title}" for frame, title in self.outcome.changes)
-        return f"AskedRun('{self.scene.config.name}': {self.ask} {kept}; {steps})"
+        done = self.outcome
+        met = f"met for {done.frames} of {len(self.ms)} frames" if done.met else "not met"
+        return f"AskedRun('{self.scene.config.name}': {self.request} {met}; {done.level})"
 
 
 def full_run(scene: Scene, file: h5py.File) -> FullRun:

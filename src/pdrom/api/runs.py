@@ -11,8 +11,8 @@ from typing import overload
 import numpy as np
 
 from pdrom.api.arguments import file_path, fitting_basis, method_spec, modes, require
-from pdrom.api.asked import asked_run
 from pdrom.api.records import AskedRun, FullRun, ReducedRun, full_run
+from pdrom.api.tolerance import requested_run
 from pdrom.core.errors import ConfigurationError, SnapshotError
 from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5, require_place
@@ -21,11 +21,12 @@ from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.runs.bounded import Advance, BoundedRun, frame_by_frame
 from pdrom.model.runs.full_order import run as run_full_order
 from pdrom.model.scene import Scene
-from pdrom.reduction.asked.ask import Ask, read_ask
 from pdrom.reduction.basis import Basis, compute_basis
 from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.local.guarded import Trained, guarded
 from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.requested.calibration import Request, read_request
+from pdrom.reduction.requested.levels import OnWork, silent
 from pdrom.reduction.rerun import compare
 from pdrom.reduction.sampling import Reduction
 from pdrom.reduction.sampling.select import select
@@ -109,11 +110,13 @@ def basis(full: FullRun, group: str, method: str | MethodSpec = "pod") -> Basis:
     )
 
 
-Wish = float | str | Ask
+Wish = float | str | Request
 
 
 @overload
-def reduce(full: FullRun, *, error: Wish, scene: Scene | None = None) -> AskedRun: ...
+def reduce(
+    full: FullRun, *, error: Wish, scene: Scene | None = None, on_work: OnWork = silent
+) -> AskedRun: ...
 
 
 @overload
@@ -136,6 +139,7 @@ def reduce(
     guard: GuardSettings = UNGUARDED,
     error: Wish | None = None,
     scene: Scene | None = None,
+    on_work: OnWork = silent,
 ) -> ReducedRun | AskedRun:
     """The scene again, with the projections of one group reduced to r modes.
 
@@ -154,6 +158,7 @@ def reduce(
         against the implicit step solved to convergence. The whole scene is reduced as far as that
         allows, or not at all.
     scene : with ``error``, another motion of the same mesh that is run; ``full`` has trained it
+    on_work : with ``error``, told what is computed and the counted work (ns) just done
 
     Returns
     -------
@@ -176,7 +181,7 @@ def reduce(
     if error is not None:
         if group is not None:
             raise ConfigurationError("error: of the whole scene, without a group")
-        return asked_run(full, read_ask(error), scene)
+        return requested_run(full, read_request(error), scene, on_work)
     if scene is not None:
         raise ConfigurationError("scene: only together with an error")
     group = require(str, group, "group", source=GROUP)

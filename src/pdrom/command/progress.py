@@ -1,8 +1,10 @@
-"""Progress of a run: one line on stderr, rewritten on a terminal."""
+"""Progress of a run, and of what precedes it: one line on stderr, rewritten on a terminal."""
 
+import os
 import sys
+from pathlib import Path
 from time import monotonic
-from typing import TextIO
+from typing import Self, TextIO
 
 from pdrom.model.dynamics.stepper import FrameReport
 
@@ -22,6 +24,9 @@ class Progress:
         self._terminal = self._stream.isatty()
         self._shown = monotonic()
         self._ends = [self._shown]
+        if not kernels_are_kept():
+            self._stream.write(f"{name}: compiling kernels (once, up to a minute)\n")
+            self._stream.flush()
 
     def __call__(self, frame: int, report: FrameReport) -> None:
         """Frame number ``frame``, from 0, is done."""
@@ -51,3 +56,40 @@ def line(name: str, done: int, frames: int, ms: float, left: float) -> str:
     full = WIDTH * done // frames
     bar = "#" * full + "." * (WIDTH - full)
     return f"{name} [{bar}] frame {done} of {frames}, {ms:.2f} ms a frame, {left:.0f} s left"
+
+
+def kernels_are_kept() -> bool:
+    """Whether the folder of compiled kernels has a step loop; True where no folder is known."""
+    folder = os.environ.get("NUMBA_CACHE_DIR")
+    return folder is None or any(Path(folder).glob("dynamics*/*.nbi"))
+
+
+class WorkProgress:
+    """A line about the work of the moment and the time so far, every few seconds.
+
+    Called with the title and the counted work of what was just done.
+    """
+
+    def __init__(self, name: str, stream: TextIO | None = None, every: float = 2.0) -> None:
+        self._name, self._every, self._stream = name, every, stream or sys.stderr
+        self._terminal = self._stream.isatty()
+        self._began = self._shown = monotonic()
+
+    def __enter__(self) -> Self:
+        if not kernels_are_kept():
+            self._stream.write(f"{self._name}: compiling kernels (once, up to a minute)\n")
+        return self
+
+    def __exit__(self, *fault: object) -> None:
+        if self._terminal:
+            self._stream.write("\n")
+
+    def __call__(self, title: str, work: float) -> None:
+        """Some ``work`` (ns, counted) on what has this ``title`` is done."""
+        now = monotonic()
+        if now - self._shown < (EVERY if self._terminal else self._every):
+            return
+        self._shown = now
+        text = f"{self._name}: {title}, {now - self._began:.0f} s"
+        self._stream.write(f"\r{text:<{3 * WIDTH}}" if self._terminal else f"{text}\n")
+        self._stream.flush()

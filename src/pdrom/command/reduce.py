@@ -10,6 +10,7 @@ from pdrom.command.base import Command, Status, declare_unchecked, require_outpu
 if TYPE_CHECKING:
     from pdrom.api import GuardSettings, ReducedRun
 
+WRONG = 0.1  # relative error above which the study calls a run wrong
 PICTURES = ("eps", "jpeg", "jpg", "pdf", "png", "ps", "svg", "tif", "tiff", "webp")
 
 
@@ -69,9 +70,9 @@ def declare(parser: argparse.ArgumentParser) -> None:
 def perform(arguments: argparse.Namespace) -> Status:
     """Run in full order unless that is done, reduce, run again, and say how it went."""
     if arguments.group is None:
-        from pdrom.command.asked import perform_asked
+        from pdrom.command.tolerance import perform_request
 
-        return perform_asked(arguments)
+        return perform_request(arguments)
     from pdrom.api import FullRun, load, load_scene, plot, reduce, run, save
     from pdrom.command.progress import Progress
     from pdrom.core.errors import StorageError
@@ -141,11 +142,15 @@ def _told(reduced: "ReducedRun") -> str:
 
     outcome, full = reduced.outcome, reduced.full
     if not outcome.finite:
-        reported = f"blew up at frame {outcome.blowup_frame} (gain {reduced.gain:.3g})"
+        reported = f"blew up at frame {outcome.blowup_frame} ({_gain(reduced)})"
     else:
         speed = f"{reduced.ms:.2f} ms a frame (full order {np.median(full.ms):.2f})"
-        reported = f"{_error(reduced)}, gain {reduced.gain:.3g}, {speed}"
+        reported = f"{_error(reduced)}, {_gain(reduced)}, {speed}"
     return f"{reduced.title}: {reported}{_seen(reduced)}"
+
+
+def _gain(reduced: "ReducedRun") -> str:
+    return f"gain {reduced.gain:.3g} (how much sampling may amplify what the basis misses)"
 
 
 def _error(reduced: "ReducedRun") -> str:
@@ -154,7 +159,13 @@ def _error(reduced: "ReducedRun") -> str:
     if reduced.seen.stopped:
         return f"stopped after frame {reduced.outcome.frames - 1}"
     error = reduced.outcome.error(displacement_norms(reduced.full.positions))
-    return "no error: nothing moves" if error is None else f"relative error {error:.2g}"
+    if error is None:
+        return "no error: nothing moves"
+    largest = float(reduced.error.max())
+    return (
+        f"relative error {error:.2g} of the full order's motion, over all frames (largest of one "
+        f"frame {largest:.2g}; {'accurate' if error <= WRONG else 'wrong'}: {WRONG:g} is the limit)"
+    )
 
 
 def _seen(reduced: "ReducedRun") -> str:

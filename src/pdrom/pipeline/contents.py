@@ -102,9 +102,9 @@ def _published(study: Study, scene: str, group: str) -> bool:
     return any((case.scene, case.group) == (scene, group) for case in cases)
 
 
-def _asked(study: Study) -> Iterator[Labels]:
+def _requested(study: Study) -> Iterator[Labels]:
     """The listed scenes, or all, the large ones among them."""
-    held, listed = (*study.scenes, *study.online), study.settings.asks.scenes
+    held, listed = (*study.scenes, *study.online), study.settings.requested_tolerances.scenes
     return ({"scene": scene} for scene in held if not listed or scene in listed)
 
 
@@ -133,7 +133,7 @@ SOME: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.LIVE_MODEL: _live,
     paths.STABILITY: _scenes(lambda study: study.settings.stability.scenes),
     paths.SUBSPACE_ABLATION: _scenes(lambda study: study.ablation.scenes),
-    **dict.fromkeys([paths.ASKS, paths.ASK_SCORES], _asked),
+    paths.REQUESTED_TOLERANCES: _requested,
     paths.ALTERNATIVES: _sized(lambda study: study.settings.alternatives.scenes),
     paths.ALTERNATIVE_TIMES: _sized(lambda study: study.settings.alternatives.scenes),
 }

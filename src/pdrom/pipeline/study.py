@@ -12,7 +12,6 @@ from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.names import SceneName
 from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
 from pdrom.experiments.alternatives.settings import Alternatives
-from pdrom.experiments.asks import Asks
 from pdrom.experiments.companion import Companion
 from pdrom.experiments.frame_times import FrameTimes
 from pdrom.experiments.guard import GuardSection
@@ -26,6 +25,7 @@ from pdrom.experiments.noise import Noise
 from pdrom.experiments.online import Online
 from pdrom.experiments.published_choices.experiment import PublishedChoices
 from pdrom.experiments.repetitions import RepetitionSection
+from pdrom.experiments.requested_tolerances import RequestedTolerances
 from pdrom.experiments.roofline.experiment import Roofline
 from pdrom.experiments.scaling import Scaling
 from pdrom.experiments.sensitivity import Sensitivity
@@ -88,7 +88,7 @@ class StudySettings(ConfigModel):
     online: Online = Online()
     live: Live = Live()
     alternatives: Alternatives = Alternatives()
-    asks: Asks = Asks()
+    requested_tolerances: RequestedTolerances = RequestedTolerances()
     viewer: Viewer = Viewer()
     variants: Variants = Variants()
     study: str | None = None

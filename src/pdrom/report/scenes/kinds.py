@@ -54,7 +54,7 @@ KINDS: dict[str, Kind] = {
     ),
     "runs": Kind("Table of the reduced runs", "tables", ("runs.csv",), MEASURED),
     "advice": Kind(
-        "Tables for pdrom advise: what each effect does, and errors and times of all settings",
+        "Tables: what each effect does, and errors and times of all settings",
         "tables", ("effects_contribution.csv", "accuracy_cost.csv"),
         (*MEASURED, *HELD_OUT, *EFFECTS),
         by_default=False, tables=("effects_contribution", "accuracy_cost"),

@@ -1,4 +1,4 @@
-"""Tables of a scene: its reduced runs, and what ``pdrom advise`` reads."""
+"""Tables of a scene: its reduced runs, effects and costs."""
 
 from pathlib import Path
 

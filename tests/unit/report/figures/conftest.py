@@ -383,16 +383,14 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for r in (1, 2, 5)
     ]
     distances = [(scene, group, *step, 0.5) for scene, group in pairs for step in steps]
-    asks = [
-        (scene, asked, True, kept, reduced, 0.5 * asked if kept else 2.0, time, 4.0, 0.3)
+    requests = [
+        (scene, tolerance, met, reduced, 0.5 * tolerance if met else 2.0, time)
         for scene in scenes
-        for asked in (0.1, 0.01)
-        for kept, reduced, time in ((True, True, 0.5), (True, False, 6.0), (False, False, 9.0))
+        for tolerance in (0.1, 0.01)
+        for met, reduced, time in ((True, True, 0.1), (True, False, 1.5), (False, False, 2.2))
     ]
     made = {
-        "asks": (
-            asks, "scene asked judged promised reduced error ms_per_frame own_ms oracle_ms"
-        ),
+        "requested_tolerances": (requests, "scene tolerance met reduced error over_own"),
         "singular_values": (values, "scene group component singular_value relative above_roundoff"),
         "reconstruction_error": (errors, "scene group method r split relative_error gain"
          " elements_sampled"),

@@ -25,12 +25,12 @@ from pdrom.core.store import checksum_path, write_hdf5
 from pdrom.core.store.checksum import write_block
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import save_mesh
-from pdrom.report.figures.asks import _dots as asked_dots
 from pdrom.report.figures.kit.catalogue import declaration
 from pdrom.report.figures.kit.multiples import log_axes
 from pdrom.report.figures.kit.output import draw_figure, write_figure
 from pdrom.report.figures.kit.results import Results
 from pdrom.report.figures.kit.style import new_figure, note
+from pdrom.report.figures.requested_tolerances import dots
 
 from .conftest import BLOWN_UP, BLOWUP_FRAME, FRAMES, ROOT, SCENES, SETTINGS, Study, mesh_of
 
@@ -407,10 +407,10 @@ def test_every_axis_of_the_scaling_has_two_numbers_at_least(study):
 
 
 def test_dots_that_are_none_leave_the_axes_their_room():
-    """Such dots, which are not clipped, made the axes of the figure of asks collapse."""
+    """Such dots, which are not clipped, made the axes of the figure collapse."""
     chart, none = new_figure(3.2), pd.Series(dtype=float)
     for ax in chart.subplots(1, 2):
-        asked_dots(ax, none, none, (1e-4, 1.0), "black")
+        dots(ax, none, none, (1e-4, 1.0), "black")
         log_axes(ax, (5e-3, 2e-1), (1e-4, 1.0))
     FigureCanvasAgg(chart).draw()
     assert all(ax.get_position().width > 0.3 for ax in chart.axes)

@@ -117,7 +117,7 @@ def test_outline_of_sheet_and_bar():
 
 
 def test_the_silhouette_of_a_round_body_is_a_closed_line_around_it():
-    ball = read_mesh_file(CONFIG / "meshes" / "ball.obj")
+    ball = read_mesh_file(CONFIG / "scenes" / "meshes" / "ball.obj")
     points = ball.points - [0.0, 2.0, 0.0]
     assert len(outline_edges(points, ball.triangles)) == 0
     camera = Camera(30.0, 20.0)

@@ -1,7 +1,6 @@
 """``pdrom reduce --error``: what is said of a run, whatever became of it, and its exit code."""
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +9,8 @@ from builders import SMALL
 from pdrom.api import AskedRun, FullRun, load_scene
 from pdrom.command.base import Status
 from pdrom.command.main import run
-from pdrom.reduction.asked.ask import Ask
+from pdrom.reduction.requested.calibration import Request
+from pdrom.reduction.requested.run import Outcome
 
 COMMAND = ["reduce", "small.yaml", "--run", "small.h5", "--error", "0.05"]
 
@@ -25,33 +25,46 @@ def full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FullRun:
     return found
 
 
-def done(full: FullRun, horizon: int = 4, error: float | None = None, **changes) -> AskedRun:
-    """A run of four frames that keeps to its error, but for the ``changes`` of its outcome."""
+def done(full: FullRun, error: float | None = None, **changes) -> AskedRun:
+    """A run of four frames within its tolerance, but for the ``changes`` of its outcome."""
     outcome = {
-        "positions": full.positions, "promised": True, "reduced": 3, "checks": [0, 2],
-        "changes": [(0, "pod, k = 4")], "repairs": 1, "expected": 0.031, "estimate": None,
-        "work": 1.0, "full_work": 4.0,
+        "positions": full.positions, "frames": 4, "limit": "", "expected": 0.031, "estimate": None,
+        "level": "ecsw, k = 20, tau = 0.01, K = 10", "reduced": True, "failed": [],
+        "checks": [0, 2], "work": 1.0, "full_work": 4.0, "seconds": 0.1,
     }  # fmt: skip
-    made = SimpleNamespace(**(outcome | changes))
-    return AskedRun(full.scene, Ask(error=0.05), made, np.full(4, 2.0), 1.5, horizon, error)
+    made = Outcome(**(outcome | changes))
+    return AskedRun(full.scene, Request(error=0.05), made, np.full(4, 2.0), 1.5, error)
+
+
+SLOW = "the iterations converge too slowly after it"
 
 
 @pytest.mark.parametrize(
     ("changes", "words", "status"),
     [
-        ({}, "implicit step: kept, by a reduction\n", Status.DONE),
-        ({"reduced": 0}, "kept, by the full order only\n", Status.DONE),
-        ({"horizon": 2}, ", up to frame 2 (round-off decides after it): kept", Status.DONE),
-        ({"promised": False}, ": nothing keeps to it for sure; run in", Status.NOTHING_FITS),
+        ({}, "implicit step: met, by a reduction\n", Status.DONE),
+        ({"reduced": False}, "met, by the full order only\n", Status.DONE),
         (
-            {"promised": False, "positions": np.full((5, 30, 3), np.nan)},
+            {"frames": 2, "limit": SLOW},
+            f"met up to frame 2 of 4, by a reduction ({SLOW})\n",
+            Status.DONE,
+        ),
+        ({"frames": 1, "limit": SLOW}, "met up to frame 1 of 4", Status.NOTHING_FITS),
+        ({"frames": 0}, ": refused (nothing meets it for sure); run in", Status.NOTHING_FITS),
+        (
+            {"frames": 0, "positions": np.full((5, 30, 3), np.nan)},
             ": blew up, with the full order, too\n",
             Status.NOTHING_FITS,
         ),
         ({}, "\n  error: expected at most 0.031\n", Status.DONE),
-        ({"estimate": 0.02, "error": 0.011}, "from the checks 0.02, reached 0.011\n", Status.DONE),
-        ({}, "3 of 4 frames reduced, 2 checked, 1 times gone back\n", Status.DONE),
-        ({}, "2.00 ms a frame, about 0.25 of the full order", Status.DONE),
+        ({"estimate": 0.02, "error": 0.011}, "estimated 0.02, reached 0.011\n", Status.DONE),
+        ({"failed": ["a"]}, "K = 10, after a; 2 frames checked\n", Status.DONE),
+        (
+            {},
+            "2.00 ms a frame, about 0.25 of the full order that meets it; choosing took 1.5 s, as "
+            "long as 750 frames",
+            Status.DONE,
+        ),
     ],
 )
 def test_what_became_of_a_run(full, monkeypatch, capsys, changes, words, status):

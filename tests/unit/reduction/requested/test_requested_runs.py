@@ -1,0 +1,179 @@
+"""Runs within a requested tolerance: met or refused, whatever the run differs in."""
+
+import numpy as np
+import pytest
+
+from builders import make_scene
+from pdrom.core.errors import ConfigurationError
+from pdrom.model.runs.full_order import trajectory
+from pdrom.model.scene import Scene
+from pdrom.reduction.requested import run as checked
+from pdrom.reduction.requested.calibration import (
+    Calibration,
+    Request,
+    ToleranceSettings,
+    calibrate,
+    last_within,
+    read_request,
+    relative_errors,
+    transferred,
+)  # fmt: skip
+from pdrom.reduction.requested.levels import Level, Trajectory
+from pdrom.reduction.requested.run import RequestedRun, check_frames
+
+EFFECTS = (
+    {"effect": "gravity"},
+    {"effect": "pins", "select": "left"},
+    {"effect": "spring", "weight": 1e5},
+)
+SHEET = {"kind": "cloth", "rows": 7, "columns": 7, "plane": "xz"}
+SETTINGS = ToleranceSettings(modes=(8,), tolerances=(1e-2,), iterations=(10,), factor=2.0)
+FRAMES = 24
+
+
+def sheet(*more, weight: float = 1e5, **keys) -> Scene:
+    effects = (*EFFECTS[:2], {"effect": "spring", "weight": weight}, *more)
+    return make_scene(*effects, mesh=SHEET, **{"frames": FRAMES, **keys})
+
+
+def kicked(speed: float) -> Scene:
+    return sheet({"effect": "kick", "speed": speed, "seed": 7})
+
+
+@pytest.fixture(scope="module")
+def own() -> Calibration:
+    return calibrate(sheet(), SETTINGS, 0.005)
+
+
+def error_of(scene: Scene, positions: np.ndarray, frames: int) -> float:
+    """Error over the first frames against 640 accelerated iterations."""
+    update = {"iterations": 640, "anderson_window": 5}
+    exact = trajectory(Scene.build(scene.config.model_copy(update=update), scene.mesh))
+    wrong = positions[1 : frames + 1] - exact[1 : frames + 1]
+    return float(relative_errors(wrong, exact, "position")[-1])
+
+
+@pytest.mark.parametrize("error", [0.1, 0.03, 0.01])
+def test_a_tolerance_is_met_on_another_motion(own, error):
+    scene = kicked(0.4)
+    done = RequestedRun(scene, own, Request(error=error)).outcome()
+    assert done.met
+    assert error_of(scene, done.positions, done.frames) <= error
+    assert done.estimate <= error
+
+
+@pytest.mark.parametrize(
+    "changes", [{"weight": 1e8}, {"vertex_mass": 0.1}, {"time_step": 0.048}], ids=str
+)
+@pytest.mark.parametrize("error", [0.05, 0.01])
+def test_what_a_calibration_rests_on_may_differ_when_it_is_made_again(changes, error):
+    scene = sheet(**changes)
+    calibration = calibrate(transferred(sheet(), scene), SETTINGS, error)
+    done = RequestedRun(scene, calibration, Request(error=error)).outcome()
+    assert not done.met or error_of(scene, done.positions, done.frames) <= error
+
+
+def test_other_cells_or_groups_are_refused():
+    with pytest.raises(ConfigurationError, match="another mesh or other constraint groups"):
+        transferred(sheet(), make_scene(*EFFECTS, mesh={**SHEET, "rows": 6}, frames=FRAMES))
+    strained = make_scene(*EFFECTS[:2], {"effect": "strain", "weight": 1e5}, mesh=SHEET)
+    with pytest.raises(ConfigurationError, match="another mesh or other constraint groups"):
+        transferred(sheet(), strained)
+
+
+def test_a_tolerance_below_the_reference_s_own_error_is_refused(own):
+    tiny = Request(error=1e-14)
+    assert own.admissible(tiny) == []
+    done = RequestedRun(sheet(), own, tiny).outcome()
+    assert not done.met
+    assert done.limit
+    assert done.level == own.most_accurate.level.title
+
+
+def test_a_refused_request_runs_with_the_most_accurate_full_order(own):
+    done = RequestedRun(kicked(0.4), own, Request(error=1e-14)).outcome()
+    expected = Trajectory(own.most_accurate.level, kicked(0.4)).to(FRAMES).positions
+    assert np.array_equal(done.positions, expected)
+    assert not done.reduced
+
+
+def test_a_full_order_is_checked_too_and_replaced_by_a_better_one(own, monkeypatch):
+    """With a check that finds every frame of the first level bad."""
+    levels = []
+
+    def poor(run: Trajectory, exact: Trajectory) -> float:
+        levels.append(run.level.title)
+        frame = run.frames
+        run.to(frame + 1)
+        run.defects[frame] = 1e3 if run.level.title == levels[0] else 0.0
+        return run.defects[frame]
+
+    monkeypatch.setattr(checked.Trajectory, "check", poor)
+    done = RequestedRun(sheet(), own, Request(error=0.05)).outcome()
+    assert done.failed[0] == levels[0] != done.level
+
+
+def test_a_run_that_departs_from_its_second_run_is_met_for_fewer_frames(own, monkeypatch):
+    late = np.where(np.arange(FRAMES) < 10, 0.0, np.inf)
+    monkeypatch.setattr(RequestedRun, "_amplified", lambda *_: late)
+    done = RequestedRun(sheet(), own, Request(error=0.05)).outcome()
+    assert (done.frames, done.limit) == (10, checked.AMPLIFIED)
+
+
+def test_two_runs_are_the_same_to_the_last_bit(own):
+    run = RequestedRun(kicked(1.0), own, Request(error=0.03))
+    first, again = run.outcome(), run.outcome()
+    assert np.array_equal(first.positions, again.positions)
+    assert (first.level, first.work, first.estimate) == (again.level, again.work, again.estimate)
+
+
+def test_the_cheapest_level_that_meets_it_is_tried_first(own):
+    levels = own.admissible(Request(error=0.1))
+    assert [each.work for each in levels] == sorted(each.work for each in levels)
+    assert all(own.expected(each, Request(error=0.1)) <= 0.1 for each in levels)
+
+
+def test_velocities_are_differences_of_positions():
+    reference = np.cumsum(np.ones((4, 2, 3)), axis=0)
+    wrong = [np.full((2, 3), 0.1)] * 3
+    assert relative_errors(wrong, reference, "position")[0] == pytest.approx(0.1)
+    np.testing.assert_allclose(
+        relative_errors(wrong, reference, "velocity"), 0.1 / np.sqrt([1.0, 2.0, 3.0])
+    )
+
+
+def test_errors_of_a_still_motion_are_zero_or_infinite():
+    still = np.zeros((3, 2, 3))
+    assert relative_errors(still[1:], still, "position").tolist() == [0.0, 0.0]
+    assert relative_errors(still[1:] + 1.0, still, "position").tolist() == [np.inf, np.inf]
+
+
+def test_frames_within_a_tolerance_are_counted_to_the_last():
+    assert last_within(np.array([0.1, 0.5, 0.2, 0.6]), 0.3) == 3
+    assert last_within(np.array([0.5]), 0.3) == 0
+
+
+@pytest.mark.parametrize(
+    "wish", [0.0, 1.0, 2, -1, "x", "speed=0.1", "velocity=2", True, None, "nan"]
+)
+def test_a_tolerance_that_is_none_is_named(wish):
+    with pytest.raises(ConfigurationError, match="error"):
+        read_request(wish)
+
+
+def test_a_tolerance_may_be_of_the_velocities():
+    assert read_request("velocity=0.05") == Request(error=0.05, quantity="velocity")
+    assert str(read_request(0.01)) == "1 % of the positions"
+
+
+@pytest.mark.parametrize(("frames", "cost", "share"), [(100, 1.0, 0.05), (3, 1e9, 0.1), (1, 1, 1)])
+def test_checks_are_spread_and_two_at_least(frames, cost, share):
+    found = check_frames(frames, cost, share)
+    assert min(2, frames) <= len(found) <= frames
+    assert all(0 <= frame < frames for frame in found)
+
+
+def test_a_level_has_a_name_and_its_own_iterations():
+    level = Level(20, 5)
+    assert level.title == "full order, Anderson, K = 20"
+    assert level.scene(sheet()).config.iterations == 20
