@@ -5,10 +5,13 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 from pydantic import ValidationError
 
-from pdrom.core.errors import ConfigurationError, choices
+from pdrom.api.records import FullRun
+from pdrom.core.errors import ConfigurationError, SnapshotError, choices
 from pdrom.core.project import config_file
+from pdrom.core.store import require_finite
 from pdrom.core.yamlfile import describe, shown
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.reduction.basis import Basis
@@ -44,6 +47,17 @@ def file_path(path: Any) -> Path:
     return Path(path)
 
 
+def require_positions(full: FullRun) -> None:
+    """SnapshotError if the positions of ``full`` are not all of its frames, or not finite."""
+    scene = full.scene
+    shape = (scene.config.frames + 1, scene.mesh.vertices, 3)
+    if np.shape(full.positions) != shape:
+        raise SnapshotError(
+            f"full: positions of shape {np.shape(full.positions)}, required: {shape}"
+        )
+    require_finite("full: positions", full.positions, SnapshotError)
+
+
 def modes(r: Any) -> int:
     """Number of modes ``r`` as an int; which are allowed is checked where they are taken."""
     if isinstance(r, bool) or not isinstance(r, Integral):
@@ -74,6 +88,10 @@ def fitting_basis(made: Any, group: ConstraintGroup, spec: MethodSpec) -> Basis:
         raise ConfigurationError(
             f"basis_of_group: of {found[0]} elements with {found[1]} rows each, group "
             f"'{group.name}' of this scene has {needed[0]} with {needed[1]}: another scene's?"
+        )
+    if basis.V.shape != (len(basis.mean), basis.rank):
+        raise ConfigurationError(
+            f"basis_of_group: V of shape {basis.V.shape}, required: {(len(basis.mean), basis.rank)}"
         )
     if basis.separate_axes != spec.separate_axes:
         raise ConfigurationError(

@@ -14,7 +14,13 @@ from pdrom.api.records import AskedRun, FullRun, ReducedRun, full_run
 from pdrom.api.scenes import bound
 from pdrom.core.errors import StorageError
 from pdrom.core.provenance import made_by
-from pdrom.core.store import open_hdf5, require_finite, write_hdf5
+from pdrom.core.store import (
+    open_hdf5,
+    require_finite,
+    require_own,
+    require_self_contained,
+    write_hdf5,
+)
 from pdrom.core.yamlfile import validate
 from pdrom.model.mesh.config import MeshConfig, MeshFile
 from pdrom.model.mesh.types import store_mesh, stored_mesh
@@ -40,6 +46,7 @@ def save(reduced: ReducedRun | AskedRun, path: str | os.PathLike[str]) -> None:
     """
     require((ReducedRun, AskedRun), reduced, "reduced", source="pdrom.api.reduce makes one")
     path = file_path(path)
+    require_own(path)
     if isinstance(reduced, AskedRun):
         _save_asked(reduced, path)
         return
@@ -90,19 +97,20 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> FullRun | Red
     Raises
     ------
     StorageError
-        The file is missing, damaged, has no checksum, or holds no run of a scene.
+        The file is missing, damaged, has no checksum, holds no run of a scene or not all that its
+        scene gives, or leads to other files.
     """
     path = file_path(path)
     try:
         with open_hdf5(path, unchecked) as file:
+            require_self_contained(file, path)
             found = _run(file, path)
     except (ValueError, TypeError, LookupError, RuntimeError) as error:
         fault = " ".join(str(error).split())[:200]
         raise StorageError(f"{path}: holds no sound run ({fault})") from error
     if found is None:
         raise StorageError(f"{path}: holds no run that could be opened here (pdrom show says what)")
-    if unchecked:
-        _require_sound(found, path)
+    _require_sound(found, path)
     return found
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from pdrom.api.arguments import file_path, require
 from pdrom.api.records import FullRun, ReducedRun
 from pdrom.core.errors import SceneError
-from pdrom.core.store import require_place
+from pdrom.core.store import require_own, require_place
 from pdrom.reduction.rerun import displacement_norms
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.multiples import clipped, log_axis
@@ -76,6 +76,7 @@ def view(path: str | os.PathLike[str], *runs: FullRun | ReducedRun) -> None:
         would be too large, or cannot be written.
     """
     require_place(file_path(path))
+    require_own(path)
     write_page(viewed_scenes(*runs), path)
 
 

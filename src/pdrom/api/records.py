@@ -14,7 +14,7 @@ from pdrom.reduction.requested.run import Outcome
 from pdrom.reduction.rerun import Rerun, mean_motion
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Snapshots:
     """Projections p (n, e p, 3) of a group at the training frames, and their round-off (n,)."""
 
@@ -24,7 +24,7 @@ class Snapshots:
     __repr__ = brief
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FullRun:
     """A full-order run.
 
@@ -43,7 +43,7 @@ class FullRun:
         return f"FullRun({self.scene!r}, {np.median(self.ms):.3g} ms a frame, {held})"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ReducedRun:
     """A run with the projections of one group reduced, compared with its full-order run.
 
@@ -88,7 +88,7 @@ class ReducedRun:
         return f"{self.group.replace('_', ' ')}, {self.method}, r = {self.r}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AskedRun:
     """A run within a requested tolerance.
 

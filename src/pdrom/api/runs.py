@@ -10,12 +10,19 @@ from typing import overload
 
 import numpy as np
 
-from pdrom.api.arguments import file_path, fitting_basis, method_spec, modes, require
+from pdrom.api.arguments import (
+    file_path,
+    fitting_basis,
+    method_spec,
+    modes,
+    require,
+    require_positions,
+)
 from pdrom.api.records import AskedRun, FullRun, ReducedRun, full_run
 from pdrom.api.tolerance import requested_run
 from pdrom.core.errors import ConfigurationError, SnapshotError
 from pdrom.core.provenance import made_by
-from pdrom.core.store import open_hdf5, require_place
+from pdrom.core.store import open_hdf5, require_own, require_place
 from pdrom.model.dynamics.stepper import FrameReport, State
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.runs.bounded import Advance, BoundedRun, frame_by_frame
@@ -68,6 +75,7 @@ def run(
     require(Scene, scene, "scene", source="build_scene and load_scene make one")
     if out is not None:
         require_place(file_path(out))
+        require_own(out)
     frames = {group: _training_frames(scene, group) for group in scene.config.groups}
     config = scene.config.model_dump(mode="json")
     reported = {"scene": config, "run": "train", "solver": DEFAULT_SOLVER}
@@ -187,6 +195,7 @@ def reduce(
     group = require(str, group, "group", source=GROUP)
     scene, spec = full.scene, method_spec(method)
     r, chosen = modes(r), scene.group(group)
+    require_positions(full)
     require(GuardSettings, guard, "guard", source="as in GuardSettings(action='stop')")
     if basis_of_group is None:
         made = basis(full, group, spec)

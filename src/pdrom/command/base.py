@@ -46,11 +46,13 @@ def require_output(path: str | Path, reads: Sequence[str]) -> None:
     Raises
     ------
     StorageError
-        The file cannot be written, or it is one of those that the command ``reads``.
+        The file cannot be written, would replace one that pdrom has not made, or is one of those
+        that the command ``reads``.
     """
     from pdrom.core.errors import StorageError
-    from pdrom.core.store import require_place
+    from pdrom.core.store import require_own, require_place
 
     require_place(path)
     if any(Path(path).resolve() == Path(read).resolve() for read in reads):
         raise StorageError(f"{path}: would be overwritten, and is read by this command")
+    require_own(path)

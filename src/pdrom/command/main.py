@@ -51,6 +51,10 @@ def parser() -> argparse.ArgumentParser:
 def run(arguments: Sequence[str]) -> int:
     """Do what the ``arguments`` of the command line ask; the exit code."""
     try:
+        os.getcwd()
+    except OSError:
+        return _fail("the working folder is not there any more; change to another one")
+    try:
         try:
             asked = _asked(arguments)
             return int(asked.perform(asked))

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from pdrom.api import GuardSettings, ReducedRun
 
 WRONG = 0.1  # relative error above which the study calls a run wrong
-PICTURES = ("eps", "jpeg", "jpg", "pdf", "png", "ps", "svg", "tif", "tiff", "webp")
+PICTURES = {"pdf": "Creator", "png": "Software", "svg": "Creator"}  # where each says its maker
 
 
 def _size(text: str) -> int:
@@ -77,6 +77,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.command.progress import Progress
     from pdrom.core.errors import StorageError
     from pdrom.core.store import atomic_path
+    from pdrom.core.store.atomic import MARK
 
     guard, out = _guard(arguments), arguments.out or _file(arguments)
     _check_outputs(arguments, out)
@@ -95,7 +96,8 @@ def perform(arguments: argparse.Namespace) -> Status:
     if arguments.plot:
         picture = plot(reduced)
         with atomic_path(arguments.plot, with_checksum=False) as path:
-            picture.savefig(path, dpi=200)
+            maker = PICTURES[path.suffix.lower().removeprefix(".")]
+            picture.savefig(path, dpi=200, metadata={maker: MARK.decode()})
     sys.stdout.write(f"{out}: {_told(reduced)}\n")
     return Status.DONE if reduced.outcome.finite else Status.BLEW_UP
 

@@ -112,7 +112,7 @@ class SceneConfig(_Model):
         return self.model_copy(update={"effects": self.held_out.variant(self.effects, motion)})
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scene:
     """A scene bound to its mesh: every listed effect built, sorted by role."""
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from pdrom import api
 from pdrom.api.pictures import viewed_scenes
 from pdrom.core.errors import ConfigurationError, PdromError, SceneError, StorageError
+from pdrom.core.store import write_hdf5
 
 EFFECTS = [
     {"effect": "gravity"},
@@ -161,3 +162,50 @@ def test_what_is_no_run_is_not_shown(faulty, tmp_path):
     with pytest.raises((SceneError, ConfigurationError), match="view"):
         api.view(tmp_path / "page.html", *faulty)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["reduced", "full"])
+def test_records_are_compared_and_hashed_by_identity(reduced, name):
+    record = reduced if name == "reduced" else reduced.full
+    assert record == record
+    assert record != replace(record)
+    assert len({record, reduced.full.scene}) == 2
+
+
+@pytest.mark.parametrize("fault", ["cut", "nan", "times", "reduced"])
+def test_a_sealed_run_is_looked_at_like_any_other(reduced, tmp_path, fault):
+    """With a right checksum, by whoever wrote it."""
+    full = reduced.full
+    positions = np.array(full.positions)
+    if fault == "cut":
+        full = replace(full, positions=positions[:-1])
+    elif fault == "nan":
+        positions[3, 2, 1] = np.nan
+        full = replace(full, positions=positions)
+    elif fault == "times":
+        full = replace(full, ms=full.ms[:-1])
+    outcome = reduced.outcome
+    if fault == "reduced":
+        outcome = replace(outcome, positions=outcome.positions[:, :-1])
+    path = tmp_path / "sealed.h5"
+    api.save(replace(reduced, full=full, outcome=outcome), path)
+    with pytest.raises(StorageError, match=r"sealed\.h5"):
+        api.load(path)
+
+
+def test_a_run_from_elsewhere_reads_no_other_file(reduced, tmp_path):
+    api.save(reduced, tmp_path / "one.h5")
+    path = tmp_path / "two.h5"
+    with write_hdf5(path) as file:
+        file["positions"] = h5py.ExternalLink(str(tmp_path / "one.h5"), "/full")
+    with pytest.raises(StorageError, match="leads elsewhere"):
+        api.load(path)
+
+
+@pytest.mark.parametrize("fault", ["cut", "nan"])
+def test_positions_that_are_not_whole_are_not_reduced(reduced, fault):
+    positions = np.array(reduced.full.positions)
+    positions[2, 1, 0] = np.nan
+    full = replace(reduced.full, positions=positions[:-1] if fault == "cut" else positions)
+    with pytest.raises(PdromError, match="full: positions"):
+        api.reduce(full, "spring", r=1)

@@ -359,7 +359,10 @@ def test_faults_are_one_line_and_code_1(folder, arguments, words, capsys):
 
 
 UNWRITABLE = [
-    ([*REDUCE, "--plot", "x.exe"], "--plot x.exe: no kind of picture 'exe' (allowed: eps, jpeg"),
+    (
+        [*REDUCE, "--plot", "x.exe"],
+        "--plot x.exe: no kind of picture 'exe' (allowed: pdf, png, svg",
+    ),
     ([*REDUCE, "--plot", "x.pgn"], "did you mean 'png'?"),
     ([*REDUCE, "--plot", "."], "--plot .: no kind of picture ''"),
     ([*REDUCE, "--plot", "folder.png"], "folder.png: cannot be written (a folder)"),
@@ -373,6 +376,39 @@ UNWRITABLE = [
     (["run", "small.yaml", "--out", "a" * 5000], "File name too long"),
     (["view", "x.h5", "--out", "."], ".: cannot be written (a folder)"),
 ]
+
+
+def test_files_of_others_and_the_mesh_of_the_scene_are_not_overwritten(folder, capsys):
+    Path("mine.h5").write_bytes(b"mine")
+    Path("m.obj").write_text("v 0 0 0\n")
+    for out in ("mine.h5", "m.obj"):
+        before = Path(out).read_bytes()
+        assert run(["run", "small.yaml", "--out", out]) == Status.FAULTY
+        assert (
+            f"{out}: cannot be written (a file that pdrom has not made" in capsys.readouterr().err
+        )
+        assert Path(out).read_bytes() == before
+
+
+def test_what_pdrom_has_written_it_writes_again_and_leaves_no_hidden_file(folder, capsys):
+    picture = ["reduce", "small.yaml", "--group", "spring", "--r", "1", "--run", "small.h5"]
+    for _ in range(2):
+        assert run(["run", "small.yaml"]) == Status.DONE
+        assert run(["view", "small.h5"]) == Status.DONE
+        for plot in ("e.png", "e.pdf", "e.svg"):
+            assert run([*picture, "--out", "r.h5", "--plot", plot]) == Status.DONE
+    assert capsys.readouterr().err.count("pdrom:") == 0
+    assert [path.name for path in folder.iterdir() if path.name.startswith(".")] == []
+
+
+def test_a_deleted_working_folder_is_one_line(tmp_path, monkeypatch, capsys):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+    assert run(["show", "x.h5"]) == Status.FAULTY
+    assert capsys.readouterr().err.startswith("pdrom: the working folder is not there any more")
+    monkeypatch.chdir(tmp_path)
 
 
 @pytest.mark.parametrize(("arguments", "words"), UNWRITABLE)

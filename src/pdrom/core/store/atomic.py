@@ -1,7 +1,10 @@
 """A file that takes its name only when it is complete, with a checksum file if it needs one."""
 
+import hashlib
 import os
+import platform
 import re
+import stat
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -10,18 +13,25 @@ from pathlib import Path
 from pdrom.core.errors import StorageError
 from pdrom.core.store.checksum import (
     CHECKSUM_SUFFIX,
+    Checksum,
     checksum_path,
     digest_of,
     new_checksum,
+    read_checksum,
     reason,
 )
+
+# What pages and pictures of this package hold within their first or last bytes.
+MARK, MARKED = b"made by pdrom", 65_536
+# Part of the names of temporary files, so that no machine removes those of another one.
+_MACHINE = hashlib.blake2b(platform.node().encode(), digest_size=2).hexdigest()
 
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Iterator[Path]:
     """Yield a temporary path beside ``path``; checksum and rename it on success, else remove it.
 
-    What a killed process left of the same target is removed first: one job at a time makes a file.
+    What a killed process of this machine left of the same target is removed first.
 
     Parameters
     ----------
@@ -31,11 +41,13 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
     Raises
     ------
     StorageError
-        The folder or the file cannot be written: no permission, no space.
+        The folder or the file cannot be written: no permission, no space; or what has the name is
+        no regular file (a folder, a link, a device, a pipe), which a new file would replace.
     """
     target = Path(path)
-    _require_no_folder(target)
-    temporary = target.with_name(f".{target.stem}.{uuid.uuid4().hex[:12]}{target.suffix}")
+    _require_file(target)
+    mark = f"{_MACHINE}{os.getpid():08x}{uuid.uuid4().hex[:4]}"
+    temporary = target.with_name(f".{target.stem}.{mark}{target.suffix}")
     checksum = temporary.with_name(f"{temporary.name}{CHECKSUM_SUFFIX}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -48,7 +60,7 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
             _rename(temporary, checksum, target)
         else:
             os.replace(temporary, target)
-            checksum_path(target).unlink(missing_ok=True)  # of an earlier file
+            _remove_checksum(checksum_path(target))  # of an earlier file
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
     finally:
@@ -63,31 +75,74 @@ def require_place(path: str | os.PathLike[str]) -> None:
     Raises
     ------
     StorageError
-        A folder is in the place of the file, or its own folder cannot be made or written to.
+        Something else than a file has the name, or its folder cannot be made or written to.
     """
     target = Path(path)
-    _require_no_folder(target)
+    _require_file(target)
     above = next((folder for folder in target.parents if folder.exists()), Path())
     if not above.is_dir() or not os.access(above, os.W_OK | os.X_OK):
         fault = "no permission to write" if above.is_dir() else "not a folder"
         raise StorageError(f"{target}: cannot be written ({above}: {fault})")
 
 
-def _require_no_folder(target: Path) -> None:
+def require_own(path: str | os.PathLike[str]) -> None:
+    """Refuse a ``path`` whose file this package has not written: it would be lost.
+
+    Raises
+    ------
+    StorageError
+        There is such a file: no result with a checksum, no page or picture with the mark of one.
+    """
+    target = Path(path)
+    if not target.is_file() or read_checksum(target) is not None:
+        return
+    with open(target, "rb") as handle:
+        begin = handle.read(MARKED)
+        handle.seek(max(0, target.stat().st_size - MARKED))
+        if MARK not in begin and MARK not in handle.read():
+            raise StorageError(
+                f"{target}: cannot be written (a file that pdrom has not made; move it away)"
+            )
+
+
+def _require_file(target: Path) -> None:
     try:
-        folder = target.is_dir()
+        mode = target.lstat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
-    if folder:
-        raise StorageError(f"{target}: cannot be written (a folder)")
+    if not stat.S_ISREG(mode):
+        kinds = {stat.S_ISDIR: "a folder", stat.S_ISLNK: "a link; name the file itself"}
+        kind = next((words for test, words in kinds.items() if test(mode)), "no regular file")
+        raise StorageError(f"{target}: cannot be written ({kind})")
+
+
+def _remove_checksum(place: Path) -> None:
+    """Remove the file ``place`` if it is a checksum, and nobody else's hidden file."""
+    content = place.read_bytes() if place.is_file() else b""
+    if content and Checksum.parse(content).content == content:
+        place.unlink()
 
 
 def _remove_leftovers(target: Path) -> None:
+    """Remove temporary files of processes of this machine that have ended."""
     stem, suffix, checksum = map(re.escape, (target.stem, target.suffix, CHECKSUM_SUFFIX))
-    name = re.compile(rf"\.{stem}\.[0-9a-f]{{12}}{suffix}({checksum})?")
+    name = re.compile(rf"\.{stem}\.{_MACHINE}([0-9a-f]{{8}})[0-9a-f]{{4}}{suffix}({checksum})?")
     for path in target.parent.iterdir():
-        if name.fullmatch(path.name):
+        found = name.fullmatch(path.name)
+        if found and not _runs(int(found[1], 16)):
             path.unlink(missing_ok=True)
+
+
+def _runs(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # of another user
+        pass
+    return True
 
 
 def _bring_to_disk(path: Path) -> None:

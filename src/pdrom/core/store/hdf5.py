@@ -90,3 +90,26 @@ def open_hdf5(path: str | os.PathLike[str], unchecked: bool = False) -> Iterator
     except OSError as error:
         require_intact(path, unchecked)  # damaged since?
         raise StorageError(f"{path}: cannot be read ({reason(error)})") from error
+
+
+def require_self_contained(file: h5py.File, path: str | os.PathLike[str]) -> None:
+    """Refuse a ``file`` from elsewhere, at ``path``, that would read other files.
+
+    Raises
+    ------
+    StorageError
+        It has a soft or an external link, external storage or a virtual dataset.
+    """
+    groups: list[h5py.Group] = [file]
+    seen: set[int] = set()
+    while groups:
+        group = groups.pop()
+        place = h5py.h5o.get_info(group.id).addr
+        for name in group if place not in seen else ():
+            link = group.get(name, getlink=True)
+            item = group[name] if isinstance(link, h5py.HardLink) else None
+            if isinstance(item, h5py.Group):
+                groups.append(item)
+            elif not isinstance(item, h5py.Dataset) or item.is_virtual or item.external:
+                raise StorageError(f"{path}: {name} is no data of this file but leads elsewhere")
+        seen.add(place)

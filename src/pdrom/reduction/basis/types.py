@@ -10,7 +10,7 @@ from pdrom.core.errors import RankError
 from pdrom.core.store import open_hdf5, write_hdf5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Basis:
     """Affine space mean + span V of vectorised projections.
 

@@ -8,4 +8,4 @@ from pdrom.report.viewer.runs import ViewedScene
 
 def viewer(scene: ViewedScene, page: Path) -> None:
     """Write the ``page`` of ``scene``."""
-    write_page([scene], page, with_checksum=False)
+    write_page([scene], page)

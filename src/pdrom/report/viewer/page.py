@@ -13,9 +13,7 @@ from pdrom.report.viewer.runs import ViewedScene
 LARGEST = 25_000_000  # bytes
 
 
-def write_page(
-    scenes: Sequence[ViewedScene], path: str | os.PathLike[str], with_checksum: bool = True
-) -> None:
+def write_page(scenes: Sequence[ViewedScene], path: str | os.PathLike[str]) -> None:
     """Write the viewer of some ``scenes`` to ``path``.
 
     Raises
@@ -30,7 +28,7 @@ def write_page(
             f"{path}: {size / 1e6:.0f} MB, allowed are {LARGEST / 1e6:.0f}: choose fewer scenes, "
             "methods or sizes (keys viewer.scenes, methods, viewer.ranks)"
         )
-    write_text(text, path, with_checksum)
+    write_text(text, path, with_checksum=False)
 
 
 def page(packed: Sequence[dict]) -> str:

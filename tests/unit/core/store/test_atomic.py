@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
@@ -16,6 +17,9 @@ from pdrom.core.store import (
     check_file,
     checksum_path,
     read_text,
+    require_own,
+    require_place,
+    require_self_contained,
     write_hdf5,
     write_table,
     write_text,
@@ -188,3 +192,85 @@ def test_what_a_killed_process_left_goes_with_the_next_write(tmp_path):
     assert left.name.startswith(".result.")
     write_one(path, "hdf5")
     assert sorted(tmp_path.iterdir()) == sorted([path, other])
+
+
+def occupied(folder, kind):
+    """Something that is no regular file, in the place of a result."""
+    path = folder / "result.txt"
+    if kind == "a link":
+        (folder / "other").write_text("mine")
+        path.symlink_to(folder / "other")
+    elif kind == "no regular file":
+        os.mkfifo(path)
+    else:
+        path.mkdir()
+    return path
+
+
+@pytest.mark.parametrize("kind", ["a link", "no regular file", "a folder"])
+@pytest.mark.parametrize("place", [require_place, lambda path: write_text("new", path)])
+def test_what_is_no_regular_file_is_refused_and_stays(tmp_path, kind, place):
+    path = occupied(tmp_path, kind)
+    before = path.lstat()
+    with pytest.raises(StorageError, match=rf"result\.txt: cannot be written \({kind}"):
+        place(path)
+    assert path.lstat().st_mode == before.st_mode
+    assert kind != "a link" or (tmp_path / "other").read_text() == "mine"
+
+
+def test_a_device_is_refused():
+    with pytest.raises(StorageError, match="no regular file"):
+        require_place(os.devnull)
+
+
+def test_a_file_of_another_program_is_refused(tmp_path):
+    path = tmp_path / "result.txt"
+    require_own(path)
+    path.write_text("mine")
+    with pytest.raises(StorageError, match="a file that pdrom has not made"):
+        require_own(path)
+    write_text("ours", path)
+    require_own(path)
+    path.write_text("<meta content='made by pdrom'>")
+    require_own(path)
+
+
+def test_a_hidden_file_of_another_program_stays(tmp_path):
+    path = tmp_path / "page.html"
+    checksum_path(path).write_text("mine")
+    write_text("page", path, with_checksum=False)
+    assert checksum_path(path).read_text() == "mine"
+
+
+def test_who_writes_the_same_file_at_once_keeps_the_own(tmp_path):
+    path = tmp_path / "result.txt"
+    with atomic_path(path) as first:
+        first.write_text("first")
+        write_text("second", path)
+        assert first.read_text() == "first"
+    assert path.read_text() == "first"
+    assert sorted(path.parent.iterdir()) == sorted([path, checksum_path(path)])
+
+
+@pytest.mark.parametrize("kind", ["external", "soft", "storage", "virtual"])
+def test_a_file_that_reads_others_is_refused(tmp_path, kind):
+    path, other = tmp_path / "run.h5", tmp_path / "other.h5"
+    with h5py.File(other, "w") as file:
+        file["x"] = np.zeros(4)
+    with h5py.File(path, "w") as file:
+        inside = file.create_group("inside")
+        inside["back"] = file  # a circle of groups
+        require_self_contained(file, path)
+        if kind == "external":
+            inside["x"] = h5py.ExternalLink(str(other), "/x")
+        elif kind == "soft":
+            inside["x"] = h5py.SoftLink("/nowhere")
+        elif kind == "storage":
+            external = [(str(tmp_path / "raw"), 0, 32)]
+            inside.create_dataset("x", (4,), "f8", external=external)
+        else:
+            layout = h5py.VirtualLayout((4,), "f8")
+            layout[:] = h5py.VirtualSource(str(other), "x", (4,))
+            inside.create_virtual_dataset("x", layout)
+        with pytest.raises(StorageError, match="x is no data of this file"):
+            require_self_contained(file, path)

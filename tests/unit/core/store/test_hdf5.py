@@ -12,6 +12,7 @@ import pytest
 from pdrom.core.aside import damaged_set_aside
 from pdrom.core.errors import StorageError
 from pdrom.core.store import check_file, checksum_path, open_hdf5, write_hdf5
+from pdrom.core.store.checksum import new_checksum
 
 
 def test_failed_hdf5_leaves_the_old_file(tmp_path):
@@ -111,7 +112,7 @@ def plain(tmp_path):
     path = tmp_path / "old.h5"
     with h5py.File(path, "w") as file:
         file["x"] = np.arange(1000)
-    checksum_path(path).write_text("of an older version\n")
+    checksum_path(path).write_bytes(new_checksum("0" * 128, path.name).content)
     return path
 
 
