@@ -7,13 +7,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from pdrom.command.main import parser as pdrom_parser
 from pdrom.core.paths import RESULTS
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.selection import KINDS
 from pdrom.model.scene import SceneConfig
 from pdrom.pipeline.front import completed
-from pdrom.pipeline.scene_command import scene_order
 from pdrom.pipeline.study import StudySettings
 from pdrom.reduction.method import MethodSpec
 from pdrom.report.figures.kit.outcomes import LOOKS
@@ -102,10 +100,6 @@ def test_commands_are_understood(command: str, monkeypatch: pytest.MonkeyPatch) 
     parsers = {"verify": verify_parser, "bundle": bundle_parser}
     if first in parsers:
         assert parsers[first]().parse_args(others)
-    elif first in ("scene", "viewer"):
-        order = scene_order([first, *others])
-        assert completed(order.arguments)
-        assert pdrom_parser().parse_args(order.drawing).perform
     else:
         assert completed([first, *others])
 

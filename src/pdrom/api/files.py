@@ -26,13 +26,15 @@ from pdrom.model.mesh.config import MeshConfig, MeshFile
 from pdrom.model.mesh.types import store_mesh, stored_mesh
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.local.guard import GuardRecord
+from pdrom.reduction.requested.calibration import Request
+from pdrom.reduction.requested.run import Outcome
 from pdrom.reduction.rerun import Rerun, displacement_norms
 
 
 def save(reduced: ReducedRun | AskedRun, path: str | os.PathLike[str]) -> None:
     """Write a reduced run with its full-order run, as positions in single precision.
 
-    A run with an asked error is written alone, in double precision, and read as a run of its scene.
+    A run within a requested tolerance is written alone, in double precision.
 
     Parameters
     ----------
@@ -78,6 +80,7 @@ def _save_asked(asked: AskedRun, path: Path) -> None:
     with made_by("pdrom.api.save", {"scene": config, **wish}), write_hdf5(path) as file:
         file.attrs.update({**wish, "frames_met": done.frames, "limit": done.limit})
         file.attrs.update({"level": done.level, "failed": done.failed, "expected": done.expected})
+        file.attrs.update({"reduced": done.reduced, "checks": done.checks})
         if done.estimate is not None:
             file.attrs["estimate"] = done.estimate
         store_mesh(asked.scene.mesh, file.create_group("mesh"))
@@ -85,7 +88,7 @@ def _save_asked(asked: AskedRun, path: Path) -> None:
         _store(file, "timings", asked.ms[:, None], "ms")
 
 
-def load(path: str | os.PathLike[str], unchecked: bool = False) -> FullRun | ReducedRun:
+def load(path: str | os.PathLike[str], unchecked: bool = False) -> FullRun | ReducedRun | AskedRun:
     """A run that `save`, `pdrom.api.run` or the pipeline wrote.
 
     Parameters
@@ -114,7 +117,9 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> FullRun | Red
     return found
 
 
-def _run(file: h5py.File, path: Path) -> FullRun | ReducedRun | None:
+def _run(file: h5py.File, path: Path) -> FullRun | ReducedRun | AskedRun | None:
+    if "requested_error" in file.attrs:
+        return _requested(_scene(file, path), file)
     if "positions" in file and "timings" in file:
         return full_run(_scene(file, path), file)
     if "reduced" in file and "full" in file:
@@ -122,9 +127,12 @@ def _run(file: h5py.File, path: Path) -> FullRun | ReducedRun | None:
     return None
 
 
-def _require_sound(found: FullRun | ReducedRun, path: Path) -> None:
+def _require_sound(found: FullRun | ReducedRun | AskedRun, path: Path) -> None:
     """StorageError for arrays of other shapes than the scene's, or NaN in them."""
-    full = found.full if isinstance(found, ReducedRun) else found
+    if isinstance(found, AskedRun):
+        full = FullRun(found.scene, found.outcome.positions, found.ms, {})
+    else:
+        full = found.full if isinstance(found, ReducedRun) else found
     frames, vertices = full.scene.config.frames, full.scene.mesh.vertices
     arrays = {"positions": (full.positions, (frames + 1, vertices, 3)), "ms": (full.ms, (frames,))}
     for name, own in full.snapshots.items():
@@ -143,6 +151,21 @@ def _require_sound(found: FullRun | ReducedRun, path: Path) -> None:
 def _store(file: h5py.File, name: str, values: np.ndarray, unit: str) -> None:
     file[name] = values
     file[name].attrs["unit"] = unit
+
+
+def _requested(scene: Scene, file: h5py.File) -> AskedRun:
+    """A run within a requested tolerance; what its calibration cost is not kept."""
+    kept, timings = file.attrs, file["timings"][...].sum(axis=1)
+    request = Request(error=float(kept["requested_error"]), quantity=str(kept["quantity"]))
+    estimate = kept.get("estimate")
+    outcome = Outcome(
+        positions=file["positions"][...], frames=int(kept["frames_met"]), limit=str(kept["limit"]),
+        expected=float(kept["expected"]), estimate=None if estimate is None else float(estimate),
+        level=str(kept["level"]), reduced=bool(kept["reduced"]),
+        failed=[str(each) for each in kept["failed"]], checks=[int(f) for f in kept["checks"]],
+        work=np.nan, full_work=np.nan, seconds=1e-3 * float(timings.sum()),
+    )  # fmt: skip
+    return AskedRun(scene, request, outcome, timings, np.nan, None)
 
 
 def _reduced(scene: Scene, file: h5py.File) -> ReducedRun:

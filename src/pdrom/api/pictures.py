@@ -1,22 +1,22 @@
 """Pictures of runs, and a page to look at them."""
 
 import os
-from functools import partial
 
 import numpy as np
-import pandas as pd
 from matplotlib.figure import Figure
 
 from pdrom.api.arguments import file_path, require
-from pdrom.api.records import FullRun, ReducedRun
+from pdrom.api.records import AskedRun, FullRun, ReducedRun
 from pdrom.core.errors import SceneError
 from pdrom.core.store import require_own, require_place
-from pdrom.reduction.rerun import displacement_norms
+from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.rerun import mean_motion
 from pdrom.report.figures.kit import style
 from pdrom.report.figures.kit.multiples import clipped, log_axis
 from pdrom.report.viewer.page import write_page
 from pdrom.report.viewer.runs import ViewedRun, ViewedScene
 
+AnyRun = FullRun | ReducedRun | AskedRun
 LOW, HIGH = 1e-7, 1e3  # errors outside are drawn on the limit
 
 
@@ -59,15 +59,16 @@ def plot(*runs: ReducedRun) -> Figure:
     return figure
 
 
-def view(path: str | os.PathLike[str], *runs: FullRun | ReducedRun) -> None:
+def view(path: str | os.PathLike[str], *runs: AnyRun) -> None:
     """Write a page (HTML, one file) that shows runs; a browser opens it without a network.
 
-    Reduced runs are shown with their full-order run; runs with equal scenes become one scene.
+    Reduced runs are shown with their full-order run, as are runs within a requested tolerance if
+    that run is there; runs with equal scenes become one scene.
 
     Parameters
     ----------
     path : file to write
-    runs : full-order and reduced runs
+    runs : full-order and reduced runs, and runs within a requested tolerance
 
     Raises
     ------
@@ -80,74 +81,80 @@ def view(path: str | os.PathLike[str], *runs: FullRun | ReducedRun) -> None:
     write_page(viewed_scenes(*runs), path)
 
 
-def viewed_scenes(*runs: FullRun | ReducedRun) -> list[ViewedScene]:
+def viewed_scenes(*runs: AnyRun) -> list[ViewedScene]:
     """Scenes as pictures and pages show them, each with its runs; errors as `view` raises them.
 
     Parameters
     ----------
-    runs : full-order and reduced runs; those with equal scenes become one scene
+    runs : those with equal scenes become one scene
     """
     if not runs:
         raise SceneError("view: at least one run is required")
+    scenes: dict[str, list[AnyRun]] = {}
     for run in runs:
-        require((FullRun, ReducedRun), run, "view", source="pdrom.api.run and reduce make one")
-    scenes: dict[str, tuple[FullRun, list[ReducedRun]]] = {}
-    for run in runs:
-        full = run.full if isinstance(run, ReducedRun) else run
-        name = full.scene.config.name
-        known, reduced = scenes.setdefault(name, (full, []))
-        if known.scene.config != full.scene.config:
-            raise SceneError(f"view: two different scenes are called '{name}'")
-        if isinstance(run, ReducedRun):
-            reduced.append(run)
-    return [_viewed(full, reduced) for full, reduced in scenes.values()]
+        require(
+            (FullRun, ReducedRun, AskedRun), run, "view", source="pdrom.api.run and reduce make one"
+        )
+        known = scenes.setdefault(_scene(run).config.name, [])
+        if known and _alike(_scene(known[0])) != _alike(_scene(run)):
+            raise SceneError(f"view: two different scenes are called '{_scene(run).config.name}'")
+        known.append(run)
+    return [_viewed(of_scene) for of_scene in scenes.values()]
 
 
-def _viewed(full: FullRun, reduced: list[ReducedRun]) -> ViewedScene:
-    config = full.scene.config
-    ordered = sorted(reduced, key=lambda run: run.r)
+def _scene(run: AnyRun) -> Scene:
+    return run.full.scene if isinstance(run, ReducedRun) else run.scene
+
+
+def _alike(scene: Scene) -> SceneConfig:
+    """Configuration without the error that its file may request."""
+    return scene.config.model_copy(update={"asked": None})
+
+
+def _viewed(runs: list[AnyRun]) -> ViewedScene:
+    """Runs of one scene; the full order is the first of them, if it is there."""
+    full = [run.full if isinstance(run, ReducedRun) else run for run in runs]
+    known: list[FullRun | AskedRun] = [run for run in full if isinstance(run, FullRun)]
+    first = [*known, *(run for run in runs if isinstance(run, AskedRun))][0]
+    others = [run for run in runs if run is not first and not isinstance(run, FullRun)]
+    others.sort(key=lambda run: run.r if isinstance(run, ReducedRun) else 0)
+    scene = _scene(first)
+    positions = first.outcome.positions if isinstance(first, AskedRun) else first.positions
     return ViewedScene(
-        name=config.name,
-        title=config.title,
-        mesh=full.scene.mesh,
-        time_step=config.time_step,
-        positions=full.positions,
-        ms=float(np.median(full.ms)),
-        runs=tuple(
-            ViewedRun(
-                group=run.group,
-                method=run.method,
-                title=run.method,
-                r=run.r,
-                read=partial(np.asarray, run.outcome.positions),
-                error=run.error,
-                blowup_frame=run.outcome.blowup_frame,
-                ms=run.ms if np.isfinite(run.ms) else None,
-            )
-            for run in ordered
-        ),
-        effects=config.effects,
-        tables={"runs": partial(_table, ordered)},
+        name=scene.config.name,
+        title=scene.config.title,
+        mesh=scene.mesh,
+        time_step=scene.config.time_step,
+        positions=positions,
+        ms=float(np.median(first.ms)),
+        runs=tuple(_shown(run, positions) for run in others),
+        effects=scene.config.effects,
+        first=first.title if isinstance(first, AskedRun) else "full order",
     )
 
 
-def _table(runs: list[ReducedRun]) -> pd.DataFrame:
-    """A row of each run; errors are those of the whole run, as no horizon is known."""
-    rows = [
-        {
-            "scene": run.full.scene.config.name,
-            "group": run.group,
-            "method": run.method,
-            "position_basis": "full",
-            "r": run.r,
-            "frames": run.outcome.frames,
-            "blowup_frame": run.outcome.blowup_frame,
-            "relative_error_within_horizon": run.outcome.error(
-                displacement_norms(run.full.positions)
-            ),
-            "ms_per_frame": run.ms,
-            "gain": run.gain,
-        }
-        for run in runs
-    ]
-    return pd.DataFrame(rows)
+def _shown(run: AnyRun, positions: np.ndarray) -> ViewedRun:
+    """A ``run`` beside the first one's ``positions`` (F + 1, N, 3) m."""
+    if isinstance(run, ReducedRun):
+        return ViewedRun(
+            group=run.group,
+            method=run.method,
+            title=run.method,
+            r=run.r,
+            positions=np.asarray(run.outcome.positions),
+            error=run.error,
+            blowup_frame=run.outcome.blowup_frame,
+            ms=run.ms if np.isfinite(run.ms) else None,
+        )
+    assert isinstance(run, AskedRun)
+    apart = np.linalg.norm(run.outcome.positions[1:] - positions[1:], axis=(1, 2))
+    return ViewedRun(
+        group="all groups",
+        method=run.title,
+        title=run.title,
+        r=0,
+        positions=run.outcome.positions,
+        error=apart / mean_motion(positions),
+        blowup_frame=None,
+        ms=float(np.median(run.ms)),
+    )

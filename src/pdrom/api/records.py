@@ -108,6 +108,15 @@ class AskedRun:
     offline_s: float
     error: float | None
 
+    @property
+    def title(self) -> str:
+        """The request, and for how long it is met."""
+        done = self.outcome
+        if not done.met:
+            return f"{self.request} requested, refused"
+        part = "" if done.frames == len(self.ms) else f" up to frame {done.frames}"
+        return f"within {self.request}{part}"
+
     def __repr__(self) -> str:
         done = self.outcome
         met = f"met for {done.frames} of {len(self.ms)} frames" if done.met else "not met"

@@ -18,7 +18,7 @@ from pdrom.core.project import checkout
 from pdrom.core.store.checksum import reason
 from pdrom.pipeline.environment import settle
 
-COMMANDS = ("new", "run", "reduce", "show", "draw", "view")
+COMMANDS = ("new", "run", "reduce", "view", "show")
 CODES = """exit codes: 0 done; 1 faulty input, or a file that cannot be read or written;
 2 the command was not understood; 3 a reduced run blew up (its file is written all the
 same); 4 the tolerance is met for less than half of the frames (reduce --error); 130 interrupted"""

@@ -1,38 +1,62 @@
-"""``pdrom view RESULT ...``: a page to look at runs."""
+"""``pdrom view RESULT ...``: a page to look at runs, a picture, files for ParaView."""
 
 import argparse
 import sys
 import webbrowser
 from pathlib import Path
 
-from pdrom.command.base import Command, Status, require_output
-from pdrom.command.results import declare_results, files_of, viewed
+from pdrom.command.base import Command, Status, declare_unchecked, require_output
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """Add to ``parser`` the runs, and the page to write."""
-    declare_results(parser)
+    """Add to ``parser`` the runs, and the files to write."""
+    parser.add_argument(
+        "results", metavar="RESULT", nargs="+", help="files of pdrom run and pdrom reduce"
+    )
     parser.add_argument("--out", metavar="FILE", help="page to write; the first RESULT as .html")
     parser.add_argument("--open", action="store_true", help="open it in the browser")
+    parser.add_argument("--png", metavar="FILE", help="picture of four frames of each run, too")
+    parser.add_argument(
+        "--vtk", metavar="FOLDER", help="files for ParaView, too: one a frame, and run.pvd"
+    )
+    declare_unchecked(parser)
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Write the page of the runs in ``arguments`` and say where it is."""
+    """Write what shows the runs in ``arguments`` and say where it is."""
+    from pdrom.api import load
+    from pdrom.api.pictures import viewed_scenes
+    from pdrom.core.errors import ConfigurationError
     from pdrom.report.viewer.page import write_page
 
     first = Path(arguments.results[0])
     out = Path(arguments.out or first.parent / f"{first.stem}.html")
-    require_output(out, files_of(arguments.results))
-    write_page(viewed(arguments), out)
+    require_output(out, arguments.results)
+    if arguments.png:
+        require_output(arguments.png, [*arguments.results, str(out)])
+    scenes = viewed_scenes(*(load(file, arguments.unchecked) for file in arguments.results))
+    if len(scenes) > 1 and (arguments.png or arguments.vtk):
+        raise ConfigurationError("--png and --vtk: of one scene at a time")
+    write_page(scenes, out)
     size = out.stat().st_size / 1e6
     sys.stdout.write(f"{out}: {size:.1f} MB; a browser opens it without a network\n")
+    if arguments.png:
+        from pdrom.report.viewer.frames import write_frames
+
+        write_frames(scenes[0], Path(arguments.png))
+        sys.stdout.write(f"{arguments.png}: four frames of each run\n")
+    if arguments.vtk:
+        from pdrom.report.viewer.vtk import vtk
+
+        vtk(scenes[0], Path(arguments.vtk, "run.pvd"))
+        sys.stdout.write(f"{Path(arguments.vtk, 'run.pvd')}: opened by ParaView\n")
     if arguments.open and not webbrowser.open(out.resolve().as_uri()):
         sys.stderr.write("pdrom: no browser was found; open the file by hand\n")
     return Status.DONE
 
 
 COMMAND = Command(
-    "Write a page on which runs are looked at",
+    "Write a page on which runs are looked at, a picture, or files for ParaView",
     "pdrom view sheet_spring_gappy_20.h5 --open",
     declare,
     perform,

@@ -148,7 +148,5 @@ PAPER_INPUT = Place("paper/{name}")
 LIVE_MODEL = Place("article/live/{scene}.js")
 ARTICLE = Place("article/{name}")
 LIVE_PAGE = Place("article/live.html")
-SCENE_TABLE = Place("scenes/{scene}/{name}.csv")
-SCENE_RUNS = Place("scenes/{scene}/runs.csv")
 
 PLACES = tuple(place for place in vars().copy().values() if isinstance(place, Place))

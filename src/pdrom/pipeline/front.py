@@ -1,15 +1,13 @@
 """``./reproduce ARGS...``: Snakemake with this project's options, names and words.
 
 ``python -m pdrom.pipeline.front`` does what the console command ``snakemake`` does, after the
-arguments were completed and the configuration files were checked. ``figure`` as the first argument
-names figures by their number in the manuscript or in the preprint; ``scene`` and ``viewer`` run the
-jobs of scenes and have ``pdrom`` draw what they made; ``verify`` compares what was made with what
-is expected; ``test`` hands the others to pytest, and ``run`` starts a
+arguments were completed and the configuration files were checked. ``figure`` as the first
+argument names figures by their number in the manuscript or in the preprint; ``verify`` compares
+what was made with what is expected; ``test`` hands the others to pytest, and ``run`` starts a
 program of the environment.
 """
 
 import os
-import subprocess
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
@@ -122,18 +120,7 @@ def main() -> None:
         _start(sys.argv[2:])
     end_at_sigterm()
     try:
-        words = sys.argv[1:]
-        if words[:1] in (["scene"], ["viewer"]):
-            # late: it loads the whole package
-            from pdrom.pipeline.scene_command import scene_order
-
-            order = scene_order(words)
-            pdrom = [sys.executable, "-m", "pdrom"]  # here, as the workflow sets another one
-            _run(order.arguments)
-            if order.draws:
-                sys.exit(subprocess.run([*pdrom, *order.drawing], check=False).returncode)
-        else:
-            _run(words)
+        _run(sys.argv[1:])
     except PdromError as error:
         sys.exit(f"pdrom: {error}")
     except KeyboardInterrupt:

@@ -48,7 +48,6 @@ from pdrom.pipeline.scenes import (
 )
 from pdrom.reduction.local.ranks import Rank
 from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
-from pdrom.report.viewer.settings import Viewer
 
 
 class StudySettings(ConfigModel):
@@ -89,7 +88,6 @@ class StudySettings(ConfigModel):
     live: Live = Live()
     alternatives: Alternatives = Alternatives()
     requested_tolerances: RequestedTolerances = RequestedTolerances()
-    viewer: Viewer = Viewer()
     variants: Variants = Variants()
     study: str | None = None
 

@@ -113,8 +113,7 @@ class Known:
         scenes = self.labels["scene"]({})
         if target in scenes:
             example = paths.FULL_ORDER.at(self.results, scene=target, run="train")
-            command = f"./reproduce scene {target}"
-            return f"target '{target}': a scene; name one of its files, as {example}, or: {command}"
+            return f"target '{target}': a scene; name one of its files, as {example}"
         allowed = self.files if "/" in target else [*names, *scenes]
         return (
             f"target '{target}': nothing makes it{_suggestion(target, allowed)}; targets are names "

@@ -1,15 +1,10 @@
 """What ``./reproduce ARGS...`` hands to Snakemake."""
 
-import subprocess
-import sys
-
 import pytest
 
 from pdrom.core.errors import ConfigurationError
-from pdrom.pipeline import front
 from pdrom.pipeline.commandline import RECORD, CommandLine, recall, remember
 from pdrom.pipeline.front import LINES, OPTIONS, completed
-from pdrom.pipeline.scene_command import SceneOrder
 from pdrom.report.figure_numbers import figure_numbers
 from places import ROOT
 
@@ -98,33 +93,3 @@ def test_a_damaged_record_counts_as_none(content):
     RECORD.parent.mkdir()
     RECORD.write_text(content)
     assert recall() == []
-
-
-@pytest.mark.parametrize("plans", [False, True])
-def test_what_the_jobs_of_a_scene_made_is_drawn_by_this_python(monkeypatch, plans):
-    """Snakemake's workflow sets another program in its place while it runs."""
-    order = SceneOrder(["--", "results/x"], ["draw", "own"], draws=not plans)
-    own, ran, drawn = sys.executable, [], []
-
-    def jobs(arguments):
-        ran.append(arguments)
-        monkeypatch.setattr(sys, "executable", "another program")
-
-    def draws(command, **_):
-        drawn.append(command)
-        return subprocess.CompletedProcess(command, 3)
-
-    monkeypatch.setattr(sys, "argv", ["front", "scene", "own"])
-    monkeypatch.setattr("pdrom.pipeline.scene_command.scene_order", lambda words: order)
-    monkeypatch.setattr(front, "settle", lambda: None)
-    monkeypatch.setattr(front, "end_at_sigterm", lambda: None)
-    monkeypatch.setattr(front, "_run", jobs)
-    monkeypatch.setattr(front.subprocess, "run", draws)
-    if plans:
-        front.main()
-    else:
-        with pytest.raises(SystemExit) as ended:
-            front.main()
-        assert ended.value.code == 3
-    assert ran == [order.arguments]
-    assert drawn == ([] if plans else [[own, "-m", "pdrom", "draw", "own"]])

@@ -32,7 +32,6 @@ def test_files_of_the_study_and_what_was_asked_for_beside_them(plan, tmp_path, m
     ]
     asked_for = [
         paths.TRAIN.at("results", scene="spring_oop"),
-        paths.SCENE_TABLE.at("results", scene="spring_oop", name="accuracy_cost"),
     ]
     others = [
         paths.TRAIN.at("results", scene="no_such_scene"),

@@ -26,6 +26,7 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
     return {
         "name": scene.name,
         "title": scene.title,
+        "first": scene.first,
         "triangles": pack_text(triangles.reshape(-1, 3).astype("<u4")),
         "timeStep": scene.time_step,
         "stride": stride,
@@ -36,7 +37,7 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
         "ms": scene.ms,
         "floor": _numbers(scene.floor),
         "horizon": scene.horizon,
-        "runs": [_pack_run(run, stride, used) for run in scene.runs if run.on_page],
+        "runs": [_pack_run(run, stride, used) for run in scene.runs],
     }
 
 

@@ -25,8 +25,7 @@ def write_page(scenes: Sequence[ViewedScene], path: str | os.PathLike[str]) -> N
     size = len(text.encode())
     if size > LARGEST:
         raise StorageError(
-            f"{path}: {size / 1e6:.0f} MB, allowed are {LARGEST / 1e6:.0f}: choose fewer scenes, "
-            "methods or sizes (keys viewer.scenes, methods, viewer.ranks)"
+            f"{path}: {size / 1e6:.0f} MB, allowed are {LARGEST / 1e6:.0f}: choose fewer runs"
         )
     write_text(text, path, with_checksum=False)
 

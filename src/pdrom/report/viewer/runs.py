@@ -1,11 +1,8 @@
-"""A scene with its runs, as pictures, films and the viewer's page show it."""
+"""A scene with its runs, as the page and pictures show it."""
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
-import pandas as pd
 
 from pdrom.model.effects.base import EffectConfig
 from pdrom.model.mesh.types import Mesh
@@ -16,27 +13,20 @@ class ViewedRun:
     """A reduced run.
 
     group, method, title : names of what is reduced and how, and the method in words
-    read : reads the positions
+    positions : (F' + 1, N, 3) m, finite, the initial ones first; it may have ended early
     error : (F',) relative error of each frame
     blowup_frame : None for a run that lived
     ms : milliseconds a frame, None where nobody measured
-    on_page : whether it is one of the sizes that the viewer offers
     """
 
     group: str
     method: str
     title: str
     r: int
-    read: Callable[[], np.ndarray]
+    positions: np.ndarray
     error: np.ndarray
     blowup_frame: int | None
     ms: float | None
-    on_page: bool = True
-
-    @cached_property
-    def positions(self) -> np.ndarray:
-        """Positions (F' + 1, N, 3) m, finite, the initial ones first; it may have ended early."""
-        return self.read()
 
 
 @dataclass(frozen=True)
@@ -51,7 +41,7 @@ class ViewedScene:
     runs : reduced runs, by group, method and ascending size
     effects : those of the scene; what has a body is shown
     velocities : (F + 1, N, 3) m/s of the full order, None where they were not stored
-    tables : makes the tables that are known of the scene, by their names
+    first : kind of the run that the others are compared with
     """
 
     name: str
@@ -65,7 +55,7 @@ class ViewedScene:
     runs: tuple[ViewedRun, ...] = ()
     effects: tuple[EffectConfig, ...] = ()
     velocities: np.ndarray | None = None
-    tables: Mapping[str, Callable[[], pd.DataFrame]] = field(default_factory=dict)
+    first: str = "full order"
 
     @property
     def groups(self) -> list[str]:

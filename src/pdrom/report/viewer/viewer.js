@@ -34,7 +34,7 @@
     const ofGroup = scene.runs.filter((run) => run.group === at("group").value);
     fill(at("method"), distinct(ofGroup.map((run) => run.method)));
     const ofMethod = ofGroup.filter((run) => run.method === at("method").value);
-    fill(at("r"), ofMethod.map((run) => run.r));
+    fill(at("r"), ofMethod.map((run) => run.r), (r) => r || "–");
     return [scene, ofMethod.find((run) => String(run.r) === at("r").value) || null];
   }
 
@@ -84,7 +84,7 @@
       body.set(q);
       drawing.add(body);
     }
-    at("left").textContent = above() ? "full order (wires) and reduced" : "full order";
+    at("left").textContent = above() ? `${shown.scene.first} (wires) and reduced` : shown.scene.first;
     at("right").textContent = beside ? "reduced" : "";
     at("legend").hidden = !(shown.reduced && at("colour").checked);
     at("largest").textContent = `${(0.1 * side() / 1.4).toPrecision(2)} and more`;
@@ -203,7 +203,7 @@
 
   function tell() {
     const { scene, run } = shown, ms = (value) => (value === null ? "not timed" : `${value.toPrecision(3)} ms a frame`);
-    const parts = [`${scene.title}.`, `Full order: ${ms(scene.ms)}.`];
+    const parts = [`${scene.title}.`, `${scene.first[0].toUpperCase()}${scene.first.slice(1)}: ${ms(scene.ms)}.`];
     if (run) parts.push(`Reduced: ${ms(run.ms)}.`);
     if (run) parts.push(`Relative error: distance of the two runs over the full order's motion (its distance from the start, root mean square over the frames); ${told(run)}.`);
     if (run && run.blowup !== null) parts.push(`The reduced run blew up at frame ${run.blowup}.`);

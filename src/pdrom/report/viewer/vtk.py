@@ -8,7 +8,7 @@ import numpy as np
 
 from pdrom.core.store import atomic_path
 from pdrom.model.mesh.types import Mesh
-from pdrom.report.scenes.picture import shown_runs
+from pdrom.report.viewer.frames import shown_runs
 from pdrom.report.viewer.runs import ViewedScene
 
 NAME = "frame_{:05d}.vtu"

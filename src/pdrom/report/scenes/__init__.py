@@ -1,1 +1,0 @@
-"""Pictures, films, tables and files of a single scene, of the pipeline's results or of own runs."""

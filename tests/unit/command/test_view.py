@@ -1,0 +1,71 @@
+"""pdrom view: a page, a picture and files for ParaView, of every kind of run."""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+import pytest
+from PIL import Image
+
+from builders import SMALL
+from pdrom.api import AskedRun, FullRun, load
+from pdrom.api.pictures import viewed_scenes
+from pdrom.command.base import Status
+from pdrom.command.main import run
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a full-order run, a reduced one and one within a requested tolerance."""
+    folder = tmp_path_factory.mktemp("runs")
+    scene, full = str(folder / "small.yaml"), str(folder / "small.h5")
+    Path(scene).write_text(SMALL, encoding="utf-8")
+    assert run(["run", scene]) == Status.DONE
+    for wish in (["--group", "spring", "--r", "2"], ["--error", "0.05"]):
+        assert run(["reduce", scene, *wish, "--run", full]) == Status.DONE
+    return folder
+
+
+def files(runs: Path) -> list[str]:
+    return [str(runs / f"{name}.h5") for name in ("small", "small_spring_gappy_2", "small_asked")]
+
+
+def test_a_run_within_a_tolerance_is_a_kind_of_its_own(runs):
+    full, _, asked = map(load, files(runs))
+    assert isinstance(full, FullRun)
+    assert isinstance(asked, AskedRun)
+    assert asked.request.error == 0.05
+    assert asked.title == "within 5 % of the positions"
+    (scene,) = viewed_scenes(asked)
+    assert scene.first == asked.title
+    (scene,) = viewed_scenes(*map(load, files(runs)))
+    assert scene.first == "full order"
+    assert [each.method for each in scene.runs] == [asked.title, "gappy"]
+    assert scene.ms == np.median(full.ms)
+    assert scene.runs[0].ms == np.median(asked.ms)
+
+
+def test_the_page_the_picture_and_the_files_for_paraview_have_all_runs(runs, tmp_path, capsys):
+    out = ["--out", str(tmp_path / "p.html"), "--png", str(tmp_path / "p.png")]
+    assert run(["view", *files(runs), *out, "--vtk", str(tmp_path / "vtk")]) == Status.DONE
+    assert len(capsys.readouterr().out.splitlines()) == 3
+    assert "within 5 % of the positions" in (tmp_path / "p.html").read_text("utf-8")
+    with Image.open(tmp_path / "p.png", formats=["PNG"]) as picture:
+        assert min(picture.size) > 100
+    listed = ElementTree.parse(tmp_path / "vtk" / "run.pvd").findall("Collection/DataSet")
+    full = load(files(runs)[0])
+    assert len(listed) == len(full.positions)
+    last = meshio.read(tmp_path / "vtk" / listed[-1].get("file"))
+    assert np.array_equal(last.points, full.positions[-1])
+    assert {name.split(" ")[0] for name in last.point_data} >= {"displacement", "spring", "all"}
+    assert [path.name for path in tmp_path.rglob(".*")] == []
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [(["none.h5"], "none.h5: no such file"), (["RUN", "--png", "RUN"], "is read by this command")],
+)
+def test_what_cannot_be_viewed_is_one_line(runs, capsys, words, message):
+    assert run(["view", *(files(runs)[0] if w == "RUN" else w for w in words)]) == Status.FAULTY
+    assert message in capsys.readouterr().err.splitlines()[-1]
