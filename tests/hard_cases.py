@@ -5,11 +5,11 @@ from functools import cache
 
 import pytest
 
-from pdrom.experiments.hard_cases.catalogue import CASES
-from pdrom.experiments.hard_cases.expectations import load_expectations
-from pdrom.experiments.hard_cases.reductions import Training
 from pdrom.reduction.method import load_methods
 from places import ROOT
+from study.experiments.hard_cases.catalogue import CASES
+from study.experiments.hard_cases.expectations import load_expectations
+from study.experiments.hard_cases.reductions import Training
 
 METHODS = load_methods(ROOT / "config" / "methods.yaml")
 EXPECTED = load_expectations(ROOT / "config" / "hard_cases.yaml")

@@ -5,10 +5,10 @@ from pathlib import Path
 
 from bad_input.project import SMALL_SCENE, make_project
 from pdrom.core.yamlfile import read_yaml
-from pdrom.experiments.kit.declaration import experiments
-from pdrom.pipeline.contents import labels_of
-from pdrom.pipeline.resolve import Resolver
-from pdrom.pipeline.study import Study
+from study.experiments.kit.declaration import experiments
+from study.pipeline.contents import labels_of
+from study.pipeline.resolve import Resolver
+from study.pipeline.study import Study
 
 SCENE = "own"
 NEEDED = (

@@ -4,17 +4,17 @@ from pathlib import Path
 
 import numpy as np
 
-from pdrom.core.paths import File
 from pdrom.core.store import write_hdf5
-from pdrom.experiments.live import LiveModels, Options, live
 from pdrom.model.mesh.types import save_mesh
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
 from pdrom.reduction.subspace.store import store_columns, store_model
-from pdrom.report.live.page import live_page
 from places import ROOT
+from study.artifact.paths import File
+from study.experiments.live import LiveModels, Options, live
+from study.live.page import live_page
 
 
 def write_page(folder: Path, models: list[Path]) -> Path:

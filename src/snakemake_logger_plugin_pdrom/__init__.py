@@ -2,7 +2,7 @@
 
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 
-from pdrom.pipeline.progress import Progress
+from study.pipeline.progress import Progress
 
 
 class LogHandler(Progress, LogHandlerBase):

@@ -9,10 +9,10 @@ from typing import Any
 import yaml
 
 from pdrom.core.yamlfile import read_yaml
-from pdrom.pipeline.commandline import check_files
-from pdrom.pipeline.plan import Plan
-from pdrom.pipeline.study import Study
 from places import CONFIG, ROOT
+from study.pipeline.commandline import check_files
+from study.pipeline.plan import Plan
+from study.pipeline.study import Study
 
 STUDY = "config/default.yaml"
 SCENE = "config/scenes/small.yaml"

@@ -127,7 +127,7 @@ for name in "${steps[@]}"; do
         [ -z "$(run git status --porcelain)" ] || fail "the run left files that git does not ignore"
         ;;
     verify) run ./reproduce verify --configfile config/tiny.yaml </dev/null ;;
-    quick) run ./reproduce test -q tests/unit/core tests/unit/pipeline tests/physics/test_patch.py </dev/null ;;
+    quick) run ./reproduce test -q tests/unit/pdrom/core tests/unit/study/pipeline tests/physics/test_patch.py </dev/null ;;
     study) run ./reproduce </dev/null ;;
     tests) run ./reproduce test ${arguments[@]+"${arguments[@]}"} </dev/null ;;
     esac

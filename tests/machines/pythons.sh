@@ -7,7 +7,7 @@
 #   --only      tiny (with its verification) or tests; may be repeated
 #   --targets   these of the tiny study only, which are then not verified
 #   --folder    keeps the clones in FOLDER, for the versions 3.11, 3.12 ..., and goes on where a call before this one ended
-#   ARGUMENT    of pytest, as in: --only tests -- tests/unit/core
+#   ARGUMENT    of pytest, as in: --only tests -- tests/unit/pdrom/core
 #
 # The clones get the caller's settings of pip, of proxies and of certificates, and nothing else. Every version is tried, and the
 # last lines say which passed.

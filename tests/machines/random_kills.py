@@ -56,7 +56,7 @@ def kind(process: psutil.Process) -> str:
             )
         if "fork_server/alone.py" in words:
             return "job"
-        return "front" if "pdrom.pipeline.front" in words else ""
+        return "front" if "study.pipeline.front" in words else ""
     except (psutil.Error, AttributeError):  # it has ended meanwhile
         return ""
 

@@ -17,7 +17,7 @@ import h5py
 import numpy as np
 import pandas as pd
 
-from pdrom.tables import declared
+from study.tables import declared
 
 ROOT = Path(__file__).resolve().parents[2]
 

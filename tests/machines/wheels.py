@@ -1,4 +1,4 @@
-"""Do the locked packages have wheels where `pdrom.pipeline.platforms` says so, and only there?
+"""Do the locked packages have wheels where `study.pipeline.platforms` says so, and only there?
 
 Usage: python tests/machines/wheels.py (the resolver `uv` is on the PATH; nothing is installed)
 
@@ -12,7 +12,7 @@ import tempfile
 from itertools import product
 from pathlib import Path
 
-from pdrom.pipeline.platforms import Machine
+from study.pipeline.platforms import Machine
 
 ROOT = Path(__file__).resolve().parents[2]
 LOCKS = ("requirements.lock", "requirements-cluster.lock")

@@ -1,4 +1,4 @@
-"""Bounded projections carry no run away (`pdrom.experiments.kit.boundedness`), tried."""
+"""Bounded projections carry no run away (`study.experiments.kit.boundedness`), tried."""
 
 import numpy as np
 import pytest
@@ -6,13 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from builders import GROUPS, make_scene
-from pdrom.experiments.kit.boundedness import (
+from pdrom.model.scene import Scene
+from study.experiments.kit.boundedness import (
     Compliance,
     held_sets,
     largest_projections,
     linear_extent,
 )
-from pdrom.model.scene import Scene
 
 RELEASED = [
     {"effect": "pins", "select": "left", "until": 20},

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from builders import GROUPS, make_scene
-from pdrom.experiments.kit.boundedness import Compliance, largest_projections
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis.compute import compute_basis
@@ -13,6 +12,7 @@ from pdrom.reduction.local.local_step import ReducedLocalStep
 from pdrom.reduction.local.reach import reach
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, Sampling, select_path
+from study.experiments.kit.boundedness import Compliance, largest_projections
 
 METHODS = {
     "pod": MethodSpec(title="pod", centring="affine", rows="all"),

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from builders import make_scene
-from pdrom.experiments.kit.boundedness import Compliance, held_sets, kept_velocity
-from pdrom.experiments.kit.premise import outside
 from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.scene import Scene
+from study.experiments.kit.boundedness import Compliance, held_sets, kept_velocity
+from study.experiments.kit.premise import outside
 
 SHEET = {"kind": "cloth", "rows": 4, "columns": 3}
 BAR = {"kind": "bar", "nx": 3, "ny": 2, "nz": 2}

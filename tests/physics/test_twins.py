@@ -2,10 +2,10 @@
 
 import pytest
 
-from pdrom.experiments.kit.sensitivity import perturbation_field, relative_difference
 from pdrom.model.runs.full_order import trajectory
-from pdrom.pipeline.scenes import load_bound_scene
 from places import ROOT
+from study.experiments.kit.sensitivity import perturbation_field, relative_difference
+from study.pipeline.scenes import load_bound_scene
 
 WELL_POSED = sorted(
     path.stem

@@ -2,8 +2,8 @@
 
 import re
 
-from pdrom.pipeline.platforms import NEWEST, OLDEST
 from places import ROOT
+from study.pipeline.platforms import NEWEST, OLDEST
 
 DOCKERFILE = (ROOT / "Dockerfile").read_text("utf-8")
 IGNORED = (ROOT / ".dockerignore").read_text("utf-8").split()

@@ -7,19 +7,19 @@ from pathlib import Path
 import pytest
 import yaml
 
-from pdrom.core.paths import RESULTS
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.selection import KINDS
 from pdrom.model.scene import SceneConfig
-from pdrom.pipeline.front import completed
-from pdrom.pipeline.study import StudySettings
 from pdrom.reduction.method import MethodSpec
-from pdrom.report.figures.kit.outcomes import LOOKS
-from pdrom.tables import declared
-from pdrom.verification.bundle import parser as bundle_parser
-from pdrom.verification.command import parser as verify_parser
-from pdrom.verification.references import folder_of, read_reference
 from places import ROOT
+from study.artifact.paths import RESULTS
+from study.figures.kit.outcomes import LOOKS
+from study.pipeline.front import completed
+from study.pipeline.study import StudySettings
+from study.tables import declared
+from study.verification.bundle import parser as bundle_parser
+from study.verification.command import parser as verify_parser
+from study.verification.references import folder_of, read_reference
 
 PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "docs").rglob("*.md")])
 ADDING = ROOT / "docs" / "adding.md"
@@ -143,7 +143,7 @@ def test_the_classes_of_runs_are_explained() -> None:
 def test_the_messages_that_are_explained_exist() -> None:
     """Their fixed parts; what stands for others is written in capitals or as three dots."""
     files = [ROOT / "reproduce", ROOT / "workflow" / "Snakefile"]
-    files += (ROOT / "src" / "pdrom").rglob("*.py")
+    files += (ROOT / "src").rglob("*.py")
     sources = "\n".join(path.read_text("utf-8") for path in files)
     sources = re.sub(r'"\s*\n\s*f?"', "", sources)  # a text over several lines
     page = (ROOT / "docs" / "messages.md").read_text("utf-8")

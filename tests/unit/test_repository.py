@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from pdrom.core.paths import FIGURE, RESULTS, TABLE
 from pdrom.core.yamlfile import read_yaml
-from pdrom.pipeline.folders import Folders
-from pdrom.report.figures.kit.catalogue import declarations
-from pdrom.tables import declared
 from places import ROOT
+from study.artifact.paths import FIGURE, RESULTS, TABLE
+from study.figures.kit.catalogue import declarations
+from study.pipeline.folders import Folders
+from study.tables import declared
 
 LARGEST = 300_000
 # Binary files that are meant: pictures of the pages for readers, compressed tables.

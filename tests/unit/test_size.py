@@ -13,12 +13,12 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 51_020,
-    "modules of src": 522,
+    "lines of src": 50_930,
+    "modules of src": 521,
     "lines of tests": 33_000,
     "words of documentation": 29_860,
     "tables": 48,
-    "figures": 28,
+    "figures": 27,
     "experiments": 29,
     "percent of src in decorators, signatures and imports": 24.0,
 }

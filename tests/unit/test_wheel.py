@@ -38,11 +38,9 @@ def test_it_carries_the_package_and_the_files_that_it_reads(wheel: Path) -> None
         methods = CONFIG / "methods.yaml"
         assert archive.read("pdrom/config/methods.yaml") == methods.read_bytes()
     source = ROOT / "src"
-    own = {str(p.relative_to(source)) for p in source.rglob("*") if p.is_file()}
+    own = {str(p.relative_to(source)) for p in (source / "pdrom").rglob("*") if p.is_file()}
     assert {name for name in own if "__pycache__" not in name and "egg-info" not in name} <= names
-    assert {name.split("/")[0].split("-")[0] for name in names} == {
-        "pdrom", "snakemake_logger_plugin_pdrom",
-    }  # fmt: skip
+    assert {name.split("/")[0].split("-")[0] for name in names} == {"pdrom"}
 
 
 @pytest.mark.slow

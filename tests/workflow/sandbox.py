@@ -17,9 +17,9 @@ import pandas as pd
 import yaml
 from checkout import ROOT, copy_repository
 
-from pdrom.core.paths import MANIFEST
 from pdrom.core.store import check_file
-from pdrom.tables import declared
+from study.artifact.paths import MANIFEST
+from study.tables import declared
 
 MICRO = {
     "scenes": ["spring_oop"],

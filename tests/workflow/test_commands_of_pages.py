@@ -32,8 +32,8 @@ LEFT_OUT = {
     r"^\.venv/bin/(ruff|snakefmt|mypy)": "executed by .ci/run",
     r"^\./reproduce --report": "executed by test_report.py",
     r"^\./reproduce (verify|bundle)": "needs a study; has tests of its own",
-    r"^\./reproduce (pages|docs)": "executed by tests/unit/verification",
-    r"^\.venv/bin/python -m pdrom\.verification": "executed by tests/unit/verification",
+    r"^\./reproduce (pages|docs)": "executed by tests/unit/study/verification",
+    r"^\.venv/bin/python -m pdrom\.verification": "executed by tests/unit/study/verification",
     r"^\./reproduce (figure [^8]|reduced_reruns)": "planned by test_measured_claim_map.py",
     r"rest_shapes|mesh_sizes|rest_lengths|leverage": "recipes, executed by test_recipes.py",
     r"^(docker|(sh |bash )?tests/)": "makes a machine of its own",
@@ -107,7 +107,7 @@ def test_a_run_is_planned(command: str, checkout: Checkout) -> None:
         pytest.skip("the script itself: test_reproduce_script.py")
     # after the names of a figure or a scene, before the hyphens that open targets
     planned = ["-n", *words] if "--" in words else [*words, "-n"]
-    run([sys.executable, "-m", "pdrom.pipeline.front", *planned], checkout.folder, checkout)
+    run([sys.executable, "-m", "study.pipeline.front", *planned], checkout.folder, checkout)
 
 
 @pytest.mark.slow

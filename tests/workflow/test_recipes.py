@@ -46,9 +46,13 @@ STUDY = {
     "sensitivity": {"perturbations": [1e-10], "seeds": [1]},
 }
 ARGUMENTS = ("--configfile", "own.yaml")
-EXPERIMENT = "src/pdrom/experiments/rest_lengths.py"
-TABLE = "src/pdrom/tables/mesh_sizes.py"
-GROUP_TESTS = ("tests/physics", "tests/unit/model/constraints", "tests/unit/model/dynamics")
+EXPERIMENT = "src/study/experiments/rest_lengths.py"
+TABLE = "src/study/tables/mesh_sizes.py"
+GROUP_TESTS = (
+    "tests/physics",
+    "tests/unit/pdrom/model/constraints",
+    "tests/unit/pdrom/model/dynamics",
+)
 
 
 @pytest.fixture(scope="module")

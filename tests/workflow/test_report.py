@@ -11,10 +11,10 @@ from playwright.sync_api import Page
 from sandbox import MICRO, MICRO_FILE
 
 from browser import browser_or_skip, page_at
-from pdrom.report.figures.kit.catalogue import declarations
-from pdrom.report.words.markup import to_plain
-from pdrom.tables import declared
 from places import MICRO_RESULTS
+from study.artifact.markup import to_plain
+from study.figures.kit.catalogue import declarations
+from study.tables import declared
 
 ARGUMENTS = ("--configfile", MICRO_FILE)
 

@@ -18,9 +18,9 @@ from places import ROOT
 SCRIPT = ROOT / "reproduce"
 TOOLS = ["cat", "chmod", "cksum", "cp", "dirname", "grep", "mkdir", "rm", "sed", "sh"]
 TOOLS += ["sleep", "tail", "touch", "tr"]
-PLATFORMS = "src/pdrom/pipeline/platforms.py"
+PLATFORMS = "src/study/pipeline/platforms.py"
 PACKAGES = "lib/python3.12/site-packages"
-FRONT = "python -m pdrom.pipeline.front"
+FRONT = "python -m study.pipeline.front"
 LOCK_FILE = f"nowhere==1.0 --hash=sha256:{64 * '0'}\n"
 
 # Stands for a Python of a given version that makes environments out of itself.

@@ -17,10 +17,10 @@ import yaml
 from checkout import Checkout, Made, copy_repository, only_line
 
 from pdrom.core.store import read_table
-from pdrom.pipeline.running import hold
-from pdrom.report.figures.kit.catalogue import declarations
-from pdrom.tables import declared
 from places import MICRO_MANUSCRIPT, MICRO_RESULTS
+from study.figures.kit.catalogue import declarations
+from study.pipeline.running import hold
+from study.tables import declared
 
 MICRO = {
     "scenes": ["spring_oop", "strain_oop", "bar_release"],
@@ -243,7 +243,7 @@ def test_a_threshold_of_a_claim_reruns_verdicts_and_manuscript_only(finished: Ch
 
 
 def test_a_caption_rerenders_its_figure_and_the_manuscript_only(finished: Checkout) -> None:
-    source = "src/pdrom/report/figures/singular_values.py"
+    source = "src/study/figures/singular_values.py"
     finished.edit(source, 'Decay of the singular values"', 'Singular values"')
     planned = finished.planned(*MICRO_ARGUMENTS)
     figure = {f"{MICRO_RESULTS}/figures/singular_values.{kind}" for kind in ("pdf", "png")}

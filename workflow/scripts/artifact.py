@@ -1,5 +1,5 @@
-from pdrom.artifact.artifact import make
-from pdrom.core.logs import job_log
+from study.artifact.artifact import make
+from study.artifact.logs import job_log
 
 with job_log(snakemake.log[0]):
     make(

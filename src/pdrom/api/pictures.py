@@ -11,10 +11,10 @@ from pdrom.core.errors import SceneError
 from pdrom.core.store import require_own, require_place
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import mean_motion
-from pdrom.report.figures.kit import style
-from pdrom.report.figures.kit.multiples import clipped, log_axis
-from pdrom.report.viewer.page import write_page
-from pdrom.report.viewer.runs import ViewedRun, ViewedScene
+from pdrom.view import style
+from pdrom.view.multiples import clipped, log_axis
+from pdrom.view.page import write_page
+from pdrom.view.runs import ViewedRun, ViewedScene
 
 AnyRun = FullRun | ReducedRun | AskedRun
 LOW, HIGH = 1e-7, 1e3  # errors outside are drawn on the limit

@@ -12,11 +12,10 @@ from contextlib import suppress
 from importlib import import_module
 
 from pdrom.command.base import Command, Status
-from pdrom.core.errors import PdromError, choices
-from pdrom.core.logs import INTERRUPTED
+from pdrom.core.environment import settle
+from pdrom.core.errors import INTERRUPTED, PdromError, choices
 from pdrom.core.project import checkout
 from pdrom.core.store.checksum import reason
-from pdrom.pipeline.environment import settle
 
 COMMANDS = ("new", "run", "reduce", "view", "show")
 CODES = """exit codes: 0 done; 1 faulty input, or a file that cannot be read or written;

@@ -108,25 +108,19 @@ def _table(path: Path) -> Iterator[str]:
     from pandas.api.types import is_numeric_dtype
 
     from pdrom.core.store import read_table
-    from pdrom.tables import declared
 
     table = read_table(path, result=False)
-    of_study = declared().get(path.stem)
-    known = {column.name: column for column in of_study.columns} if of_study else {}
-    if of_study:
-        yield f"table of the study: {of_study.title}"
     yield f"{len(table)} rows of {len(table.columns)} columns:"
     for name in table.columns:
-        values, column = table[name].dropna(), known.get(name)
-        parts = [column.meaning, column.unit and f"in {column.unit}"] if column else []
+        values = table[name].dropna()
         if not len(values):
-            parts.append("empty")
+            content = "empty"
         elif not is_numeric_dtype(values):
             different = list(dict.fromkeys(map(str, values)))
-            parts.append(", ".join(different[:4]) + (" ..." if len(different) > 4 else ""))
+            content = ", ".join(different[:4]) + (" ..." if len(different) > 4 else "")
         else:
-            parts.append(f"{values.min():.4g} to {values.max():.4g}")
-        yield f"  {name}: {'; '.join(filter(None, parts))}"
+            content = f"{values.min():.4g} to {values.max():.4g}"
+        yield f"  {name}: {content}"
 
 
 def _short(value: Any) -> str:

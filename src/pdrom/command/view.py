@@ -27,7 +27,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.api import load
     from pdrom.api.pictures import viewed_scenes
     from pdrom.core.errors import ConfigurationError
-    from pdrom.report.viewer.page import write_page
+    from pdrom.view.page import write_page
 
     first = Path(arguments.results[0])
     out = Path(arguments.out or first.parent / f"{first.stem}.html")
@@ -41,12 +41,12 @@ def perform(arguments: argparse.Namespace) -> Status:
     size = out.stat().st_size / 1e6
     sys.stdout.write(f"{out}: {size:.1f} MB; a browser opens it without a network\n")
     if arguments.png:
-        from pdrom.report.viewer.frames import write_frames
+        from pdrom.view.frames import write_frames
 
         write_frames(scenes[0], Path(arguments.png))
         sys.stdout.write(f"{arguments.png}: four frames of each run\n")
     if arguments.vtk:
-        from pdrom.report.viewer.vtk import vtk
+        from pdrom.view.vtk import vtk
 
         vtk(scenes[0], Path(arguments.vtk, "run.pvd"))
         sys.stdout.write(f"{Path(arguments.vtk, 'run.pvd')}: opened by ParaView\n")

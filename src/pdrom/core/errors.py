@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+INTERRUPTED = 130  # exit status of a program that ends by Ctrl-C
+
 
 def choices(value: object, allowed: Iterable[object]) -> str:
     """End of a message about ``value``: what is allowed, and the name that was probably meant."""

@@ -3,8 +3,8 @@
 import pytest
 
 from hard_cases import parameters
-from pdrom.experiments.hard_cases.catalogue import CASES
-from pdrom.experiments.hard_cases.checks import CHECKS, faults
+from study.experiments.hard_cases.catalogue import CASES
+from study.experiments.hard_cases.checks import CHECKS, faults
 
 
 @pytest.mark.parametrize("name", parameters(CASES))

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from hard_cases import EXPECTED, METHODS, training
-from pdrom.experiments.hard_cases.catalogue import CASES as CATALOGUE
-from pdrom.experiments.hard_cases.catalogue import reducible_cases
-from pdrom.experiments.hard_cases.expectations import FAILURES, NOT_TAKEN, surprise
-from pdrom.experiments.hard_cases.outcomes import row
-from pdrom.experiments.hard_cases.reductions import names, reduced_run
 from pdrom.model.effects import EFFECTS
+from study.experiments.hard_cases.catalogue import CASES as CATALOGUE
+from study.experiments.hard_cases.catalogue import reducible_cases
+from study.experiments.hard_cases.expectations import FAILURES, NOT_TAKEN, surprise
+from study.experiments.hard_cases.outcomes import row
+from study.experiments.hard_cases.reductions import names, reduced_run
 
 CASES = [*reducible_cases(), *reducible_cases(slow=True)]
 REDUCTIONS = names(METHODS)

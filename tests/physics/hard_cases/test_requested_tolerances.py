@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from hard_cases import training
-from pdrom.experiments.hard_cases.catalogue import reducible_cases
 from pdrom.reduction.requested.calibration import Request, ToleranceSettings, calibrate
 from pdrom.reduction.requested.run import RequestedRun
+from study.experiments.hard_cases.catalogue import reducible_cases
 
 SETTINGS = ToleranceSettings(
     modes=(8,), tolerances=(1e-2,), iterations=(5, 20), plain=(2,), accelerated=(5, 20)

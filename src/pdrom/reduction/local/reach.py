@@ -20,7 +20,7 @@ def reach(
 
     Parameters
     ----------
-    largest : (e,) bounds of | p_e |_F, see `pdrom.experiments.kit.boundedness.largest_projections`
+    largest : (e,) bounds of | p_e |_F, see `study.experiments.kit.boundedness.largest_projections`
     compliance : (N, N) K^+, m/N
     """
     mean = np.linalg.norm(reduction.basis.mean.reshape(group.elements, -1), axis=1)

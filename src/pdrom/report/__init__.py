@@ -1,1 +1,0 @@
-"""Figures, manuscript and viewers for readers."""

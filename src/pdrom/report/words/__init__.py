@@ -1,1 +1,0 @@
-"""Words of users and captions: what can be typeset, and the light mark-up."""

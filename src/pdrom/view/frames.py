@@ -1,0 +1,90 @@
+"""A picture of four frames of a scene: the full-order run, and below it each other run."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from pdrom.core.store import atomic_path
+from pdrom.core.store.atomic import MARK
+from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.effects import EFFECTS
+from pdrom.view import style
+from pdrom.view.camera import Camera
+from pdrom.view.panels import RunPanel, shared_window
+from pdrom.view.read import frame_numbers
+from pdrom.view.run_rows import Row, draw_rows
+from pdrom.view.runs import ViewedRun, ViewedScene
+from pdrom.view.text import plain_words
+
+INSTANTS = (0.25, 0.5, 0.75, 1.0)  # of the run
+CAMERA = Camera(30.0, 20.0)
+NO_LIMIT = 100.0  # inches: the picture need not fit on a page
+SHOWN = 20  # modes
+
+
+def write_frames(scene: ViewedScene, png: Path) -> None:
+    """Write the picture of ``scene`` to ``png``."""
+    with style.look(), atomic_path(png, with_checksum=False) as temporary:
+        _draw(scene).savefig(temporary, dpi=150, metadata={"Software": MARK.decode()})
+
+
+def shown(sizes: Sequence[ViewedRun]) -> ViewedRun:
+    """Choose the largest of some sizes (ascending) up to `SHOWN`, else the smallest."""
+    return ([run for run in sizes if run.r <= SHOWN] or sizes[:1])[-1]
+
+
+def shown_runs(scene: ViewedScene) -> list[ViewedRun]:
+    """One run of each group and method of ``scene``, of the size that pictures show."""
+    pairs = dict.fromkeys((run.group, run.method) for run in scene.runs)
+    return [shown(scene.sizes(*pair)) for pair in pairs]
+
+
+def _draw(scene: ViewedScene) -> Figure:
+    """One row per run; the grey outline in the rows below is the first run."""
+    numbers = frame_numbers(INSTANTS, len(scene.positions) - 1)
+    full = scene.positions[numbers].astype(float)
+    reference = [
+        RunPanel(f"frame {frame}", style.FULL_ORDER, q, reference=True).seen_by(CAMERA)
+        for frame, q in zip(numbers, full, strict=True)
+    ]
+    labels = [f"{style.words(scene.name)}\n{scene.first}"]
+    labels += [_title(scene, run) for run in shown_runs(scene)]
+    every = [reference, *([_panel(run, f) for f in numbers] for run in shown_runs(scene))]
+    windows = [
+        shared_window(CAMERA, q, [panels[i] for panels in every]) for i, q in enumerate(full)
+    ]
+    rows = [
+        Row(label, scene.mesh, panels, windows, full)
+        for label, panels in zip(labels, every, strict=True)
+    ]
+    return draw_rows(rows, CAMERA, NO_LIMIT)
+
+
+def _title(scene: ViewedScene, run: ViewedRun) -> str:
+    """Method and size of ``run``, below the group where ``scene`` reduces several."""
+    group = f"{style.words(run.group)}\n" if len(scene.groups) > 1 else ""
+    return f"{group}{plain_words(run.title)}" + (f"\nr = {run.r}" if run.r else "")
+
+
+def panel_of(run: ViewedRun, frame: int) -> RunPanel:
+    """Panel of ``run`` at ``frame``, or at its last one with what went wrong."""
+    last = len(run.positions) - 1
+    failure = f"blew up at frame {run.blowup_frame}" if run.blowup_frame is not None else "ended"
+    positions = run.positions[min(frame, last)].astype(float)
+    return RunPanel("", _colour(run.group), positions, failure if frame > last else None)
+
+
+def _panel(run: ViewedRun, frame: int) -> RunPanel:
+    panel, last = panel_of(run, frame).seen_by(CAMERA), len(run.positions) - 1
+    drawn = f"drawn: frame {last}" if last else "drawn: initial state"
+    remark = drawn if panel.failure else f"relative error {run.error[frame - 1]:.1g}"
+    return replace(panel, remark=remark if frame else None)
+
+
+def _colour(group: str) -> tuple[float, float, float]:
+    """Colour of a constraint group, by its place among all; of all groups the first one."""
+    groups = [name for name in EFFECTS if issubclass(EFFECTS.load(name), ConstraintGroup)]
+    looks, place = style.GROUP_LOOKS, groups.index(group) if group in groups else 0
+    return style.surface_colour(looks[place % len(looks)][0])

@@ -1,0 +1,234 @@
+"""Shaded pictures of triangle meshes, drawn with matplotlib polygons.
+
+Faces are painted from far to near (painter's algorithm) and lit from both sides (Lambert), so that
+a sheet shows its folds whichever side it turns to the camera.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdrom.view.artists import Axes, PolyCollection
+from pdrom.view.camera import Camera, Window
+
+AMBIENT = 0.45
+RASTER_ABOVE = 1000  # faces; more are drawn as pixels, to keep the PDF small
+SHARP = np.cos(np.radians(80.0))  # edges between faces that turn more are drawn as outline
+# directions towards the lights in the camera's frame, and their strengths
+LIGHTS = (((-0.35, 0.45, 0.82), 0.85), ((0.80, -0.10, 0.59), 0.30))
+BACK = 0.78  # how much of the colour the back of an open surface keeps
+FLOOR, FLOOR_LINE, SHADOW = "#F4F2EE", "#DEDAD2", "#D3CFC6"
+
+
+Colour = str | tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Triangles (T, 3); ``open`` surfaces are shaded smoothly and show a darker back."""
+
+    triangles: np.ndarray
+    open: bool = True
+
+
+def face_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals (T, 3) of ``triangles`` (T, 3) of ``points`` (N, 3); zero without area."""
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    return _unit(np.cross(b - a, c - a))
+
+
+def smooth_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Face normals (T, 3) averaged over the neighbourhood of each face; as `face_normals`.
+
+    ``points`` are (N, 3), ``triangles`` (T, 3).
+    """
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    weighted = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+    vertex = np.zeros_like(points, dtype=float)
+    np.add.at(vertex, triangles.ravel(), weighted)
+    return _unit(_unit(vertex)[triangles].sum(axis=1))
+
+
+def shade(normals: np.ndarray, camera: Camera) -> np.ndarray:
+    """Brightness (T,) of faces with unit ``normals`` (T, 3), in [AMBIENT, 1], two-sided.
+
+    Lights go with the ``camera``.
+    """
+    view = normals @ camera.basis.T
+    lit = np.zeros(len(normals))
+    for direction, strength in LIGHTS:
+        unit = np.asarray(direction) / np.linalg.norm(direction)
+        lit += strength * np.abs(view @ unit)
+    return AMBIENT + (1.0 - AMBIENT) * np.clip(lit, 0.0, 1.0)
+
+
+def depth_order(points: np.ndarray, triangles: np.ndarray, camera: Camera) -> np.ndarray:
+    """Faces (T,) of ``triangles`` (T, 3) from far to near by ``camera``; ties keep order.
+
+    ``points`` (N, 3) m are their vertices.
+    """
+    return np.argsort(camera.depth(points)[triangles].mean(axis=1), kind="stable")
+
+
+def draw_surface(
+    ax: Axes,
+    points: np.ndarray,
+    surface: Surface,
+    camera: Camera,
+    colour: Colour | np.ndarray,
+    wire: float = 0.14,
+    contrast: float = 1.0,
+) -> PolyCollection:
+    """Draw a shaded surface on ``ax``, as ``camera`` sees it.
+
+    Parameters
+    ----------
+    points : (N, 3) m, finite
+    colour : one colour, or one RGB row per face (T, 3)
+    wire : opacity of the wireframe, 0 for none
+    contrast : 1 for the full shading, less where colours carry numbers
+    """
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import to_rgb
+
+    triangles = surface.triangles
+    raw = face_normals(points, triangles)
+    normals = smooth_normals(points, triangles) if surface.open else raw
+    brightness = 1.0 - contrast * (1.0 - shade(normals, camera))
+    base = colour if isinstance(colour, np.ndarray) else np.tile(to_rgb(colour), (len(raw), 1))
+    if surface.open and contrast == 1.0:
+        back = raw @ camera.basis[2] < 0.0
+        base = np.where(back[:, None], BACK * base + (1.0 - BACK) * 0.55, base)
+    faces = np.clip(base * brightness[:, None], 0.0, 1.0)
+    edges = (1.0 - wire) * faces + wire * 0.08
+    order = depth_order(points, triangles, camera)
+    collection = PolyCollection(
+        camera.project(points)[triangles[order]],
+        facecolors=faces[order],
+        edgecolors=edges[order],
+        linewidths=0.2,
+        joinstyle="round",
+        rasterized=len(triangles) > RASTER_ABOVE,
+    )
+    ax.add_collection(collection)
+    return collection
+
+
+def draw_floor(
+    ax: Axes, points: np.ndarray, surface: Surface, camera: Camera, window: Window
+) -> bool:
+    """Draw the floor y = 0 under the mesh, with its shadow, where it is in view; whether it is.
+
+    Parameters
+    ----------
+    ax, camera, window : picture and its view
+    points, surface : (N, 3) m of the mesh, and its triangles
+    """
+    from matplotlib.collections import PolyCollection
+
+    margin = 0.25 * max(window.width, window.height)
+    near = camera.project(points * [1.0, 0.0, 1.0])
+    if camera.elevation < 3.0 or not window.contains(near).any():
+        return False
+    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+    corners = np.array(
+        [[x, 0.0, z] for x, z in ((low[0], low[2]), (high[0], low[2]), (high[0], high[2]))]
+        + [[low[0], 0.0, high[2]]]
+    )
+    quad = PolyCollection(
+        [camera.project(corners)], facecolors=FLOOR, edgecolors=FLOOR_LINE, linewidths=0.5
+    )
+    quad.set_zorder(0.1)
+    ax.add_collection(quad)
+    shadow = PolyCollection(
+        near[surface.triangles],
+        facecolors=SHADOW,
+        edgecolors=SHADOW,
+        linewidths=0.25,
+        rasterized=len(surface.triangles) > RASTER_ABOVE,
+    )
+    shadow.set_zorder(0.2)
+    ax.add_collection(shadow)
+    return True
+
+
+def outline_edges(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Edges (n, 2) on the boundary of the surface, or between faces that meet sharply.
+
+    ``points`` are (N, 3) m, ``triangles`` (T, 3).
+    """
+    edges, first, second = _edges_between(triangles)
+    normals = face_normals(points, triangles)
+    turn = np.einsum("ij,ij->i", normals[first], normals[second])
+    return edges[(first == second) | (turn < SHARP)]
+
+
+def silhouette_edges(points: np.ndarray, triangles: np.ndarray, camera: Camera) -> np.ndarray:
+    """Edges (n, 2) between a face that ``camera`` sees from the front and one from behind.
+
+    ``points`` are (N, 3) m, ``triangles`` (T, 3).
+    """
+    edges, first, second = _edges_between(triangles)
+    a, b, c = np.moveaxis(camera.project(points)[triangles], 1, 0)
+    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
+    front = ux * vy > uy * vx
+    return edges[front[first] != front[second]]
+
+
+def _edges_between(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Edges (n, 2) and the two triangles (n,) at each; on the boundary the same one twice."""
+    pairs = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    owner = np.repeat(np.arange(len(triangles)), 3)
+    edges, inverse, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(inverse.ravel(), kind="stable")
+    start = np.concatenate([[0], np.cumsum(count)[:-1]])
+    return edges, owner[order[start]], owner[order[start + np.minimum(count - 1, 1)]]
+
+
+def draw_outline(
+    ax: Axes, points: np.ndarray, edges: np.ndarray, camera: Camera, colour: str = "#4D4D4D"
+) -> None:
+    """Draw a thin outline on ``ax``, the ghost of a shape to compare with.
+
+    ``points`` (N, 3) m are joined by ``edges`` (n, 2), as ``camera`` sees them, in one ``colour``.
+    """
+    from matplotlib.collections import LineCollection
+
+    lines = LineCollection(camera.project(points)[edges], colors=colour, linewidths=0.6)
+    lines.set_zorder(0.5)
+    ax.add_collection(lines)
+
+
+def draw_lines(
+    ax: Axes, segments: np.ndarray, camera: Camera, colours: np.ndarray, width: float = 1.2
+) -> None:
+    """Draw coloured ``segments`` (n, 2, 3) m on ``ax`` from far to near, as ``camera`` sees them.
+
+    ``colours`` (n, 4) are theirs, RGBA, ``width`` is in points.
+    """
+    from matplotlib.collections import LineCollection
+
+    order = np.argsort(camera.depth(segments.mean(axis=1)), kind="stable")
+    flat = camera.project(segments.reshape(-1, 3)).reshape(-1, 2, 2)
+    lines = LineCollection(
+        flat[order], colors=colours[order], linewidths=width, capstyle="round",
+        rasterized=len(segments) > RASTER_ABOVE,
+    )  # fmt: skip
+    lines.set_zorder(2.0)
+    ax.add_collection(lines)
+
+
+def set_window(ax: Axes, window: Window) -> None:
+    """Show ``window`` on ``ax`` without axes, all directions to the same scale."""
+    ax.set_xlim(window.left, window.right)
+    ax.set_ylim(window.bottom, window.top)
+    ax.set_aspect("equal")
+    ax.set_xticks([])
+    ax.set_yticks([])
+    for spine in ax.spines.values():
+        spine.set_visible(False)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors, dtype=float), where=length > 0.0)

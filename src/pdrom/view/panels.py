@@ -1,0 +1,172 @@
+"""Panels with a run in them: the mesh at one instant, or why there is none."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pdrom.model.mesh.types import Mesh
+from pdrom.view.artists import Axes
+from pdrom.view.camera import Camera, Window, bounds, window_of
+from pdrom.view.mesh_render import (
+    Colour,
+    Surface,
+    draw_floor,
+    draw_outline,
+    draw_surface,
+    outline_edges,
+    set_window,
+    silhouette_edges,
+)
+from pdrom.view.style import FAILED
+
+SAME_SCALE = 1.25  # a run that needs more than this multiple of the window is drawn smaller
+SLACK = 1.05  # a picture this much smaller than its neighbours is not pointed out
+SHORTEST, TALLEST = 0.35, 1.5  # allowed heights of a panel over its width
+
+
+@dataclass(frozen=True)
+class RunPanel:
+    """One run at one instant.
+
+    colour : one for all, or one for each triangle (T, 3), which then carries a number
+    positions : (N, 3) m, finite; None if there is nothing to draw
+    failure : what went wrong, drawn in red; None for a run that lived
+    remark : one line below the picture
+    reference : whether this is the run that others are compared with
+    flat : (N, 2) m, the positions in the picture plane (see `seen_by`)
+    """
+
+    title: str
+    colour: Colour | np.ndarray
+    positions: np.ndarray | None
+    failure: str | None = None
+    remark: str | None = None
+    reference: bool = False
+    flat: np.ndarray | None = None
+
+    def seen_by(self, camera: Camera) -> "RunPanel":
+        """The panel with its positions in the picture plane of ``camera``."""
+        flat = None if self.positions is None else camera.project(self.positions)
+        return replace(self, flat=flat)
+
+    def zoomed(self, window: Window) -> Window:
+        """``window``, or one of the same shape that holds both it and the run."""
+        if self.flat is None or window.contains(self.flat).all():
+            return window
+        corners = [(window.left, window.bottom), (window.right, window.top)]
+        both = bounds(np.concatenate([self.flat, corners]), 0.03)
+        factor = max(both.width / window.width, both.height / window.height)
+        return both.resized(factor * window.width, factor * window.height)
+
+    def scale(self, window: Window) -> float:
+        """Factor, at least 1, by which the run is drawn smaller than in ``window``."""
+        return self.zoomed(window).width / window.width
+
+
+def mesh_surface(mesh: Mesh) -> Surface:
+    """Surface of a mesh; that of a volume is closed."""
+    return Surface(mesh.triangles, open=len(mesh.tetrahedra) == 0)
+
+
+def shared_window(
+    camera: Camera, reference: np.ndarray, panels: list[RunPanel], margin: float = 0.1
+) -> Window:
+    """Window by ``camera`` of ``reference`` (N, 3) m, widened for ``panels`` of about its size."""
+    base = window_of(camera, [reference], margin)
+    size = SAME_SCALE * max(base.width, base.height)
+    clouds = [reference]
+    for panel in panels:
+        if panel.positions is None or panel.failure:
+            continue
+        own = window_of(camera, [reference, panel.positions], margin)
+        if max(own.width, own.height) <= size:
+            clouds.append(panel.positions)
+    return fit_aspect(window_of(camera, clouds, margin))
+
+
+def fit_aspect(window: Window) -> Window:
+    """The window made taller or wider until its shape is allowed for a panel."""
+    height = np.clip(window.height, SHORTEST * window.width, None)
+    width = max(window.width, height / TALLEST)
+    return window.resized(width, height)
+
+
+def draw_run(
+    ax: Axes,
+    mesh: Mesh,
+    panel: RunPanel,
+    camera: Camera,
+    window: Window,
+    ghost: np.ndarray | None = None,
+) -> None:
+    """Draw a run in ``window``; one that left it is drawn smaller and says so.
+
+    Parameters
+    ----------
+    ax, camera : picture and its view
+    mesh, panel : of the run
+    ghost : (N, 3) m, positions whose outline is drawn for comparison
+    """
+    ax.set_title(panel.title, pad=3)
+    if panel.failure:
+        _mark_failure(ax)
+    if panel.positions is None:
+        set_window(ax, window)
+        _centre_note(ax, panel)
+        return
+    shown, zoom = panel.zoomed(window), panel.scale(window)
+    surface = mesh_surface(mesh)
+    if not panel.failure:
+        draw_floor(ax, panel.positions, surface, camera=camera, window=shown)
+    if ghost is not None:
+        edges = outline_edges(mesh.points, mesh.triangles)
+        if not len(edges):  # a round body has no edges of its own
+            edges = silhouette_edges(ghost, mesh.triangles, camera)
+        draw_outline(ax, ghost, edges, camera=camera)
+    contrast = 0.5 if isinstance(panel.colour, np.ndarray) else 1.0
+    draw_surface(
+        ax, panel.positions, surface, camera=camera, colour=panel.colour, contrast=contrast
+    )
+    set_window(ax, shown)
+    lines = [text for text in (panel.failure, panel.remark) if text]
+    if zoom > SLACK:
+        lines.append(f"scale 1 : {_scale(zoom)}")
+        _frame(ax)
+    if lines:
+        colour = FAILED if panel.failure or zoom > SLACK else "#555555"
+        ax.set_xlabel("\n".join(lines), color=colour, fontsize=7.5, labelpad=2)
+
+
+def _scale(factor: float) -> str:
+    return f"{factor:.1f}" if factor < 10.0 else f"{factor:.0f}"
+
+
+def _mark_failure(ax: Axes) -> None:
+    look = {"facecolor": "#FBEDEB", "edgecolor": "#EBB9B4", "hatch": "////", "linewidth": 0.0}
+    _cover(ax, zorder=-5, **look)
+
+
+def _frame(ax: Axes) -> None:
+    """Thin red frame: this picture has another scale than its neighbours."""
+    _cover(ax, zorder=8, facecolor="none", edgecolor=FAILED, linewidth=0.6)
+
+
+def _cover(ax: Axes, **look: Any) -> None:
+    """Rectangle over the whole panel."""
+    from matplotlib.patches import Rectangle
+
+    ax.add_patch(Rectangle((0, 0), 1, 1, transform=ax.transAxes, clip_on=False, **look))
+
+
+def _centre_note(ax: Axes, panel: RunPanel) -> None:
+    centre_note(ax, panel.failure or panel.remark or "", FAILED if panel.failure else "#666666")
+
+
+def centre_note(ax: Axes, text: str, colour: str = "#666666") -> None:
+    """Write boxed ``text`` of a ``colour`` in the middle of a panel ``ax``."""
+    box = {"boxstyle": "round,pad=0.4", "facecolor": "white", "edgecolor": colour, "lw": 0.6}
+    ax.text(
+        0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center",
+        color=colour, fontsize=7.5, bbox=box,
+    )  # fmt: skip

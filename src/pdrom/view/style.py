@@ -1,0 +1,186 @@
+"""One look for all figures: fonts, palette, markers, small helpers."""
+
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any, Literal
+
+from pdrom.view.artists import Artist, Axes, Figure, Line2D, Patch
+
+WIDTH = 7.0  # inches, text width of the manuscript
+NOTE = 100  # characters in a line of a figure that only says something
+
+# Okabe and Ito (2008): told apart with every common colour deficiency.
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
+GREY = "#8C8C8C"
+FAILED = "#B3261E"
+FULL_ORDER = "#DAD6CC"
+
+METHODS: dict[str, tuple[str, str]] = {
+    "pod": (BLACK, "o"),
+    "deim": (ORANGE, "s"),
+    "qdeim": (SKY, "^"),
+    "deim-joint": (VERMILLION, "D"),
+    "published": (PURPLE, "v"),
+    "block-deim": (BLUE, "P"),
+    "block-qdeim": (GREEN, "X"),
+    "gappy": ("#7A5C00", "<"),
+    "bounded": ("#1F9E89", "*"),
+    "fewer-iterations": ("#4D4D4D", "x"),
+    "pod subspace": ("#5E3C99", "p"),
+    "pod subspace, ecsw-3e-02": ("#00A19A", "."),
+    "pod subspace, ecsw-1e-02": ("#1B6E6E", ">"),
+    "pod subspace, ecsw-1e-03": ("#3F6B00", "d"),
+    "skinning subspace": ("#8B1A4A", "h"),
+    "pod subspace, block-deim": ("#4FA3C7", "H"),
+    "pod subspace, gappy": ("#C08A00", "8"),
+    "pod subspace, hrpd": ("#B05CC6", "|"),
+    "skinning subspace, hrpd": ("#D98BA6", "+"),
+}
+_RESERVE = (("#5A5A5A", "1"), ("#9A6A00", "2"), ("#6B3F00", "3"), ("#2B2B80", "4"))
+
+# Of constraint groups, by their place among all of them.
+GROUP_LOOKS = (
+    (GREEN, "^"), (ORANGE, "s"), (BLUE, "o"), (SKY, "D"), (PURPLE, "v"), (VERMILLION, "P"),
+    ("#7A5C00", "X"), ("#5A5A5A", "<"), ("#2B2B80", ">"),
+)  # fmt: skip
+AXES = {"x": VERMILLION, "y": GREEN, "z": BLUE}
+SPLITS = {"train": "-", "test": "--", "heldout": ":"}
+SPLIT_NAMES = {"train": "train", "test": "test", "heldout": "held-out run"}
+SCENE_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
+
+RC: dict[str, Any] = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 8.0,
+    "axes.titlesize": 8.0,
+    "axes.labelsize": 8.0,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "axes.grid": False,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.5,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.minor.size": 0.0,
+    "ytick.minor.size": 0.0,
+    "lines.linewidth": 1.1,
+    "lines.markersize": 3.5,
+    "hatch.linewidth": 0.5,
+    "figure.dpi": 100,
+    "pdf.fonttype": 42,
+    "pdf.use14corefonts": False,
+    "svg.hashsalt": "pdrom",
+}
+
+
+@contextmanager
+def look() -> Iterator[None]:
+    """Context with this style on top of matplotlib's own defaults, whatever the user has set."""
+    import matplotlib as mpl
+
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(RC)
+        yield
+
+
+def method_styles(names: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """(colour, marker) of methods; names that are not preset share a reserve, in sorted order."""
+    names = list(names)
+    others = sorted(set(names) - set(METHODS))
+    spare = {name: _RESERVE[i % len(_RESERVE)] for i, name in enumerate(others)}
+    return {name: METHODS.get(name) or spare[name] for name in names}
+
+
+def scene_style(index: int) -> tuple[str, str]:
+    """(colour, marker) of the ``index``-th scene of a figure that tells scenes apart."""
+    return CYCLE[index % len(CYCLE)], SCENE_MARKERS[index % len(SCENE_MARKERS)]
+
+
+def scene_handles(scenes: Iterable[str]) -> list[Line2D]:
+    """Legend entries of scenes in the styles of `scene_style`."""
+    looks = {words(scene): scene_style(i) for i, scene in enumerate(scenes)}
+    return handles(looks, linestyle="none")
+
+
+def surface_colour(colour: str) -> tuple[float, float, float]:
+    """``colour`` on a shaded surface: lightened, so that the shading has room."""
+    from matplotlib.colors import to_rgb
+
+    red, green, blue = (0.72 * c + 0.28 for c in to_rgb(colour))
+    return red, green, blue
+
+
+def words(name: str) -> str:
+    """A name of the configuration as plain words."""
+    return name.replace("_", " ")
+
+
+def new_figure(height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
+    """An empty figure of the manuscript's width, ``height`` inches high, with a ``layout``."""
+    from matplotlib.figure import Figure
+
+    from pdrom.view.layout import RoundedLayout
+
+    engine = None if layout is None else RoundedLayout()
+    return Figure(figsize=(WIDTH, height), layout=engine)
+
+
+def handle(label: str, **look: Any) -> Line2D:
+    """Entry ``label`` of a legend: a line, or a marker, with this ``look``."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], label=label, **look)
+
+
+def patch(label: str, **look: Any) -> Patch:
+    """Entry ``label`` of a legend: a rectangle with this ``look``."""
+    from matplotlib.patches import Patch
+
+    return Patch(label=label, **look)
+
+
+def handles(looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
+    """Entries of a legend by their labels, each with its (colour, marker) of ``looks``.
+
+    What they have in ``common`` are keywords of `handle`.
+    """
+    return [handle(label, color=c, marker=m, **common) for label, (c, m) in looks.items()]
+
+
+def split_handles(splits: Iterable[str]) -> list[Line2D]:
+    """Entries of a legend: sets of snapshots, ``splits``, by their lines."""
+    return [handle(SPLIT_NAMES[s], color="#555555", linestyle=SPLITS[s]) for s in splits]
+
+
+def legend(figure: Figure, entries: Sequence[Artist], columns: int) -> None:
+    """Draw a legend of ``entries`` in ``columns`` below all panels of ``figure``."""
+    figure.legend(handles=list(entries), loc="outside lower center", ncols=columns)
+
+
+def label_rows(ax: Axes, labels: Sequence[str]) -> None:
+    """Name rows of ``ax`` at 0, 1, 2, ... from the top by ``labels``."""
+    ax.set_yticks(range(len(labels)), labels)
+    ax.set_ylim(len(labels) - 0.4, -0.6)
+
+
+def grid(ax: Axes) -> None:
+    """Draw a light grid behind the data of ``ax``."""
+    ax.grid(True, which="major")
+
+
+def note(text: str) -> Figure:
+    """A figure that only says in ``text`` why there is nothing to draw."""
+    lines = [line for part in text.split("\n") for line in textwrap.wrap(part, NOTE)]
+    figure = new_figure(0.3 + 0.15 * len(lines), None)
+    figure.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", fontsize=9, color="#444444")
+    return figure

@@ -1,0 +1,61 @@
+"""A scene's runs for ParaView: one file a frame (VTU), and a collection with their times (PVD)."""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+
+from pdrom.core.store import atomic_path
+from pdrom.model.mesh.types import Mesh
+from pdrom.view.frames import shown_runs
+from pdrom.view.runs import ViewedScene
+
+NAME = "frame_{:05d}.vtu"
+
+
+def vtk(scene: ViewedScene, collection: Path) -> None:
+    """Write the frames of ``scene`` beside the ``collection``, which is written last."""
+    names = [NAME.format(frame) for frame in range(len(scene.positions))]
+    for frame, name in enumerate(names):
+        data = point_data(scene, frame)
+        _write(scene.mesh, scene.positions[frame], data, collection.with_name(name))
+    for path in collection.parent.glob("frame_*.vtu"):  # of an earlier, longer run
+        if path.name not in names:
+            path.unlink()
+    _write_collection(collection, names, scene.time_step)
+
+
+def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
+    """Data of each vertex of ``scene`` in a ``frame``, (N, 3) float32 each.
+
+    Velocity (m/s, where it was stored) and displacement from the start (m) of the full-order run;
+    for each reduced run the vector from the full order to it (m), by which ParaView warps the one
+    into the other, NaN where it had ended.
+    """
+    now = scene.positions[frame]
+    data = {} if scene.velocities is None else {"velocity": scene.velocities[frame]}
+    data["displacement"] = now - scene.positions[0]
+    for run in shown_runs(scene):
+        ended = frame >= len(run.positions)
+        apart = np.full_like(now, np.nan) if ended else run.positions[frame] - now
+        data[f"{run.group} {run.method} r={run.r}"] = apart
+    return {name: np.asarray(values, dtype=np.float32) for name, values in data.items()}
+
+
+def _write(mesh: Mesh, points: np.ndarray, data: dict[str, np.ndarray], path: Path) -> None:
+    volume = len(mesh.tetrahedra) > 0
+    cells = [("tetra", mesh.tetrahedra) if volume else ("triangle", mesh.triangles)]
+    with atomic_path(path, with_checksum=False) as temporary:
+        meshio.Mesh(points, cells, point_data=data).write(temporary, file_format="vtu")
+
+
+def _write_collection(path: Path, names: list[str], time_step: float) -> None:
+    root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
+    collection = ElementTree.SubElement(root, "Collection")
+    for frame, name in enumerate(names):
+        time = f"{frame * time_step:.9g}"
+        ElementTree.SubElement(collection, "DataSet", timestep=time, part="0", file=name)
+    ElementTree.indent(root)
+    with atomic_path(path, with_checksum=False) as temporary:
+        ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)

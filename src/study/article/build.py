@@ -1,0 +1,159 @@
+"""The article: paper and supplement as pages, and those of tables, figures and claims."""
+
+import json
+import re
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+
+import pandas as pd
+
+from pdrom.core.store import read_table, read_text, write_text
+from study.article.claims import claims_page
+from study.article.latex import Origins, linked_table, prepared
+from study.article.pandoc import Tree, page, parsed
+from study.article.pictures import copy_pdf, shown_figure, write_picture
+from study.article.tables import FACTS, contents, list_page, table_page
+from study.article.tree import Labels, numbered, resolved
+from study.article.verified import INDEX, write_verified
+from study.artifact.files import Files
+from study.artifact.paths import ARTICLE, Place
+from study.artifact.reads import Given, ProjectFile, Setting
+from study.figures.kit.catalogue import declarations
+from study.paper.build import NUMBERS, Facts, fact_tables
+from study.paper.source import DOCUMENTS, documents
+from study.tables import declared
+from study.tables.claims.rules import Added, load_claims
+
+FOLDER = Path("src/study/article")
+CLAIMS = "config/claims.yaml"
+ASSETS = {
+    "text": "article.html",
+    "plain": "plain.html",
+    "table": "table.html",
+    "style": "article.css",
+    "script": "article.js",
+}
+# Pages of the documents by the name of their source.
+PAGES = dict(zip(DOCUMENTS, (INDEX, "supplement.html"), strict=True))
+TITLES = dict(zip(DOCUMENTS, ("Paper", "Supplement"), strict=True))
+LINKS = {"tables.html": "Tables", "claims.html": "Claims", "live.html": "A model, running"}
+_FIGURE = re.compile(r"\\figureof\{(\w+)\}")
+_PREFIX = re.compile(r"\\renewcommand\{?\\thefigure\}?\{([A-Z]+)")
+
+
+def write_article(
+    source: list[str],
+    references: str,
+    tables: list[str],
+    machine: str,
+    inputs: list[str],
+    figures: list[str],
+    facts: Facts,
+    claims: Path,
+    added: Added,
+    outputs: Mapping[str, str],
+    **assets: Path,
+) -> None:
+    """Write every page of the article to its place among ``outputs``.
+
+    Parameters
+    ----------
+    source, references : TeX sources of the manuscript and its bibliography
+    tables, machine : CSV of the tables and the record of the machine
+    inputs : what the manuscript reads, with `NUMBERS`
+    figures : PDF and PNG of each
+    facts, claims : stated beside results, and the file of the claims' rules
+    added : values that the study adds to sets of ``claims``, see `load_claims`
+    assets : templates, style and script, see `ASSETS`
+    """
+    made = {Path(path).name: path for path in inputs}
+    origins = Origins(**json.loads(read_text(made[NUMBERS])))
+    known = fact_tables(Path(machine), facts)
+    csv = contents(tables, known)
+    known |= {Path(path).stem: read_table(path) for path in tables}
+    templates = {name: path.read_text("utf-8") for name, path in assets.items()}
+    texts = documents(Path(source[0]).parent)
+    pages = {name: PAGES[stem] for stem, text in texts.items() for name in _FIGURE.findall(text)}
+    rules, plain = load_claims(claims, added), templates["plain"]
+    written = {name: templates[name] for name in ("style", "script")}
+    for name, content in csv.items():
+        written[f"table_{name}"] = table_page(name, content, templates["table"])
+    written["tables"] = list_page(sorted(csv), plain)
+    written["claims"] = claims_page(rules, known["claims_tests"], known["claims"], pages, plain)
+    drawn = _write_figures(figures, outputs)
+    files = _linked_inputs(made, origins, known)
+    labels: dict[str, tuple[str, str]] = {}
+    trees: dict[str, Tree] = {}
+    for stem, text in texts.items():
+        tex = prepared(text, stem, origins, facts)
+        prefix = _PREFIX.search(text)
+        trees[stem] = numbered(
+            parsed(tex, files, Path(references)),
+            Labels(prefix[1] if prefix else "", PAGES[stem], labels),
+            lambda name, node: shown_figure(name, node, *drawn[name], pages),
+        )
+    for stem, tree in trees.items():
+        others = {PAGES[other]: TITLES[other] for other in texts if other != stem}
+        whole = resolved(tree, labels, rules)
+        written[stem] = page(whole, assets["text"], _variables(others, facts))
+    for name, text in written.items():
+        write_text(text, outputs[name])
+    write_verified({}, Path(outputs["main"]).parent)
+
+
+def _write_figures(
+    figures: list[str], outputs: Mapping[str, str]
+) -> dict[str, tuple[tuple[int, int], bool]]:
+    """Write pictures and PDF files; return the size of each, and whether it has a PDF here."""
+    made = {Path(path).name: Path(path) for path in figures}
+    folder = Path(outputs["main"]).parent / "figures"
+    return {
+        name: (
+            write_picture(made[f"{name}.png"], Path(outputs[f"picture_{name}"])),
+            copy_pdf(made[f"{name}.pdf"], folder / f"{name}.pdf"),
+        )
+        for name in sorted({path.stem for path in made.values()})
+    }
+
+
+def _linked_inputs(
+    made: Mapping[str, str], origins: Origins, tables: Mapping[str, pd.DataFrame]
+) -> dict[str, str]:
+    """TeX tables by file name, their numbers with links to rows."""
+    return {
+        f"{name}.tex": linked_table(
+            read_text(made[f"{name}.tex"]), {table: tables[table] for table in read}
+        )
+        for name, read in origins.tables.items()
+    }
+
+
+def _variables(others: Mapping[str, str], facts: Facts) -> dict[str, str]:
+    nav = [f'<a href="{address}">{words}</a>' for address, words in {**others, **LINKS}.items()]
+    return {"pages": " ".join(nav), **({"part": escape(facts.part)} if facts.part else {})}
+
+
+def _writes() -> dict[str, Place]:
+    names = {**PAGES, "tables": "tables.html", "claims": "claims.html"}
+    names |= {"style": "article.css", "script": "article.js"}
+    names |= {f"table_{name}": f"tables/{name}.html" for name in (*declared(), *FACTS)}
+    names |= {f"picture_{name}": f"figures/{name}.webp" for name in declarations()}
+    return {key: ARTICLE.where(name=name) for key, name in names.items()}
+
+
+article = Files(
+    "article",
+    "The manuscript as a page",
+    {
+        **dict.fromkeys(
+            ("source", "references", "tables", "machine", "inputs", "figures"), Given()
+        ),
+        "claims": ProjectFile(CLAIMS),
+        **{name: ProjectFile(str(FOLDER / file)) for name, file in ASSETS.items()},
+        "facts": Setting("facts"),
+        "added": Setting("claim_sets"),
+    },
+    _writes(),
+    write_article,
+)

@@ -1,0 +1,181 @@
+r"""The manuscript's source as LaTeX that pandoc reads: numbers are links, tables plain.
+
+Whatever the source reads or decides when TeX runs is put in its place here: ``\val``, ``\known``,
+``\row``, ``\ifpart``, captions of figures. A link's address is ``origin:KEY``.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from pdrom.view.text import escape
+from study.paper.build import Facts
+from study.paper.known import NOTED, SHOWN, closing, note, sentences
+from study.paper.macros import matching
+
+ORIGIN = "origin:"
+_COMMENT = re.compile(r"(?m)^[ \t]*%.*\n|(?<!\\)%.*$")
+_VAL = re.compile(r"\\val\{([^{}]*)\}")
+_MATH = re.compile(r"(?<!\\)\$((?:[^$\\]|\\.)*)\$", re.DOTALL)
+_ENSURED = re.compile(r"\\ensuremath\{((?:[^{}]|\{[^{}]*\})*)\}")
+_CAPTION = re.compile(r"\\csname caption@(\w+)\\endcsname")
+_FIGURE = re.compile(r"\\figureof\{(\w+)\}")
+_PART = re.compile(
+    r"\\ifpart(?![A-Za-z])(.*?)(?:\\else(?![A-Za-z])(.*?))?\\fi(?![A-Za-z])", re.DOTALL
+)
+_DROPPED = re.compile(
+    r"\\(?:tableofcontents|renewcommand\{.*)|(?:\{\\\w+\s*)?\\input\{\w+\.bbl\}\}?"
+)
+_HEAD = re.compile(r"\\endfirsthead.*?\\endhead\n", re.DOTALL)
+_SPEC = re.compile(r"\\(?:begin\{(?:tabular|longtable)\}|multicolumn\{\d+\})(?=\{)")
+_NUMBER = re.compile(
+    r"(?:[^A-Za-z]|\\(?:ensuremath|cdot|infty|times|ge|le)(?![A-Za-z])|\b(?:to|of)\b)*\d"
+    r"(?:[^A-Za-z]|\bloses\b)*"
+)
+_TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # of "holds (20/20)", of "{blow-up, 34}"
+END = r" \\"
+# Of a preamble, pandoc reads short definitions; those that lay a page out are replaced.
+_SHORT = re.compile(r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile)\w+\}.*\}|newtheorem.*)$")
+REPLACED = r"""
+\newcommand{\longtableof}[4]{\begin{table}\caption{#3}\label{#2}\input{#4}\end{table}}
+\newcommand{\tablefile}[1]{\input{#1.tex}}
+\newenvironment{heretable}{\begin{table}}{\end{table}}
+"""
+
+
+@dataclass(frozen=True)
+class Origins:
+    """Contents of numbers.json, see `study.paper.build.write_inputs`."""
+
+    known: Mapping[str, Sequence[str]]
+    numbers: Mapping[str, Mapping[str, Any]]
+    tables: Mapping[str, Sequence[str]]
+
+
+def prepared(source: str, document: str, origins: Origins, facts: Facts) -> str:
+    """Return the ``source`` of a ``document`` for pandoc, linked by ``origins`` and ``facts``."""
+    preamble, begin, text = source.partition(r"\begin{document}")
+    left_out = rf"\emph{{[{note(facts.part, facts.full_study)}]}}"
+    text = _COMMENT.sub("", _decided(text, origins.known[document], left_out))
+    text = _FIGURE.sub(_figure, text)
+    text = _CAPTION.sub(lambda found: facts.captions[found[1]], text)
+    text = _PART.sub(lambda found: (found[1] if facts.part else found[2]) or "", text)
+    full = facts.full_study
+    for name, words in {"configuration": facts.part or full, "fullstudy": full}.items():
+        shown = rf"\texttt{{{escape(words)}}}".replace("\\", r"\\")
+        text = re.sub(rf"\\{name}(?![A-Za-z])(?:\{{\}})?", shown, text)
+    text = _VAL.sub(
+        lambda found: _link(found[1], origins.numbers[found[1]]["text"]), _MATH.sub(_apart, text)
+    )
+    text = re.sub(r"\\(begin|end)\{fitted\}", "", text).replace("{fittedtabular}", "{tabular}")
+    text = _DROPPED.sub("", text)
+    short = [found[0] for found in _SHORT.finditer(preamble)]
+    return plain_columns("\n".join([*short, _title(preamble), REPLACED, begin, text]))
+
+
+def _title(preamble: str) -> str:
+    r"""The lines of the title, with a colon between them."""
+    start = preamble.index(r"\title{") + len(r"\title{")
+    lines = _PART.sub("", preamble[start : closing(preamble, start)]).split(r"\\")
+    words = [re.sub(r"^\[[^\]]*\]|\\large|%", "", line).strip() for line in lines]
+    return rf"\title{{{': '.join(words).replace('?:', '?')}}}"
+
+
+def _decided(source: str, known: Sequence[str], left_out: str) -> str:
+    r"""``source`` with its ``\known`` and ``\row`` blocks shown, noted or left out."""
+    pieces, start = [], 0
+    for sentence, decision in zip(sentences(source), known, strict=True):
+        opening = (r"\row{" if sentence.is_row else r"\known{") + sentence.text + "}"
+        place = source.index(opening, start)
+        shown = {SHOWN: sentence.text, NOTED: left_out}.get(decision, "")
+        pieces += [source[start:place], shown]
+        start = place + len(opening)
+    return "".join([*pieces, source[start:]])
+
+
+def _figure(found: re.Match[str]) -> str:
+    name = found[1]
+    return (
+        rf"\begin{{figure}}\includegraphics{{{name}.pdf}}"
+        rf"\caption{{\csname caption@{name}\endcsname}}\label{{fig:{name}}}\end{{figure}}"
+    )
+
+
+def _apart(found: re.Match[str]) -> str:
+    """Mathematics, with the numbers in it between its parts: a link cannot stand inside."""
+    if not _VAL.search(found[1]):
+        return found[0]
+    parts = re.split(r"(\\val\{[^{}]*\})", found[1])
+    return "".join(p if p.startswith(r"\val") else f"${p.strip()}$ " for p in parts if p.strip())
+
+
+def _link(key: str, text: str) -> str:
+    return rf"\href{{{ORIGIN}{key.encode().hex()}}}{{{_plain_mathematics(text)}}}"
+
+
+def _plain_mathematics(text: str) -> str:
+    return _ENSURED.sub(r"$\1$", text)
+
+
+def linked_table(text: str, tables: Mapping[str, pd.DataFrame]) -> str:
+    """Return ``text``, a made TeX table, with numbers that link to the rows that they come from.
+
+    They are in the one of ``tables`` that shares most columns with the made table. Where that has
+    as many rows, each has made one; else they agree in the columns that both have, as far as these
+    hold the same (a rounded number, a sum or a title is none of the table's own cells).
+    """
+    text = _HEAD.sub("", text).replace("\\captionrow\n", "").replace("longtable", "tabular")
+    lines = text.replace(r"\noalign{\smallskip}", "").split("\n")
+    split = [line.removesuffix(END).split(" & ") if line.endswith(END) else [] for line in lines]
+    first = next(place for place, cells in enumerate(split) if cells)
+    header = split[first]
+    body = [n for n, cells in enumerate(split) if n > first and len(cells) == len(header)]
+    origin = max(tables, key=lambda name: len({*header} & {*tables[name]}))
+    one_to_one = len(body) == len(tables[origin])
+    for row, line in enumerate(body, 1):
+        own = [f"row={row}"] if one_to_one else _agreeing(tables[origin], header, split[line])
+        key = "|".join([origin, *own])
+        lines[line] = " & ".join(_linked_cell(cell, key) for cell in split[line]) + END
+    return plain_columns("\n".join(map(_plain_mathematics, lines)))
+
+
+def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) -> list[str]:
+    """Filters by which rows of ``table`` agree with a made row."""
+    found = []
+    for title, cell in zip(header, cells, strict=True):
+        for value in (_plain(cell), _plain(cell).replace(" ", "_")) if title in table else ():
+            rows = matching(table, [(title, "=", value)])
+            if len(rows):
+                table = rows
+                found.append(f"{title}={value}")
+                break
+    return found
+
+
+def _linked_cell(cell: str, key: str) -> str:
+    """A cell whose number, or the one at its end behind words, is a link."""
+    if _NUMBER.fullmatch(cell):
+        return _link(key, cell)
+    return _TAIL.sub(lambda found: found[1] + _link(key, found[2]) + found[3], cell)
+
+
+def _plain(cell: str) -> str:
+    """A cell without TeX; of one that begins with a name, the name."""
+    name = re.match(r"\\texttt\{([^{}]*)\}", cell)
+    return (name[1] if name else cell).replace("\\", "")
+
+
+def plain_columns(text: str) -> str:
+    """Return ``text`` with tables whose columns are letters alone; pandoc knows no others."""
+    pieces, start = [], 0
+    for found in _SPEC.finditer(text):
+        end = closing(text, found.end() + 1)
+        spec = text[found.end() + 1 : end]
+        spec = re.sub(r"[><@!]\{(?:[^{}]|\{[^{}]*\})*\}", "", spec)
+        spec = re.sub(r"[pm]\{[^{}]*\}|[XYZ]", "l", spec)
+        pieces += [text[start : found.end() + 1], spec]
+        start = end
+    return "".join([*pieces, text[start:]])

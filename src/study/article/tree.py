@@ -1,0 +1,214 @@
+"""Pandoc's syntax tree of a document: numbers of what is referred to, links, captions.
+
+Labels have the numbers that LaTeX gives them, since both count in the order of the source.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from pdrom.core.errors import PaperError
+from study.article.latex import ORIGIN
+from study.article.nodes import Node, attributes, changed, content_of, link, plain, words
+from study.article.pandoc import Tree
+
+_LABEL = re.compile(r"\\label\{([^{}]*)\}")
+_EQUATION = re.compile(r"\\begin\{(equation|align)\}")
+_CLAIM = re.compile(r"(\W*)(C\d+)\b(.*)")
+_COLOUR = re.compile(r"color: (ok\w+)")
+PARAGRAPH = 4  # level of a heading that opens a paragraph
+
+
+@dataclass
+class Labels:
+    """Numbers of labels, and the pages that they are on."""
+
+    prefix: str
+    page: str
+    numbers: dict[str, tuple[str, str]] = field(default_factory=dict)
+    counts: Counter[str] = field(default_factory=Counter)
+
+    def next(self, kind: str, label: str = "") -> str:
+        """Number of the next figure, table ... (``kind``); a ``label`` will stand for it."""
+        self.counts[kind] += 1
+        return self.note(label, f"{self.prefix}{self.counts[kind]}")
+
+    def section(self, level: int, appendix: bool, label: str) -> str:
+        """Number of the next section of a ``level``; a ``label`` will stand for it.
+
+        Those of an ``appendix`` begin with a letter.
+        """
+        if appendix and level == 1 and not self.counts["appendix"]:
+            self.counts["appendix"], self.counts["level1"] = 1, 0
+        self.counts[f"level{level}"] += 1
+        for deeper in range(level + 1, PARAGRAPH):
+            self.counts[f"level{deeper}"] = 0
+        parts = [self.counts[f"level{above}"] for above in range(1, level + 1)]
+        first = chr(64 + parts[0]) if self.counts["appendix"] else f"{self.prefix}{parts[0]}"
+        return self.note(label, ".".join([first, *map(str, parts[1:])]))
+
+    def note(self, label: str, number: str) -> str:
+        """Let a label stand for a number."""
+        if label:
+            self.numbers[label] = (number, self.page)
+        return number
+
+
+def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> Tree:
+    """Number sections, figures, tables, equations and theorems of ``tree``, and lay them out.
+
+    Parameters
+    ----------
+    labels : gets the number of every label
+    shown : makes of a figure's name and its node, with the number in its caption, what is shown
+    """
+
+    def visit(node: Node) -> Any:
+        kind, content = node["t"], content_of(node)
+        if kind == "Header" and content[0] < PARAGRAPH:
+            level, attribute, inlines = content
+            appendix = "unnumbered" in attribute[1]
+            number = labels.section(level, appendix, attribute[0])
+            return {"t": kind, "c": [level, attribute, [*words(f"{number}\u2002"), *inlines]]}
+        if kind == "Figure":
+            name = re.sub(r"^fig:", "", content[0][0])
+            number = labels.next("figure", content[0][0])
+            return shown(name, _captioned(node, f"Figure {number}. ", 1))
+        if kind == "Div" and content[1] and content[1][0]["t"] == "Table":
+            return _table(content[0][0], content[1][0], labels)
+        if kind == "Div" and content[0][0] == "refs":
+            title = {"t": "Header", "c": [1, attributes("references"), words("References")]}
+            return [title, node]
+        if kind == "Div" and (which := {"theorem", "proposition"} & set(content[0][1])):
+            # pandoc's heading has the name and a number without prefix
+            content[1][0]["c"][0]["c"][-1]["c"] = labels.next(which.pop(), content[0][0])
+        if kind == "Math" and content[0]["t"] == "DisplayMath":
+            return _equation(node, labels)
+        return None
+
+    return changed(tree, visit)
+
+
+def _table(label: str, node: Node, labels: Labels) -> Node:
+    """A table that scrolls, below its caption, which does not."""
+    content = _captioned(node, f"Table {labels.next('table', label)}. ", 1)["c"]
+    caption = {"t": "Div", "c": [attributes("", "caption"), content[1][1]]}
+    region = {"role": "region", "tabindex": "0", "aria_label": plain(content[1])[:80]}
+    head = changed(content[3], _headed)
+    for cell in (cell for row in head[1] for cell in row[1]):
+        cell[4] = cell[4] if plain(cell[4]).strip() else [{"t": "Plain", "c": [_heard("row")]}]
+    table = {"t": "Table", "c": [content[0], [None, []], content[2], head, *content[4:]]}
+    scroll = {"t": "Div", "c": [attributes("", "scroll", **region), [table]]}
+    return {"t": "Div", "c": [attributes(label), [caption, scroll]]}
+
+
+def _headed(node: Node) -> Node | None:
+    """A formula in a head, with its letters for those who listen."""
+    if node["t"] != "Math":
+        return None
+    return {"t": "Span", "c": [attributes(), [node, _heard(plain(node))]]}
+
+
+def _heard(text: str) -> Node:
+    return {"t": "Span", "c": [attributes("", "heard"), words(text)]}
+
+
+def _captioned(node: Node, opening: str, place: int) -> Node:
+    """A figure or a table whose caption opens with its number."""
+    content = list(node["c"])
+    short, blocks = content[place]
+    first = blocks[0] if blocks else {"t": "Plain", "c": []}
+    strong = {"t": "Strong", "c": words(opening.strip())}
+    opened = {"t": "Plain", "c": [strong, {"t": "Space"}, *first["c"]]}
+    content[place] = [short, [opened, *blocks[1:]]]
+    return {"t": node["t"], "c": content}
+
+
+def _equation(node: Node, labels: Labels) -> Node:
+    """An equation beside its number; one of several lines has a number for each."""
+    kind, tex = node["c"]
+    found = _EQUATION.search(tex)
+    lines = [] if found is None else [tex] if found[1] == "equation" else tex.split(r"\\")
+    names = [named[1] if (named := _LABEL.search(line)) else "" for line in lines]
+    marks = [
+        {
+            "t": "Span",
+            "c": [attributes(name, "number"), words(f"({labels.next('equation', name)})")],
+        }
+        for name in names
+    ]
+    numbers = {"t": "Span", "c": [attributes("", "numbers"), marks]}
+    math = {"t": "Math", "c": [kind, _LABEL.sub("", tex)]}
+    return {"t": "Span", "c": [attributes("", "equation", tabindex="0"), [math, numbers]]}
+
+
+def resolved(tree: Tree, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Tree:
+    """Give references their numbers, numbers and claims their links; open paragraphs in bold.
+
+    Parameters
+    ----------
+    labels : number and page of each
+    claims : by name; the text names them
+
+    Raises
+    ------
+    PaperError
+        The text refers to a label that no document has.
+    """
+
+    def visit(node: Node) -> Any:
+        kind, content = node["t"], content_of(node)
+        if kind == "Link":
+            return _resolved_link(node, labels)
+        if kind == "Str" and (found := _CLAIM.fullmatch(content)) and found[2] in claims:
+            here = link(words(found[2]), f"claims.html#{found[2]}", "claim")
+            return [*words(found[1]), here, *words(found[3])]
+        if kind == "Span" and (colour := _COLOUR.search(str(content[0][2]))):
+            return {"t": kind, "c": [attributes("", colour[1]), changed(content[1], visit)]}
+        return None
+
+    found = changed(tree, visit)
+    return {**found, "blocks": _run_in(found["blocks"])}
+
+
+def _run_in(blocks: list[Node]) -> list[Node]:
+    """Headings of paragraphs as the bold words that these begin with."""
+    made: list[Node] = []
+    heading: list[Node] = []
+    for block in blocks:
+        if block["t"] == "Header" and block["c"][0] >= PARAGRAPH:
+            heading = [{"t": "Strong", "c": block["c"][2]}, {"t": "Space"}]
+            continue
+        if heading and block["t"] == "Para":
+            block = {"t": "Para", "c": [*heading, *block["c"]]}
+        elif heading:
+            made.append({"t": "Para", "c": heading})
+        made.append(block)
+        heading = []
+    return made
+
+
+def _resolved_link(node: Node, labels: Mapping[str, tuple[str, str]]) -> Node | None:
+    attribute, inlines, (address, _) = node["c"]
+    keys = dict(attribute[2])
+    if address.startswith(ORIGIN):
+        return link(
+            inlines, address_of(bytes.fromhex(address.removeprefix(ORIGIN)).decode()), "val"
+        )
+    if "reference" in keys:
+        if keys["reference"] not in labels:
+            raise PaperError(f"manuscript: no label {keys['reference']}, which the text refers to")
+        number, page = labels[keys["reference"]]
+        shown = f"({number})" if keys["reference-type"] == "eqref" else number
+        return link(words(shown), f"{page}#{keys['reference']}")
+    return None
+
+
+def address_of(key: str) -> str:
+    """Address of the rows that a key names (`study.paper.macros`) on the table's page."""
+    table, _, rows = key.partition("|")
+    signs = {"%": "%25", " ": "%20", '"': "%22", "<": "%3C", ">": "%3E", "#": "%23"}
+    place = "".join(signs.get(sign, sign) for sign in rows)
+    return f"tables/{table}.html" + (f"#{place}" if place else "")

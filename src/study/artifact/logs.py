@@ -1,0 +1,107 @@
+"""One log per job, and what the user sees when the job fails."""
+
+import errno
+import faulthandler
+import logging
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from io import TextIOWrapper
+from pathlib import Path
+
+from threadpoolctl import threadpool_limits
+
+from pdrom.core.aside import damaged_set_aside
+from pdrom.core.errors import INTERRUPTED, PdromError
+from study.artifact.usage import Meter
+
+PACKAGES = ("pdrom", "study")
+FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
+
+
+class _LogFile(logging.FileHandler):
+    """A log whose disk is full is cut short; the job's own files say that there is no space."""
+
+    stream: TextIOWrapper
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Say nothing: the default prints a traceback for every message."""
+
+
+@contextmanager
+def job_log(path: str) -> Iterator[logging.Logger]:
+    """Send the packages' logs to ``path`` while a job runs, and keep libraries to one thread.
+
+    Snakemake gives the libraries of a job as many threads as the job claims, and one that measures
+    claims all cores to be alone. More threads would also change the order of sums.
+
+    A `PdromError` (a user's mistake) ends the job with one line on stderr; any other exception
+    keeps its traceback in the log and one line on stderr that says where to look. Lack of memory or
+    of space on the disk is reported in words. The last line of a job that ends well reports its
+    usage. Where a signal ends it, Python's own lines are the last.
+
+    Damaged results that the job reads are set aside (`pdrom.core.aside`).
+    """
+    meter = Meter()
+    loggers = [logging.getLogger(name) for name in PACKAGES]
+    logger = loggers[0]
+    try:
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        handler = _LogFile(path, mode="w", encoding="utf-8")
+    except OSError as error:
+        sys.exit(f"pdrom: {path}: cannot be written ({error.strerror})")
+    handler.setFormatter(logging.Formatter(FORMAT))
+    previous = [each.level for each in loggers]
+    for each in loggers:
+        each.addHandler(handler)
+        each.setLevel(logging.INFO)
+    faulthandler.enable(handler.stream)
+    try:
+        with threadpool_limits(limits=1), damaged_set_aside():
+            yield logger
+        logger.info("%s", meter.read())
+    except PdromError as error:
+        logger.error("%s", error)
+        sys.exit(f"pdrom: {error}")
+    except KeyboardInterrupt:
+        logger.error("interrupted")
+        sys.exit(INTERRUPTED)
+    except Exception as error:
+        fault = _fault(error)
+        logger.error("%s (traceback in %s)\n%s", fault, path, traceback.format_exc())
+        sys.exit(f"pdrom: {fault} (traceback in {path})")
+    finally:
+        faulthandler.disable()
+        for each, level in zip(loggers, previous, strict=True):
+            each.removeHandler(handler)
+            each.setLevel(level)
+        with suppress(OSError):
+            handler.close()
+
+
+@contextmanager
+def planning_log(quiet: bool) -> Iterator[None]:
+    """Show the packages' warnings on stderr, or drop them if ``quiet``.
+
+    Every job plans again in a process of its own: what the main process logged is enough.
+    """
+    handler = logging.NullHandler() if quiet else logging.StreamHandler()
+    handler.setLevel(logging.WARNING)
+    handler.setFormatter(logging.Formatter("pdrom: warning: %(message)s"))
+    loggers = [logging.getLogger(name) for name in PACKAGES]
+    for logger in loggers:
+        logger.addHandler(handler)
+    try:
+        yield
+    finally:
+        for logger in loggers:
+            logger.removeHandler(handler)
+
+
+def _fault(error: Exception) -> str:
+    if isinstance(error, MemoryError):
+        return f"out of memory ({error})" if str(error) else "out of memory"
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return f"no space left on the disk ({error})"
+    return f"{type(error).__name__}: {error}"

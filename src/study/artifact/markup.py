@@ -1,0 +1,79 @@
+r"""The light mark-up of titles and captions, as TeX, as plain words and as reStructuredText.
+
+Two marks: ```name``` is a name of the study, and ``$r \le 20$`` is mathematics. ``{key}`` is filled
+in with a setting of the configuration (`filled`).
+"""
+
+import re
+from collections.abc import Callable, Mapping
+
+from pdrom.core.errors import ConfigurationError, choices
+from pdrom.view.text import escape
+
+_Words = Callable[[str], str]
+_MARK = re.compile(r"`([^`]*)`|\$([^$]*)\$")
+_KEY = re.compile(r"\{([a-z_.]+)\}")
+_SIGNS = {
+    r"\gamma": "γ", r"\tau": "τ", r"\sigma": "σ", r"\le": "≤", r"\ge": "≥", r"\times": "×",
+    r"\infty": "∞", r"\cdot": "·", r"\%": "%", r"\,": " ", "-": "−",
+}  # fmt: skip
+_SIGN = re.compile("|".join(sorted(map(re.escape, _SIGNS), key=len, reverse=True)))
+_RAISED = str.maketrans("0123456789−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+_LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+
+
+def filled(text: str, settings: Mapping[str, float]) -> str:
+    """``text`` with the settings that it names; ConfigurationError for one that is not there."""
+
+    def value(found: re.Match[str]) -> str:
+        key = found[1]
+        if key not in settings:
+            raise ConfigurationError(f"caption: no setting '{key}'{choices(key, settings)}")
+        return number(settings[key])
+
+    return _KEY.sub(value, text)
+
+
+def number(value: float) -> str:
+    """Number ``value`` in mark-up: powers of ten as such."""
+    mantissa, mark, exponent = f"{value:g}".partition("e")
+    if not mark:
+        return f"${mantissa}$"
+    factor = "" if mantissa == "1" else rf"{mantissa} \cdot "
+    return f"${factor}10^{{{int(exponent)}}}$"
+
+
+def to_tex(text: str) -> str:
+    """Mark-up ``text`` as TeX; the mathematics is TeX already."""
+    return _converted(text, escape, lambda name: rf"\texttt{{{escape(name)}}}", lambda m: f"${m}$")
+
+
+def to_plain(text: str) -> str:
+    """Mark-up ``text`` as plain words."""
+    return _converted(text, str, str, _plain_mathematics)
+
+
+def to_rst(text: str) -> str:
+    """Mark-up as one line of reStructuredText in which every sign of the text is dead.
+
+    A backslash takes the meaning of any sign: no directive, role, link or substitution is left.
+    """
+    words = " ".join(to_plain(text).split())
+    return re.sub(r"([^\w\s]|_)", r"\\\1", words)
+
+
+def _converted(text: str, words: _Words, name: _Words, mathematics: _Words) -> str:
+    pieces, end = [], 0
+    for found in _MARK.finditer(text):
+        pieces.append(words(text[end : found.start()]))
+        pieces.append(name(found[1]) if found[1] is not None else mathematics(found[2]))
+        end = found.end()
+    return "".join([*pieces, words(text[end:])])
+
+
+def _plain_mathematics(formula: str) -> str:
+    """A formula in plain letters: signs, exponents and indices."""
+    text = _SIGN.sub(lambda found: _SIGNS[found[0]], formula)
+    text = re.sub(r"\^(?:\{([^{}]*)\}|(.))", lambda f: (f[1] or f[2]).translate(_RAISED), text)
+    text = re.sub(r"_(?:\{([^{}]*)\}|(.))", lambda f: (f[1] or f[2]).translate(_LOWERED), text)
+    return text.replace("{", "").replace("}", "")

@@ -1,0 +1,159 @@
+"""Error and time of every method on one scene, against two references.
+
+One is the implicit step of the scene, solved to convergence: what more iterations approach. The
+other is the motion in continuous time, which the implicit step itself misses: what a user wants.
+All run the held-out motions; only the reduction has a training motion.
+"""
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pdrom.core.store import write_table
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.model.constraints.base import GroupConfig
+from pdrom.model.held_out import FIRST
+from pdrom.model.metrics import trajectory_error
+from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.rerun import displacement_norms
+from study.artifact.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File
+from study.artifact.reads import Settings, SourcesOf
+from study.experiments.alternatives.candidates import Trained, candidates, trained
+from study.experiments.alternatives.processes import Case, in_processes
+from study.experiments.alternatives.settings import CONVERGED, Comparison
+from study.experiments.alternatives.solvers.continuous import continuous
+from study.experiments.kit.converged import converged_run
+from study.experiments.kit.declaration import experiment
+from study.experiments.kit.settings import BlowupExtent
+
+log = logging.getLogger(__name__)
+
+COLUMNS = [
+    "scene", "factor", "vertices", "stiffness", "method", "substeps", "iterations", "trained_on",
+    "k", "elements_sampled", "motion", "frames", "finite", "error_implicit", "error_continuous",
+    "reference_error",
+]  # fmt: skip
+
+
+class Options(ConfigModel):
+    """Settings of the comparison on a mesh size."""
+
+    scene: SceneConfig
+    alternatives: Comparison
+    blowup_extent: BlowupExtent
+
+
+@dataclass(frozen=True)
+class References:
+    """Runs (F + 1, N, 3) that errors are taken against, and the error of the second one.
+
+    ``implicit`` is None where a frame did not converge, or where it would cost too much.
+    """
+
+    implicit: np.ndarray | None
+    continuous: np.ndarray
+    error: float
+
+    def errors(self, run: np.ndarray | None) -> dict[str, float | None]:
+        """Relative errors of a ``run`` (F + 1, N, 3) m, empty if it blew up."""
+        return {
+            "error_implicit": _error(run, self.implicit),
+            "error_continuous": _error(run, self.continuous),
+        }
+
+
+@experiment(
+    "Alternatives to projective dynamics in {scene} with {factor} times the vertices along a side",
+    reads={"sources": SourcesOf("scene.mesh"), "settings": Settings(Options)},
+    writes={"out": ALTERNATIVES, "times": ALTERNATIVE_TIMES},
+    alone=True,
+)
+def alternatives(sources: list[Path], settings: Options, out: File, times: File) -> None:
+    """Compare all methods on one mesh: ``factor`` times the vertices along each side.
+
+    Parameters
+    ----------
+    sources : files of the mesh; the job depends on them
+    settings : scene, methods and limits
+    out, times : tables of the errors and of the times, with the factor among their labels
+    """
+    factor, section = float(out["factor"]), settings.alternatives
+    rows, cases = [], []
+    for stiffness in section.factors(settings.scene.name, factor):
+        config = sized(settings.scene, factor, stiffness)
+        config = config.model_copy(update={"frames": min(section.compared, config.frames)})
+        training = Scene.build(config, config.mesh.build(Path()))
+        models = tuple(trained(training, section))
+        own = {"scene": config.name, "factor": factor, "stiffness": stiffness}
+        for motion in section.motions:
+            scene = Scene.build(config.heldout_variant(motion), training.mesh)
+            methods = section.methods(decide=motion != FIRST)
+            for row in _rows(scene, models, methods, settings):
+                rows.append({**own, "motion": motion, **row})
+            if motion == FIRST:
+                cases.append(Case(own, scene, models))
+        log.info("%s: stiffness %g done", settings.scene.name, stiffness)
+    write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
+    write_table(in_processes(cases, section), times.path)
+
+
+def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
+    """``config`` on a mesh ``factor`` times finer, of equal mass, weights times ``stiffness``."""
+    finer = config.coarsened(factor, 1.0)
+    counts = [c.mesh.build(Path()).vertices for c in (config, finer)]
+    effects = tuple(
+        e.model_copy(update={"weight": stiffness * e.weight}) if isinstance(e, GroupConfig) else e
+        for e in finer.effects
+    )
+    mass = config.vertex_mass * counts[0] / counts[1]
+    return finer.model_copy(update={"vertex_mass": mass, "effects": effects})
+
+
+def _rows(
+    scene: Scene, models: tuple[Trained, ...], methods: tuple[str, ...], settings: Options
+) -> Iterator[dict[str, Any]]:
+    """Errors of every candidate in the motion of ``scene``, those of the reference first."""
+    frames, against = scene.config.frames, references(scene, settings.alternatives)
+    common = {
+        "vertices": scene.mesh.vertices,
+        "frames": frames,
+        "reference_error": against.error,
+    }
+    implicit = against.errors(against.implicit)
+    yield {**common, "method": CONVERGED, "substeps": 1, "finite": True, **implicit}
+    for candidate in candidates(scene, models, settings.alternatives, methods):
+        with np.errstate(over="ignore", invalid="ignore"):
+            reached = candidate.run(frames, settings.blowup_extent, scene.mesh.extent)
+        made = {"finite": reached is not None, **against.errors(reached)}
+        yield {**common, **candidate.labels, **made}
+
+
+def references(scene: Scene, section: Comparison) -> References:
+    """Both references of a scene's own motion, with the limits of a ``section``."""
+    wanted = section.continuous
+    limit = wanted.limit // scene.mesh.vertices
+    exact = continuous(
+        scene, scene.config.frames, wanted.tolerance, substeps=wanted.substeps, limit=limit
+    )
+    name = scene.config.name
+    log.info("%s: %d explicit steps a frame, error %.1e", name, exact.substeps, exact.error)
+    if not exact.within(wanted.tolerance):
+        log.warning("%s: motion in continuous time is known to %.1e only", name, exact.error)
+    implicit = None
+    if section.affords(CONVERGED, scene.mesh.vertices):
+        implicit = converged_run(scene, section.implicit.tolerance, section.implicit.limit)
+        if implicit is None:
+            log.warning("%s: no convergence in %d evaluations", name, section.implicit.limit)
+    return References(implicit, exact.positions, exact.error)
+
+
+def _error(run: np.ndarray | None, reference: np.ndarray | None) -> float | None:
+    if run is None or reference is None:
+        return None
+    difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
+    return trajectory_error(difference, displacement_norms(reference))

@@ -1,0 +1,159 @@
+"""Section ``alternatives``: methods, their steps, and what they are compared with."""
+
+from typing import Annotated, Any, Final, Literal, TypeVar
+
+from pydantic import AfterValidator, Field
+
+from pdrom.core.errors import choices
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.model.held_out import FIRST, MOTIONS, HeldOutMotion
+from study.experiments.alternatives.solvers.methods import METHODS
+from study.experiments.kit.measurement import Protocol
+from study.experiments.kit.settings import Count, Modes, Repeats, Tolerance
+
+REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # the others are full-order ones
+OWN: Final = "own iterations"  # frames that a reduction may be trained on, beside converged ones
+# What the text says is decided by these: the best of the others at large errors, and reductions.
+TWO_LEVEL: Final = "two-level"  # full order, with a trained subspace for its coarse level
+TRAINED: Final = (TWO_LEVEL, *REDUCTIONS)
+DECIDING: Final = ("projective", "anderson", "chebyshev", *TRAINED)
+CONVERGED: Final = "converged"  # the implicit step itself, however long it takes
+
+# What tells candidates of a scene apart.
+SETTING: Final = ["method", "substeps", "iterations", "trained_on", "k"]
+
+Named = TypeVar("Named", dict[str, Any], tuple[str, ...])
+Trained = Literal["own iterations", "converged"]
+Factors = Annotated[tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...], Field(min_length=1)]
+Work = Annotated[int, Field(ge=1, le=10**12, description="vertices times steps")]
+Steps = Annotated[tuple[Count, Count], Field(description="substeps of a frame, iterations of each")]
+
+
+def _with_the_first(motions: tuple[HeldOutMotion, ...]) -> tuple[HeldOutMotion, ...]:
+    if motions[:1] != (FIRST,):
+        raise ValueError(f"begins with '{FIRST}', which all methods run")
+    return motions
+
+
+def _known(by_method: Named) -> Named:
+    allowed = (*METHODS, *TRAINED, CONVERGED)
+    for name in by_method:
+        if name not in allowed:
+            raise ValueError(f"unknown method '{name}'{choices(name, allowed)}")
+    return by_method
+
+
+def _without_converged(steps: dict[str, Any]) -> dict[str, Any]:
+    if CONVERGED in steps:
+        raise ValueError(f"{CONVERGED}: has no steps, it is the reference")
+    return steps
+
+
+def _sweep(*iterations: int) -> tuple[Steps, ...]:
+    return tuple((1, count) for count in iterations)
+
+
+def _small(*substeps: int) -> tuple[Steps, ...]:
+    return tuple((count, 1) for count in substeps)
+
+
+def default_steps() -> dict[str, tuple[Steps, ...]]:
+    """More iterations of one step, and more steps of one iteration."""
+    return {
+        "projective": (*_sweep(1, 2, 3, 4, 5, 10, 20, 40, 80), *_small(2, 5, 10, 20, 40), (5, 4)),
+        "anderson": (*_sweep(5, 10, 20, 40, 80), (5, 5), (10, 5)),
+        "chebyshev": _sweep(10, 20, 40, 80),
+        "l-bfgs": (*_sweep(5, 10, 20, 40, 80), (5, 5), (10, 5)),
+        "newton": _sweep(1, 2, 3),
+        "xpbd": (*_sweep(5, 10, 20, 50), *_small(5, 10, 20, 50, 100)),
+        "vertex-descent": (*_sweep(10, 20, 50), *_small(10, 20, 50)),
+        "explicit": _small(5, 10, 20, 40, 80, 160),
+        TWO_LEVEL: _sweep(2, 3, 5, 10, 20),
+        REDUCED: _sweep(5, 10, 20, 40, 80, 160),
+        ACCELERATED: _sweep(5, 10, 20),
+    }
+
+
+class ContinuousReference(ConfigModel):
+    """The motion in continuous time: explicit steps, halved from ``substeps`` a frame on.
+
+    They are halved until the estimated error is below ``tolerance``, as long as the vertices times
+    the steps of a frame are at most ``limit``.
+    """
+
+    substeps: Count = 40
+    limit: Work = 2_400_000
+    tolerance: Tolerance = 1e-4
+
+
+class ImplicitReference(ConfigModel):
+    """The implicit step of the scene: a frame is converged when one more local/global iteration
+    moves no vertex by more than ``tolerance`` times the extent; ``limit`` bounds the evaluations.
+    """
+
+    tolerance: Tolerance = 1e-7
+    limit: Annotated[int, Field(ge=2)] = 4000
+
+
+class Comparison(Protocol):
+    """One scene on one mesh.
+
+    ``steps`` has pairs (substeps of a frame, iterations of each) for each method. Errors are taken
+    over ``compared`` frames of the held-out motion, for each factor on all weights that
+    ``stiffness`` has for the scene (1 if none, and on other meshes than its own); the ``deciding``
+    methods run all of ``motions``. Each of ``processes`` new ones times ``frames`` of the first
+    motion, the first process by all methods and the others by the deciding ones: a frame takes the
+    same work in all motions. The reduction has each of ``modes`` and samples to ``tau``, trained on
+    the training motion, its frames as they are or converged (``trained_on``); the coarse level of
+    two samples to ``coarse_tau`` and is trained on converged frames. ``work`` bounds the
+    vertices times substeps times iterations of a frame of a method: steps beyond are left out
+    (converged: the implicit reference, one step of one iteration).
+    """
+
+    compared: Count = 20
+    stiffness: dict[str, Factors] = Field(default_factory=dict)
+    steps: Annotated[
+        dict[str, tuple[Steps, ...]], AfterValidator(_known), AfterValidator(_without_converged)
+    ] = Field(default_factory=default_steps)
+    work: Annotated[dict[str, Work], AfterValidator(_known)] = Field(default_factory=dict)
+    modes: Annotated[tuple[Modes, ...], Field(min_length=1)] = (40,)
+    tau: Tolerance = 1e-2
+    coarse_tau: Tolerance = 1e-3
+    trained_on: Annotated[tuple[Trained, ...], Field(min_length=1)] = (OWN, CONVERGED)
+    implicit: ImplicitReference = ImplicitReference()
+    continuous: ContinuousReference = ContinuousReference()
+    motions: Annotated[tuple[HeldOutMotion, ...], AfterValidator(_with_the_first)] = MOTIONS
+    deciding: Annotated[tuple[str, ...], AfterValidator(_known)] = DECIDING
+    frames: Count = 2
+    repeats: Repeats = 3
+    processes: Repeats = 10
+
+    def methods(self, decide: bool) -> tuple[str, ...]:
+        """Methods that are run; those that ``decide``, or all of them."""
+        return tuple(m for m in self.steps if not decide or m in self.deciding)
+
+    def factors(self, scene: str, size: float) -> tuple[float, ...]:
+        """Factors on all weights of a scene with ``size`` times the vertices along a side."""
+        return self.stiffness.get(scene, (1.0,)) if size == 1.0 else (1.0,)
+
+    def pairs(self, method: str, vertices: int) -> list[tuple[int, int]]:
+        """Substeps and iterations with which a method runs on a mesh of so many ``vertices``."""
+        steps = self.steps.get(method, ())
+        return [(n, k) for n, k in steps if self.affords(method, vertices * n * k)]
+
+    def affords(self, method: str, work: int) -> bool:
+        """Whether a frame of a method may have ``work``: vertices x substeps x iterations."""
+        return work <= self.work.get(method, work)
+
+
+class Alternatives(Comparison):
+    """Section ``alternatives``: factors on the vertices along a side for each of ``scenes``.
+
+    The mass of a mesh is that of the scene, whatever the factor. The winners are named for each of
+    ``errors``.
+    """
+
+    scenes: dict[str, tuple[Annotated[float, Field(gt=0.0, le=100.0)], ...]] = Field(
+        default_factory=dict
+    )
+    errors: tuple[Tolerance, ...] = (1e-1, 1e-2, 1e-3)

@@ -1,0 +1,41 @@
+"""Declaration of an experiment: a question that the study asks, with files as the answer."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from study.artifact.artifact import Artifact, declare, declared_in, normal
+from study.artifact.paths import Place
+from study.artifact.reads import Read
+
+
+class Experiment(Artifact):
+    """An artifact whose function writes its files itself."""
+
+
+def experiment(
+    title: str,
+    *,
+    reads: Mapping[str, Read | Place],
+    writes: Mapping[str, Place],
+    alone: bool = False,
+) -> Callable[[Callable[..., None]], Experiment]:
+    """Declare the function below as an experiment, see `Artifact`.
+
+    ``title`` names its jobs; nothing runs beside those of one that wants to be ``alone``.
+
+    Raises
+    ------
+    TypeError
+        If the function does not take what it reads and writes.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Experiment:
+        made = Experiment(function.__name__, title, normal(reads), writes, function, alone)
+        return declare(made, *writes)
+
+    return decorate
+
+
+def experiments(package: str = "study.experiments") -> dict[str, Experiment]:
+    """Return every experiment of a package by name."""
+    return declared_in(package, Experiment)

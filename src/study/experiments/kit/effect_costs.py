@@ -1,0 +1,200 @@
+"""Time of each effect of a scene in a frame, and the time that a scene without it saves.
+
+Effects are timed by stand-ins around them, so that a normal run holds no timer at all.
+"""
+
+from collections.abc import Callable, Sequence
+from itertools import combinations
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.constraints.local_kernel import LocalKernel
+from pdrom.model.dynamics.space import VertexSpace
+from pdrom.model.dynamics.stepper import Stepper
+from pdrom.model.dynamics.system import GlobalSystem
+from pdrom.model.effects.base import Boundary, Contact, Effect, Force
+from pdrom.model.scene import Scene
+from study.experiments.kit.measurement import Measurement, Variant, measure, median_frames
+from study.experiments.kit.names import GLOBAL, REST, RIGHT
+from study.experiments.kit.timed_kernel import timed
+
+COSTS = ["scene", "effect", "elements", "ms_per_frame", "share", "us_per_iteration"]
+LEFT_OUT = ["scene", "left_out", "groups", "elements", "ms_per_frame", "saved_ms", "own_ms"]
+
+# Questions that the step loop asks an effect of each role.
+_QUESTIONS: dict[type[Effect], tuple[str, ...]] = {
+    ConstraintGroup: ("begin_frame", "accumulate"),
+    Force: ("acceleration",),
+    Boundary: ("active", "held", "takes_hold", "path"),
+    Contact: ("apply",),
+}
+
+
+class Timed:
+    """Stands for an effect and adds up the time of the questions that the step loop asks it.
+
+    Attributes
+    ----------
+    local_kernel, threads : of a group, whose kernel is timed inside the compiled loop
+    """
+
+    def __init__(self, effect: Effect, questions: Sequence[str]) -> None:
+        self.name = effect.name
+        self._asked, self._kernel = 0.0, np.zeros(1)
+        self.local_kernel: LocalKernel | None = None
+        if isinstance(effect, ConstraintGroup):
+            self.threads = effect.threads
+            if effect.local_kernel is not None:
+                self.local_kernel, self._kernel = timed(effect.local_kernel)
+        for question in questions:
+            setattr(self, question, self._timed(getattr(effect, question)))
+
+    @property
+    def seconds(self) -> float:
+        """Time since `reset`."""
+        return self._asked + self.kernel_seconds
+
+    @property
+    def kernel_seconds(self) -> float:
+        """Part of `seconds` that is spent inside the compiled loop."""
+        return float(self._kernel.sum())
+
+    def reset(self) -> None:
+        """Begin again."""
+        self._asked = 0.0
+        self._kernel[:] = 0.0
+
+    def _timed(self, ask: Callable[..., Any]) -> Callable[..., Any]:
+        def answer(*arguments: Any) -> Any:
+            before = perf_counter()
+            result = ask(*arguments)
+            self._asked += perf_counter() - before
+            return result
+
+        return answer
+
+
+def effect_costs(
+    scene: Scene, system: GlobalSystem, frames: int, warmup: int, repeats: int
+) -> pd.DataFrame:
+    """Table of `COSTS` of the full-order run: effects, right-hand side, global solve, the rest.
+
+    An effect that a scene lists several times has one row. Elements are those of a group, the
+    vertices that a hold may ever hold, else all vertices. The shares add up to one. What the
+    compiled loop does in each iteration has its time there, too; the right-hand side is what the
+    loop's local steps take beside the groups.
+
+    Parameters
+    ----------
+    warmup, repeats : runs before the timed ones, and timed ones
+    """
+    roles: list[Sequence[Effect]] = []
+    roles += [scene.groups, scene.forces, scene.boundaries, scene.contacts]
+    questions = zip(roles, _QUESTIONS.values(), strict=True)
+    by_role: Any = [[Timed(effect, asked) for effect in role] for role, asked in questions]
+    groups, *others = by_role
+    space = VertexSpace(system, *others)
+    config = scene.config
+    loop = Stepper(
+        space, config.time_step, config.iterations, local_steps=groups, track_objective=False
+    )
+    stands = [stand for role in by_role for stand in role]
+    names = list(dict.fromkeys(stand.name for stand in stands))
+    samples = [_profile(loop, scene, frames, stands, names) for _ in range(warmup + repeats)]
+    total, *parts = median_frames(np.array(samples[warmup:]))
+    phases = [*names, RIGHT, GLOBAL, REST]
+    costs = pd.DataFrame({"scene": config.name, "effect": phases})
+    costs["elements"] = [_elements(scene, phase) for phase in phases]
+    costs["ms_per_frame"], inside = np.reshape(parts, (2, -1))
+    costs["share"] = costs.ms_per_frame / total
+    costs["us_per_iteration"] = np.where(inside > 0.0, 1e3 * inside / config.iterations, np.nan)
+    return costs[COSTS]
+
+
+def _profile(
+    loop: Stepper, scene: Scene, frames: int, stands: list[Timed], names: list[str]
+) -> list[list[float]]:
+    """Milliseconds of each frame: total, all phases, then of each what the compiled loop takes."""
+    state, rows = scene.initial_state(), []
+    for frame in range(frames):
+        for stand in stands:
+            stand.reset()
+        state, report = loop.step(state, frame)
+        own = [sum(stand.seconds for stand in stands if stand.name == name) for name in names]
+        inside = [sum(s.kernel_seconds for s in stands if s.name == name) for name in names]
+        total, (_, local, solve, _) = float(report.seconds.sum()), report.seconds.tolist()
+        # a loop outside compiled code asks the groups themselves
+        right = local - sum(inside) if sum(inside) > 0.0 else 0.0
+        parts = [*own, right, solve, total - sum(own) - right - solve]
+        rows.append([1e3 * part for part in (total, *parts, *inside, right, solve, 0.0)])
+    return rows
+
+
+def _elements(scene: Scene, name: str) -> int:
+    """Elements of the effects called ``name``."""
+    for group in scene.groups:
+        if group.name == name:
+            return group.elements
+    held = [b.vertices for b in scene.boundaries if b.name == name]
+    return len(np.unique(np.concatenate(held))) if held else scene.mesh.vertices
+
+
+def left_out_sets(scene: Scene) -> list[tuple[str, ...]]:
+    """Effects to leave out in turn: none, every effect of a frame alone, all groups but one.
+
+    Empty for a scene with a single group: without it there is nothing to project. Effects of the
+    start, such as a kick, take no time of a frame.
+    """
+    groups = scene.config.groups
+    if len(groups) < 2:
+        return []
+    roles = (scene.groups, scene.forces, scene.boundaries, scene.contacts)
+    lasting = {effect.name for role in roles for effect in role}
+    listed = dict.fromkeys(e.effect for e in scene.config.effects)
+    single = [(name,) for name in listed if name in lasting]
+    several = combinations(groups, len(groups) - 1) if len(groups) > 2 else ()
+    return [(), *single, *several]
+
+
+def left_out(
+    scene: Scene, costs: pd.DataFrame, frames: int, warmup: int, repeats: int, solver: str
+) -> pd.DataFrame:
+    """Table of `LEFT_OUT`: time of the scene without some of its effects, built without them.
+
+    ``saved_ms`` is the time of the whole scene minus that of the row, ``own_ms`` what the effects
+    cost inside the whole scene (``costs``, see `effect_costs`). ``frames``, ``warmup`` and
+    ``repeats`` as there, ``solver`` is the name of the linear solver.
+    """
+    sets = left_out_sets(scene)
+    variants = [_without(scene, names, frames, solver) for names in sets]
+    if not variants:
+        return pd.DataFrame(columns=LEFT_OUT)
+    results = measure(variants, warmup, repeats)
+    whole, own = results[0].frame, costs.set_index("effect")
+    rows = [_saving(r, names, whole, own) for r, names in zip(results, sets, strict=True)]
+    return pd.DataFrame([(scene.config.name, *row) for row in rows], columns=LEFT_OUT)
+
+
+def _without(scene: Scene, names: tuple[str, ...], frames: int, solver: str) -> Variant:
+    kept = {"effects": scene.config.effects_without(*names)}
+    part = Scene.build(scene.config.model_copy(update=kept), scene.mesh)
+    loop = part.stepper(part.system_with(solver), track_objective=False)
+    return Variant({"groups": len(part.groups)}, loop, part.initial_state(), frames)
+
+
+def _saving(
+    result: Measurement, names: tuple[str, ...], whole: float, own: pd.DataFrame
+) -> tuple[object, ...]:
+    chosen = own.loc[list(names)]
+    return (
+        " + ".join(names) or "nothing",
+        result.labels["groups"],
+        int(chosen.elements.sum()),
+        result.frame,
+        whole - result.frame,
+        float(chosen.ms_per_frame.sum()),
+    )

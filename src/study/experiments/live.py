@@ -1,0 +1,232 @@
+"""Reduced models of a scene in a file that a page loads, to run them in the reader's browser."""
+
+import json
+import logging
+from collections.abc import Iterator
+from math import ceil
+from typing import Any
+
+import numpy as np
+
+from pdrom.core.errors import StorageError
+from pdrom.core.names import SceneName
+from pdrom.core.packed import pack_array, pack_positions
+from pdrom.core.store import write_text
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.basis import Basis, load_basis
+from pdrom.reduction.local.guard_settings import GuardSettings
+from pdrom.reduction.local.trained_range import largest_extent
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.rerun import mean_motion
+from pdrom.reduction.subspace.columns import Columns
+from pdrom.reduction.subspace.exported import (
+    export_basis,
+    export_model,
+    export_scene,
+    needed_vertices,
+    trained_box,
+)
+from pdrom.reduction.subspace.interpolation import Interpolation
+from pdrom.reduction.subspace.joint import interpolation_of
+from pdrom.reduction.subspace.model import SubspaceModel, ecsw_name
+from pdrom.reduction.subspace.store import load_models
+from study.artifact.paths import (
+    BASIS,
+    COMPANION,
+    LIVE_MODEL,
+    MESH,
+    ONLINE_MODELS,
+    SAMPLING,
+    SUBSPACES,
+    TRAIN,
+    File,
+)
+from study.artifact.reads import EachOf, Settings
+from study.experiments.kit.declaration import experiment
+from study.experiments.kit.load_reduction import load_reduction
+from study.experiments.kit.scenes import positions_of, scene_of
+from study.experiments.kit.settings import Modes, Tolerance
+
+log = logging.getLogger(__name__)
+
+LARGEST = 3_000_000  # bytes of a file
+GHOST = 250_000  # positions of the full-order run that a file holds, about
+JOINT = "deim-joint"
+FORMAT = 1
+
+
+class LiveModels(ConfigModel):
+    """Models of the page: numbers of modes k, tolerances of the sampling, and the modes r of the
+    joint rows; each as far as the study has it."""
+
+    sizes: tuple[Modes, ...] = (10, 20, 40)
+    tolerances: tuple[Tolerance, ...] = (3e-2, 1e-2, 1e-3)
+    joint_rows: Modes = 20
+
+
+class Live(LiveModels):
+    """Section ``live``: the models of the page, and the ``scenes`` that a reader chooses from.
+
+    Shown are those that the study has models of: position subspaces, or ``online.scenes``.
+    """
+
+    scenes: tuple[SceneName, ...] = ()
+
+
+class JointRows(ConfigModel):
+    """Joint rows of a group, which the study has samples of."""
+
+    scene: str
+    group: str
+    method: MethodSpec
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Labels of the files of this case."""
+        return {"scene": self.scene, "group": self.group, "method": JOINT}
+
+
+class Options(ConfigModel):
+    """Settings of the models of a scene."""
+
+    scene: SceneConfig
+    title: str
+    live: LiveModels
+    guard: GuardSettings
+    joint_rows: tuple[JointRows, ...]
+
+
+@experiment(
+    "Models of {scene} for the page",
+    reads={
+        "mesh": MESH,
+        "train": TRAIN,
+        "subspaces": EachOf(SUBSPACES, "with_subspaces"),
+        "online": EachOf(ONLINE_MODELS, "with_online_models"),
+        "companions": EachOf(COMPANION, "with_companion"),
+        "bases": EachOf(BASIS, "joint_rows"),
+        "samplings": EachOf(SAMPLING, "joint_rows"),
+        "settings": Settings(Options),
+    },
+    writes={"out": LIVE_MODEL},
+)
+def live(
+    mesh: File,
+    train: File,
+    subspaces: list[File],
+    online: list[File],
+    companions: list[File],
+    bases: list[File],
+    samplings: list[File],
+    settings: Options,
+    out: File,
+) -> None:
+    """Write the models with the recorded full-order run.
+
+    Parameters
+    ----------
+    bases, samplings : of the joint rows, in the order of the settings
+
+    Raises
+    ------
+    StorageError
+        The file would be larger than `LARGEST`.
+    """
+    scene = scene_of(settings.scene, mesh)
+    reference = positions_of(train)
+    own = [found for file in (*subspaces, *online) for found in load_models(file.path)]
+    chosen = list(_chosen(own, settings.live))
+    size = settings.live.joint_rows
+    for case, basis, sampling in zip(settings.joint_rows, bases, samplings, strict=True):
+        joint = _Joint(case, load_basis(basis.path), sampling.path, size)
+        chosen += list(joint.models(scene, [model for _, model in chosen]))
+    beside = [model for file in companions for _, model in load_models(file.path)]
+    chosen += [({"family": "companion", "k": model.columns.modes}, model) for model in beside]
+    content = {
+        "format": FORMAT,
+        "scene": settings.scene.name,
+        "title": settings.title,
+        **export_scene(scene),
+        **_models(scene, chosen, reference),
+        "shown": _shown(scene, reference),
+        "guard": {
+            "margin": settings.guard.margin,
+            "extent": settings.guard.extent * largest_extent(reference),
+            "threshold": settings.guard.threshold,
+            "motion": mean_motion(reference),
+        },
+    }
+    text = f"pdromLive({json.dumps(content, separators=(',', ':'), allow_nan=False)});\n"
+    if len(text) > LARGEST:
+        raise StorageError(
+            f"{out.path}: {len(text) / 1e6:.1f} MB, allowed are {LARGEST / 1e6:.1f}: choose fewer "
+            "sizes or tolerances (keys live.sizes, live.tolerances)"
+        )
+    write_text(text, out.path)
+    log.info("%s: %d models, %.1f MB", settings.scene.name, len(chosen), len(text) / 1e6)
+
+
+Labelled = tuple[dict[str, Any], SubspaceModel]
+
+
+def _chosen(
+    models: list[tuple[dict[str, Any], SubspaceModel]], asked: LiveModels
+) -> Iterator[Labelled]:
+    """Models with sampled elements on snapshot bases, of the sizes and tolerances asked for."""
+    tolerances = {ecsw_name(tolerance): tolerance for tolerance in asked.tolerances}
+    for labels, model in models:
+        method, kind, k = labels["method"], labels["position_basis"], labels["k"]
+        if method in tolerances and kind == "pod" and k in asked.sizes:
+            yield {"family": "elements", "k": k, "tau": tolerances[method]}, model
+
+
+class _Joint:
+    """Joint rows of one group, of the size asked for or of the largest that exists."""
+
+    def __init__(self, case: JointRows, basis: Basis, sampling: str, size: int) -> None:
+        self._group = case.group
+        self._reduction = load_reduction(basis, sampling, case.method, min(size, basis.rank))
+
+    def models(self, scene: Scene, beside: list[SubspaceModel]) -> Iterator[Labelled]:
+        """One for each subspace of the models ``beside``; other groups are sampled as there."""
+        group = scene.group(self._group)
+        for model in {id(model.columns): model for model in beside}.values():
+            joint: Interpolation = interpolation_of(group, model.columns, self._reduction)
+            labels = {"family": "joint", "k": model.columns.modes, "r": self._reduction.r}
+            samples = {**model.samples, self._group: joint}
+            yield labels, SubspaceModel(model.position_basis, model.columns, samples)
+
+
+def _models(scene: Scene, chosen: list[Labelled], reference: np.ndarray) -> dict[str, Any]:
+    """Bases and models; a model knows the place of its basis."""
+    columns: dict[int, Columns] = {id(model.columns): model.columns for _, model in chosen}
+    places = {key: place for place, key in enumerate(columns)}
+    needed = [
+        needed_vertices(scene, [m for _, m in chosen if id(m.columns) == key]) for key in columns
+    ]
+    return {
+        "bases": [
+            {
+                **export_basis(scene, own, rows),
+                "trained": pack_array(trained_box(scene, own, reference), "f8"),
+            }
+            for own, rows in zip(columns.values(), needed, strict=True)
+        ],
+        "models": [
+            {**labels, "basis": places[id(model.columns)], **export_model(scene, model)}
+            for labels, model in chosen
+        ],
+    }
+
+
+def _shown(scene: Scene, reference: np.ndarray) -> dict[str, Any]:
+    """Surface, and every so many frames of the full-order run at its vertices."""
+    used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
+    stride = max(1, ceil((len(reference) - 1) * len(used) / GHOST))
+    return {
+        "vertices": pack_array(used, "u4"),
+        "triangles": pack_array(triangles.reshape(-1, 3), "u4"),
+        "stride": stride,
+        "full": pack_positions(reference[::stride, used]),
+    }

@@ -1,0 +1,27 @@
+"""Snapshots of a group -> basis."""
+
+import logging
+
+from pdrom.reduction.basis import compute_basis, save_basis
+from pdrom.reduction.method import BasisSpec
+from pdrom.reduction.snapshots import load_snapshots
+from study.artifact.paths import BASIS, SNAPSHOTS, File
+from study.artifact.reads import Setting
+from study.experiments.kit.declaration import experiment
+
+log = logging.getLogger(__name__)
+
+
+@experiment(
+    "POD of {group} in {scene} ({basis})",
+    reads={"snapshots": SNAPSHOTS, "spec": Setting("basis")},
+    writes={"out": BASIS},
+)
+def pod(snapshots: File, spec: BasisSpec, out: File) -> None:
+    """Compute a basis ``spec`` of the training ``snapshots`` and save it to ``out``."""
+    data = load_snapshots(snapshots.path)
+    basis = compute_basis(
+        data.train, data.row_mass, data.roundoff, rows_per_element=data.rows_per_element, spec=spec
+    )
+    log.info("numerical rank %d of %d snapshots", basis.rank, len(data.train))
+    save_basis(basis, out.path)

@@ -1,0 +1,123 @@
+"""Runs within requested tolerances, on motions that no calibration has seen."""
+
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+from pydantic import Field
+
+from pdrom.core.store import write_table
+from pdrom.model.held_out import MOTIONS, HeldOutMotion
+from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.requested.calibration import (
+    Calibration,
+    Motion,
+    Quantity,
+    Request,
+    ToleranceSettings,
+    calibrate,
+    transferred,
+)  # fmt: skip
+from pdrom.reduction.requested.levels import Level, Trajectory
+from pdrom.reduction.requested.run import RequestedRun
+from study.artifact.paths import REQUESTED_TOLERANCES, File
+from study.artifact.reads import Setting, SourcesOf
+from study.experiments.kit.declaration import experiment
+from study.experiments.kit.settings import Tolerance
+
+log = logging.getLogger(__name__)
+
+COLUMNS = [
+    "scene", "motion", "tolerance", "vertices", "frames", "reduced", "error", "velocity_error",
+    "expected", "estimate", "level", "failed", "checks", "ms_per_frame", "full_level",
+    "full_error", "full_ms", "own_ms",
+]  # fmt: skip
+REPEATS = 2  # runs of a request, for the time
+
+
+class RequestedRuns(ToleranceSettings):
+    """Every tolerance of ``errors``, requested on each of ``motions``."""
+
+    errors: Annotated[tuple[Tolerance, ...], Field(min_length=1)] = (0.1, 0.03, 0.01)
+    motions: Annotated[tuple[HeldOutMotion, ...], Field(min_length=1)] = MOTIONS
+
+
+class RequestedTolerances(RequestedRuns):
+    """Section ``requested_tolerances``: ``scenes`` (all if empty, the large ones too)."""
+
+    scenes: tuple[str, ...] = ()
+
+
+@experiment(
+    "Requested tolerances of {scene}",
+    reads={
+        "sources": SourcesOf("scene.mesh"),
+        "config": Setting("scene"),
+        "section": Setting("requested_tolerances"),
+    },
+    writes={"out": REQUESTED_TOLERANCES},
+)
+def requested_tolerances(
+    sources: list[Path], config: SceneConfig, section: RequestedRuns, out: File
+) -> None:
+    """Calibrate a scene, and run every held-out motion within every tolerance.
+
+    Parameters
+    ----------
+    sources : files of the mesh; the job depends on them
+    config : of the scene
+    section : tolerances, motions, and the levels
+    out : table of the runs
+    """
+    training = Scene.build(config, config.mesh.build(Path()))
+    made: list[Calibration] = []
+    rows: list[dict[str, Any]] = []
+    for name in section.motions:
+        variant = Scene.build(config.heldout_variant(name), training.mesh, masses=training.masses)
+        own = transferred(training, variant)
+        if not made or made[-1].motions[0].scene.config.effects != own.config.effects:
+            made.append(calibrate(own, section, min(section.errors)))
+        rows += ({"motion": name, **row} for row in _rows(variant, made[-1], section))
+        log.info("%s: %s done", config.name, name)
+    write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
+
+
+def _rows(scene: Scene, own: Calibration, section: RequestedRuns) -> Iterator[dict[str, Any]]:
+    motion, frames = Motion(scene, min(section.errors) / section.factor), scene.config.frames
+    own_run = Trajectory(Level(scene.config.iterations), scene).to(frames)
+    known: dict[str, Trajectory] = {}
+    for error in section.errors:
+        run = RequestedRun(scene, own, Request(error=error))
+        outcomes = [run.outcome() for _ in range(REPEATS)]
+        done, full = outcomes[0], run.full_order.level
+        if full.title not in known:
+            known[full.title] = Trajectory(full, scene).to(frames)
+        alone = known[full.title]
+        end = done.frames or min(motion.ends(error, "position"))
+        yield {
+            "scene": scene.config.name,
+            "tolerance": error,
+            "vertices": scene.mesh.vertices,
+            "frames": done.frames,
+            "reduced": done.reduced,
+            "error": _error(motion, done.positions, end, "position"),
+            "velocity_error": _error(motion, done.positions, end, "velocity"),
+            "expected": done.expected,
+            "estimate": done.estimate,
+            "level": done.level,
+            "failed": len(done.failed),
+            "checks": len(done.checks),
+            "ms_per_frame": 1e3 * min(each.seconds for each in outcomes) / frames,
+            "full_level": full.title,
+            "full_error": _error(motion, alone.positions, end, "position"),
+            "full_ms": 1e3 * alone.seconds / frames,
+            "own_ms": 1e3 * own_run.seconds / frames,
+        }
+
+
+def _error(motion: Motion, run: np.ndarray, end: int, quantity: Quantity) -> float | None:
+    """Error of ``run`` (F + 1, N, 3) over the first frames, up to ``end``; None without any."""
+    return float(motion.errors(run, quantity)[end - 1]) if end else None

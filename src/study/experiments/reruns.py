@@ -1,0 +1,236 @@
+"""Sampling of a group by one method, then the scene again with the group reduced, for every r."""
+
+import logging
+from dataclasses import dataclass
+from typing import Any
+
+import h5py
+import numpy as np
+import pandas as pd
+
+from pdrom.core.store import write_hdf5, write_table
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.model.energy import largest
+from pdrom.model.held_out import FIRST
+from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.basis import Basis, load_basis
+from pdrom.reduction.deviations import Yardstick
+from pdrom.reduction.local.guard import GUARD_COLUMNS, GuardRecord
+from pdrom.reduction.local.guard_settings import GuardSettings
+from pdrom.reduction.local.guarded import Trained, guarded_rerun
+from pdrom.reduction.local.ranks import Rank, resolve_ranks
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.rerun import Rerun
+from pdrom.reduction.snapshots import load_snapshots
+from pdrom.reduction.subspace.store import load_models
+from study.artifact.paths import (
+    BASIS,
+    COMPANION,
+    FULL_ORDER,
+    MESH,
+    RECONSTRUCTION,
+    RERUNS,
+    RERUNS_HELDOUT,
+    RERUNS_TRAIN,
+    SAMPLING,
+    SNAPSHOTS,
+    TRAIN,
+    File,
+)
+from study.artifact.reads import EachOf, Every, Settings
+from study.experiments.kit.declaration import experiment
+from study.experiments.kit.load_reduction import load_reduction
+from study.experiments.kit.sampling import Sweep, sample
+from study.experiments.kit.scenes import TRAIN as TRAINING
+from study.experiments.kit.scenes import positions_of, scene_of
+from study.experiments.kit.settings import BlowupExtent, Solver
+
+log = logging.getLogger(__name__)
+
+COLUMNS = [
+    "scene", "group", "method", "r", "frames", "finite", "blowup_frame", "max_extent",
+    "relative_error", "energy_ratio", "gain", *GUARD_COLUMNS,
+]  # fmt: skip
+MOTION = "motion"  # column of the held-out rows only
+UNWATCHED = GuardSettings(action="none")
+
+
+class OfScene(ConfigModel):
+    """Names a file of a scene."""
+
+    scene: str
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Labels of the file."""
+        return {"scene": self.scene}
+
+
+class Options(ConfigModel):
+    """Settings of samplings and reruns by one method."""
+
+    scene: SceneConfig
+    method: MethodSpec
+    sweep: Sweep
+    ranks: tuple[Rank, ...]
+    heldout_ranks: tuple[Rank, ...]
+    blowup_extent: BlowupExtent
+    guard: GuardSettings
+    solver: Solver
+
+
+@experiment(
+    "Sampling and reruns of {scene}, {group} by {method}",
+    reads={
+        "mesh": MESH,
+        "fom": TRAIN,
+        "motions": Every(FULL_ORDER),
+        "snapshots": SNAPSHOTS,
+        "basis": BASIS,
+        "companions": EachOf(COMPANION, "companions"),
+        "settings": Settings(Options),
+    },
+    writes={
+        "sampling": SAMPLING,
+        "errors": RECONSTRUCTION,
+        "runs": RERUNS,
+        "out": RERUNS_TRAIN,
+        "heldout_table": RERUNS_HELDOUT,
+    },
+)
+def reruns(
+    mesh: File,
+    fom: File,
+    motions: list[File],
+    snapshots: File,
+    basis: File,
+    companions: list[File],
+    settings: Options,
+    sampling: File,
+    errors: File,
+    runs: File,
+    out: File,
+    heldout_table: File,
+) -> None:
+    """Sample the group, then rerun the scene for every r, as trained and as held out.
+
+    One job does all: starting another process takes longer than the sampling. The first held-out
+    motion runs with the ``heldout_ranks``, the others with the full one if it is among them.
+    """
+    space, data = load_basis(basis.path), load_snapshots(snapshots.path)
+    sample(
+        space,
+        data,
+        settings.method,
+        sweep=settings.sweep,
+        ranks=settings.ranks,
+        sampling=sampling,
+        errors=errors,
+    )
+    labels = runs.labels
+    models = [model for file in companions for _, model in load_models(file.path)]
+    trained = Trained.on(positions_of(fom), models[0] if models else None)
+    full = tuple(rank for rank in settings.heldout_ranks if rank == "full")
+    ranks = {TRAINING: settings.ranks, FIRST: settings.heldout_ranks}
+    found = {}
+    with write_hdf5(runs.path) as file:
+        for run in motions:
+            motion, reference = run["run"], positions_of(run)
+            scene = scene_of(settings.scene, mesh, motion)
+            case = _Case(scene, motion, labels, settings, space, sampling.path, trained)
+            yardstick = Yardstick(scene, reference)
+            file.attrs.update(yardstick.units)
+            store = file if motion == TRAINING else file.create_group(motion)
+            rows = case.run(store, ranks.get(motion, full), yardstick)
+            whole = ["guard_frame", "guard_count", "fallback_frames"]
+            table = pd.DataFrame(rows, columns=COLUMNS).astype(dict.fromkeys(whole, "Int64"))
+            found[motion] = table
+    write_table(found.pop(TRAINING), out.path)
+    heldout = [table.assign(**{MOTION: motion}) for motion, table in found.items()]
+    write_table(pd.concat(heldout, ignore_index=True), heldout_table.path)
+
+
+@dataclass(frozen=True)
+class _Case:
+    """One motion of a scene with one method."""
+
+    scene: Scene
+    motion: str
+    labels: dict[str, str]
+    settings: Options
+    basis: Basis
+    sampling: str
+    trained: Trained
+
+    def run(
+        self, file: h5py.Group, ranks: tuple[Rank, ...], yardstick: Yardstick
+    ) -> list[dict[str, Any]]:
+        """Rerun for every r and return the rows; an r beyond the rank is a marked row.
+
+        Parameters
+        ----------
+        yardstick : the motion's full-order run
+        """
+        settings, reference = self.settings, yardstick.reference
+        for name, values in yardstick.series.items():
+            file[name] = values
+        system = self.scene.system_with(settings.solver)
+        rows = []
+        for r in resolve_ranks(ranks, self.basis.rank):
+            store = file.create_group(f"r{r:04d}")
+            store.attrs.update(r=r, full=r == self.basis.rank, marked=r > self.basis.rank)
+            if r > self.basis.rank:
+                log.warning("r = %d exceeds the numerical rank %d: not run", r, self.basis.rank)
+                rows.append({**self.labels, "r": r, "frames": 0})
+                continue
+            reduction = load_reduction(self.basis, self.sampling, settings.method, r=r)
+            watched = self._watched(r)
+            guard = settings.guard if watched else UNWATCHED
+            outcome, seen = guarded_rerun(
+                self.scene, system, self.labels["group"], reduction=reduction, reference=reference,
+                blowup_extent=settings.blowup_extent, settings=guard, trained=self.trained,
+            )  # fmt: skip
+            apart = yardstick.deviations(outcome)
+            for name, values in apart.items():
+                store[name] = values
+            _store(store, outcome, yardstick.displacement, seen)
+            if watched:  # the error of these is estimated, too
+                store["positions"] = outcome.positions.astype(np.float32)
+            measured = {
+                "energy_ratio": largest(apart["energy"]),
+                "gain": reduction.gain,
+                **seen.columns(),
+            }
+            rows.append(
+                {**self.labels, "r": r, **_row(outcome, yardstick.displacement), **measured}
+            )
+            log.info("r = %d: %d frames, blow-up %s", r, outcome.frames, outcome.blowup_frame)
+        return rows
+
+    def _watched(self, r: int) -> bool:
+        """Whether the guard sees a run, which doubles its time.
+
+        One that acts sees all. One that only reports sees those whose alarms are counted: all of
+        the training motion, those of full rank of the held-out ones.
+        """
+        if self.settings.guard.action not in ("none", "report") or self.motion == TRAINING:
+            return True
+        return r == self.basis.rank
+
+
+def _store(store: h5py.Group, outcome: Rerun, displacement: np.ndarray, seen: GuardRecord) -> None:
+    store["error"] = outcome.difference / np.sqrt(np.mean(displacement**2))
+    store["extent"] = outcome.extent
+    blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
+    store.attrs.update(finite=outcome.finite, blowup_frame=blowup, max_extent=outcome.max_extent)
+    store.attrs.update({k: v for k, v in seen.columns().items() if v is not None})
+
+
+def _row(outcome: Rerun, displacement: np.ndarray) -> dict[str, Any]:
+    return {
+        "frames": outcome.frames,
+        "finite": outcome.finite,
+        "blowup_frame": outcome.blowup_frame,
+        "max_extent": outcome.max_extent,
+        "relative_error": outcome.error(displacement),
+    }

@@ -1,0 +1,229 @@
+"""One scene over the time step and over the stiffness, by every method."""
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any, Self
+
+import numpy as np
+import pandas as pd
+from pydantic import Field, model_validator
+
+from pdrom.core.store import write_table
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.model.dynamics.system import GlobalSystem
+from pdrom.model.energy import EnergyScale
+from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.basis import load_basis
+from pdrom.reduction.local.local_step import ReducedLocalStep
+from pdrom.reduction.local.ranks import Rank, resolve_ranks
+from pdrom.reduction.local.rerun import replace_group, rerun
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.rerun import Rerun, displacement_norms
+from pdrom.reduction.sampling import Reduction
+from pdrom.reduction.subspace.model import SubspaceModel
+from pdrom.reduction.subspace.rerun import rerun_model
+from pdrom.reduction.subspace.store import load_models
+from study.artifact.paths import BASIS, MESH, SAMPLING, STABILITY, SUBSPACES, File
+from study.artifact.reads import Every, Setting
+from study.experiments.kit.declaration import experiment
+from study.experiments.kit.load_reduction import basis_of, load_reduction
+from study.experiments.kit.scenes import scene_of
+from study.experiments.kit.settings import BlowupExtent, Solver
+from study.experiments.kit.variation import varied
+
+log = logging.getLogger(__name__)
+
+COLUMNS = [
+    "scene", "method", "r", "h", "stiffness_ratio", "finite", "blowup_frame", "max_extent",
+    "energy_ratio", "gain", "group", "position_basis", "k", "frames", "relative_error",
+]  # fmt: skip
+
+
+class ShortRuns(ConfigModel):
+    """Short runs over the time step and over the stiffness of the reduced groups.
+
+    The bases and samplings are those of the scene's own setting.
+
+    ranks : basis sizes, as far as the study holds them; position subspaces run at their largest
+    time_steps : h in seconds, beside the scene's own
+    stiffness_ratios : factors on the weights of the reduced groups, beside 1
+    duration : seconds of simulated time, within ``min_frames`` and ``max_frames``
+    """
+
+    ranks: tuple[Rank, ...] = ()
+    time_steps: tuple[Annotated[float, Field(gt=0.0, le=10.0)], ...] = ()
+    stiffness_ratios: tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...] = ()
+    duration: Annotated[float, Field(gt=0.0)] = 1.0
+    min_frames: Annotated[int, Field(ge=2)] = 30
+    max_frames: Annotated[int, Field(ge=2)] = 120
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.max_frames < self.min_frames:
+            raise ValueError(
+                f"max_frames = {self.max_frames}: at least min_frames = {self.min_frames}"
+            )
+        return self
+
+
+class Stability(ShortRuns):
+    """Section ``stability``: the short runs, and how they are judged.
+
+    scenes : where, as far as the study holds them
+    wrong : relative error above which a run is finite but wrong
+    departure : multiple of the full-order run's largest extent above which a run has left the
+        scene; the key is ``left``
+    """
+
+    scenes: tuple[str, ...] = ()
+    wrong: Annotated[float, Field(gt=0.0)] = 0.1
+    departure: Annotated[float, Field(gt=1.0, alias="left")] = 2.0
+
+    @property
+    def left(self) -> float:
+        """`departure`, by its key."""
+        return self.departure
+
+
+@experiment(
+    "Time step and stiffness of {scene}",
+    reads={
+        "mesh": MESH,
+        "bases": Every(BASIS),
+        "samplings": Every(SAMPLING),
+        "subspaces": Every(SUBSPACES),
+        "config": Setting("scene"),
+        "methods": Setting("methods"),
+        "short": Setting("stability"),
+        "blowup_extent": Setting("blowup_extent"),
+        "solver": Setting("solver"),
+    },
+    writes={"out": STABILITY},
+)
+def stability(
+    mesh: File,
+    bases: list[File],
+    samplings: list[File],
+    subspaces: list[File],
+    config: SceneConfig,
+    methods: dict[str, MethodSpec],
+    short: ShortRuns,
+    blowup_extent: BlowupExtent,
+    solver: Solver,
+    out: File,
+) -> None:
+    """Run the full order, every local reduction and the largest subspaces at every setting.
+
+    Bases and samplings are those of the scene's own setting: how far do they carry?
+    """
+    scene = scene_of(config, mesh)
+    reductions = list(_reductions(methods, short.ranks, bases, samplings))
+    models = [model for file in subspaces for model in _largest(load_models(file.path))]
+    rows = []
+    for h, ratio in _grid(scene.config.time_step, short):
+        limits = (short.min_frames, short.max_frames)
+        other = varied(scene.config, h, ratio, duration=short.duration, frames=limits)
+        case = _Case(Scene.build(other, scene.mesh), ratio, solver, blowup_extent)
+        rows += case.rows(reductions, models)
+        log.info("h = %g s, stiffness times %g: %d frames", h, ratio, other.frames)
+    table = pd.DataFrame(rows, columns=COLUMNS)
+    whole = ["r", "blowup_frame", "k", "frames"]
+    write_table(table.astype(dict.fromkeys(whole, "Int64")), out.path)
+
+
+def _grid(own: float, chosen: ShortRuns) -> list[tuple[float, float]]:
+    """(h, stiffness ratio) pairs: one of them at a time leaves the scene's own setting."""
+    steps = sorted({own, *chosen.time_steps})
+    ratios = sorted({1.0, *chosen.stiffness_ratios})
+    return [(h, 1.0) for h in steps] + [(own, ratio) for ratio in ratios if ratio != 1.0]
+
+
+@dataclass(frozen=True)
+class _Local:
+    """A reduction of one group; None where the basis has fewer modes."""
+
+    group: str
+    method: str
+    r: int
+    reduction: Reduction | None
+
+
+def _reductions(
+    methods: dict[str, MethodSpec],
+    ranks: tuple[Rank, ...],
+    bases: list[File],
+    samplings: list[File],
+) -> Iterator[_Local]:
+    for file in samplings:
+        group, method = file["group"], file["method"]
+        spec = methods[method]
+        basis = load_basis(basis_of(file, spec, bases).path)
+        for r in resolve_ranks(ranks, basis.rank):
+            known = r <= basis.rank
+            reduction = load_reduction(basis, file.path, spec, r=r) if known else None
+            yield _Local(group, method, r, reduction)
+
+
+def _largest(
+    models: list[tuple[dict[str, Any], SubspaceModel]],
+) -> list[tuple[dict[str, Any], SubspaceModel]]:
+    size = max(labels["k"] for labels, _ in models)
+    return [(labels, model) for labels, model in models if labels["k"] == size]
+
+
+class _Case:
+    """The scene at one setting, with its full-order run."""
+
+    def __init__(self, scene: Scene, ratio: float, solver: str, limit: float) -> None:
+        self.scene, self.limit = scene, limit
+        self.system: GlobalSystem = scene.system_with(solver)
+        self.labels = {
+            "scene": scene.config.name, "h": scene.config.time_step, "stiffness_ratio": ratio,
+        }  # fmt: skip
+        nothing = np.zeros((scene.config.frames + 1, *scene.mesh.points.shape))
+        self.full_order = rerun(
+            scene, self.system, scene.groups, reference=nothing, blowup_extent=limit
+        )
+        self.reference = self.full_order.positions
+        self.displacement = displacement_norms(self.reference)
+        self.scale = EnergyScale.of(scene, self.reference)
+
+    def rows(
+        self, reductions: list[_Local], models: list[tuple[dict[str, Any], SubspaceModel]]
+    ) -> list[dict[str, Any]]:
+        """Rows of the full order and, if that is finite, of everything else."""
+        full = {"method": "full", "position_basis": "full"}
+        rows = [self._row(full, self.full_order)]
+        if not self.full_order.finite:
+            log.warning("the full-order run blew up: nothing to compare with")
+            return rows
+        rows[0]["relative_error"] = 0.0
+        for local in reductions:
+            labels = {"group": local.group, "method": local.method, "r": local.r}
+            labels["position_basis"] = "full"
+            if local.reduction is None:
+                rows.append({**self.labels, **labels, "frames": 0})
+                continue
+            step = ReducedLocalStep(self.scene.group(local.group), local.reduction)
+            steps = replace_group(self.scene, local.group, step)
+            outcome = rerun(
+                self.scene, self.system, steps, reference=self.reference, blowup_extent=self.limit
+            )
+            rows.append(self._row({**labels, "gain": local.reduction.gain}, outcome))
+        for labels, model in models:
+            outcome = rerun_model(self.scene, model, self.reference, blowup_extent=self.limit)
+            rows.append(self._row({"group": "all", **labels}, outcome))
+        return rows
+
+    def _row(self, labels: dict[str, Any], outcome: Rerun) -> dict[str, Any]:
+        return {
+            **self.labels,
+            **labels,
+            "frames": outcome.frames,
+            "finite": outcome.finite,
+            "blowup_frame": outcome.blowup_frame,
+            "max_extent": outcome.max_extent,
+            "energy_ratio": self.scale.ratio(outcome.positions),
+            "relative_error": outcome.error(self.displacement),
+        }

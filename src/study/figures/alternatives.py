@@ -1,0 +1,104 @@
+"""Error against time of the alternatives to projective dynamics."""
+
+import numpy as np
+import pandas as pd
+
+from pdrom.model.held_out import FIRST
+from pdrom.view import style
+from pdrom.view.artists import Axes, Figure
+from pdrom.view.multiples import (
+    clipped,
+    label_outer,
+    log_axis,
+    panels,
+    rows_of,
+    time_axis,
+)
+from study.artifact.reads import TableOf
+from study.experiments.alternatives.settings import ACCELERATED, CONVERGED, REDUCED, TWO_LEVEL
+from study.figures.kit.declaration import figure
+from study.figures.kit.options import Scenes
+from study.figures.kit.results import NothingToDraw, Results
+
+LOW, HIGH = 1e-4, 1.0  # errors outside are drawn on the limit
+PAIRS = 2  # cases side by side
+LOOKS = {
+    "projective": ("projective dynamics", style.BLACK, "o"),
+    "anderson": ("with Anderson acceleration", style.GREY, "s"),
+    "chebyshev": ("with Chebyshev acceleration", style.GREY, "<"),
+    TWO_LEVEL: ("with a coarse level", style.GREY, ">"),
+    "l-bfgs": ("L-BFGS", style.BLUE, "^"),
+    "newton": ("projected Newton", style.PURPLE, "D"),
+    "xpbd": ("XPBD", style.ORANGE, "v"),
+    "vertex-descent": ("vertex block descent", style.SKY, "P"),
+    "explicit": ("explicit (Verlet)", style.VERMILLION, "X"),
+    REDUCED: ("POD subspace, ecsw", style.GREEN, "*"),
+    ACCELERATED: ("the same, accelerated", style.GREEN, "p"),
+}
+
+
+@figure(
+    title="Alternatives to projective dynamics",
+    caption=(
+        "Error against time per frame on the first held-out motion, the best points of each "
+        "method. Left of each pair the error against the implicit step of 16 ms solved to "
+        "convergence, right the total error, against the motion in continuous time; the dashed "
+        "line is the converged implicit step itself. Filled markers: one step a frame with more "
+        "iterations; hollow ones: the frame divided into substeps. The reduction (ecsw) was "
+        "trained on another motion, on its frames as they are or converged. "
+        "$\\times 100$: the same scene with stiffer weights. Errors outside are drawn on the rim."
+    ),
+    reads=(TableOf("alternatives"),),
+    options=Scenes,
+)
+def alternatives(results: Results, options: Scenes) -> Figure:
+    """Draw a pair of panels for each scene, mesh and stiffness."""
+    table = results.asked_rows("alternatives", options)
+    table = table[table.motion == FIRST]
+    cases = list(table.groupby(["scene", "vertices", "stiffness"]))
+    if not cases:
+        raise NothingToDraw("no alternatives")
+    beside = min(PAIRS, len(cases))
+    figure = style.new_figure(1.55 * rows_of(len(cases), beside) + 0.75)
+    axes = panels(figure, 2 * len(cases), 2 * beside, sharey=True)
+    for (labels, case), *pair in zip(cases, axes[::2], axes[1::2], strict=True):
+        _draw_case(pair, labels, case)
+    label_outer(axes, 2 * beside, "ms a frame", y="relative error")
+    drawn = {label: look for m, (label, *look) in LOOKS.items() if (table.method == m).any()}
+    style.legend(figure, style.handles(drawn, markersize=4), 4)
+    return figure
+
+
+def _draw_case(pair: list[Axes], labels: tuple[str, int, float], case: pd.DataFrame) -> None:
+    scene, vertices, stiffness = labels
+    stiff = "" if stiffness == 1.0 else rf" $\times {stiffness:g}$"
+    name = f"{style.words(scene)}{stiff}, {vertices:,} vertices"
+    for ax, reference in zip(pair, ("implicit", "continuous"), strict=True):
+        log_axis(ax, LOW, HIGH)
+        time_axis(ax, case.ms_per_frame.to_numpy(float))
+        kind = "implicit step" if reference == "implicit" else "total error"
+        ax.set_title(f"{name}\n{kind}", fontsize=7)
+        rows = case.assign(error=case[f"error_{reference}"]).dropna(subset="error")
+        own = rows[rows.method == CONVERGED]
+        if reference == "continuous" and len(own):
+            ax.axhline(own.error.iloc[0], color="#555555", linestyle="--", linewidth=0.8)
+        for method, (_, colour, marker) in LOOKS.items():
+            _draw_best(ax, best_points(rows[rows.method == method]), colour, marker)
+
+
+def best_points(rows: pd.DataFrame) -> pd.DataFrame:
+    """Points that no other one of ``rows`` beats in time and error, from cheap to accurate."""
+    ordered = rows.sort_values(["ms_per_frame", "error"], kind="stable")
+    before = ordered.error.cummin().shift(fill_value=np.inf)
+    return ordered[ordered.error < before]
+
+
+def _draw_best(ax: Axes, points: pd.DataFrame, colour: str, marker: str) -> None:
+    errors = clipped(points.error.to_numpy(float), LOW, HIGH)
+    ax.plot(points.ms_per_frame, errors, color=colour, linewidth=0.9)
+    divided = (points.substeps > 1).to_numpy(bool)
+    for chosen, face in ((~divided, colour), (divided, "white")):
+        ax.plot(
+            points.ms_per_frame[chosen], errors[chosen], color=colour, marker=marker,
+            markerfacecolor=face, linestyle="none", markersize=3.6, markeredgewidth=0.8,
+        )  # fmt: skip

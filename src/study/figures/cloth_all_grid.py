@@ -1,0 +1,127 @@
+"""The cloth with three groups: full order, and with one group reduced, over time."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from pdrom.model.mesh.types import Mesh, load_mesh
+from pdrom.view import style
+from pdrom.view.artists import Figure, ScalarMappable
+from pdrom.view.panels import RunPanel, fit_aspect, shared_window
+from pdrom.view.read import choose_ranks, positions_at, rerun_infos
+from pdrom.view.run_rows import NOTHING_RAN, Row, draw_rows, run_panel
+from study.artifact.paths import FULL_ORDER, MESH, RERUNS
+from study.figures.kit.declaration import figure
+from study.figures.kit.elements import magnitudes
+from study.figures.kit.experiment_rows import RUNS
+from study.figures.kit.floor import Floors
+from study.figures.kit.options import ReducedRuns
+from study.figures.kit.results import NothingToDraw, Results, asked
+
+DISTANCES = (1e-4, 1.0)  # extents of the mesh, at the ends of the scale of colours
+FOOTER = 0.55  # inches, for the scale of colours
+
+
+@figure(
+    number=4,
+    title="Three constraint groups, one of them reduced",
+    caption=(
+        "The cloth with bending, springs and strain at instants up to the scene's horizon, beyond "
+        "which no difference could be blamed on a reduction: the full-order run, then runs that "
+        "reduce the projections of one group only, by two methods. Triangles are coloured by "
+        "their distance to the full-order run, whose outline is grey; a framed picture is drawn to "
+        "the smaller scale given below it. Springs carry nearly all of the force, so that reducing "
+        "strain changes little whatever the method."
+    ),
+    reads=RUNS,
+    options=ReducedRuns,
+)
+def cloth_all_grid(results: Results, options: ReducedRuns) -> Figure:
+    """Draw a row per reduced group (first the full-order run), the methods side by side.
+
+    A method has a column for each instant; instants are shares of the scene's horizon. All pictures
+    have the same camera and scale but for framed ones, whose scale is given. The size is the first
+    of ``options.ranks`` that ran.
+    """
+    camera = options.camera
+    found = results.holdings.first(options)
+    if found is None:
+        raise NothingToDraw(asked(options))
+    scene, methods = found[0], results.methods(options)
+    mesh = load_mesh(results.path(MESH, scene))
+    end = Floors(results).horizon(scene)
+    frames, full = positions_at(results.path(FULL_ORDER, scene), options.frames, end)
+    first = [
+        RunPanel(f"frame {f}", style.FULL_ORDER, q, reference=True)
+        for f, q in zip(frames, full, strict=True)
+    ]
+    rows: list[tuple[str, list[RunPanel], str | None]] = [
+        ("full order", first * len(methods), None)
+    ]
+    for group in results.holdings.scenes[scene].groups:
+        runs = [_run(results, options, (scene, group, m), frames, full, mesh) for m in methods]
+        label, ran = f"{style.words(group)} reduced", any(runs)
+        panels = [panel for run in runs for panel in run or _blank(len(frames))]
+        rows.append((label, panels, None if ran else NOTHING_RAN))
+    windows = [shared_window(camera, q, [], margin=0.04) for q in full]
+    size = (max(w.width for w in windows), max(w.height for w in windows))
+    windows = [fit_aspect(w.resized(*size)) for w in windows] * len(methods)
+    ghosts = np.concatenate([full] * len(methods))
+    made = [
+        Row(label, mesh, [panel.seen_by(camera) for panel in panels], windows, ghosts, note)
+        for label, panels, note in rows
+    ]
+    figure = draw_rows(made, camera, footer=FOOTER)
+    _draw_scale(figure)
+    return figure
+
+
+def _blank(count: int) -> list[RunPanel]:
+    return [RunPanel("", style.GREY, None, remark="not run")] * count
+
+
+def _run(
+    results: Results,
+    options: ReducedRuns,
+    experiment: tuple[str, str, str],
+    frames: list[int],
+    full: np.ndarray,
+    mesh: Mesh,
+) -> list[RunPanel] | None:
+    """A reduced run at every instant, coloured by its distance; None if no size ran."""
+    path = results.path(RERUNS, *experiment)
+    infos = choose_ranks(rerun_infos(path), options.ranks)
+    info = next((i for i in infos if not i.marked), None)
+    if info is None:
+        return None
+    plain = style.surface_colour(style.GREY)
+    panels = [
+        _coloured(run_panel(path, info, frame, colour=plain, title=""), q, mesh)
+        for frame, q in zip(frames, full, strict=True)
+    ]
+    middle = len(panels) // 2
+    title = f"{results.method_title(experiment[2])}, {info.title}"
+    panels[middle] = replace(panels[middle], title=title)
+    return panels
+
+
+def _coloured(panel: RunPanel, full: np.ndarray, mesh: Mesh) -> RunPanel:
+    """The panel with each triangle coloured by its distance to the full-order run."""
+    if panel.positions is None or panel.failure:
+        return panel
+    distance = np.linalg.norm(panel.positions - full, axis=1) / mesh.extent
+    return replace(panel, colour=_colours().to_rgba(distance[mesh.triangles].mean(axis=1))[:, :3])
+
+
+def _colours() -> ScalarMappable:
+    from matplotlib.colors import LogNorm
+
+    return magnitudes(LogNorm(*DISTANCES, clip=True))
+
+
+def _draw_scale(figure: Figure) -> None:
+    inch = 1.0 / figure.get_figheight()
+    ax = figure.add_axes((0.3, 0.40 * inch, 0.5, 0.08 * inch))
+    bar = figure.colorbar(_colours(), cax=ax, orientation="horizontal", extend="both")
+    bar.set_label("distance to the full-order run (extents)", labelpad=1)
+    bar.outline.set_linewidth(0.4)

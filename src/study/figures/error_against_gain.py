@@ -1,0 +1,131 @@
+"""Error of a run against the gain of its interpolation, which tells whether it fails."""
+
+import numpy as np
+import pandas as pd
+
+from pdrom.view import style
+from pdrom.view.artists import Axes, Figure
+from pdrom.view.multiples import clipped, log_axes, rim_arrows
+from study.artifact.reads import TableOf
+from study.figures.kit.declaration import figure
+from study.figures.kit.legends import method_handles
+from study.figures.kit.options import Experiments, Methods
+from study.figures.kit.results import NothingToDraw, Results
+from study.tables.gain_prediction import EVERY, FAILED, judged_runs
+
+ERRORS, GAINS = (1e-5, 1e2), (1.0, 1e5)  # limits; what lies outside is drawn on the rim
+ENDS = ("low", "median", "high")
+_KEYS = ["scene", "group", "method", "r"]
+
+
+class Options(Experiments, Methods):
+    """Choices."""
+
+
+@figure(
+    title="Error of the run against the gain",
+    caption=(
+        "Left: every run of a sampled method whose basis suffices (the orthogonal projection does "
+        "not fail at the same size), over all scenes and sizes. Dashed: the error from which on a "
+        "run counts as failed; dotted: the gain that separates failed runs from others with the "
+        "fewest mistakes. Arrows on the rim lie outside the axes. Crosses: range and median over "
+        "runs, in some scenes, that are trained on as many resampled frames. Right: how many of "
+        "them failed, by decade of the gain."
+    ),
+    reads=(
+        TableOf("reduced_reruns"),
+        TableOf("reconstruction_error"),
+        TableOf("gain_prediction"),
+        TableOf("repetitions"),
+    ),
+    options=Options,
+)
+def error_against_gain(results: Results, options: Options) -> Figure:
+    """Draw a dot per run, error within the horizon over gain, and failures by decade of gain.
+
+    Runs that ended before their horizon lie on the upper rim, singular interpolations on the right
+    one. Shown are the runs that the table gain_prediction counts.
+    """
+    prediction = results.table("gain_prediction")
+    runs = judged_runs(results.table("reduced_reruns"), results.table("reconstruction_error"))
+    runs = results.held_rows(runs, options)
+    if runs.empty:
+        raise NothingToDraw("no run with a gain")
+    figure = style.new_figure(3.0)
+    left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
+    ranges = _ranges(results.table("repetitions"), runs)
+    methods = [m for m in results.holdings.methods if (runs.method == m).any()]
+    styles = style.method_styles(methods)
+    for method in methods:
+        _draw_method(left, runs[runs.method == method], *styles[method])
+        _draw_ranges(left, ranges[ranges.method == method], styles[method][0])
+    _draw_limits(left, prediction)
+    _draw_decades(right, prediction[prediction.lower != EVERY])
+    style.legend(figure, method_handles(results, styles, linestyle="none"), 4)
+    return figure
+
+
+def _draw_method(ax: Axes, runs: pd.DataFrame, colour: str, marker: str) -> None:
+    x, y = runs.gain.to_numpy(float), runs.error.to_numpy(float)
+    rim_arrows(ax, x, y, colour=colour, across=GAINS, along=ERRORS)
+    ax.plot(
+        clipped(x, *GAINS), clipped(y, *ERRORS), linestyle="none", color=colour, marker=marker,
+        markersize=3.2, alpha=0.7, markeredgewidth=0.0, clip_on=False,
+    )  # fmt: skip
+
+
+def _ranges(repetitions: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
+    """Ranges over other training frames of those of the ``runs`` that were repeated."""
+    repeated = repetitions[repetitions.varied == "training"]
+    return runs[[*_KEYS, "gain", "error"]].merge(repeated, on=_KEYS)
+
+
+def _draw_ranges(ax: Axes, ranges: pd.DataFrame, colour: str) -> None:
+    """A cross from least to largest gain and error, at the medians."""
+    gains = [clipped(ranges[f"gain_{e}"].to_numpy(float), *GAINS) for e in ENDS]
+    errors = [clipped(ranges[f"error_{e}"].to_numpy(float), *ERRORS) for e in ENDS]
+    bars = {"color": colour, "linewidth": 0.9, "zorder": 3}
+    ax.vlines(gains[1], errors[0], errors[2], **bars)
+    ax.hlines(errors[1], gains[0], gains[2], **bars)
+
+
+def _draw_limits(ax: Axes, prediction: pd.DataFrame) -> None:
+    """Axes, the error above which a run counts as failed, and the best threshold of the gain."""
+    log_axes(ax, GAINS, ERRORS)
+    ax.set_xlabel("gain of the interpolation")
+    ax.set_ylabel("error within the horizon (relative)")
+    ax.axhline(FAILED, color="#333333", linewidth=0.8, linestyle="--", zorder=0)
+    ax.text(GAINS[1], FAILED * 1.1, "failed ", ha="right", va="bottom", fontsize=7)
+    ax.text(GAINS[0] * 1.1, ERRORS[1] * 0.8, "ended early: upper rim", va="top", fontsize=7)
+    whole = prediction[(prediction.lower == EVERY) & (prediction.predictor == "gain")]
+    threshold = float(whole.threshold.iloc[0]) if len(whole) else np.nan
+    if GAINS[0] < threshold < GAINS[1]:
+        ax.axvline(threshold, color="#333333", linewidth=0.8, linestyle=":", zorder=0)
+        ax.text(
+            threshold * 1.08, ERRORS[0] * 1.3, f"best threshold {threshold:.2g}", fontsize=7,
+            va="bottom",
+        )  # fmt: skip
+
+
+def _draw_decades(ax: Axes, decades: pd.DataFrame) -> None:
+    """Share of failed runs, the number of runs above each bar."""
+    places = np.arange(len(decades))
+    ax.bar(places, 100.0 * decades.failed_share, width=0.7, color=style.FAILED, alpha=0.75)
+    for place, row in zip(places, decades.itertuples(), strict=True):
+        ax.text(place, 100.0 * row.failed_share + 1.5, f"{row.runs}", ha="center", fontsize=7)
+    ax.set_xticks(places, [_span(row.lower, row.upper) for row in decades.itertuples()])
+    ax.set_ylim(0, 112)
+    ax.set_yticks([0, 25, 50, 75, 100])
+    ax.tick_params(axis="x", labelrotation=35)
+    ax.set_xlabel("gain of the interpolation")
+    ax.set_ylabel("failed runs (%)")
+    ax.set_title("number of runs above each bar")
+    style.grid(ax)
+
+
+def _span(lower: str, upper: str) -> str:
+    """Name of a decade."""
+    low = round(np.log10(float(lower)))
+    if np.isinf(float(upper)):
+        return rf"over $10^{{{low}}}$"
+    return rf"$10^{{{low}}}$ to $10^{{{low + 1}}}$"

@@ -1,0 +1,155 @@
+"""Places of the elements of a constraint group on the mesh, to colour them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdrom.core.errors import StorageError
+from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.effects import EFFECTS
+from pdrom.model.mesh.types import Mesh
+from pdrom.view.artists import Axes, Normalize, ScalarMappable
+from pdrom.view.camera import Camera
+from pdrom.view.mesh_render import Surface, draw_lines, draw_surface
+
+NEUTRAL = "#E4E1DA"
+SIGNED = "RdBu_r"
+
+
+def magnitudes(norm: Normalize | None = None) -> ScalarMappable:
+    """Colours from the page's white to dark, of values from 0 to 1 or as ``norm`` says."""
+    import matplotlib as mpl
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LinearSegmentedColormap, Normalize
+
+    shades = mpl.colormaps["magma_r"](np.linspace(0.02, 0.92, 256))
+    colours = LinearSegmentedColormap.from_list("pdrom_magnitude", shades)
+    return ScalarMappable(norm or Normalize(0.0, 1.0), colours)
+
+
+def signed() -> ScalarMappable:
+    """Colours of values from -1 to 1."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    return ScalarMappable(Normalize(-1.0, 1.0), SIGNED)
+
+
+@dataclass(frozen=True)
+class ElementMap:
+    """Elements of one group on one mesh.
+
+    kind : vertex, edge, triangle or tetrahedron
+    cells : (e, m) vertex indices of each element
+    """
+
+    kind: str
+    cells: np.ndarray
+    mesh: Mesh
+
+    @property
+    def surface(self) -> Surface:
+        """Surface of the mesh, ready to be drawn."""
+        return Surface(self.mesh.triangles, open=len(self.mesh.tetrahedra) == 0)
+
+    def centres(self, points: np.ndarray) -> np.ndarray:
+        """Centre of each element (e, 3), m, with vertices at ``points`` (N, 3) m."""
+        return points[self.cells].mean(axis=1)
+
+    def face_values(self, values: np.ndarray) -> np.ndarray:
+        """Values (e,) of the elements carried to the surface triangles (T,).
+
+        A triangle takes its own value, that of the tetrahedron behind it, or the mean of its
+        vertices that carry one; NaN where there is none. Edges have no face values.
+        """
+        triangles = self.mesh.triangles
+        if self.kind == "triangle":
+            return values
+        if self.kind == "tetrahedron":
+            return values[_tetrahedron_behind(self.mesh)]
+        field = np.full(self.mesh.vertices, np.nan)
+        field[self.cells[:, 0]] = values
+        corners = field[triangles]
+        known = np.isfinite(corners)
+        total = np.where(known, corners, 0.0).sum(axis=1)
+        count = known.sum(axis=1)
+        return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
+
+    def draw(
+        self,
+        ax: Axes,
+        points: np.ndarray,
+        values: np.ndarray,
+        camera: Camera,
+        colours: ScalarMappable,
+    ) -> None:
+        """Draw on ``ax``, by ``camera``, the mesh at ``points`` (N, 3) m.
+
+        Its elements have ``values`` (e,), which ``colours`` maps to colours.
+        """
+        if self.kind == "edge" and self.surface.open:
+            draw_surface(
+                ax, points, self.surface, camera=camera, colour="#FFFFFF", wire=0.0, contrast=0.15
+            )
+            draw_lines(ax, points[self.cells], camera, colours=colours.to_rgba(values))
+            return
+        if self.kind == "edge":
+            values, faces = _edges_to_vertices(self, values), True
+        else:
+            faces = False
+        carried = self.face_values(values) if not faces else values[self.mesh.triangles].mean(1)
+        rgb = colours.to_rgba(np.nan_to_num(carried))[:, :3]
+        rgb[~np.isfinite(carried)] = (0.92, 0.91, 0.89)
+        draw_surface(ax, points, self.surface, camera=camera, colour=rgb, wire=0.12, contrast=0.35)
+
+
+def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMap:
+    """Elements of ``group`` on ``mesh``, in the order of the group's rows.
+
+    Raises
+    ------
+    StorageError
+        The effect is no constraint group, or ``source`` holds another number of elements than the
+        mesh.
+    ConfigurationError
+        There is no such effect.
+    """
+    effect = EFFECTS.load(group)
+    if not issubclass(effect, ConstraintGroup):
+        raise StorageError(f"{source}: '{group}' has no elements that could be drawn")
+    cells = effect.element_vertices(mesh)
+    if len(cells) != elements:
+        raise StorageError(f"{source}: {elements} elements of '{group}', the mesh has {len(cells)}")
+    return ElementMap(effect.cells, cells, mesh)
+
+
+def signed_entry(vector: np.ndarray, rows_per_element: int) -> tuple[np.ndarray, str]:
+    """One of the 3 p entries of every element (e,), the one that is largest somewhere; its name.
+
+    vector : a vectorised quantity (3 e p,) with p ``rows_per_element``
+    """
+    entries = vector.reshape(-1, 3 * rows_per_element)
+    slot = int(np.argmax(np.abs(vector))) % (3 * rows_per_element)
+    row = f", row {slot // 3 + 1}" if rows_per_element > 1 else ""
+    return entries[:, slot], f"{'xyz'[slot % 3]}{row}"
+
+
+def _tetrahedron_behind(mesh: Mesh) -> np.ndarray:
+    """Tetrahedron (T,) that each boundary triangle belongs to."""
+    corners = mesh.tetrahedra[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3)
+    keys = _face_keys(corners, mesh.vertices)
+    order = np.argsort(keys, kind="stable")
+    position = np.searchsorted(keys[order], _face_keys(mesh.triangles, mesh.vertices))
+    return order[position] // 4
+
+
+def _face_keys(faces: np.ndarray, vertices: int) -> np.ndarray:
+    a, b, c = np.sort(faces.astype(np.int64), axis=1).T
+    return (a * vertices + b) * vertices + c
+
+
+def _edges_to_vertices(elements: ElementMap, values: np.ndarray) -> np.ndarray:
+    """Mean value of the edges at each vertex (N,)."""
+    n = elements.mesh.vertices
+    total = np.bincount(elements.cells.ravel(), np.repeat(values, 2), minlength=n)
+    return total / np.maximum(np.bincount(elements.cells.ravel(), minlength=n), 1)

@@ -1,0 +1,92 @@
+"""Drift of runs that start almost alike, and the horizon that follows."""
+
+import numpy as np
+
+from pdrom.view import style
+from pdrom.view.artists import Axes, Figure
+from pdrom.view.multiples import clipped, label_outer, log_axis, small_multiples
+from study.figures.kit.declaration import figure
+from study.figures.kit.floor import FLOORS, Floors
+from study.figures.kit.options import Columns, Scenes
+from study.figures.kit.results import NothingToDraw, Results
+
+LOW, HIGH = 1e-12, 1e2
+TWIN = "_twin"
+
+
+class Options(Scenes, Columns):
+    """Choices."""
+
+
+@figure(
+    title="Sensitivity floor and horizon",
+    caption=(
+        "How far full-order runs drift apart whose initial positions differ by "
+        "{sensitivity.reference} of the extent. The horizon, given in the legends, is the first "
+        "frame above the threshold of {sensitivity.threshold}: beyond it a reduced run cannot be "
+        "judged by its error. Dashed lines are twins, scenes that end before."
+    ),
+    reads=FLOORS,
+    options=Options,
+)
+def sensitivity_floor(results: Results, options: Options) -> Figure:
+    """Draw a panel per kind of scene, a line per scene: its spread under a perturbed start.
+
+    The grey line is the threshold; a dot marks the frame at which a scene crosses it, its horizon,
+    given in the legend. A twin has the colour of its scene and is dashed.
+    """
+    floors = Floors(results)
+    kinds: dict[str, list[str]] = {}
+    for scene in results.scenes(options):
+        if len(floors.of(scene)):
+            kinds.setdefault(_kind(results, scene), []).append(scene)
+    if not kinds:
+        raise NothingToDraw(f"no run perturbed by {floors.perturbation:g}")
+    columns = min(options.columns, len(kinds))
+    figure, axes = small_multiples(len(kinds), columns, height=2.7)
+    for ax, (kind, scenes) in zip(axes, kinds.items(), strict=True):
+        log_axis(ax, LOW, HIGH)
+        ax.axhline(floors.threshold, color=style.GREY, linewidth=0.9)
+        for scene, colour in _colours(scenes).items():
+            _draw_scene(ax, scene, floors, colour)
+        ax.set_title(kind)
+        ax.legend(
+            loc="upper center", bbox_to_anchor=(0.5, -0.31), fontsize=7.5, handlelength=1.6,
+            labelspacing=0.25,
+        )  # fmt: skip
+    label_outer(axes, columns, "frame", y="relative difference")
+    for ax in axes:
+        ax.set_xlabel("frame")
+    dot = {"color": "#555555", "marker": "o", "linestyle": "none"}
+    handles = [
+        style.handle(f"threshold {floors.threshold:g}", color=style.GREY),
+        style.handle("horizon (frame given)", **dot),
+    ]
+    style.legend(figure, handles, 2)
+    return figure
+
+
+def _kind(results: Results, scene: str) -> str:
+    groups = results.holdings.scenes[scene].groups
+    if len(groups) > 1:
+        return "several groups"
+    on_volume = results.holdings.groups[groups[0]].cells == "tetrahedron"
+    return "tetrahedra" if on_volume else style.words(groups[0])
+
+
+def _colours(scenes: list[str]) -> dict[str, str]:
+    """Colour of each scene; a twin shares that of its scene."""
+    families = list(dict.fromkeys(scene.removesuffix(TWIN) for scene in scenes))
+    colours = {name: style.CYCLE[i % len(style.CYCLE)] for i, name in enumerate(families)}
+    return {scene: colours[scene.removesuffix(TWIN)] for scene in scenes}
+
+
+def _draw_scene(ax: Axes, scene: str, floors: Floors, colour: str) -> None:
+    floor, end = floors.of(scene), floors.horizon(scene)
+    beyond = f"beyond {len(floor)}"
+    label = f"{style.words(scene)}: {beyond if end is None else end}"
+    shown = clipped(floor, LOW, HIGH)
+    line = "--" if scene.endswith(TWIN) else "-"
+    ax.plot(np.arange(len(shown)), shown, color=colour, label=label, linestyle=line)
+    if end is not None:
+        ax.plot([end], [floors.threshold], color=colour, marker="o", markersize=4.5, zorder=5)

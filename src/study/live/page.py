@@ -1,0 +1,63 @@
+"""The page on which reduced models run: one file, and beside it a file of models for each scene."""
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from pdrom.core.errors import StorageError
+from pdrom.core.store import read_text, write_text
+from pdrom.view.page import filled, safe_json
+from study.artifact.artifact import declare
+from study.artifact.files import Files
+from study.artifact.paths import LIVE_MODEL, LIVE_PAGE, File
+from study.artifact.reads import Every, ProjectFile
+
+# Folder of the models, from that of the page.
+MODELS = Path(LIVE_MODEL.pattern).parent.name
+HEAD = re.compile(r'pdromLive\(\{"format":1,"scene":("\w+"),"title":("(?:[^"\\]|\\.)*"),')
+
+
+def _write(models: list[File], html: Path, outputs: Mapping[str, str], **parts: Path) -> None:
+    """Write the page of its ``parts``; it loads the models of a scene when a reader chooses it.
+
+    Raises
+    ------
+    StorageError
+        A file of models is damaged, or none.
+    """
+    texts = {name.upper(): path.read_text("utf-8") for name, path in parts.items()}
+    texts["SCENES"] = safe_json([_listed(file) for file in models])
+    write_text(filled(html.read_text("utf-8"), texts), outputs["out"])
+
+
+def _listed(file: File) -> dict[str, str]:
+    head = HEAD.match(read_text(file.path))
+    if head is None:
+        raise StorageError(f"{file.path}: no models for the page, or of another version")
+    scene, title = map(json.loads, head.groups())
+    return {"scene": scene, "title": title, "file": f"{MODELS}/{Path(file.path).name}"}
+
+
+def _asset(name: str, folder: str = "study/live") -> ProjectFile:
+    return ProjectFile(f"src/{folder}/{name}")
+
+
+live_page = declare(
+    Files(
+        "live_page",
+        "Page on which models run",
+        {
+            "models": Every(LIVE_MODEL),
+            "html": _asset("live.html"),
+            "style": _asset("live.css"),
+            "packed": _asset("packed.js", "pdrom/view"),
+            "engine": _asset("engine.js"),
+            "drawing": _asset("drawing.js", "pdrom/view"),
+            "script": _asset("live.js"),
+        },
+        {"out": LIVE_PAGE},
+        _write,
+    ),
+    "outputs",
+)

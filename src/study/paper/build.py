@@ -1,0 +1,161 @@
+"""Rules of the manuscript: tables -> macros, TeX tables, bibliography -> PDF."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from pdrom.core.errors import StorageError
+from pdrom.core.machine import Machine
+from pdrom.core.store import read_table, read_text, require_intact, write_text
+from pdrom.core.yamlfile import describe
+from pdrom.view.text import replaced
+from study.artifact.files import Files
+from study.artifact.paths import PAPER_INPUT
+from study.artifact.reads import Given, Setting
+from study.paper.bibliography import bibliography
+from study.paper.figuretex import captions
+from study.paper.known import decisions, provenance
+from study.paper.macros import keys_of, macros, number_of
+from study.paper.source import DOCUMENTS, documents
+from study.paper.tex import build_pdfs
+from study.paper.textables import TEX_TABLES
+
+PAGES = {"main": 16}  # at most: all else belongs in the supplement
+
+
+class Facts(BaseModel):
+    """Facts that the manuscript states beside results.
+
+    captions : titles and captions of the figures, as TeX, by name
+    part : what the study was read from where it is not the full one, else None
+    full_study : the configuration of the full study
+    tables : facts of the configuration (scenes, methods, study), as rows of tables
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    captions: dict[str, str]
+    part: str | None
+    full_study: str
+    tables: dict[str, list[dict[str, Any]]]
+
+
+def write_inputs(
+    source: list[str],
+    references: str,
+    tables: list[str],
+    machine: str,
+    facts: Facts,
+    outputs: Mapping[str, str],
+) -> None:
+    r"""Write macros.tex, figures.tex, the TeX tables and the bibliographies.
+
+    Made from TeX files ``source``, BibTeX ``references``, CSV ``tables``, the record of the
+    ``machine`` and ``facts``.
+
+    `NUMBERS` says of every ``\val`` key and TeX table where its numbers come from, and which blocks
+    of each document are shown (`decisions`).
+    """
+    texts = documents(Path(source[0]).parent)
+    whole = "".join(texts.values())
+    data = {Path(path).stem: read_table(path) for path in tables}
+    data |= fact_tables(Path(machine), facts)
+    decided = {document: decisions(text, data) for document, text in texts.items()}
+    known = provenance(decided, facts.part, facts.full_study)
+    written = {"macros": macros(whole, data) + known, "figures": captions(facts.captions)}
+    watched = {name: _Watched(data) for name in TEX_TABLES}
+    written |= {name: make(watched[name]) for name, make in TEX_TABLES.items()}
+    for document, text in texts.items():
+        written[document] = bibliography(text, Path(references))
+    origins = {
+        "known": decided,
+        "numbers": {key: asdict(number_of(key, data)) for key in keys_of(whole)},
+        "tables": {name: list(dict.fromkeys(one.read)) for name, one in watched.items()},
+    }
+    written[Path(NUMBERS).stem] = json.dumps(origins, indent=1, allow_nan=False) + "\n"
+    for name, content in written.items():
+        write_text(content, outputs[name])
+
+
+class _Watched(dict[str, pd.DataFrame]):
+    """Tables by name, which note those that are read."""
+
+    def __init__(self, tables: Mapping[str, pd.DataFrame]) -> None:
+        super().__init__(tables)
+        self.read: list[str] = []
+
+    def __getitem__(self, name: str) -> pd.DataFrame:
+        self.read.append(name)
+        return super().__getitem__(name)
+
+
+def fact_tables(machine: Path, facts: Facts) -> dict[str, pd.DataFrame]:
+    """Tables of the manuscript that are no results: ``facts``, and the record ``machine``."""
+    tables = {name: pd.DataFrame(rows) for name, rows in facts.tables.items()}
+    return {**tables, "machine": _machine_table(machine)}
+
+
+def _machine_table(path: Path) -> pd.DataFrame:
+    """One row; versions of libraries as ``version_NAME``."""
+    try:
+        record = Machine.model_validate_json(read_text(path))
+    except ValidationError as error:
+        raise StorageError(f"{path}: {describe(error, Machine)}") from error
+    versions = {f"version_{name}": version for name, version in record.libraries.items()}
+    architectures = ", ".join(sorted({k.architecture for k in record.kernels if k.architecture}))
+    plain = record.model_dump(exclude={"libraries", "kernels", "units"})
+    row = {**plain, **versions, "kernels": architectures}
+    if record.units is not None:
+        row |= {**record.units.model_dump(), "unit_s": record.units.unit_s}
+    # names of a machine are not ours and may hold any character
+    words = {key: replaced(value) for key, value in row.items() if isinstance(value, str)}
+    return pd.DataFrame([{**row, **words}])
+
+
+def build(
+    source: list[str],
+    figures: list[str],
+    inputs: list[str],
+    facts: Facts,
+    outputs: Mapping[str, str],
+) -> None:
+    """Build the PDFs of the paper and of its supplement from figures and what `write_inputs` wrote.
+
+    Each links into the other, as long as both lie in one folder. ``source`` and ``outputs`` are TeX
+    and PDF of each, ``figures`` and ``inputs`` files that they read, with ``facts``.
+    """
+    results = [Path(path) for path in (*figures, *inputs)]
+    for path in results:
+        require_intact(path)
+    folder = Path(source[0]).parent
+    made = {folder / f"{name}.tex": Path(outputs[name]) for name in DOCUMENTS}
+    build_pdfs(made, sorted({path.parent for path in results}), PAGES)
+
+
+NUMBERS = "numbers.json"
+FILES = (
+    NUMBERS, "macros.tex", "figures.tex", *(f"{document}.bbl" for document in DOCUMENTS),
+    *(f"{name}.tex" for name in TEX_TABLES),
+)  # fmt: skip
+paper_inputs = Files(
+    "paper_inputs",
+    "Numbers, tables and references of the manuscript",
+    {
+        **dict.fromkeys(("source", "references", "tables", "machine"), Given()),
+        "facts": Setting("facts"),
+    },
+    {Path(name).stem: PAPER_INPUT.where(name=name) for name in FILES},
+    write_inputs,
+)
+paper = Files(
+    "paper",
+    "Manuscript",
+    {**dict.fromkeys(("source", "figures", "inputs"), Given()), "facts": Setting("facts")},
+    {},
+    build,
+)

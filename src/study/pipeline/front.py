@@ -1,0 +1,131 @@
+"""``./reproduce ARGS...``: Snakemake with this project's options, names and words.
+
+``python -m study.pipeline.front`` does what the console command ``snakemake`` does, after the
+arguments were completed and the configuration files were checked. ``figure`` as the first
+argument names figures by their number in the manuscript or in the preprint; ``verify`` compares
+what was made with what is expected; ``test`` hands the others to pytest, and ``run`` starts a
+program of the environment.
+"""
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+from pdrom.core.environment import settle
+from pdrom.core.errors import INTERRUPTED, PdromError
+from study.pipeline.commandline import CommandLine, check_files, recall
+from study.pipeline.folders import Folders, folders
+from study.pipeline.running import end_at_sigterm
+
+# Snakemake's default scheduler solves an integer program for each choice among the jobs; they are
+# short, so that this takes longer than it saves.
+OPTIONS = ("--scheduler", "greedy", "--rerun-incomplete")
+
+LINES = ("--logger", "pdrom")
+
+# First arguments that hand the others on, with the modules that get them.
+HANDED_ON = {
+    "test": "pytest",
+    "verify": "study.verification",
+    "bundle": "study.verification.bundle",
+}
+
+
+def completed(arguments: Sequence[str]) -> list[str]:
+    """Complete the ``arguments`` of the command line for Snakemake.
+
+    Raises
+    ------
+    ConfigurationError
+        A configuration file is missing or no mapping; a target was taken for an option's value;
+        there is no such figure.
+    """
+    if arguments[:1] == ["figure"]:
+        # late: it loads the whole package
+        from study.pipeline.figure_command import figure_arguments
+
+        arguments = figure_arguments(arguments[1:])
+    command = CommandLine.parse(arguments)
+    if command.report and not command.configfiles and not command.settings and recall():
+        _say(f"a report of the last run, {' '.join(recall())}")
+        command = CommandLine.parse(command.rewritten(recall(), {t: [t] for t in command.targets}))
+    check_files(command.configfiles)
+    own = folders(command.configfiles, command.settings)
+    made = files_of(command.targets, own) if command.targets else {}
+    for target, files in made.items():
+        if files != [target]:
+            _say(f"{_described(target)}: {', '.join(files)}")
+    cores = () if command.cores else ("--cores", "all")
+    replaced = command.plans or not command.looks_only
+    lines = LINES if replaced and not command.own_output else ()
+    return command.rewritten([*cores, *lines, *OPTIONS], made)
+
+
+def files_of(targets: Sequence[str], own: Folders) -> dict[str, list[str]]:
+    """Files of the folders ``own`` to make for each of ``targets``, see `Names.files`."""
+    # late: it loads the whole package
+    from study.figures.kit.catalogue import declarations
+    from study.pipeline.targets import Names
+    from study.tables import declared
+
+    names = Names(list(declarations()), declared())
+    return {target: names.files(target, own) for target in targets}
+
+
+def _described(target: str) -> str:
+    # late, as above
+    from study.pipeline.figure_command import described
+
+    return described(target)
+
+
+def _say(line: str) -> None:
+    sys.stderr.write(f"reproduce: {line}\n")
+
+
+def _start(command: Sequence[str]) -> NoReturn:
+    """Become a program of the environment, found as the shell finds it."""
+    if not command:
+        sys.exit(
+            "pdrom: run: the name of a program is missing, as in: ./reproduce run pdrom --help"
+        )
+    try:
+        os.execvp(command[0], list(command))
+    except OSError as error:
+        sys.exit(f"pdrom: run: {command[0]}: {error.strerror}")
+
+
+def _run(arguments: Sequence[str]) -> None:
+    """Run Snakemake; a failure ends the process with its status."""
+    from snakemake.cli import main as snakemake
+
+    arguments = completed(arguments)
+    sys.argv = ["snakemake", *arguments]
+    try:
+        snakemake(arguments)
+    except SystemExit as ended:
+        if ended.code:
+            raise
+
+
+def main() -> None:
+    """Run Snakemake or the tests; end the process with their status."""
+    settle()
+    if sys.argv[1:2] and sys.argv[1] in HANDED_ON:
+        module = HANDED_ON[sys.argv[1]]
+        os.execv(sys.executable, [sys.executable, "-m", module, *sys.argv[2:]])
+    if sys.argv[1:2] == ["run"]:
+        _start(sys.argv[2:])
+    end_at_sigterm()
+    try:
+        _run(sys.argv[1:])
+    except PdromError as error:
+        sys.exit(f"pdrom: {error}")
+    except KeyboardInterrupt:
+        sys.stderr.write("pdrom: interrupted\n")
+        sys.exit(INTERRUPTED)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,161 @@
+"""The manifest of a study: each of its results with its checksum and with what made it.
+
+It is written at the end of every run that succeeds, from the checksum files, so that no large file
+is read again: an HDF5 file has its BLAKE2b digest, everything else its SHA-256 as well. Equal
+results have an equal manifest.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from pdrom.core.errors import StorageError
+from pdrom.core.store import Checksum, Condition, check_file, read_checksum, write_text
+from pdrom.core.yamlfile import describe
+from study.artifact import paths
+from study.pipeline.folders import Folders
+from study.pipeline.plan import Plan
+from study.pipeline.scenes import scene_names
+
+LARGE = ".h5"
+_ENVIRONMENT = ("pdrom_version", "python_version", "library_versions")
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Entry(_Record):
+    """A result; ``environment`` is a key of the manifest's environments.
+
+    sha256 : None for a large file, and for one that was damaged before the manifest was written
+    """
+
+    bytes: int
+    blake2b: str
+    sha256: str | None = None
+    made_by: str | None = None
+    configuration_sha256: str | None = None
+    code_sha256: str | None = None
+    environment: str | None = None
+
+    def fits(self, path: Path) -> bool:
+        """Whether the file ``path`` has the bytes that the entry records."""
+        if self.sha256:
+            with open(path, "rb") as handle:
+                return hashlib.file_digest(handle, "sha256").hexdigest() == self.sha256
+        checksum = read_checksum(path)
+        reported = checksum is not None and checksum.digest == self.blake2b
+        return reported and check_file(path) is Condition.INTACT
+
+
+class Manifest(_Record):
+    """Results by their paths from the folder that the manifest lies in.
+
+    options : of the command line, which name the configuration
+    environments : versions of the package, of Python and of libraries, by a short key
+    """
+
+    format: Literal[1] = 1
+    options: tuple[str, ...]
+    environments: dict[str, dict[str, str]]
+    files: dict[str, Entry]
+
+
+def write_manifest(plan: Plan, folders: Folders, options: Iterable[str]) -> tuple[Manifest, bool]:
+    """Write the manifest of a study whose run has succeeded; say whether it is another now."""
+    environments: dict[str, dict[str, str]] = {}
+    files = {}
+    for path in sorted(study_files(plan, folders)):
+        checksum = read_checksum(path)
+        if checksum is not None:
+            inside = os.path.relpath(path, folders.results)
+            files[inside] = _entry(Path(path), checksum, environments)
+    made = Manifest(options=tuple(options), environments=environments, files=files)
+    text = f"{made.model_dump_json(indent=1, exclude_none=True)}\n"
+    place = Path(paths.MANIFEST.at(folders.results))
+    changed = not place.is_file() or place.read_bytes() != text.encode()
+    write_text(text, place)
+    return made, changed
+
+
+def read_manifest(results: str) -> Manifest:
+    """The manifest in a folder of results; nothing is changed.
+
+    Raises
+    ------
+    StorageError
+        It is missing, damaged, or of another layout.
+    """
+    path = Path(paths.MANIFEST.at(results))
+    if check_file(path) is Condition.DAMAGED:
+        raise StorageError(f"{path}: damaged, its content and its checksum differ")
+    try:
+        return Manifest.model_validate_json(path.read_text(encoding="utf-8"))
+    except (ValidationError, UnicodeDecodeError) as error:
+        fault = describe(error, Manifest) if isinstance(error, ValidationError) else error
+        raise StorageError(f"{path}: {fault}") from error
+
+
+def own_files(plan: Plan, folders: Folders) -> set[str]:
+    """Files in ``folders`` that a whole run of a study makes by ``plan``."""
+    return {
+        *folders.documents.values(), *plan.paper.files, *plan.table_paths,
+        *plan.figures, *(job.png for job in plan.figure_jobs.values()),
+        *plan.measured, *plan.page.outputs.values(), *plan.paper.article.outputs.values(),
+    }  # fmt: skip
+
+
+def study_files(plan: Plan, folders: Folders) -> Iterator[str]:
+    """Files on the disk that belong to a study: its own, and what was asked for beside them."""
+    yield from (path for path in own_files(plan, folders) if Path(path).is_file())
+    yield from asked_for(_visible(folders.results), plan, folders)
+
+
+def asked_for(found: Iterable[str], plan: Plan, folders: Folders) -> Iterator[str]:
+    """Paths among ``found`` that a target may name beside the study's own files."""
+    own = own_files(plan, folders)
+    scenes, methods = set(scene_names(plan.root)), set(plan.study.methods)
+    for path in found:
+        if path not in own and _is_target(path, folders.results, scenes, methods):
+            yield path
+
+
+def _visible(results: str) -> Iterator[str]:
+    """Files below a folder of results, without logs and other studies."""
+    for folder, below, names in os.walk(results):
+        if folder == results:
+            below[:] = [name for name in below if name not in ("logs", "studies")]
+        yield from (f"{folder}/{name}" for name in names if not name.startswith("."))
+
+
+def _is_target(path: str, results: str, scenes: set[str], methods: set[str]) -> bool:
+    """Whether a target may name the file: something of a scene that there is."""
+    for place in paths.PLACES:
+        try:
+            labels = place.file(path).labels
+        except StorageError:
+            continue
+        known = labels.get("scene") in scenes and labels.get("method", "") in {*methods, ""}
+        if known and place.at(results, **labels) == path:
+            return True
+    return False
+
+
+def _entry(path: Path, checksum: Checksum, environments: dict[str, dict[str, str]]) -> Entry:
+    made = json.loads(checksum.provenance) if checksum.provenance else {}
+    environment = {name: made.pop(name) for name in _ENVIRONMENT if name in made}
+    if environment:
+        key = hashlib.sha256(json.dumps(environment, sort_keys=True).encode()).hexdigest()[:8]
+        environments[key] = environment
+        made["environment"] = key
+    if path.suffix != LARGE:
+        content = path.read_bytes()
+        if hashlib.blake2b(content).hexdigest() == checksum.digest:
+            made["sha256"] = hashlib.sha256(content).hexdigest()
+    return Entry(bytes=path.stat().st_size, blake2b=checksum.digest, **made)

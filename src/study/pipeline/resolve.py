@@ -1,0 +1,177 @@
+"""Jobs of artifacts: what each reads, writes and depends on, from the declarations and a study."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pdrom.core.errors import ConfigurationError, choices
+from pdrom.model.scene import SceneConfig
+from study.artifact.artifact import Artifact, make, modules_in
+from study.artifact.paths import TABLE, Place
+from study.artifact.reads import Labels, Paths
+from study.pipeline.contents import labels_of
+from study.pipeline.fingerprint import digest, fingerprint
+from study.pipeline.study import Study
+from study.pipeline.values import DERIVED
+from study.tables import declared
+
+
+@dataclass(frozen=True)
+class Job:
+    """An artifact for one set of labels.
+
+    inputs, outputs : paths by name
+    settings : plain data
+    content : checksum of the files it reads that people edit; their dates may be set back
+    code : fingerprint of the code that it runs
+    """
+
+    artifact: Artifact
+    labels: dict[str, str]
+    inputs: dict[str, Paths]
+    outputs: dict[str, str]
+    settings: dict[str, Any]
+    content: str
+    code: str
+
+    def make(self, outputs: Mapping[str, str]) -> None:
+        """Run the job here; ``outputs`` are the files to write, by name."""
+        make(
+            self.artifact.address,
+            self.artifact.rule,
+            settings=self.settings,
+            labels=self.labels,
+            code=self.code,
+            inputs=self.inputs,
+            outputs=outputs,
+        )
+
+    @property
+    def files(self) -> list[str]:
+        """Every path that it reads."""
+        return [path for paths in self.inputs.values() for path in listed(paths)]
+
+
+class Resolver:
+    """Files and settings of a study, see `study.artifact.reads.Sources`.
+
+    results : folder of the results
+    """
+
+    def __init__(self, study: Study, results: str) -> None:
+        self.study, self.results = study, results
+        self._jobs: dict[tuple[str, ...], Job] = {}
+        self._prints: dict[tuple[str, ...], str] = {}
+
+    def job(self, artifact: Artifact, labels: Labels) -> Job:
+        """The job of an artifact with these labels.
+
+        Raises
+        ------
+        ConfigurationError
+            If it reads a table or a key that does not exist.
+        """
+        key = (artifact.rule, *(labels[name] for name in artifact.labels))
+        if key not in self._jobs:
+            own = {name: labels[name] for name in artifact.labels}
+            self._jobs[key] = self._resolved(artifact, own)
+        return self._jobs[key]
+
+    def _resolved(self, artifact: Artifact, labels: dict[str, str]) -> Job:
+        settings = artifact.settings(self, labels)
+        inputs = artifact.inputs(self, labels)
+        edited = [p for k, r in artifact.files.items() if r.edited for p in listed(inputs[k])]
+        places = artifact.writes.items()
+        return Job(
+            artifact,
+            labels,
+            inputs,
+            {name: place.at(self.results, **labels) for name, place in places},
+            artifact.plain(settings),
+            digest(self.study.root, *edited) if edited else "",
+            self.code(artifact.module, *sorted(set(modules_in(settings)))),
+        )
+
+    def code(self, *modules: str) -> str:
+        """Fingerprint of modules, see `study.pipeline.fingerprint`."""
+        if modules not in self._prints:
+            self._prints[modules] = fingerprint(*modules)
+        return self._prints[modules]
+
+    # What declarations ask for (`Sources`) --------------------------------------------------
+
+    def file(self, place: Place, labels: Labels) -> str:
+        """Path of the file ``place`` of a job with ``labels``.
+
+        Mesh and basis follow from its scene and method.
+        """
+        found = dict(labels)
+        if "mesh" in place.labels and "mesh" not in found:
+            found["mesh"] = self.study.mesh_of(found["scene"])
+        if "basis" in place.labels and "basis" not in found:
+            found["basis"] = self.study.methods[found["method"]].basis_id
+        return place.at(self.results, **{name: found[name] for name in place.labels})
+
+    def files(self, place: Place, labels: Labels) -> list[str]:
+        """Paths of a kind, ``place``, whose labels agree with the ``labels`` of a job."""
+        study = self.study.only(labels["scene"]) if "scene" in labels else self.study
+        return [
+            place.at(self.results, **held)
+            for held in labels_of(study, place)
+            if all(held[name] == labels[name] for name in held.keys() & labels.keys())
+        ]
+
+    def first(self, place: Place, label: str, value: str) -> list[str]:
+        """One path of ``place`` for each set of its other labels.
+
+        It is that whose ``label`` has this ``value``, else the first.
+        """
+        chosen: dict[tuple[str, ...], Labels] = {}
+        for labels in labels_of(self.study, place):
+            others = tuple(other for name, other in labels.items() if name != label)
+            if others not in chosen or labels[label] == value:
+                chosen[others] = labels
+        return [place.at(self.results, **labels) for labels in chosen.values()]
+
+    def chosen(self, place: Place, first: bool) -> list[str]:
+        """Paths of ``place`` by the options of a figure; a study has none.
+
+        ``first`` limits them to the first of each experiment and method.
+        """
+        raise NotImplementedError
+
+    def published(self, name: str) -> list[str]:
+        """Tables ``name`` of the published code that the options of a figure ask for."""
+        raise NotImplementedError
+
+    def table(self, name: str) -> str:
+        """File of the table ``name``; ConfigurationError if there is no such table."""
+        if name not in declared():
+            raise ConfigurationError(f"'{name}': unknown{choices(name, declared())}")
+        return TABLE.at(self.results, name=name)
+
+    def value(self, key: str, labels: Labels) -> Any:
+        """Value of the configuration by its ``key``, or one derived (`DERIVED`) for ``labels``."""
+        head, *parts = key.split(".")
+        if head in DERIVED:
+            value = DERIVED[head](self.study, labels)
+        else:
+            value, parts = self.study.settings, [head, *parts]
+        for part in parts:
+            if not hasattr(value, part):
+                known = choices(part, getattr(type(value), "model_fields", ()))
+                raise ConfigurationError(f"the key '{key}': unknown{known}")
+            value = getattr(value, part)
+        return value
+
+    def per_scene(self, key: str) -> dict[str, Any]:
+        """Value of ``key`` of every scene by its name."""
+        if key not in SceneConfig.model_fields:
+            known = choices(key, SceneConfig.model_fields)
+            raise ConfigurationError(f"the key '{key}' of scenes: unknown{known}")
+        return {name: getattr(scene, key) for name, scene in self.study.scenes.items()}
+
+
+def listed(paths: Paths) -> list[str]:
+    """List of one path, or of several, ``paths``."""
+    return [paths] if isinstance(paths, str) else list(paths)

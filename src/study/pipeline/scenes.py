@@ -1,0 +1,200 @@
+"""Scenes of config/scenes, changed as a study requests, and built to find every fault early.
+
+A configuration also makes scenes out of others: finer meshes, other weights, other starts.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from itertools import product
+from pathlib import Path
+from typing import Annotated, NamedTuple, Self
+
+from pydantic import Field, model_validator
+
+from pdrom.core.errors import ConfigurationError, PdromError, choices
+from pdrom.core.names import SceneName, named
+from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
+from pdrom.model.constraints.base import GroupConfig
+from pdrom.model.effects import EFFECTS
+from pdrom.model.effects.base import Seed
+from pdrom.model.effects.entries import effect_config
+from pdrom.model.mesh.config import MeshFile
+from pdrom.model.scene import Scene, SceneConfig
+from study.experiments.kit.variation import varied
+
+Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
+Positive = Annotated[float, Field(gt=0.0, le=1e12, allow_inf_nan=False)]
+
+
+class Coarsen(ConfigModel):
+    """Factors on mesh resolution (vertices along a side) and on every frame number."""
+
+    resolution: Fraction = 1.0
+    frames: Fraction = 1.0
+
+    def of(self, scene: SceneConfig) -> SceneConfig:
+        """Return the coarsened ``scene``."""
+        return scene if self == Coarsen() else scene.coarsened(self.resolution, self.frames)
+
+
+class Replicate(ConfigModel):
+    """Another sample of every scene, on which rules that were fixed before are tried again.
+
+    frames_factor : stretches handles, pins and schedules in time; below 1 the motion is faster
+    kick : speed of a random start (m/s), along the axes of the scene's held-out motions
+    seed : of that start; held-out motions take the seeds that follow theirs by as much
+    """
+
+    frames_factor: Annotated[float, Field(ge=0.1, le=10.0)] = 1.0
+    kick: Annotated[float, Field(ge=0.0, le=1e3)] = 0.0
+    seed: Seed = 0
+
+    def of(self, scene: SceneConfig) -> SceneConfig:
+        """Return ``scene`` at another speed, from another start, with other held-out seeds."""
+        if self == Replicate():
+            return scene
+        effects = [effect.with_frames_scaled(self.frames_factor) for effect in scene.effects]
+        held_out = scene.held_out
+        if self.kick:
+            kick = {"effect": "kick", "speed": self.kick, "seed": self.seed}
+            effects.append(effect_config(kick | {"axes": held_out.kick_axes}, len(effects)))
+        held_out = held_out.model_copy(update={"seed": (held_out.seed + self.seed) % 2**63})
+        return scene.model_copy(update={"effects": tuple(effects), "held_out": held_out})
+
+
+class Changes(NamedTuple):
+    """Changes that a study makes to every scene of config/scenes."""
+
+    coarsen: Coarsen = Coarsen()
+    replicate: Replicate = Replicate()
+
+    def of(self, scene: SceneConfig) -> SceneConfig:
+        """Return ``scene`` with both changes."""
+        return self.coarsen.of(self.replicate.of(scene))
+
+
+Change = Coarsen | Replicate | Changes
+UNCHANGED = Changes()
+
+
+def scene_names(root: Path) -> list[str]:
+    """Names of all scenes that have a file below ``root``."""
+    return sorted(path.stem for path in (root / "config" / "scenes").glob("*.yaml"))
+
+
+def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
+    """ConfigurationError, which ``key`` opens, if one of ``names`` has no file below ``root``."""
+    known = scene_names(root)
+    for name in names:
+        if name not in known:
+            raise ConfigurationError(f"{key}: unknown scene '{name}'{choices(name, known)}")
+
+
+def load_bound_scene(root: Path, name: str, changes: Change = UNCHANGED) -> Scene:
+    """Scene ``name`` below ``root`` with ``changes``, built to find every fault early.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the file and the fault; also for faults of the held-out variant.
+    """
+    return bind(root, read_scene(root, name, changes), str(scene_file(root, name)))
+
+
+def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
+    """Built ``scene``, whose files lie below ``root``; ``source`` opens messages about its faults.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the fault; also for those of the held-out variant.
+    """
+    try:
+        mesh = scene.mesh.build(root)
+        bound = Scene.build(scene, mesh)
+        # its groups are those of the scene: what differs is built alone
+        heldout = scene.heldout_variant()
+        other = tuple(e for e in heldout.effects if not isinstance(e, GroupConfig))
+        Scene.build(heldout.model_copy(update={"effects": other}), mesh)
+    except PdromError as error:
+        raise ConfigurationError(f"{source}: {error}") from error
+    bound.log_holds()
+    bound.log_contacts()
+    return bound
+
+
+def read_scene(root: Path, name: str, changes: Change = UNCHANGED) -> SceneConfig:
+    """Configuration of scene ``name`` below ``root``, with ``changes``; ConfigurationError.
+
+    Its mesh is not built; a mesh file is named from ``root`` on.
+    """
+    require_scenes(root, [name], "scenes")
+    path = scene_file(root, name)
+    scene = validate(SceneConfig, named(read_yaml(path), name), str(path))
+    if scene.name != name:
+        raise ConfigurationError(f"{path}: name = '{scene.name}', required: '{name}', as the file")
+    if isinstance(scene.mesh, MeshFile):
+        folder = path.parent.relative_to(root).as_posix()
+        scene = scene.model_copy(update={"mesh": scene.mesh.below(folder)})
+    return changes.of(scene)
+
+
+def scene_file(root: Path, name: str) -> Path:
+    """File of scene ``name`` below ``root``."""
+    return root / "config" / "scenes" / f"{name}.yaml"
+
+
+def not_taken(scene: SceneConfig) -> list[str]:
+    """Effects of a scene that no position subspace takes."""
+    return [e.effect for e in scene.effects if not EFFECTS.load(e.effect).in_subspace]
+
+
+class Variants(ConfigModel):
+    """Section ``variants``: every combination of the lists, of every scene.
+
+    resolutions : factors of the vertices along each side of the mesh
+    stiffness_ratios : factors of the weights of the reduced groups
+    seeds : random starts by `kick`, the largest speed of a vertex in m/s
+    """
+
+    scenes: tuple[SceneName, ...] = ()
+    resolutions: Annotated[tuple[Positive, ...], Field(min_length=1)] = (1.0,)
+    stiffness_ratios: Annotated[tuple[Positive, ...], Field(min_length=1)] = (1.0,)
+    seeds: Annotated[tuple[Seed, ...], Field(min_length=1)] = (1,)
+    kick: Annotated[float, Field(gt=0.0, le=1e3)] = 0.5
+
+    @model_validator(mode="after")
+    def _given_once(self) -> Self:
+        for key in ("scenes", "resolutions", "stiffness_ratios", "seeds"):
+            values = getattr(self, key)
+            if len(set(values)) < len(values):
+                raise ValueError(f"{key} = {list(values)}: an entry is given twice")
+        return self
+
+    def of(self, read: Callable[[str], SceneConfig]) -> Iterator[SceneConfig]:
+        """Every variant; ``read`` gives the configuration of a scene.
+
+        The name says what differs: ``strain_oop_m1p5_w0p01_s3`` has 1.5 times the vertices along a
+        side, a hundredth of the weight, and the start of seed 3.
+        """
+        for name in self.scenes:
+            scene = read(name)
+            for factor, ratio, seed in product(self.resolutions, self.stiffness_ratios, self.seeds):
+                yield self._variant(scene, factor, ratio, seed)
+
+    def _variant(self, scene: SceneConfig, factor: float, ratio: float, seed: int) -> SceneConfig:
+        h, frames = scene.time_step, scene.frames
+        stiff = varied(scene, h, ratio, h * frames, (frames, frames))
+        kick = {"effect": "kick", "speed": self.kick, "seed": seed}
+        return stiff.model_copy(
+            update={
+                "name": f"{scene.name}_m{_word(factor)}_w{_word(ratio)}_s{seed}",
+                "title": f"{scene.title}; mesh x {factor:g}, weight x {ratio:g}, start {seed}",
+                "mesh": scene.mesh.coarsened(factor),
+                "effects": (*stiff.effects, effect_config(kick, len(stiff.effects))),
+            }
+        )
+
+
+def _word(number: float) -> str:
+    """A number as part of a scene's name."""
+    return f"{number:g}".replace(".", "p").replace("-", "m").replace("+", "")

@@ -1,0 +1,73 @@
+"""Whether NumPy and SciPy calculate correctly on this machine, with the kernels that jobs use.
+
+``./reproduce`` runs this before a new environment counts as made. The kernels of a linear algebra
+library can be broken on one processor for some shapes of matrices, and then end the process without
+a word, so that each calculation is named on standard output before it is made.
+"""
+
+import faulthandler
+import sys
+from collections.abc import Iterator
+from importlib.metadata import version
+from typing import Any
+
+from pdrom.core.environment import settle
+
+# Rows: one element, those of the hard cases, a group of a scene. Columns: sizes of bases.
+ROWS = (1, 2, 3, 4, 6, 9, 12, 27, 48, 96, 100, 256, 300, 900, 1000, 2700)
+COLUMNS = (1, 2, 3, 4, 6, 8, 12, 16, 20, 25, 32, 50)
+# Difference relative to the largest entry; rounding at these sizes stays far below.
+TOLERANCE = 1e-9
+
+
+def main() -> None:
+    """Make all calculations; the last line on standard output names the one that failed."""
+    faulthandler.enable()
+    settle()
+    for what in calculations():
+        sys.stdout.write(f"{what}\n")
+        sys.stdout.flush()
+
+
+def calculations() -> Iterator[str]:
+    """Name each calculation, and make it when the next one is asked for."""
+    import numpy as np
+    import scipy.linalg
+
+    random = np.random.default_rng(1)
+    names = [f"{library} {version(library)}" for library in ("numpy", "scipy")]
+    for rows, columns in [(rows, columns) for rows in ROWS for columns in COLUMNS]:
+        x = random.standard_normal((rows, columns))
+        # sums that are formed without a linear algebra library
+        gram = np.einsum("ij,ik->jk", x, x)
+        where = f"with X of {rows} x {columns}"
+        yield f"{names[0]}: X.T @ (2 * X) {where}"
+        compare(x.T @ (2 * x), 2 * gram)
+        yield f"{names[0]}: X.T @ X {where}"
+        compare(x.T @ x, gram)
+        yield f"{names[0]}: X @ y {where}"
+        compare(x @ x[0], np.einsum("ij,j->i", x, x[0]))
+        yield f"{names[1]}: X.T @ X {where}"
+        compare(scipy.linalg.blas.dgemm(1.0, x, x, trans_a=True), gram)
+        yield f"{names[1]}: pivoted QR factors {where}"
+        q, r, order = scipy.linalg.qr(x, mode="economic", pivoting=True)
+        compare(q @ r, x[:, order])
+        for name, linalg in zip(names, (np.linalg, scipy.linalg), strict=True):
+            yield f"{name}: singular values {where}"
+            left, values, right = linalg.svd(x, full_matrices=False)
+            compare((left * values) @ right, x)
+            yield f"{name}: solution of a system of {columns} unknowns"
+            regular = gram + rows * np.eye(columns)
+            compare(regular @ linalg.solve(regular, x.T), x.T)
+
+
+def compare(found: Any, expected: Any) -> None:
+    """End the process where two arrays differ by more than rounding, or one is not finite."""
+    import numpy as np
+
+    if not np.abs(found - expected).max() <= TOLERANCE * max(np.abs(expected).max(), 1.0):
+        sys.exit("a wrong result")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,249 @@
+"""The study: which scenes, methods and settings one run of the pipeline covers."""
+
+from collections.abc import Iterable
+from copy import copy
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import Field, model_validator
+
+from pdrom.core.errors import ConfigurationError, choices
+from pdrom.core.names import SceneName
+from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
+from pdrom.model.dynamics.system import DEFAULT_SOLVER
+from pdrom.model.mesh.config import MeshConfig
+from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.local.ranks import Rank
+from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
+from study.experiments.alternatives.settings import Alternatives
+from study.experiments.companion import Companion
+from study.experiments.frame_times import FrameTimes
+from study.experiments.guard import GuardSection
+from study.experiments.hard_cases.experiment import HardCases
+from study.experiments.iterations import IterationSweep
+from study.experiments.kit.sampling import Sweep
+from study.experiments.kit.settings import BlowupExtent, Solver, Threads
+from study.experiments.ladder import LadderFile
+from study.experiments.live import Live
+from study.experiments.noise import Noise
+from study.experiments.online import Online
+from study.experiments.published_choices.experiment import PublishedChoices
+from study.experiments.repetitions import RepetitionSection
+from study.experiments.requested_tolerances import RequestedTolerances
+from study.experiments.roofline.experiment import Roofline
+from study.experiments.scaling import Scaling
+from study.experiments.sensitivity import Sensitivity
+from study.experiments.stability import Stability
+from study.experiments.subspace_ablation import AblationFile
+from study.experiments.subspaces import Subspace
+from study.experiments.timing import Timing
+from study.pipeline.scenes import (
+    Changes,
+    Coarsen,
+    Replicate,
+    Variants,
+    bind,
+    load_bound_scene,
+    read_scene,
+    scene_names,
+)
+
+
+class StudySettings(ConfigModel):
+    """Content of config/default.yaml, possibly overridden by --configfile.
+
+    A section is declared by the experiment whose settings it holds; a default stands there, or here
+    for keys without a section, and nowhere else.
+    ``study`` names the folder of the results, see `study.pipeline.folders`.
+    """
+
+    scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
+    methods: Annotated[tuple[str, ...], Field(min_length=1)]
+    ranks: Annotated[tuple[Rank, ...], Field(min_length=1)] = (6, 10, 20, 50, "full")
+    heldout_ranks: tuple[Rank, ...] | None = None
+    sweep: Sweep = Sweep()
+    solver: Solver = DEFAULT_SOLVER
+    threads: Threads = 1
+    blowup_extent: BlowupExtent = 100.0
+    coarsen: Coarsen = Coarsen()
+    replicate: Replicate = Replicate()
+    claim_sets: dict[str, tuple[SceneName, ...]] = Field(default_factory=dict)
+    sensitivity: Sensitivity = Sensitivity()
+    iterations: IterationSweep = IterationSweep()
+    timing: Timing = Timing()
+    frame_times: FrameTimes = FrameTimes()
+    budgets: tuple[Annotated[float, Field(gt=0.0)], ...] = (0.1, 1.0, 10.0)
+    subspace: Subspace = Subspace()
+    scaling: Scaling = Scaling()
+    roofline: Roofline = Roofline()
+    stability: Stability = Stability()
+    noise: Noise = Noise()
+    published_choices: PublishedChoices = PublishedChoices()
+    repetitions: RepetitionSection = RepetitionSection()
+    guard: GuardSection = GuardSection()
+    companion: Companion = Companion()
+    hard_cases: HardCases = HardCases()
+    online: Online = Online()
+    live: Live = Live()
+    alternatives: Alternatives = Alternatives()
+    requested_tolerances: RequestedTolerances = RequestedTolerances()
+    variants: Variants = Variants()
+    study: str | None = None
+
+    @property
+    def changes(self) -> Changes:
+        """Changes of every scene of config/scenes."""
+        return Changes(self.coarsen, self.replicate)
+
+    @model_validator(mode="after")
+    def _given_once(self) -> Self:
+        for key in ("scenes", "methods", "ranks"):
+            values = getattr(self, key)
+            if len(set(values)) < len(values):
+                raise ValueError(f"{key} = {list(values)}: an entry is given twice")
+        return self
+
+    @model_validator(mode="after")
+    def _heldout_ranks_are_run(self) -> Self:
+        """Samples exist for the ranks; those of the full rank always do."""
+        for rank in self.heldout_ranks or ():
+            if rank not in (*self.ranks, "full"):
+                allowed = ", ".join(map(str, self.ranks))
+                raise ValueError(f"heldout_ranks = {rank}: allowed are ranks ({allowed}) and full")
+        return self
+
+
+class Study:
+    """Settings with the scenes and methods that they name, all checked."""
+
+    def __init__(self, settings: StudySettings, root: Path) -> None:
+        self.settings = settings
+        self.root = root
+        self.titles: dict[str, str] = {}  # for what prints them
+        self.vertices: dict[str, int] = {}
+        self.bound: dict[str, Scene] = {
+            name: load_bound_scene(root, name, settings.changes) for name in settings.scenes
+        }
+        for config in settings.variants.of(partial(read_scene, root, changes=settings.changes)):
+            self.bound[config.name] = bind(root, config, "variants")
+        self.scenes = {name: self._physics(s) for name, s in self.bound.items()}
+        self.online = {name: self._loaded(name) for name in settings.online.scenes}
+        self._others: dict[str, SceneConfig] = {}
+        self.methods: dict[str, MethodSpec] = self.named_methods(settings.methods, "methods")
+
+    @classmethod
+    def load(
+        cls,
+        config: dict[str, Any],
+        root: Path | str = ".",
+        source: str = "configuration (config/default.yaml)",
+    ) -> "Study":
+        """Study of a (merged) ``config`` below ``root``; ``source`` opens the messages about it.
+
+        Raises
+        ------
+        ConfigurationError
+            Naming file, key, value and what is allowed, before anything is computed.
+        """
+        settings = validate(StudySettings, config, source)
+        return cls(settings, Path(root))
+
+    @cached_property
+    def ladder(self) -> LadderFile:
+        """Ladder of config/ladder.yaml."""
+        path = self.root / "config" / "ladder.yaml"
+        return validate(LadderFile, read_yaml(path), str(path))
+
+    @cached_property
+    def ablation(self) -> AblationFile:
+        """Ablation of config/subspace_ablation.yaml."""
+        path = self.root / "config" / "subspace_ablation.yaml"
+        return validate(AblationFile, read_yaml(path), str(path))
+
+    @cached_property
+    def every_method(self) -> dict[str, MethodSpec]:
+        """All methods of config/methods.yaml by name."""
+        return load_methods(self.root / "config" / "methods.yaml")
+
+    def scene(self, name: str) -> SceneConfig:
+        """Configuration of scene ``name``; of one outside the study, too, if it has a file.
+
+        Raises
+        ------
+        ConfigurationError
+            If there is no such scene, or it is faulty.
+        """
+        for held in (self.scenes, self.online, self._others):
+            if name in held:
+                return held[name]
+        self._others[name] = self._loaded(name)
+        return self._others[name]
+
+    def _loaded(self, name: str) -> SceneConfig:
+        """Configuration of a scene that the study does not keep bound to its mesh."""
+        return self._physics(load_bound_scene(self.root, name, self.settings.changes))
+
+    def _physics(self, scene: Scene) -> SceneConfig:
+        """The scene under its name instead of its title, so that no job depends on the title."""
+        config = scene.config
+        self.titles[config.name], self.vertices[config.name] = config.title, scene.mesh.vertices
+        return config.model_copy(update={"title": config.name})
+
+    def only(self, scene: str) -> "Study":
+        """Return a study of one scene, which need not be held."""
+        single = copy(self)
+        single.scenes = {scene: self.scene(scene)}
+        return single
+
+    @property
+    def experiments(self) -> list[tuple[str, str]]:
+        """(scene, group) pairs whose group is reduced, in configuration order."""
+        return [(name, group) for name, scene in self.scenes.items() for group in scene.reduce]
+
+    def mesh_of(self, scene: str) -> str:
+        """Identifier of a scene's mesh."""
+        return self.scene(scene).mesh.identifier
+
+    @property
+    def meshes(self) -> dict[str, MeshConfig]:
+        """Mesh configurations by identifier."""
+        return {scene.mesh.identifier: scene.mesh for scene in self.scenes.values()}
+
+    def mesh(self, identifier: str) -> MeshConfig:
+        """Configuration of mesh ``identifier``; of one outside the study, too, if a scene has it.
+
+        Raises
+        ------
+        ConfigurationError
+            If no scene of config/scenes has it.
+        """
+        if identifier in self.meshes:
+            return self.meshes[identifier]
+        for name in scene_names(self.root):
+            mesh = read_scene(self.root, name, self.settings.changes).mesh
+            if mesh.identifier == identifier:
+                return mesh
+        raise ConfigurationError(f"no scene in config/scenes has the mesh '{identifier}'")
+
+    def method(self, name: str) -> MethodSpec:
+        """Method ``name`` of the study; ConfigurationError for another one."""
+        if name not in self.methods:
+            raise ConfigurationError(f"unknown method '{name}'{choices(name, self.methods)}")
+        return self.methods[name]
+
+    def basis(self, identifier: str) -> BasisSpec:
+        """Specification of basis ``identifier`` by its first method, else ConfigurationError."""
+        for method in self.methods.values():
+            if method.basis_id == identifier:
+                return BasisSpec(**{key: getattr(method, key) for key in BasisSpec.model_fields})
+        known = [method.basis_id for method in self.methods.values()]
+        raise ConfigurationError(f"unknown basis '{identifier}'{choices(identifier, known)}")
+
+    def named_methods(self, names: Iterable[str], key: str) -> dict[str, MethodSpec]:
+        """Methods by ``names``; ConfigurationError, which ``key`` opens, for an unknown one."""
+        known = self.every_method
+        for name in names:
+            if name not in known:
+                raise ConfigurationError(f"{key}: unknown method '{name}'{choices(name, known)}")
+        return {name: known[name] for name in names}

@@ -1,0 +1,81 @@
+"""Scenes with an effect that no position subspace takes: what they go without, and what asks."""
+
+import logging
+
+from pdrom.core.errors import ConfigurationError, SceneError
+from pdrom.reduction.subspace.exported import DOUBLES, require_known
+from study.artifact.paths import LIVE_MODEL
+from study.experiments.live import LARGEST
+from study.pipeline.contents import labels_of
+from study.pipeline.scenes import not_taken
+from study.pipeline.study import Study
+
+log = logging.getLogger(__name__)
+
+
+def check_subspaces(study: Study) -> None:
+    """Say which scenes of ``study`` go without subspaces, auxiliary model and estimates.
+
+    Raises
+    ------
+    ConfigurationError
+        One of them is named where a subspace is asked for.
+    """
+    outside = {
+        name: effects
+        for name, config in {**study.scenes, **study.online}.items()
+        if (effects := not_taken(config))
+    }
+    for key, scenes in _asking(study).items():
+        for name in scenes:
+            if name in outside:
+                raise ConfigurationError(
+                    f"{key}: scene '{name}' has the effect '{outside[name][0]}', which no position "
+                    "subspace (and no auxiliary model) takes"
+                )
+    for name, effects in outside.items():
+        log.warning(
+            "%s: no position subspaces, no auxiliary model and no estimated errors, since none "
+            "takes the effect '%s'", name, "', '".join(effects),
+        )  # fmt: skip
+
+
+def _asking(study: Study) -> dict[str, tuple[str, ...]]:
+    """Keys that ask for a subspace of the scenes that they name."""
+    settings, guard = study.settings, study.settings.guard
+    estimated = guard.action != "none" and guard.alarm == "estimate"
+    return {
+        "subspace.scenes": settings.subspace.scenes,
+        "scaling.scenes": tuple(settings.scaling.scenes),
+        "online.scenes": settings.online.scenes,
+        "alternatives.scenes": tuple(settings.alternatives.scenes),
+        "config/subspace_ablation.yaml: scenes": study.ablation.scenes,
+        "guard.cases": tuple(case.scene for case in guard.cases),
+        "guard.alarm = 'estimate'": tuple(study.scenes) if estimated else (),
+    }
+
+
+def check_live(study: Study) -> None:
+    """ConfigurationError for a scene that the page with running models cannot hold."""
+    for name in (labels["scene"] for labels in labels_of(study, LIVE_MODEL)):
+        try:
+            require_known(study.scene(name))
+        except SceneError as error:
+            raise ConfigurationError(f"live.scenes: {error}") from error
+        size = _live_bytes(study, name)
+        if size > LARGEST:
+            raise ConfigurationError(
+                f"live.scenes: scene '{name}' takes at least {size / 1e6:.1f} MB of models on "
+                f"{study.vertices[name]} vertices, allowed are {LARGEST / 1e6:.1f}: choose fewer "
+                f"modes (live.sizes = {list(study.settings.live.sizes)})"
+            )
+
+
+def _live_bytes(study: Study, name: str) -> float:
+    """Size of the vertices, masses and bases of a scene in the file of its models."""
+    settings, vertices = study.settings, study.vertices[name]
+    section = settings.subspace if name in study.scenes else settings.online
+    sizes = [k for k in settings.live.sizes if k in section.sizes and "pod" in section.bases]
+    entries = [vertices * (k + 4) for k in sizes]  # affine columns stand beside the modes
+    bases = sum(count * (8 if count <= DOUBLES else 4) for count in entries)
+    return (vertices * 32 + bases) * 4 / 3  # written in base 64

@@ -1,0 +1,171 @@
+"""Last lines of a run: of a dry run the jobs and how long all take, else what came of it."""
+
+import atexit
+import logging
+import os
+import shlex
+import sys
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import psutil
+from snakemake_interface_logger_plugins.common import LogEvent
+
+from pdrom.core.store import Condition, check_file, read_table
+from study.artifact import paths
+from study.pipeline.commandline import CommandLine
+from study.pipeline.folders import Folders
+from study.pipeline.progress import rounded
+
+# Snakemake's reasons, as they begin, and in fewer words. The last one follows from other jobs and
+# is left out beside another one.
+FOLLOWS = "Input files updated by another job"
+REASONS = {
+    "Forced execution": "forced",
+    "Missing output files": "output is missing",
+    "Incomplete output files": "output is incomplete",
+    "Updated input files": "input is newer",
+    "Set of input files has changed": "other input files",
+    "Code has changed": "script has changed",
+    "Params have changed": "settings or code have changed",
+    "Software environment definition has changed": "environment has changed",
+    FOLLOWS: "input is made again",
+}
+END = "This was a dry-run"
+
+LISTED = 8  # targets, by their names
+
+
+def processor_seconds() -> float:
+    """Processor time of this process and of all that it has started, until now."""
+    own = psutil.Process()
+    total = 0.0
+    for process in (own, *own.children(recursive=True)):
+        try:
+            times = process.cpu_times()
+        except psutil.Error:  # it has ended meanwhile
+            continue
+        total += times.user + times.system
+        total += getattr(times, "children_user", 0.0) + getattr(times, "children_system", 0.0)
+    return total
+
+
+def summary(
+    command: CommandLine,
+    folders: Folders,
+    figures: Sequence[str],
+    tables: Sequence[str],
+    apart: str = "",
+) -> str:
+    """Lines about a run that has ended well.
+
+    Parameters
+    ----------
+    command, folders : line that started the run, and where its results lie
+    figures, tables : files that the study has when it is complete
+    apart : words that tell its verdicts from those of the full study, if it is another one
+    """
+    wall = time.time() - psutil.Process().create_time()
+    lines = [f"configuration: {configuration(command)}"]
+    if command.targets:
+        more = len(command.targets) - LISTED
+        others = [f"and {more} more"] if more > 0 else []
+        lines.append(f"made: {', '.join([*command.targets[:LISTED], *others])}")
+    else:
+        lines += _verdicts(folders, apart)
+        lines.append(f"manuscript: {', '.join(folders.documents.values())}")
+        for kind, files in (("figures", figures), ("tables", tables)):
+            found = sum(Path(file).is_file() for file in files)
+            lines.append(f"{kind}: {found} in {folders.results}/{kind}")
+        lines.append(f"report: {shlex.join(['./reproduce', '--report', 'report.html'])}")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    lines.append(
+        f"time: {minutes(wall)} on {cores} cores, {minutes(processor_seconds())} of processor time"
+    )
+    return "\n".join(f"pdrom: {line}" for line in lines) + "\n"
+
+
+def minutes(seconds: float) -> str:
+    """A time in minutes and seconds."""
+    whole = round(seconds)
+    return f"{whole // 60} min {whole % 60} s" if whole >= 60 else f"{whole} s"
+
+
+def configuration(command: CommandLine) -> str:
+    """Files and settings of the configuration of ``command``, in one line."""
+    names = command.configfiles or ("config/default.yaml",)
+    return ", ".join([*names, *command.settings])
+
+
+def _verdicts(folders: Folders, apart: str) -> list[str]:
+    """All verdicts in one line; none where the table cannot be read."""
+    path = paths.TABLE.at(folders.results, name="claims")
+    # only looked at: a job sets a damaged one aside
+    if not Path(path).is_file() or check_file(path) is not Condition.INTACT:
+        return []
+    table = read_table(path, ["claim", "verdict", "verdict_beyond"])
+    verdicts = [f"{r.claim} {r.verdict} / {r.verdict_beyond}" for r in table.itertuples()]
+    words = f"as published / beyond; {apart}" if apart else "as published / beyond"
+    return [f"verdicts ({words}): {', '.join(verdicts)}"]
+
+
+class Preview(logging.Handler):
+    """Listens to Snakemake's log for the jobs of a plan.
+
+    Parameters
+    ----------
+    seconds : expected processor time of a job, given its log
+    cores : how many there are; a job that is alone claims all of them
+    """
+
+    def __init__(self, seconds: Callable[[str], float], cores: int) -> None:
+        super().__init__(logging.INFO)
+        self._of_job, self._cores = seconds, cores
+        self._jobs: Counter[str] = Counter()
+        self._reasons: defaultdict[str, set[str]] = defaultdict(set)
+        self._processor = self._wall = 0.0
+        self._ended = False
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Count the job of a ``record``."""
+        self._ended = self._ended or END in record.getMessage()
+        if getattr(record, "event", None) != LogEvent.JOB_INFO:
+            return
+        self._jobs[record.rule_name] += 1
+        self._reasons[record.rule_name] |= shortened(record.reason)
+        if record.log:  # what only names targets has none
+            seconds = self._of_job(str(record.log[0]))
+            self._processor += seconds
+            self._wall += seconds * min(record.threads, self._cores) / self._cores
+
+    def text(self) -> str:
+        """A line for each rule, then jobs and minutes; nothing of a plan without an end."""
+        if not self._ended:
+            return ""
+        width = max(map(len, self._jobs))
+        lines = [
+            f"{count:>5} {rule:<{width}}  {', '.join(sorted(self._reasons[rule]))}"
+            for rule, count in self._jobs.items()
+        ]
+        wall = f"{rounded(self._wall)} on {self._cores} core{'s' * (self._cores > 1)}"
+        lines.append(
+            f"pdrom: {sum(self._jobs.values())} jobs, {wall}, "
+            f"{rounded(self._processor)} of processor time"
+        )
+        return "\n".join(lines) + "\n"
+
+
+def shortened(reason: str) -> set[str]:
+    """Reasons in ``reason``, a text of Snakemake's, which lists files and settings behind each."""
+    found = [text for text in REASONS if reason.startswith(text) or f"; {text}" in reason]
+    own = [text for text in found if text != FOLLOWS] or found
+    return {REASONS[text] for text in own}
+
+
+def preview(seconds: Callable[[str], float], cores: int) -> None:
+    """Have this process say at its end what its dry run has planned."""
+    planned = Preview(seconds, cores)
+    logging.getLogger("snakemake.logging").addHandler(planned)
+    atexit.register(lambda: sys.stdout.write(planned.text()))

@@ -1,0 +1,154 @@
+"""Measurements that git keeps: costs of jobs, winners on large meshes, verdicts on another sample.
+
+``./reproduce run python -m study.pipeline.tracked costs`` writes `config/reference/job_costs.csv`
+again, from the logs of the full and of the tiny study in ``results``. It holds the mean processor
+seconds of a kind of job on the meshes of both studies, with the longest time and the largest memory
+of a job, which the requests of `workflow/profiles/slurm` are to cover. A kind is what a job's log
+is named by below ``logs``: an experiment, or ``tables``, ``figures`` or ``paper``.
+
+``./reproduce run python -m study.pipeline.tracked meshes`` writes the file of the table
+`large_meshes` again, from a finished run of ``config/alternatives.yaml``, which takes too long for
+the default run. Its times are those of one machine, so that the record names both.
+
+``./reproduce run python -m study.pipeline.tracked replication`` writes the file of the table
+`replication` again, from the table claims of ``config/replication.yaml``.
+"""
+
+import sys
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pandas as pd
+
+from pdrom.core.errors import ConfigurationError, PdromError, choices
+from pdrom.core.machine import machine
+from pdrom.core.store import atomic_path, read_table
+from study.artifact.paths import TABLE
+from study.artifact.usage import usage_of
+from study.pipeline.folders import folders
+from study.tables.claims import load_claims
+from study.tables.claims.replication import MEASURED, RULES
+from study.tables.claims.replication import RECORDED as REPLICATED
+from study.tables.large_meshes import RECORDED
+
+COSTS = Path("config/reference/job_costs.csv")
+COLUMNS = ["kind", "seconds", "coarse_seconds", "longest_s", "memory_mb"]
+COARSE = "config/tiny.yaml"
+LARGE = "config/alternatives.yaml"
+SAMPLE = "config/replication.yaml"
+
+
+def write_tracked(path: Path, content: bytes) -> None:
+    """Write ``content`` to ``path``, which git keeps: whole or not at all, without a checksum."""
+    with atomic_path(path, with_checksum=False) as temporary:
+        temporary.write_bytes(content)
+
+
+def kind_of(log: str, results: str) -> str:
+    """Kind of a job, given its log and the results folder of its study."""
+    return Path(log).relative_to(Path(results, "logs")).parts[0].removesuffix(".log")
+
+
+def measured_costs(results: str, coarse: str) -> pd.DataFrame:
+    """A row for each kind of job, with the `COLUMNS`: what the logs of two runs say.
+
+    Parameters
+    ----------
+    results, coarse : results folders of the full study and of one with coarse meshes
+
+    Raises
+    ------
+    PdromError
+        If no log says what a job used: there was no run.
+    """
+    full = _used(results).groupby("kind")
+    columns = [
+        full.processor.mean().round(2),
+        _used(coarse).groupby("kind").processor.mean().round(2),
+        full.wall.max().round(1),
+        full.memory.max().round().astype(int),
+    ]
+    return pd.concat(columns, axis=1, keys=COLUMNS[1:]).reset_index()
+
+
+def recorded_meshes(winners: Path, processor: str) -> pd.DataFrame:
+    """Table ``winners`` with the machine, its ``processor``, and the day on which it was made.
+
+    Raises
+    ------
+    StorageError
+        The table is missing or damaged.
+    """
+    table = read_table(winners)
+    day = datetime.fromtimestamp(winners.stat().st_mtime, UTC).date().isoformat()
+    return table.assign(processor=processor, date=day)
+
+
+def recorded_verdicts(claims: Path, rules: Path) -> pd.DataFrame:
+    """The verdicts of the table claims, the fingerprints of their rules, and the day.
+
+    Parameters
+    ----------
+    claims : the table of another sample
+    rules : the file of the rules
+
+    Raises
+    ------
+    StorageError
+        The table is missing or damaged.
+    """
+    table = read_table(claims)[["claim", *MEASURED]]
+    loaded = load_claims(rules)
+    day = datetime.fromtimestamp(claims.stat().st_mtime, UTC).date().isoformat()
+    return table.assign(rules=[loaded[claim].fingerprint for claim in table.claim], date=day)
+
+
+def _used(results: str) -> pd.DataFrame:
+    rows = [
+        {"kind": kind_of(str(log), results), **vars(used)}
+        for log in sorted(Path(results, "logs").rglob("*.log"))
+        if (used := usage_of(log)) is not None
+    ]
+    if not rows:
+        raise PdromError(f"{results}/logs: no job says what it used; run the study first")
+    return pd.DataFrame(rows)
+
+
+def _costs() -> tuple[Path, pd.DataFrame]:
+    return COSTS, measured_costs(folders([], []).results, folders([COARSE], []).results)
+
+
+def _meshes() -> tuple[Path, pd.DataFrame]:
+    winners = Path(TABLE.at(folders([LARGE], []).results, name="winners"))
+    return Path(RECORDED), recorded_meshes(winners, machine().cpu)
+
+
+def _verdicts() -> tuple[Path, pd.DataFrame]:
+    claims = Path(TABLE.at(folders([SAMPLE], []).results, name="claims"))
+    return Path(REPLICATED), recorded_verdicts(claims, Path(RULES))
+
+
+KEPT = {"costs": _costs, "meshes": _meshes, "replication": _verdicts}
+
+
+def main(words: Sequence[str]) -> None:
+    """Write the measurements that ``words`` name again.
+
+    Raises
+    ------
+    ConfigurationError
+        There are no such ones.
+    """
+    for word in words or [""]:
+        if word not in KEPT:
+            raise ConfigurationError(f"tracked: '{word}': unknown{choices(word, KEPT)}")
+        path, table = KEPT[word]()
+        write_tracked(path, table.to_csv(index=False).encode())
+
+
+if __name__ == "__main__":
+    try:
+        main(sys.argv[1:])
+    except PdromError as error:
+        sys.exit(f"pdrom: {error}")

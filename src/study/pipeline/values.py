@@ -1,0 +1,218 @@
+"""Settings that are derived from the configuration for a job, by the names that artifacts read.
+
+A name that is not listed here is a key of the configuration. A setting of the type of a section's
+base class gets the fields of that class only, so that a job depends on nothing else.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from pdrom.model.mesh.config import MeshConfig
+from pdrom.model.scene import SceneConfig
+from pdrom.reduction.local.ranks import Rank
+from pdrom.reduction.method import BasisSpec, MethodSpec
+from study.artifact import paths
+from study.artifact.paths import Place
+from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
+from study.experiments.guard import Trial
+from study.experiments.kit.settings import Horizon
+from study.experiments.live import JOINT, JointRows
+from study.experiments.repetitions import Repeated
+from study.experiments.reruns import OfScene
+from study.experiments.stability import Stability
+from study.pipeline.contents import labels_of
+from study.pipeline.study import Study
+
+Labels = Mapping[str, str]
+
+
+def _scene(study: Study, labels: Labels) -> SceneConfig:
+    return study.scene(labels["scene"])
+
+
+def _title(study: Study, labels: Labels) -> str:
+    return study.titles[study.scene(labels["scene"]).name]
+
+
+def _mesh(study: Study, labels: Labels) -> MeshConfig:
+    return study.mesh(labels["mesh"])
+
+
+def _method(study: Study, labels: Labels) -> MethodSpec:
+    return study.method(labels["method"])
+
+
+def _basis(study: Study, labels: Labels) -> BasisSpec:
+    """Specification of a basis by the first method that uses it."""
+    return study.basis(labels["basis"])
+
+
+def _horizon(study: Study, labels: Labels) -> Horizon:
+    section = study.settings.sensitivity
+    return Horizon(perturbation=section.reference, threshold=section.threshold)
+
+
+def _stability(study: Study, labels: Labels) -> Stability:
+    """The short runs at the sizes that the study has samples of."""
+    section = study.settings.stability
+    held = tuple(r for r in section.ranks if r in study.settings.ranks)
+    return section.model_copy(update={"ranks": held})
+
+
+def _trials(study: Study, labels: Labels) -> tuple[Trial, ...]:
+    """The guard's cases that the study holds, one for each reduced group."""
+    settings = study.settings
+    held = [
+        case
+        for case in settings.guard.cases
+        if case.scene in study.scenes and case.method in study.methods and case.r in settings.ranks
+    ]
+    return tuple(
+        Trial(
+            scene=study.scenes[case.scene],
+            group=group,
+            name=case.method,
+            method=study.methods[case.method],
+            r=case.r,
+        )
+        for case in held
+        for group in study.scenes[case.scene].reduce
+    )
+
+
+def _companions(study: Study, labels: Labels) -> tuple[OfScene, ...]:
+    """The auxiliary model that a job's guard estimates errors with, if it does."""
+    guard = study.settings.guard
+    estimates = guard.action != "none" and guard.alarm == "estimate"
+    return (OfScene(scene=labels["scene"]),) if estimates else ()
+
+
+def _held(place: Place) -> Callable[[Study, Labels], tuple[OfScene, ...]]:
+    """The scene of a job if the study itself holds its file of a kind."""
+
+    def held(study: Study, labels: Labels) -> tuple[OfScene, ...]:
+        own = {"scene": labels["scene"]}
+        return (OfScene(**own),) if own in labels_of(study, place) else ()
+
+    return held
+
+
+def _joint_rows(study: Study, labels: Labels) -> tuple[JointRows, ...]:
+    """Joint rows of the reduced groups of a scene, as far as the study samples them."""
+    scene = labels["scene"]
+    if JOINT not in study.methods or scene not in study.scenes:
+        return ()
+    method = study.methods[JOINT]
+    return tuple(
+        JointRows(scene=scene, group=group, method=method) for group in study.scenes[scene].reduce
+    )
+
+
+def _timed_scenes(study: Study, labels: Labels) -> tuple[NamedScene, ...]:
+    return tuple(NamedScene(scene=scene) for scene in study.scenes.values())
+
+
+def _large_scenes(study: Study, labels: Labels) -> tuple[NamedScene, ...]:
+    return tuple(NamedScene(scene=scene) for scene in study.online.values())
+
+
+def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
+    """Cases whose models the study holds."""
+    held = {labels["scene"] for labels in labels_of(study, paths.SUBSPACES)}
+    models = study.settings.subspace
+    return tuple(
+        case
+        for case in study.settings.frame_times.subspaces
+        if case.scene in held and case.method in models.methods(case.position_basis, case.k)
+    )
+
+
+def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...]:
+    """Cases whose samplings the study holds."""
+    held = labels_of(study, paths.SAMPLING)
+    return tuple(
+        case
+        for case in study.settings.frame_times.projections
+        if case.labels in held and case.r in study.settings.ranks
+    )
+
+
+def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
+    """Methods that ``study`` times on growing meshes, the same for all ``labels``.
+
+    They need not be among its own.
+    """
+    section = study.settings.scaling
+    found = study.named_methods([section.method], "scaling.method")
+    return found | study.named_methods(section.breakeven.methods, "scaling.breakeven.methods")
+
+
+def _sizes_of_scenes(study: Study, labels: Labels) -> dict[str, tuple[float, ...]]:
+    """Factors of the meshes on which scenes of the study are timed."""
+    sizes = study.settings.scaling.scenes
+    return {name: factors for name, factors in sizes.items() if name in study.scenes}
+
+
+def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
+    """The cells of a scene, a method after the other; the methods need not be among the study's."""
+    cells = [c for c in study.settings.repetitions.cells if labels["scene"] in c.scenes]
+    return tuple(
+        Repeated(method=name, spec=spec, sizes=cell.sizes, varied=cell.varied)
+        for cell in cells
+        for name, spec in study.named_methods(cell.methods, "repetitions.cells").items()
+    )
+
+
+def _noise_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
+    """The methods of the noise runs; they need not be among the study's."""
+    return study.named_methods(study.settings.noise.methods, "noise.methods")
+
+
+def _published_experiment(study: Study, labels: Labels) -> str:
+    """Name of the scene in the stored output of the published code."""
+    cases = study.settings.published_choices.cases
+    named = {(case.scene, case.group): case.experiment for case in cases}
+    return named[labels["scene"], labels["group"]]
+
+
+def _projection_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
+    return {case.method: study.methods[case.method] for case in _projection_cases(study, labels)}
+
+
+def _heldout_ranks(study: Study, labels: Labels) -> tuple[Rank, ...]:
+    """Sizes that run on the first held-out motion: all, unless the configuration chooses."""
+    chosen = study.settings.heldout_ranks
+    return study.settings.ranks if chosen is None else chosen
+
+
+DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
+    "scene": _scene,
+    "title": _title,
+    "mesh": _mesh,
+    "method": _method,
+    "methods": lambda study, labels: study.methods,
+    "every_scene": lambda study, labels: study.scenes,
+    "sizes": _sizes_of_scenes,
+    "every_method": lambda study, labels: study.every_method,
+    "scaled_methods": scaled_methods,
+    "noise_methods": _noise_methods,
+    "published_experiment": _published_experiment,
+    "repeated": _repeated,
+    "basis": _basis,
+    "horizon": _horizon,
+    "stability": _stability,
+    "trials": _trials,
+    "companions": _companions,
+    "with_subspaces": _held(paths.SUBSPACES),
+    "with_online_models": _held(paths.ONLINE_MODELS),
+    "with_companion": _held(paths.COMPANION),
+    "joint_rows": _joint_rows,
+    "timed_scenes": _timed_scenes,
+    "large_scenes": _large_scenes,
+    "subspace_cases": _subspace_cases,
+    "projection_cases": _projection_cases,
+    "projection_methods": _projection_methods,
+    "heldout_ranks": _heldout_ranks,
+    "ladder": lambda study, labels: study.ladder,
+    "ablation": lambda study, labels: study.ablation,
+}

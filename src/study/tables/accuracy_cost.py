@@ -1,0 +1,162 @@
+"""Table accuracy_cost: each method and size as a point (error, time), and the best.
+
+Errors have one of two references, and only rows with the same one may be compared:
+
+=================  ==================================================================
+method             error against
+=================  ==================================================================
+fom, fom-anderson  the full-order run whose frames are converged (K -> infinity)
+every other        the scene's own full-order run, which has finitely many iterations
+=================  ==================================================================
+
+Among the others, ``full`` without a position subspace is that own run (error zero by definition),
+and ``fewer-iterations`` is the full-order run stopped earlier: what a reduction has to beat.
+``fom-anderson`` are full-order runs with accelerated iterations.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from study.artifact import paths
+from study.artifact.paths import File
+from study.artifact.reads import Every, PerScene, TableOf
+from study.experiments.kit.names import ANDERSON, FOM
+from study.tables.kit.declaration import compared, flag, integer, number, table, timed
+from study.tables.kit.held_out import COLUMNS, MEDIAN, with_held_out
+from study.tables.kit.one_time import timings_in_one_time
+from study.tables.kit.parts import joined
+from study.tables.kit.reruns import USERS
+from study.tables.kit.vocabulary import (
+    ERROR_WITHIN,
+    GROUP,
+    METHOD,
+    MS_PER_FRAME,
+    POSITION_BASIS,
+    SCENE,
+    K,
+    R,
+)
+
+FEWER = "fewer-iterations"
+_MODEL = ["scene", "position_basis", "k", "method"]
+CONVERGED, OWN = "converged", "own iterations"
+
+
+@table(
+    title="Every method and size as a point of accuracy and cost",
+    only_with_error=True,
+    columns=(
+        SCENE,
+        GROUP,
+        METHOD,
+        POSITION_BASIS,
+        K,
+        R,
+        integer("iterations", "local/global iterations of a frame"),
+        ERROR_WITHIN,
+        MS_PER_FRAME,
+        timed(flag("pareto", "no point of the same reference is as good in both, better in one")),
+        compared(
+            "error",
+            number(
+                "error_converged",
+                "error against the run of converged frames: of the full order, whose error before "
+                "the horizon may have another reference, and in position subspaces",
+            ),
+            tolerance=0.05,
+        ),
+        *COLUMNS,
+        timed(flag("pareto_heldout", "the same by the error held out; full order as it is")),
+        *USERS,
+    ),
+    reads={
+        "reruns": TableOf("reduced_reruns"),
+        "heldout": TableOf("heldout_reruns"),
+        "timings": Every(paths.TIMINGS),
+        "frame_times": TableOf("frame_times"),
+        "sweeps": Every(paths.ITERATIONS),
+        "models": Every(paths.SUBSPACES_CONVERGED),
+        "iterations": PerScene("iterations"),
+    },
+)
+def accuracy_cost(
+    reruns: pd.DataFrame,
+    heldout: pd.DataFrame,
+    timings: list[File],
+    frame_times: pd.DataFrame,
+    sweeps: list[File],
+    models: list[File],
+    iterations: Mapping[str, int],
+) -> pd.DataFrame:
+    """Points of the reruns whose error within the horizon and time exist, and full-order runs.
+
+    A point is Pareto-optimal among those of its scene with the same reference.
+
+    Parameters
+    ----------
+    iterations : scene -> its own local/global iterations K per frame
+    """
+    times = timings_in_one_time(timings, frame_times)
+    times = times[times.implementation == "compiled"]
+    full = times[times.method.isna()].copy()
+    full = full.assign(method="full", position_basis="full", relative_error_within_horizon=0.0)
+    sweep = _sweep(joined(sweeps), times)
+    points = reruns.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
+    points = with_held_out(points.assign(iterations=points.scene.map(iterations)), heldout)
+    known = joined(models).reindex(columns=[*_MODEL, "error_converged"]).astype({"k": "Int64"})
+    points = points.merge(known, on=_MODEL, how="left")
+    own = sweep[sweep.method == FOM].set_index(["scene", "iterations"]).error_converged
+    full["error_converged"] = [own.get((scene, iterations[scene]), np.nan) for scene in full.scene]
+    parts = [full.assign(iterations=full.scene.map(iterations)), points, sweep]
+    points = pd.concat([part for part in parts if len(part)], ignore_index=True)
+    reduced = points.method.isin(reruns.method) & ~_unreduced(points)
+    unseen = points[MEDIAN].where(reduced, points.relative_error_within_horizon)
+    errors = {"pareto": points.relative_error_within_horizon, "pareto_heldout": unseen}
+    for name, error in errors.items():
+        points[name] = False
+        known = points[error.notna()]
+        for _, rows in known.groupby(["scene", reference_of(known)], sort=False):
+            own = error[rows.index].to_numpy(float)
+            points.loc[rows.index, name] = pareto(own, rows.ms_per_frame.to_numpy(float))
+    order = points.scene.map({scene: i for i, scene in enumerate(iterations)})
+    return points.iloc[np.argsort(order, kind="stable")]
+
+
+def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
+    """Full-order runs of every K against the converged one, and those stopped early."""
+    full = times[times.method.isna() | times.method.isin([FOM, ANDERSON])]
+    cost = full[["scene", "method", "iterations", "ms_per_frame"]]
+    cost = cost.fillna({"method": FOM})
+    errors = errors.dropna(subset=["iterations"])
+    errors["method"] = (errors.window > 0).map({True: ANDERSON, False: FOM})
+    errors = errors.merge(cost, on=["scene", "method", "iterations"])
+    own = full[full.method.isna()].set_index("scene").iterations
+    early = (errors.iterations < errors.scene.map(own)) & (errors.method == FOM)
+    parts = [(errors.method, errors, "error_converged")]
+    parts.append((FEWER, errors[early], "error_scene"))
+    named = [
+        rows.assign(method=method, relative_error_within_horizon=rows[column])
+        for method, rows, column in parts
+    ]
+    points = pd.concat(named, ignore_index=True).assign(position_basis="full", k=None, r=None)
+    return points.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
+
+
+def _unreduced(points: pd.DataFrame) -> pd.Series:
+    """Whether each point is the full order: ``full`` is also a model with reduced positions."""
+    return (points.method == "full") & (points.position_basis == "full")
+
+
+def reference_of(points: pd.DataFrame) -> pd.Series:
+    """Reference of the error of each row of ``points``: `CONVERGED` or `OWN`."""
+    return points.method.isin([FOM, ANDERSON]).map({True: CONVERGED, False: OWN})
+
+
+def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
+    """Whether no other point is as good in ``error`` and ``cost`` and better in one of them."""
+    return [
+        not any((e <= a) & (c <= b) & ((e < a) | (c < b)) for e, c in zip(error, cost, strict=True))
+        for a, b in zip(error, cost, strict=True)
+    ]

@@ -1,0 +1,203 @@
+"""Rules of config/claims.yaml: each claim of the preprint with the tests that decide it, twice."""
+
+import datetime
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, FiniteFloat, model_validator
+
+from pdrom.core.errors import ConfigurationError, choices
+from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
+from study.tables import declared
+from study.tables.claims.metrics import METRICS
+from study.tables.claims.rows import Value
+
+SETS = "sets"
+_NAMED = "@"  # opens the name of a set in ``where``
+Added = Mapping[str, Sequence[Value]]
+NONE_ADDED: Added = MappingProxyType({})
+MARGIN = 1.5  # of tests that compare times and name no other
+
+
+class _Model(ConfigModel):
+    """Base of the rules."""
+
+
+class TestRule(_Model):
+    """One comparison.
+
+    what : words for the rows that are compared, used in the reason
+    metric : name in `METRICS`
+    where : column -> allowed values
+    accuracy : error up to which a run counts as accurate, for the metrics that ask
+    margin : factor between a ratio of times and its limit up to which it decides nothing, see
+        `factor`
+    share : fraction of the rows that must agree for a clear answer: the test passes where as many
+        satisfy the comparison, fails where as many do not, and depends otherwise
+    by : column whose values the answer is broken down by where it depends
+    """
+
+    __test__ = False
+
+    what: str
+    metric: str
+    where: dict[str, tuple[Value, ...]] = Field(default_factory=dict)
+    compare: Literal[">=", "<="]
+    threshold: FiniteFloat
+    accuracy: Annotated[float, Field(gt=0.0)] = 0.1
+    margin: Annotated[FiniteFloat, Field(ge=1.0)] | None = None
+    share: Annotated[float, Field(ge=0.5, le=1.0)] = 0.75
+    by: str | None = None
+    decides: bool = True
+
+    @property
+    def timed(self) -> bool:
+        """Whether what is compared depends on timing."""
+        metric = METRICS[self.metric]
+        timing = declared()[metric.table].timing_columns
+        return not set(timing).isdisjoint({*metric.columns, *self.where})
+
+    @property
+    def factor(self) -> float:
+        """The margin, `MARGIN` by default; 1 where nothing depends on timing."""
+        if not self.timed:
+            return 1.0
+        return MARGIN if self.margin is None else self.margin
+
+    @model_validator(mode="after")
+    def _metric_exists(self) -> Self:
+        if self.metric not in METRICS:
+            raise ValueError(f"metric = '{self.metric}': allowed are {', '.join(METRICS)}")
+        metric = METRICS[self.metric]
+        columns = (*declared()[metric.table].column_names, *metric.labels)
+        for column in self.where:
+            if column not in columns:
+                raise ValueError(f"where: no column '{column}'{choices(column, columns)}")
+        if self.by is not None and self.by not in columns:
+            raise ValueError(f"by: no column '{self.by}'{choices(self.by, columns)}")
+        if self.margin is not None and not self.timed:
+            raise ValueError(f"margin = {self.margin:g}: {self.metric} compares no times")
+        return self
+
+
+class Change(_Model):
+    """Date and reason of a change in the rules of a claim.
+
+    after_data : whether results that the rules decide on were known by then
+    rules : fingerprint of the rules from then on, see `ClaimRule.fingerprint`
+    """
+
+    date: datetime.date
+    reason: Annotated[str, Field(min_length=10)]
+    after_data: bool
+    rules: str | None = None
+
+
+class ClaimRule(_Model):
+    """A claim of the preprint, where it stands, and the tests that decide it.
+
+    text : the claim in our words
+    paper : what the preprint says, in a few words
+    section, shown : section and figures of the preprint
+    qualifiers : what a fair test has to keep
+    published : tests on the preprint's own variants and scenes
+    beyond : tests on sound variants and well-posed scenes
+    changes : history of the rules, oldest first
+    """
+
+    text: str
+    source: str
+    paper: str
+    section: str
+    shown: str
+    qualifiers: str
+    figure_or_table: str
+    published: tuple[TestRule, ...]
+    beyond: tuple[TestRule, ...]
+    changes: Annotated[tuple[Change, ...], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _something_decides(self) -> Self:
+        for part in ("published", "beyond"):
+            if not any(test.decides for test in getattr(self, part)):
+                raise ValueError(f"{part}: none of them decides")
+        return self
+
+    @model_validator(mode="after")
+    def _changes_in_order(self) -> Self:
+        dates = [change.date for change in self.changes]
+        if dates != sorted(dates):
+            raise ValueError("changes: dates must not go back")
+        return self
+
+    @property
+    def fingerprint(self) -> str:
+        """Eight digits that change with every rule, but not with its words."""
+        tests = [*self.published, *self.beyond]
+        plain = [
+            test.model_dump(mode="json", exclude={"what", "margin"})
+            | ({"margin": test.factor} if test.timed else {})
+            for test in tests
+        ]
+        content = json.dumps([len(self.published), plain], sort_keys=True)
+        return hashlib.blake2b(content.encode(), digest_size=4).hexdigest()
+
+
+def load_claims(path: Path, added: Added = NONE_ADDED) -> dict[str, ClaimRule]:
+    """Claims of the file ``path`` by identifier.
+
+    Parameters
+    ----------
+    added : values that a study adds to named sets of the file, for scenes that the rules were not
+        written for
+
+    Raises
+    ------
+    ConfigurationError
+        For any fault of the file, and for a set that it does not have.
+    """
+    content = read_yaml(path)
+    if not isinstance(content, dict) or not content:
+        raise ConfigurationError(f"{path}: a mapping of claims is required")
+    sets = dict(_sets(content.get(SETS, {}), f"{path}: {SETS}"))
+    for name, values in added.items():
+        if name not in sets:
+            raise ConfigurationError(f"claim_sets: no set '{name}'{choices(name, sets)}")
+        sets[name] = [*sets[name], *values]
+    rules = {str(claim): rule for claim, rule in content.items() if claim != SETS}
+    if not rules:
+        raise ConfigurationError(f"{path}: a mapping of claims is required")
+    places = {claim: f"{path}: {claim}" for claim in rules}
+    return {
+        claim: validate(ClaimRule, _resolved(rule, sets, places[claim]), places[claim])
+        for claim, rule in rules.items()
+    }
+
+
+def _sets(content: Any, place: str) -> Mapping[str, list[Value]]:
+    """Named lists of values, which tests may name."""
+    if not isinstance(content, dict) or not all(isinstance(v, list) for v in content.values()):
+        raise ConfigurationError(f"{place}: a mapping of lists is required")
+    return content
+
+
+def _resolved(entry: Any, sets: Mapping[str, list[Value]], place: str) -> Any:
+    """``entry`` with every word ``@name`` of a list replaced by the values of that set."""
+    if isinstance(entry, dict):
+        return {key: _resolved(value, sets, place) for key, value in entry.items()}
+    if not isinstance(entry, list):
+        return entry
+    values: list[Any] = []
+    for value in entry:
+        if isinstance(value, str) and value.startswith(_NAMED):
+            name = value.removeprefix(_NAMED)
+            if name not in sets:
+                raise ConfigurationError(f"{place}: no set '{name}'{choices(name, sets)}")
+            values += sets[name]
+        else:
+            values.append(_resolved(value, sets, place))
+    return values

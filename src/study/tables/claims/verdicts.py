@@ -1,0 +1,191 @@
+"""Verdicts: the tests of a claim, evaluated."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from study.tables.claims.metrics import METRICS
+from study.tables.claims.rows import VALUE, Tables, filtered
+from study.tables.claims.rules import Change, ClaimRule, TestRule
+
+VERDICTS = HOLDS, FAILS, DEPENDS, MACHINE, UNDECIDED = (
+    "holds", "does not hold", "depends", "depends on the machine", "cannot be decided",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Result of one test.
+
+    verdict : one of `VERDICTS`; undecided where there was nothing to compare, dependent on the
+        machine where ratios of times close to the limit decide
+    measured : range of the values
+    sentence : how many rows satisfy the comparison, in words
+    condition : where it depends, how many do so for each value of the column that it names
+    """
+
+    verdict: str
+    measured: str
+    sentence: str
+    condition: str = ""
+
+
+def timed_columns(rule: ClaimRule) -> set[str]:
+    """Columns of the row of a ``rule`` that depend on timing: two runs may differ there."""
+    found: set[str] = set()
+    for part, suffix in (("published", ""), ("beyond", "_beyond")):
+        tests: Sequence[TestRule] = getattr(rule, part)
+        timed = [test for test in tests if is_timed(test)]
+        if timed:
+            found.add(f"why{suffix}")
+        if any(test.decides for test in timed):
+            found |= {f"{name}{suffix}" for name in ("measured", "verdict", "condition")}
+            found.add("answer")
+    return found
+
+
+def is_timed(test: TestRule) -> bool:
+    """Whether what a test compares depends on timing."""
+    return test.timed
+
+
+def values_of(test: TestRule, tables: Tables) -> pd.DataFrame:
+    """Labels and a value for each row of ``tables`` that ``test`` compares."""
+    return METRICS[test.metric].values(tables, dict(test.where), test.accuracy)
+
+
+def satisfied(test: TestRule, values: np.ndarray) -> np.ndarray:
+    """Whether each of ``values`` satisfies the comparison of ``test``."""
+    return values >= test.threshold if test.compare == ">=" else values <= test.threshold
+
+
+def close(test: TestRule, values: np.ndarray) -> np.ndarray:
+    """Whether each of ``values`` is a ratio of times within the margin of ``test``'s limit."""
+    ratio = METRICS[test.metric].ratio
+    apart = ratio(values) / ratio(np.array(test.threshold))
+    return (apart > 1.0 / test.factor) & (apart < test.factor)
+
+
+def answer(share: float, good: int, total: int) -> str:
+    """Verdict of a test that ``good`` of ``total`` rows satisfy where ``share`` must."""
+    if total == 0:
+        return UNDECIDED
+    if good >= share * total:
+        return HOLDS
+    return FAILS if total - good >= share * total else DEPENDS
+
+
+def answer_of(test: TestRule, values: np.ndarray) -> str:
+    """Verdict of a test; what values close to the limit would have to decide, the machine does."""
+    near = close(test, values)
+    sure, total = int((satisfied(test, values) & ~near).sum()), len(values)
+    answers = {answer(test.share, sure + more, total) for more in range(int(near.sum()) + 1)}
+    return answers.pop() if len(answers) == 1 else MACHINE
+
+
+def evaluate(test: TestRule, tables: Tables) -> Outcome:
+    """Compare the rows of ``tables`` that ``test`` selects with its threshold."""
+    rows = values_of(test, tables)
+    values = rows[VALUE].to_numpy(float)
+    if len(values) == 0:
+        return Outcome(UNDECIDED, "no data", f"{test.what}: {_why_empty(test, tables)}")
+    passed = satisfied(test, values)
+    good, total = int(passed.sum()), len(values)
+    spread = _range(values)
+    sign = "at least" if test.compare == ">=" else "at most"
+    sentence = f"{test.what}: {good} of {total} {sign} {test.threshold:g} (measured {spread})"
+    near = int(close(test, values).sum())
+    beside = f"{near} of {total} within a factor {test.factor:g} of it" if near else ""
+    sentence += f", {beside}" if beside else ""
+    verdict = answer_of(test, values)
+    condition = ""
+    if verdict in (DEPENDS, MACHINE):
+        condition = f"{test.what}, {sign} {test.threshold:g}: {_broken_down(test, rows, passed)}"
+    if verdict == MACHINE:
+        condition += f" (measured {spread}; {beside}, which decides nothing)"
+    return Outcome(verdict, spread, sentence, condition)
+
+
+def _broken_down(test: TestRule, rows: pd.DataFrame, passed: np.ndarray) -> str:
+    """Number of rows that satisfy the comparison for each value of the column ``by``."""
+    if test.by is None or test.by not in rows:
+        return f"{int(passed.sum())} of {len(passed)}"
+    counts = pd.Series(passed).groupby(rows[test.by].to_numpy(), sort=False)
+    parts = [f"{value} {int(part.sum())} of {len(part)}" for value, part in counts]
+    return ", ".join(parts).replace("_", " ")
+
+
+def _why_empty(test: TestRule, tables: Tables) -> str:
+    """Reason for a test without values: reruns that could not start, or none in this study."""
+    if test.metric == "rerun_error":
+        where = {k: v for k, v in test.where.items() if k != "r"}
+        if len(filtered(tables["reduced_reruns"], where)):
+            return "no size can run, the numerical rank allows none"
+    return "nothing to compare in this configuration"
+
+
+def _range(values: np.ndarray) -> str:
+    """Smallest to largest, and the median of three and more."""
+    low, high = _text(values.min()), _text(values.max())
+    if low == high:
+        return low
+    middle = f", median {_text(float(np.median(values)))}" if len(values) > 2 else ""
+    return f"{low} to {high}{middle}"
+
+
+def _text(value: float) -> str:
+    if np.isinf(value):
+        return "blow-up"
+    if 100.0 <= abs(value) < 1e5:
+        return f"{float(f'{value:.2g}'):.0f}"
+    return f"{value:.2g}"
+
+
+def combined(verdicts: Sequence[str]) -> str:
+    """Verdict of a claim whose parts have ``verdicts``: it holds where all of them hold."""
+    for verdict in (UNDECIDED, FAILS, MACHINE, DEPENDS):
+        if verdict in verdicts:
+            return verdict
+    return HOLDS
+
+
+def claims_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
+    """Rows of the table claims from ``rules`` and ``tables``, in the order of the file."""
+    return pd.DataFrame([_row(name, rule, tables) for name, rule in rules.items()])
+
+
+def _row(name: str, rule: ClaimRule, tables: Tables) -> dict[str, Any]:
+    published, beyond = _decided(rule.published, tables), _decided(rule.beyond, tables)
+    return {
+        "claim": name,
+        "source": rule.source,
+        "paper": rule.paper,
+        **published,
+        "figure_or_table": rule.figure_or_table,
+        "section": rule.section,
+        "shown": rule.shown,
+        "text": rule.text,
+        "qualifiers": rule.qualifiers,
+        **{f"{key}_beyond": value for key, value in beyond.items()},
+        "answer": f"as published it {published['verdict']}, beyond it {beyond['verdict']}",
+        "history": " ".join(_told(change) for change in rule.changes),
+    }
+
+
+def _decided(tests: Sequence[TestRule], tables: Tables) -> dict[str, str]:
+    outcomes = [(test, evaluate(test, tables)) for test in tests]
+    deciding = [o for test, o in outcomes if test.decides]
+    return {
+        "measured": "; ".join(o.measured for o in deciding),
+        "verdict": combined([o.verdict for o in deciding]),
+        "condition": "; ".join(o.condition for o in deciding if o.condition),
+        "why": "; ".join(o.sentence for _, o in outcomes) + ".",
+    }
+
+
+def _told(change: Change) -> str:
+    known = " (results were known)" if change.after_data else ""
+    return f"{change.date.isoformat()}{known}: {change.reason}"

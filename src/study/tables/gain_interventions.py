@@ -1,0 +1,180 @@
+"""Table gain_interventions: lower the gain and leave everything else; does the error fall?
+
+A correlation of gain and error over methods may stand for anything in which the methods differ. The
+methods compared here share basis and size and differ in what is sampled, or in whether the axes
+share their coefficients (the two by two of table ladder). If the gain were how separate systems do
+their harm, a lower gain would lower the error among runs with coefficients of one kind as well: the
+last steps order any two such runs of a basis by their gain.
+"""
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+
+from study.artifact.reads import TableOf
+from study.tables.gain_prediction import judged_runs
+from study.tables.kit.declaration import compared, integer, number, table, text
+from study.tables.kit.families import families
+
+RESAMPLES, SEED = 2000, 1
+STEPS = {
+    "whole elements for single entries": ("deim", "block-deim"),
+    "three elements a mode for one": ("block-deim", "gappy"),
+    "a gain of at most two": ("gappy", "bounded"),
+}
+# Steps between the runs of the ladder's two by two; those from rows to elements need more than one
+# row an element.
+SQUARE = {
+    "shared coefficients, single rows": ("single rows, separate", "single rows, shared"),
+    "shared coefficients, whole elements": ("whole elements, separate", "whole elements, shared"),
+    "whole elements, separate coefficients": ("single rows, separate", "whole elements, separate"),
+    "whole elements, shared coefficients": ("single rows, shared", "whole elements, shared"),
+}
+# Methods by the kind of their coefficients, ordered by their gain: does the error follow?
+KINDS = {
+    "lower gain, shared coefficients": ("deim", "block-deim", "gappy", "bounded"),
+    "lower gain, separate coefficients": ("deim-joint", "published"),
+}
+_CELL = ["scene", "group", "r"]
+
+
+@table(
+    title="What the error does when the gain is lowered and the basis stays",
+    columns=(
+        text("step", f"one of: {', '.join([*STEPS, *SQUARE, *KINDS])}"),
+        text("method_before", "method before the step"),
+        text("method_after", "method after it, on the same basis"),
+        compared("share", integer("pairs", "scenes, groups and sizes at which both methods ran")),
+        compared("share", integer("scenes", "scenes among them")),
+        compared("share", number("gain_ratio", "median of the gain after over that before")),
+        compared(
+            "share", number("error_ratio", "median of the error of the run after over that before")
+        ),
+        compared(
+            "share",
+            number(
+                "error_ratio_low",
+                "2.5 % quantile of this median, families of scenes resampled (bootstrap)",
+            ),
+        ),
+        compared("share", number("error_ratio_high", "97.5 % quantile")),
+        compared("share", number("fallen_share", "pairs whose error falls")),
+        compared("share", integer("scenes_fallen", "scenes whose median error ratio is below one")),
+        compared(
+            "share",
+            number("p_value", "two-sided sign test over all families, for which a tie is no fall"),
+        ),
+        compared("share", integer("families", "families among the scenes: a scene and its twin")),
+        compared(
+            "share", integer("families_fallen", "those whose median error ratio is below one")
+        ),
+        compared(
+            "share", number("rank_correlation", "of the two ratios over the pairs (Spearman)")
+        ),
+        compared("share", number("unexplained_share", "pairs of which one falls, the other not")),
+    ),
+    reads={
+        "reruns": TableOf("reduced_reruns"),
+        "reconstruction": TableOf("reconstruction_error"),
+        "ladder": TableOf("ladder"),
+    },
+)
+def gain_interventions(
+    reruns: pd.DataFrame, reconstruction: pd.DataFrame, ladder: pd.DataFrame
+) -> pd.DataFrame:
+    """One row per step; counted are the runs of `study.tables.gain_prediction`.
+
+    Sizes and groups of one scene are no independent observations, nor are a scene and its twin:
+    intervals draw whole families, the test counts them. Errors below the sensitivity floor count as
+    the floor. A run that ended early has an infinite error; a pair of two such runs says nothing
+    and is left out.
+    """
+    runs = judged_runs(reruns, reconstruction)
+    rows = []
+    for name, before, after, pairs in _steps(runs, _square(ladder, runs)):
+        if len(pairs):
+            rows.append(
+                {"step": name, "method_before": before, "method_after": after, **_summary(pairs)}
+            )
+    return pd.DataFrame(rows)
+
+
+def _steps(
+    runs: pd.DataFrame, square: pd.DataFrame
+) -> Iterator[tuple[str, str, str, pd.DataFrame]]:
+    """Name, methods before and after, and pairs of every step."""
+    for name, methods in STEPS.items():
+        yield name, *methods, _pairs(runs, *methods)
+    for name, (before, after) in SQUARE.items():
+        rows = name.startswith("whole elements")
+        chosen = square[square.rows_per_element > 1] if rows else square
+        yield name, before, after, _pairs(chosen, before, after)
+    for name, kind in KINDS.items():
+        pairs = pd.concat([_pairs(runs, *two) for two in combinations(kind, 2)])
+        rising = pairs.gain > 1.0
+        falling = pairs.assign(
+            gain=pairs.gain.where(~rising, 1.0 / pairs.gain),
+            error=pairs.error.where(~rising, 1.0 / pairs.error),
+        )
+        yield name, "the larger gain", "the smaller gain", falling[falling.gain < 1.0]
+
+
+def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
+    """Runs of the two by two at the places of ``runs``: there the basis suffices."""
+    chosen = ladder[(ladder.direction == "square") & ladder.gain.notna()]
+    chosen = chosen.rename(columns={"rung": "method"})
+    error = chosen.relative_error_within_horizon.astype(float).fillna(np.inf)
+    places = runs[[*_CELL, "sensitivity_floor"]].drop_duplicates(_CELL)
+    return chosen.assign(error=error).merge(places, on=_CELL)
+
+
+def _pairs(runs: pd.DataFrame, before: str, after: str) -> pd.DataFrame:
+    """Scene, ratio of gains and ratio of errors of each pair."""
+    error = np.maximum(runs.error, runs.sensitivity_floor)
+    runs = runs[[*_CELL, "method", "gain"]].assign(error=error)
+    one, other = (runs[runs.method == m].drop(columns="method") for m in (before, after))
+    both = one.merge(other, on=_CELL, suffixes=("_before", "_after"))
+    both = both[np.isfinite(both.error_before) | np.isfinite(both.error_after)]
+    return pd.DataFrame(
+        {
+            "scene": both.scene,
+            "gain": both.gain_after / both.gain_before,
+            "error": both.error_after / both.error_before,
+        }
+    )
+
+
+def _summary(pairs: pd.DataFrame) -> Mapping[str, float]:
+    # statistics take a second to load, which planning does not need
+    from scipy.stats import binomtest
+
+    by_scene = pairs.groupby("scene").error
+    by_family = pairs.groupby(families(pairs.scene)).error
+    fallen = int((by_family.median() < 1.0).sum())
+    low, high = _interval([values.to_numpy(float) for _, values in by_family])
+    known = len(pairs) > 2 and pairs.gain.nunique() > 1 and pairs.error.nunique() > 1
+    return {
+        "pairs": len(pairs),
+        "scenes": by_scene.ngroups,
+        "gain_ratio": float(pairs.gain.median()),
+        "error_ratio": float(pairs.error.median()),
+        "error_ratio_low": low,
+        "error_ratio_high": high,
+        "fallen_share": float((pairs.error < 1.0).mean()),
+        "scenes_fallen": int((by_scene.median() < 1.0).sum()),
+        "p_value": float(binomtest(fallen, by_family.ngroups).pvalue),
+        "families": by_family.ngroups,
+        "families_fallen": fallen,
+        "rank_correlation": float(pairs.gain.rank().corr(pairs.error.rank())) if known else np.nan,
+        "unexplained_share": float(((pairs.gain < 1.0) != (pairs.error < 1.0)).mean()),
+    }
+
+
+def _interval(families: list[np.ndarray]) -> tuple[float, float]:
+    """Percentiles of the median over all values, with whole families drawn with replacement."""
+    drawn = np.random.default_rng(SEED).integers(len(families), size=(RESAMPLES, len(families)))
+    medians = [np.median(np.concatenate([families[i] for i in row])) for row in drawn]
+    low, high = np.percentile(medians, [2.5, 97.5], method="inverted_cdf")
+    return float(low), float(high)

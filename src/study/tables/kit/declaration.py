@@ -1,0 +1,241 @@
+"""Declaration of a table: title, columns, reads, and the function that makes it.
+
+A module of this package holds one table, a function under its declaration::
+
+    @table(
+        title="What part of a frame the local step takes",
+        columns=(SCENE, number("local_share", "local over all", timed=True)),
+        reads={"timings": Every(paths.TIMINGS), "wrong": Setting("stability.wrong")},
+    )
+    def local_share(timings: list[File], wrong: float) -> pd.DataFrame: ...
+
+The function gets what it reads by name: files as a list of `File`, tables as frames, values of the
+configuration as plain data. Whatever it returns is brought to the declared columns and types.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+import pandas as pd
+
+from pdrom.core.errors import StorageError
+from pdrom.core.store import write_table
+from study.artifact.artifact import Artifact, declare, declared_in
+from study.artifact.paths import TABLE
+from study.artifact.reads import ProjectFile, Read
+from study.tables.kit.quantities import TALLY, TOLERANCES, Quantity, usual_quantity
+
+Kind = Literal["text", "integer", "number", "flag"]
+_DTYPES: dict[Kind, str] = {"integer": "Int64", "number": "float64", "flag": "boolean"}
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column; any cell may be empty.
+
+    unit : empty for text, counts and what has no dimension
+    timed : it depends on timing (or on the memory in use), so that two runs may differ
+    declared : its quantity, where that does not follow from type and name
+    tolerance : its own, where that of its quantity is not the right one; of words and truth values
+        the share of the rows that may be others
+    """
+
+    name: str
+    kind: Kind
+    meaning: str
+    unit: str = ""
+    timed: bool = False
+    declared: Quantity | None = None
+    tolerance: float | None = None
+
+    @property
+    def quantity(self) -> Quantity:
+        """Kind of difference that two machines may have in it."""
+        return self.declared or usual_quantity(self.kind, self.name, self.timed)
+
+    @property
+    def within(self) -> float:
+        """Tolerance of a cell; words, truth values and whole numbers are equal."""
+        if self.tolerance is not None:
+            return self.tolerance
+        if self.kind == "integer":
+            return TALLY if self.quantity == "share" else 0.0
+        return TOLERANCES.get(self.quantity, 0.0) if self.kind == "number" else 0.0
+
+    def cast(self, values: pd.Series) -> pd.Series:
+        """``values`` with the type of the column; ValueError or TypeError if they do not fit."""
+        if self.kind == "text":
+            return values
+        if self.kind == "flag":
+            values = _flags(values)
+        return values.astype(_DTYPES[self.kind])
+
+
+def _flags(values: pd.Series) -> pd.Series:
+    """Flags as objects: True, False, None; joined with an empty column they are numbers."""
+    others = values[values.notna() & ~values.isin([True, False])]
+    if len(others):
+        raise ValueError(f"'{others.iloc[0]}'")
+    flags = [None if pd.isna(value) else bool(value) for value in values]
+    return pd.Series(flags, values.index, dtype=object)
+
+
+def text(name: str, meaning: str) -> Column:
+    """Column ``name`` of words; ``meaning`` tells readers what it holds, in a few words."""
+    return Column(name, "text", meaning)
+
+
+def integer(name: str, meaning: str) -> Column:
+    """Column ``name`` of counts, sizes or indices; ``meaning`` as in `text`."""
+    return Column(name, "integer", meaning)
+
+
+def flag(name: str, meaning: str) -> Column:
+    """Column ``name`` of True and False; ``meaning`` as in `text`."""
+    return Column(name, "flag", meaning)
+
+
+def number(name: str, meaning: str, unit: str = "") -> Column:
+    """Column ``name`` of floating-point numbers in ``unit``; ``meaning`` as in `text`."""
+    return Column(name, "number", meaning, unit)
+
+
+def timed(column: Column) -> Column:
+    """Mark a column as a timing."""
+    return replace(column, timed=True, declared=None)
+
+
+def compared(quantity: Quantity, column: Column, tolerance: float | None = None) -> Column:
+    """Declare the quantity of a column, and its own tolerance."""
+    return replace(column, declared=quantity, tolerance=tolerance)
+
+
+class TimedCells(Protocol):
+    """Names of the timed columns of each row, from the table and the project files it reads."""
+
+    def __call__(self, table: pd.DataFrame, **files: Path) -> Sequence[Collection[str]]: ...
+
+
+@dataclass(frozen=True)
+class Table(Artifact):
+    """A table of the study; calling it makes it.
+
+    timed_cells : columns of each row that depend on timing, where that differs from row to row
+    only_with_error : the table lists only the runs that have an error before their horizon
+    """
+
+    columns: tuple[Column, ...] = ()
+    timed_cells: TimedCells | None = None
+    only_with_error: bool = False
+
+    def __call__(self, *arguments: Any, **named: Any) -> pd.DataFrame:
+        """Make the table from what it reads, see `checked`."""
+        return self.checked(self.function(*arguments, **named))
+
+    @property
+    def rule(self) -> str:
+        """Name of the rule that makes it."""
+        return f"{self.name}_table"
+
+    def perform(
+        self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
+    ) -> None:
+        """Make the table in a job and write it."""
+        write_table(self(**self.read(settings, inputs)), Path(outputs["table"]))
+
+    @property
+    def column_names(self) -> tuple[str, ...]:
+        """Columns in their order."""
+        return tuple(column.name for column in self.columns)
+
+    @property
+    def timing_columns(self) -> tuple[str, ...]:
+        """Columns that may differ between two runs on one machine, in some row at least."""
+        return tuple(column.name for column in self.columns if column.timed)
+
+    def checked(self, table: pd.DataFrame) -> pd.DataFrame:
+        """``table`` with exactly the declared columns, in order and with their types.
+
+        Raises
+        ------
+        StorageError
+            If there are rows and a column is missing or holds a value that does not fit.
+        """
+        missing = [name for name in self.column_names if name not in table.columns]
+        if missing and len(table):
+            raise StorageError(f"table {self.name}: lacks the column(s) {', '.join(missing)}")
+        table = table.reindex(columns=list(self.column_names)).reset_index(drop=True)
+        return table.assign(**{c.name: self._cast(c, table[c.name]) for c in self.columns})
+
+    def _cast(self, column: Column, values: pd.Series) -> pd.Series:
+        try:
+            return column.cast(values)
+        except (TypeError, ValueError) as error:
+            place = f"table {self.name}: column '{column.name}'"
+            raise StorageError(f"{place} is no {column.kind} ({error})") from error
+
+    def without_times(self, table: pd.DataFrame, root: Path) -> pd.DataFrame:
+        """``table``, as text, with every cell emptied that depends on timing.
+
+        Parameters
+        ----------
+        root : folder of the project, for the files that the table reads there
+        """
+        cells: Sequence[Collection[str]] = [self.timing_columns] * len(table)
+        if self.timed_cells is not None:
+            files = {k: r.path for k, r in self.reads.items() if isinstance(r, ProjectFile)}
+            cells = self.timed_cells(table, **{name: root / path for name, path in files.items()})
+        kept = table.astype(object)
+        for name in self.timing_columns:
+            kept[name] = [
+                "" if name in of_row else value
+                for value, of_row in zip(kept[name], cells, strict=True)
+            ]
+        return kept.astype(str)
+
+
+def table(
+    *,
+    title: str,
+    columns: Sequence[Column],
+    reads: Mapping[str, Read],
+    timed_cells: TimedCells | None = None,
+    only_with_error: bool = False,
+) -> Callable[[Callable[..., pd.DataFrame]], Table]:
+    """Declare the function below as the one that makes the table of its name.
+
+    Parameters
+    ----------
+    timed_cells, only_with_error : see `Table`
+
+    Raises
+    ------
+    TypeError
+        If a column is declared twice, or the function does not take what it reads.
+    """
+
+    def decorate(function: Callable[..., pd.DataFrame]) -> Table:
+        name = function.__name__
+        writes = {"table": TABLE.where(name=name)}
+        made = Table(
+            name, title, reads, writes, function, columns=tuple(columns), timed_cells=timed_cells,
+            only_with_error=only_with_error,
+        )  # fmt: skip
+        _require_distinct(made)
+        return declare(made)
+
+    return decorate
+
+
+def declared(package: str = "study.tables") -> dict[str, Table]:
+    """Return every table of a package by name."""
+    return declared_in(package, Table)
+
+
+def _require_distinct(made: Table) -> None:
+    names = made.column_names
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise TypeError(f"table {made.name}: column(s) declared twice: {', '.join(twice)}")

@@ -1,0 +1,44 @@
+"""Errors on held-out motions: one number for each run, by a rule fixed in config/claims.yaml."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from study.tables.kit.declaration import compared, integer, number
+from study.tables.kit.reruns import KEYS
+
+MEDIAN, LOW, HIGH, COUNT = "error_heldout", "error_heldout_low", "error_heldout_high", "motions"
+COLUMNS = (
+    number(MEDIAN, "the same error on held-out motions: their median; inf where a run ended"),
+    number(LOW, "the least of them"),
+    number(HIGH, "the largest"),
+    integer(COUNT, "held-out motions that were run and can be judged"),
+)
+AS_ERRORS = tuple(compared("error", column) for column in COLUMNS[:3])
+_WHOLE = {"k": "Int64", "r": "Int64"}
+
+
+def over_motions(heldout: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFrame:
+    """Median, least and largest error of each run over its held-out motions, and their number.
+
+    A run that ended before the horizon has an infinite error. A size beyond the rank was not run,
+    and a motion whose horizon is its start judges nothing: both are left out.
+
+    Parameters
+    ----------
+    heldout : table heldout_reruns
+    keys : columns that tell runs apart
+    """
+    ran = (heldout.frames > 0) | heldout.blowup_frame.notna()
+    rows = heldout[ran & (heldout.horizon_frame > 0)]
+    rows = rows.astype({key: kind for key, kind in _WHOLE.items() if key in keys})
+    error = rows.relative_error_within_horizon.astype(float).fillna(np.inf)
+    runs = error.groupby([rows[key] for key in keys], sort=False, dropna=False)
+    made = runs.agg(**{MEDIAN: "median", LOW: "min", HIGH: "max", COUNT: "count"})
+    return made.reset_index()
+
+
+def with_held_out(runs: pd.DataFrame, heldout: pd.DataFrame) -> pd.DataFrame:
+    """``runs`` with the columns of `over_motions` of ``heldout``, empty where it lacks the run."""
+    return runs.astype(_WHOLE).merge(over_motions(heldout), on=KEYS, how="left")

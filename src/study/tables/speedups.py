@@ -1,0 +1,167 @@
+"""Table speedups: the speed-ups that the text quotes, with all that belongs to them."""
+
+from collections.abc import Iterator
+
+import pandas as pd
+
+from study.artifact import paths
+from study.artifact.paths import File
+from study.artifact.reads import Every, TableOf
+from study.experiments.kit.fresh_process import FULL, REDUCED
+from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
+from study.tables.kit.held_out import COLUMNS, HIGH, LOW, MEDIAN, over_motions
+from study.tables.kit.intervals import in_words, median_interval
+from study.tables.kit.parts import joined
+from study.tables.kit.vocabulary import (
+    GROUP,
+    METHOD,
+    MS_PER_FRAME,
+    POSITION_BASIS,
+    SCENE,
+    SPEEDUP,
+    SPEEDUP_HIGH,
+    SPEEDUP_LOW,
+    VERTICES,
+    K,
+    R,
+)
+
+_MODEL = ["scene", "position_basis", "k", "method"]
+_REDUCTION = ["scene", "group", "method", "r"]
+_LABELS = ["scene", "group", "method", "position_basis", "k", "r"]
+_ERROR = "relative_error_within_horizon"
+UNCONFIRMED = "not confirmed by its control"
+
+
+@table(
+    title="Speed-ups over several processes, with what they cost",
+    columns=(
+        SCENE,
+        VERTICES,
+        GROUP,
+        METHOD,
+        POSITION_BASIS,
+        K,
+        R,
+        integer("processes", "processes that timed it"),
+        timed(number("full_ms", "time of a frame of the full-order run", "ms")),
+        MS_PER_FRAME,
+        SPEEDUP,
+        SPEEDUP_LOW,
+        SPEEDUP_HIGH,
+        timed(text("shown", "the median and its quantiles, where the control confirms the times")),
+        timed(flag("loses", "dearer than the full order: the upper quantile is below one")),
+        timed(number("training_s", "time of the training run", "s")),
+        timed(number("reduction_s", "processor time of basis and sampling", "s")),
+        compared(
+            "timed",
+            timed(
+                number(
+                    "frames_to_break_even", "frames after which both are paid back; none if never"
+                )
+            ),
+        ),
+        number(
+            "error_train", "of the training motion before the horizon, over all of a large scene"
+        ),
+        *COLUMNS[:3],
+    ),
+    reads={
+        "parts": Every(paths.FRAME_TIMES),
+        "times": TableOf("frame_times"),
+        "projections": Every(paths.PROJECTION_SECONDS),
+        "subspaces": Every(paths.SUBSPACES_SECONDS),
+        "large": Every(paths.ONLINE),
+        "reruns": TableOf("reduced_reruns"),
+        "heldout": TableOf("heldout_reruns"),
+    },
+)
+def speedups(
+    parts: list[File],
+    times: pd.DataFrame,
+    projections: list[File],
+    subspaces: list[File],
+    large: list[File],
+    reruns: pd.DataFrame,
+    heldout: pd.DataFrame,
+) -> pd.DataFrame:
+    """One row per quoted reduction; a speed-up is a ratio of two times of one process."""
+    rows = joined(parts)
+    if rows.empty or not (rows.role == REDUCED).any():
+        return pd.DataFrame()
+    made = pd.DataFrame(list(timed_reductions(rows, times)))
+    extra = [
+        _costs(joined(projections), _REDUCTION),
+        _costs(joined(subspaces), _MODEL),
+        _costs(joined(large), _MODEL),
+    ]
+    errors = [_errors(reruns, heldout, keys) for keys in (_REDUCTION, _MODEL)]
+    errors.append(_large_errors(joined(large)))
+    made = _first_known(made, extra, "reduction_s")
+    for column in ("error_train", MEDIAN, LOW, HIGH):
+        made = _first_known(made, errors, column)
+    made["training_s"] = 1e-3 * made.full_ms * made.frames
+    saved = made.full_ms - made.ms_per_frame
+    paid = 1e3 * (made.training_s + made.reduction_s) / saved
+    return made.assign(frames_to_break_even=paid.where(saved > 0.0))
+
+
+def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
+    """Labels, times and ratios of each reduction, over the processes.
+
+    Parameters
+    ----------
+    rows : what the processes measured
+    times : table frame_times
+    """
+    full = rows[rows.role == FULL].set_index(["scene", "process"]).ms_per_frame
+    trusted = times.set_index("scene").confirmed
+    reduced = rows[rows.role == REDUCED]
+    for labels, own in reduced.groupby(_LABELS, sort=False, dropna=False):
+        own = own.set_index(["scene", "process"]).ms_per_frame
+        ratio, low, high = median_interval((full.loc[own.index] / own).to_numpy(float))
+        scene = labels[0]
+        first = rows[rows.scene == scene].iloc[0]
+        yield {
+            **dict(zip(_LABELS, labels, strict=True)),
+            "vertices": first.vertices,
+            "frames": first.frames,
+            "processes": len(own),
+            "full_ms": float(full.loc[own.index].median()),
+            "ms_per_frame": float(own.median()),
+            "speedup": ratio,
+            "speedup_low": low,
+            "speedup_high": high,
+            "shown": in_words(ratio, low, high) if trusted[scene] else UNCONFIRMED,
+            "loses": high < 1.0,
+        }
+
+
+def _costs(costs: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
+    return costs.reindex(columns=[*keys, "reduction_s"])
+
+
+def _errors(reruns: pd.DataFrame, heldout: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
+    inside = keys == _MODEL
+    own, unseen = (runs[(runs.position_basis != "full") == inside] for runs in (reruns, heldout))
+    train = own[[*keys, _ERROR]].rename(columns={_ERROR: "error_train"})
+    sizes = {key: "Int64" for key in keys if key in ("k", "r")}
+    return train.astype(sizes).merge(over_motions(unseen, keys), on=keys, how="outer")
+
+
+def _large_errors(large: pd.DataFrame) -> pd.DataFrame:
+    names = {"relative_error_train": "error_train", "relative_error_heldout": MEDIAN}
+    names |= {"relative_error_heldout_low": LOW, "relative_error_heldout_high": HIGH}
+    return large.reindex(columns=[*_MODEL, *names]).rename(columns=names)
+
+
+def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -> pd.DataFrame:
+    """``made`` with a column from the first source that has it, by what tells its rows apart."""
+    found = pd.Series(float("nan"), made.index)
+    for source in sources:
+        keys = [key for key in _LABELS if key in source.columns]
+        sizes = {key: "Int64" for key in keys if key in ("k", "r")}
+        known = source.dropna(subset=[*keys, column])[[*keys, column]].astype(sizes)
+        own = made[keys].astype(sizes).merge(known, on=keys, how="left")[column]
+        found = found.fillna(own.astype(float).set_axis(made.index))
+    return made.assign(**{column: found})

@@ -1,0 +1,155 @@
+"""Table stability: where each method can be trusted, over scenes, sizes, time step, stiffness."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pdrom.core.store import open_hdf5
+from study.artifact import paths
+from study.artifact.paths import File
+from study.artifact.reads import Every, PerScene, Setting, TableOf
+from study.tables.kit.declaration import compared, number, table, text
+from study.tables.kit.parts import joined
+from study.tables.kit.reruns import KEYS
+from study.tables.kit.vocabulary import (
+    BLOWUP_FRAME,
+    ENERGY_RATIO,
+    FINITE,
+    GAIN,
+    GROUP,
+    GUARD_COUNT,
+    GUARD_FRAME,
+    GUARD_REASON,
+    MAX_EXTENT,
+    METHOD,
+    POSITION_BASIS,
+    RELATIVE_ERROR,
+    SCENE,
+    K,
+    R,
+)
+
+# the first is the only one after which numbers of the run count
+OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
+SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # what has one full-order run
+
+
+@table(
+    title="Where each method can be trusted",
+    columns=(
+        SCENE,
+        METHOD,
+        R,
+        compared("exact", number("h", "time step", "s")),
+        compared("exact", number("stiffness_ratio", "factor on the weights of the reduced groups")),
+        FINITE,
+        BLOWUP_FRAME,
+        MAX_EXTENT,
+        ENERGY_RATIO,
+        GAIN,
+        GROUP,
+        POSITION_BASIS,
+        K,
+        text("experiment", "rerun (of the study) or sweep (a short run)"),
+        RELATIVE_ERROR,
+        compared("error", text("outcome", f"one of: {', '.join(OUTCOMES)}")),
+        GUARD_FRAME,
+        GUARD_REASON,
+        GUARD_COUNT,
+    ),
+    reads={
+        "full_order": Every(paths.TRAIN),
+        "reruns": Every(paths.RERUNS_TRAIN),
+        "subspaces": Every(paths.SUBSPACES_TRAIN),
+        "sweeps": Every(paths.STABILITY),
+        "reduced_reruns": TableOf("reduced_reruns"),
+        "time_steps": PerScene("time_step"),
+        "wrong": Setting("stability.wrong"),
+        "departure": Setting("stability.left"),
+    },
+)
+def stability(
+    full_order: list[File],
+    reruns: list[File],
+    subspaces: list[File],
+    sweeps: list[File],
+    reduced_reruns: pd.DataFrame,
+    time_steps: Mapping[str, float],
+    wrong: float,
+    departure: float,
+) -> pd.DataFrame:
+    """Rows of the study's reruns (experiment "rerun"), then of the short runs ("sweep").
+
+    What the guard saw (first frame and reason, number of frames) is known for reruns with unreduced
+    positions; nobody watches the others.
+
+    Method "full" with position basis "full" is the full-order run. The error of a rerun is the one
+    within the horizon, that of a short run is over all of it.
+
+    Parameters
+    ----------
+    time_steps : scene -> h in seconds
+    """
+    runs = pd.concat(
+        [_full_order_rows(full_order), _rerun_rows(reruns, subspaces, reduced_reruns)],
+        ignore_index=True,
+    )
+    runs = runs.assign(h=runs.scene.map(time_steps), stiffness_ratio=1.0, experiment="rerun")
+    rows = pd.concat([runs, joined(sweeps).assign(experiment="sweep")], ignore_index=True)
+    return rows.assign(outcome=outcomes(rows, wrong, departure))
+
+
+def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
+    """One of `OUTCOMES` for each row of ``runs``, by the limits ``wrong`` and ``departure``."""
+    full = runs[(runs.method == "full") & (runs.position_basis == "full")]
+    extents = full.set_index(SETTING).max_extent.to_dict()
+    return [
+        _outcome(row, extents[tuple(getattr(row, key) for key in SETTING)], wrong, departure)
+        for row in runs.itertuples()
+    ]
+
+
+def _outcome(row: Any, full_extent: float, wrong: float, departure: float) -> str:
+    if pd.isna(row.finite):
+        return "not run"
+    if not row.finite:
+        return "blow-up"
+    if row.max_extent > departure * full_extent:
+        return "left the scene"
+    if pd.isna(row.relative_error):
+        return "not judged"
+    return "wrong" if row.relative_error > wrong else "accurate"
+
+
+def _full_order_rows(files: list[File]) -> pd.DataFrame:
+    """The full-order runs themselves; their energy ratio is one by definition."""
+    rows = []
+    for run in files:
+        with open_hdf5(run.path) as file:
+            extents = np.ptp(file["positions"][...], axis=1).max(axis=1)
+        rows.append(
+            {
+                "scene": run["scene"],
+                "method": "full",
+                "position_basis": "full",
+                "finite": bool(np.isfinite(extents).all()),
+                "max_extent": float(extents[1:].max() / extents[0]),
+                "energy_ratio": 1.0,
+                "relative_error": 0.0,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _rerun_rows(
+    reruns: list[File], subspaces: list[File], reduced_reruns: pd.DataFrame
+) -> pd.DataFrame:
+    """Reruns with their energy ratio and gain, and with the error that reduced_reruns judges by."""
+    local = joined(reruns).assign(position_basis="full", k=np.nan)
+    runs = pd.concat([local, joined(subspaces)], ignore_index=True)
+    runs = runs.drop(columns="relative_error")
+    errors = reduced_reruns[[*KEYS, "relative_error_within_horizon"]]
+    errors = errors.rename(columns={"relative_error_within_horizon": "relative_error"})
+    return runs.merge(errors, on=KEYS, how="left", validate="one_to_one")

@@ -1,0 +1,243 @@
+"""Lines about claims, figures and tables of a results folder."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from pdrom.core.errors import StorageError
+from pdrom.core.store import Condition, check_file, read_table
+from study.artifact.paths import TABLE
+from study.pipeline.figures import FigureJob
+from study.tables import declared
+from study.tables.claims import is_timed, load_claims
+from study.verification.again import is_derived, made
+from study.verification.compare import Comparison
+from study.verification.judge import Judgement, in_words, judge
+from study.verification.lines import Line, Outcome, table_line
+from study.verification.pairing import names_row
+from study.verification.references import Reference, folder_of, kept, read_reference
+from study.verification.rows import RUNS, Context
+from study.verification.subject import Subject
+
+RULES = Path("config/claims.yaml")
+CLAIMS = "claims"
+# Columns of the table of claims with a verdict: their tests in the rules, and words.
+PARTS = {"verdict": ("published", "as published"), "verdict_beyond": ("beyond", "beyond")}
+GOOD = (Outcome.REPRODUCED, Outcome.NOT_COMPARABLE)
+
+
+@dataclass
+class Examination:
+    """Examination of what is there, what is expected, and what differs."""
+
+    subject: Subject
+    conditions: dict[str, Condition | None] = field(default_factory=dict)
+    tables: dict[str, pd.DataFrame] = field(default_factory=dict)
+    made_again: dict[str, pd.DataFrame] = field(default_factory=dict)
+
+    def lines(self) -> list[Line]:
+        """Lines of all claims, figures and tables."""
+        tables = [*map(self.table, declared()), *self._strangers()]
+        return [*self.claims(), *self._figures(tables), *tables]
+
+    def condition(self, path: str) -> Condition | None:
+        """Condition of the file ``path``, None if it is not there."""
+        if path not in self.conditions:
+            there = Path(path).is_file()
+            self.conditions[path] = check_file(path) if there else None
+        return self.conditions[path]
+
+    def found(self, name: str) -> pd.DataFrame:
+        """Table ``name``, which is there and intact.
+
+        Raises
+        ------
+        StorageError
+            It cannot be read, or has other columns than those that are declared.
+        """
+        if name not in self.tables:
+            path, table = TABLE.at(self.subject.results, name=name), declared()[name]
+            if self.condition(path) is not Condition.INTACT:
+                raise StorageError(f"{path}: not there, or damaged")
+            frame = read_table(path)
+            other = sorted(set(frame.columns) - set(table.column_names))
+            if other:
+                raise StorageError(f"{path}: has the unknown column(s) {', '.join(other)}")
+            self.tables[name] = read_table(path, table.column_names)
+        return declared()[name].checked(self.tables[name])
+
+    @cached_property
+    def expected(self) -> dict[str, Reference]:
+        """Expected tables that there are, by name."""
+        folder = folder_of(self.subject.results)
+        read = {name: read_reference(table, folder) for name, table in declared().items()}
+        return {name: reference for name, reference in read.items() if reference is not None}
+
+    @cached_property
+    def context(self) -> Context:
+        """Context of rows by the expected tables."""
+        tables = {name: reference.frame for name, reference in self.expected.items()}
+        try:
+            return Context.of(tables, self.found(RUNS))
+        except StorageError:
+            return Context.of(tables)
+
+    def judgement(self, name: str) -> Judgement:
+        """Judgement on the table ``name``, which is there and expected."""
+        frame, reference, table = self.found(name), self.expected[name], declared()[name]
+        lacking = set(frame.columns) - set(reference.columns)
+        known = table.checked(frame.assign(**dict.fromkeys(lacking, None)))
+        return judge(Comparison(table, reference.frame, known, self.context))
+
+    def again(self, name: str) -> pd.DataFrame | None:
+        """Table ``name``, made from other tables alone, made again from those at hand.
+
+        None for other tables, and where one of those is not intact.
+        """
+        if not is_derived(name):
+            return None
+        job = self.subject.plan.job(declared()[name])
+        if any(self.condition(path) is not Condition.INTACT for path in _results(job.files)):
+            return None
+        if name not in self.made_again:
+            with made(job) as files:
+                self.made_again[name] = read_table(files[job.outputs["table"]])
+        return self.made_again[name]
+
+    def table(self, name: str) -> Line:
+        """Line of the table ``name``."""
+        missing = self._missing("table", name, [TABLE.at(self.subject.results, name=name)])
+        if missing is not None:
+            return missing
+        if name not in self.expected:
+            return Line("table", name, Outcome.NO_REFERENCE, "run verify --update")
+        table = declared()[name]
+        try:
+            judgement, again = self.judgement(name), self.again(name)
+        except StorageError as error:
+            return Line("table", name, Outcome.DIFFERS, str(error))
+        other = None if again is None else _first_difference(self.tables[name], again)
+        if other is not None:
+            text = f"not what the tables at hand give, {other}"
+            return Line("table", name, Outcome.DIFFERS, text)
+        lacking = set(kept(table)) - set(self.expected[name].columns)
+        measured = any(not names_row(column) for column in kept(table).values())
+        return table_line(judgement, measured, sorted(lacking))
+
+    def claims(self) -> list[Line]:
+        """Lines of the claims."""
+        line = self.table(CLAIMS)
+        try:
+            found = self.found(CLAIMS).set_index("claim")
+            expected = self.expected[CLAIMS].frame.set_index("claim")
+            again = self.again(CLAIMS)
+        except (KeyError, StorageError):
+            return [Line("claim", "all", line.outcome, line.text)]
+        decided = found if again is None else again.set_index("claim")
+        names = dict.fromkeys([*expected.index, *found.index])
+        return [claim_line(str(name), expected, found, decided) for name in names]
+
+    def _missing(self, kind: str, name: str, paths: list[str]) -> Line | None:
+        for path in paths:
+            condition = self.condition(path)
+            if condition is not Condition.INTACT:
+                fault = "not there" if condition is None else condition
+                text = f"{path} is {fault}; make it by {self.subject.command(name)}"
+                return Line(kind, name, Outcome.MISSING, text)
+        return None
+
+    def _strangers(self) -> list[Line]:
+        """Lines of files that lie among the tables and are none."""
+        known = {TABLE.at(self.subject.results, name=name) for name in declared()}
+        folder = Path(TABLE.at(self.subject.results, name="any")).parent
+        return [
+            Line("table", path.stem, Outcome.DIFFERS, f"{path} is no table of the study")
+            for path in sorted(folder.glob("*.csv"))
+            if str(path) not in known and path.name[0] != "."
+        ]
+
+    def _figures(self, tables: list[Line]) -> list[Line]:
+        by_name = {line.name: line for line in tables}
+        return [
+            self._figure(name, job, by_name) for name, job in self.subject.plan.figure_jobs.items()
+        ]
+
+    def _figure(self, name: str, figure: FigureJob, tables: Mapping[str, Line]) -> Line:
+        missing = self._missing("figure", name, [figure.pdf, figure.png])
+        if missing is not None:
+            return missing
+        paths = {TABLE.at(self.subject.results, name=table): table for table in declared()}
+        read = [paths[path] for path in figure.job.files if path in paths]
+        bad = [tables[table] for table in read if tables[table].outcome not in GOOD]
+        if bad:
+            text = f"reads the table(s) {', '.join(line.name for line in bad)}"
+            return Line("figure", name, bad[0].outcome, text)
+        files = [path for path in _results(figure.job.files) if path not in paths]
+        for path in files:
+            if self.condition(path) is not Condition.INTACT:
+                text = f"{path}, which it reads, is not there or damaged"
+                return Line("figure", name, Outcome.MISSING, text)
+        text = f"by the table(s) {', '.join(read)}" if read else "its files are there and intact"
+        if read and all(tables[t].outcome is Outcome.NOT_COMPARABLE for t in read):
+            return Line("figure", name, Outcome.NOT_COMPARABLE, f"{text}, which hold times")
+        more = f" and {len(files)} intact files" if read and files else ""
+        return Line("figure", name, Outcome.REPRODUCED, text + more)
+
+
+def claim_line(
+    name: str, expected: pd.DataFrame, found: pd.DataFrame, decided: pd.DataFrame
+) -> Line:
+    """Line of the claim ``name``.
+
+    Parameters
+    ----------
+    expected, found : tables of claims by claim
+    decided : that which the tables at hand give
+    """
+    if name not in expected.index or name not in found.index:
+        text = "the claim is new" if name in found.index else "the claim is gone"
+        return Line("claim", name, Outcome.DIFFERS, text)
+    outcome, same, changed = Outcome.REPRODUCED, [], []
+    for column, (part, words) in PARTS.items():
+        a, b, c = (str(frame.loc[name, column]) for frame in (expected, found, decided))
+        if a == b == c:
+            same.append(f"{words}: {b}")
+        elif b != c:
+            changed.append(f"{words}: found '{b}', the tables at hand give '{c}'")
+            outcome = Outcome.DIFFERS
+        else:
+            timed = _rests_on_times(name, part)
+            why = ", which rests on times" if timed else ""
+            changed.append(f"{words}: expected '{a}', found '{b}'{why}")
+            if not timed or outcome is Outcome.DIFFERS:
+                outcome = Outcome.DIFFERS
+            else:
+                outcome = Outcome.NOT_COMPARABLE
+    return Line("claim", name, outcome, "; ".join(changed or same))
+
+
+def _rests_on_times(claim: str, part: str) -> bool:
+    """Whether a test decides that compares times, of the ``published`` or ``beyond`` ones."""
+    rule = load_claims(RULES).get(claim)
+    return any(test.decides and is_timed(test) for test in getattr(rule, part, ()))
+
+
+def _results(paths: Sequence[str]) -> list[str]:
+    return [path for path in paths if path.startswith("results/")]
+
+
+def _first_difference(found: pd.DataFrame, again: pd.DataFrame) -> str | None:
+    """The first cell of a table that is another one when it is made again; None if none is."""
+    if list(found.columns) != list(again.columns) or len(found) != len(again):
+        return f"which have {len(again)} rows of {len(again.columns)} columns"
+    other = (found != again) & ~(found.isna() & again.isna())
+    places = np.argwhere(other.to_numpy())
+    if not len(places):
+        return None
+    row, column = places[0]
+    old, new = (in_words(frame.iloc[row, column]) for frame in (found, again))
+    return f"as in row {row + 1} {found.columns[column]}: found {old}, they give {new}"

@@ -1,0 +1,108 @@
+"""Expected tables, kept in git below ``results/reference``, in a compact form.
+
+Columns that are never compared are left out, numbers have the digits that are compared. A table is
+a CSV file, so that a change of it reads well; a large one is packed (``.csv.xz``), so that all of
+them together stay small.
+"""
+
+import io
+import lzma
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+
+import pandas as pd
+
+from pdrom.core.errors import StorageError
+from study.artifact.paths import RESULTS
+from study.pipeline.tracked import write_tracked
+from study.tables.kit.declaration import Column, Table
+from study.verification.compare import NOT_COMPARED
+
+# Digits of numbers; tolerances are a hundred times what these digits leave out, or more.
+DIGITS = 9
+PACKED_FROM = 50_000
+LOG = "changes.md"
+HEAD = """# Changes of the expected tables
+
+Written by `./reproduce verify --update --reason "..."`, newest last.
+
+"""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """An expected table: ``frame`` has all declared columns, ``columns`` names those it holds."""
+
+    frame: pd.DataFrame
+    columns: tuple[str, ...]
+
+
+def folder_of(results: str) -> Path:
+    """Folder of the expected tables of a folder of ``results``."""
+    root = Path(RESULTS)
+    return root / "reference" / Path(results).relative_to(root) / "tables"
+
+
+def compact(table: Table, frame: pd.DataFrame) -> pd.DataFrame:
+    """Return the part of ``frame``, a ``table``, that is kept."""
+    columns = kept(table)
+    return pd.DataFrame({n: _rounded(c, frame[n]) for n, c in columns.items()}, index=frame.index)
+
+
+def kept(table: Table) -> dict[str, Column]:
+    """Columns that are kept of a table, by name."""
+    return {c.name: c for c in table.columns if c.quantity not in NOT_COMPARED}
+
+
+def _rounded(column: Column, values: pd.Series) -> pd.Series:
+    if column.kind != "number":
+        return values
+    texts = [f"{value:.{DIGITS}g}" for value in values.to_numpy(dtype=float)]
+    return pd.Series([float(text) for text in texts], values.index, dtype=float)
+
+
+def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
+    """Write the expected form of ``frame``, a ``table``, into ``folder``, packed if it is large."""
+    plain = compact(table, frame).to_csv(
+        index=False, float_format=f"%.{DIGITS}g", lineterminator="\n"
+    )
+    content = plain.encode()
+    path, other = _paths(table.name, folder)
+    if len(content) > PACKED_FROM:
+        path, other, content = other, path, lzma.compress(content, preset=9)
+    write_tracked(path, content)
+    other.unlink(missing_ok=True)
+
+
+def read_reference(table: Table, folder: Path) -> Reference | None:
+    """Expected form of a ``table`` in ``folder``; None if there is none.
+
+    Raises
+    ------
+    StorageError
+        If it cannot be read.
+    """
+    plain, packed = _paths(table.name, folder)
+    path = plain if plain.is_file() else packed
+    if not path.is_file():
+        return None
+    try:
+        content = path.read_bytes()
+        text = content if path == plain else lzma.decompress(content)
+        frame = pd.read_csv(io.BytesIO(text))
+    except (OSError, lzma.LZMAError, ValueError) as error:
+        raise StorageError(f"{path}: cannot be read ({' '.join(str(error).split())})") from error
+    whole = frame.reindex(columns=list(table.column_names))
+    return Reference(table.checked(whole), tuple(frame.columns))
+
+
+def note(folder: Path, reason: str, day: date, code: str) -> None:
+    """Add ``day``, hash of the ``code`` and ``reason`` to the log of changes in ``folder``."""
+    path = folder / LOG
+    text = path.read_text(encoding="utf-8") if path.is_file() else HEAD
+    write_tracked(path, f"{text}- {day:%Y-%m-%d}, code {code}: {reason}\n".encode())
+
+
+def _paths(name: str, folder: Path) -> tuple[Path, Path]:
+    return folder / f"{name}.csv", folder / f"{name}.csv.xz"

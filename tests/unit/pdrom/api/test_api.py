@@ -1,0 +1,335 @@
+"""The package from Python: the page's example, what runs hold, and files that are read back."""
+
+import copy
+import inspect
+import pickle
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pdrom import api
+from pdrom.core.errors import ConfigurationError, PdromError, RankError, StorageError
+from pdrom.model.runs.full_order import trajectory
+from pdrom.model.scene import Scene
+from pdrom.reduction.snapshots import training_frames
+from places import CONFIG, ROOT
+from study.pipeline.scenes import load_bound_scene
+
+PAGE = (ROOT / "docs" / "python.md").read_text("utf-8")
+EFFECTS = [
+    {"effect": "gravity"},
+    {"effect": "pins", "select": "left"},
+    {"effect": "spring", "weight": 1e5},
+]
+KEYS = {"mesh": {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}, "frames": 12}
+
+
+@pytest.fixture(scope="module")
+def full() -> api.FullRun:
+    """A short run of a small sheet."""
+    return api.run(api.build_scene(effects=EFFECTS, **KEYS))
+
+
+def test_the_pages_example_runs_and_is_short(tmp_path, monkeypatch, capsys):
+    (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    assert len(code.strip().splitlines()) <= 15
+    monkeypatch.chdir(tmp_path)
+    exec(compile(code, "python.md", "exec"), {})
+    said = capsys.readouterr().out
+    assert "rank of the projections" in said
+    assert said.count("error at the end") == 3
+    assert (tmp_path / "errors.png").stat().st_size > 10_000
+
+
+def test_the_page_has_every_name_and_no_function_more():
+    functions = {n for n in api.__all__ if n[0].islower()}
+    assert set(re.findall(r"`([a-z_]+)\(", PAGE.split("| name |")[1])) == functions
+    assert len(functions) <= 10
+    assert all(f"`{name}`" in PAGE for name in set(api.__all__) - functions)
+
+
+def test_a_run_is_that_of_the_step_loop(full):
+    assert np.array_equal(full.positions, trajectory(full.scene))
+    assert full.ms.shape == (12,)
+    group = full.scene.group("spring")
+    assert full.snapshots["spring"].p.shape == (6, group.elements, 3)
+    assert len(training_frames(12, 6)) == 6
+
+
+def test_the_full_rank_reproduces_the_run_and_few_modes_do_not(full):
+    """Snapshots train the basis at even frames; at full rank the rest is interpolation error."""
+    rank = api.basis(full, "spring").rank
+    best, poor = (api.reduce(full, "spring", "pod", r) for r in (rank, 1))
+    assert best.outcome.finite
+    assert best.gain == pytest.approx(1.0)
+    assert best.error[-1] < 0.1 * poor.error[-1]
+    with pytest.raises(RankError, match=f"r = {rank + 1}"):
+        api.reduce(full, "spring", "pod", rank + 1)
+
+
+def test_files_are_read_back(full, tmp_path):
+    reduced = api.reduce(full, "spring", "block-deim", 2)
+    api.save(reduced, tmp_path / "reduced.h5")
+    read = api.load(tmp_path / "reduced.h5")
+    assert isinstance(read, api.ReducedRun)
+    assert (read.title, read.gain, read.ms) == (reduced.title, reduced.gain, reduced.ms)
+    assert read.outcome.positions == pytest.approx(reduced.outcome.positions, abs=1e-6)
+    assert read.error == pytest.approx(reduced.error, rel=1e-5)
+    whole = np.sqrt(np.mean(np.square(reduced.error)))
+    errors, found = reduced.errors, read.errors
+    assert errors["relative_error_within_horizon"] == pytest.approx(whole)
+    assert errors.pop("contact_delay") is found.pop("contact_delay") is None  # there is no floor
+    assert found == pytest.approx(errors, rel=1e-3)
+    assert read.full.scene.config == full.scene.config
+    stored = api.run(full.scene, tmp_path / "full.h5")
+    again = api.load(tmp_path / "full.h5")
+    assert np.array_equal(stored.positions, again.positions)
+    assert np.array_equal(again.scene.mesh.triangles, full.scene.mesh.triangles)
+
+
+@pytest.mark.parametrize("action", ["none", "report", "stop", "fall-back"])
+def test_what_a_guard_saw_is_read_back(full, tmp_path, action):
+    guard = api.GuardSettings(action=action, alarm="estimate", threshold=1e-9)
+    reduced = api.reduce(full, "spring", "block-deim", 1, guard=guard)
+    assert (reduced.seen.count > 0) == (action != "none")
+    api.save(reduced, tmp_path / "guarded.h5")
+    # which group gave the alarm is the run's own
+    assert api.load(tmp_path / "guarded.h5").seen == replace(reduced.seen, group=None)
+
+
+def test_a_file_without_a_run_is_refused(tmp_path):
+    with pytest.raises(StorageError, match="no such file"):
+        api.load(tmp_path / "none.h5")
+
+
+def test_a_scene_of_the_project():
+    assert api.load_scene(CONFIG / "scenes" / "spring_oop.yaml").mesh.vertices == 400
+
+
+@pytest.mark.parametrize("folder", ["own", "config/scenes"])
+def test_the_path_of_a_mesh_means_the_same_in_every_folder(tmp_path, monkeypatch, folder):
+    own = tmp_path / folder
+    own.mkdir(parents=True)
+    monkeypatch.chdir(tmp_path)
+    (own / "square.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nf 1 2 3\nf 1 3 4\n")
+    path = Path(folder, "own.yaml")
+    path.write_text(
+        "name: own\ntitle: Own\nframes: 4\nmesh: {kind: file, path: square.obj}\n"
+        "effects: [{effect: spring, weight: 1.0}]\n"
+    )
+    assert api.load_scene(path).mesh.vertices == 4
+    if folder == "config/scenes":
+        assert load_bound_scene(Path(), "own").mesh.vertices == 4
+    (own / "square.obj").rename(tmp_path / "square.obj")
+    with pytest.raises(ConfigurationError, match=rf"no such mesh file \(looked in {own}\)"):
+        api.load_scene(path)
+
+
+@pytest.mark.parametrize(
+    ("faulty", "words"),
+    [
+        (lambda full: api.build_scene(**KEYS), "key 'effects' is missing"),
+        (lambda full: api.reduce(full, "spring", "gapy"), "did you mean 'gappy'"),
+        (lambda full: api.reduce(full, "strain"), "no group 'strain'"),
+        (lambda full: api.basis(replace(full, snapshots={}), "spring"), "stored no snapshots"),
+        (lambda full: api.load_scene(Path("none.yaml")), "no such configuration file"),
+    ],
+)
+def test_faults_are_named(full, faulty, words):
+    with pytest.raises(PdromError, match=words):
+        faulty(full)
+
+
+FAULTY = {
+    "r a fraction": (lambda full, _: api.reduce(full, "spring", r=1.5), "r = 1.5: a whole number"),
+    "r a text": (lambda full, _: api.reduce(full, "spring", r="3"), "r = '3': a whole number"),
+    "r nothing": (lambda full, _: api.reduce(full, "spring", r=None), "r = None: a whole"),
+    "r true": (lambda full, _: api.reduce(full, "spring", r=True), "r = True: a whole number"),
+    "r NaN": (lambda full, _: api.reduce(full, "spring", r=np.nan), "r = nan: a whole number"),
+    "r zero": (lambda full, _: api.reduce(full, "spring", r=0), "r = 0, the snapshots have"),
+    "no run": (lambda full, _: api.reduce(full.scene, "spring"), "full = Scene.*a FullRun is"),
+    "no run of a basis": (lambda *_: api.basis(None, "spring"), "full = None: a FullRun"),
+    "no scene": (lambda full, _: api.run(full), "scene = FullRun.*a Scene is required"),
+    "group nothing": (lambda full, _: api.reduce(full, None), "group = None"),
+    "method nothing": (lambda full, _: api.reduce(full, "spring", None), "unknown method None"),
+    "method a list": (lambda full, _: api.basis(full, "spring", ["pod"]), "unknown method"),
+    "basis of arrays": (
+        lambda full, _: api.reduce(full, "spring", r=1, basis_of_group=np.eye(3)),
+        "basis_of_group = array.*a Basis is required",
+    ),
+    "error of a group": (
+        lambda full, _: api.reduce(full, "spring", error=0.1), "error: of the whole scene",
+    ),
+    "motion of a group": (
+        lambda full, _: api.reduce(full, "spring", scene=full.scene), "scene: only together with",
+    ),
+    "motion of another mesh": (
+        lambda full, _: api.reduce(full, error=0.1, scene=api.build_scene(
+            **(KEYS | {"mesh": {"kind": "cloth", "rows": 4, "columns": 4}}), effects=EFFECTS,
+        )), "another mesh or other constraint groups",
+    ),
+    "motion of other groups": (
+        lambda full, _: api.reduce(full, error=0.1, scene=api.build_scene(
+            **KEYS, effects=[*EFFECTS, {"effect": "strain", "weight": 1.0}],
+        )), "another mesh or other constraint groups",
+    ),
+    "motion that is none": (
+        lambda full, _: api.reduce(full, error=0.1, scene=full), "scene = FullRun.*a Scene is",
+    ),
+    "guard a text": (lambda full, _: api.reduce(full, "spring", guard="stop"), "guard = 'stop'"),
+    "guard NaN": (lambda *_: api.GuardSettings(threshold=np.nan), "threshold = nan"),
+    "guard misspelt": (lambda *_: api.GuardSettings(action="halt"), "GuardSettings: action"),
+    "plot of a run": (lambda full, _: api.plot(full), "plot = FullRun.*a ReducedRun"),
+    "plot of nothing": (lambda *_: api.plot(), "at least one run"),
+    "view of a scene": (lambda full, p: api.view(p / "v", full.scene), "view = Scene"),
+    "view into a folder": (lambda full, p: api.view(p, full), "cannot be written .a folder"),
+    "save of a run": (lambda full, p: api.save(full, p / "s"), "reduced = FullRun"),
+    "load of a folder": (lambda _, p: api.load(p), "is a folder"),
+    "load of nothing": (lambda *_: api.load(None), "None: the name of a file"),
+    "load of a zero": (lambda *_: api.load("a\0b"), "the name of a file is required"),
+    "run into a folder": (lambda full, p: api.run(full.scene, p), "cannot be written .a folder"),
+    "scene of nothing": (lambda *_: api.load_scene(None), "None: the name of a file"),
+    "scene a folder": (lambda _, p: api.load_scene(p), "no such configuration file"),
+    "mass NaN": (
+        lambda *_: api.build_scene(**KEYS, effects=EFFECTS, vertex_mass=np.nan), "vertex_mass",
+    ),
+    "mesh nothing": (lambda *_: api.build_scene(effects=EFFECTS, frames=3), "key 'mesh' is"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FAULTY)
+def test_wrong_arguments_are_named_in_one_line(full, tmp_path, name):
+    call, words = FAULTY[name]
+    with pytest.raises(PdromError, match=words) as caught:
+        call(full, tmp_path)
+    assert len(str(caught.value).splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_basis_of_another_scene_or_method_is_refused(full):
+    """One that fits gives the run that the function makes by itself."""
+    other = api.build_scene(mesh=KEYS["mesh"] | {"rows": 7}, frames=12, effects=EFFECTS)
+    faulty = {
+        "group 'spring' of this scene has": api.basis(api.run(other), "spring", "gappy"),
+        "made for another method": api.basis(full, "spring", "published"),
+    }
+    for words, made in faulty.items():
+        with pytest.raises(ConfigurationError, match=words):
+            api.reduce(full, "spring", "gappy", 2, basis_of_group=made)
+    own = api.basis(full, "spring", "gappy")
+    fitting = api.reduce(full, "spring", "gappy", np.int64(2), basis_of_group=own)
+    alone = api.reduce(full, "spring", "gappy", 2)
+    assert np.array_equal(fitting.outcome.positions, alone.outcome.positions)
+
+
+SQUARE = [[0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0]]
+CORNER = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+
+
+def given(points, cells) -> Scene:
+    """A scene on arrays, without a side that is held."""
+    return api.build_scene(mesh=(points, cells), frames=4, effects=[EFFECTS[0], EFFECTS[2]])
+
+
+def test_a_mesh_is_given_as_arrays(tmp_path):
+    scene = given(SQUARE, [[0, 1, 2], [0, 3, 2]])
+    assert np.array_equal(scene.mesh.points, SQUARE)
+    assert len(scene.mesh.edges()) == 5
+    solid = given(np.array(CORNER), np.array([[0, 2, 1, 3]], dtype=np.uint64))
+    assert (len(solid.mesh.tetrahedra), len(solid.mesh.triangles)) == (1, 4)
+    larger = given(2.0 * np.array(SQUARE), [[0, 1, 2], [0, 3, 2]])
+    assert larger.config != scene.config  # or two meshes would count as one scene
+    run = api.run(scene, tmp_path / "given.h5")
+    read = api.load(tmp_path / "given.h5")
+    assert np.array_equal(read.positions, run.positions)
+    assert read.scene.config == scene.config
+    assert np.array_equal(read.scene.mesh.triangles, scene.mesh.triangles)
+
+
+@pytest.mark.parametrize(
+    ("points", "cells", "words"),
+    [
+        (SQUARE, [[0, 1, 4]], "names vertex"),
+        (SQUARE, [[0, 1, -1]], "names vertex"),
+        (SQUARE, np.array([[0, 1, 2**63]], dtype=np.uint64), "names vertex"),
+        (SQUARE, [[0, 1, 2**40]], "names vertex"),
+        (SQUARE, [[0, 1, 2]], "in no element"),
+        (SQUARE, [[0.0, 1.0, 2.0]], "cells: an array"),
+        (SQUARE, [[0, 1]], r"cells of shape \(1, 2\), required: \(n, 3\) or \(n, 4\)"),
+        (SQUARE, [], "cells of shape"),
+        (SQUARE, np.empty((0, 3), int), "both are required"),
+        (np.array(SQUARE)[:, :2], [[0, 1, 2]], "points of shape"),
+        (np.array(SQUARE) * np.nan, [[0, 1, 2], [0, 3, 2]], "vertex 0 lies at"),
+        (None, None, "points of shape"),
+        ("points", "cells", "points of shape"),
+        ([[0.0], [1.0, 2.0]], [[0, 1, 2]], "points: an array"),
+    ],
+)
+def test_faults_of_given_arrays_are_named(points, cells, words):
+    with pytest.raises(PdromError, match=words) as caught:
+        given(points, cells)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_pair_is_required():
+    with pytest.raises(ConfigurationError, match="mesh of 3 parts"):
+        api.build_scene(mesh=(1, 2, 3), frames=4, effects=EFFECTS)
+
+
+def copies(value):
+    """Two copies, one by pickle."""
+    return copy.deepcopy(value), pickle.loads(pickle.dumps(value))
+
+
+def test_scenes_and_runs_are_copied_and_pickled(full):
+    assert full.scene.system is not None  # what a run leaves behind does not hinder
+    for scene in copies(full.scene):
+        assert scene is not full.scene
+        assert scene.config == full.scene.config
+        assert np.array_equal(trajectory(scene), full.positions)
+    reduced = api.reduce(full, "spring", "block-deim", 2)
+    for again in copies(reduced):
+        assert repr(again) == repr(reduced)
+        assert np.array_equal(again.error, reduced.error)
+        one = api.reduce(again.full, "spring", "block-deim", 2)
+        assert np.array_equal(one.outcome.positions, reduced.outcome.positions)
+
+
+def test_a_scene_that_shares_its_work_among_threads_does_so_as_a_copy(full):
+    scene = Scene.build(full.scene.config, full.scene.mesh, threads=2)
+    assert [s.groups[0].threads for s in copies(scene)] == [2, 2]
+
+
+def test_representations_are_one_line(full):
+    made, reduced = api.basis(full, "spring"), api.reduce(full, "spring", "pod", 2)
+    shown = [
+        (full, "FullRun(Scene('scene', 30 vertices, 12 frames: gravity, pins, spring), "),
+        (full.scene, "Scene('scene', 30 vertices"),
+        (full.scene.mesh, "Mesh(points=<30 x 3 float64>"),
+        (full.snapshots["spring"], "Snapshots(p=<6 x "),
+        (reduced, "ReducedRun('scene': spring, pod, r = 2, gain 1, error "),
+        (reduced.outcome, "Rerun(positions=<13 x 30 x 3 float64>"),
+        (made, "Basis(V=<"),
+    ]
+    for value, words in shown:
+        assert repr(value).startswith(words)
+        assert len(repr(value).splitlines()) == 1
+        assert len(repr(value)) < 400
+
+
+@pytest.mark.parametrize("name", [n for n in api.__all__ if n[0].islower()])
+def test_docstrings_tell_every_argument(name):
+    function = getattr(api, name)
+    told = function.__doc__.split("Parameters\n")[-1]
+    for argument in inspect.signature(function).parameters:
+        assert f"    {argument} : " in told
+
+
+def test_a_mesh_that_is_missing_is_named(tmp_path):
+    with pytest.raises(ConfigurationError, match=r"none\.obj"):
+        api.build_scene(
+            tmp_path, mesh={"kind": "file", "path": "none.obj"}, frames=4, effects=EFFECTS
+        )

@@ -1,0 +1,532 @@
+"""The command line: each command does its work, says it in a line, and ends with its code."""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import yaml
+
+from builders import SMALL
+from pdrom.api import load_scene
+from pdrom.command.base import Status
+from pdrom.command.main import COMMANDS, parser, run
+from pdrom.command.new import template
+from pdrom.core.store import check_file
+from pdrom.model.mesh.generators import bar, cloth
+from pdrom.model.mesh.types import Mesh
+from pdrom.model.scene import Scene, SceneConfig
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder with a scene, in which the commands run."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")
+    return tmp_path
+
+
+def test_a_scene_is_run_reduced_and_shown(folder, capsys):
+    assert run(["run", "small.yaml"]) == Status.DONE
+    said = capsys.readouterr()
+    assert said.out.startswith("small.h5: 12 frames of 30 vertices")
+    assert "frame 12 of 12" in said.err
+    asked = ["reduce", "small.yaml", "--group", "spring", "--r", "2", "--run", "small.h5"]
+    assert run([*asked, "--plot", "e.png"]) == Status.DONE
+    assert capsys.readouterr().out.startswith("small_spring_gappy_2.h5: spring, gappy, r = 2: rel")
+    assert not list(folder.glob(".*"))  # no hidden file beside a user's own
+    assert run(["show", "small_spring_gappy_2.h5"]) == Status.DONE
+    shown = capsys.readouterr().out
+    for words in ("intact", "reduced: 13 x 30 x 3 float32, in m", "method: gappy", "scene: small"):
+        assert words in shown
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the scene and its full-order run."""
+    folder = tmp_path_factory.mktemp("finished")
+    (folder / "small.yaml").write_text(SMALL, encoding="utf-8")
+    assert run(["run", str(folder / "small.yaml")]) == Status.DONE
+    return folder
+
+
+def test_a_requested_error_is_met_said_and_viewed(folder, capsys):
+    assert run(["run", "small.yaml"]) == Status.DONE
+    capsys.readouterr()
+    with (folder / "small.yaml").open("a", encoding="utf-8") as file:
+        file.write("reduce: {error: velocity=0.2}\n")
+    asked = ["reduce", "small.yaml", "--run", "small.h5"]
+    assert run([*asked, "--error", "0.05", "--out", "one.h5"]) == Status.DONE
+    said = capsys.readouterr().out
+    assert said.startswith("one.h5: 5 % of the positions against the converged implicit step")
+    for words in ("met, by", "frames checked", "reached", "choosing took"):
+        assert words in said
+    assert run(asked) == Status.DONE
+    assert capsys.readouterr().out.startswith("small_asked.h5: 20 % of the velocities")
+    assert run(["view", "one.h5"]) == Status.DONE
+    assert run(["show", "one.h5"]) == Status.DONE
+    assert "requested_error: 0.05" in capsys.readouterr().out
+
+
+REDUCE = ["reduce", "small.yaml", "--group", "spring", "--r", "1"]
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    """Every file of a folder."""
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def reads_of(name: str) -> list[list[str]]:
+    """Commands that read a file as a run."""
+    return [[*REDUCE, "--run", name], ["view", name], ["view", name, "--unchecked"], ["show", name]]
+
+
+def test_a_run_is_read_wherever_it_was_copied(folder, finished, capsys):
+    shutil.copy(finished / "small.h5", "copy.h5")
+    shutil.copy(finished / "small.h5", "no suffix")
+    for name in ("copy.h5", "no suffix"):
+        assert run([*REDUCE, "--run", name]) == Status.DONE
+        assert run(["show", name]) == Status.DONE
+        assert "bytes, intact" in capsys.readouterr().out
+        assert check_file(name) == "intact"
+    made = {"small.yaml", "small_spring_gappy_1.h5"}
+    assert set(content(folder)) == {"copy.h5", "no suffix", *made}
+
+
+@pytest.mark.parametrize("name", ["x.h5", "x.txt", "x", "x.csv"])
+def test_a_file_of_others_is_never_moved_changed_or_removed(folder, name, capsys):
+    Path(name).write_bytes(b"somebody's own\n")
+    before = content(folder)
+    for arguments in reads_of(name)[:3]:
+        assert run(arguments) == Status.FAULTY
+        (told,) = capsys.readouterr().err.splitlines()
+        assert told.startswith(f"pdrom: {name}: ")
+    run(["show", name])
+    assert content(folder) == before
+
+
+@pytest.mark.parametrize("position", [0, 100, 2048, 5000, -1])
+def test_a_damaged_run_is_refused_and_left_where_it_is(folder, finished, position, capsys):
+    damaged = bytearray((finished / "small.h5").read_bytes())
+    damaged[position] ^= 1
+    Path("small.h5").write_bytes(damaged)
+    before = content(folder)
+    for arguments in reads_of("small.h5")[:3]:
+        assert run(arguments) == Status.FAULTY
+        assert "small.h5: damaged, its content and its checksum differ" in capsys.readouterr().err
+    assert content(folder) == before
+
+
+def without_checksum(path: Path, change: Callable[[h5py.File], None]) -> None:
+    """Replace a run by the one that an older pdrom wrote, changed."""
+    with h5py.File(path) as old, h5py.File("new", "w", track_order=True) as new:
+        for name in old:
+            old.copy(name, new)
+        new.attrs.update(old.attrs)
+        change(new)
+    Path("new").rename(path)
+
+
+def test_a_run_without_a_checksum_is_read_if_that_is_asked_for(folder, finished, capsys):
+    shutil.copy(finished / "small.h5", ".")
+    without_checksum(Path("small.h5"), lambda file: None)
+    before = content(folder)
+    assert run([*REDUCE, "--run", "small.h5"]) == Status.FAULTY
+    (told,) = capsys.readouterr().err.splitlines()
+    assert told.startswith("pdrom: small.h5: no checksum inside (")
+    assert "--unchecked" in told
+    assert content(folder) == before
+    assert run([*REDUCE, "--run", "small.h5", "--unchecked"]) == Status.DONE
+    assert run(["view", "small.h5", "--unchecked"]) == Status.DONE
+
+
+def cut_positions(file: h5py.File) -> None:
+    """A run that ends early."""
+    short = file["positions"][:-1]
+    del file["positions"]
+    file["positions"] = short
+
+
+def spoil_snapshots(file: h5py.File) -> None:
+    """A number that is none."""
+    file["snapshots/spring/p"][0, 0, 0] = np.nan
+
+
+def spoil_configuration(file: h5py.File) -> None:
+    """A configuration that is none."""
+    file.attrs["configuration"] = "{"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (cut_positions, "positions of shape (12, 30, 3), required: (13, 30, 3)"),
+        (spoil_snapshots, "snapshots of spring: entry (0, 0, 0) is nan"),
+        (spoil_configuration, "holds no sound run"),
+        (lambda file: file.pop("timings"), "holds no run"),
+        (lambda file: file["mesh"].pop("points"), "points"),
+    ],
+)
+def test_an_unchecked_run_has_to_be_sound(folder, finished, change, words, capsys):
+    shutil.copy(finished / "small.h5", ".")
+    without_checksum(Path("small.h5"), change)
+    assert run([*REDUCE, "--run", "small.h5", "--unchecked"]) == Status.FAULTY
+    (told,) = capsys.readouterr().err.splitlines()
+    assert told.startswith("pdrom: small.h5: ")
+    assert words in told
+
+
+def test_a_run_is_watched_by_its_companion(folder, capsys):
+    run(["run", "small.yaml"])
+    capsys.readouterr()
+    asked = ["reduce", "small.yaml", "--group", "spring", "--r", "1", "--run", "small.h5"]
+    asked += ["--method", "block-deim", "--alarm", "estimate"]
+    assert run([*asked, "--guard", "report", "--threshold", "1e6"]) == Status.DONE
+    assert "; no alarm; estimated error " in capsys.readouterr().out
+    assert run([*asked, "--guard", "fall-back", "--threshold", "0"]) == Status.DONE
+    told = capsys.readouterr().out
+    assert "relative error 0 of" in told
+    assert "; alarms in 12 frames, first in 0 (estimate), 12 repeated" in told
+    assert run([*asked, "--guard", "stop", "--threshold", "0"]) == Status.DONE
+    assert "stopped after frame 0" in capsys.readouterr().out
+
+
+def test_runs_are_put_on_a_page(folder, capsys):
+    asked = ["reduce", "small.yaml", "--group", "spring", "--r"]
+    assert [run([*asked, r]) for r in ("1", "2")] == [Status.DONE] * 2
+    files = [f"small_spring_gappy_{r}.h5" for r in "12"]
+    assert run(["view", *files, "--out", "both.html"]) == Status.DONE
+    page = (folder / "both.html").read_text("utf-8")
+    assert '"r":1' in page
+    assert '"r":2' in page
+    assert run(["view", "small.yaml"]) == Status.FAULTY
+
+
+def test_the_whole_configuration_is_shown_as_yaml(folder, capsys):
+    run(["run", "small.yaml", "--out", "x.h5"])
+    capsys.readouterr()
+    assert run(["show", "x.h5", "--configuration"]) == Status.DONE
+    text = capsys.readouterr().out.split("configuration:\n")[1].split("attributes")[0]
+    assert yaml.safe_load(text)["scene"]["name"] == "small"
+
+
+def test_a_table_is_shown_with_what_its_columns_hold(folder, capsys):
+    (folder / "singular_values.csv").write_text("scene,component\na,1\nb,3\n")
+    assert run(["show", "singular_values.csv"]) == Status.DONE
+    said = capsys.readouterr().out
+    assert "2 rows of 2 columns" in said
+    assert "no checksum" in said
+    assert "1 to 3" in said
+
+
+def test_a_new_scene_is_valid_and_replaces_nothing(folder, capsys):
+    assert run(["new", "My Sheet-1"]) == Status.DONE
+    text = (folder / "My Sheet-1.yaml").read_text("utf-8")
+    scene = SceneConfig.model_validate(yaml.safe_load(text))
+    assert scene.name == "my_sheet_1"
+    assert run(["new", "My Sheet-1.yaml"]) == Status.FAULTY
+    assert "there is such a file already" in capsys.readouterr().err
+    assert (folder / "My Sheet-1.yaml").read_text("utf-8") == text
+
+
+@pytest.mark.parametrize(
+    ("mesh", "listed", "others"),
+    [
+        (None, {"spring"}, {"translate", "strain", "bending", "volume"}),
+        (cloth(4, 3), {"spring"}, {"translate", "strain", "bending"}),
+        (bar(3, 2, 2), {"tetrahedron_strain"}, {"translate", "volume"}),
+    ],
+)
+def test_every_commented_effect_of_a_new_scene_is_valid(mesh, listed, others):
+    """Of a mesh that is known only groups that fit it are named."""
+    text = template("it's", 'o\'b "1" ü.obj', mesh)
+    scene = SceneConfig.model_validate(yaml.safe_load(text))
+    assert {*scene.groups, *scene.reduce} == listed
+    assert scene.mesh.sources == ([] if mesh is None else ['o\'b "1" ü.obj'])
+    every = SceneConfig.model_validate(yaml.safe_load(text.replace("  # - {", "  - {")))
+    assert others <= {effect.effect for effect in every.effects}
+    assert (mesh is None) or {"strain", "volume"} - set(every.groups)
+
+
+def written(path: Path, mesh: Mesh) -> None:
+    """A file of the surface."""
+    lines = ["v {} {} {}".format(*point) for point in mesh.points.tolist()]
+    lines += ["f {} {} {}".format(*triangle) for triangle in (mesh.triangles + 1).tolist()]
+    path.write_text("\n".join([*lines, ""]), encoding="utf-8")
+
+
+def test_a_new_scene_tells_of_its_mesh_and_runs(folder, capsys, caplog):
+    """Also where a quote is in the name of the mesh, and the scene lies in another folder."""
+    (folder / "in").mkdir()
+    written(folder / "in" / "o'b.obj", cloth(4, 3, "xz", lift=-7.0))
+    assert run(["new", "in/no", "--mesh", "in/o'b.obj"]) == Status.DONE
+    text = (folder / "in" / "no.yaml").read_text("utf-8")
+    assert (
+        "# Of this file: 12 vertices, 12 triangles; x from -0.5 to 0.5, y from -7 to -7, z" in text
+    )
+    assert "number of their vertices: left 3, right 3, back 4, front 4." in text
+    small = text.replace("frames: 100", "frames: 4").replace("train: 40", "train: 2")
+    (folder / "in" / "no.yaml").write_text(small, encoding="utf-8")
+    scene = load_scene("in/no.yaml")
+    assert scene.config.name == "no"
+    (floor,) = [effect for effect in scene.config.effects if effect.effect == "floor"]
+    assert -9.0 < floor.height <= -7.5
+    assert run(["run", "in/no.yaml"]) == Status.DONE
+    assert caplog.messages == []
+    assert run(["new", "other", "--mesh", "in/../../x.obj"]) == Status.FAULTY
+    assert "required is a file below" in capsys.readouterr().err
+    assert run(["new", "other", "--mesh", "in/none.obj"]) == Status.FAULTY
+    assert "no such mesh file" in capsys.readouterr().err
+    assert not (folder / "other.yaml").exists()
+
+
+def test_a_mesh_without_a_whole_side_is_held_at_its_top(folder):
+    points = np.array([[0, 0, 0], [3, 1, 0], [1, 3, 0.5], [2, 2, 3], [4, 4, 4]], dtype=float)
+    mesh = Mesh(points, np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4]]))
+    scene = SceneConfig.model_validate(yaml.safe_load(template("a", "a.obj", mesh)))
+    built = Scene.build(scene, mesh)
+    assert built.boundaries[0].vertices.tolist() == [2, 3, 4]
+
+
+def test_names_and_titles_follow_from_the_file(folder):
+    short = SMALL.partition("\n")[2].replace("title: Small\n", "")
+    (folder / "Two Words.yaml").write_text(short, encoding="utf-8")
+    config = load_scene("Two Words.yaml").config
+    assert (config.name, config.title) == ("two_words", "Two words")
+    (folder / "on.yaml").write_text(short, encoding="utf-8")
+    assert load_scene("on.yaml").config.name == "on"
+
+
+def test_what_an_obstacle_moves_at_rest_is_said_once(folder, caplog):
+    inside = "  - {effect: floor, height: 2.0}\n  - {effect: self_collision, thickness: 0.01}\n"
+    held = "{kind: cloth, rows: 6, columns: 5, plane: xy}"
+    text = SMALL.replace("{kind: cloth, rows: 6, columns: 5, plane: xz}", held) + inside
+    (folder / "small.yaml").write_text(text, encoding="utf-8")
+    assert run(["run", "small.yaml"]) == Status.DONE
+    lies, thin = caplog.messages
+    start = "scene 'small', effect "
+    free = "10 of 25 free vertices lie inside it at rest and are moved by up to 0.4 m in the first"
+    assert lies.startswith(f"{start}'floor': {free}")
+    assert thin.startswith(f"{start}'self_collision': with thickness 0.01 a vertex can pass")
+
+
+ASK = ["reduce", "small.yaml", "--error"]
+GUARDED = ["reduce", "small.yaml", "--group", "spring", "--guard", "stop"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "none.yaml"], "none.yaml: no such configuration file"),
+        (["show", "none.h5"], "none.h5: no such file"),
+        (["reduce", "small.yaml", "--group", "sprin"], "no group 'sprin'"),
+        (["reduce", "small.yaml", "--group", "spring", "--method", "gapy"], "did you mean 'gappy'"),
+        (["reduce", "small.yaml", "--group", "spring", "--r", "99"], "r = 99"),
+        (["reduce", "small.yaml", "--group", "spring", "--alarm", "estimate"], "--guard is"),
+        ([*GUARDED, "--threshold", "1"], "--alarm estimate is required"),
+        ([*GUARDED, "--alarm", "estimate", "--threshold", "-1"], "threshold = -1"),
+        (["run", "small.yaml", "--out", "nowhere.d/../small.yaml/x.h5"], "cannot be written"),
+        (["new", "nowhere/x"], "No such file"),
+        (["run", f"{'a' * 5000}.yaml"], "File name too long"),
+        (["show", "a" * 5000], "File name too long"),
+        (["show", "."], "is a folder"),
+        (["view", "."], "is a folder"),
+        (["run", "."], "no such configuration file"),
+        (["reduce", ".", "--group", "spring"], "no such configuration file"),
+        (["reduce", "small.yaml"], "--group or --error: one is required"),
+        ([*ASK, "0"], "--error = '0': a number above 0 and below 1 is required"),
+        ([*ASK, "1.0"], "--error = '1.0': a number above 0 and below 1"),
+        ([*ASK, "nan"], "--error = 'nan': a number above 0 and below 1"),
+        (
+            [*ASK, "velocty=0.1"],
+            "unknown quantity 'velocty' (allowed: position, velocity), did you",
+        ),
+        ([*ASK, "0.1"], "--error: --run is required with it: a training run"),
+        ([*ASK, "0.1", "--guard", "stop"], "--guard: only together with --group"),
+    ],
+)
+def test_faults_are_one_line_and_code_1(folder, arguments, words, capsys):
+    assert run(arguments) == Status.FAULTY
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last.startswith("pdrom: ")
+    assert words in last
+
+
+UNWRITABLE = [
+    (
+        [*REDUCE, "--plot", "x.exe"],
+        "--plot x.exe: no kind of picture 'exe' (allowed: pdf, png, svg",
+    ),
+    ([*REDUCE, "--plot", "x.pgn"], "did you mean 'png'?"),
+    ([*REDUCE, "--plot", "."], "--plot .: no kind of picture ''"),
+    ([*REDUCE, "--plot", "folder.png"], "folder.png: cannot be written (a folder)"),
+    ([*REDUCE, "--plot", "small.yaml/e.png"], "small.yaml: not a folder"),
+    ([*REDUCE, "--out", "."], ".: cannot be written (a folder)"),
+    ([*REDUCE, "--out", "small.yaml"], "is read by this command"),
+    ([*REDUCE, "--out", "e.png", "--plot", "e.png"], "is read by this command"),
+    (["run", "small.yaml", "--out", "."], ".: cannot be written (a folder)"),
+    (["run", "small.yaml", "--out", "folder.png"], "cannot be written (a folder)"),
+    (["run", "small.yaml", "--out", "small.yaml"], "is read by this command"),
+    (["run", "small.yaml", "--out", "a" * 5000], "File name too long"),
+    (["view", "x.h5", "--out", "."], ".: cannot be written (a folder)"),
+]
+
+
+def test_files_of_others_and_the_mesh_of_the_scene_are_not_overwritten(folder, capsys):
+    Path("mine.h5").write_bytes(b"mine")
+    Path("m.obj").write_text("v 0 0 0\n")
+    for out in ("mine.h5", "m.obj"):
+        before = Path(out).read_bytes()
+        assert run(["run", "small.yaml", "--out", out]) == Status.FAULTY
+        assert (
+            f"{out}: cannot be written (a file that pdrom has not made" in capsys.readouterr().err
+        )
+        assert Path(out).read_bytes() == before
+
+
+def test_what_pdrom_has_written_it_writes_again_and_leaves_no_hidden_file(folder, capsys):
+    picture = ["reduce", "small.yaml", "--group", "spring", "--r", "1", "--run", "small.h5"]
+    for _ in range(2):
+        assert run(["run", "small.yaml"]) == Status.DONE
+        assert run(["view", "small.h5"]) == Status.DONE
+        for plot in ("e.png", "e.pdf", "e.svg"):
+            assert run([*picture, "--out", "r.h5", "--plot", plot]) == Status.DONE
+    assert capsys.readouterr().err.count("pdrom:") == 0
+    assert [path.name for path in folder.iterdir() if path.name.startswith(".")] == []
+
+
+def test_a_deleted_working_folder_is_one_line(tmp_path, monkeypatch, capsys):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+    assert run(["show", "x.h5"]) == Status.FAULTY
+    assert capsys.readouterr().err.startswith("pdrom: the working folder is not there any more")
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize(("arguments", "words"), UNWRITABLE)
+def test_what_cannot_be_written_is_found_before_anything_runs(
+    folder, arguments, words, monkeypatch, capsys
+):
+    def called(*_: object, **__: object) -> None:
+        raise AssertionError("a run began")
+
+    (folder / "folder.png").mkdir()
+    monkeypatch.setattr("pdrom.api.load", called)
+    monkeypatch.setattr("pdrom.api.runs.run_full_order", called)
+    assert run(arguments) == Status.FAULTY
+    (told,) = capsys.readouterr().err.splitlines()
+    assert words in told
+    assert (folder / "small.yaml").read_text("utf-8") == SMALL
+
+
+def test_a_mesh_path_that_is_too_long_is_one_line(folder, capsys):
+    mesh = f"{{kind: file, path: {'m' * 5000}.obj}}"
+    text = SMALL.replace("{kind: cloth, rows: 6, columns: 5, plane: xz}", mesh)
+    Path("long.yaml").write_text(text, encoding="utf-8")
+    assert run(["run", "long.yaml"]) == Status.FAULTY
+    (told,) = capsys.readouterr().err.splitlines()
+    assert "long.yaml: mesh.file.path = " in told
+    assert "a path of at most 4095 bytes is required" in told
+    assert len(told) < 300
+
+
+def shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """A line of the shell that calls ``pdrom``."""
+    called = line.replace("pdrom", f'"{sys.executable}" -m pdrom')
+    command = ["bash", "-o", "pipefail", "-c", called]
+    # as a user's: the output waits in a buffer until the end
+    own = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, env=own, check=False)
+
+
+@pytest.mark.parametrize(
+    ("command", "status", "said"),
+    [
+        ("pdrom show small.yaml | sh -c 'exec 0<&-'", 0, ""),
+        ("pdrom --help | sh -c 'exec 0<&-'", 0, ""),
+        ("pdrom show small.yaml >&- 2>&-", 0, ""),
+        ("pdrom show none.yaml >&- 2>&-", 1, ""),
+        ("pdrom show none.yaml >&-", 1, "pdrom: none.yaml: no such file\n"),
+    ],
+)
+def test_an_output_that_nobody_reads_is_no_traceback(folder, command, status, said):
+    done = shell(command, folder)
+    assert (done.returncode, done.stderr) == (status, said)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+def test_an_output_that_cannot_be_written_is_one_line(folder):
+    done = shell("pdrom show small.yaml > /dev/full", folder)
+    assert done.returncode == Status.FAULTY
+    assert done.stderr == "pdrom: standard output: No space left on device\n"
+
+
+def test_a_misspelt_option_gets_a_suggestion(capsys):
+    with pytest.raises(SystemExit) as caught:
+        run(["reduce", "sheet.yaml", "--eror", "1e-2"])
+    assert caught.value.code == 2
+    assert "did you mean '--error'?" in capsys.readouterr().err
+
+
+def test_a_run_of_another_scene_is_not_reduced(folder, capsys):
+    run(["run", "small.yaml"])
+    (folder / "small.yaml").write_text(SMALL.replace("1.0e+5", "2.0e+5"))
+    assert run(["reduce", "small.yaml", "--group", "spring", "--run", "small.h5"]) == Status.FAULTY
+    assert "a run of another scene" in capsys.readouterr().err
+
+
+def test_a_blow_up_has_a_code_of_its_own(folder, monkeypatch, capsys):
+    monkeypatch.setattr("pdrom.api.runs.BLOWUP_EXTENT", 1e-3)
+    assert run(["reduce", "small.yaml", "--group", "spring", "--r", "2"]) == Status.BLEW_UP
+    assert "blew up at frame 0" in capsys.readouterr().out
+    assert (folder / "small_spring_gappy_2.h5").is_file()
+
+
+@pytest.mark.parametrize("arguments", [[], ["frobnicate"], ["run"], ["reduce", "x", "--r", "0"]])
+def test_what_is_not_understood_has_code_2(arguments, capsys):
+    with pytest.raises(SystemExit) as caught:
+        run(arguments)
+    assert caught.value.code == 2
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_has_an_example(name, capsys):
+    with pytest.raises(SystemExit) as caught:
+        run([name, "--help"])
+    assert caught.value.code == 0
+    said = capsys.readouterr().out
+    example = said.split("example: pdrom ")[1].split()
+    assert example[0] == name
+    assert parser().parse_args(example).perform
+
+
+def test_an_interrupt_is_said(folder, monkeypatch, capsys):
+    def interrupted(*arguments, **named):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pdrom.api.run", interrupted)
+    assert run(["run", "small.yaml"]) == 130
+    assert capsys.readouterr().err == "\npdrom: interrupted\n"
+
+
+def test_a_page_without_a_browser_is_opened_by_hand(folder, finished, monkeypatch, capsys):
+    monkeypatch.setattr("webbrowser.open", lambda _: False)
+    shutil.copy(finished / "small.h5", folder)
+    assert run(["view", "small.h5", "--open"]) == Status.DONE
+    assert capsys.readouterr().err == "pdrom: no browser was found; open the file by hand\n"
+
+
+def test_the_module_is_the_program(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "pdrom", "new", "x"],
+        cwd=tmp_path, capture_output=True, text=True, env=dict(os.environ), check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "x.yaml").is_file()

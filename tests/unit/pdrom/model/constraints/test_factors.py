@@ -1,0 +1,73 @@
+"""Weights by selection: the elements inside get them, in energies, systems and runs."""
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from builders import GROUPS, make_scene
+from pdrom.core.errors import SceneError
+from pdrom.model.runs.full_order import trajectory
+from study.experiments.kit.variation import varied
+
+BOX = {"kind": "plane", "point": [0.1, 0, 0], "normal": [-1, 0, 0]}
+
+
+def scene_with(group, *factors, weight=1e4):
+    return make_scene(
+        {"effect": group, "weight": weight, "factors": list(factors)}, mesh=GROUPS[group]
+    )
+
+
+@pytest.mark.parametrize("group", GROUPS)
+def test_elements_inside_are_multiplied_and_others_left_alone(group):
+    plain, changed = scene_with(group), scene_with(group, {"select": BOX, "factor": 7.0})
+    inside = changed.mesh.points[:, 0] <= 0.1 + 1e-6
+    elements = inside[plain.groups[0].element_vertices(plain.mesh)].all(axis=1)
+    ratio = changed.groups[0].weights / plain.groups[0].weights
+    assert 0 < elements.sum() < len(elements)
+    assert ratio == pytest.approx(np.where(elements, 7.0, 1.0))
+
+
+@pytest.mark.parametrize("group", GROUPS)
+def test_all_elements_times_a_factor_are_another_weight(group):
+    """Same run as with the product as weight, through the compiled kernels."""
+    every = {"select": {"kind": "component"}, "factor": 4.0}
+    runs = []
+    for scene in (scene_with(group, every), scene_with(group, weight=4e4)):
+        start = 0.1 * np.random.default_rng(5).standard_normal(scene.mesh.points.shape)
+        runs.append(trajectory(scene, perturbation=start))
+    assert np.array_equal(runs[0], runs[1])
+
+
+def test_the_energy_is_that_of_the_elements(rng):
+    """1/2 sum_e w_e |S_e q - p_e|^2 with the element weights, of the compiled kernel."""
+    scene = scene_with("strain", {"select": BOX, "factor": 30.0})
+    (group,) = scene.groups
+    q = scene.mesh.points + 0.1 * rng.standard_normal(scene.mesh.points.shape)
+    residual = group.S @ q - group.project(q)
+    expected = 0.5 * float(np.sum(group.row_weights[:, None] * residual**2))
+    assert group.accumulate(q, np.zeros_like(q)) == pytest.approx(expected)
+
+
+def test_another_stiffness_keeps_the_factors():
+    config = scene_with("spring", {"select": BOX, "factor": 7.0}).config
+    config = config.model_copy(update={"reduce": {"spring": None}})
+    stiffer = varied(config, config.time_step, 10.0, 0.1, (1, 100))
+    (effect,) = stiffer.effects
+    assert (effect.weight, effect.factors) == (1e5, config.effects[0].factors)
+
+
+def test_a_selection_without_an_element_is_named():
+    with pytest.raises(
+        SceneError, match=r"effect 'spring': factors\[0\]: selects no element.*edge"
+    ):
+        scene_with("spring", {"select": [0], "factor": 2.0})
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [({"factor": 1.0}, "factors.0.select"), ({"select": "top", "factor": 0.0}, "factors.0.factor")],
+)
+def test_faults_name_key_and_value(entry, message):
+    with pytest.raises(ValidationError, match=message):
+        scene_with("spring", entry)

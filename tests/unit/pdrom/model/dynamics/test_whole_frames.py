@@ -1,0 +1,109 @@
+"""Whole frames in compiled code: bit for bit those of the loop through Python."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from builders import GROUPS, make_scene
+from pdrom.model.dynamics.stepper import Stepper
+from pdrom.model.scene import Scene
+from places import ROOT
+from study.pipeline.scenes import Coarsen, read_scene, scene_names
+
+SPRING = {"effect": "spring", "weight": 1e5}
+STRAIN = {"effect": "strain", "weight": 1e5}
+FALL = {"effect": "gravity", "acceleration": [0.0, -200.0, 1.0]}
+OWN = {
+    "floor": ([SPRING, FALL, {"effect": "floor", "height": -0.1}], {}),
+    "held in the floor": (
+        [SPRING, FALL, {"effect": "floor", "height": 0.1}, {"effect": "pins", "select": "bottom"}],
+        {},
+    ),
+    "drag and damping": (
+        [SPRING, FALL, {"effect": "drag", "coefficient": 3.0}, {"effect": "damping", "rate": 2.0}],
+        {},
+    ),
+    "taken hold of on the way": (
+        [
+            STRAIN,
+            FALL,
+            {"effect": "pins", "select": "top", "until": 7},
+            {"effect": "translate", "select": "bottom", "start": 5, "over": 4, "offset": [1, 0, 0]},
+        ],
+        {},
+    ),
+    "poke": ([SPRING, {"effect": "poke", "over": 4, "rest": 0, "count": 3}], {}),
+    "accelerated": ([STRAIN, FALL, {"effect": "pins", "select": "top"}], {"anderson_window": 3}),
+    "bar": (
+        [{"effect": "tetrahedron_strain", "weight": 1e6}, FALL],
+        {"mesh": GROUPS["tetrahedron_strain"]},
+    ),
+    "plane": ([SPRING, FALL, {"effect": "plane"}], {}),
+    "bending": ([{"effect": "bending", "weight": 1.0}, FALL], {"mesh": GROUPS["bending"]}),
+    "wind": ([SPRING, {"effect": "wind", "velocity": [3.0, 0.0, 1.0]}], {}),
+}
+
+
+def own(name: str) -> Scene:
+    effects, settings = OWN[name]
+    return make_scene(*effects, **settings)
+
+
+def assert_same(scene: Scene, loop: Stepper) -> None:
+    """The frames of ``loop`` against those that an observer keeps in Python."""
+    plain = scene.stepper()
+    state, frames = scene.initial_state(), range(scene.config.frames)
+    for frame, (found, report) in zip(frames, loop.run(state, frames), strict=True):
+        state, expected = plain.step(state, frame, lambda y: None)
+        np.testing.assert_array_equal(found.positions, state.positions)
+        np.testing.assert_array_equal(found.velocities, state.velocities)
+        np.testing.assert_array_equal(report.objective, expected.objective)
+        assert (report.seconds[1:] > 0.0).all()
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_frames_at_once_are_those_of_the_loop(name):
+    assert_same(own(name), own(name).stepper())
+
+
+@pytest.mark.parametrize("name", scene_names(ROOT))
+def test_scenes_of_the_catalogue_are_the_same(name):
+    config = read_scene(ROOT, name, Coarsen(resolution=0.15, frames=0.3))
+    scene, other = (Scene.build(config, config.mesh.build(ROOT)) for _ in range(2))
+    assert_same(scene, other.stepper())
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_a_call_does_many_frames_where_nothing_is_left_to_python(name):
+    scene = own(name)
+    loop, calls = scene.stepper(), []
+    whole = loop._whole
+    if name in ("plane", "bending", "wind"):
+        assert whole is None
+        return
+
+    class Counted:
+        def run(self, q, v, frames, *rest):
+            done = whole.run(q, v, frames, *rest)
+            calls.append(frames.start)
+            return done
+
+    loop._whole = Counted()
+    list(loop.run(scene.initial_state(), range(scene.config.frames)))
+    ends = {"taken hold of on the way": [0, 5, 7], "poke": [0, 4, 8, 12]}
+    assert calls == ends.get(name, [0, 16])
+
+
+def test_a_run_begins_anew_in_the_middle():
+    """States that a run hands out are not overwritten, and any of them starts another run."""
+    scene = own("floor")
+    loop = scene.stepper()
+    states = [state for state, _ in loop.run(scene.initial_state(), range(20))]
+    kept = [state.positions.copy() for state in states]
+    again = [state for state, _ in loop.run(states[3], range(4, 20))]
+    for a, b in zip(states[4:], again, strict=True):
+        np.testing.assert_array_equal(a.positions, b.positions)
+    for state, copy in zip(states, kept, strict=True):
+        np.testing.assert_array_equal(state.positions, copy)
+    assert all(not np.array_equal(a, b) for a, b in pairwise(kept[:5]))

@@ -1,0 +1,126 @@
+"""Self-collision: no pair ends closer than it may, momentum is kept, the rest is left alone."""
+
+import logging
+
+import numpy as np
+import pytest
+from hypothesis import given
+from scipy.spatial.distance import pdist, squareform
+
+from builders import make_scene
+from pdrom.core.errors import NotReducibleError
+from pdrom.model.runs.full_order import trajectory
+from pdrom.reduction.subspace.model import make_columns
+from pdrom.reduction.subspace.space import ReducedSpace
+from strategies import SEEDS
+from study.experiments.hard_cases.shapes import folded, noisy, scales, scrambled
+
+GROUPS = ({"effect": "spring", "weight": 1e4}, {"effect": "strain", "weight": 1e3})
+SHEET = {"kind": "cloth", "rows": 12, "columns": 12, "plane": "xz", "lift": 0.1}
+THICKNESS = 0.08
+
+
+def sheet(*effects, thickness=THICKNESS, mesh=SHEET, **settings):
+    collision = {"effect": "self_collision", "thickness": thickness}
+    return make_scene(*GROUPS, *effects, collision, mesh=mesh, **settings)
+
+
+def closest(scene, positions):
+    """Least distance over the thickness, of pairs that are farther apart than it at rest."""
+    apart = pdist(scene.mesh.points) > THICKNESS
+    return pdist(positions)[apart].min() / THICKNESS
+
+
+@pytest.mark.parametrize(
+    "start", [folded, noisy(folded, 1e-3), scrambled(), scales(0, 0, 0)],
+    ids=["folded", "folded unevenly", "scrambled", "one point"],
+)  # fmt: skip
+def test_no_pair_ends_closer_than_nine_tenths(start):
+    """A sheet that falls on the floor as a heap: vertices coincide at the start."""
+    scene = sheet({"effect": "gravity"}, {"effect": "floor"})
+    loop, state = scene.stepper(), start(scene)
+    assert closest(scene, state.positions) < 0.5
+    for frame in range(40):
+        state, _ = loop.step(state, frame)
+    assert closest(scene, state.positions) >= 0.9
+
+
+def test_a_folded_cloth_keeps_its_layers_apart():
+    """One half is laid over the other by a handle; without the effect the layers meet."""
+    over = {
+        "effect": "keyframes", "select": "right", "interpolation": "smooth",
+        "keys": [{"at": 30, "offset": [-0.5, 0.5, 0]}, {"at": 60, "offset": [-0.9, 0.1, 0]}],
+    }  # fmt: skip
+    effects = [{"effect": "gravity"}, {"effect": "floor"}, {"effect": "pins", "select": "left"}]
+    with_it = sheet(*effects, over, frames=80)
+    last = trajectory(with_it)[-1]
+    assert closest(with_it, last) >= 0.9
+    without = make_scene(*GROUPS, *effects, over, mesh=SHEET, frames=80)
+    assert closest(with_it, trajectory(without)[-1]) < 0.5
+
+
+@given(seed=SEEDS)
+def test_the_response_is_symmetric(seed):
+    """The centre of mass of light and heavy vertices stays; each moves by its inverse mass."""
+    rng = np.random.default_rng(seed)
+    scene = sheet(masses=[{"select": "left", "vertex_mass": 500.0}])
+    (contact,) = scene.contacts
+    before = scene.mesh.points + 0.1 * rng.standard_normal(scene.mesh.points.shape)
+    positions = before + 0.02 * rng.standard_normal(before.shape)
+    ended = positions.copy()
+    contact.correct(ended, before)
+    moved = scene.masses @ (ended - positions)
+    assert np.abs(moved).max() < 1e-10 * scene.masses.sum()
+    assert closest(scene, ended) >= 0.9
+
+
+def test_a_pair_that_passed_is_put_back():
+    """Two layers a tenth of the thickness beyond each other end in their old order."""
+    scene = sheet()
+    (contact,) = scene.contacts
+    before = scene.mesh.points.copy()
+    upper = before[:, 0] > 0.0
+    before[upper, 0] -= 0.5
+    before[upper, 1] += 0.09
+    after = before.copy()
+    after[upper, 1] -= 0.1
+    contact.correct(after, before)
+    assert after[upper, 1].min() > after[~upper, 1].max()
+
+
+def test_what_is_apart_is_left_alone():
+    scene = sheet()
+    (contact,) = scene.contacts
+    positions = 1.2 * scene.mesh.points
+    ended = positions.copy()
+    contact.correct(ended, scene.mesh.points)
+    assert np.array_equal(ended, positions)
+    assert squareform(pdist(positions)).shape == (144, 144)
+
+
+def test_two_runs_give_the_same_bits():
+    scenes = [sheet({"effect": "gravity"}, {"effect": "floor"}, frames=20) for _ in range(2)]
+    first, second = (trajectory(scene, perturbation=folding(scene)) for scene in scenes)
+    assert np.array_equal(first, second)
+
+
+def folding(scene):
+    return folded(scene).positions - scene.mesh.points
+
+
+def test_a_thickness_that_lets_vertices_pass_is_said_in_the_log_and_mended_by_what_it_says(caplog):
+    with caplog.at_level(logging.WARNING):
+        sheet().log_contacts()
+        assert caplog.messages == []
+        sheet(thickness=0.05).log_contacts()
+        sheet(thickness=0.075).log_contacts()
+    (message,) = caplog.messages
+    said = "with thickness 0.05 a vertex can pass between others; at least 0.075 is needed"
+    assert message.endswith(f"effect 'self_collision': {said}")
+
+
+def test_a_position_subspace_refuses_it():
+    scene = sheet()
+    columns = make_columns(scene, scene.mesh.points[None], "skinning", 4)
+    with pytest.raises(NotReducibleError, match="effect 'self_collision' needs all vertices"):
+        ReducedSpace(scene, columns, [])

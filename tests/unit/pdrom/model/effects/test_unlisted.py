@@ -1,0 +1,168 @@
+"""What a scene does not list costs it nothing, for every effect of the registry."""
+
+import json
+import subprocess
+import sys
+from functools import cache
+
+import numpy as np
+import pytest
+
+from builders import GROUPS, make_scene
+from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.effects import EFFECTS
+from pdrom.model.runs.full_order import trajectory
+from pdrom.model.scene import SceneConfig
+from places import ROOT
+from study.pipeline.fingerprint import closure
+from study.pipeline.scenes import read_scene
+
+FRAMES = 12
+SCENES = sorted(path.stem for path in (ROOT / "config" / "scenes").glob("*.yaml"))
+
+# An entry of each effect with which it cannot act in `FRAMES` frames. None: it always acts.
+LATE = {"select": "top", "start": FRAMES}
+FAR = 1e6
+IDLE: dict[str, dict | None] = {
+    "gravity": {"acceleration": [0, 0, 0]},
+    "damping": {"rate": 0},
+    "drag": {"coefficient": 0},
+    "wind": {"velocity": [0, 0, 1e4], "density": 0},
+    "floor": {"height": -FAR},
+    "plane": {"point": [0, -FAR, 0], "friction": 1},
+    "sphere": {"centre": [0, -FAR, 0], "radius": 1, "friction": 1},
+    "box": {"lower": [-1, -FAR, -1], "upper": [1, 1 - FAR, 1], "friction": 1},
+    "self_collision": {"thickness": 1e-6},
+    "kick": {"speed": 1e-300, "seed": 1},
+    "pins": LATE,
+    "translate": {**LATE, "offset": [0, 1, 0], "over": 3},
+    "rotate": {**LATE, "axis": "x", "degrees": 90, "over": 3},
+    "keyframes": {**LATE, "keys": [{"at": 3, "offset": [0, 1, 0]}]},
+    "poke": None,
+}
+
+
+def other_group(effect: str) -> str:
+    """A group to make a scene of that does not list ``effect``."""
+    return "spring" if effect != "spring" else "strain"
+
+
+@cache
+def report(group: str) -> dict:
+    """What a scene of one group imports, compiles and holds, in a process of its own."""
+    effects = [name for name in EFFECTS if other_group(name) == group]
+    done = subprocess.run(
+        [sys.executable, "holdings_of_scenes.py", group, *effects],
+        cwd=ROOT / "tests", capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_a_scene_without_it_does_not_import_it(effect):
+    group = other_group(effect)
+    modules = report(group)["modules"]
+    assert EFFECTS.module(group) in modules
+    assert EFFECTS.module(effect) not in modules
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_a_scene_without_it_compiles_and_holds_no_more_once_it_is_loaded(effect):
+    """The same compiled functions of its own, arrays and bytes, and the same bits of its run."""
+    found = report(other_group(effect))
+    alone, beside = found["alone"], found[effect]
+    assert alone["arrays"] > 5
+    for what in ("arrays", "bytes", "run"):
+        assert beside[what] == alone[what], what
+    own = {
+        n: count
+        for n, count in beside["compiled"].items()
+        if n.rpartition(".")[0] in found["modules"]
+    }
+    assert own == alone["compiled"] != {}
+
+
+def test_a_scene_with_an_effect_holds_more():
+    """The count sees what an effect keeps: two constants of a group, the areas of drag."""
+    from holdings_of_scenes import arrays
+
+    spring = {"effect": "spring", "weight": 1.0}
+    plain, with_drag = (
+        arrays(make_scene(spring, *others))
+        for others in ((), ({"effect": "drag", "coefficient": 1.0},))
+    )
+    assert sum(with_drag.values()) == sum(plain.values()) + 30 * 8
+
+
+@pytest.mark.parametrize("effect", [name for name in EFFECTS if IDLE.get(name, {}) is not None])
+def test_what_cannot_act_changes_no_bit(effect):
+    """Of a sheet that falls, held on one side, with a start off its rest shape."""
+    if issubclass(EFFECTS.load(effect), ConstraintGroup):
+        check_group(effect)
+    else:
+        assert run_with({"effect": effect, **IDLE[effect]}).tobytes() == run_with().tobytes()
+
+
+def run_with(*effects):
+    spring, gravity = {"effect": "spring", "weight": 1e4}, {"effect": "gravity"}
+    pins = {"effect": "pins", "select": [0, 1, 2]}
+    scene = make_scene(gravity, pins, spring, *effects, frames=FRAMES)
+    noise = 0.01 * np.random.default_rng(3).standard_normal(scene.mesh.points.shape)
+    return trajectory(scene, perturbation=noise)
+
+
+def check_group(effect):
+    """A group always acts; another group's projections have the same bits beside it."""
+    if effect not in ("bending", "spring", "strain"):
+        mesh, group = GROUPS[effect], "spring"
+    else:
+        mesh, group = GROUPS["bending"], other_group(effect)
+    first, second = {"effect": group, "weight": 1e4}, {"effect": effect, "weight": 1e4}
+    alone, beside = (make_scene(first, *others, mesh=mesh) for others in ((), (second,)))
+    rng = np.random.default_rng(3)
+    q = alone.mesh.points + 0.05 * rng.standard_normal(alone.mesh.points.shape)
+    projections = []
+    for scene in (alone, beside):
+        for each in scene.groups:
+            each.begin_frame(q)
+        projections.append(scene.group(group).project(q).tobytes())
+    assert projections[0] == projections[1]
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_scene_depends_on_the_code_of_its_own_effects_only(scene):
+    """Fingerprints of its jobs cover these modules; an edit of another effect reruns nothing."""
+    config = read_scene(ROOT, scene)
+    covered = set(closure("study.experiments.fom", *config.modules))
+    listed = {EFFECTS.module(effect.effect) for effect in config.effects}
+    needed = set(closure(*listed))
+    every = {EFFECTS.module(effect) for effect in EFFECTS}
+    assert listed <= covered
+    assert covered & every <= needed
+
+
+@pytest.mark.parametrize("effect", IDLE)
+def test_a_configuration_survives_the_way_to_a_job(effect):
+    """As plain JSON, with a shape as selection and friction without end where there are any."""
+    entry: dict = {"effect": effect, **(IDLE[effect] or {})}
+    ball = {"kind": "sphere", "centre": [0, 2, 0], "radius": 0.5}
+    if "select" in entry:
+        entry["select"] = {"kind": "union", "of": ["top", {"kind": "complement", "of": ball}]}
+    if "friction" in entry:
+        entry["friction"] = float("inf")
+    masses = [{"select": ball, "density": 2.0}]
+    config = make_scene({"effect": "spring", "weight": 1.0}, entry, masses=masses).config
+    plain = json.loads(json.dumps(config.model_dump(mode="json")))
+    assert SceneConfig.model_validate(plain) == config
+
+
+def test_every_effect_says_how_it_does_nothing():
+    """A new effect needs a line in `IDLE`, a new group none."""
+    groups = {e for e in EFFECTS if issubclass(EFFECTS.load(e), ConstraintGroup)}
+    assert set(IDLE) == set(EFFECTS) - groups
+
+
+def test_an_idle_effect_is_not_idle_by_itself():
+    """The comparison sees an effect that acts: the same entries, within reach."""
+    for entry in ({"effect": "floor", "height": 2.2}, {"effect": "damping", "rate": 1.0}):
+        assert run_with().tobytes() != run_with(entry).tobytes()

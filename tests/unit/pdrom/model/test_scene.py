@@ -1,0 +1,203 @@
+"""Scenes: what is listed is built, what is not is not; faults have one clear message."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from builders import make_scene
+from pdrom.core.errors import ConfigurationError, SceneError
+from pdrom.core.store import open_hdf5
+from pdrom.model.compiled import rows
+from pdrom.model.constraints.local_kernel import OWN, LocalKernel, call, local_kernel
+from pdrom.model.dynamics.stepper import State
+from pdrom.model.runs.full_order import run, trajectory
+from places import ROOT
+from study.pipeline.scenes import Coarsen, load_bound_scene, read_scene
+from study.pipeline.study import Study
+
+SPRING = {"effect": "spring", "weight": 1e5}
+
+
+def test_unlisted_effects_are_not_imported():
+    """A spring scene loads no other constraint, no gravity, no floor, no poke."""
+    code = (
+        "import sys; from builders import make_scene;"
+        "from pdrom.model.runs.full_order import trajectory;"
+        "trajectory(make_scene({'effect': 'spring', 'weight': 1.0}, frames=1));"
+        "print('\\n'.join(m for m in sys.modules if m.startswith('pdrom.')))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT / "tests", capture_output=True, text=True, check=True
+    )
+    loaded = set(done.stdout.split())
+    assert "pdrom.model.constraints.spring" in loaded
+    for absent in ("bending", "triangle_strain", "tetrahedron", "svd3", "deformation_gradient"):
+        assert f"pdrom.model.constraints.{absent}" not in loaded
+    for absent in ("gravity", "floor", "hold", "poke", "kick", "damping"):
+        assert f"pdrom.model.effects.{absent}" not in loaded
+
+
+def test_unlisted_groups_leave_no_matrix_entry():
+    """The system matrix is the sum of inertia and the listed groups, entry by entry."""
+    scene = make_scene(SPRING)
+    both = make_scene(SPRING, {"effect": "strain", "weight": 1e5})
+    matrix = scene.system_with("supernodal").matrix
+    expected = scene.groups[0].system_matrix().toarray()
+    expected += np.diag(scene.masses / scene.config.time_step**2)
+    assert np.array_equal(matrix.toarray(), expected)
+    assert not np.array_equal(both.system_with("supernodal").matrix.toarray(), expected)
+
+
+@local_kernel
+def _counted(y, rhs, record, part):
+    """Counts its calls and hands them on."""
+    entries = rows.indices(record, OWN + 3)
+    rows.doubles(entries[OWN + 1], 1)[0] += 1.0
+    return call(entries[OWN], y, rhs, entries[OWN + 2], part)
+
+
+def test_unlisted_groups_are_never_evaluated():
+    """Calls per run: K a frame for each listed group, none for others, none without forces."""
+    scene = make_scene(SPRING, {"effect": "strain", "weight": 1e5}, frames=3, iterations=4)
+    calls = {}
+    for group in scene.groups:
+        own, calls[group.name] = group.local_kernel, np.zeros(1)
+        group.local_kernel = LocalKernel.of(
+            _counted, scene.mesh.vertices, 1, [calls[group.name], own.record], [own.address]
+        )
+    trajectory(scene)
+    assert calls == {"spring": 12, "strain": 12}
+    assert scene.forces == scene.boundaries == scene.contacts == scene.starts == []
+
+
+def test_only_needed_snapshots_are_stored(tmp_path):
+    scene = make_scene(SPRING, {"effect": "strain", "weight": 1e5}, frames=6)
+    run(scene, tmp_path / "run.h5", {"strain": np.array([0, 3])})
+    with open_hdf5(tmp_path / "run.h5") as file:
+        assert set(file["snapshots"]) == {"strain"}
+        assert file["snapshots/strain/p"].shape == (2, 2 * scene.group("strain").elements, 3)
+        assert file["positions"].shape == (7, scene.mesh.vertices, 3)
+        assert set(file) == {"positions", "velocities", "objective", "timings", "snapshots"}
+
+
+def test_stored_snapshot_is_the_projection_of_the_last_iterate(tmp_path):
+    """Replay frame 3 and project at the last local iterate."""
+    effects = [{"effect": "gravity"}, {"effect": "pins", "select": "top"}, SPRING]
+    scene = make_scene(*effects, frames=5)
+    run(scene, tmp_path / "run.h5", {"spring": np.array([3])})
+    seen = []
+    loop, state = scene.stepper(), scene.initial_state()
+    for frame in range(4):
+        state, _ = loop.step(state, frame, lambda y: seen.append(scene.groups[0].project(y)))
+    with open_hdf5(tmp_path / "run.h5") as file:
+        assert np.array_equal(file["snapshots/spring/p"][0], seen[3])
+
+
+@pytest.mark.parametrize(
+    ("effects", "message"),
+    [
+        ([{"effect": "gravity"}], "no constraint group"),
+        ([SPRING, {"effect": "sprnig", "weight": 1.0}], "allowed: area, bending"),
+        ([{"effect": "spring", "weight": -1.0}], "weight = -1.0"),
+        ([{"effect": "spring", "weight": float("nan")}], "weight"),
+        ([{"effect": "spring", "weigth": 1.0}], "weigth"),
+        ([{"effect": "spring"}], "'weight' is missing"),
+        ([SPRING, SPRING], "twice"),
+        ([SPRING, {"effect": "gravity", "acceleration": "down"}], "acceleration"),
+        ([SPRING, {"effect": "pins", "select": "top", "start": 5, "until": 3}], "until = 3"),
+        ([{"effect": "strain", "weight": 1.0, "minimum": 1.2}], "minimum"),
+        (["spring"], "a mapping with a key 'effect'"),
+    ],
+)
+def test_faulty_effects_name_key_and_value(effects, message):
+    with pytest.raises(ValidationError, match=message):
+        make_scene(*effects)
+
+
+@pytest.mark.parametrize(
+    ("effects", "message"),
+    [
+        ([SPRING, {"effect": "pins", "select": "front"}], "selects nothing"),
+        ([{"effect": "tetrahedron_strain", "weight": 1.0}], "needs tetrahedra"),
+        (
+            [
+                SPRING,
+                {"effect": "pins", "select": "top"},
+                {"effect": "translate", "select": "top", "offset": [0, 1, 0], "over": 3},
+            ],
+            "held by 'pins' and by 'translate' in frame 0",
+        ),
+        ([SPRING, {"effect": "poke", "count": 500}], "count = 500"),
+    ],
+)
+def test_contradictions_with_the_mesh_are_named(effects, message):
+    with pytest.raises(SceneError, match=message):
+        make_scene(*effects)
+
+
+def test_coarsening_scales_every_frame_number():
+    scene = read_scene(ROOT, "cloth_all", Coarsen(resolution=0.5, frames=0.25))
+    assert (scene.mesh.rows, scene.frames) == (10, 60)
+    pins = [e for e in scene.effects if e.effect == "pins"]
+    assert [(p.start, p.until) for p in pins] == [(0, 15), (0, 5), (15, 35), (35, None)]
+    assert scene.reduce["spring"].train == 25
+
+
+def test_held_out_run_differs_in_speed_direction_and_seed():
+    scene = read_scene(ROOT, "bar_twist")
+    held = scene.heldout_variant()
+    turn = next(e for e in held.effects if e.effect == "rotate")
+    assert (turn.degrees, turn.over) == (-90.0, 125)
+    assert held.frames == scene.frames
+    assert read_scene(ROOT, "bar_release").heldout_variant().effects[-1].effect == "kick"
+
+
+@pytest.mark.parametrize("name", ["bar_twist", "spring_oop"])
+def test_one_rule_gives_every_scene_a_kick_of_its_own_and_twice_the_stiffness(name):
+    scene = read_scene(ROOT, name)
+    *same, kick = scene.heldout_variant("kick").effects
+    assert tuple(same) == scene.effects
+    assert (kick.effect, kick.speed, kick.seed) == ("kick", 0.5, 2)
+    for stiff, own in zip(scene.heldout_variant("stiffness").effects, scene.effects, strict=True):
+        weight = {"weight": 2.0 * own.weight} if own.effect in scene.groups else {}
+        assert stiff == own.model_copy(update=weight)
+
+
+def test_every_scene_file_is_valid():
+    for path in sorted((ROOT / "config" / "scenes").glob("*.yaml")):
+        assert load_bound_scene(ROOT, path.stem).config.name == path.stem
+
+
+@pytest.mark.parametrize(
+    ("config", "message"),
+    [
+        ({"scenes": ["nope"], "methods": ["pod"]}, "unknown scene 'nope'"),
+        ({"scenes": ["bend_fall"], "methods": ["podd"]}, "unknown method 'podd'"),
+        ({"scenes": ["bend_fall"], "methods": ["pod"], "ranks": [0]}, "ranks.0"),
+        ({"scenes": ["bend_fall"], "methods": ["pod"], "rank": [1]}, "unknown key 'rank'"),
+        ({"scenes": [], "methods": ["pod"]}, "scenes"),
+        ({"scenes": ["bend_fall"], "methods": ["pod"], "solver": "lu"}, "splu, splu-columns"),
+        ({"scenes": ["bend_fall"], "methods": ["pod"], "threads": 3}, "threads = 3.*1 or 2"),
+        ({"scenes": ["bend_fall", "bend_fall"], "methods": ["pod"]}, "twice"),
+    ],
+)
+def test_faulty_studies_name_key_and_value(config, message):
+    with pytest.raises(ConfigurationError, match=message):
+        Study.load(config, ROOT)
+
+
+@pytest.mark.parametrize(("rate", "stable"), [(124.9, True), (125.0, False)])
+def test_explicit_drag_beyond_its_stability_limit_is_refused(rate, stable):
+    """Free flight multiplies the velocity by 1 - c h: it decays for c h < 2 only (h = 0.016 s)."""
+    effects = ({"effect": "spring", "weight": 1.0}, {"effect": "damping", "rate": rate})
+    if stable:
+        scene = make_scene(*effects, frames=1)
+        velocities = np.ones_like(scene.mesh.points)
+        after, _ = scene.stepper().step(State(scene.mesh.points.copy(), velocities), 0)
+        assert np.abs(after.velocities).max() < 1.0
+        return
+    with pytest.raises(ValueError, match="allowed are rates below 125"):
+        make_scene(*effects)

@@ -1,0 +1,354 @@
+"""Selections and reductions of whole methods: the presets and every other combination."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from pdrom.core.errors import RankError, StorageError
+from pdrom.core.store import write_hdf5
+from pdrom.reduction.basis import Basis, compute_basis, save_basis
+from pdrom.reduction.method import MethodSpec, load_methods
+from pdrom.reduction.sampling import Reduction, Sampling, select, select_path
+from places import CONFIG
+from study.experiments.kit.load_reduction import load_reduction
+
+ELEMENTS, P = 14, 2
+ROWS = ELEMENTS * P
+SEEDS = st.integers(0, 2**32 - 1)
+PRESETS = load_methods(CONFIG / "methods.yaml")
+INGREDIENTS = {
+    "weighting": ("none", "mass"),
+    "centring": ("none", "affine", "mean-in-modes"),
+    "layout": ("vectorised", "per-axis"),
+    "rows": ("all", "scalar", "joint", "element"),
+    "selection": ("greedy", "pivoted-qr", "s-opt"),
+    "solve": ("square", "qr", "tikhonov"),
+}
+
+
+def combinations() -> dict[str, MethodSpec]:
+    """Every combination of ingredients that the specification admits."""
+    specs = {}
+    for values in itertools.product(*INGREDIENTS.values()):
+        try:
+            spec = MethodSpec(title="t", **dict(zip(INGREDIENTS, values, strict=True)))
+        except ValidationError:
+            continue
+        specs["/".join(values)] = spec
+    return specs
+
+
+EVERY = combinations()
+PROJECTIONS = {n: s for n, s in EVERY.items() if s.rows == "all" or s.solve != "tikhonov"}
+UNWEIGHTED = {n: s for n, s in PROJECTIONS.items() if s.weighting == "none"}
+
+
+def data(seed: int, n: int = 8) -> tuple[np.ndarray, np.ndarray]:
+    """Snapshots (n, rows, 3) and row masses."""
+    rng = np.random.default_rng(seed)
+    return rng.standard_normal((n, ROWS, 3)) + 2.0, rng.uniform(0.5, 2.0, ROWS)
+
+
+def reduction_of(p: np.ndarray, mass: np.ndarray, spec: MethodSpec, r: int) -> Reduction:
+    """Basis, selection and operator of one method."""
+    basis = compute_basis(p, mass, 0.0, P, spec)
+    return Reduction(basis, select(basis, spec, r), spec, r)
+
+
+def span_part(basis: Basis, v: np.ndarray, p: np.ndarray, per_axis: bool) -> np.ndarray:
+    """Best approximation of p in mean + span (of each axis by itself if ``per_axis``)."""
+    columns = p.reshape(len(p), -1).T - basis.mean[:, None]
+    best = np.zeros_like(columns)
+    for part in (slice(a, None, 3) if per_axis else slice(None) for a in range(3)):
+        c = np.linalg.lstsq(v[part], columns[part], rcond=None)[0]
+        best[part] = v[part] @ c
+    return (best + basis.mean[:, None]).T.reshape(p.shape)
+
+
+def test_the_presets_are_those_of_the_study():
+    assert set(PRESETS) == {
+        "pod", "deim", "qdeim", "deim-joint", "published", "block-deim", "block-qdeim", "gappy",
+        "bounded", "bounded-range", "s-opt", "block-s-opt",
+    }  # fmt: skip
+    assert len(EVERY) > 50
+
+
+@given(seed=SEEDS, name=st.sampled_from(list(PROJECTIONS)))
+def test_what_is_in_the_span_is_reproduced(name, seed):
+    spec = PROJECTIONS[name]
+    p, mass = data(seed)
+    reduction = reduction_of(p, mass, spec, 5)
+    inside = span_part(reduction.basis, reduction.v, p, reduction.blocks[0].axis is not None)
+    tolerance = 1e-11 * max(reduction.gain, 1.0)
+    np.testing.assert_allclose(reduction.reconstruct(inside), inside, atol=tolerance)
+
+
+@given(seed=SEEDS, name=st.sampled_from(list(EVERY)))
+def test_reconstruction_stays_in_the_space_and_keeps_its_input(name, seed):
+    spec = EVERY[name]
+    p, mass = data(seed)
+    before = p.copy()
+    reduction = reduction_of(p, mass, spec, 5)
+    result = reduction.reconstruct(p)
+    np.testing.assert_array_equal(p, before)
+    assert result.shape == p.shape
+    per_axis = reduction.blocks[0].axis is not None
+    inside = span_part(reduction.basis, reduction.v, result, per_axis)
+    np.testing.assert_allclose(result, inside, atol=1e-10 * np.abs(result).max())
+
+
+@given(seed=SEEDS, name=st.sampled_from(list(UNWEIGHTED)))
+def test_error_is_at_most_gain_times_that_of_the_best_approximation(name, seed):
+    """|| p - p^ || <= gain || (I - V V^T)(p - mean) || for data outside the training set."""
+    spec = PROJECTIONS[name]
+    p, mass = data(seed)
+    reduction = reduction_of(p, mass, spec, 5)
+    unseen = np.random.default_rng(seed + 1).standard_normal(p.shape)
+    per_axis = reduction.blocks[0].axis is not None
+    best = unseen - span_part(reduction.basis, reduction.v, unseen, per_axis)
+    error = unseen - reduction.reconstruct(unseen)
+    bound = reduction.gain * np.linalg.norm(best, axis=(1, 2))
+    assert (np.linalg.norm(error, axis=(1, 2)) <= bound * (1.0 + 1e-10)).all()
+
+
+@given(seed=SEEDS, name=st.sampled_from([n for n in UNWEIGHTED if UNWEIGHTED[n].rows != "all"]))
+def test_gain_is_the_norm_of_the_pseudo_inverse_and_attained(name, seed):
+    """Some sampled values are amplified by the gain: it is no mere bound."""
+    spec = PROJECTIONS[name]
+    p, mass = data(seed)
+    reduction = reduction_of(p, mass, spec, 5)
+    norms = [np.linalg.norm(np.linalg.pinv(b.matrix), 2) for b in reduction.blocks]
+    assert reduction.gain == pytest.approx(max(norms), rel=1e-6)
+    assert reduction.condition == pytest.approx(
+        max(np.linalg.cond(b.matrix) for b in reduction.blocks), rel=1e-6
+    )
+    assert reduction.gain >= 1.0 - 1e-12
+
+
+@given(seed=SEEDS)
+@pytest.mark.parametrize("rows", ["scalar", "element"])
+def test_error_with_mass_weighting_has_its_factor_in_the_mass_norm(rows, seed):
+    """|| (P^T V)^+ P^T M^(-1/2) ||_2 takes the place of the gain, see `Reduction.gain`."""
+    spec = MethodSpec(title="t", weighting="mass", centring="affine", rows=rows, solve="qr")
+    p, mass = data(seed)
+    reduction = reduction_of(p, mass, spec, 5)
+    block, weight = reduction.blocks[0], np.repeat(mass, 3)
+    factor = np.linalg.norm(block.operator / np.sqrt(weight[block.entries]), 2)
+    unseen = np.random.default_rng(seed + 1).standard_normal(p.shape)
+    centred = unseen.reshape(8, -1) - reduction.basis.mean
+    best = centred - (centred * weight) @ reduction.v @ reduction.v.T
+    error = (unseen - reduction.reconstruct(unseen)).reshape(8, -1)
+    norms = [np.linalg.norm(e * np.sqrt(weight), axis=1) for e in (error, best)]
+    assert (norms[0] <= factor * norms[1] * (1.0 + 1e-10)).all()
+
+
+@pytest.mark.parametrize("preset", ["deim", "qdeim", "deim-joint"])
+def test_square_methods_interpolate_the_sampled_entries(preset):
+    spec = PRESETS[preset]
+    p, mass = data(5)
+    reduction = reduction_of(p, mass, spec, 6)
+    unseen = np.random.default_rng(6).standard_normal(p.shape)
+    flat, result = unseen.reshape(8, -1), reduction.reconstruct(unseen).reshape(8, -1)
+    sampled = np.concatenate([b.entries for b in reduction.blocks])
+    assert len(sampled) == (18 if spec.rows == "joint" else 6)
+    np.testing.assert_allclose(result[:, sampled], flat[:, sampled], atol=1e-11 * reduction.gain)
+
+
+def test_pod_is_the_best_approximation_of_all_shared_methods():
+    p, mass = data(7)
+    errors = {}
+    for name, spec in PRESETS.items():
+        if spec.centring == "affine":
+            reduction = reduction_of(p, mass, spec, 4)
+            errors[name] = np.linalg.norm(p - reduction.reconstruct(p))
+    pod = errors.pop("pod")
+    basis = compute_basis(p, mass, 0.0, P, PRESETS["pod"])
+    assert pod == pytest.approx(np.linalg.norm(basis.singular_values[4:]), rel=1e-12)
+    assert len(errors) == 9
+    assert all(error > pod for error in errors.values())
+
+
+def test_whole_elements_have_a_smaller_gain_than_single_entries():
+    gains = {"deim": [], "block-deim": [], "qdeim": [], "block-qdeim": []}
+    for seed in range(20):
+        p, mass = data(seed)
+        for name, values in gains.items():
+            values.append(reduction_of(p, mass, PRESETS[name], 6).gain)
+    mean = {name: np.mean(values) for name, values in gains.items()}
+    assert mean["block-deim"] < mean["deim"]
+    assert mean["block-qdeim"] < mean["qdeim"]
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_only_sampled_elements_are_read(preset):
+    p, mass = data(9)
+    reduction = reduction_of(p, mass, PRESETS[preset], 4)
+    unsampled = np.setdiff1d(np.arange(ELEMENTS), reduction.elements)
+    assert (len(unsampled) == 0) == (preset == "pod")
+    other = p.reshape(8, ELEMENTS, P, 3).copy()
+    other[:, unsampled] = np.nan
+    np.testing.assert_array_equal(
+        reduction.reconstruct(other.reshape(p.shape)), reduction.reconstruct(p)
+    )
+
+
+def test_numbers_of_rows_and_elements():
+    p, mass = data(11)
+    by_name = {name: reduction_of(p, mass, spec, 4) for name, spec in PRESETS.items()}
+    assert by_name["pod"].rows_sampled == ROWS
+    assert by_name["block-deim"].rows_sampled == by_name["block-qdeim"].rows_sampled == 4 * P
+    assert by_name["deim-joint"].rows_sampled == 4
+    assert by_name["deim"].rows_sampled <= 4
+    for reduction in by_name.values():
+        assert len(reduction.elements) == len(np.unique(reduction.elements))
+
+
+# Axes ---------------------------------------------------------------------------------------
+
+
+def test_round_off_axis_does_not_enter_the_joint_method():
+    """A planar scene: z is round-off, its coefficients are zero and the gain is that of x, y."""
+    p, mass = data(13)
+    p[:, :, 2] = 1e-17 * np.random.default_rng(1).standard_normal(p.shape[:2])
+    basis = compute_basis(p, mass, 1e-13, P, PRESETS["deim-joint"])
+    spec = PRESETS["deim-joint"]
+    reduction = Reduction(basis, select(basis, spec, 5), spec, 5)
+    assert [b.axis for b in reduction.blocks] == [0, 1]
+    assert np.isfinite(reduction.gain)
+    assert not reduction.reconstruct(p)[:, :, 2].any()
+
+
+def test_singular_axis_is_a_failure_that_raises_nothing():
+    """z takes part through a mode beyond r only: at r its system is zero, but not round-off."""
+    spec = PRESETS["deim-joint"]
+    rng = np.random.default_rng(2)
+    p = np.zeros((6, ROWS, 3))
+    p[:5, :, :2] = 10.0 * rng.standard_normal((5, ROWS, 2))
+    p[5, :, 2] = 1e-3 * rng.standard_normal(ROWS)
+    basis = compute_basis(p, np.ones(ROWS), 1e-10, P, spec)
+    # exact zeros, as an exactly planar run gives them
+    v = basis.V.copy()
+    v.reshape(ROWS, 3, -1)[:, 2, :5] = 0.0
+    basis = Basis(**{**vars(basis), "V": v})
+    reduction = Reduction(basis, select(basis, spec, 5), spec, 5)
+    assert basis.active_axes == (True, True, True)
+    assert (reduction.gain, reduction.condition) == (np.inf, np.inf)
+    result = reduction.reconstruct(p)
+    assert np.isnan(result[:, :, 2]).all()
+    assert np.isfinite(result[:, :, :2]).all()
+
+
+def test_poorer_axis_of_a_basis_per_axis_fails_beyond_its_rank_only():
+    rng = np.random.default_rng(3)
+    p, mass = data(15)
+    p[:, :, 2] = rng.standard_normal((8, 2)) @ rng.standard_normal((2, ROWS))
+    joint = MethodSpec(title="t", layout="per-axis", rows="joint", solve="qr")
+    assert np.isfinite(reduction_of(p, mass, joint, 2).gain)
+    assert reduction_of(p, mass, joint, 5).gain == np.inf
+    everything = MethodSpec(title="t", layout="per-axis", rows="all")
+    full = reduction_of(p, mass, everything, 8)
+    np.testing.assert_allclose(full.reconstruct(p), p, atol=1e-11)
+
+
+def test_shared_coefficients_give_zero_in_a_flat_axis():
+    p, mass = data(17)
+    p[:, :, 2] = 0.0
+    result = reduction_of(p, mass, PRESETS["block-deim"], 5).reconstruct(
+        p + np.array([0.0, 0.0, 1.0])
+    )
+    assert np.abs(result[:, :, 2]).max() < 1e-13
+
+
+# Selection ----------------------------------------------------------------------------------
+
+
+@given(name=st.sampled_from(list(EVERY)))
+def test_path_holds_the_selection_of_every_rank(name):
+    spec = EVERY[name]
+    p, mass = data(19)
+    basis = compute_basis(p, mass, 0.0, P, spec)
+    path = select_path(basis, spec, [2, 5, 3])
+    assert set(path) == {2, 3, 5}
+    for r, sampling in path.items():
+        alone = select(basis, spec, r)
+        np.testing.assert_array_equal(sampling.entries, alone.entries)
+        np.testing.assert_array_equal(sampling.elements, alone.elements)
+
+
+def test_selection_is_what_the_specification_says():
+    """Each algorithm is reached: no two methods pick the same entries."""
+    p, mass = data(21)
+    names = ("deim", "qdeim", "deim-joint", "block-deim", "block-qdeim")
+    picks = set()
+    for name in names:
+        basis = compute_basis(p, mass, 0.0, P, PRESETS[name])
+        picks.add(tuple(select(basis, PRESETS[name], 7).entries.tolist()))
+    assert len(picks) == len(names)
+
+
+def test_more_modes_than_rows_end_in_an_infinite_gain():
+    p = np.random.default_rng(23).standard_normal((30, 6, 3))
+    reduction = reduction_of(p, np.ones(6), PRESETS["deim-joint"], 9)
+    assert reduction.gain == np.inf
+    assert len(reduction.elements) == 3
+
+
+@pytest.mark.parametrize("ranks", [[0], [0, 3], [9], [3, 9], [-1]])
+def test_impossible_ranks_are_named(ranks):
+    p, mass = data(25)
+    basis = compute_basis(p, mass, 0.0, P, PRESETS["deim-joint"])
+    with pytest.raises(RankError, match="allowed are 1 to 8"):
+        select_path(basis, PRESETS["deim-joint"], ranks)
+
+
+def test_no_rank_no_selection():
+    basis = compute_basis(np.zeros((4, ROWS, 3)), np.ones(ROWS), 0.0, P, PRESETS["deim"])
+    assert select_path(basis, PRESETS["deim"], []) == {}
+    with pytest.raises(RankError, match="numerical rank 0"):
+        select(basis, PRESETS["deim"], 1)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_reduction_from_files_is_the_same(preset, tmp_path):
+    spec = PRESETS[preset]
+    p, mass = data(27)
+    basis = compute_basis(p, mass, 0.0, P, spec)
+    sampling = select(basis, spec, 4)
+    save_basis(basis, tmp_path / "basis.h5")
+    with write_hdf5(tmp_path / "sampling.h5") as file:
+        file["r0004/entries"], file["r0004/elements"] = sampling.entries, sampling.elements
+    loaded = load_reduction(basis, tmp_path / "sampling.h5", spec, 4)
+    assert isinstance(loaded.sampling, Sampling)
+    np.testing.assert_array_equal(
+        loaded.reconstruct(p), Reduction(basis, sampling, spec, 4).reconstruct(p)
+    )
+    with pytest.raises(StorageError, match=r"sampling\.h5"):
+        load_reduction(basis, tmp_path / "sampling.h5", spec, 5)
+
+
+@pytest.mark.parametrize("selection", INGREDIENTS["selection"])
+@pytest.mark.parametrize("rows", ["scalar", "element"])
+def test_oversampling_starts_from_the_selection_and_lowers_the_gain(rows, selection):
+    """Single entries and elements, with three samples a mode and with a bound on the gain."""
+    p, mass = data(11)
+    start = MethodSpec(title="t", centring="affine", rows=rows, selection=selection, solve="qr")
+    reductions = {
+        key: reduction_of(p, mass, start.model_copy(update=changes), 4)
+        for key, changes in {
+            "start": {},
+            "three": {"oversampling": 3},
+            "bounded": {"oversampling": 2, "gain_bound": 1.5},
+        }.items()
+    }
+    first = reductions["start"].sampling.entries
+    for reduction in reductions.values():
+        np.testing.assert_array_equal(reduction.sampling.entries[: len(first)], first)
+        assert reduction.gain <= reductions["start"].gain * (1.0 + 1e-12)
+    per_sample = 1 if rows == "scalar" else 3 * P
+    assert len(reductions["three"].sampling.entries) == 12 * per_sample
+    assert len(reductions["bounded"].sampling.entries) >= 8 * per_sample
+    assert reductions["bounded"].gain <= 1.5

@@ -1,0 +1,330 @@
+"""The viewer: positions survive packing, the page is one file, and it works in a real browser."""
+
+import base64
+import io
+import json
+import zlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+from playwright.sync_api import Locator, Page
+
+from browser import browser_or_skip, page_at
+from pdrom.core.errors import StorageError
+from pdrom.core.packed import LEVELS, pack_positions
+from pdrom.model.effects.entries import effect_config
+from pdrom.model.mesh.generators import bar, cloth
+from pdrom.view import page as writer
+from pdrom.view.pack import FRAMES, pack_scene, shown_region
+from pdrom.view.page import write_page
+from pdrom.view.runs import ViewedRun, ViewedScene
+from pdrom.view.view import EYE, Y, rotation_to
+
+
+def unpack_positions(packed: dict[str, Any]) -> np.ndarray:
+    """The positions (F, N, 3) that the page draws."""
+    data = zlib.decompress(base64.b64decode(packed["changes"]))
+    changes = np.frombuffer(data, "<u2").reshape(packed["frames"], packed["vertices"], 3)
+    levels = np.cumsum(changes, axis=0, dtype=np.int64) % (LEVELS + 1)
+    return np.array(packed["low"]) + np.array(packed["step"]) * levels
+
+
+@given(st.integers(1, 4), st.integers(1, 5), st.floats(1e-6, 1e6), st.integers(0, 2**32 - 1))
+def test_positions_survive_packing_to_half_a_step(frames, vertices, size, seed):
+    positions = size * np.random.default_rng(seed).normal(size=(frames, vertices, 3))
+    positions[..., 2] = 0.5 * size  # a sheet without thickness
+    found = unpack_positions(pack_positions(positions))
+    box = np.ptp(positions, axis=(0, 1))
+    assert np.all(np.abs(found - positions) <= 0.5001 * box / LEVELS + 1e-15 * size)
+
+
+OBSTACLES = [
+    {"effect": "gravity"},
+    {"effect": "floor", "height": 1.0},
+    {"effect": "sphere", "centre": [0.0, 1.6, 0.0], "radius": 0.3, "friction": float("inf")},
+    {"effect": "box", "lower": [-0.5, 1.0, -0.5], "upper": [-0.2, 1.2, 0.5]},
+    {"effect": "plane", "point": [0.5, 1.5, 0.0], "normal": [-1.0, 0.3, 0.0]},
+]
+
+
+def viewed(
+    name: str = "sheet", frames: int = 12, runs: int = 2, effects: Sequence[dict] = ()
+) -> ViewedScene:
+    """A sheet that sinks; one reduced run is near it, the other one bends up and ends early."""
+    mesh = cloth(6, 6, "xz", 1.0, 2.0, 0.0)
+    t = np.linspace(0.0, 1.0, frames + 1)[:, None]
+    full = np.repeat(mesh.points[None], frames + 1, axis=0)
+    full[..., 1] -= t * mesh.points[:, 0] ** 2
+    bent = full.copy()
+    bent[..., 1] += 1.5 * t * np.abs(mesh.points[:, 0])
+    error = np.linspace(1e-3, 1.0, frames)
+    half = frames // 2
+    near = ViewedRun("spring", "near", "near", 6, full + 0.01, error, None, 0.5)
+    end = half + 1
+    far = ViewedRun("spring", "far", "far", 6, bent[:end], error[:half], half, None)
+    floor = np.geomspace(1e-9, 1e-2, frames)
+    return ViewedScene(
+        name, "A <sheet> <!--<script> </script>", mesh, 0.02, full, 1.0, floor, 9,
+        (near, far)[:runs], tuple(effect_config(entry, i) for i, entry in enumerate(effects)),
+    )  # fmt: skip
+
+
+def test_the_surface_alone_is_packed_and_few_frames():
+    mesh = bar(6, 4, 4)
+    positions = np.repeat(mesh.points[None], 3 * FRAMES, axis=0)
+    packed = pack_scene(ViewedScene("bar", "Bar", mesh, 0.01, positions, None))
+    assert packed["full"]["vertices"] == len(np.unique(mesh.triangles)) < mesh.vertices
+    assert FRAMES / 2 < packed["full"]["frames"] <= FRAMES + 1
+    assert unpack_positions(packed["full"])[0].max() == pytest.approx(mesh.points.max(), rel=1e-4)
+    assert json.dumps(packed, allow_nan=False)
+
+
+def test_every_obstacle_is_packed_with_its_surface():
+    packed = pack_scene(viewed(effects=OBSTACLES))
+    bodies = [np.array(body["points"]) for body in packed["bodies"]]
+    assert len(bodies) == 4  # gravity has none
+    floor, sphere, box, _ = bodies
+    assert floor[1] == pytest.approx(np.full(4, 1.0))
+    radii = np.linalg.norm(sphere.T - [0.0, 1.6, 0.0], axis=1)
+    assert radii == pytest.approx(0.3, abs=1e-3)  # coordinates have four digits
+    assert box.min(axis=1) == pytest.approx([-0.5, 1.0, -0.5])
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "whole"),
+    [
+        ({"centre": [0.0, -0.3, 0.0], "radius": 0.25}, True),
+        ({"centre": [0.0, -9.0, 0.0], "radius": 0.25}, False),
+        ({"centre": [0.0, -3.0, 0.0], "radius": 2.9}, False),
+    ],
+    ids=["beside", "far away", "larger than the run"],
+)
+def test_an_obstacle_near_the_run_is_shown_whole(obstacle, whole):
+    run = np.random.default_rng(0).uniform(-0.5, 0.5, (3, 20, 3))
+    effects = [effect_config({"effect": "sphere", **obstacle}, 0)]
+    low, high = shown_region(run, effects)
+    assert np.ptp(high - low) == pytest.approx(0.0)  # a cube
+    assert (low < run.min(axis=(0, 1))).all()
+    assert (high > run.max(axis=(0, 1))).all()
+    body = effects[0].body(low, high).points
+    assert ((body > low) & (body < high)).all() == whole
+    if not whole:
+        assert np.array_equal((low, high), shown_region(run, []))
+
+
+def test_a_page_that_is_too_large_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(writer, "LARGEST", 1000)
+    with pytest.raises(StorageError, match="choose fewer runs"):
+        write_page([viewed()], tmp_path / "x.html")
+    assert not list(tmp_path.iterdir())
+
+
+def test_no_title_ends_a_script_of_the_page(tmp_path):
+    write_page([viewed()], tmp_path / "x.html")
+    text = (tmp_path / "x.html").read_text("utf-8")
+    assert text.count("</script>") == 4
+    # neither the element's end nor what hides it from a browser: a comment in which a script begins
+    data = text.split('<script id="scenes" type="application/json">')[1].split("</script>")[0]
+    assert "<" not in data
+    assert json.loads(data)[0]["title"] == viewed().title
+
+
+@pytest.mark.parametrize(
+    ("pulls", "up"),
+    [
+        ([], [0.0, 1.0, 0.0]),
+        ([[0.0, -9.81, 0.0]], [0.0, 1.0, 0.0]),
+        ([[0.0, 0.0, -9.81]], [0.0, 0.0, 1.0]),
+        ([[0.0, 9.81, 0.0]], [0.0, -1.0, 0.0]),
+        ([[0.0, -3.0, 0.0], [4.0, 0.0, 0.0]], [-0.8, 0.6, 0.0]),
+        ([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]], [0.0, 1.0, 0.0]),
+    ],
+)
+def test_up_is_against_gravity_and_the_eye_turns_with_it(pulls, up):
+    effects = [{"effect": "gravity", "acceleration": pull} for pull in pulls]
+    view = pack_scene(viewed(effects=effects))["view"]
+    assert view["up"] == pytest.approx(up)
+    assert np.linalg.norm(view["eye"]) == pytest.approx(np.linalg.norm(EYE))
+    assert np.dot(view["eye"], up) == pytest.approx(EYE @ Y)
+
+
+@given(st.tuples(*3 * [st.floats(-1.0, 1.0)]).filter(lambda v: np.linalg.norm(v) > 0.1))
+def test_the_rotation_takes_y_there_and_mirrors_nothing(direction):
+    up = np.array(direction) / np.linalg.norm(direction)
+    found = rotation_to(up)
+    assert found @ Y == pytest.approx(up, abs=1e-9)
+    assert found.T @ found == pytest.approx(np.eye(3), abs=1e-6)
+    assert np.linalg.det(found) == pytest.approx(1.0)
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    """The page of two scenes in a headless browser; what it said and asked for is noted."""
+    browser_or_skip()
+    path = tmp_path_factory.mktemp("viewer") / "index.html"
+    sideways = [{"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]}]
+    scenes = [
+        viewed(),
+        viewed("other", runs=0),
+        viewed("obstacles", effects=OBSTACLES),
+        viewed("sideways", effects=sideways),
+    ]
+    write_page(scenes, path)
+    with page_at(path.as_uri(), width=1000, height=700) as page:
+        ready(page)
+        yield page
+
+
+def ready(page: Page) -> None:
+    """Wait until the page shows what was chosen."""
+    page.wait_for_selector('body[data-ready="yes"]')
+
+
+def choose(page: Page, **chosen: str) -> None:
+    """Choose from lists by the words shown."""
+    for name, label in chosen.items():
+        page.select_option(f"#{name}", label=label)
+        ready(page)
+
+
+def go_to(page: Page, frame: int) -> None:
+    """Move the slider as the keyboard does."""
+    page.focus("#frame")
+    page.keyboard.press("Home")
+    for _ in range(frame):
+        page.keyboard.press("ArrowRight")
+    page.wait_for_selector(f'body[data-frame="{frame}"]')
+
+
+def picture(element: Locator) -> np.ndarray:
+    """What is seen, (height, width, 3)."""
+    with Image.open(io.BytesIO(element.screenshot())) as image:
+        return np.asarray(image.convert("RGB"), dtype=int)
+
+
+def differ(first: np.ndarray, second: np.ndarray) -> bool:
+    """Whether more than a thousandth of the pixels changed clearly."""
+    return np.mean(np.abs(first - second).max(axis=2) > 30) > 1e-3
+
+
+@pytest.mark.slow
+def test_two_methods_and_two_frames_differ(opened: Page) -> None:
+    shapes = opened.locator("#shapes")
+    choose(opened, scene="sheet", method="near")
+    go_to(opened, 0)
+    start = picture(shapes)
+    assert np.mean(start.min(axis=2) < 200) > 0.01  # something is drawn
+    go_to(opened, 6)
+    near = picture(shapes)
+    assert differ(start, near)
+    assert "frame 6, 0.12 s" in opened.inner_text("#status")
+    choose(opened, method="far")
+    assert differ(near, picture(shapes))
+    assert "blew up at frame 6" in opened.inner_text("#about")
+    assert "Beyond frame 9" in opened.inner_text("#about")
+
+
+@pytest.mark.slow
+def test_views_and_scenes_are_chosen(opened: Page) -> None:
+    shapes = opened.locator("#shapes")
+    choose(opened, scene="sheet", method="near")
+    beside = picture(shapes)
+    choose(opened, view="on top of each other")
+    assert differ(beside, picture(shapes))
+    choose(opened, scene="other", view="side by side")
+    assert opened.locator("#method").is_disabled()
+    assert "A <sheet> <!--<script> </script>" in opened.inner_text("#about")
+
+
+@pytest.mark.slow
+def test_folds_are_seen_and_the_colour_of_distances_can_be_left_out(opened: Page) -> None:
+    """Lit: the grey sheet, bent as it is, has clearly lighter and darker faces."""
+    choose(opened, scene="sheet", method="far", view="side by side")
+    go_to(opened, 6)
+    shapes = picture(opened.locator("#shapes"))
+    red, _, blue = np.moveaxis(shapes, 2, 0)
+    grey = shapes[(red - blue > 8) & (red - blue < 30) & (red < 230)].mean(axis=1)
+    assert len(grey) > 1000
+    assert np.ptp(np.percentile(grey, [2, 98])) > 8
+    opened.uncheck("#colour")
+    ready(opened)
+    without = picture(opened.locator("#shapes"))
+    opened.check("#colour")
+    ready(opened)
+    blueish = (without[..., 2] - without[..., 0] > 40) & (without[..., 1] - without[..., 0] > 20)
+    assert differ(shapes, without)
+    assert blueish.sum() > 1000
+    yellow = (shapes[..., 0] - shapes[..., 2] > 80).sum()
+    assert yellow > 10 * (without[..., 0] - without[..., 2] > 80).sum(), "one colour alone"
+
+
+@pytest.mark.slow
+def test_the_axis_of_errors_fits_them_and_they_are_explained(opened: Page) -> None:
+    choose(opened, scene="sheet", method="near")
+    assert (
+        opened.get_attribute("#errors", "data-decades") == "-9 0"
+    )  # the floor begins at 1e-9, the largest error is 1
+    assert "over the full order's motion" in opened.inner_text("#about")
+    assert "largest 1.0 (frame 12), last 1.0 (frame 12)" in opened.inner_text("#about")
+
+
+@pytest.mark.slow
+def test_a_scene_with_another_gravity_is_seen_from_another_side(opened: Page) -> None:
+    """The same shape, whose up is another direction."""
+    shapes = opened.locator("#shapes")
+    choose(opened, scene="sheet", method="near", view="on top of each other")
+    go_to(opened, 0)
+    upright = picture(shapes)
+    choose(opened, scene="sideways", method="near")
+    go_to(opened, 0)
+    assert differ(upright, picture(shapes))
+    choose(opened, scene="sheet", method="near")
+    go_to(opened, 0)
+    assert not differ(upright, picture(shapes))
+    choose(opened, view="side by side")
+
+
+@pytest.mark.slow
+def test_obstacles_are_seen_in_both_views_and_stay(opened: Page) -> None:
+    """Translucent: the sheets behind them still change from frame to frame."""
+    shapes = opened.locator("#shapes")
+    for view in ("side by side", "on top of each other"):
+        choose(opened, view=view, scene="sheet", method="near")
+        go_to(opened, 0)
+        without = picture(shapes)
+        choose(opened, scene="obstacles", method="near")
+        go_to(opened, 0)
+        start = picture(shapes)
+        assert differ(without, start)
+        go_to(opened, 9)
+        assert differ(start, picture(shapes))
+    choose(opened, view="side by side", scene="sheet")
+
+
+@pytest.mark.slow
+def test_playing_goes_through_the_frames_and_stops(opened: Page) -> None:
+    choose(opened, scene="sheet", method="near")
+    go_to(opened, 0)
+    opened.focus("#play")
+    opened.keyboard.press("Enter")
+    opened.wait_for_selector('body:not([data-frame="0"])')
+    opened.keyboard.press("Enter")
+    assert opened.inner_text("#play") == "Play"
+    assert opened.get_attribute("#play", "aria-pressed") == "false"
+
+
+@pytest.mark.slow
+def test_nothing_is_asked_of_a_network_and_nothing_fails(opened: Page) -> None:
+    assert [url for url in opened.asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    assert opened.said == []
+
+
+def test_the_small_page_is_far_below_the_limit(tmp_path: Path) -> None:
+    write_page([viewed()], tmp_path / "x.html")
+    assert (tmp_path / "x.html").stat().st_size < 200_000

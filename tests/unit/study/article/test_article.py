@@ -1,0 +1,510 @@
+"""The article: every number is the PDF's and leads to its rows, no link is broken, it opens."""
+
+import base64
+import gzip
+import io
+import json
+import os
+import re
+import subprocess
+from collections.abc import Mapping
+from dataclasses import asdict
+from functools import cache
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote
+
+import pandas as pd
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from PIL import Image
+
+from browser import browser_or_skip, page_at
+from pdrom.core.errors import PaperError
+from pdrom.core.machine import machine
+from pdrom.core.store import atomic_path, write_table, write_text
+from places import ROOT
+from study.article.build import ASSETS, FOLDER, PAGES, article
+from study.article.latex import linked_table, plain_columns
+from study.article.tables import FACTS
+from study.article.verified import write_verified
+from study.paper.build import Facts
+from study.paper.figuretex import captions
+from study.paper.known import provenance
+from study.paper.macros import (
+    AGGREGATES,
+    MISSING,
+    format_number,
+    keys_of,
+    macros,
+    matching,
+    number_of,
+)
+from study.paper.source import documents
+from study.paper.tex import find_pdflatex, packages_of
+
+SPECIAL = r"""
+\documentclass{article}
+\input{preamble.tex}
+\title{One?\\[2pt] \large Two\ifpart\\ Part\fi}
+"""
+MAIN = r"""
+\begin{document}
+\begin{abstract}\ifpart Of \configuration{}.\else Full.\fi\end{abstract}
+% \section{Not there}
+\section{First}\label{sec:first}
+On \scene{bar\_a} it is \val{payoff|method=pod|error_train}, at most \val{payoff|error_train|max} of
+$K = \val{payoff|scenes|max}$, named \val{payoff|method=pod|position_basis}; equation
+\eqref{eq:one}, figure~\ref{fig:ladder}, table~\ref{tab:payoff}, theorem~\ref{thm:s},
+section~\ref{sec:more} \cite{Page63}. C1 holds.
+\known{Shown, \val{payoff|method=pod|scenes}.} \known{Left out, $x$.}
+\paragraph{Opening.} Words.
+\begin{equation}\label{eq:one} a = b \end{equation}
+\figureof{ladder}
+\longtableof{\small}{tab:payoff}{Caption.}{tab_payoff.tex}
+\end{document}
+"""
+SUPPLEMENT = r"""
+\renewcommand{\thesection}{S\arabic{section}}
+\renewcommand{\thefigure}{S\arabic{figure}}
+\renewcommand{\thetheorem}{S\arabic{theorem}}
+\begin{document}
+\section{More}\label{sec:more} See \ref{sec:first}.
+\figureof{spring_runs}
+\figureof{bar_runs}
+\begin{theorem}\label{thm:s} Let $x$ be \val{study|scenes}. \end{theorem}
+\end{document}
+"""
+TABLE = r"""\begin{longtable}{l>{\raggedright\arraybackslash}p{2cm}r}
+\captionrow
+\hline
+reduction & error & in \\
+\hline
+\endfirsthead
+\hline
+reduction & error & in \\
+\hline
+\endhead
+\texttt{pod} & \ensuremath{1.5\cdot 10^{-4}} & 3 \\
+\texttt{deim} & 0.25 & holds (4) \\
+\hline
+\end{longtable}
+"""
+CLAIM = """
+sets: {own: [numpy]}
+C1:
+  text: A <b> claim.
+  source: Somebody
+  paper: errors are large
+  section: "1"
+  shown: "2"
+  qualifiers: none
+  figure_or_table: ladder
+  published:
+    - {what: all rows, metric: local_share, where: {implementation: ["@own"]}, compare: ">=",
+       threshold: 0.7}
+  beyond: [{what: others, metric: local_share, compare: "<=", threshold: 0.7}]
+  changes: [{date: 2026-11-21, after_data: true, reason: "First version of it."}]
+"""
+PAYOFF = pd.DataFrame(
+    {
+        "method": ["pod", "deim"],
+        "position_basis": ["full", 'a, "b"'],
+        "scenes": [3, 4],
+        "error_train": [1.5e-4, 0.2512],
+    }
+)
+TESTS = {
+    "claim": "C1", "what": "all rows", "satisfied": 3, "of": 4, "least": 0.5, "median": 0.75,
+    "most": 1.0, "verdict": "holds",
+}  # fmt: skip
+
+
+def write_study(folder: Path) -> dict[str, object]:
+    """A manuscript of two documents with what it reads; arguments of `article`."""
+    tables = {
+        "payoff": PAYOFF,
+        "claims_tests": pd.DataFrame([{**TESTS, "part": "published"}, {**TESTS, "part": "beyond"}]),
+        "local_share": pd.DataFrame([{"implementation": "numpy", "local_share": 0.75}]),
+        "ladder": pd.DataFrame([{"gain": 2.0}]),
+        "claims": pd.DataFrame([{"claim": "C1", "verdict": "holds", "verdict_beyond": "depends"}]),
+    }
+    for name, table in tables.items():
+        write_table(table, folder / "tables" / f"{name}.csv")
+    facts = Facts(
+        captions={
+            "ladder": r"Steps. Errors of $r \le 6$ modes.",
+            "spring_runs": "Springs.",
+            "bar_runs": "Bars.",
+        },
+        part=None,
+        full_study="config/default.yaml",
+        tables={name: [{"scenes": 2}] for name in FACTS if name != "machine"},
+    )
+    texts = {"main": SPECIAL + MAIN, "supplement": SPECIAL + SUPPLEMENT}
+    preamble = (ROOT / "paper" / "preamble.tex").read_text(encoding="utf-8")
+    for name, text in {**texts, "preamble": preamble}.items():
+        write_text(text, folder / "paper" / f"{name}.tex")
+    data, whole = {**tables, "study": pd.DataFrame(facts.tables["study"])}, "".join(texts.values())
+    known = {"main": ["shown", "dropped"], "supplement": []}
+    origins = {
+        "known": known,
+        "numbers": {key: asdict(number_of(key, data)) for key in keys_of(whole)},
+        "tables": {"tab_payoff": ["payoff"]},
+    }
+    inputs = {
+        "numbers.json": json.dumps(origins),
+        "tab_payoff.tex": TABLE,
+        "macros.tex": macros(whole, data) + provenance(known, facts.part, facts.full_study),
+        "figures.tex": captions(facts.captions),
+    }
+    for name, text in inputs.items():
+        write_text(text, folder / "inputs" / name)
+    write_text(CLAIM, folder / "claims.yaml")
+    write_text(machine().model_dump_json(), folder / "machine.json")
+    for name in facts.captions:
+        write_text("%PDF-1.4", folder / "figures" / f"{name}.pdf")
+        with atomic_path(folder / "figures" / f"{name}.png") as path:
+            Image.new("RGB", (40, 20), "white").save(path, "PNG")
+    return {
+        "source": [str(folder / "paper" / "main.tex")],
+        "references": str(ROOT / "paper" / "references.bib"),
+        "tables": [str(folder / "tables" / f"{name}.csv") for name in tables],
+        "machine": str(folder / "machine.json"),
+        "inputs": [str(folder / "inputs" / n) for n in ("numbers.json", "tab_payoff.tex")],
+        "figures": [
+            str(folder / "figures" / f"{name}.{end}")
+            for name in facts.captions
+            for end in ("pdf", "png")
+        ],
+        "facts": facts,
+        "claims": folder / "claims.yaml",
+        "added": {"own": ["compiled"]},
+        **{name: ROOT / FOLDER / file for name, file in ASSETS.items()},
+    }
+
+
+def write_pages(given: dict[str, object], out: Path) -> Path:
+    """The article of a study, below ``out``."""
+    outputs = {name: str(out / place.pattern) for name, place in article.writes.items()}
+    article.function(**given, outputs=outputs)
+    return out / "article"
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The article of the small study; the page of models is another's."""
+    folder = tmp_path_factory.mktemp("article")
+    pages = write_pages(write_study(folder), folder)
+    (pages / "live.html").write_text("<!DOCTYPE html><title>Models</title>", encoding="utf-8")
+    return pages
+
+
+class Links(HTMLParser):
+    """Identifiers of a page, and its links with their words."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.names: list[str] = []
+        self.links: list[tuple[str, str, str]] = []  # class, address, words
+        self._open: list[str] | None = None
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = dict(attrs)
+        self.names += [str(found["id"])] if "id" in found else []
+        if tag == "a" and "href" in found:
+            self._open = [found.get("class") or "", str(found["href"]), ""]
+        elif tag in ("img", "script", "link"):
+            self.links.append((tag, found.get("src") or found.get("href") or "", ""))
+        elif tag == "annotation" and self._open:
+            self._open[2] = ""  # what follows is the formula's TeX
+
+    def handle_data(self, data: str) -> None:
+        if self._open:
+            self._open[2] += data
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag == "a" and self._open:
+            self.links.append((self._open[0], self._open[1], self._open[2]))
+            self._open = None
+
+
+@cache
+def table_at(path: Path) -> pd.DataFrame:
+    """Table that a page holds, its rows counted."""
+    page = path.read_text(encoding="utf-8")
+    packed = re.search(r'id="data">([^<]*)<', page)
+    assert packed
+    table = pd.read_csv(io.BytesIO(gzip.decompress(base64.b64decode(packed[1]))))
+    return table.assign(row=range(1, len(table) + 1))
+
+
+@cache
+def rows_at(path: Path, key: str) -> int:
+    """How many rows of a page's table agree with a key."""
+    parts = [re.fullmatch(r"(.*?)(!?=)(.*)", part) for part in key.split("|")]
+    return len(matching(table_at(path), [part.groups() for part in parts if part]))
+
+
+def as_shown(text: str) -> str:
+    """TeX of a number as the words of its link."""
+    found = re.fullmatch(r"\\ensuremath\{(.*)\}", text)
+    return (found[1] if found else text).replace(r"\_", "_").replace(r"\infty", r"\infty")
+
+
+def test_each_number_is_the_pdfs_and_leads_to_the_cells_that_it_was_rounded_from(small, tmp_path):
+    """The numbers of the macros, in order, and the rows of the page that a link opens."""
+    origins = json.loads((small.parent / "inputs" / "numbers.json").read_text(encoding="utf-8"))
+    seen = set()
+    for page in ("index.html", "supplement.html"):
+        for kind, address, words in Links(small / page).links:
+            key = unquote(address).removeprefix("tables/").replace(".html#", "|", 1)
+            if kind != "val" or key not in origins["numbers"]:
+                continue
+            number = origins["numbers"][key]
+            seen.add(key)
+            assert words == as_shown(number["text"])
+            table = table_at(small / "tables" / f"{number['table']}.html")
+            cells = table[number["column"]].iloc[number["rows"]]
+            value = AGGREGATES[number["take"]](cells) if number["take"] else cells.iloc[0]
+            assert format_number(value) == number["text"]
+    assert seen == set(origins["numbers"])
+
+
+def test_a_made_table_leads_to_its_rows(small):
+    rows = [link for link in Links(small / "index.html").links if "row=" in link[1]]
+    assert [(a, w) for _, a, w in rows] == [
+        ("tables/payoff.html#row=1", r"1.5\cdot 10^{-4}"),
+        ("tables/payoff.html#row=1", "3"),
+        ("tables/payoff.html#row=2", "0.25"),
+        ("tables/payoff.html#row=2", "4"),
+    ]
+
+
+RUNS = pd.DataFrame(
+    {"scene": ["a_b", "a_b", "c"], "group": ["x_y", "z", "z"], "error": [0.0123, 0.25, 0.5]}
+)
+
+
+@pytest.mark.parametrize(
+    ("cells", "key"),
+    [
+        (r"\texttt{a\_b} & x y & 3", "runs|scene=a_b|group=x_y"),
+        (r"\texttt{a\_b} $\times 4$ & z & 3", "runs|scene=a_b|group=z"),
+        (r"\texttt{a\_b} &  & 0.012", "runs|scene=a_b"),  # rounded
+        (r"\texttt{c} & full order & 0.50", "runs|scene=c|error=0.50"),
+        (r"\texttt{d} & z & 2 of 3", "runs|group=z"),
+    ],
+)
+def test_rows_agree_in_what_both_tables_have(cells, key):
+    text = rf"""\begin{{tabular}}{{llr}}
+scene & group & error \\
+{cells} \\
+\end{{tabular}}"""
+    made = linked_table(text, {"other": pd.DataFrame({"scene": ["c"]}), "runs": RUNS})
+    number = cells.rpartition(" & ")[2]
+    assert f"{key.encode().hex()}}}{{{number}}}" in made
+
+
+@pytest.mark.parametrize(
+    ("cell", "number"),
+    [
+        ("holds (2/3, 1/4)", "2/3, 1/4"),
+        (r"\textcolor{okred}{blow-up, 34}", "34"),
+        (r"$\ge$ 0.70", r"$\ge$ 0.70"),
+        ("3.4 (3.1 to 3.6) (loses)", "3.4 (3.1 to 3.6) (loses)"),
+        ("4 of 20", "4 of 20"),
+    ],
+)
+def test_a_number_among_words_is_a_link(cell, number):
+    made = linked_table(f"a & b \\\\\nnone & {cell} \\\\", {"runs": RUNS})
+    assert f"}}{{{number}}}" in made
+    assert "{none}" not in made
+
+
+def test_columns_are_plain_letters():
+    spec = r"\begin{tabular}{>{\raggedright\arraybackslash}p{1.5cm}r@{\,}X}"
+    assert plain_columns(spec) == r"\begin{tabular}{lrl}"
+
+
+def assert_links_resolve(pages: Path) -> int:
+    """Every link of every page leads to a file, and to a name or rows in it; how many there are."""
+    found = {path: Links(path) for path in pages.resolve().rglob("*.html")}
+    count = 0
+    for path, page in found.items():
+        for _, address, words in page.links:
+            if re.match("https?:|data:", address):
+                continue
+            file, _, name = unquote(address).partition("#")
+            target = (path.parent / file).resolve() if file else path
+            assert target.is_file(), f"{path.name}: {address}"
+            count += 1
+            if name and target.parent.name == "tables":
+                none = words == MISSING or name.endswith(("|count", "|distinct"))
+                assert none or rows_at(target, name), f"{path.name}: {address}"
+            elif name and target.suffix == ".html":
+                assert name in found[target].names, f"{path.name}: {address}"
+        assert len(set(page.names)) == len(page.names), path.name
+    return count
+
+
+def test_every_link_leads_somewhere(small):
+    assert assert_links_resolve(small) > 40
+
+
+def numbers_of_tex(sources: Mapping[str, str], inputs: Path, folder: Path) -> dict[str, str]:
+    """Number of every label, by its address in the article, as TeX counts; pictures are boxes."""
+    program = find_pdflatex(packages_of("".join(sources.values())), folder)
+    found = {}
+    for name, text in sources.items():
+        (folder / f"{name}.tex").write_text(rf"\PassOptionsToPackage{{demo}}{{graphicx}}{text}")
+        command = [program, "-interaction=nonstopmode", "-halt-on-error", f"{name}.tex"]
+        places = {**os.environ, "TEXINPUTS": f"{inputs.resolve()}:"}
+        done = subprocess.run(command, cwd=folder, env=places, capture_output=True, check=False)
+        assert done.returncode == 0, done.stdout[-500:]
+        labels = re.findall(
+            r"\\newlabel\{([^{}]+)\}\{\{([^{}]*)\}", (folder / f"{name}.aux").read_text("utf-8")
+        )
+        found |= {f"{PAGES[name]}#{label}": number for label, number in labels}
+    return found
+
+
+def test_references_have_the_numbers_of_the_pdf(small, tmp_path):
+    """Those of TeX's .aux files; of the full study, too, where a run has made its article."""
+    for pages in study_or_small(small):
+        paper, inputs = (
+            (pages.parent / "paper", pages.parent / "inputs")
+            if pages == small
+            else (ROOT / "paper", pages.parent / "paper")
+        )
+        (folder := tmp_path / str(pages == small)).mkdir()
+        numbers = numbers_of_tex(documents(paper), inputs, folder)
+        links = [link for page in PAGES.values() for link in Links(pages / page).links]
+        shown = {a: words.strip("()") for kind, a, words in links if a in numbers and not kind}
+        assert shown == {address: numbers[address] for address in shown}
+        kinds = {re.split("[#:]", address)[1] for address in shown}
+        assert {"eq", "fig", "tab", "thm", "sec"} <= kinds
+    assert ("claim", "claims.html#C1", "C1") in Links(small / "index.html").links
+
+
+def test_a_reference_to_nothing_is_named(tmp_path):
+    given = write_study(tmp_path)
+    path = tmp_path / "paper" / "main.tex"
+    write_text(path.read_text("utf-8").replace(r"\ref{thm:s}", r"\ref{thm:lost}"), path)
+    with pytest.raises(PaperError, match="no label thm:lost"):
+        write_pages(given, tmp_path)
+    assert not (tmp_path / "article" / "index.html").exists()
+
+
+def test_what_the_study_does_not_hold_is_left_out(small):
+    text = (small / "index.html").read_text(encoding="utf-8")
+    assert "Shown, " in text
+    assert "Left out" not in text
+    assert "Not there" not in text
+    assert "<strong>Opening.</strong> Words." in text
+    assert "Full." in text
+    assert "One? Two" in text
+    supplement = (small / "supplement.html").read_text(encoding="utf-8")
+    assert "<strong>Theorem S1</strong>" in supplement
+    claims = (small / "claims.html").read_text(encoding="utf-8")
+    assert "A &lt;b&gt; claim." in claims
+    assert "First version of it." in claims
+    assert "(implementation: numpy, compiled)" in claims
+
+
+def test_the_same_bytes_again(small, tmp_path):
+    again = write_pages(write_study(tmp_path), tmp_path)
+    for path in (p for p in again.rglob("*") if p.is_file() and p.name[0] != "."):
+        assert path.read_bytes() == (small / path.relative_to(again)).read_bytes(), path.name
+
+
+def study_or_small(small: Path) -> list[Path]:
+    """The small article and, where a run has made it, that of the full study."""
+    made = ROOT / "results" / "article"
+    return [small, *([made] if (made / "index.html").is_file() else [])]
+
+
+@pytest.mark.slow
+def test_the_article_of_the_study_has_no_broken_link(small):
+    for pages in study_or_small(small):
+        assert assert_links_resolve(pages) > 40
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (390, "light"), (1400, "dark")])
+def test_pages_open_without_a_message_and_axe_finds_no_error(small, width, scheme):
+    """The small article, and that of the study where there is one."""
+    browser_or_skip()
+    for pages in study_or_small(small):
+        for name in ("index", "claims", "tables", "tables/payoff"):
+            with page_at((pages / f"{name}.html").as_uri(), width, 900) as page:
+                page.emulate_media(color_scheme=scheme)
+                found = Axe().run(page, options={"preload": False}).response["violations"]
+                assert [(each["id"], each["nodes"][0]["html"]) for each in found] == [], name
+                assert page.evaluate("document.documentElement.scrollWidth") <= width
+                assert page.said == []
+                assert {url.split(":")[0] for url in page.asked} <= {"file", "data", "blob"}
+
+
+@pytest.mark.slow
+def test_a_link_opens_its_rows(small):
+    """The script of the page chooses the rows that the number was taken of."""
+    browser_or_skip()
+    for pages in study_or_small(small):
+        inputs = pages.parent / ("inputs" if pages == small else "paper")
+        numbers = json.loads((inputs / "numbers.json").read_text(encoding="utf-8"))["numbers"]
+        for table in {number["table"] for number in numbers.values()}:
+            keys = [key for key, number in numbers.items() if number["table"] == table]
+            with page_at((pages / "tables" / f"{table}.html").as_uri(), 900, 700) as page:
+                page.wait_for_selector("#rows td")
+                rows = page.evaluate(
+                    "keys => keys.map(pdromTable.matching)", [k.partition("|")[2] for k in keys]
+                )
+                for key, found in zip(keys, rows, strict=True):
+                    assert set(numbers[key]["rows"]) <= set(found), key
+                    assert numbers[key]["take"] or len(found) <= 1, key
+
+
+@pytest.mark.slow
+def test_a_figure_shows_the_scenes_of_another(small):
+    browser_or_skip()
+    write_verified({"figure spring_runs": "reproduced"}, small)
+    with page_at((small / "supplement.html").as_uri(), 900, 700) as page:
+        figure = page.locator("figure", has_text="Springs.")
+        own = figure.locator("img").get_attribute("alt")
+        figure.locator("select").select_option("bar_runs")
+        other = page.locator("[id='fig:spring_runs']")
+        assert other.locator("img").get_attribute("src") == "figures/bar_runs.webp"
+        assert "./reproduce figure bar_runs" in other.inner_text()
+        assert "Springs." not in other.inner_text()
+        assert "Last verification: not yet" in other.inner_text()
+        other.locator("select").select_option("spring_runs")
+        assert other.locator("img").get_attribute("alt") == own
+        assert "Springs." in other.inner_text()
+        assert "Last verification: reproduced" in other.inner_text()
+        assert page.said == []
+    write_verified({}, small)
+
+
+@pytest.mark.slow
+def test_the_outcome_of_a_verification_is_shown(small, tmp_path):
+    browser_or_skip()
+    write_verified({"table payoff": "differs, row 2", "claim C1": "reproduced"}, small)
+    with page_at(
+        (small / "tables" / "payoff.html").as_uri() + "#method=deim|error_train", 900, 700
+    ) as page:
+        page.wait_for_selector("#rows td.asked")
+        assert page.inner_text("[data-verified]") == "differs, row 2"
+        assert page.inner_text("#rows td.asked") == "0.2512"
+        assert "tolerance" in page.inner_text("#column")
+        page.get_by_role("button", name="All rows").click()
+        page.get_by_role("button", name="scenes").click()
+        page.get_by_role("button", name="scenes").click()
+        assert page.locator("#rows tbody tr").first.inner_text().startswith("2\tdeim")
+        assert page.evaluate("document.activeElement.textContent") == "scenes"
+        page.evaluate("location.hash = '#error_train%'")
+        page.wait_for_function("document.getElementById('every').hidden === false")
+        assert page.locator("#rows tbody tr").count() == 2
+        assert page.said == []
+    write_verified({}, small)

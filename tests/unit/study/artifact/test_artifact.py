@@ -1,0 +1,173 @@
+"""Artifacts: declarations are checked, settings typed, jobs run from plain data."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from pydantic import ValidationError
+
+from pdrom.core.store import checksum_path, read_table, write_table
+from pdrom.core.yamlfile import ConfigModel
+from study.artifact.artifact import Artifact, declare, declared_in, load, make, modules_in, normal
+from study.artifact.paths import File, Place
+from study.artifact.reads import (
+    Chosen,
+    EachOf,
+    Every,
+    PerScene,
+    Preferred,
+    ProjectFile,
+    Setting,
+    Settings,
+    SourcesOf,
+    TableOf,
+)
+from study.experiments.kit.declaration import Experiment, experiment, experiments
+
+SCENE, GROUP = Place("a/{scene}.csv"), Place("b/{scene}/{group}.csv")
+
+
+class Section(ConfigModel):
+    """As much of a section as the function asks for."""
+
+    factor: float
+
+    @property
+    def modules(self) -> list[str]:
+        """A module that the settings name."""
+        return ["pdrom.model.effects.gravity"]
+
+
+class Whole(Section):
+    """The section of the configuration."""
+
+    others: tuple[str, ...] = ("b",)
+
+    @property
+    def sources(self) -> list[str]:
+        """Files that people edit."""
+        return ["mesh.obj"]
+
+
+@experiment(
+    "Rows of {scene} times a factor",
+    reads={"table": SCENE, "section": Setting("section")},
+    writes={"out": Place("c/{scene}.csv")},
+)
+def multiplied(table: File, section: Section, out: File) -> None:
+    """Multiply a column."""
+    write_table(read_table(table.path) * section.factor, out.path)
+
+
+@dataclass
+class Sources:
+    """A study of two scenes."""
+
+    values: dict[str, Any] = field(default_factory=lambda: {"section": Whole(factor=2.0)})
+
+    def file(self, place, labels):
+        return place.at("r", **{name: labels[name] for name in place.labels})
+
+    def files(self, place, labels):
+        return [place.at("r", scene=scene) for scene in ("s", "t")]
+
+    def first(self, place, label, value):
+        return [place.at("r", scene="s", **{label: value})]
+
+    def chosen(self, place, first):
+        return self.files(place, {})[: 1 if first else None]
+
+    def table(self, name):
+        return f"r/tables/{name}.csv"
+
+    def published(self, name):
+        return [f"{name}.csv"]
+
+    def value(self, key, labels):
+        return self.values[key]
+
+    def per_scene(self, key):
+        return {"s": key}
+
+
+def test_a_job_runs_from_plain_data_and_says_what_made_it(tmp_path):
+    source, out = str(tmp_path / "a" / "s.csv"), str(tmp_path / "c" / "s.csv")
+    write_table(pd.DataFrame({"x": [1.0, 2.0]}), source)
+    settings = multiplied.settings(Sources(), {"scene": "s"})
+    make(
+        multiplied.address,
+        multiplied.rule,
+        settings=multiplied.plain(settings),
+        labels={"scene": "s"},
+        code="c0de",
+        inputs={"table": source},
+        outputs={"out": out},
+    )
+    assert read_table(out).x.tolist() == [2.0, 4.0]
+    assert "multiplied" in checksum_path(Path(out)).read_text()
+
+
+def test_a_job_depends_on_as_much_of_a_section_as_its_function_asks_for():
+    settings = multiplied.settings(Sources(), {"scene": "s"})
+    assert multiplied.plain(settings) == {"section": {"factor": 2.0}}
+    assert list(modules_in(settings)) == ["pdrom.model.effects.gravity"]
+
+
+@pytest.mark.parametrize("settings", [{"section": {"factor": "much"}}, {"section": {"other": 1}}])
+def test_faulty_settings_are_refused(settings, tmp_path):
+    write_table(pd.DataFrame({"x": [1.0]}), tmp_path / "a" / "s.csv")
+    inputs = {"table": str(tmp_path / "a" / "s.csv")}
+    with pytest.raises(ValidationError):
+        multiplied.perform(settings, inputs, {"out": str(tmp_path / "c" / "s.csv")})
+
+
+@pytest.mark.parametrize(
+    ("read", "paths"),
+    [
+        (GROUP, "r/b/s/g.csv"),
+        (Every(SCENE), ["r/a/s.csv", "r/a/t.csv"]),
+        (Preferred(GROUP, "group", "h"), ["r/b/s/h.csv"]),
+        (Chosen(SCENE, first=True), ["r/a/s.csv"]),
+        (TableOf("budget"), "r/tables/budget.csv"),
+        (ProjectFile("config/claims.yaml"), "config/claims.yaml"),
+        (SourcesOf("section"), ["mesh.obj"]),
+    ],
+)
+def test_files_are_asked_of_the_study(read, paths):
+    made = Artifact("a", "", normal({"x": read}), {"out": GROUP}, multiplied.function)
+    assert made.inputs(Sources(), {"scene": "s", "group": "g"}) == {"x": paths}
+
+
+def test_one_file_for_each_entry_of_a_setting():
+    entries = [File("", {"scene": "t"}), File("", {"scene": "s"})]
+    read = EachOf(SCENE, "cases")
+    assert read.paths(Sources({"cases": entries}), {}) == ["r/a/t.csv", "r/a/s.csv"]
+
+
+def test_settings_that_go_together_are_one_model():
+    read = Settings(Section)
+    assert read.value(Sources({"factor": 3.0}), {}) == Section(factor=3.0)
+    assert PerScene("frames").value(Sources(), {}) == {"s": "frames"}
+
+
+def test_labels_are_those_of_what_is_written():
+    made = Artifact("a", "", {}, {"x": SCENE, "y": GROUP}, multiplied.function)
+    assert made.labels == ["scene", "group"]
+
+
+def test_a_function_that_does_not_take_what_is_declared_is_refused():
+    made = Artifact("a", "", {"table": Every(SCENE)}, {"out": SCENE}, multiplied.function)
+    with pytest.raises(TypeError, match="a: missing a required argument: 'section'"):
+        declare(made, "out")
+
+
+def test_artifacts_are_found_and_loaded_by_their_address():
+    found = experiments()
+    assert list(found) == sorted(found)
+    assert {"fom", "pod", "reruns", "subspaces"} <= set(found)
+    for made in found.values():
+        assert load(made.address) is made
+        assert set(made.types) | set(made.files) == set(made.reads)
+    assert declared_in("pdrom.core", Experiment) == {}

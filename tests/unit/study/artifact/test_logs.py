@@ -1,0 +1,146 @@
+"""What a job leaves in its log, and what the user sees when it fails."""
+
+import errno
+import io
+import logging
+
+import pytest
+import scipy.linalg  # noqa: F401  -- loads libraries that have threads
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from pdrom.core.aside import sets_aside
+from pdrom.core.errors import INTERRUPTED, MeshError
+from study.artifact.logs import job_log, planning_log
+
+LOGGER = logging.getLogger("pdrom")
+
+
+@pytest.fixture
+def path(tmp_path):
+    """A log in a folder that does not exist yet."""
+    return tmp_path / "logs" / "rule" / "job.log"
+
+
+def test_messages_of_the_package_are_in_the_log(path):
+    with job_log(str(path)):
+        logging.getLogger("pdrom.model.mesh").info("made %d", 3)
+        logging.getLogger("pdrom.model.mesh").debug("hidden")
+        logging.getLogger("study.tables").info("wrote %d", 2)
+        logging.getLogger("other").error("elsewhere")
+    text = path.read_text()
+    assert "INFO" in text
+    first, second, last = text.splitlines()
+    assert first.endswith("pdrom.model.mesh: made 3")
+    assert second.endswith("study.tables: wrote 2")
+    assert "pdrom: used " in last
+
+
+def test_libraries_have_one_thread_in_a_job(path):
+    """Snakemake sets as many as the job claims, and timing jobs claim every core."""
+
+    def threads() -> set[int]:
+        return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+    with threadpool_limits(limits=2):
+        assert threads() == {2}
+        with job_log(str(path)):
+            assert threads() == {1}
+        assert threads() == {2}
+
+
+def test_damaged_results_are_set_aside_in_a_job_and_nowhere_else(path):
+    with pytest.raises(SystemExit), job_log(str(path)):
+        assert sets_aside()
+        raise MeshError("x")
+    assert not sets_aside()
+
+
+def test_a_new_job_starts_a_new_log(path):
+    for message in ("first", "second"):
+        with job_log(str(path)) as logger:
+            logger.info(message)
+    assert "second" in path.read_text()
+    assert "first" not in path.read_text()
+
+
+def test_a_mistake_of_the_user_is_one_line_without_traceback(path):
+    with pytest.raises(SystemExit) as caught, job_log(str(path)):
+        raise MeshError("a.obj: vertex 3 is nan")
+    assert caught.value.code == "pdrom: a.obj: vertex 3 is nan"
+    assert "ERROR   pdrom: a.obj: vertex 3 is nan" in path.read_text()
+    assert "Traceback" not in path.read_text()
+
+
+def test_any_other_failure_keeps_its_traceback_in_the_log(path):
+    with pytest.raises(SystemExit) as caught, job_log(str(path)):
+        raise ZeroDivisionError("by zero")
+    assert caught.value.code == f"pdrom: ZeroDivisionError: by zero (traceback in {path})"
+    assert "Traceback" in path.read_text()
+    assert "test_logs.py" in path.read_text()
+
+
+@pytest.mark.parametrize("failure", [None, MeshError("x"), ValueError("x"), KeyboardInterrupt()])
+def test_logger_is_as_before_whatever_happened(path, failure):
+    before = (list(LOGGER.handlers), LOGGER.level)
+    try:
+        with job_log(str(path)):
+            assert len(LOGGER.handlers) == len(before[0]) + 1
+            if failure is not None:
+                raise failure
+    except (SystemExit, KeyboardInterrupt):
+        assert failure is not None
+    assert (list(LOGGER.handlers), LOGGER.level) == before
+
+
+@pytest.mark.parametrize(
+    ("failure", "said"),
+    [
+        (MemoryError("Unable to allocate 9 GiB"), "out of memory (Unable to allocate 9 GiB)"),
+        (MemoryError(), "out of memory"),
+        (OSError(errno.ENOSPC, "No space left on device", "a.h5"), "no space left on the disk ("),
+        (OSError(errno.EDQUOT, "Disk quota exceeded"), "no space left on the disk ("),
+        (OSError(errno.EIO, "Input/output error"), "OSError: [Errno 5] Input/output error"),
+    ],
+)
+def test_lack_of_memory_or_space_is_said_in_words(path, failure, said):
+    with pytest.raises(SystemExit) as caught, job_log(str(path)):
+        raise failure
+    assert caught.value.code.startswith(f"pdrom: {said}")
+    assert f"ERROR   pdrom: {said}" in path.read_text()
+
+
+def test_an_interrupted_job_ends_without_a_traceback(path, capfd):
+    with pytest.raises(SystemExit) as caught, job_log(str(path)):
+        raise KeyboardInterrupt
+    assert caught.value.code == INTERRUPTED
+    assert path.read_text().endswith("ERROR   pdrom: interrupted\n")
+    assert capfd.readouterr().err == ""
+
+
+def test_a_log_that_cannot_be_written_is_named(tmp_path):
+    (tmp_path / "logs").write_text("a file in place of the folder")
+    with pytest.raises(SystemExit) as caught, job_log(str(tmp_path / "logs" / "job.log")):
+        pass
+    assert "job.log: cannot be written (" in caught.value.code
+
+
+def test_a_full_disk_prints_no_traceback_for_each_message(path, capfd, monkeypatch):
+    """The log is cut short; what the job itself cannot write is another matter."""
+    with (
+        job_log(str(path)) as logger,
+        open("/dev/full", "wb", buffering=0) as full,
+        monkeypatch.context() as patch,
+    ):
+        stream = io.TextIOWrapper(full, write_through=True)
+        patch.setattr(logger.handlers[-1], "stream", stream)
+        logger.info("a message")
+    assert capfd.readouterr().err == ""
+
+
+def test_warnings_of_the_planning_are_shown_once(capsys):
+    for quiet in (False, True):
+        with planning_log(quiet):
+            logging.getLogger("pdrom.anything").warning("look")
+            logging.getLogger("pdrom.anything").info("not shown")
+    assert capsys.readouterr().err == "pdrom: warning: look\n"
+    assert logging.getLogger("pdrom").handlers == []

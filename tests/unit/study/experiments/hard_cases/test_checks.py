@@ -1,0 +1,85 @@
+"""The checks find what they are for: each is shown a run that breaks it, and one that does not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from study.experiments.hard_cases.catalogue import CASES
+from study.experiments.hard_cases.checks import CHECKS, faults
+from study.experiments.hard_cases.record import record
+from study.experiments.hard_cases.roundoff import Roundoff
+from study.experiments.hard_cases.runs import full_order
+
+CASE = CASES["inverted_uneven"]
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return CASE.scene()
+
+
+@pytest.fixture(scope="module")
+def run(scene):
+    return full_order(CASE, scene)
+
+
+def with_last(array, value):
+    changed = array.copy()
+    changed[-1] = value
+    return changed
+
+
+def broken(run, check):
+    """The run with one thing wrong that ``check`` is there for."""
+    drift = run.velocities.copy()
+    drift[10:, :, 0] += 1e-6 * np.abs(run.velocities).max()
+    squeezed = run.positions[-1] * [1.0, 0.9, 1.0]
+    changes = {
+        "finite": {"positions": run.positions[:-1], "blowup_frame": 59},
+        "bounded": {"positions": with_last(run.positions, 3.0 * run.positions[-1])},
+        "objective": {"excess": with_last(run.excess, 1e-12)},
+        "energy": {"energy": with_last(run.energy, 1.001 * run.energy[0])},
+        "momentum": {"velocities": drift},
+        "determinism": {"positions": np.nextafter(run.positions, np.inf)},
+        "recovers": {"positions": with_last(run.positions, squeezed)},
+        "still": {},
+    }
+    return replace(run, **changes[check])
+
+
+@pytest.mark.parametrize("check", CHECKS)
+def test_a_check_finds_its_fault(check, scene, run):
+    if check != "still":
+        assert CHECKS[check](CASE, scene, run) == ""
+    assert CHECKS[check](CASE, scene, broken(run, check)) != ""
+
+
+def test_what_is_not_refused_is_a_fault():
+    assert faults(replace(CASE, holds=("refused",))) == ["was not refused"]
+
+
+class TooStrong:
+    """A group that writes a wrong right-hand side: the local step descends no longer."""
+
+    name = "wrong"
+
+    def __init__(self, group, factor):
+        self.group, self.factor = group, factor
+
+    def begin_frame(self, q):
+        self.group.begin_frame(q)
+
+    def accumulate(self, y, rhs):
+        part = np.zeros_like(rhs)
+        energy = self.group.accumulate(y, part)
+        rhs += self.factor * part
+        return energy
+
+
+@pytest.mark.parametrize(("error", "rises"), [(0.0, False), (1e-8, True)])
+def test_the_allowance_tells_a_wrong_projection_from_rounding(scene, error, rises):
+    """At rest the objective is zero: a right-hand side that is wrong by 1e-8 moves it away."""
+    loop = scene.stepper(local_steps=[TooStrong(scene.groups[0], 1.0 + error)])
+    found = record(scene, loop, scene.initial_state(), Roundoff(scene, loop))
+    assert (found.excess.max() > 0.0) == rises

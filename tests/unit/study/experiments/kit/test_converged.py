@@ -1,0 +1,77 @@
+"""The limit K -> infinity: L-BFGS against dense solves, SciPy's minimiser and very many steps."""
+
+import numpy as np
+import pytest
+from scipy import optimize, sparse
+
+from builders import make_scene
+from pdrom.model.dynamics.stepper import Stepper
+from study.experiments.kit.converged import ConvergedStepper, minimise
+
+SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
+EFFECTS = ({"effect": "gravity"}, {"effect": "floor"}, {"effect": "pins", "select": "left"})
+
+
+def sheet(group: str = "spring", **settings):
+    return make_scene(*EFFECTS, {"effect": group, "weight": 1e5}, mesh=SHEET, **settings)
+
+
+def positive(rng, n: int) -> sparse.csr_array:
+    a = rng.standard_normal((n, n))
+    return sparse.csr_array(a @ a.T + n * np.eye(n))
+
+
+def test_a_quadratic_ends_at_its_minimum(rng):
+    """Hessian H = A + B differs from the metric A, as with any nonlinear projection."""
+    a, b = positive(rng, 8), positive(rng, 8)
+    hessian = (a + b).toarray()
+    load = rng.standard_normal((8, 3))
+
+    def evaluate(y):
+        gradient = hessian @ y - load
+        value = 0.5 * float(np.vdot(y, hessian @ y)) - float(np.vdot(y, load))
+        return value, y - np.linalg.solve(a.toarray(), gradient)
+
+    end = minimise(evaluate, a, np.zeros((8, 3)), 1e-10, 500)
+    assert end.change <= 1e-10
+    np.testing.assert_allclose(end.y, np.linalg.solve(hessian, load), rtol=0.0, atol=1e-8)
+
+
+def test_a_metric_far_from_the_hessian_is_enough():
+    """It need only bound the Hessian, as the system matrix does."""
+    bound = 5000.0
+    a = sparse.csr_array(bound * np.eye(2))
+
+    def rosenbrock(y):
+        value = float(optimize.rosen(y.ravel()))
+        return value, y - optimize.rosen_der(y.ravel()).reshape(y.shape) / bound
+
+    end = minimise(rosenbrock, a, np.full((2, 3), 0.6), 1e-10, 5000)
+    assert end.change <= 1e-10
+    np.testing.assert_allclose(end.y, 1.0, atol=1e-4)
+
+
+def test_the_limit_ends_the_search_and_is_reported(rng):
+    scene = sheet()
+    loop = ConvergedStepper(scene, scene.system, 1e-14, 3)
+    loop.step(scene.initial_state(), 0)
+    assert loop.evaluations == [3]
+    assert not loop.converged
+
+
+@pytest.mark.parametrize("group", ["spring", "strain"])
+def test_a_frame_ends_where_very_many_iterations_end(group, rng):
+    scene = sheet(group)
+    state = scene.initial_state(0.02 * rng.standard_normal(scene.mesh.points.shape))
+    best = ConvergedStepper(scene, scene.system, 1e-11, 2000)
+    config = scene.config
+    plain = Stepper(scene.space(scene.system), config.time_step, 10_000, scene.groups)
+    for frame in range(3):
+        expected, report = plain.step(state, frame)
+        state, _ = best.step(state, frame)
+        # the plain iteration stands still
+        assert report.objective[-2] - report.objective[-1] <= 1e-10 * report.objective[-1]
+        np.testing.assert_allclose(state.positions, expected.positions, rtol=0.0, atol=2e-7)
+        state = expected
+    assert best.converged
+    assert max(best.evaluations) < 500

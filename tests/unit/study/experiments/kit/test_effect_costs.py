@@ -1,0 +1,119 @@
+"""Cost of effects: every listed one is asked and counted, absent ones are not there at all."""
+
+import numpy as np
+import pytest
+
+from builders import make_scene
+from pdrom.model.constraints.local_kernel import LocalPass
+from study.experiments.kit.effect_costs import (
+    COSTS,
+    LEFT_OUT,
+    Timed,
+    effect_costs,
+    left_out,
+    left_out_sets,
+)
+from study.experiments.kit.names import GLOBAL, REST, RIGHT
+
+EFFECTS = (
+    {"effect": "gravity"},
+    {"effect": "floor"},
+    {"effect": "pins", "select": "left"},
+    {"effect": "pins", "select": "right", "until": 2},
+    {"effect": "spring", "weight": 1e5},
+    {"effect": "strain", "weight": 1e4},
+)
+
+
+def test_every_effect_has_a_row_and_the_shares_are_whole():
+    scene = make_scene(*EFFECTS)
+    table = effect_costs(scene, scene.system, 3, 1, 3)
+    assert list(table.columns) == COSTS
+    expected = {
+        "spring": scene.group("spring").elements, "strain": scene.group("strain").elements,
+        "gravity": 30, "pins": 2 * 5, "floor": 30, RIGHT: 30, GLOBAL: 30, REST: 30,
+    }  # fmt: skip
+    assert dict(zip(table.effect, table.elements, strict=True)) == expected
+    assert (table.ms_per_frame > 0.0).all()
+    assert table.share.sum() == pytest.approx(1.0)
+    inside = table[table.us_per_iteration > 0.0]
+    assert inside.effect.tolist() == ["spring", "strain", RIGHT, GLOBAL]
+    assert (1e-3 * 10 * inside.us_per_iteration <= inside.ms_per_frame * (1.0 + 1e-12)).all()
+
+
+def test_a_stand_in_answers_as_the_effect_does(rng):
+    scene = make_scene(*EFFECTS)
+    group = scene.group("strain")
+    y = scene.mesh.points + 0.01 * rng.standard_normal(scene.mesh.points.shape)
+    own, timed = np.zeros_like(y), np.zeros_like(y)
+    stand = Timed(group, ("begin_frame", "accumulate"))
+    stand.begin_frame(y)
+    assert stand.accumulate(y, timed) == group.accumulate(y, own)
+    assert (own == timed).all()
+    assert stand.seconds > 0.0
+    stand.reset()
+    assert stand.seconds == 0.0
+
+
+def test_a_timed_kernel_does_what_the_kernel_does(rng):
+    """In the compiled loop, which the stand-ins must not leave: they time what a run does."""
+    scene = make_scene(*EFFECTS)
+    group = scene.group("strain")
+    y = scene.mesh.points + 0.01 * rng.standard_normal(scene.mesh.points.shape)
+    own, other = np.zeros_like(y), np.zeros_like(y)
+    stand = Timed(group, ("begin_frame",))
+    kernel = LocalPass([stand.local_kernel])
+    for _ in range(1000):
+        other[...] = 0.0
+        energy = kernel.accumulate(y, other, 1)
+    assert energy == group.accumulate(y, own)
+    assert (own == other).all()
+    assert stand.seconds > 0.0
+    space = scene.space(scene.system)
+    assert space.compiled([Timed(g, ("begin_frame",)) for g in scene.groups]) is not None
+
+
+def test_effects_are_left_out_alone_and_groups_together():
+    effects = (*EFFECTS, {"effect": "bending", "weight": 1.0})
+    sets = left_out_sets(make_scene(*effects))
+    assert sets == [
+        (), ("gravity",), ("floor",), ("pins",), ("spring",), ("strain",), ("bending",),
+        ("spring", "strain"), ("spring", "bending"), ("strain", "bending"),
+    ]  # fmt: skip
+    assert left_out_sets(make_scene({"effect": "spring", "weight": 1.0})) == []
+
+
+def test_a_scene_without_an_effect_does_not_ask_it(monkeypatch):
+    """Not one call of the left-out projections happens, whatever their time would be."""
+    from pdrom.model.constraints.triangle_strain import TriangleStrain
+
+    scene = make_scene(*EFFECTS)
+    costs = effect_costs(scene, scene.system, 2, 0, 1)
+
+    def refuse(*_):
+        raise AssertionError("strain was asked")
+
+    monkeypatch.setattr(TriangleStrain, "accumulate", refuse)
+    with pytest.raises(AssertionError, match="strain was asked"):
+        left_out(scene, costs, 2, 0, 1, "splu")
+    monkeypatch.setattr("study.experiments.kit.effect_costs.left_out_sets", lambda _: [("strain",)])
+    table = left_out(scene, costs, 2, 0, 1, "splu")
+    assert list(table.columns) == LEFT_OUT
+    row = table.iloc[0]
+    assert (row.left_out, row.groups) == ("strain", 1)
+    assert row.elements == scene.group("strain").elements
+    assert row.own_ms == costs.set_index("effect").ms_per_frame["strain"]
+
+
+def test_what_is_left_out_is_saved_against_the_whole():
+    # a kick is over before the first frame
+    scene = make_scene({"effect": "kick", "speed": 0.1, "seed": 1}, *EFFECTS)
+    costs = effect_costs(scene, scene.system, 2, 0, 1)
+    table = left_out(scene, costs, 2, 0, 3, "splu")
+    assert table.left_out.tolist() == ["nothing", "gravity", "floor", "pins", "spring", "strain"]
+    assert table.groups.tolist() == [2, 2, 2, 2, 1, 1]
+    whole = table.ms_per_frame.iloc[0]
+    np.testing.assert_allclose(table.saved_ms, whole - table.ms_per_frame)
+    single = make_scene({"effect": "spring", "weight": 1.0})
+    costs = effect_costs(single, single.system, 1, 0, 1)
+    assert len(left_out(single, costs, 1, 0, 1, "splu")) == 0

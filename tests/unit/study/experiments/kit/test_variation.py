@@ -1,0 +1,54 @@
+"""Scenes at another time step and stiffness: what changes, and what stays in physical units."""
+
+import numpy as np
+import pytest
+
+from builders import make_scene
+from pdrom.model.runs.full_order import trajectory
+from pdrom.model.scene import Scene
+from study.experiments.kit.variation import varied
+
+EFFECTS = (
+    {"effect": "gravity"},
+    {"effect": "pins", "select": "top", "until": 10},
+    {"effect": "spring", "weight": 1e4},
+    {"effect": "strain", "weight": 1e3},
+)
+
+
+@pytest.fixture
+def scene():
+    return make_scene(*EFFECTS, frames=20, reduce={"spring": {"train": 4}})
+
+
+def weights(config):
+    return {e.effect: e.weight for e in config.effects if hasattr(e, "weight")}
+
+
+def test_the_own_setting_is_the_scene_itself(scene):
+    config = varied(scene.config, 0.016, 1.0, 0.32, (2, 100))
+    assert config == scene.config
+
+
+def test_schedules_keep_their_seconds_and_only_the_reduced_weight_changes(scene):
+    config = varied(scene.config, 0.004, 100.0, 0.32, (2, 100))
+    assert (config.time_step, config.frames) == (0.004, 80)
+    assert config.effects[1].until == 40
+    assert weights(config) == {"spring": 1e6, "strain": 1e3}
+
+
+@pytest.mark.parametrize(("h", "frames"), [(1e-3, 50), (0.016, 20), (0.2, 5)])
+def test_frames_stay_within_their_limits(scene, h, frames):
+    assert varied(scene.config, h, 1.0, 0.32, (5, 50)).frames == frames
+
+
+def test_a_smaller_step_converges_to_the_same_motion():
+    """Implicit Euler is of first order: the difference to h / 4 is about a third of that to h."""
+    scene = make_scene({"effect": "gravity"}, EFFECTS[2], frames=20, iterations=5)
+    ends = {}
+    for h in (0.016, 0.004, 0.001):
+        fine = Scene.build(varied(scene.config, h, 1.0, 0.32, (2, 1000)), scene.mesh)
+        ends[h] = trajectory(fine)[-1]
+    coarse = np.linalg.norm(ends[0.016] - ends[0.001])
+    fine = np.linalg.norm(ends[0.004] - ends[0.001])
+    assert fine / coarse == pytest.approx(0.003 / 0.015, rel=1e-6)

@@ -1,0 +1,240 @@
+"""Rule alternatives: errors against both references, and the tables of the rows."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from builders import make_scene
+from pdrom.core.errors import ConfigurationError
+from pdrom.core.store import read_table, write_table
+from pdrom.core.yamlfile import validate
+from study.artifact.paths import File
+from study.experiments.alternatives import experiment, processes
+from study.experiments.alternatives.settings import Alternatives, Comparison
+from study.tables.alternatives import alternatives
+from study.tables.reduction_pays import reduction_pays
+from study.tables.winners import winners
+
+EFFECTS = (
+    {"effect": "gravity"},
+    {"effect": "pins", "select": "left"},
+    {"effect": "spring", "weight": 1e4},
+)
+STEPS = {
+    "projective": ((1, 5), (1, 2000), (8, 1)),
+    "newton": ((1, 20),),
+    "explicit": ((1, 1), (64, 1)),
+    "two-level": ((1, 20),),
+    "ecsw": ((1, 10), (4, 2)),
+    "ecsw-anderson": ((1, 10),),
+}
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    mesh = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
+    scene = make_scene(*EFFECTS, mesh=mesh, frames=8, held_out={"kick": 0.5})
+    folder = tmp_path_factory.mktemp("alternatives")
+    settings = experiment.Options(
+        scene=scene.config,
+        alternatives=Comparison(
+            compared=6,
+            stiffness={"test": (1.0, 4.0)},
+            steps=STEPS,
+            modes=(4,),
+            frames=2,
+            motions=("heldout", "stiffness"),
+            repeats=1,
+            processes=2,
+        ),
+        blowup_extent=100.0,
+    )
+    names = {"out": "x1.csv", "times": "x1_times.csv"}
+    files = {key: File(str(folder / name), {"factor": "1"}) for key, name in names.items()}
+    experiment.alternatives(sources=[], settings=settings, **files)
+    return files["out"], files["times"]
+
+
+@pytest.fixture(scope="module")
+def table(written):
+    parts, times = written
+    return alternatives([parts], [times])
+
+
+def test_rows_of_a_scene(written, table):
+    made = read_table(written[0].path)
+    assert made.columns.tolist() == experiment.COLUMNS
+    assert read_table(written[1].path).columns.tolist() == processes.COLUMNS
+    assert len(table) == len(made)
+    # a reduction is trained twice; Newton and explicit steps run one motion
+    all_of, deciding = sum(map(len, STEPS.values())), 3 + 1 + 2 + 1
+    assert table[table.motion == "heldout"].shape[0] == 2 * (1 + all_of + 3)
+    assert table[table.motion == "stiffness"].shape[0] == 2 * (1 + deciding + 3)
+    reduced = table[table.trained_on.notna()]
+    assert reduced.groupby("trained_on").size().to_dict() == {"converged": 16, "own iterations": 12}
+    timed = table[table.method != "converged"].set_index("method")
+    assert (timed.ms_per_frame > 0.0).all()
+    assert timed.processes.groupby("method").unique().map(list).to_dict() == {
+        "projective": [2], "newton": [1], "explicit": [1], "two-level": [2], "ecsw": [2],
+        "ecsw-anderson": [2],
+    }  # fmt: skip
+    stiffer = table[table.motion == "stiffness"].set_index(["method", "iterations"])
+    own = table[table.motion == "heldout"].set_index(["method", "iterations"])
+    # one time for a setting, an error for each motion
+    assert (
+        stiffer.ms_per_frame["projective", 5].tolist() == own.ms_per_frame["projective", 5].tolist()
+    )
+    assert (stiffer.error_implicit["projective", 5] != own.error_implicit["projective", 5]).all()
+
+
+def test_errors_of_a_scene(table):
+    table = table[(table.trained_on != "converged") & (table.motion == "heldout")]
+    case = table[table.stiffness == 1.0].set_index(["method", "substeps", "iterations"])
+    # many iterations end at the implicit step, many explicit steps in continuous time
+    assert case.error_implicit["newton", 1, 20] < 1e-4
+    assert case.error_implicit["projective", 1, 2000] < 1e-4
+    assert case.error_continuous["explicit", 64, 1] < 1e-3
+    own = table[(table.method == "converged") & (table.stiffness == 1.0)].iloc[0]
+    assert own.error_implicit == 0.0
+    assert own.error_continuous > 1e-3
+    assert case.error_continuous["newton", 1, 20] == pytest.approx(own.error_continuous, rel=1e-2)
+    assert case.elements_sampled["ecsw", 1, 10] > 0
+
+
+def test_a_finer_mesh_has_the_mass_of_the_scene():
+    config = make_scene(*EFFECTS, mesh={"kind": "cloth", "rows": 6, "columns": 5}).config
+    finer = experiment.sized(config, 2.0, 10.0)
+    mesh = finer.mesh.build(experiment.Path())
+    assert finer.vertex_mass * mesh.vertices == pytest.approx(30 * config.vertex_mass)
+    weights = [getattr(effect, "weight", None) for effect in finer.effects]
+    assert weights == [None, None, 1e5]
+
+
+def test_tables_of_the_rows(written, table):
+    times = [written[1]]
+    found = winners(table, times, [1.0, 1e-3, 1e-12])
+    assert len(found) == 2 * 2 * (3 + 2)
+    assert len(winners(alternatives([], []), [], [0.1])) == 0
+    strict = found[(found.limit == 1e-3) & (found.reference == "continuous")]
+    assert (strict[strict.motion == "heldout"].method == "explicit").all()
+    assert len(reduction_pays(found)) == 2 * (3 + 2)
+    assert len(reduction_pays(found[:0])) == 0
+    assert found[found.limit == 1e-12].method.isna().all()
+
+
+def test_winners_are_the_cheapest_that_reach_the_error(tmp_path):
+    labels = {
+        "scene": "s",
+        "factor": 1.0,
+        "stiffness": 1.0,
+        "substeps": 1,
+        "iterations": 1,
+        "k": np.nan,
+    }
+    rows = pd.DataFrame(
+        [
+            ("a", 1.0, 0.05), ("b", 2.0, 0.005), ("ecsw", 0.5, 0.02), ("c", 0.1, np.nan),
+            ("converged", np.nan, 0.0),
+        ],
+        columns=["method", "ms_per_frame", "error_implicit"],
+    ).assign(
+        **labels, trained_on=lambda t: t.method.map({"ecsw": "own iterations"}),
+        vertices=9, motion="heldout", error_continuous=lambda t: t.error_implicit,
+        reference_error=1e-2,
+    )  # fmt: skip
+    # the ratio in a process counts: both are slower in the second
+    ms = rows.dropna(subset="ms_per_frame").drop(columns="error_implicit")
+    slow = ms.assign(process=2, ms_per_frame=4.0 * ms.ms_per_frame)
+    measured = pd.concat([ms.assign(process=1), slow])[processes.COLUMNS]
+    write_table(measured, tmp_path / "times.csv")
+    found = winners(rows, [File(str(tmp_path / "times.csv"), {})], [0.1, 0.01])
+    found = found.set_index(["reference", "limit"])
+    loose, strict = found.loc[("implicit", 0.1)], found.loc[("implicit", 0.01)]
+    assert (loose.method, loose.second, loose.margin, loose.reduced_speedup) == ("a", "b", 2.0, 2.0)
+    assert (loose.reduced_speedup_low, loose.reduced_speedup_high) == (2.0, 2.0)
+    assert strict.method == "b"
+    assert pd.isna(strict.reduced_ms)
+    # the motion in continuous time is not known well enough for the smaller error
+    assert ("continuous", 0.1) in found.index
+    assert ("continuous", 0.01) not in found.index
+    assert strict.reduced_error == 0.02
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"steps": {"newtn": [[1, 1]]}}, "unknown method 'newtn'.*newton"),
+        ({"steps": {"newton": [[0, 1]]}}, "newton"),
+        ({"stiffness": {"s": [0.0]}}, "stiffness"),
+        ({"deciding": ["newtn"]}, "unknown method 'newtn'"),
+        ({"motions": ["kick"]}, "begins with 'heldout'"),
+    ],
+)
+def test_faulty_settings_are_refused(changes, message):
+    with pytest.raises(ConfigurationError, match=message):
+        validate(Alternatives, changes, "here")
+
+
+def test_steps_that_cost_too_much_are_left_out():
+    asked = Comparison(work={"newton": 200, "converged": 100}, steps=STEPS)
+    assert asked.pairs("newton", 10) == [(1, 20)]
+    assert asked.pairs("newton", 11) == []
+    assert asked.pairs("explicit", 10**6) == [(1, 1), (64, 1)]
+    assert asked.pairs("xpbd", 1) == []
+    assert asked.affords("converged", 100)
+    assert not asked.affords("converged", 101)
+
+
+def test_weights_vary_on_the_own_mesh_only():
+    asked = Comparison(stiffness={"s": (1.0, 100.0)})
+    assert asked.factors("s", 1.0) == (1.0, 100.0)
+    assert asked.factors("s", 2.0) == asked.factors("other", 1.0) == (1.0,)
+
+
+def test_the_size_from_which_a_reduction_pays():
+    rows = pd.DataFrame(
+        {
+            "vertices": [100, 400, 10_000],
+            "motion": "heldout",
+            "limit": 0.1,
+            "plain_ms": [2.0, 8.0, 200.0],
+            "reduced_ms": [1.0, 1.0, 1.0],
+            "reduced_speedup": [0.25, 0.5, 50.0],
+            "ms_per_frame": [0.25, 0.5, 50.0],
+            "reduced_speedup_low": [0.2, 0.4, 40.0],
+            "reduced_speedup_high": [0.3, 0.6, 60.0],
+            # what is trained on the scene's own iterations is slower
+            "own_ms": [1.0, 2.0, 2.0],
+        }
+    )
+    strict = rows.assign(limit=0.01, reduced_speedup=[0.5, np.nan, 3.0], plain_ms=np.nan)
+    never = rows.assign(limit=0.001, reduced_speedup=[3.0, 2.0, np.nan])
+    always = rows.assign(limit=0.5, reduced_speedup=[2.0, 2.0, 2.0])
+    both = pd.concat([never, always, strict, rows]).assign(
+        scene="s", stiffness=1.0, reference="implicit"
+    )
+    slower = both.assign(
+        motion="kick",
+        reduced_speedup=0.9 * both.reduced_speedup,
+        reduced_speedup_low=0.1 * both.reduced_speedup_low,
+    )
+    lost = both[both.limit == 0.5].assign(motion="stiffness", reduced_speedup=np.nan)
+    found = reduction_pays(pd.concat([both, slower, lost])).set_index("limit")
+    assert found.loc[0.1, ["smallest", "largest", "from_plain", "from_best"]].tolist() == [
+        100, 10_000, 100, 10_000,
+    ]  # fmt: skip
+    # a straight line in both logarithms; the worse motion counts
+    crossing = 400 * (10_000 / 400) ** (np.log(1.0 / 0.45) / np.log(100.0))
+    assert found.breaks_even[0.1] == pytest.approx(crossing)
+    assert (found.from_best_own[0.1], found.speedup_own[0.1]) == (10_000, 25.0)
+    assert (found.speedup_low[0.1], found.speedup_high[0.1]) == (4.0, 60.0)
+    assert found.speedup[0.1] == 47.5
+    assert (found.motions[0.1], found.reached[0.1]) == (2, 2)
+    assert found.from_best[0.01] == 10_000
+    assert pd.isna(found.from_plain[0.01])
+    assert pd.isna(found.breaks_even[0.01])
+    assert pd.isna(found.from_best[0.001])
+    # one motion does not reach it on the largest mesh
+    assert (found.motions[0.5], found.reached[0.5]) == (3, 2)
+    assert pd.isna(found.from_best[0.5])
+    assert pd.isna(found.breaks_even[0.5])

@@ -1,0 +1,147 @@
+"""Models of the page: written by the experiment, run by the page's engine as pdrom runs them."""
+
+import json
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from builders import GROUPS, make_scene
+from node import RUN, evaluate
+from pdrom.core.errors import SceneError, StorageError
+from pdrom.model.scene import Scene
+from pdrom.reduction.subspace import exported
+from pdrom.reduction.subspace.exported import export_scene
+from pdrom.reduction.subspace.model import SubspaceModel
+from study.experiments import live as module
+from written_models import write_models
+
+FRAMES = 24
+PULL = [{"effect": "gravity"}, {"effect": "damping", "rate": 0.5}]
+BELOW = 0.02  # a shape at rest lies the floor, m
+WEIGHTS = {"spring": 1e3, "strain": 1e4, "tetrahedron_strain": 1e6, "deformation_gradient": 1e6}
+
+
+def scene_with(group: str, *more: Mapping) -> Scene:
+    """A body of one group that hangs from its left side for a while, then falls on a floor."""
+    pins = {"effect": "pins", "select": "left", "until": 9}
+    own = {"effect": group, "weight": WEIGHTS[group]}
+    settings = {"mesh": GROUPS[group], "frames": FRAMES, "iterations": 4}
+    rest = make_scene(own, **settings).mesh.points
+    floor = {"effect": "floor", "height": float(rest[:, 1].min()) - BELOW}
+    return make_scene(*PULL, floor, pins, own, *more, **settings)
+
+
+def positions(scene: Scene, model: SubspaceModel) -> np.ndarray:
+    """Positions (F + 1, N, 3) of pdrom's own run."""
+    loop, state = model.loop(scene)
+    found = [state.positions]
+    for frame in range(scene.config.frames):
+        state, _ = loop.step(state, frame)
+        found.append(state.positions)
+    return np.stack([model.positions(z) for z in found])
+
+
+@pytest.mark.parametrize("group", WEIGHTS)
+def test_the_engine_runs_a_model_as_pdrom_does(group, tmp_path):
+    scene = scene_with(group)
+    file, model = write_models(scene, tmp_path)
+    (run,) = evaluate(RUN, file, frames=FRAMES)
+    assert run["elements"] == model.elements_evaluated(scene)
+    found = model.columns.B @ np.reshape(run["coordinates"], (FRAMES + 1, -1, 3))
+    own = positions(scene_with(group), model)
+    floor = scene.mesh.points[:, 1].min() - BELOW
+    assert own[-1][:, 1].min() == pytest.approx(floor, abs=0.02), "it fell on the floor"
+    assert np.abs(found - own).max() < 1e-10
+    assert (tmp_path / "test.js").read_bytes() == write_models(scene, tmp_path)[0].read_bytes()
+
+
+def test_a_large_basis_is_short_but_for_what_is_computed_with(tmp_path, monkeypatch):
+    monkeypatch.setattr(exported, "DOUBLES", 10)
+    monkeypatch.setattr(exported, "PROBES", 4)
+    scene = scene_with("strain")
+    file, model = write_models(scene, tmp_path)
+    basis = evaluate("return new engine.Basis(data, data.bases[0]).B;", file)
+    own = model.columns.B
+    apart = np.abs(np.reshape(basis, own.shape) - own).max(axis=1)
+    needed = exported.needed_vertices(scene, [model])
+    assert apart[needed].max() == 0.0
+    assert 0.0 <= apart.max() < 1e-6
+
+
+def test_a_handle_takes_its_vertices_where_the_reader_does(tmp_path):
+    """Offsets are from where it was taken hold of; what moves only that is no new shape."""
+    file, model = write_models(scene_with("spring"), tmp_path)
+    script = """
+    const run = new engine.Run(data, data.models[0], new engine.Basis(data, data.bases[0]));
+    for (let frame = 0; frame < 5; frame++) run.step(new Map([[0, [0, 0.1 * frame, 0.2]]]));
+    return run.z;
+    """
+    atom = model.columns.atoms[0]
+    found = (model.columns.B @ np.reshape(evaluate(script, file), (-1, 3)))[atom]
+    start = scene_with("spring").mesh.points[atom]
+    assert found == pytest.approx(start + np.array([0.0, 0.4, 0.2]), abs=1e-12)
+
+
+def test_a_file_that_is_too_large_names_the_keys(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "LARGEST", 100)
+    with pytest.raises(StorageError, match=r"live\.sizes, live\.tolerances"):
+        write_models(scene_with("spring"), tmp_path)
+    assert not (tmp_path / "test.js").exists()
+
+
+@pytest.mark.parametrize(
+    ("effect", "named"),
+    [
+        ({"effect": "sphere", "centre": [0.0, -2.0, 0.0], "radius": 0.5}, "'sphere'"),
+        ({"effect": "translate", "select": "right", "over": 3, "offset": [0, 1, 0]}, "'translate'"),
+        ({"effect": "area", "weight": 1.0}, "'area'"),
+    ],
+)
+def test_what_the_engine_does_not_know_is_refused(effect, named):
+    with pytest.raises(SceneError, match=f"no {named} .*allowed: spring"):
+        export_scene(scene_with("spring", effect))
+
+
+def test_an_accelerated_scene_is_refused():
+    scene = make_scene({"effect": "spring", "weight": 1.0}, anderson_window=3)
+    with pytest.raises(SceneError, match="anderson_window = 3"):
+        export_scene(scene)
+
+
+MATRICES = """
+return given.matrices.map((matrix) => {
+  const d = Float64Array.from(matrix), p = new Float64Array(matrix.length);
+  engine[given.name](d, p, 0, given.low, given.high);
+  return p;
+});
+"""
+
+
+@pytest.mark.parametrize(("low", "high"), [(1.0, 1.0), (0.95, 1.1)])
+@pytest.mark.parametrize(("name", "rows"), [("clamp2", 2), ("clamp3", 3)])
+def test_projections_are_the_nearest_matrices(name, rows, low, high):
+    """Also of flat, turned over, tiny and huge ones, where the nearest one is unique."""
+    rng = np.random.default_rng(0)
+    matrices = rng.standard_normal((60, rows, 3))
+    matrices[20:40] = np.eye(3)[:rows] + 0.02 * matrices[20:40]
+    matrices[40:50, -1] = 1e-9 * matrices[40:50, -1] + matrices[40:50, 0]
+    matrices[50:] *= np.geomspace(1e-20, 1e20, 10)[:, None, None]
+    given = {"name": name, "low": low, "high": high}
+    asked = matrices.reshape(60, -1).tolist()
+    found = np.reshape(evaluate(MATRICES, matrices=asked, **given), matrices.shape)
+    group = scene_with("strain" if rows == 2 else "tetrahedron_strain").groups[0]
+    group.config = group.config.model_copy(update={"minimum": low, "maximum": high})
+    expected = group.reference_project(matrices, np.arange(60))
+    # nearly flat ones are as unsure as their second direction
+    allowed = np.where((np.arange(60) >= 40) & (np.arange(60) < 50), 1e-5, 1e-11)
+    assert (np.abs(found - expected).max(axis=(1, 2)) < allowed).all()
+
+
+def test_the_file_says_what_it_is(tmp_path):
+    file, _ = write_models(scene_with("spring"), tmp_path)
+    text = file.read_text("utf-8")
+    assert text.startswith('pdromLive({"format":1,"scene":"test","title":"A title",')
+    content = json.loads(text.removeprefix("pdromLive(").removesuffix(");\n"))
+    assert {model["family"] for model in content["models"]} == {"elements"}
+    assert content["shown"]["full"]["frames"] == FRAMES + 1

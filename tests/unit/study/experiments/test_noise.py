@@ -1,0 +1,94 @@
+"""Bases of round-off: what a start's round-off reaches, and what becomes of the runs."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pdrom.core.store import read_table, write_table
+from pdrom.model.mesh.types import save_mesh
+from pdrom.reduction.method import load_methods
+from pdrom.view.read import rerun_infos
+from places import ROOT
+from study.artifact.paths import File
+from study.experiments.kit.settings import Horizon
+from study.experiments.noise import (
+    ALL,
+    PLANE,
+    VERTEX,
+    NoiseRuns,
+    Options,
+    kinds,
+    noise,
+    noise_basis,
+    roundoff_field,
+)
+from study.pipeline.scenes import Coarsen, load_bound_scene
+
+METHODS = load_methods(ROOT / "config" / "methods.yaml")
+
+
+@pytest.fixture(scope="module")
+def fall():
+    """The falling sheet, coarse and short."""
+    return load_bound_scene(ROOT, "bend_fall", Coarsen(resolution=0.4, frames=0.4))
+
+
+def test_a_flat_mesh_may_keep_its_plane(fall):
+    assert kinds(fall) == (ALL, PLANE, VERTEX)
+    curved = load_bound_scene(ROOT, "bend_curved", Coarsen(resolution=0.4))
+    assert kinds(curved) == (ALL,)
+    every, plane, vertex = (roundoff_field(fall, axes, 1e-15, 1) for axes in kinds(fall))
+    np.testing.assert_array_equal(plane[:, :2], every[:, :2])
+    np.testing.assert_array_equal(vertex[:, :2], every[:, :2])
+    assert not plane[:, 2].any()
+    assert np.count_nonzero(vertex[:, 2]) == 1
+    assert every[:, 2].all()
+
+
+def test_a_basis_of_noise_keeps_every_axis(rng):
+    p = 1e-13 * rng.standard_normal((6, 10, 3)) * [1.0, 1.0, 0.0]
+    basis = noise_basis(p, np.ones(10), 1, METHODS["deim-joint"])
+    assert basis.rank == 6
+    assert basis.active_axes == (True, True, True)
+
+
+def test_the_joint_selection_fails_where_an_axis_carries_nothing(fall, tmp_path):
+    """Its separate system is exactly singular; noise in that axis is harmless."""
+    labels = {"scene": "bend_fall", "group": "bending"}
+    floor = {"scene": "bend_fall", "perturbation": "1e-10", "frame": range(22)}
+    sensitivity = tmp_path / "sensitivity.csv"
+    write_table(pd.DataFrame({**floor, "relative_difference": 0.0}), sensitivity)
+    save_mesh(fall.mesh, tmp_path / "mesh.h5", {})
+    settings = Options(
+        scene=fall.config,
+        noise=NoiseRuns(sizes=(2, 5, 99), repetitions=2),
+        noise_methods={name: METHODS[name] for name in ("deim-joint", "published")},
+        horizon=Horizon(perturbation=1e-10, threshold=1e-3),
+        blowup_extent=100.0,
+    )
+    mesh = File(str(tmp_path / "mesh.h5"), {"mesh": "m"})
+    output = File(str(tmp_path / "noise.csv"), labels)
+    runs = File(str(tmp_path / "noise.h5"), labels)
+    floors = File(str(sensitivity), labels)
+    noise(mesh=mesh, sensitivity=floors, settings=settings, out=output, runs=runs)
+    table = read_table(Path(output.path))
+    assert len(table) == 3 * 2 * 2 * 3
+    beyond = table.r == 99
+    assert (table.frames[beyond] == 0).all()
+    assert (table["rank"] < 99).all()
+    singular = (table.noisy_axes == PLANE) & (table.method == "deim-joint") & ~beyond
+    assert np.isinf(table.gain[singular]).all()
+    assert (table.blowup_frame[singular] == 0).all()
+    runs_through = table.noisy_axes.isin((ALL, PLANE)) & ~singular & ~beyond
+    assert (table.relative_error[runs_through] < 1e-10).all()
+    drawn = [rerun_infos(runs.path, f"{axes}/deim-joint") for axes in kinds(fall)]
+    assert [[(i.r, i.marked) for i in infos] for infos in drawn] == 3 * [
+        [(2, False), (5, False), (99, True)]
+    ]
+    joint = table[(table.method == "deim-joint") & ~beyond]
+    for axes, infos in zip(kinds(fall), drawn, strict=True):
+        starts = joint[joint.noisy_axes == axes].groupby("seed").frames.apply(list)
+        ends = [info.entries - 1 for info in infos if not info.marked]
+        assert ends == next((s for s in starts if len(set(s)) > 1), starts.iloc[0])

@@ -1,0 +1,127 @@
+"""Rule online: the rows of one scene."""
+
+import numpy as np
+import pytest
+
+from builders import make_scene
+from pdrom.core.errors import ConfigurationError, PdromError
+from pdrom.core.store import read_table
+from pdrom.core.yamlfile import validate
+from pdrom.model.dynamics.system import DEFAULT_SOLVER
+from pdrom.model.runs.full_order import trajectory
+from pdrom.model.scene import SceneConfig
+from pdrom.reduction.subspace.model import SubspaceModel, make_columns
+from study.artifact.paths import File
+from study.experiments import online as experiment
+from study.experiments.kit.fresh_process import Request, Subspaces, TimedScene, in_fresh_process
+from study.experiments.kit.measurement import Protocol
+from study.experiments.online import COLUMNS, Online, OnlineModels, relative_error
+from study.tables.frame_times import frame_times
+from study.tables.online import online
+
+EFFECTS = (
+    {"effect": "spring", "weight": 1e5},
+    {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]},
+    {"effect": "pins", "select": "top"},
+)
+CHANGES = {"reduce": {"spring": {"train": 5}}, "held_out": {"kick": 0.5}}
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    scene = make_scene(*EFFECTS, mesh={"kind": "cloth", "rows": 8, "columns": 7}, frames=10)
+    config = SceneConfig.model_validate(scene.config.model_dump(mode="json") | CHANGES)
+    path = tmp_path_factory.mktemp("online") / "scene.csv"
+    asked = OnlineModels(bases=("pod", "skinning"), sizes=(3,), tolerances=(0.3, 1e-2))
+    models = path.with_suffix(".h5")
+    out, stored = File(str(path), {"scene": "test"}), File(str(models), {})
+    experiment.online(sources=[], config=config, asked=asked, out=out, models=stored)
+    timed = TimedScene(scene=config, subspaces=Subspaces(path=str(models)))
+    request = Request(
+        scenes=(timed,), timing=Protocol(frames=3, warmup=1, repeats=1), solver=DEFAULT_SOLVER,
+        threads=1, seed=1, result=str(path.parent / "times.csv"),
+    )  # fmt: skip
+    in_fresh_process(request, path.parent)
+    return scene, path, File(request.result, {})
+
+
+def test_rows_of_a_scene(written):
+    scene, path, _ = written
+    table = read_table(path)
+    assert table.columns.tolist() == COLUMNS
+    assert table.position_basis.tolist() == ["pod", "pod", "skinning", "skinning"]
+    assert table.tau.tolist() == [0.3, 1e-2] * 2
+    assert (table.vertices == 56).all()
+    assert (table.elements == scene.groups[0].elements).all()
+    assert (table.elements_sampled > 0).all()
+    assert (table.elements_sampled <= table.elements).all()
+    heldout = [f"relative_error_heldout{end}" for end in ("_low", "", "_high")]
+    for column in ("relative_error_train", *heldout):
+        assert table[column].between(1e-6, 1.0).all()
+    # three motions: the median lies between the others
+    assert (table[heldout].diff(axis=1).iloc[:, 1:] > 0.0).all(axis=None)
+    # the held-out motion starts with a kick that the training has not seen
+    assert (table.relative_error_heldout > table.relative_error_train).any()
+
+
+def test_a_fresh_process_times_every_model(written):
+    scene, path, times = written
+    rows = read_table(times.path)
+    assert rows.role.tolist() == ["full", "control", *4 * ["reduced"]]
+    assert (rows.ms_per_frame > 0.0).all()
+    assert (rows.vertices == scene.mesh.vertices).all()
+    table = online([File(str(path), {})], [times], frame_times([times]))
+    np.testing.assert_allclose(table.ms_per_iteration, table.ms_per_frame / 10)
+    np.testing.assert_allclose(table.speedup, table.fom_ms_per_frame / table.ms_per_frame)
+    assert table.fom_ms_per_frame.nunique() == 1
+    # the files hold the same models
+    assert table.ms_per_frame.tolist() == rows.ms_per_frame[2:].tolist()
+
+
+def test_a_process_that_fails_is_told(written, tmp_path):
+    missing = TimedScene(
+        scene=written[0].config, subspaces=Subspaces(path=str(tmp_path / "none.h5"))
+    )
+    request = Request(
+        scenes=(missing,), timing=Protocol(), solver=DEFAULT_SOLVER, threads=1, seed=1,
+        result=str(tmp_path / "times.csv"),
+    )  # fmt: skip
+    with pytest.raises(PdromError, match=r"none\.h5"):
+        in_fresh_process(request, tmp_path)
+
+
+def test_a_motion_that_blows_up_has_an_infinite_error(written, tmp_path, monkeypatch):
+    scene = written[0].config.model_dump(mode="json") | CHANGES
+    errors = iter((0.1, 0.2, None, 0.3))
+    monkeypatch.setattr(experiment, "relative_error", lambda *given: next(errors))
+    files = {key: File(str(tmp_path / key), {}) for key in ("out", "models")}
+    config = SceneConfig.model_validate(scene)
+    experiment.online(sources=[], config=config, asked=OnlineModels(sizes=(3,)), **files)
+    row = read_table(tmp_path / "out").iloc[0]
+    assert (row.relative_error_train, row.relative_error_heldout_low) == (0.1, 0.2)
+    assert (row.relative_error_heldout, row.relative_error_heldout_high) == (0.3, np.inf)
+
+
+def test_no_scene_leaves_an_empty_table():
+    empty = online([], [], frame_times([]))
+    assert tuple(empty.columns) == online.column_names
+    assert len(empty) == 0
+
+
+def test_error_is_that_of_the_trajectories(written):
+    scene, _, _ = written
+    reference = trajectory(scene)
+    model = SubspaceModel("pod", make_columns(scene, reference[1:], "pod", 3))
+    loop, state = model.loop(scene)
+    run = [reference[0]]
+    for frame in range(scene.config.frames):
+        state, _ = loop.step(state, frame)
+        run.append(model.positions(state.positions))
+    moved = np.linalg.norm(reference - reference[0])
+    expected = np.linalg.norm(np.stack(run) - reference) / moved
+    assert relative_error(scene, model, reference) == pytest.approx(expected, rel=1e-9)
+
+
+def test_faulty_settings_are_refused():
+    with pytest.raises(ConfigurationError, match="tolerances"):
+        validate(Online, {"tolerances": [2.0]}, "here")

@@ -1,0 +1,393 @@
+"""Files of one scene's experiments, each compared with what follows from those that it read.
+
+The scene is a sheet of springs, held at its left side, that falls for eight frames.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bad_input.project import make_project
+from pdrom import api
+from pdrom.command import main
+from pdrom.core.store import open_hdf5, read_table
+from pdrom.core.yamlfile import read_yaml, validate
+from pdrom.model.held_out import MOTIONS
+from pdrom.model.mesh.types import Mesh, stored_mesh
+from places import CONFIG
+from small_scene import run_jobs
+from study.artifact import paths
+from study.artifact.paths import File, Place
+from study.experiments.companion_times import companion_times
+from study.experiments.kit.settings import Horizon
+from study.experiments.ladder import LadderFile, ladder
+from study.pipeline.study import Study
+
+SCENE, GROUP, METHOD = "small", "spring", "block-deim"
+ASKED = {
+    "ranks": [2, "full"],
+    "sensitivity": {"perturbations": [1e-10, 1e-8], "seeds": [1, 2]},
+    "iterations": {"counts": [1, 2, 5, 20]},
+    "subspace": {"bases": ["pod"], "sizes": [2, 4], "tolerances": [1e-2]},
+    "timing": {"frames": 2, "repeats": 1, "breakeven": [2], "breakeven_repeats": 5},
+    "companion": {"modes": 6},
+    "repetitions": {
+        "repetitions": 3,
+        "cells": [{"scenes": [SCENE], "methods": [METHOD], "sizes": [1, 2]}],
+    },
+    "guard": {"repeats": 1, "cases": [{"scene": SCENE, "method": METHOD, "r": 2}]},
+}
+JOBS = (
+    "mesh", "fom", "sensitivity", "subspaces", "iterations", "snapshots", "pod", "companion",
+    "reruns", "bounds", "estimates", "repetitions", "guard", "timing",
+)  # fmt: skip
+STEP, GRAVITY, VERTEX_MASS = 0.016, 9.81, 10.0
+
+PathOf = Callable[[Place], str]
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    root = make_project(tmp_path_factory.mktemp("study"), {})
+    return Study.load({**read_yaml(root / "config" / "default.yaml"), **ASKED}, root)
+
+
+@pytest.fixture(scope="module")
+def at(study: Study) -> PathOf:
+    """Path of a finished file; of several of a kind that of `METHOD`."""
+    results = str(study.root / "results")
+    run_jobs(study, results, JOBS, SCENE)
+    known = {
+        "scene": SCENE, "group": GROUP, "method": METHOD, "run": "train",
+        "basis": study.methods[METHOD].basis_id, "mesh": study.mesh_of(SCENE),
+    }  # fmt: skip
+    return lambda place: place.at(results, **{name: known[name] for name in place.labels})
+
+
+@pytest.fixture
+def table(at: PathOf) -> Callable[[Place], pd.DataFrame]:
+    return lambda place: read_table(at(place))
+
+
+@pytest.fixture
+def array(at: PathOf) -> Callable[[Place, str], np.ndarray]:
+    def read(place: Place, name: str) -> np.ndarray:
+        with open_hdf5(at(place)) as file:
+            return file[name][...].astype(float)
+
+    return read
+
+
+@pytest.fixture
+def mesh(at: PathOf) -> Mesh:
+    with open_hdf5(at(paths.MESH)) as file:
+        return stored_mesh(file)
+
+
+def norms(values: np.ndarray) -> np.ndarray:
+    """Frobenius norm of each frame."""
+    return np.linalg.norm(values.reshape(len(values), -1), axis=1)
+
+
+def whole(difference: np.ndarray, moved: np.ndarray) -> float:
+    """Relative error of a run: norms over all frames."""
+    return float(np.linalg.norm(difference) / np.linalg.norm(moved))
+
+
+def test_a_run_starts_at_rest_keeps_what_is_held_and_loses_objective(array, mesh):
+    """Nothing damps: velocities are what the positions say."""
+    q, v = array(paths.TRAIN, "positions"), array(paths.TRAIN, "velocities")
+    assert np.array_equal(q[0], mesh.points)
+    left = mesh.points[:, 0] == mesh.points[:, 0].min()
+    assert np.all(q[:, left] == mesh.points[left])
+    assert v[1:] == pytest.approx(np.diff(q, axis=0) / STEP, abs=1e-9)
+    objective = array(paths.TRAIN, "objective")
+    assert np.all(np.diff(objective, axis=1) <= 1e-9 * np.abs(objective[:, :-1]))
+
+
+def test_snapshots_are_the_edges_turned_at_their_rest_length(array, mesh):
+    a, b = mesh.edges().T
+    rest = np.linalg.norm(mesh.points[a] - mesh.points[b], axis=1)
+    for split, first in {"train": 0, "test": 1, "heldout": 1}.items():
+        p, frames = (array(paths.SNAPSHOTS, name) for name in (split, f"{split}_frames"))
+        assert frames.tolist() == list(range(first, 8, 2))
+        assert np.linalg.norm(p, axis=2) == pytest.approx(np.tile(rest, (4, 1)))
+
+
+def test_the_basis_is_that_of_numpys_decomposition(array):
+    train = array(paths.SNAPSHOTS, "train").reshape(4, -1)
+    v, sigma = array(paths.BASIS, "V"), array(paths.BASIS, "singular_values")
+    mean = train.mean(axis=0)
+    assert array(paths.BASIS, "mean") == pytest.approx(mean, abs=1e-15)
+    _, values, vectors = np.linalg.svd(train - mean, full_matrices=False)
+    assert sigma == pytest.approx(values, abs=1e-12 * values[0])
+    assert v.shape[1] == 3  # four snapshots about their mean
+    assert np.abs(vectors[:3] @ v) == pytest.approx(np.eye(3), abs=1e-9)
+
+
+def test_errors_of_projections_are_tails_of_the_singular_values(at, array, table):
+    """The sampled reconstruction is worse than the best one, by its gain at most."""
+    train = array(paths.SNAPSHOTS, "train")
+    sigma = array(paths.BASIS, "singular_values")
+    tails = {r: np.linalg.norm(sigma[r:]) / np.linalg.norm(train) for r in (1, 2, 3)}
+    sampled = table(paths.RECONSTRUCTION)
+    best = read_table(at(paths.RECONSTRUCTION).replace(METHOD, "pod"))
+    for found, allowed in ((best, best.gain), (sampled, sampled.gain)):
+        own = found.assign(allowed=allowed)[found.split == "train"].set_index("r")
+        for r, tail in tails.items():
+            error, gain = own.relative_error[r], own.allowed[r]
+            assert tail * (1 - 1e-9) - 1e-14 <= error <= gain * tail * (1 + 1e-9) + 1e-14
+    assert (best.gain == 1.0).all()
+    assert (sampled.elements_sampled < best.elements_sampled).any()
+
+
+def first_motion(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows of the training run, or of the first held-out motion."""
+    return rows[rows.motion == "heldout"] if "motion" in rows else rows
+
+
+@pytest.mark.parametrize(
+    ("place", "run", "kept"),
+    [
+        (paths.RERUNS_TRAIN, paths.TRAIN, ["r0002", "r0003"]),
+        (paths.RERUNS_HELDOUT, paths.HELDOUT, ["heldout/r0003"]),
+    ],
+)
+def test_a_rerun_differs_from_the_full_order_by_what_its_table_says(
+    at, array, table, place, run, kept
+):
+    reference = array(run, "positions")
+    moved = norms(reference[1:] - reference[0])
+    rows = first_motion(table(place)).tail(len(kept))  # smaller held-out runs keep no positions
+    assert [f"r{r:04d}" for r in rows.r] == [name.rpartition("/")[2] for name in kept]
+    for name, row in zip(kept, rows.itertuples(), strict=True):
+        positions = array(paths.RERUNS, f"{name}/positions")  # in single precision
+        difference = array(paths.RERUNS, f"{name}/difference")
+        assert difference == pytest.approx(norms(positions[1:] - reference[1:]), abs=1e-5)
+        assert row.relative_error == pytest.approx(whole(difference, moved))
+        sides = np.ptp(positions[1:], axis=1).max(axis=1) / np.ptp(reference[0], axis=0).max()
+        assert row.max_extent == pytest.approx(sides.max(), abs=1e-6)
+        assert (row.frames, row.finite) == (8, True)
+    assert rows.relative_error.is_monotonic_decreasing
+
+
+def test_runs_are_as_long_as_the_theorem_allows(table):
+    """The bound holds, and no spectral radius exceeds the norm of its iteration."""
+    bounds = table(paths.BOUNDS).query("method == @METHOD").set_index("r")
+    runs = table(paths.RERUNS_TRAIN).set_index("r")
+    assert (runs.max_extent <= bounds.bound).all()
+    assert (bounds.spectral_radius <= bounds.contraction * (1 + 1e-9)).all()
+    assert (bounds.growth >= 1.0).all()
+
+
+def test_small_perturbations_grow_in_proportion(table):
+    found = table(paths.SENSITIVITY)
+    by_size = {
+        size: found[found.perturbation == size].set_index(["seed", "frame"]).relative_difference
+        for size in ("1e-10", "1e-08")
+    }
+    ratio = by_size["1e-08"] / by_size["1e-10"]
+    assert len(ratio) == 2 * 8
+    assert ratio.to_numpy() == pytest.approx(np.full(16, 100.0), rel=1e-2)
+
+
+def test_without_gravity_the_sheet_stays_where_it_is(array, table):
+    """All that the run does is then a difference."""
+    found = table(paths.SENSITIVITY).query("perturbation == 'without gravity'")
+    q = array(paths.TRAIN, "positions")
+    moved = norms(q[1:] - q[0])
+    expected = moved / np.sqrt(np.mean(moved**2))
+    assert found.relative_difference.to_numpy() == pytest.approx(expected, rel=1e-9)
+
+
+def test_contributions_are_forces_and_energies_of_the_run(array, table, mesh):
+    q = array(paths.TRAIN, "positions")
+    free = mesh.points[:, 0] > mesh.points[:, 0].min()
+    rows = table(paths.CONTRIBUTIONS).set_index("effect")
+    weight = VERTEX_MASS * GRAVITY
+    assert rows.force["gravity"].to_numpy() == pytest.approx(weight * np.sqrt(free.sum()))
+    height = weight * q[1:, :, 1].sum(axis=1)
+    assert np.diff(rows.energy["gravity"]) == pytest.approx(np.diff(height), rel=1e-6)
+    a, b = mesh.edges().T
+    length = np.linalg.norm(q[:, a] - q[:, b], axis=2)
+    springs = 0.5 * 1e5 * ((length[1:] - length[0]) ** 2).sum(axis=1)
+    assert rows.energy["spring"].to_numpy() == pytest.approx(springs, rel=1e-6)
+
+
+def test_more_iterations_approach_the_converged_run(table):
+    rows = table(paths.ITERATIONS)
+    plain = rows[rows.window == 0].sort_values("iterations")
+    mixed = rows[rows.window == 5].set_index("iterations").error_converged
+    assert plain.iterations.tolist() == [1, 2, 5, 10, 20]
+    assert (np.diff(plain.error_converged) < 0.0).all()
+    assert (mixed < plain.set_index("iterations").error_converged[mixed.index]).all()
+    own, limit = plain[plain.iterations == 10].iloc[0], rows.iloc[-1]
+    assert own.error_scene == 0.0
+    assert limit.residual <= 1e-8
+    # the same two runs, each relative to the other's motion
+    assert limit.error_scene == pytest.approx(own.error_converged, rel=2e-2)
+
+
+@pytest.mark.parametrize("split", ["train", *MOTIONS])
+def test_runs_in_subspaces_are_their_coordinates(array, table, split):
+    reference = array(paths.FULL_ORDER.where(run=split), "positions")
+    moved = norms(reference[1:] - reference[0])
+    heldout = table(paths.SUBSPACES_HELDOUT).query("motion == @split")
+    rows = table(paths.SUBSPACES_TRAIN) if split == "train" else heldout
+    rows = rows.set_index(["k", "method"])
+    for k, method in rows.index:
+        columns = array(paths.SUBSPACES, f"columns/pod_k{k:03d}/B")
+        z = array(paths.SUBSPACES, f"models/pod_k{k:03d}_{method}/{split}/coordinates")
+        difference = norms(np.einsum("nk,fka->fna", columns, z)[1:] - reference[1:])
+        assert rows.relative_error[k, method] == pytest.approx(whole(difference, moved), rel=1e-6)
+    full = rows.xs("full", level="method")
+    assert (np.diff(full.relative_error) < 0.0).all()
+    sampled = rows.drop("full", level="method").reset_index("method").r
+    assert (sampled < full.r).all()
+
+
+def test_an_estimate_is_wrong_by_the_companions_own_error_at_most(table):
+    """Triangle inequality, with the unit of the estimate wrong by as much."""
+    rows = table(paths.ESTIMATES)
+    # methods at their sizes, held out at full rank alone, and subspaces
+    assert rows.split.value_counts().to_dict() == {
+        "train": 2 * 2 + 4,
+        **dict.fromkeys(("heldout", "kick", "stiffness"), 2 * 1 + 4),
+    }
+    wrong = (rows.estimate - rows.relative_error_within_horizon).abs()
+    assert (wrong <= rows.companion_error * (1.0 + rows.estimate)).all()
+    assert rows.companion_error.groupby(rows.split).nunique().eq(1).all()
+
+
+def test_a_moved_start_changes_nothing_and_other_training_does(table):
+    rows, frames = table(paths.REPETITIONS), table(paths.REPEATED_FRAMES)
+    start, training = (rows[rows.varied == varied] for varied in ("start", "training"))
+    assert start.groupby("r").gain.nunique().eq(1).all()
+    assert training.groupby("r").gain.nunique().eq(3).all()
+    own = table(paths.RERUNS_TRAIN).set_index("r").relative_error[2]
+    assert start[start.r == 2].error.to_numpy() == pytest.approx(np.full(3, own), rel=1e-4)
+    assert training[training.r == 2].error.min() > 1.1 * own
+    assert (frames.error_low <= frames.error_median).all()
+    assert (frames.error_median <= frames.error_high).all()
+    assert frames.frame.tolist() == 4 * [*range(1, 9)]  # two sizes, two kinds
+    middle = frames[(frames.varied == "start") & (frames.r == 2)].error_median
+    assert np.sqrt(np.mean(middle**2)) == pytest.approx(own, rel=1e-4)
+
+
+def test_every_rung_of_a_ladder_is_run_and_judged(study, at, array, tmp_path):
+    """Whole elements with shared coefficients are worse than the best by their gain at most."""
+    path = CONFIG / "ladder.yaml"
+    few = {"r": 2, "signs": 2, "repetitions": 3, "sizes": (2, 50), "repeated": (SCENE,)}
+    asked = validate(LadderFile, read_yaml(path), str(path)).model_copy(update=few)
+    section = study.settings.sensitivity
+    out = File(str(tmp_path / "ladder.csv"), {"scene": SCENE, "group": GROUP})
+    ladder(
+        mesh=paths.MESH.file(at(paths.MESH)),
+        fom=paths.TRAIN.file(at(paths.TRAIN)),
+        snapshots=paths.SNAPSHOTS.file(at(paths.SNAPSHOTS)),
+        sensitivity=paths.SENSITIVITY.file(at(paths.SENSITIVITY)),
+        config=study.scenes[SCENE],
+        ladder=asked,
+        horizon=Horizon(perturbation=section.reference, threshold=section.threshold),
+        blowup_extent=study.settings.blowup_extent,
+        out=out,
+    )
+    rows = read_table(out.path)
+    kinds = {"up": len(asked.up), "down": len(asked.down), "signs": 2, "square": len(asked.square)}
+    assert rows.direction.value_counts(sort=False).to_dict() == kinds  # none at 50: three modes
+    sigma, train = array(paths.BASIS, "singular_values"), array(paths.SNAPSHOTS, "train")
+    best = np.linalg.norm(sigma[2:]) / np.linalg.norm(train)
+    least = rows[rows.rung.isin(["- oversampling", asked.up[-1].title, "whole elements, shared"])]
+    assert len(least) == 3
+    assert least.error_train.between(0.999 * best, 1.001 * best * least.gain).all()
+    repeated = rows[rows.direction.isin(["up", "down"])]
+    assert (repeated.repetitions == 3).all()
+    assert (repeated.error_low <= repeated.error_median).all()
+    assert (repeated.error_median <= repeated.error_high).all()
+    assert rows.repetitions.notna().sum() == len(repeated)
+
+
+def test_an_auxiliary_model_is_timed_beside_the_full_order(study, at, mesh, tmp_path):
+    out = File(str(tmp_path / "times.csv"), {"scene": SCENE})
+    files = (place.file(at(place)) for place in (paths.MESH, paths.COMPANION))
+    companion_times(*files, study.scenes[SCENE], study.settings.timing, out)
+    (row,) = read_table(out.path).itertuples()
+    assert row.scene == SCENE
+    assert 0 < row.elements_sampled <= len(mesh.edges())
+    assert min(row.companion_ms, row.full_ms) > 0.0
+
+
+def test_a_guard_that_only_watches_changes_nothing_and_falling_back_helps(table):
+    rows = table(paths.GUARD)
+    own = table(paths.RERUNS_TRAIN).set_index("r").relative_error[2]
+    full, reduced = rows.iloc[0], rows.iloc[1:].set_index(["action", "alarm"])
+    assert (full.method, full.relative_error, full.relative_cost) == ("full", 0.0, 1.0)
+    watched = reduced.relative_error[["none", "report"]]
+    assert watched.to_numpy() == pytest.approx(np.full(3, own))
+    back = reduced.loc[("fall-back", "trained-range")]
+    assert 0 < back.fallback_frames == back.guard_count
+    assert back.fallback_share == back.fallback_frames / back.frames
+    assert back.relative_error < own
+    never = reduced.loc[("fall-back", "estimate")]  # the estimate stays below the threshold
+    assert never.guard_estimate < never.threshold
+    assert (never.guard_count, never.fallback_frames) == (0, 0)
+    assert rows.relative_cost.to_numpy() == pytest.approx(rows.ms_per_frame / full.ms_per_frame)
+
+
+def test_everything_is_timed_once_and_phases_fit_into_their_frame(table):
+    rows = table(paths.TIMINGS)
+    key = ["group", "method", "position_basis", "k", "r", "iterations", "implementation"]
+    assert not rows.duplicated(key).any()
+    assert set(rows.implementation) == {"compiled", "numpy", "interpreted"}
+    reduced = rows[rows.group == GROUP]
+    assert set(zip(reduced.method, reduced.r, strict=True)) == {
+        (method, r) for method in ("pod", METHOD) for r in (2, 3)
+    }
+    phases = rows[["inertia_ms", "local_ms", "assembly_ms", "lift_ms", "global_ms"]]
+    assert (phases >= 0.0).all(axis=None)
+    assert (phases.sum(axis=1) <= rows.ms_per_frame * (1 + 1e-6)).all()
+    alone = table(paths.BREAK_EVEN)
+    assert alone.threads.tolist() == [1, 2]
+    effects = table(paths.EFFECTS)
+    assert effects.effect.tolist()[:3] == ["spring", "gravity", "pins"]
+    assert effects.share.sum() == pytest.approx(1.0)
+
+
+def test_the_package_and_the_command_give_the_runs_of_the_study(at, array, table, tmp_path, capsys):
+    config = Path(at(paths.MACHINE)).parents[1] / "config"
+    full = api.run(api.load_scene(config / "scenes" / f"{SCENE}.yaml"))
+    assert np.array_equal(full.positions, array(paths.TRAIN, "positions"))
+    reduced = api.reduce(full, GROUP, METHOD, 2)
+    row = table(paths.RERUNS_TRAIN).set_index("r").loc[2]
+    moved = norms(full.positions[1:] - full.positions[0])
+    assert reduced.outcome.error(moved) == pytest.approx(row.relative_error, rel=1e-9)
+    assert reduced.gain == pytest.approx(row.gain, rel=1e-9)
+    asked = ["--group", GROUP, "--method", METHOD, "--r", "2", "--out", str(tmp_path / "run.h5")]
+    assert main.run(["reduce", str(config / "scenes" / f"{SCENE}.yaml"), *asked]) == 0
+    said = capsys.readouterr().out
+    assert f"relative error {row.relative_error:.2g} " in said
+    assert f"gain {row.gain:.3g} " in said
+    stored = api.load(at(paths.TRAIN))
+    assert np.array_equal(stored.positions, full.positions)
+    assert np.array_equal(stored.snapshots[GROUP].p[::2], full.snapshots[GROUP].p)
+
+
+def test_every_result_is_shown_with_all_that_it_holds(at, capsys):
+    results = Path(at(paths.MACHINE)).parent
+    files = [*results.rglob("*.csv"), *results.rglob("*.h5")]
+    assert len(files) > len(JOBS)
+    for path in files:
+        assert main.run(["show", str(path)]) == 0
+        told = capsys.readouterr().out
+        assert told.startswith(f"{path}: {path.stat().st_size:,} bytes, intact\n")
+        if path.suffix == ".csv":
+            names = path.read_text("utf-8").partition("\n")[0].split(",")
+        else:
+            with open_hdf5(path) as file:
+                names = [*file, *file.attrs["configuration"].split('"')[1:2]]
+        assert all(f"  {name}" in told for name in names), path
+        assert "provenance:\n" in told
+        assert "config: small (small)" in told or "fom" not in path.parts

@@ -1,0 +1,559 @@
+"""Results of invented studies in the documented formats: bent sheets, a bar, random bases."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pdrom.core.store import write_hdf5, write_table
+from pdrom.model.effects import EFFECTS
+from pdrom.model.mesh.generators import bar, cloth
+from pdrom.model.mesh.types import Mesh, save_mesh
+from pdrom.reduction.sampling.block import block_elements
+from pdrom.reduction.sampling.deim import deim_entries
+from places import ROOT
+from study.artifact.paths import (
+    BASIS,
+    CONTRIBUTIONS,
+    FULL_ORDER,
+    MESH,
+    NOISE_RUNS,
+    REPEATED_FRAMES,
+    RERUNS,
+    SAMPLING,
+    SENSITIVITY,
+    SNAPSHOTS,
+    TABLE,
+)
+from study.experiments.kit.names import GLOBAL, RIGHT
+from study.figures.kit.catalogue import declarations, load_choices
+from study.figures.kit.holdings import GroupHolding, Holdings, MethodHolding, SceneHolding
+from study.figures.kit.options import Options
+from study.figures.kit.results import Results
+from study.tables.roofline import WHOLE
+from study.tables.scaling_fit import scaling_fit
+
+FRAMES = 20
+SETTINGS = {"sensitivity.reference": 1e-10, "sensitivity.threshold": 1e-3,
+            "stability.wrong": 0.1, "stability.left": 2.0, "guard.threshold": 0.12}  # fmt: skip
+ROWS = {"bending": 1, "spring": 1, "strain": 2, "deformation_gradient": 3, "tetrahedron_strain": 3}
+METHOD_ROWS = {"pod": "all", "deim": "scalar", "qdeim": "scalar", "deim-joint": "joint",
+               "published": "joint", "block-deim": "element"}  # fmt: skip
+SCENES = {
+    "cloth_all": ("bending", "spring", "strain"),
+    "bend_fall": ("bending",),
+    "bend_curved": ("bending",),
+    "spring_stretch": ("spring",),
+    "spring_twist": ("spring",),
+    "spring_twist_twin": ("spring",),
+    "strain_twist": ("strain",),
+    "strain_oop": ("strain",),
+    "bar_release": ("deformation_gradient",),
+    "bar_twist": ("tetrahedron_strain",),
+}
+FLAT = ("bend_fall",)  # scenes whose projections are round-off
+BLOWN_UP = ("spring_twist", "deim-joint", 10)  # scene, method, r of a run that fails
+BLOWUP_FRAME = 4
+
+
+@dataclass
+class Study:
+    """An invented study on disk."""
+
+    root: Path
+    results: Results
+    specs: dict[str, Options]
+
+
+def mesh_of(scene: str) -> Mesh:
+    """Small mesh of a scene."""
+    if scene.startswith("bar"):
+        return bar(7, 3, 3)
+    return cloth(7, 6, wave=0.1 if scene == "bend_curved" else 0.0)
+
+
+def element_count(mesh: Mesh, group: str) -> int:
+    """Elements of a group on a mesh."""
+    return len(EFFECTS.load(group).element_vertices(mesh))
+
+
+def group_holdings() -> dict[str, GroupHolding]:
+    """All constraint groups."""
+    return {
+        name: GroupHolding(
+            place=place, cells=EFFECTS.load(name).cells, unit=EFFECTS.load(name).unit
+        )
+        for place, name in enumerate(ROWS)
+    }
+
+
+def make_results(root: Path, scenes: dict[str, tuple[str, ...]], methods: list[str]) -> Holdings:
+    """Write the results of ``scenes`` and ``methods`` below ``root``."""
+    rng = np.random.default_rng(7)
+    holdings = Holdings(
+        scenes={
+            name: SceneHolding(mesh="bar" if name.startswith("bar") else name, groups=groups)
+            for name, groups in scenes.items()
+        },
+        methods={
+            name: MethodHolding(title=name, basis="none-none-vectorised", rows=METHOD_ROWS[name])
+            for name in methods
+        },
+        groups=group_holdings(),
+    )
+    results = Results(str(root), holdings, SETTINGS)
+    for scene, groups in scenes.items():
+        mesh = mesh_of(scene)
+        save_mesh(mesh, results.path(MESH, scene))
+        positions = _trajectory(mesh)
+        with write_hdf5(results.path(FULL_ORDER, scene)) as file:
+            file["positions"] = positions
+        for group in groups:
+            rank = 0 if scene in FLAT else 14
+            count = element_count(mesh, group)
+            basis = _write_basis(results, scene, group, count, rank, methods[0], rng)
+            for method in methods:
+                _write_sampling(results.path(SAMPLING, scene, group, method), basis, group, method)
+                _write_reruns(results, scene, group, method, positions, rank, rng)
+    _write_tables(results, scenes, methods, rng)
+    return holdings
+
+
+def _trajectory(mesh: Mesh) -> np.ndarray:
+    """The mesh bends more and more and sinks to the floor."""
+    t = np.linspace(0.0, 1.0, FRAMES + 1)[:, None]
+    q = np.repeat(mesh.points[None], FRAMES + 1, axis=0)
+    q[:, :, 2] += 0.4 * t * np.sin(4.0 * mesh.points[:, 0])
+    q[:, :, 1] -= 1.5 * t**2
+    return q
+
+
+def _write_basis(results, scene, group, count, rank, method, rng) -> np.ndarray:
+    rows = ROWS[group]
+    V = np.linalg.qr(rng.standard_normal((3 * rows * count, 14)))[0][:, :rank]
+    with write_hdf5(results.path(BASIS, scene, group, method)) as file:
+        file["V"], file["mean"] = V, np.zeros(len(V))
+        file["singular_values"] = 0.5 ** np.arange(14)
+        file.attrs.update(rank=rank, roundoff=1e-12, rows_per_element=rows)
+    with write_hdf5(results.path(SNAPSHOTS, scene, group)) as file:
+        for split in ("train", "test", "heldout"):
+            file[split] = rng.standard_normal((10, rows * count, 3))
+            file[f"{split}_frames"] = np.arange(0, FRAMES, 2) + (split != "train")
+        file["row_mass"] = np.ones(rows * count)
+        file.attrs.update(rows_per_element=rows, elements=count, roundoff=1e-12)
+    return V
+
+
+def _write_sampling(path: str, V: np.ndarray, group: str, method: str) -> None:
+    size = 3 * ROWS[group]
+    with write_hdf5(path) as file:
+        for r in range(1, V.shape[1] + 1):
+            if METHOD_ROWS[method] == "scalar":
+                entries = deim_entries(V[:, :r])
+            elif METHOD_ROWS[method] == "joint":
+                entries = 3 * np.arange(r)
+            else:
+                elements = block_elements(V[:, :r], size)
+                entries = (size * elements[:, None] + np.arange(size)).ravel()
+            store = file.create_group(f"r{r:04d}")
+            store["entries"] = entries
+            store["elements"] = np.unique(entries // size)
+
+
+def _write_reruns(results, scene, group, method, positions, rank, rng) -> None:
+    with write_hdf5(results.path(RERUNS, scene, group, method)) as file:
+        file["displacement"] = np.ones(FRAMES)
+        for r in (6, 10, 14, 20):
+            store = file.create_group(f"r{r:04d}")
+            store.attrs.update(r=r, full=r == rank, marked=r > rank)
+            if r > rank:
+                continue
+            failed = (scene, method, r) == BLOWN_UP
+            last = BLOWUP_FRAME if failed else FRAMES
+            moved = positions[: last + 1] + 0.02 / r * rng.standard_normal(positions[0].shape)
+            if failed:
+                moved[-1] = np.nan
+            store["positions"] = moved.astype(np.float32)
+            store["error"] = np.geomspace(1e-4, 1e-1, last) / r
+            store["extent"] = np.ones(last)
+            blowup = BLOWUP_FRAME if failed else -1
+            store.attrs.update(finite=not failed, blowup_frame=blowup, max_extent=1.1)
+
+
+def _outcome(scene: str, method: str, r: int) -> tuple[float, float, float]:
+    """Frame of a blow-up, error of the run, error within the horizon."""
+    if (scene, method) == BLOWN_UP[:2]:
+        return BLOWUP_FRAME, np.nan, np.nan
+    error = 1e-3 if method == "pod" else 1e-2 * r
+    return np.nan, error, error
+
+
+def _write_tables(results, scenes, methods, rng) -> None:
+    pairs = [(scene, group) for scene, groups in scenes.items() for group in groups]
+    values, errors = [], []
+    for scene, group in pairs:
+        flat = scene in FLAT
+        for k in range(1, 15):
+            relative = 0.05 ** (k - 1)
+            values.append((scene, group, k, 3 * relative, relative, not flat and relative > 1e-13))
+        for method in methods:
+            for r in (1, 2, 4, 8, 14):
+                for split in ("train", "test", "heldout"):
+                    error = np.nan if flat else 1e5 / 10.0**r
+                    gain = 1.0 if method == "pod" else 3.0 * r
+                    errors.append((scene, group, method, r, split, error, gain, r))
+    times = [
+        (scene, implementation, 42, local, 0.1, 1.0, local / (local + 1.1))
+        for scene in scenes
+        for implementation, local in (("compiled", 0.6), ("numpy", 4.0), ("interpreted", 90.0))
+    ]
+    costs = [
+        (scene, method, "full", np.nan, r, 10, 1.0 / r, 0.2 * r, r == 14)
+        for scene in scenes
+        for method in methods
+        for r in (6, 14)
+    ]
+    costs += [(scene, "full", "full", np.nan, np.nan, 10, 0.0, 4.0, True) for scene in scenes]
+    for k, time in ((2, 1.0), (5, 2.0), (10, 4.0), (40, 16.0)):
+        costs += [
+            (scene, "fom", "full", np.nan, np.nan, k, 1.0 / k**2, time, True) for scene in scenes
+        ]
+        costs += [
+            (scene, "fom-anderson", "full", np.nan, np.nan, k, 1.0 / k**3, 1.1 * time, True)
+            for scene in scenes
+            if k > 2
+        ]
+        if k < 10:
+            early = ("fewer-iterations", "full", np.nan, np.nan, k, 0.5 / k, time, k == 2)
+            costs += [(scene, *early) for scene in scenes]
+    bought = [
+        (scene, limit, reference, *best)
+        for scene in scenes
+        for limit, reference, best in (
+            (0.1, "own iterations", (None, None, np.nan, np.nan, np.nan, np.nan)),
+            (0.1, "converged", (None, None, np.nan, np.nan, np.nan, np.nan)),
+            (1.0, "own iterations", (methods[0], "full", np.nan, 14, 10, 0.02)),
+            (1.0, "converged", ("fom", "full", np.nan, np.nan, 2, 0.25)),
+            (3.0, "own iterations", ("ecsw-1e-02", "pod", 8, 33, 10, 1e-9)),
+            (3.0, "converged", ("fom", "full", np.nan, np.nan, 5, 0.04)),
+            (10.0, "own iterations", ("full", "full", np.nan, np.nan, 10, 0.0)),
+            (10.0, "converged", ("fom", "full", np.nan, np.nan, 10, 0.01)),
+        )
+    ]
+    ratios = [
+        (scene, group, method, factor, 400 * factor**2, threads, r, *_ratio(method, r, threads))
+        for scene, group in pairs
+        for method in methods
+        for factor in (1, 2, 5)
+        for threads in (1, 2)
+        for r in (6, 14, 40)
+    ]
+    shares = [
+        (scene, effect, time, time / 4.0)
+        for scene, groups in scenes.items()
+        for effect, time in (
+            *((group, 2.0 / len(groups)) for group in groups), ("gravity", 0.5), ("pins", 0.5),
+            ("global solve", 0.7), ("rest of the frame", 0.3),
+        )
+    ]  # fmt: skip
+    removed = [
+        (scene, name, number, time, 4.0 - time)
+        for scene, groups in scenes.items()
+        if len(groups) > 1
+        for name, number, time in (("nothing", 3, 4.0), ("gravity", 3, 3.5), ("a + b", 1, 2.0))
+    ]
+    rungs = [("up", "published code"), ("up", "+ affine"), ("down", "- QR"), ("signs", "signs 1")]
+    others = [
+        (scene, 400, stiffness, motion, method, n, 0.1 * n, None if n > 4 else 0.1 / n, 0.3 / n)
+        for scene in scenes
+        for stiffness in (1.0, 100.0)
+        for motion in ("heldout", "kick")
+        for method in ("converged", "projective", "newton", "ecsw")
+        for n in (1, 2, 5)
+    ]
+    ladder = [
+        (
+            scene,
+            direction,
+            rung,
+            10.0**i if i < 2 else np.inf,
+            0.1 * i if i else np.nan,
+            *((0.05, np.inf, 1.0, 50.0) if i < 2 else 4 * (np.nan,)),
+        )
+        for scene in scenes
+        for i, (direction, rung) in enumerate(rungs)
+    ]
+    outcome = {6: "wrong", 14: "accurate", 20: "not run"}
+    runs = [
+        (scene, group, method, "full", np.nan, r, "rerun", outcome[r], np.nan, 0.016, 1.0)
+        for scene, group in pairs
+        for method in methods
+        for r in outcome
+        if scene not in FLAT
+    ]
+    runs += [
+        (scene, "all", "full", "pod", 10, 99, "rerun", "left the scene", np.nan, 0.016, 1.0)
+        for scene in scenes
+    ]
+    failed = {0.016: "accurate", 0.2: "blow-up"}
+    runs += [
+        (scene, group, method, "full", np.nan, 6, "sweep", failed[h],
+         np.nan if h < 0.1 else BLOWUP_FRAME, h, ratio)
+        for scene, group in pairs
+        for method in methods
+        for h, ratio in ((0.016, 1.0), (0.2, 1.0), (0.016, 100.0))
+    ]  # fmt: skip
+    reruns = [
+        (scene, group, method, r, "full", 1.0, *_outcome(scene, method, r), 0.2 * r, None)
+        for scene, group in pairs
+        if scene not in FLAT
+        for method in methods
+        for r in (8, 14)
+    ]
+    estimates = [
+        (scene, basis, split, error, 1.2 * error, 1.2, True, error > 1e-3)
+        for scene in scenes
+        for basis in ("full", "pod", "skinning")
+        for split in ("train", "heldout")
+        for error in (1e-5, 1e-2)
+    ]
+    repetitions = [
+        (scene, group, method, r, "training", 0.01, 0.1, np.inf, 1.0, 2.0, 3.0)
+        for scene, group, method, r, *_ in reruns
+    ]
+    predictions = [
+        ("gain", "10", "100", 40, 0.25, np.nan),
+        ("gain", "10000", "inf", 2, 1.0, np.nan),
+        ("gain", "all", "all", 42, 0.3, 30.0),
+    ]
+    variants = [("plain", 9.0, 0.5), ("refused", None, None), ("both + more", 2.0, None)]
+    ablation = [
+        (scene, "pod", 20, r, variant, gain, error, 0.01)
+        for scene in scenes
+        for r in (20, 50)
+        for variant, gain, error in variants
+    ]
+    rates = [("bytes read", 2.0**k, f"L{k // 20 + 1}", 90.0, 80.0, 95.0) for k in range(14, 26)]
+    phases = [
+        (scene, phase, 3e5, 1.0, np.nan if phase == "bending" else 3.0, limit)
+        for scene, phase in (*pairs, *((s, p) for s in scenes for p in (RIGHT, GLOBAL, WHOLE)))
+        for limit in ("bytes", "sums and products")
+    ]
+    noise = [
+        (scene, "bending", axes, method, r, 9, None if axes in fails else 1e-12)
+        for scene in FLAT
+        for axes, fails in (("all", ()), ("plane", ("plane",)), ("vertex", ()))
+        for method in ("deim-joint", "published")
+        for r in (6, 10)
+    ]
+    variations = [
+        (claim, part, varied, f"v{n}", "holds", n == 0)
+        for claim in ("C1", "C2")
+        for part in ("published", "beyond")
+        for varied in ("threshold", "scenes")
+        for n in range(3)
+    ]
+    moved = [
+        (scene, effect, role, drift, 1e-6, None if drift is None else drift > 1e-6)
+        for scene, groups in scenes.items()
+        for effect, role, drift in (
+            *((group, "constraint group", None) for group in groups[:1]),
+            *((group, "constraint group", 1e-9) for group in groups[1:]),
+            ("gravity", "force", 0.5),
+            ("kick", "start", 1e-15),
+        )
+    ]
+    steps = [
+        ("cumulative", "as in this study"), ("cumulative", "nothing is pinned"),
+        ("alone", "nothing is pinned"), ("signs", "draw 1"), ("ties", "draw 1"),
+    ]  # fmt: skip
+    chosen = [
+        (scene, group, *step, axis, r, 0.1 * r, 0.2)
+        for scene, group in pairs
+        for step in steps
+        for axis in "xyz"
+        for r in (1, 2, 5)
+    ]
+    distances = [(scene, group, *step, 0.5) for scene, group in pairs for step in steps]
+    requests = [
+        (scene, tolerance, met, reduced, 0.5 * tolerance if met else 2.0, time)
+        for scene in scenes
+        for tolerance in (0.1, 0.01)
+        for met, reduced, time in ((True, True, 0.1), (True, False, 1.5), (False, False, 2.2))
+    ]
+    made = {
+        "requested_tolerances": (requests, "scene tolerance met reduced error over_own"),
+        "singular_values": (values, "scene group component singular_value relative above_roundoff"),
+        "reconstruction_error": (errors, "scene group method r split relative_error gain"
+         " elements_sampled"),
+        "local_share": (times, "scene implementation vertices local_ms assembly_ms global_ms"
+         " local_share"),
+        "accuracy_cost": (costs, "scene method position_basis k r iterations"
+         " relative_error_within_horizon ms_per_frame pareto"),
+        "ladder": (ladder, "scene direction rung gain relative_error_within_horizon error_low"
+         " error_high gain_low gain_high"),
+        "repetitions": (repetitions, "scene group method r varied error_low error_median"
+         " error_high gain_low gain_median gain_high"),
+        "stability": (runs, "scene group method position_basis k r experiment outcome"
+         " blowup_frame h stiffness_ratio"),
+        "budget": (bought, "scene budget_ms reference method position_basis k r iterations"
+         " relative_error_within_horizon"),
+        "breakeven": (ratios, "scene group method factor vertices threads r ratio breakeven_r"),
+        "effects_cost": (shares, "scene effect ms_per_frame share"),
+        "effects_left_out": (removed, "scene left_out groups ms_per_frame own_ms"),
+        "machine_rates": (rates, "quantity working_set level rate low high"),
+        "roofline": (phases, "scene phase working_set bound_us measured_us limit"),
+        "reduced_reruns": (reruns, "scene group method r position_basis max_extent blowup_frame"
+         " relative_error relative_error_within_horizon ms_per_frame k"),
+        "gain_prediction": (predictions, "predictor lower upper runs failed_share threshold"),
+        "noise": (noise, "scene group noisy_axes method r rank relative_error"),
+        "claims_sensitivity": (variations, "claim part varied variation verdict_of_rules same"),
+        "subspace_ablation": (ablation, "scene position_basis k r variant gain"
+         " relative_error_within_horizon relative_error_full_projections"),
+        "alternatives": (others, "scene vertices stiffness motion method substeps"
+         " ms_per_frame"
+         " error_implicit error_continuous"),
+        "estimates": (estimates, "scene position_basis split relative_error_within_horizon"
+         " estimate ratio within resolved"),
+        "effects_contribution": (moved, "scene effect role moved sensitivity_floor above_floor"),
+        "published_choices": (chosen, "scene group direction choice axis r error reference"),
+        "published_distance": (distances, "scene group direction choice distance"),
+    }  # fmt: skip
+    for name, (rows, header) in made.items():
+        _write(TABLE.at(results.folder, name=name), header, rows)
+    _write_scaling(results, scenes)
+    for scene, group in pairs:
+        _write_repeated_frames(results, scene, group, methods)
+    for scene in FLAT:
+        if scene in scenes:
+            _write_noise_runs(results, scene)
+    for scene in scenes:
+        _write_sensitivity(results, scene)
+        _write_contributions(results, scene)
+
+
+def _write(path: str, columns: str, rows: list[tuple]) -> pd.DataFrame:
+    table = pd.DataFrame(rows, columns=columns.split())
+    write_table(table, path)
+    return table
+
+
+def _write_repeated_frames(results, scene, group, methods) -> None:
+    """Bands of a tenth to ten times a thousandth, open above in the last frame."""
+    rows = [
+        (scene, group, method, 6, "training", frame, 1e-4, 1e-3, 1e-2 if frame < FRAMES else np.inf)
+        for method in methods
+        for frame in range(1, FRAMES + 1)
+    ]
+    columns = "scene group method r varied frame error_low error_median error_high"
+    _write(results.path(REPEATED_FRAMES, scene, group), columns, rows)
+
+
+def _write_noise_runs(results, scene) -> None:
+    """Runs that do not start where round-off stays in the plane, else the sheet at rest."""
+    points = mesh_of(scene).points
+    with write_hdf5(results.path(NOISE_RUNS, scene, "bending")) as file:
+        for axes, frames in (("all", FRAMES), ("plane", 0), ("vertex", FRAMES)):
+            for r in (6, 10):
+                store = file.create_group(f"{axes}/deim-joint/r{r:04d}")
+                store["positions"] = np.repeat(points[None], frames + 1, axis=0)
+                store.attrs.update(r=r, marked=r > 9, blowup_frame=-1 if frames else 0)
+                store.attrs["max_extent"] = 1.0
+
+
+def _write_contributions(results, scene) -> None:
+    """Gravity always pulls, the groups ever more; a kick acts once."""
+    names = [*results.holdings.scenes[scene].groups, "gravity"]
+    rows = [
+        (scene, effect, "force", frame, 1.0 if effect == "gravity" else float(frame), None)
+        for effect in names
+        for frame in range(FRAMES)
+    ]
+    rows.append((scene, "kick", "start", 0, 5.0, 1.0))
+    _write(results.path(CONTRIBUTIONS, scene), "scene effect role frame force energy", rows)
+
+
+def _write_sensitivity(results, scene) -> None:
+    """Floors of springs rise tenfold every other frame, others hardly."""
+    rows = [
+        (scene, label, frame, 10.0 ** (-9 + (0.5 * frame if "spring" in scene else 0.05)))
+        for label in ("1e-10", "1e-08", "solver")
+        for frame in range(FRAMES)
+    ]
+    _write(results.path(SENSITIVITY, scene), "scene perturbation frame relative_difference", rows)
+
+
+def _ratio(method, r, threads):
+    """Ratio and break-even size: block-deim pays always, qdeim never, the others up to 20."""
+    if method == "block-deim":
+        return 0.01 * r, np.nan
+    return (0.2 * r, 6) if method == "qdeim" else (0.05 * r * threads, 20 // threads)
+
+
+def _write_scaling(results, scenes) -> None:
+    header = (
+        "scene method threads vertices ms_per_iteration local_ms global_ms factorisation_ms"
+        " memory_mb"
+    )
+    rows = [
+        (scene, method, threads, n, n * cost, 0.6 * n * cost, 0.4 * n * cost, *extra)
+        for scene in scenes
+        for n in (400, 1600, 10000)
+        for method, threads, cost, extra in (
+            ("fom", 1, 1e-4, (0.01 * n, 0.001 * n)),
+            ("fom", 2, 7e-5, (np.nan, np.nan)),
+            ("block-deim", 1, 5e-5, (np.nan, np.nan)),
+            ("ecsw", 1, 1e-2 / n, (np.nan, np.nan)),
+        )
+    ]
+    table = _write(TABLE.at(results.folder, name="scaling"), header, rows)
+    write_table(scaling_fit(table), TABLE.at(results.folder, name="scaling_fit"))
+
+
+@pytest.fixture(scope="session")
+def specs() -> dict[str, Options]:
+    """The figures of the project."""
+    return load_choices(ROOT / "config" / "figures.yaml")
+
+
+@pytest.fixture(scope="session")
+def study(tmp_path_factory, specs) -> Study:
+    """An invented study with all methods."""
+    return make_study(tmp_path_factory.mktemp("results"), specs, SCENES, list(METHOD_ROWS))
+
+
+def make_study(
+    root: Path, specs: dict[str, Options], scenes: dict[str, tuple[str, ...]], methods: list[str]
+) -> Study:
+    """An invented study of some scenes, with their groups, and methods, written below ``root``."""
+    return Study(root, Results(str(root), make_results(root, scenes, methods), SETTINGS), specs)
+
+
+@pytest.fixture
+def small_study(tmp_path, specs) -> Callable[..., Study]:
+    """Maker of a study with other scenes and methods, which a test may change."""
+    return partial(make_study, tmp_path, specs)
+
+
+@pytest.fixture(scope="session")
+def strain_only(tmp_path_factory, specs) -> Study:
+    """A study without most scenes and methods."""
+    scenes = {"strain_oop": ("strain",)}
+    return make_study(tmp_path_factory.mktemp("strain"), specs, scenes, ["deim", "block-deim"])
+
+
+@pytest.fixture(scope="session")
+def round_off_only(tmp_path_factory, specs) -> Study:
+    """A study of which the snapshots are round-off."""
+    methods = ["deim", "deim-joint", "block-deim"]
+    return make_study(tmp_path_factory.mktemp("flat"), specs, {"bend_fall": ("bending",)}, methods)
+
+
+@pytest.fixture(params=list(declarations()))
+def figure_name(request) -> str:
+    """Every figure in turn."""
+    return request.param

@@ -1,0 +1,192 @@
+"""The page on which models run: one file, scenes beside it, and it works in a real browser."""
+
+import io
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import Page
+
+from browser import browser_or_skip, page_at
+from builders import make_scene
+from pdrom.core.errors import StorageError
+from pdrom.core.store import write_text
+from study.live.page import filled
+from written_models import write_models, write_page
+
+
+def test_what_is_filled_in_is_not_looked_at():
+    assert filled("a{{X}}b{{Y}}", {"X": "{{Y}}", "Y": "}}"}) == "a{{Y}}b}}"
+
+
+def test_no_title_ends_the_script_and_scenes_are_named_in_order(tmp_path):
+    file = tmp_path / "live" / "one.js"
+    write_text(
+        'pdromLive({"format":1,"scene":"one","title":"A </script> \\"b\\"","more":0});\n', file
+    )
+    text = write_page(tmp_path, [file]).read_text("utf-8")
+    assert '[{"scene":"one","title":"A \\u003c/script> \\"b\\"","file":"live/one.js"}]' in text
+    assert text.count("</script>") == 5
+
+
+@pytest.mark.parametrize("content", ["", "pdromLive({});", 'pdromLive({"format":2,"scene":"x"});'])
+def test_a_file_without_models_is_named(content, tmp_path):
+    write_text(content, tmp_path / "other.js")
+    with pytest.raises(StorageError, match=r"other\.js: no models for the page"):
+        write_page(tmp_path, [tmp_path / "other.js"])
+    assert not (tmp_path / "live.html").exists()
+
+
+def test_a_damaged_file_is_refused(tmp_path):
+    write_text("pdromLive({});", tmp_path / "own.js")
+    (tmp_path / "own.js").write_text("other", encoding="utf-8")
+    with pytest.raises(StorageError, match=r"own\.js"):
+        write_page(tmp_path, [tmp_path / "own.js"])
+
+
+def write_sheet(folder: Path) -> Path:
+    """Models of a sheet that hangs from one side, where the page of ``folder`` looks for them."""
+    (folder / "live").mkdir()
+    pull, pins = {"effect": "gravity"}, {"effect": "pins", "select": "left"}
+    sheet = {"kind": "cloth", "rows": 8, "columns": 8, "plane": "xz"}
+    scene = make_scene(pull, pins, {"effect": "spring", "weight": 1e4}, mesh=sheet, frames=120)
+    return write_models(scene, folder / "live", every=1)[0]
+
+
+@pytest.mark.slow
+def test_of_scenes_chosen_in_haste_the_last_is_shown_and_a_lost_one_is_named(tmp_path):
+    """Files may come in any order; the page goes on after one that is missing.
+
+    Stands before the tests that share a browser: there can be one at a time.
+    """
+    browser_or_skip()
+    one = write_sheet(tmp_path)
+    files = [one.with_name(f"{name}.js") for name in "abcd"]
+    for file in files:
+        named = f'"scene":"{file.stem}","title":"{file.stem.upper()}"'
+        write_text(one.read_text("utf-8").replace('"scene":"test","title":"test"', named), file)
+    path = write_page(tmp_path, files)
+    files[3].unlink()
+    choose = """scenes => scenes.forEach((scene) => {
+      document.getElementById("scene").value = scene;
+      document.getElementById("scene").dispatchEvent(new Event("change"));
+    })"""
+    with page_at(path.as_uri(), width=900, height=800) as page:
+        for chosen, title in (([1, 2], "C."), ([0, 1, 0], "A.")):
+            page.evaluate(choose, chosen)
+            page.wait_for_selector('body[data-ready="yes"]')
+            assert page.inner_text("#about").startswith(title)
+        page.evaluate(choose, [3])
+        page.wait_for_selector("#verdict.bad")
+        for button in ("#play", "#again"):
+            page.click(button)
+        assert "live/d.js: missing" in page.inner_text("#verdict")
+        page.evaluate(choose, [1])
+        page.wait_for_selector('body[data-ready="yes"]')
+        assert page.inner_text("#about").startswith("B.")
+        assert [said for said in page.said if "ERR_FILE_NOT_FOUND" not in said] == []
+
+
+@pytest.fixture(scope="module", params=["", "#plain"], ids=["WebGL2", "canvas"])
+def opened(request, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    """The page of a sheet in a headless browser; what it said and asked for is noted."""
+    browser_or_skip()
+    folder = tmp_path_factory.mktemp("page")
+    path = write_page(folder, [write_sheet(folder)])
+    with page_at(path.as_uri() + request.param, width=900, height=800) as page:
+        page.wait_for_selector('body[data-ready="yes"]')
+        yield page
+
+
+def after(page: Page, frame: int) -> None:
+    """Wait until the run has come so far."""
+    page.wait_for_function(f"Number(document.body.dataset.frame) >= {frame}")
+
+
+def picture(page: Page) -> np.ndarray:
+    """What is drawn, (height, width, 3), without the words on it."""
+    with Image.open(io.BytesIO(page.locator("#picture").screenshot())) as image:
+        return np.asarray(image.convert("RGB"), dtype=int)[60:]
+
+
+@pytest.mark.slow
+def test_it_runs_and_is_drawn(opened: Page) -> None:
+    after(opened, 2)
+    seen = picture(opened)
+    assert np.mean(seen.min(axis=2) < 200) > 0.005
+    after(opened, 25)
+    assert np.mean(np.abs(picture(opened) - seen).max(axis=2) > 30) > 1e-3
+    assert opened.inner_text("#verdict") == "Inside the trained range."
+    assert "%" in opened.inner_text("#distance")
+    after(opened, 125)
+    opened.wait_for_function("document.getElementById('distance').textContent.includes('ended')")
+
+
+@pytest.mark.slow
+def test_a_dragged_handle_leaves_the_trained_range(opened: Page) -> None:
+    opened.click("#again")
+    opened.wait_for_function("Number(document.body.dataset.frame) < 60")
+    opened.focus("#handles button")
+    opened.wait_for_function(
+        """() => {
+        document.activeElement.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowUp'}));
+        return document.getElementById('verdict').classList.contains('bad');
+        }"""
+    )
+    assert "Outside the trained range" in opened.inner_text("#verdict")
+    assert opened.inner_text("#distance") == "your motion was not recorded"
+    opened.get_by_role("button", name="Let go of left").click()
+    opened.get_by_role("button", name="Hold left").wait_for()
+
+
+@pytest.mark.slow
+def test_a_pointer_takes_a_handle_and_turns_the_picture_elsewhere(opened: Page) -> None:
+    opened.click("#again")
+    opened.click("#play")
+    picture_box = opened.locator("#picture").bounding_box()
+    # no handle lies in the corner
+    opened.mouse.move(picture_box["x"] + 10, picture_box["y"] + picture_box["height"] - 10)
+    before = picture(opened)
+    opened.mouse.down()
+    opened.mouse.move(picture_box["x"] + 200, picture_box["y"] + picture_box["height"] - 40)
+    opened.mouse.up()
+    opened.wait_for_timeout(0)
+    assert np.mean(np.abs(picture(opened) - before).max(axis=2) > 30) > 1e-3
+    assert opened.inner_text("#play") == "Play"
+    assert opened.inner_text("#distance") != "your motion was not recorded"
+
+
+@pytest.mark.slow
+def test_nothing_is_asked_of_a_network_and_nothing_is_said(opened: Page) -> None:
+    assert [url for url in opened.asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    assert opened.said == []
+
+
+LIFTED = """
+(size) => {
+  const [canvas, other] = [1, 2].map(() => document.createElement("canvas"));
+  canvas.style.width = canvas.style.height = "200px";
+  document.body.append(canvas);
+  const drawing = new pdromDrawing.Drawing(canvas, { plain: location.hash === "#plain" });
+  const layer = drawing.add(new pdromDrawing.Layer({ triangles: Uint32Array.of(0, 1, 2), n: 3 }));
+  const B = new Float32Array(3 * size), z = new Float32Array(3 * size);
+  for (let v = 0; v < 3; v++) B[size * v + size - 1 - v] = z[3 * (size - 1 - v) + v] = 1;
+  layer.lifted(B, size);
+  layer.move(z);
+  drawing.camera.look([0, 0, 0], 2);
+  drawing.draw();
+  const copy = other.getContext("2d");
+  copy.drawImage(canvas, 0, 0);
+  canvas.remove();
+  const { data } = copy.getImageData(0, 0, 200, 150);
+  return data.filter((value, i) => i % 4 === 3 && value > 0).length;
+}
+"""
+
+
+@pytest.mark.slow
+def test_more_coordinates_than_a_card_takes_are_drawn_too(opened: Page) -> None:
+    few, many = (opened.evaluate(LIFTED, size) for size in (12, 204))
+    assert few == many > 100

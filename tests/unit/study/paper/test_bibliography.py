@@ -1,0 +1,63 @@
+"""Bibliography of what is cited, in the order of citation."""
+
+import pytest
+
+from pdrom.core.errors import PaperError
+from study.paper.bibliography import bibliography, cited_keys
+
+BIB = """
+@article{beta, author = {Bea B{\\'e}ta}, title = {The {DEIM} of beta}, journal = {J. Beta},
+  year = 2011, volume = 3, pages = {1--2}}
+@book{alpha, author = {Al Alpha and Cy Gamma}, title = {Alpha & more}, publisher = {Pub},
+  year = 2001}
+@misc{unused, author = {No One}, title = {Unused}, year = 1999}
+"""
+
+
+@pytest.fixture
+def references(tmp_path):
+    """A small BibTeX file."""
+    path = tmp_path / "references.bib"
+    path.write_text(BIB.replace("&", "\\&"))
+    return path
+
+
+def test_keys_in_order_of_first_citation():
+    source = r"\cite{b, a} then \cite{c} and \cite{a,d} but not \citet{e} or \cite {f}"
+    assert cited_keys(source) == ["b", "a", "c", "d"]
+    assert cited_keys("none") == []
+
+
+def test_cited_entries_only_in_order(references):
+    text = bibliography(r"\cite{beta} \cite{alpha,beta}", references)
+    assert text.startswith(r"\begin{thebibliography}")
+    assert text.rstrip().endswith(r"\end{thebibliography}")
+    assert text.index(r"\bibitem{beta}") < text.index(r"\bibitem{alpha}")
+    assert text.count(r"\bibitem") == 2
+    assert "Unused" not in text
+    for piece in ("Bea B{é}ta", "{DEIM}", "2011", "Cy~Gamma", r"Alpha \& more", "2001"):
+        assert piece in text
+    assert text == bibliography(r"\cite{beta} \cite{alpha,beta}", references)
+
+
+def test_missing_entries_are_all_named(references):
+    with pytest.raises(PaperError, match=r"references\.bib: no entry for gone, lost"):
+        bibliography(r"\cite{alpha,gone} \cite{lost}", references)
+
+
+def test_a_file_that_is_no_bibtex_is_named(tmp_path):
+    path = tmp_path / "references.bib"
+    path.write_text("@article{alpha, title = {unfinished")
+    with pytest.raises(PaperError, match=r"references\.bib"):
+        bibliography(r"\cite{alpha}", path)
+
+
+def test_no_citation_no_item(references):
+    assert r"\bibitem" not in bibliography("text", references)
+
+
+def test_a_missing_field_names_file_and_entry(tmp_path):
+    path = tmp_path / "references.bib"
+    path.write_text("@inbook{alpha, author = {A}, title = {T}, chapter = 3, year = 2001}")
+    with pytest.raises(PaperError, match=r"references\.bib: missing publisher in alpha"):
+        bibliography(r"\cite{alpha}", path)

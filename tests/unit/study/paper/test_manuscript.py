@@ -1,0 +1,225 @@
+"""The manuscript types no result: every number of its prose comes from a table."""
+
+import re
+
+import pytest
+from matplotlib.figure import Figure
+
+from pdrom.core.yamlfile import read_yaml
+from places import ROOT
+from study.figures.kit.catalogue import declarations
+from study.paper.bibliography import bibliography, cited_keys
+from study.paper.build import PAGES
+from study.paper.known import sentences
+from study.paper.macros import AGGREGATES, keys_of
+from study.paper.source import documents
+from study.paper.tex import build_pdfs, packages_of
+from study.pipeline.plan import Plan
+from study.pipeline.study import Study
+from study.tables import declared
+
+SOURCES = documents(ROOT / "paper")
+PAPER = SOURCES["main"]
+SOURCE = "".join(SOURCES.values())
+
+# What may hold digits without stating a result: mathematics, keys, lengths, names of claims.
+_NOT_PROSE = [
+    r"(?<!\\)%.*",
+    r"\\begin\{(equation|align)\*?\}.*?\\end\{\1\*?\}",
+    r"(?s:\\begin\{(theorem|proposition)\}.*?\\end\{\1\})",
+    r"(?s:\\emph\{Proof\.\}.*?\\proven)",
+    r"\\(val|cite|label|ref|eqref|input|includegraphics|scene|method|source|figureof|fontsize)"
+    r"(\[[^\]]*\])?\{[^{}]*\}",
+    r"\\multicolumn\{\d\}|\\cline\{\d-\d\}",
+    r"\\(setlength|vspace|hspace)\{[^{}]*\}(\{[^{}]*\})?",
+    r"\{fig:[a-z_]+\}|\\begin\{[a-z]+\}(\[[^\]]*\])?(\{[^{}]*\})?",
+    r"\bC\d+\b",
+]
+
+
+# Digits of a formula that are no quantity: indices and exponents, a factor of a symbol, a bound 0.
+_NOTATION = [r"[_^](\{[^{}]*\}|.)", r"\d+(?=[a-zA-Z])", r"\\(ge|le)\s*0(?![.\d])"]
+
+
+def notation_removed(formula: re.Match) -> str:
+    """An inline formula without its notation: what keeps a digit states a quantity."""
+    text = formula.group(0)
+    for pattern in _NOTATION:
+        text = re.sub(pattern, " ", text)
+    return text
+
+
+def prose(source: str) -> str:
+    """Body text without mathematics, propositions, proofs, keys, lengths and names of claims."""
+    text = source.rpartition(r"\begin{document}")[2]
+    for pattern in _NOT_PROSE:
+        text = re.sub(pattern, " ", text, flags=re.S if "begin" in pattern else 0)
+    return re.sub(r"(?<!\\)\$.*?(?<!\\)\$", notation_removed, text, flags=re.S)
+
+
+def typed_numbers(source: str) -> list[str]:
+    """Numbers typed in the prose, with the words around them."""
+    return [m.group(0) for m in re.finditer(r".{0,30}\d[\d.,]*.{0,20}", prose(source))]
+
+
+@pytest.mark.parametrize("document", SOURCES)
+def test_no_result_is_typed(document):
+    assert typed_numbers(SOURCES[document]) == []
+
+
+@pytest.mark.parametrize(
+    "sentence",
+    [
+        "The error is 0.03.",
+        "It blew up at frame 12.",
+        "A speed-up of 50 times.",
+        r"5\,\% remain",
+        "The error is $0.03$.",
+        r"It stays below $10^{-3}$.",
+        r"$50\times$ faster",
+        r"an $e \le 0.2$",
+    ],
+)
+def test_a_typed_result_is_found(sentence):
+    changed = PAPER.replace(r"\paragraph{Limitations.}", rf"\paragraph{{Limitations.}} {sentence}")
+    assert len(typed_numbers(changed)) == 1
+
+
+def test_only_packages_of_both_tex_systems():
+    allowed = {
+        "fontenc", "inputenc", "lmodern", "amsmath", "geometry", "graphicx", "xcolor", "array",
+        "longtable", "enumitem", "microtype", "hyperref", "xr-hyper", "tabularx", "rotating", "url",
+    }  # fmt: skip
+    assert set(packages_of(SOURCE)) <= allowed
+
+
+def test_every_key_names_a_column_of_a_table():
+    study = Study.load(read_yaml(ROOT / "config" / "default.yaml"), ROOT)
+    facts = Plan(study).paper.manuscript.settings["facts"]["tables"]
+    columns = {name: set(table.column_names) for name, table in declared().items()}
+    columns |= {name: set(rows[0]) for name, rows in facts.items()}
+    for key in keys_of(SOURCE):
+        table, *parts = key.split("|")
+        if table == "machine":
+            continue
+        fields = [re.split("!?=", part)[0] for part in parts]
+        unknown = set(fields) - columns[table] - set(AGGREGATES)
+        assert not unknown, key
+
+
+def test_every_figure_of_the_study_is_shown():
+    shown = re.findall(r"\\figureof\{([a-z_]+)\}", SOURCE)
+    assert len(set(shown)) == len(shown)
+    assert set(shown) == set(declarations())
+
+
+def test_the_text_speaks_of_every_figure():
+    shown = re.findall(r"\\figureof\{([a-z_]+)\}", SOURCE)
+    assert set(shown) - set(re.findall(r"\\ref\{fig:([a-z_]+)\}", SOURCE)) == set()
+
+
+def test_the_text_speaks_of_every_table():
+    labels = re.findall(r"\\label\{(tab:[a-z]+)\}|\\longtableof\{.*?\}\{(tab:[a-z]+)\}", SOURCE)
+    shown = {one or other for one, other in labels}
+    assert shown == set(re.findall(r"\\ref\{(tab:[a-z]+)\}", SOURCE)) != set()
+
+
+def test_numbers_that_a_configuration_may_lack_stand_in_sentences_that_can_be_left_out():
+    """Outside of them only what every configuration holds."""
+    blocks = [sentence.text for sentence in sentences(SOURCE)]
+    outside = SOURCE
+    for block in blocks:
+        outside = outside.replace(rf"\known{{{block}}}", "").replace(rf"\row{{{block}}}", "")
+    for key in keys_of(outside):
+        table = key.split("|")[0]
+        assert table in ("study", "claims", "machine") or re.fullmatch(r"scenes\|\w+\|max", key)
+    assert all(keys_of(block) for block in blocks)
+
+
+def plain_words(text: str) -> list[str]:
+    """Words of a text as a reader counts them: a value of a table is one."""
+    text = re.sub(r"\\val\{[^{}]*\}", "value", text)
+    return re.findall(r"[\w-]+", re.sub(r"\\(known|noindent|method|scene|emph)\b", " ", text))
+
+
+def paragraphs(source: str) -> list[str]:
+    """Paragraphs, items and captions of a document, without the rows of its tables."""
+    text = re.sub(r"\\begin\{fittedtabular\}.*?\\end\{fittedtabular\}", "", source, flags=re.DOTALL)
+    return re.split(r"\n[ \t]*\n|\\item|\\caption|\\longtableof|\\begin\{document\}", text)[1:]
+
+
+def numbers_in(paragraph: str) -> int:
+    """Numbers that a reader sees in a paragraph: values of tables but words, and typed digits."""
+    kinds = {(n, c.name): c.kind for n, table in declared().items() for c in table.columns}
+    shown = 0
+    for key in re.findall(r"\\val\{([^{}]*)\}", paragraph):
+        table, *parts = key.split("|")
+        column = next(part for part in reversed(parts) if part not in AGGREGATES)
+        counted = parts[-1] in ("count", "distinct")
+        shown += counted or kinds.get((table, column)) != "text"
+    return shown + len(typed_numbers(r"\begin{document}" + paragraph))
+
+
+def test_the_paper_keeps_to_its_measures():
+    """Its number of pages is seen to by the build (`test_tex`)."""
+    abstract = PAPER.split(r"\begin{abstract}")[1].split(r"\end{abstract}")[0]
+    assert 100 < len(plain_words(abstract)) <= 180
+    assert 0 < len(re.findall(r"\\figureof\{[a-z_]+\}", PAPER)) <= 9
+    tables = r"\\begin\{(?:table|heretable|longtable)\}|\\longtableof\{"
+    body = PAPER.rpartition(r"\begin{document}")[2]
+    assert 0 < len(re.findall(tables, body)) <= 5
+    assert PAGES == {"main": 16}
+
+
+def test_no_paragraph_of_the_paper_has_more_than_six_numbers():
+    crowded = {p.strip()[:60]: n for p in paragraphs(PAPER) if (n := numbers_in(p)) > 6}
+    assert crowded == {}
+
+
+@pytest.mark.parametrize(
+    ("paragraph", "numbers"),
+    [
+        (r"None.", 0),
+        (r"\val{study|scenes} of \val{claims|claim|count}, and 3 typed.", 3),
+        (r"\method{\val{winners|limit=0.1|method}} in \val{winners|limit=0.1|ms_per_frame}~ms", 1),
+    ],
+)
+def test_numbers_of_a_paragraph_are_counted(paragraph, numbers):
+    assert numbers_in(paragraph) == numbers
+
+
+def test_every_citation_has_an_entry():
+    for source in SOURCES.values():
+        text = bibliography(source, ROOT / "paper" / "references.bib")
+        assert text.count(r"\bibitem") == len(cited_keys(source)) > 10
+
+
+def test_the_same_inputs_give_the_same_bytes_in_every_folder(tmp_path):
+    """An included PDF brings the name of its file along unless the preamble suppresses it."""
+    settings = [line for line in SOURCE.splitlines() if line.startswith(r"\pdf")]
+    document = "\n".join(
+        [r"\documentclass{article}", r"\usepackage[T1]{fontenc}", r"\usepackage{lmodern}",
+         r"\usepackage{graphicx}", *settings, r"\begin{document}",
+         r"\noindent\includegraphics[width=\textwidth]{picture.pdf}", r"\end{document}"]
+    )  # fmt: skip
+    made = []
+    for name in ("one", "another"):
+        folder = tmp_path / name / "paper"
+        folder.mkdir(parents=True)
+        figure = Figure()
+        figure.subplots().plot([0, 1])
+        figure.savefig(folder / "picture.pdf", metadata={"CreationDate": None})
+        (folder / "main.tex").write_text(document, encoding="utf-8")
+        build_pdfs({folder / "main.tex": tmp_path / name / "main.pdf"}, [])
+        made.append((tmp_path / name / "main.pdf").read_bytes())
+    assert made[0] == made[1]
+
+
+def test_the_pdf_has_the_title_and_the_authors_of_the_manuscript():
+    for source in SOURCES.values():
+        title = re.search(r"\\title\{([^\\}]*)", source)
+        author = re.search(r"\\author\{([^}]*)\}", source)
+        assert title
+        assert author
+        assert re.search(rf"\\hypersetup\{{\s*pdftitle=\{{{re.escape(title[1])}", source)
+        assert rf"pdfauthor={{{author[1]}}}" in source

@@ -1,0 +1,467 @@
+"""TeX tables from the tables of the study, cell by cell."""
+
+import pandas as pd
+import pytest
+
+from study.paper.cost_tables import break_even, exponents, iterations, positions
+from study.paper.textables import (
+    TEX_TABLES,
+    claims,
+    guard,
+    local_share,
+    longtable,
+    ranks,
+    reruns,
+    stability,
+    tabular,
+)
+from study.paper.textables import scenes as scene_table
+
+ERROR = "relative_error_within_horizon"
+COLUMNS = [
+    "scene", "group", "method", "position_basis", "r", "frames", "blowup_frame", "horizon_frame",
+    ERROR, "k", "speedup",
+]  # fmt: skip
+TABLES = {
+    "methods": pd.DataFrame(
+        {
+            "method": ["pod", "deim_x"],
+            "title": ["A & B", "50 %"],
+            "centring": ["none", "affine"],
+            "rows": ["all", "scalar"],
+            "selection": ["greedy", "greedy"],
+            "solve": ["square", "qr"],
+            "oversampling": [1, 3],
+            "gain_bound": [None, None],
+        }
+    ),
+    "scenes": pd.DataFrame(
+        {
+            "scene": ["bar_a", "b"],
+            "groups": ["triangle_strain (1e+07)", "spring (1)"],
+            "vertices": [400, 9],
+            "elements": [722, 12],
+            "frames": [10, 20],
+        }
+    ),
+    "reduced_reruns": pd.DataFrame(
+        [
+            ("bar_a", "edge_spring", "pod", "full", 6, 10, None, 10, 0.5, None, None),
+            ("bar_a", "edge_spring", "pod", "full", 20, 10, None, 10, 0.25, None, None),
+            ("bar_a", "edge_spring", "pod", "full", 30, 0, None, 10, None, None, None),
+            ("bar_a", "edge_spring", "deim_x", "full", 6, 10, None, 10, 0.75, None, None),
+            ("bar_a", "edge_spring", "deim_x", "full", 20, 5, 4, 10, None, None, None),
+            ("b", "bending", "pod", "full", 6, 0, None, 7, None, None, None),
+            ("b", "all", "full", "pod", 6, 10, None, 7, 0.125, 6, 2.5),
+            ("b", "all", "ecsw-1e-02", "pod", 90, 10, None, 7, 0.375, 6, 4.0),
+        ],
+        columns=COLUMNS,
+    ),
+    "heldout_reruns": pd.DataFrame(
+        [("b", "all", "full", "pod", 6, 7, 9, None, 9, error) for error in (0.25, 0.5, 9.0)],
+        columns=[*COLUMNS[:4], "k", "r", *COLUMNS[5:9]],
+    ),
+    "accuracy_cost": pd.DataFrame(
+        [
+            ("bar_a", "fom", 1, 0.5, 0.25),
+            ("bar_a", "fom", 10, 0.125, 2.0),
+            ("bar_a", "fom-anderson", 10, 0.0625, 3.0),
+            ("bar_a", "pod", None, 0.03, 1.0),
+        ],
+        columns=["scene", "method", "iterations", ERROR, "ms_per_frame"],
+    ),
+    "breakeven": pd.DataFrame(
+        [
+            ("bar_a", "edge_spring", "deim-joint", 1, 400, 1, 6, 20.0),
+            ("bar_a", "edge_spring", "deim-joint", 1, 400, 1, 20, 20.0),
+            ("bar_a", "edge_spring", "deim-joint", 1, 400, 2, 6, None),
+        ],
+        columns=[
+            "scene",
+            "group",
+            "method",
+            "factor",
+            "vertices",
+            "threads",
+            "r",
+            "breakeven_r",
+        ],
+    ),
+    "scaling_fit": pd.DataFrame(
+        [
+            ("bar_a", "fom", 1, "ms_per_iteration", 1.25, 3),
+            ("bar_a", "fom", 2, "ms_per_iteration", 1.5, 3),
+            ("bar_a", "ecsw", 1, "ms_per_iteration", 0.125, 3),
+        ],
+        columns=["scene", "method", "threads", "quantity", "exponent", "points"],
+    ),
+    "singular_values": pd.DataFrame(
+        {
+            "scene": "bar_a",
+            "group": "edge_spring",
+            "component": [1, 6, 10, 20],
+            "relative": [1.0, 0.5, 0.01, 1e-15],
+            "above_roundoff": [True, True, True, False],
+        }
+    ),
+    "stability": pd.DataFrame(
+        [
+            ("full", "full", "rerun", "accurate", 1.0),
+            ("pod", "full", "rerun", "accurate", 1.0),
+            ("pod", "full", "rerun", "blow-up", float("inf")),
+            ("pod", "full", "rerun", "not run", None),
+            ("pod", "full", "rerun", "wrong", 3.0),
+            ("pod", "full", "sweep", "wrong", 2.0),
+            ("ecsw", "pod", "rerun", "accurate", 0.5),
+        ],
+        columns=["method", "position_basis", "experiment", "outcome", "energy_ratio"],
+    ),
+    "guard": pd.DataFrame(
+        [
+            ("bar_a", "full", None, "none", None, 0.0, None, 1.0, None, None, None, 2.0),
+            ("bar_a", "deim", 20, "none", None, 0.5, None, 4.0, None, None, None, 1.0),
+            ("bar_a", "deim", 20, "fall-back", "trained-b", None, 0.4, 1.0, 3, "extent", 0.25, 1.5),
+        ],
+        columns=[
+            "scene",
+            "method",
+            "r",
+            "action",
+            "alarm",
+            "relative_error",
+            "guard_estimate",
+            "energy_ratio",
+            "guard_frame",
+            "guard_reason",
+            "fallback_share",
+            "ms_per_frame",
+        ],
+    ),
+    "local_share": pd.DataFrame(
+        {
+            "scene": "bar_a",
+            "implementation": ["compiled", "interpreted", "numpy"],
+            "local_ms": [1.0, 100.0, 10.0],
+            "assembly_ms": [0.0, 20.0, 2.0],
+            "global_ms": [1.0, 30.0, 4.0],
+            "local_share": [0.5, 0.8, 0.75],
+        }
+    ),
+    "claims": pd.DataFrame(
+        {
+            "claim": ["C1", "C2", "C3"],
+            "paper": ["70 % or more", "x", "y"],
+            "verdict": ["holds", "cannot be decided", "does not hold"],
+            "figure_or_table": ["local_share", "a", "b"],
+            "verdict_beyond": ["depends", "holds", "does not hold"],
+            "section": "4",
+            "shown": ["5", "none", "6"],
+            "text": ["a claim_1", "t", "t"],
+            "qualifiers": ["often", "q", "q"],
+            "history": ["2026-01-31: first.", "h", "h"],
+        }
+    ),
+    "claims_tests": pd.DataFrame(
+        [
+            ("C1", "published", "some_one", True, ">=", 0.1, 1, 2, 0.05, 0.1, float("inf")),
+            ("C1", "published", "others", True, ">=", 0.1, 3, 4, 0.0, 0.5, 1.0),
+            ("C1", "published", "aside", False, "<=", 0.1, 5, 6, 0.0, 0.5, 1.0),
+            ("C1", "beyond", "all", True, "<=", 0.05, 0, 0, None, None, None),
+        ],
+        columns=[
+            "claim",
+            "part",
+            "what",
+            "decides",
+            "compare",
+            "threshold",
+            "satisfied",
+            "of",
+            "least",
+            "median",
+            "most",
+        ],
+    ),
+    "speedups": pd.DataFrame(
+        [
+            ("bar_a", "deim_x", "full", None, 6, 1.2, "0.50", True, 0.1, None, 2.0, 0.5, None),
+            ("b", "ecsw", "pod", 20, 97, 8.0, "66 to 73", False, 0.01, 0.02, 1.0, 3.0, 1234.5),
+        ],
+        columns=[
+            "scene",
+            "method",
+            "position_basis",
+            "k",
+            "r",
+            "full_ms",
+            "shown",
+            "loses",
+            "error_train",
+            "error_heldout",
+            "training_s",
+            "reduction_s",
+            "frames_to_break_even",
+        ],
+    ),
+    "reduction_pays": pd.DataFrame(
+        [
+            ("s_one", 1.0, "implicit", 0.1, 400, 10_000, 400, 1600, 900.0, 17.0, 15.0, 20.0, 3, 2),
+            ("s_two", 100.0, "continuous", 0.01, 400, 400, *6 * [None], 3, 0),
+        ],
+        columns=[
+            "scene",
+            "stiffness",
+            "reference",
+            "limit",
+            "smallest",
+            "largest",
+            "from_plain",
+            "from_best",
+            "breaks_even",
+            "speedup",
+            "speedup_low",
+            "speedup_high",
+            "motions",
+            "reached",
+        ],
+    ),
+    "large_meshes": pd.DataFrame(
+        [
+            (400, "implicit", 0.1, "x_pbd", 1, 5, 0.25, "newton", 0.5, None),
+            (9, "continuous", 0.01, *7 * [None]),
+        ],
+        columns=[
+            "vertices",
+            "reference",
+            "limit",
+            "method",
+            "substeps",
+            "iterations",
+            "ms_per_frame",
+            "second",
+            "second_ms",
+            "reduced_ms",
+        ],
+    ),
+    "payoff": pd.DataFrame(
+        [
+            ("full", "deim_x", 3, 0, 0, 0, *5 * [None], 0, 0, 0),
+            ("pod", "ecsw", 3, 2, 1, 1, *5 * [0.5], 2, 2, 1),
+        ],
+        columns=[
+            "position_basis",
+            "method",
+            "scenes",
+            "accurate",
+            "pays",
+            "loses",
+            "least_speedup",
+            "best_speedup",
+            "most_speedup",
+            "error_train",
+            "error_heldout",
+            "heldout",
+            "accurate_heldout",
+            "pays_heldout",
+        ],
+    ),
+    "hard_cases": pd.DataFrame(
+        [
+            ("torn", "pod", 1.0, None, 1.0, "holds", None),
+            ("torn", "deim_x", float("inf"), 0, 1.0, "singular", "a % reason"),
+            ("kicked", "pod", None, None, None, "nothing to reduce", None),
+            ("kicked", "deim_x", 25.0, 7, 300.0, "blow-up", "a % reason"),
+            ("folded", "deim_x", 25.0, None, 4.0, "distorted", "a % reason"),
+        ],
+        columns=["case", "method", "gain", "blowup_frame", "max_extent", "outcome", "why"],
+    ),
+    "kernel_accuracy": pd.DataFrame(
+        {
+            "group": ["spring", "strain", "strain"],
+            "matrix_class": ["random", "zero", "huge (1e150)"],
+            "cases": [4, 5, 6],
+            "condition": [1.0, 1.0, 1e6],
+            "worst_relative_error": [1e-16, 3e-16, 1e-12],
+            "worst_over_condition": [1e-16, 3e-16, 1e-18],
+        }
+    ),
+}
+
+
+def rows(text: str) -> list[str]:
+    """Rows of the body, the head (on every page) left out."""
+    lines = [line for line in text.splitlines() if line.endswith(r" \\")]
+    return [line for line in lines if line != lines[0]]
+
+
+def test_rows_and_columns_of_a_table():
+    for make, name in ((tabular, "tabular"), (longtable, "longtable")):
+        text = make(["a", "b"], [["1", "2"], ["3", "4"]], "lr")
+        assert text.startswith(rf"\begin{{{name}}}{{lr}}")
+        assert text.endswith(rf"\end{{{name}}}" + "\n")
+        assert rows(text) == [r"1 & 2 \\", r"3 & 4 \\"]
+        assert r"a & b \\" in text
+
+
+@pytest.mark.parametrize("name", TEX_TABLES)
+def test_every_row_has_a_cell_for_every_column(name):
+    text = TEX_TABLES[name](TABLES)
+    head = next(line for line in text.splitlines() if line.endswith(r" \\"))
+    body = rows(text)
+    assert body
+    for row in body:
+        across = r"\multicolumn" in row
+        assert row.replace(r"\&", "").count("&") == (0 if across else head.count("&"))
+        assert "nan" not in row
+    assert TEX_TABLES[name](TABLES) == text
+
+
+def test_iterations_have_error_and_time():
+    assert rows(iterations(TABLES)) == [
+        r"\texttt{bar\_a} & 0.50 (0.25) & -- & 0.12 (2) & -- & 0.062 (3) \\"
+    ]
+
+
+def test_positions_show_the_subspace_and_its_sample():
+    assert rows(positions(TABLES)) == [
+        r"\texttt{b} & 0.12 & 0.50 & 0.38 & -- & 90 & 4 & -- & -- & -- \\"
+    ]
+
+
+def test_a_reduction_that_always_pays_has_no_break_even():
+    assert rows(break_even(TABLES)) == [
+        r"\texttt{bar\_a} & edge spring & 400 & 20 & pays & -- & -- & -- & -- \\"
+    ]
+
+
+def test_exponents_of_one_thread():
+    assert rows(exponents(TABLES)) == [r"\texttt{bar\_a} & 3 & 1.2 & -- & -- & -- & 0.12 \\"]
+
+
+def test_errors_that_a_reduction_does_not_reach_are_left_out():
+    assert rows(TEX_TABLES["tab_pays"](TABLES)) == [
+        r"\texttt{s\_one} & implicit & 0.10 & 400 to 10000 & 400 & 1600 & 17 (15 to 20) & 2 of 3 \\"
+    ]
+
+
+def test_speedups_that_lose_say_so():
+    deim, ecsw = rows(TEX_TABLES["tab_speedups"](TABLES))
+    assert "0.50 (loses)" in deim
+    assert "never" in deim
+    assert "deim\\_x, r = 6" in deim
+    assert "66 to 73 &" in ecsw
+    assert "ecsw, k = 20" in ecsw
+    # two digits of a count
+    assert ecsw.endswith(r"& 1200 \\")
+
+
+def test_reruns_show_the_largest_size_that_ran():
+    """Ranks beyond the data and subspaces are left out, a blow-up shows its frame."""
+    (row,) = rows(reruns(TABLES))
+    assert row == (r"\texttt{bar\_a} & edge spring & 0.25 & \textcolor{okred}{blow-up, 4} \\")
+
+
+@pytest.mark.parametrize(
+    ("changes", "samples"),
+    [
+        ({}, "3 a mode"),
+        ({"oversampling": 1}, "one a mode"),
+        ({"gain_bound": 2.5}, r"$\gamma \le 2.5$"),
+        ({"rows": "all"}, "--"),
+    ],
+)
+def test_methods_say_how_many_samples_they_take(changes, samples):
+    frame = TABLES["methods"][1:].assign(**changes)
+    (row,) = rows(TEX_TABLES["tab_methods"]({"methods": frame}))
+    assert row.split(" & ")[5] == samples
+
+
+def test_ranks_count_what_is_above_round_off():
+    (row,) = rows(ranks(TABLES))
+    assert row == r"\texttt{bar\_a} & edge spring & 3 & 0.50 & 0.010 & -- \\"
+
+
+def test_local_share_orders_the_implementations():
+    (row,) = rows(local_share(TABLES))
+    assert row == r"\texttt{bar\_a} & 150 & 0.80 & 16 & 0.75 & 2 & 0.50 \\"
+
+
+def test_horizon_of_a_calm_scene_is_its_run():
+    first, second = rows(scene_table(TABLES))
+    assert first.endswith(r"& 400 & 722 & 10 & run \\")
+    assert second.endswith(r"& 9 & 12 & 20 & 7 \\")
+    assert r"triangle strain ($10^{7}$)" in first
+
+
+def test_a_scene_without_a_run_has_no_horizon():
+    other = TABLES["reduced_reruns"][TABLES["reduced_reruns"].scene == "b"]
+    first, _ = rows(scene_table(TABLES | {"reduced_reruns": other}))
+    assert first.endswith(r"& 10 & -- \\")
+
+
+def test_hard_cases_show_failures_only():
+    torn, kicked, folded = rows(TEX_TABLES["tab_hard_cases"](TABLES))
+    assert r"\texttt{deim\_x}" in TEX_TABLES["tab_hard_cases"](TABLES)
+    assert "pod" not in TEX_TABLES["tab_hard_cases"](TABLES)
+    assert torn.endswith(r"and lets go & \texttt{deim\_x}: singular \\")
+    assert kicked.endswith(r"& \texttt{deim\_x}: blow-up, 7; gain 25 \\")
+    assert folded.endswith(r"& \texttt{deim\_x}: 4\,$\times$ the extent; gain 25 \\")
+
+
+def test_hard_reductions_count_outcomes():
+    pod, deim = rows(TEX_TABLES["tab_hard_reductions"](TABLES))
+    assert pod == r"\texttt{pod} & 1 & 1 & 0 & 0 & 0 & 0 & -- \\"
+    assert deim == r"\texttt{deim\_x} & 0 & 0 & 0 & 1 & 1 & 1 & a \% reason \\"
+
+
+def test_kernel_accuracy_names_the_worst_class():
+    spring, strain = rows(TEX_TABLES["tab_kernel_accuracy"](TABLES))
+    assert spring.startswith("spring & 1 & 4 & ")
+    assert strain.startswith("strain & 2 & 11 & ")
+    assert "& zero &" in strain
+    assert "& huge (1e150) &" in strain
+
+
+def test_verdicts_have_their_colour():
+    holds, open_, fails = rows(claims(TABLES))
+    assert r"\textcolor{okgreen}{holds}" in holds
+    assert r"\textcolor{okgrey}{cannot be decided}" in open_
+    assert r"\textcolor{okred}{does not hold}" in fails
+    assert r"70 \% or more" in holds
+    assert "holds} (1/2, 3/4) &" in holds  # the tests that decide
+    assert r"\textcolor{okgrey}{depends} (0/0) &" in holds
+    assert r"figure~\ref{fig:local_share}" in holds
+    assert r"\texttt{a}" in open_
+
+
+def test_claims_are_stated_with_place_and_qualifiers():
+    first, history, *_ = rows(TEX_TABLES["tab_claims_in_full"](TABLES))
+    for words in ("Section 4", "figures: 5", r"a claim\_1", "often"):
+        assert words in first
+    assert "2026" in history
+
+
+def test_every_test_has_a_row():
+    _, _, decides, _, aside, empty, *others = rows(TEX_TABLES["tab_claims_in_full"](TABLES))
+    assert decides == (
+        r"\emph{as published} & some\_one & $\ge$ 0.10 & 1 of 2 & 0.050 & 0.10 & "
+        r"\ensuremath{\infty} \\"
+    )
+    assert aside.startswith(r" & \textcolor{okgrey}{aside} & $\le$ 0.10 & 5 of 6 &")
+    assert empty == r"\emph{beyond} & all & $\le$ 0.050 & 0 of 0 & -- & -- & -- \\"
+    assert len(others) == 4  # two claims without tests, in two rows of words each
+
+
+def test_stability_counts_what_ran():
+    first, second = rows(stability(TABLES))
+    cells = [cell.strip() for cell in first.removesuffix(r"\\").split("&")]
+    assert cells[1:5] == ["1", "1", "0", "1"]
+    assert cells[5:] == ["3", r"\ensuremath{\infty}", "0 of 1", "2"]
+    assert second.startswith(r"\texttt{ecsw, pod subspace} & 1 & 0 & 0 & 0 & 0.50 & 0.50 & 0 of 0")
+
+
+def test_guard_shows_what_was_seen_and_repeated():
+    full, plain, fallen = rows(guard(TABLES))
+    assert full == r"\texttt{bar\_a} &  & full order & -- & 0 & -- & 1 & -- & -- & 2 \\"
+    assert plain.endswith(r"& none & -- & 0.50 & -- & 4 & -- & -- & 1 \\")
+    assert fallen.endswith(r"& fall-back & b & blow-up & 0.40 & 1 & 3, extent & 0.25 & 1.5 \\")

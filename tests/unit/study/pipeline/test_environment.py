@@ -1,0 +1,141 @@
+"""Environment variables of the jobs, and the kernels of OpenBLAS."""
+
+import json
+import os
+import platform
+import subprocess
+import sys
+
+import pytest
+
+from pdrom.core.environment import (
+    COMPILED_HASWELL,
+    compiled_for,
+    core_type,
+    features_here,
+    processor_features,
+    settled,
+)
+
+INHERITED = {
+    "OPENBLAS_CORETYPE": "Prescott",
+    "MKL_CBWR": "AVX2",
+    "NPY_DISABLE_CPU_FEATURES": "AVX2",
+    "NUMBA_DISABLE_JIT": "1",
+    "NUMBA_CPU_NAME": "cascadelake",
+    "OMP_NUM_THREADS": "7",
+    "KMP_AFFINITY": "none",
+    "SOURCE_DATE_EPOCH": "1",
+    "PYTHONOPTIMIZE": "2",
+    "MATPLOTLIBRC": "/etc/rc",
+    "TEXINPUTS": "/etc/tex",
+    "LC_ALL": "tr_TR.UTF-8",
+    "PATH": "/bin",
+    "HOME": "/home/somebody",
+    "NUMBA_CACHE_DIR": "/cache",
+    "SLURM_JOB_ID": "3",
+}
+
+
+def test_nothing_inherited_changes_a_result():
+    names = ("PATH", "HOME", "NUMBA_CACHE_DIR", "SLURM_JOB_ID")
+    bare = {name: INHERITED[name] for name in names}
+    target = compiled_for("x86_64", set(COMPILED_HASWELL))
+    assert settled(INHERITED, "Haswell", target) == settled(bare, "Haswell", target)
+    assert settled(INHERITED, None, {}) == settled(bare, None, {})
+    assert bare.items() <= settled(INHERITED, None, {}).items()
+
+
+def test_threads_locale_and_kernels_are_fixed():
+    made = settled(INHERITED, "Haswell", {})
+    assert made["OMP_NUM_THREADS"] == made["OPENBLAS_NUM_THREADS"] == "1"
+    assert made["LC_ALL"] == "C.UTF-8"
+    assert made["OPENBLAS_CORETYPE"] == "Haswell"
+    assert "OPENBLAS_CORETYPE" not in settled(INHERITED, None, {})
+
+
+def test_what_is_asked_for_is_kept_as_it_is():
+    asked = INHERITED | {"PDROM_KEEP": "OPENBLAS_CORETYPE OMP_NUM_THREADS NUMBA_CPU_NAME"}
+    made = settled(asked, "Haswell", compiled_for("x86_64", set(COMPILED_HASWELL)))
+    assert made["OPENBLAS_CORETYPE"] == "Prescott"
+    assert made["OMP_NUM_THREADS"] == "7"
+    assert made["NUMBA_CPU_NAME"] == "cascadelake"
+    assert "NUMBA_CPU_FEATURES" not in made
+    assert "MKL_CBWR" not in made
+    assert made["OPENBLAS_NUM_THREADS"] == "1"
+
+
+# as Linux prints them: a Haswell, a virtual machine that hides AVX2, and an ARM processor
+CPUINFO = {
+    "Haswell": "processor\t: 0\nflags\t\t: fpu sse4_2 avx f16c fma avx2 bmi2\n",
+    "Nehalem": "processor\t: 0\nflags\t\t: fpu sse4_2 avx fma\n",
+    "mixed": "flags\t\t: sse4_2 fma avx2\n\nflags\t\t: sse4_2 fma\n",
+    "arm": "processor\t: 0\nFeatures\t: fp asimd evtstrm aes\n",
+    "empty": "",
+}
+
+
+@pytest.mark.parametrize(
+    ("system", "machine", "cpuinfo", "expected"),
+    [
+        ("Linux", "x86_64", "Haswell", "Haswell"),
+        ("Linux", "x86_64", "Nehalem", "Nehalem"),
+        ("Linux", "x86_64", "mixed", "Nehalem"),
+        ("Linux", "x86_64", "empty", "Nehalem"),
+        ("Linux", "aarch64", "arm", "ARMV8"),
+        ("Linux", "riscv64", "empty", None),
+        ("Darwin", "arm64", "empty", None),
+        ("Darwin", "x86_64", "empty", None),
+    ],
+)
+def test_kernels_are_the_newest_that_every_processor_has(system, machine, cpuinfo, expected):
+    assert core_type(system, machine, processor_features(CPUINFO[cpuinfo])) == expected
+
+
+def test_the_kernels_are_those_of_numpy_and_of_scipy():
+    """Set as a run sets them, both libraries report them."""
+    kernels = core_type(platform.system(), platform.machine(), features_here())
+    if not kernels:
+        pytest.skip("nothing to choose on this machine")
+    code = (
+        "import json; from pdrom.core.machine import loaded_kernels as k;"
+        "print(json.dumps([[x.architecture, x.library] for x in k() if x.kind == 'blas']))"
+    )
+    environment = {**os.environ, "OPENBLAS_CORETYPE": kernels}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
+    found = json.loads(done.stdout)
+    assert [name.lower() for name, _ in found] == [kernels.lower()] * 2
+    assert {library for _, library in found} == {"openblas"}
+
+
+@pytest.mark.parametrize("missing", sorted(COMPILED_HASWELL))
+def test_a_processor_that_lacks_an_instruction_is_compiled_for_as_it_is(missing):
+    assert (
+        compiled_for("x86_64", set(COMPILED_HASWELL) | {"avx512f"})["NUMBA_CPU_NAME"] == "haswell"
+    )
+    assert compiled_for("x86_64", set(COMPILED_HASWELL) - {missing}) == {}
+    assert compiled_for("riscv64", set(COMPILED_HASWELL)) == {}
+    assert compiled_for("aarch64", set()) == compiled_for("arm64", {"asimd"})
+
+
+def test_kernels_are_compiled_for_the_target():
+    """What numba says it compiled a kernel for, and keys its cache by, is what was chosen."""
+    target = compiled_for(platform.machine(), features_here())
+    code = (
+        "import json; from pdrom.model.compiled.vectors import dot; import numpy as np;"
+        "dot(np.ones(3), np.ones(3)); library = dot.overloads[dot.signatures[0]].library;"
+        "print(json.dumps(library.codegen.magic_tuple()[1:]))"
+    )
+    # another processor: had the inherited name any effect, it would be seen
+    inherited = {**os.environ, "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+    environment = settled(inherited, None, target)
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
+    name, features = json.loads(done.stdout)
+    if target:
+        assert [name, features] == list(target.values())
+    else:
+        assert name != "generic"

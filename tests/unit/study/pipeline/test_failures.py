@@ -1,0 +1,174 @@
+"""The last lines of a failed run: every cause in words of its own."""
+
+import logging
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from snakemake_interface_logger_plugins.common import LogEvent
+
+from pdrom.core.errors import INTERRUPTED
+from study.artifact.logs import job_log
+from study.pipeline.failures import ADVICE, Failures, cause
+
+ENDED = "CalledProcessError in file x, line 3:\nCommand 'python x.py' "
+
+
+@pytest.fixture
+def snakemake():
+    """Stands for Snakemake's logger, with somebody who listens for failures."""
+    logger = logging.Logger("snakemake")
+    logger.failures = Failures()
+    logger.addHandler(logger.failures)
+    return logger
+
+
+def fail(logger, rule, log, said, output=("results/x.h5",)):
+    """A failed job as Snakemake logs it."""
+    logger.error(f"RuleException:\n{said}", extra={"event": LogEvent.ERROR})
+    extra = {"event": LogEvent.JOB_ERROR, "rule_name": rule, "log": [log], "output": list(output)}
+    logger.error("Error in rule", extra=extra)
+
+
+def end(logger):
+    """Exit status and last lines."""
+    text, status = logger.failures.end()
+    lines = text.splitlines()
+    assert lines[-1] == ADVICE
+    return status, lines[:-1]
+
+
+@pytest.mark.parametrize(
+    ("said", "expected"),
+    [
+        (ENDED + "died with <Signals.SIGKILL: 9>.", "killed (SIGKILL): out of memory?"),
+        (ENDED + "returned non-zero exit status 137.", "killed (SIGKILL): out of memory?"),
+        (ENDED + "returned non-zero exit status 130.", "interrupted"),
+        (ENDED + "returned non-zero exit status 143.", "ended by SIGTERM"),
+        (ENDED + "died with <Signals.SIGSEGV: 11>.", "crashed (SIGSEGV)"),
+        (ENDED + "returned non-zero exit status 139.", "crashed (SIGSEGV)"),
+        (ENDED + "returned non-zero exit status 127.", "its interpreter was not found"),
+        (ENDED + "returned non-zero exit status 126.", "its interpreter cannot be executed"),
+        (ENDED + "returned non-zero exit status 3.", "exit status 3, without a word"),
+        ("OSError: [Errno 28] No space left on device: 'x'", "no space left on the disk"),
+        ("MemoryError", "out of memory"),
+        ("SLURM-job '3' failed, SLURM status is: 'CANCELLED'. x", "SLURM says cancelled"),
+        ("SLURM-job '3' failed, SLURM status is: 'OUT_OF_MEMORY'.", "SLURM says out of memory"),
+        ("", "it ended without a word"),
+    ],
+)
+def test_causes_are_told_apart(said, expected, tmp_path):
+    assert cause(said, tmp_path) == expected
+
+
+@pytest.mark.parametrize(
+    ("written", "why"),
+    [
+        ("slurmstepd: error: *** JOB 3 ON vm CANCELLED AT 2026-01-01T00:00:00 ***", "cancelled"),
+        (
+            "error: *** JOB 3 ON n7 CANCELLED AT 2026-01-01T00:00:00 DUE TO TIME LIMIT ***",
+            "time limit",
+        ),
+        ("Exited with exit code 1", "a job of it failed"),
+    ],
+)
+def test_a_batch_on_a_cluster_is_named_with_the_jobs_that_wrote_an_error(
+    snakemake, tmp_path, written, why
+):
+    whole, failed, unstarted = (tmp_path / name for name in ("3.log", "fom.log", "pod.log"))
+    whole.write_text(f"Building DAG\n{written}\n")
+    failed.write_text("2026-01-01 00:00:00,000 ERROR   pdrom: too stiff\n")
+    group = {"event": LogEvent.GROUP_ERROR, "groupid": "scene_x", "aux_logs": [str(whole)]}
+    snakemake.error("Error in group scene_x", extra=group)
+    for rule, log in (("fom", failed), ("pod", unstarted)):
+        job = {"event": LogEvent.JOB_ERROR, "rule_name": rule, "log": [str(log)], "output": []}
+        snakemake.error("Error in rule", extra={**job, "indent": True})
+    assert end(snakemake) == (
+        1,
+        [
+            f"pdrom: batch scene_x failed: {why} (log: {whole})",
+            "pdrom: job fom failed: too stiff",
+        ],
+    )
+
+
+def test_every_failed_job_is_named_with_its_error(snakemake, tmp_path):
+    log = tmp_path / "job.log"
+    with pytest.raises(SystemExit), job_log(str(log)):
+        raise ValueError("vertex 3 is nan")
+    fail(snakemake, "pod", str(log), ENDED + "returned non-zero exit status 1.")
+    fail(snakemake, "fom", str(tmp_path / "none.log"), ENDED + "died with <Signals.SIGKILL: 9>.")
+    status, lines = end(snakemake)
+    assert status == 1
+    assert lines == [
+        f"pdrom: job pod failed: ValueError: vertex 3 is nan (traceback in {log})",
+        "pdrom: job fom failed while making results/x.h5: killed (SIGKILL): out of memory?",
+    ]
+
+
+def test_the_log_of_an_earlier_run_is_not_the_cause(snakemake, tmp_path):
+    """A job whose interpreter was not found did not open its log."""
+    log = tmp_path / "job.log"
+    with pytest.raises(SystemExit), job_log(str(log)):
+        raise ValueError("long ago")
+    fail(snakemake, "pod", str(log), ENDED + "returned non-zero exit status 127.")
+    _, lines = end(snakemake)
+    assert lines == [
+        "pdrom: job pod failed while making results/x.h5: its interpreter was not found"
+    ]
+
+
+CRASHING = """
+import ctypes, sys
+from study.artifact.logs import job_log
+from study.pipeline.fork_server.client import place_of
+def calculate():
+    place_of(Name())  # a function of the project calls what crashes
+class Name:
+    def __fspath__(self):
+        ctypes.string_at(0)
+with job_log(sys.argv[1]):
+    calculate()
+"""
+
+
+def test_a_job_that_crashes_is_named_with_the_line_it_was_at(snakemake, tmp_path):
+    log = tmp_path / "job.log"
+    done = subprocess.run([sys.executable, "-c", CRASHING, log], capture_output=True, check=False)
+    assert done.returncode == -signal.SIGSEGV
+    fail(snakemake, "fom", str(log), ENDED + "died with <Signals.SIGSEGV: 11>.")
+    _, (line,) = end(snakemake)
+    begin = "pdrom: job fom failed while making results/x.h5: crashed (SIGSEGV) at "
+    assert line.startswith(begin)
+    place, _, function = line.removeprefix(begin).partition(" in ")
+    assert function == f"place_of (log: {log})"
+    path, _, number = place.rpartition(":")
+    assert "os.fsencode" in Path(path).read_text().splitlines()[int(number) - 1]
+
+
+def test_the_crash_of_an_earlier_run_is_not_this_one(snakemake, tmp_path):
+    log = tmp_path / "job.log"
+    subprocess.run([sys.executable, "-c", CRASHING, log], capture_output=True, check=False)
+    os.utime(log, (1, 1))
+    fail(snakemake, "fom", str(log), ENDED + "died with <Signals.SIGKILL: 9>.")
+    assert end(snakemake)[1] == [
+        "pdrom: job fom failed while making results/x.h5: killed (SIGKILL): out of memory?"
+    ]
+
+
+@pytest.mark.parametrize("word", ["interrupted", "ended by SIGTERM"])
+def test_an_interrupted_run_says_so_and_no_more(word, snakemake, tmp_path):
+    if word == "ended by SIGTERM":
+        snakemake.failures.note_sigterm()
+    snakemake.info("Terminating processes on user request, this might take some time.")
+    fail(snakemake, "pod", "none.log", ENDED + "returned non-zero exit status 130.")
+    assert end(snakemake) == (INTERRUPTED, [f"pdrom: {word}"])
+
+
+def test_faults_of_a_rule_itself(snakemake):
+    text = "WorkflowError in rule pod in file workflow/rules/x.smk, line 3:\nno such mesh"
+    snakemake.error(text, extra={"event": LogEvent.ERROR})
+    assert end(snakemake) == (1, ["pdrom: job pod: no such mesh"])

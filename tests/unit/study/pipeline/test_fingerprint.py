@@ -1,0 +1,224 @@
+"""Fingerprints: what changes a result changes them, what does not leaves them alone."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import pdrom
+from pdrom.core.errors import ConfigurationError
+from pdrom.model.effects import EFFECTS
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.selections import SELECTIONS
+from study.pipeline.fingerprint import closure, digest_of_source, fingerprint
+
+PACKAGE = Path(pdrom.__file__).parent
+SOURCE = '''"""Module."""
+
+import os
+
+LIMIT = 3
+"""What is allowed."""
+
+
+class Thing:
+    """A thing."""
+
+    size: int = 2
+    """Its size."""
+
+    def grow(self, by=1):
+        """Grow."""
+        return self.size + by  # not in place
+
+
+def empty():
+    """Nothing."""
+'''
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('"""Module."""', '"""Another text."""'),
+        ('"""Module."""\n', ""),
+        ('"""What is allowed."""', '"""Limit."""'),
+        ('    """A thing."""\n', ""),
+        ('"""Its size."""', '"""Extent."""'),
+        ('        """Grow."""\n', ""),
+        ("  # not in place", ""),
+        ("import os\n", "# comment\nimport os\n\n\n"),
+        ("self.size + by", "(self.size +\n                by)"),
+        ('    """Nothing."""', "    pass"),
+    ],
+)
+def test_text_about_the_code_does_not_count(old, new):
+    assert old in SOURCE
+    assert digest_of_source(SOURCE.replace(old, new)) == digest_of_source(SOURCE)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("LIMIT = 3", "LIMIT = 4"),
+        ("LIMIT = 3", "LIMIT = 3.0"),
+        ("import os", "import sys"),
+        ("self.size + by", "self.size - by"),
+        ("by=1", "by=2"),
+        ("size: int", "size: float"),
+        ("def grow", "def swell"),
+        ("return self.size + by", "return 'x'"),
+        ("class Thing:", "class Thing(list):"),
+    ],
+)
+def test_code_counts(old, new):
+    assert old in SOURCE
+    assert digest_of_source(SOURCE.replace(old, new)) != digest_of_source(SOURCE)
+
+
+def test_strings_that_are_used_count():
+    assert digest_of_source("x = 'a'") != digest_of_source("x = 'b'")
+    assert digest_of_source("f('a')") != digest_of_source("f('b')")
+
+
+def test_closure_follows_imports():
+    found = closure("pdrom.core.registry")
+    assert found == ["pdrom.core", "pdrom.core.errors", "pdrom.core.registry"]
+    assert {"pdrom.core.store", "pdrom.model.constraints.base"} < set(
+        closure("pdrom.model.dynamics.system")
+    )
+    assert "pdrom.reduction.basis.pod" in closure("pdrom.reduction.subspace.model")
+
+
+def test_effects_are_in_no_closure_that_does_not_list_them():
+    """The mesh does not depend on a spring; a scene that lists springs does."""
+    kernels = {
+        "pdrom.model.constraints.spring",
+        "pdrom.model.constraints.bending",
+        "pdrom.model.effects.poke",
+    }
+    assert not kernels & set(closure("study.experiments.mesh"))
+    assert not kernels & set(closure("study.experiments.fom"))
+    with_spring = closure("study.experiments.fom", "pdrom.model.constraints.spring")
+    assert kernels & set(with_spring) == {"pdrom.model.constraints.spring"}
+
+
+REGISTRY = """
+from pdrom.core.registry import Registry
+
+THINGS = Registry("thing", {"own": "pdrom.here:Own", "other": "pdrom.there:Other"})
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "counts"),
+    [
+        ('"other": "pdrom.there:Other"', '"other": "pdrom.there:Another"', False),
+        ('"other": "pdrom.there:Other"', '"more": "pdrom.more:More"', False),
+        (', "other": "pdrom.there:Other"', "", False),
+        ('"own": "pdrom.here:Own"', '"own": "pdrom.here:Other"', True),
+        ('"own": "pdrom.here:Own", ', "", True),
+        ('"thing"', '"kind"', True),
+        ("Registry(", "dict(", True),
+    ],
+)
+def test_entries_of_a_registry_for_other_modules_do_not_count(old, new, counts):
+    """Who asks for one lists it; entries for the module itself are its code."""
+    assert old in REGISTRY
+    edited = digest_of_source(REGISTRY.replace(old, new), "pdrom.here")
+    assert (edited != digest_of_source(REGISTRY, "pdrom.here")) == counts
+
+
+def test_an_entry_counts_by_its_attribute_too():
+    """Two effects of one module."""
+    pins, rotate = (fingerprint(EFFECTS[name]) for name in ("pins", "rotate"))
+    assert EFFECTS.module("pins") == EFFECTS.module("rotate")
+    assert pins != rotate
+    assert closure(EFFECTS["pins"]) == closure(EFFECTS.module("pins"))
+
+
+def test_selections_are_in_no_closure_that_does_not_list_them():
+    own = set(map(SELECTIONS.module, SELECTIONS))
+    for name in SELECTIONS:
+        method = MethodSpec(title="test", rows="element", selection=name)
+        found = closure("pdrom.reduction.sampling.select", *method.modules)
+        assert own & set(found) == {SELECTIONS.module(name)}
+    everything = MethodSpec(title="test", rows="all")
+    assert not own & set(closure("pdrom.reduction.sampling.select", *everything.modules))
+
+
+def test_order_and_repetition_of_modules_do_not_matter():
+    names = ["study.experiments.mesh", "pdrom.model.metrics", "pdrom.reduction.snapshots"]
+    assert fingerprint(*names) == fingerprint(*reversed(names), names[0])
+    assert fingerprint(*names) != fingerprint(*names[1:])
+
+
+@pytest.mark.parametrize("name", ["pdrom.nothing", "pdrom.stages.meshes", "numpy"])
+def test_unknown_modules_are_named(name):
+    with pytest.raises(ConfigurationError, match=name):
+        fingerprint(name)
+
+
+@pytest.fixture(scope="module")
+def prints(tmp_path_factory):
+    """Fingerprints of a copy of the package after each of some edits."""
+    root = tmp_path_factory.mktemp("copy")
+    copy = root / "pdrom"
+    for package in (PACKAGE, PACKAGE.with_name("study")):
+        ignored = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(package, root / package.name, ignore=ignored)
+
+    def taken() -> tuple[str, ...]:
+        code = (
+            "from study.pipeline.fingerprint import fingerprint as f; import pdrom;"
+            "print(pdrom.__file__, f('study.experiments.mesh'),"
+            "f('study.experiments.fom', 'pdrom.model.constraints.spring'))"
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            env={"PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"},
+            cwd=root,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        place, *found = done.stdout.split()
+        assert Path(place).parent == copy
+        return tuple(found)
+
+    def edited(name: str, text: str) -> tuple[str, ...]:
+        path = copy / name
+        before = path.read_text()
+        path.write_text(before + text)
+        result = taken()
+        path.write_text(before)
+        return result
+
+    return {
+        "none": taken(),
+        "comment": edited("model/constraints/spring.py", "\n# a comment\n"),
+        "spring": edited("model/constraints/spring.py", "\nADDED = 1\n"),
+        "bending": edited("model/constraints/bending.py", "\nADDED = 1\n"),
+        "mesh": edited("model/mesh/generators.py", "\nADDED = 1\n"),
+        "store": edited("core/store/text.py", "\nADDED = 1\n"),
+    }
+
+
+def test_copy_has_the_fingerprint_of_the_original(prints):
+    assert prints["none"][0] == fingerprint("study.experiments.mesh")
+
+
+@pytest.mark.parametrize(
+    ("edit", "changed"),
+    [
+        ("comment", (False, False)),
+        ("spring", (False, True)),
+        ("bending", (False, False)),
+        ("mesh", (True, True)),
+        ("store", (True, True)),
+    ],
+)
+def test_edit_changes_what_uses_the_module(prints, edit, changed):
+    assert tuple(a != b for a, b in zip(prints[edit], prints["none"], strict=True)) == changed

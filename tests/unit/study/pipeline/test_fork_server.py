@@ -1,0 +1,356 @@
+"""Jobs that are forked from a server: they behave as scripts of a plain interpreter do."""
+
+import os
+import shlex
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import psutil
+import pytest
+
+from study.pipeline import run as running
+from study.pipeline.fork_server import interpreter
+from study.pipeline.fork_server.client import ADDRESS, of_this_user, place_of
+from study.pipeline.fork_server.start import SUPPORTED
+
+pytestmark = pytest.mark.skipif(not SUPPORTED, reason="no safe forks on this platform")
+
+# A process that starts the server, runs the shell commands of its arguments, and says how they end.
+OWNER = """
+import subprocess, sys
+from study.pipeline.fork_server import start_server
+start_server(libraries=["fractions"])
+for command in sys.argv[1:]:
+    done = subprocess.run(command, shell=True)
+    print("ended", done.returncode, flush=True)
+"""
+
+
+def run(*commands: str, owner: str = OWNER, **options) -> subprocess.CompletedProcess[str]:
+    """The owner with these commands, to its end."""
+    return subprocess.run(
+        [sys.executable, "-c", owner, *commands],
+        capture_output=True, text=True, check=True, **options,
+    )  # fmt: skip
+
+
+def script(folder: Path, text: str) -> str:
+    """Shell command that runs ``text`` as the workflow runs a script."""
+    path = folder / "a script é.py"
+    path.write_text(text, encoding="utf-8")
+    return f"{interpreter()} '{path}'"
+
+
+def test_a_job_has_the_surroundings_of_its_client(tmp_path):
+    code = """
+import os, sys
+print(os.getcwd(), os.environ["COLOUR"], sys.argv, sys.stdin.read().strip())
+print(__name__, "fractions" in sys.modules)
+print("a warning", file=sys.stderr)
+"""
+    command = script(tmp_path, code)
+    done = run(f"cd / && echo hello | COLOUR=blue {command}")
+    path = str(tmp_path / "a script é.py")
+    assert done.stdout.splitlines() == [f"/ blue {[path]} hello", "__main__ True", "ended 0"]
+    assert done.stderr == "a warning\n"
+
+
+def test_a_fork_has_what_numba_registers(tmp_path):
+    """What else each process that loads a compiled function would import anew."""
+    code = """
+import sys
+known = set(sys.modules)
+from numba.core.registry import cpu_target
+cpu_target.typing_context.refresh()
+cpu_target.target_context.refresh()
+print(sorted(set(sys.modules) - known))
+"""
+    done = run(script(tmp_path, code), owner=OWNER.replace("fractions", "numba"))
+    assert done.stdout.splitlines() == ["[]", "ended 0"]
+
+
+def test_jobs_do_not_see_each_other(tmp_path):
+    code = "import fractions; print(getattr(fractions, 'mark', 0)); fractions.mark = 1"
+    command = script(tmp_path, code)
+    assert run(command, command).stdout.split("\n")[:4] == ["0", "ended 0", "0", "ended 0"]
+
+
+@pytest.mark.parametrize(
+    ("code", "ending", "message"),
+    [
+        ("import sys; sys.exit(3)", 3, ""),
+        ("import sys; sys.exit('pdrom: no')", 1, "pdrom: no\n"),
+        ("1 / 0", 1, "ZeroDivisionError: division by zero\n"),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", -9, ""),
+        ("import os; os._exit(7)", 7, ""),
+    ],
+)
+def test_the_client_ends_as_the_job_does(tmp_path, code, ending, message):
+    done = run(f"exec {script(tmp_path, code)}")
+    assert done.stdout == f"ended {ending}\n"
+    assert done.stderr.endswith(message)
+
+
+def test_a_signal_reaches_the_job(tmp_path):
+    """The client hands it on; the job says when it is ready for it."""
+    code = """
+import os, signal, sys
+signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(5))
+print("ready", os.getpid(), os.getppid(), flush=True)
+signal.pause()
+"""
+    command = f"exec {script(tmp_path, code)}"
+    owner = subprocess.Popen(
+        [sys.executable, "-c", OWNER, f"{command} & read line; kill -TERM $!; wait $!"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert owner.stdout.readline().startswith("ready")
+    out, _ = owner.communicate("go\n")
+    assert out == "ended 5\n"
+
+
+def test_a_job_that_ends_well_leaves_nothing_undone(tmp_path):
+    """Though its process does not take itself apart: threads, exit functions, a full buffer."""
+    code = f"""
+import atexit, sys, threading
+begun = threading.Event()
+atexit.register(lambda: open({str(tmp_path / "exit")!r}, "w").write("done"))
+def work():
+    begun.wait()
+    open({str(tmp_path / "thread")!r}, "w").write("done")
+threading.Thread(target=work).start()
+sys.stdout.write("x" * 5000)
+begun.set()
+"""
+    done = run(f"{{ {script(tmp_path, code)}; echo; }}")
+    assert done.stdout == f"{'x' * 5000}\nended 0\n"
+    assert (tmp_path / "exit").read_text() == (tmp_path / "thread").read_text() == "done"
+
+
+@pytest.mark.parametrize("victim", ["client", "owner"])
+def test_no_job_outlives_its_client_or_the_owner(tmp_path, victim):
+    """A pipe that the job holds closes when the job is gone, and only then."""
+    code = """
+import os, signal
+print(os.getpid(), flush=True)
+signal.pause()
+"""
+    told = "import os; os.execv('/bin/sh', ['sh', '-c', 'echo $$; exec ' + os.environ['JOB']])"
+    command = f"exec {shlex.join([sys.executable, '-c', told])}"
+    environment = {**os.environ, "JOB": script(tmp_path, code)}
+    owner = subprocess.Popen(
+        [sys.executable, "-c", OWNER, command], stdout=subprocess.PIPE, text=True, env=environment
+    )
+    client, _job = int(owner.stdout.readline()), int(owner.stdout.readline())
+    os.kill(client if victim == "client" else owner.pid, signal.SIGKILL)
+    rest = owner.stdout.read()
+    assert rest == ("ended -9\n" if victim == "client" else "")
+    owner.wait()
+
+
+# A process that is a server: its address, its patience; its owner holds its standard input.
+SERVER = """
+import os, socket, sys
+from study.pipeline.fork_server.client import place_of
+from study.pipeline.fork_server.server import Server, run
+listener = socket.socket(socket.AF_UNIX)
+listener.bind(place_of(sys.argv[1]))
+listener.listen()
+print("listens", flush=True)
+script = Server(listener, os.dup(0), patience=float(sys.argv[2])).serve()
+if script is not None:
+    run(script)
+"""
+
+
+class ForkServer:
+    """A server with clients that misbehave; it has to come to its end without a word."""
+
+    def __init__(self, folder: Path, patience: float = 1e6) -> None:
+        self.folder = folder
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", SERVER, str(folder), str(patience)],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+
+    def __enter__(self) -> "ForkServer":
+        assert self.process.stdout.readline() == "listens\n", self.process.stderr.read()
+        return self
+
+    def __exit__(self, *_fault: object) -> None:
+        out, errors = self.process.communicate()
+        assert (out, errors) == ("", "")
+
+    def connect(self) -> socket.socket:
+        """Connection of a client."""
+        connection = socket.socket(socket.AF_UNIX)
+        connection.connect(place_of(str(self.folder)))
+        return connection
+
+    def ask(self, connection: socket.socket, code: str, stream: int) -> None:
+        """Request a job that runs ``code``, with one stream for all three."""
+        path = self.folder / "job.py"
+        path.write_text(code)
+        content = f"/\0{path}\0A=b".encode()
+        socket.send_fds(connection, [b"%20d" % len(content)], [stream] * 3)
+        connection.sendall(content)
+
+    def serves(self) -> bool:
+        """Whether another client gets its job, and the job's end."""
+        with self.connect() as connection, open(os.devnull) as nothing:
+            self.ask(connection, "import sys; sys.exit(3)", nothing.fileno())
+            told = b"".join(iter(lambda: connection.recv(20), b""))
+        return os.waitstatus_to_exitcode(int(told[20:])) == 3
+
+
+GARBAGE = {
+    "no number": b"x" * 30,
+    "negative": b"%20d" % -5,
+    "too long": b"%20d" % 10**15,
+    "no streams": b"%20d/\0/script" % 9,
+    "no script": b"%20d/" % 1,
+    "nothing": b"%20d" % 0,
+}
+
+
+@pytest.mark.parametrize("content", GARBAGE.values(), ids=GARBAGE)
+def test_what_is_no_request_is_dropped(tmp_path, content):
+    """The client learns it from the end of its connection."""
+    with ForkServer(tmp_path) as server:
+        with server.connect() as connection:
+            connection.sendall(content)
+            assert connection.recv(20) == b""
+        assert server.serves()
+
+
+@pytest.mark.parametrize("sent", [b"", b"%20d/" % 40], ids=["nothing", "half a request"])
+def test_a_silent_client_keeps_nobody_waiting(tmp_path, sent):
+    with ForkServer(tmp_path) as server, server.connect() as connection:
+        connection.sendall(sent)
+        assert server.serves()
+
+
+def test_the_patience_with_a_silent_client_ends(tmp_path):
+    with ForkServer(tmp_path, patience=0.01) as server, server.connect() as connection:
+        assert connection.recv(20) == b""
+
+
+def test_a_client_that_is_gone_before_its_answer(tmp_path):
+    """Its job ends with it: the pipe that the job holds closes, and others get their jobs."""
+    reader, writer = os.pipe()
+    with ForkServer(tmp_path) as server:
+        os.kill(server.process.pid, signal.SIGSTOP)
+        with server.connect() as connection:
+            server.ask(connection, "import signal; signal.pause()", writer)
+        os.close(writer)
+        os.kill(server.process.pid, signal.SIGCONT)
+        assert os.read(reader, 1) == b""
+        assert server.serves()
+    os.close(reader)
+
+
+def test_a_job_ends_with_its_server(tmp_path):
+    """Also if its client does nothing about it."""
+    reader, writer = os.pipe()
+    with ForkServer(tmp_path) as server, server.connect() as connection:
+        server.ask(connection, "import os, signal; os.write(1, b'x'); signal.pause()", writer)
+        os.close(writer)
+        assert os.read(reader, 1) == b"x"
+        server.process.kill()
+        assert os.read(reader, 1) == b""
+    os.close(reader)
+
+
+def test_what_a_job_has_started_ends_with_the_server(tmp_path):
+    """By the client: the pipe that both hold closes."""
+    code = """
+import os, subprocess
+subprocess.run("echo $PPID; read nothing", shell=True)
+"""
+    owner = subprocess.Popen(
+        [sys.executable, "-c", OWNER, f"exec {script(tmp_path, code)} 2>&1"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    job = int(owner.stdout.readline())
+    os.kill(psutil.Process(job).ppid(), signal.SIGKILL)
+    assert owner.stdout.read() == "pdrom: the process that jobs start from is gone\nended 1\n"
+    owner.communicate()
+
+
+def test_a_plain_interpreter_ends_with_the_run(tmp_path):
+    """The pipe that it holds as its output closes."""
+    path = tmp_path / "script.py"
+    path.write_text("import os; print('ready', flush=True); os.read(0, 1)")
+    code = f"""
+import subprocess
+from pathlib import Path
+from study.pipeline.fork_server import hold_pipe
+hold_pipe(Path({str(tmp_path / "pipe")!r}))
+subprocess.run({f"{interpreter()} {path}; echo its end"!r}, shell=True)
+"""
+    owner = subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert owner.stdout.readline() == "ready\n"
+    owner.kill()
+    assert owner.stdout.read() == "its end\n"
+    owner.communicate()
+
+
+def test_without_a_server_the_client_is_a_plain_interpreter(tmp_path):
+    command = script(tmp_path, "import sys; print('fractions' in sys.modules, sys.argv[1:])")
+    for environment in ({}, {ADDRESS: str(tmp_path / "nobody")}):
+        done = subprocess.run(
+            command, shell=True, capture_output=True, text=True, env={**os.environ, **environment}
+        )
+        assert done.stdout == "False []\n"
+    done = subprocess.run(
+        f"{interpreter()} -c 'print(1 + 1)'", shell=True, capture_output=True, text=True
+    )
+    assert done.stdout == "2\n"
+
+
+def test_a_killed_run_leaves_no_file_behind(tmp_path):
+    """Its job says when it runs; everything that the run might have written lies in TMPDIR."""
+    scripts, temporary = tmp_path / "scripts", tmp_path / "temporary"
+    scripts.mkdir()
+    temporary.mkdir()
+    command = script(scripts, "import signal; print('ready', flush=True); signal.pause()")
+    owner = subprocess.Popen(
+        [sys.executable, "-c", OWNER, command],
+        stdout=subprocess.PIPE, text=True, env={**os.environ, "TMPDIR": str(temporary)},
+    )  # fmt: skip
+    assert owner.stdout.readline() == "ready\n"
+    os.kill(owner.pid, signal.SIGKILL)
+    assert owner.stdout.read() == ""
+    owner.wait()
+    assert list(temporary.iterdir()) == []
+
+
+def test_only_the_same_user_is_answered(monkeypatch):
+    ours, theirs = socket.socketpair(socket.AF_UNIX)
+    with ours, theirs:
+        assert of_this_user(ours)
+        monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+        assert not of_this_user(ours)
+
+
+@pytest.mark.parametrize(
+    ("remote", "arguments", "starts"),
+    [
+        (False, ["--target-jobs", "fom:"], 0),
+        (True, ["--executor", "slurm-jobstep", "--target-jobs", "fom:"], 0),
+        (True, ["--target-jobs", "fom:"], 1),
+    ],
+    ids=["here", "hands the batch on", "runs the batch"],
+)
+def test_a_batch_on_a_node_has_a_server(monkeypatch, remote, arguments, starts):
+    started = []
+    monkeypatch.setattr(running, "start_server", lambda: started.append(1))
+    monkeypatch.setattr(sys, "argv", ["snakemake", *arguments])
+    running.start_batch(SimpleNamespace(remote_exec=remote))
+    assert len(started) == starts

@@ -1,0 +1,130 @@
+"""Expected times of jobs, what the logs of a run say of them, and what a cluster is asked for."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import pandas as pd
+import pytest
+import yaml
+
+from pdrom.core.errors import PdromError
+from pdrom.core.machine import Units, machine
+from places import ROOT
+from study.artifact.usage import Usage
+from study.experiments.kit.declaration import experiments
+from study.pipeline.expectation import RUN_TIMES, expected_seconds, units_of
+from study.pipeline.scenes import Coarsen
+from study.pipeline.summary import minutes
+from study.pipeline.tracked import COLUMNS, COSTS, main, measured_costs
+
+TABLE = pd.read_csv(ROOT / COSTS).set_index("kind")
+PROFILE = yaml.safe_load((ROOT / "workflow/profiles/slurm/config.yaml").read_text("utf-8"))
+# What a job needs beside its own: two processes of Snakemake, each of which makes the plan, and the
+# process that jobs are forked from.
+ABOVE_S, ABOVE_MB = 60.0, 1000
+# Factor for slower machines.
+ROOM = 2.0
+
+
+def plan(**coarsen: float) -> SimpleNamespace:
+    """A plan, as far as it is asked."""
+    return SimpleNamespace(
+        root=ROOT,
+        results="results/studies/logs",
+        settings=SimpleNamespace(coarsen=Coarsen(**coarsen)),
+    )
+
+
+def say(results: Path, log: str, processor: float, wall: float = 0.0, memory: float = 0.0) -> None:
+    """Write the log of a job that has ended well."""
+    path = results / "logs" / log
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f"date INFO pdrom: {Usage(wall, processor, memory)}\n", encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("log", "kind"),
+    [
+        ("fom/sheet_train.log", "fom"),
+        ("hard_cases.log", "hard_cases"),
+        ("tables/budget.log", "tables"),
+    ],
+)
+def test_a_job_takes_what_jobs_of_its_kind_took_on_meshes_like_its_own(log, kind):
+    place = f"results/studies/logs/logs/{log}"
+    assert expected_seconds(plan())(place) == TABLE.seconds[kind]
+    coarse = expected_seconds(plan(resolution=0.5))
+    assert coarse(place) == TABLE.coarse_seconds[kind]
+
+
+def test_times_are_scaled_by_the_units_of_the_last_run(tmp_path):
+    """A machine with twice the units takes twice as long; an older record has none."""
+    asked = SimpleNamespace(**vars(plan()) | {"results": str(tmp_path)})
+    log, usual = f"{tmp_path}/logs/guard.log", TABLE.seconds["guard"]
+    there = units_of("full", ROOT).model_dump()
+    twice = Units(**{name: 2.0 * seconds for name, seconds in there.items()})
+    for units, factor in ((twice, 2.0), (None, 1.0)):
+        (tmp_path / "machine.json").write_text(machine(units).model_dump_json(), "utf-8")
+        assert expected_seconds(asked)(log) == pytest.approx(factor * usual)
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/running.md"])
+def test_pages_say_the_times_of_the_record_and_the_unit(page):
+    text = (ROOT / page).read_text("utf-8")
+    times = pd.read_csv(ROOT / RUN_TIMES).set_index("study")
+    assert f"{times.cpu['full']} (unit {units_of('full', ROOT).unit_s:.3f} s" in text
+    if page == "README.md":
+        assert f"about {times.wall_s['full'] / 60:.0f} minutes" in text
+        words = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
+        assert f"in {words[round(times.wall_s['tiny'] / 60)]} minutes" in text
+        return
+    for study in times.itertuples():
+        processor = f"({minutes(study.processor_s)} of processor time)"
+        assert f"{minutes(study.wall_s)} with the set-up {processor}" in text
+
+
+def test_a_kind_that_was_not_measured_takes_the_median():
+    found = expected_seconds(plan())("results/studies/logs/logs/never_seen/a.log")
+    assert found == TABLE.seconds.median()
+
+
+def test_every_experiment_was_measured_and_takes_time():
+    assert set(experiments()) <= set(TABLE.index)
+    assert (TABLE > 0.0).all().drop("longest_s").all()
+
+
+def test_costs_are_read_from_the_logs_of_two_runs(tmp_path):
+    full, coarse = tmp_path / "full", tmp_path / "coarse"
+    say(full, "fom/a.log", 3.0, wall=4.0, memory=210.0)
+    say(full, "fom/b.log", 5.0, wall=3.0, memory=250.4)
+    say(full, "guard.log", 7.0, wall=8.0, memory=200.0)
+    say(coarse, "fom/a.log", 0.5)
+    say(coarse, "guard.log", 0.25)
+    (full / "logs" / "fom" / "failed.log").write_text("ERROR pdrom: no\n", encoding="utf-8")
+    table = measured_costs(str(full), str(coarse))
+    assert list(table.columns) == COLUMNS
+    assert table.to_numpy().tolist() == [
+        ["fom", 4.0, 0.5, 4.0, 250],
+        ["guard", 7.0, 0.25, 8.0, 200],
+    ]
+
+
+def test_what_git_does_not_keep_is_not_written():
+    with pytest.raises(PdromError, match=r"'cost': unknown .*did you mean 'costs'"):
+        main(["cost"])
+
+
+def test_without_a_run_it_says_so(tmp_path):
+    with pytest.raises(PdromError, match="run the study first"):
+        measured_costs(str(tmp_path), str(tmp_path))
+
+
+@pytest.mark.parametrize("kind", TABLE.index)
+@pytest.mark.parametrize("attempt", [1, 2])
+def test_the_profile_asks_for_more_than_any_measured_job_needed(kind, attempt):
+    """What the workflow calls by another name than the kind has the default request."""
+    asked = PROFILE["default-resources"] | PROFILE["set-resources"].get(kind, {})
+    memory, minutes = (eval(asked[key], {"attempt": attempt}) for key in ("mem_mb", "runtime"))
+    assert memory >= attempt * (ABOVE_MB + TABLE.memory_mb[kind])
+    assert 60.0 * minutes >= attempt * (ABOVE_S + ROOM * TABLE.longest_s[kind])
+    assert set(PROFILE["set-resources"]) <= set(TABLE.index)

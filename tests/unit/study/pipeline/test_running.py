@@ -1,0 +1,191 @@
+"""A run is alone in its folder, with dates that Snakemake takes; it ends at once, and wholly."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from pdrom.core.errors import INTERRUPTED
+from study.pipeline.running import (
+    LOCK,
+    SNAKEMAKE_LOCKS,
+    AtWorkError,
+    hold,
+    remove_stale_locks,
+    settle_dates,
+)
+
+HOLDER = """
+import sys, time
+from study.pipeline.running import hold
+hold()
+print("held", flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """Each test is at work in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def other():
+    """Another process that holds the lock."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", HOLDER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == "held\n"
+    yield process
+    process.kill()
+    process.communicate()
+
+
+def snakemake_lock() -> None:
+    SNAKEMAKE_LOCKS.mkdir(parents=True)
+    (SNAKEMAKE_LOCKS / "0.output.lock").write_text("results/x\n")
+
+
+def test_the_second_process_names_the_first(other):
+    with pytest.raises(AtWorkError, match=rf"process {other.pid} on .* is at work in this folder"):
+        hold()
+    assert LOCK.read_text().startswith(f"process {other.pid} ")
+
+
+def test_a_lock_goes_with_its_process_however_it_ends(other):
+    other.send_signal(signal.SIGKILL)
+    other.wait()
+    snakemake_lock()
+    descriptor = hold()
+    assert LOCK.read_text().startswith(f"process {os.getpid()} ")
+    assert not SNAKEMAKE_LOCKS.exists()
+    os.close(descriptor)
+
+
+def test_a_lock_is_not_inherited_by_jobs():
+    descriptor = hold()
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as job:
+        os.close(descriptor)
+        os.close(hold())
+        job.communicate(b"\n")
+
+
+def test_stale_locks_go_and_those_of_a_living_run_stay(other):
+    snakemake_lock()
+    remove_stale_locks()
+    assert SNAKEMAKE_LOCKS.exists()
+    other.kill()
+    other.wait()
+    remove_stale_locks()
+    assert not SNAKEMAKE_LOCKS.exists()
+    os.close(hold())
+
+
+def test_a_folder_that_cannot_be_written_is_named(folder):
+    (folder / ".snakemake").write_text("a file where the folder should be")
+    with pytest.raises(AtWorkError, match=r"run\.lock: cannot be written"):
+        hold()
+
+
+DAY = 86_400 * 10**9
+
+
+def test_future_dates_come_before_now_in_their_order(tmp_path):
+    start = time.time_ns()
+    offsets = {"old": -DAY, "late": 3 * DAY, "early": DAY, "twin": DAY, "deep/later": 4 * DAY}
+    for name, offset in offsets.items():
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(name)
+        os.utime(path, ns=(start, start + offset))
+    assert settle_dates([tmp_path, tmp_path / "none"]) == 4
+    dates = {name: (tmp_path / name).stat().st_mtime_ns for name in offsets}
+    assert dates["old"] == start - DAY
+    assert dates["old"] < dates["early"] == dates["twin"] < dates["late"] < dates["deep/later"]
+    assert dates["deep/later"] <= time.time_ns()
+    assert settle_dates([tmp_path]) == 0
+
+
+def test_dates_of_what_a_link_leads_to_are_left_alone(tmp_path):
+    folder, elsewhere = tmp_path / "results", tmp_path / "elsewhere"
+    folder.mkdir()
+    elsewhere.write_text("not of this study")
+    later = time.time_ns() + DAY
+    os.utime(elsewhere, ns=(later, later))
+    link = folder / "link"
+    link.symlink_to(elsewhere)
+    os.utime(link, ns=(later, later), follow_symlinks=False)
+    assert settle_dates([folder]) == 1
+    assert elsewhere.stat().st_mtime_ns == later
+    assert link.lstat().st_mtime_ns <= time.time_ns()
+
+
+PLANS = """
+import signal
+from study.pipeline.running import end_at_sigterm
+end_at_sigterm()
+print("ready", flush=True)
+signal.pause()
+"""
+
+# A run with a job in a shell, as Snakemake waits for it; it prints how the job ended.
+RUNS = """
+import os, subprocess, sys
+from study.pipeline import running
+running.PATIENCE = float(sys.argv[1])
+running.stop_at_sigterm(lambda: os.write(1, b"noted\\n"))
+job = subprocess.Popen(["sh", "-c", sys.argv[2]], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+ready = job.stdout.readline()
+try:
+    os.write(1, ready)
+    job.wait()
+except KeyboardInterrupt:
+    print(job.wait(), flush=True)
+"""
+
+
+def sigterm(*command: str) -> tuple[int, str, str]:
+    """Exit status, output and errors of a program that gets SIGTERM once it is ready."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", *command],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True,
+    )  # fmt: skip
+    assert process.stdout.readline() == "ready\n"
+    process.send_signal(signal.SIGTERM)
+    out, errors = process.communicate()
+    return process.returncode, out, errors
+
+
+def test_a_plan_ends_with_one_line():
+    assert sigterm(PLANS) == (INTERRUPTED, "", "pdrom: ended by SIGTERM\n")
+
+
+@pytest.mark.parametrize(
+    ("patience", "job", "ending"),
+    [
+        ("1e6", "echo ready; read nothing", -signal.SIGTERM),
+        ("0", "trap '' TERM; echo ready; read nothing", -signal.SIGKILL),
+    ],
+    ids=["ends by it", "does not listen"],
+)
+def test_a_run_ends_its_jobs(patience, job, ending):
+    said = "pdrom: SIGTERM: ending the jobs that run\n"
+    assert sigterm(RUNS, patience, job) == (0, f"noted\n{ending:d}\n", said)
+
+
+def test_a_run_whose_reader_is_gone_ends_too():
+    """Nothing can be said, and the job is ended all the same."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", RUNS, "1e6", "echo ready; read nothing"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True,
+    )  # fmt: skip
+    assert process.stdout.readline() == "ready\n"
+    process.stderr.close()
+    process.send_signal(signal.SIGTERM)
+    assert process.stdout.read() == f"noted\n{-signal.SIGTERM:d}\n"
+    process.wait()

@@ -1,0 +1,147 @@
+"""The last lines of a dry run and of a finished one."""
+
+import logging
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from snakemake_interface_logger_plugins.common import LogEvent
+
+from pdrom.core.store import write_table
+from pdrom.core.yamlfile import read_yaml
+from places import ROOT
+from study.pipeline.commandline import CommandLine
+from study.pipeline.folders import Folders
+from study.pipeline.full import apart
+from study.pipeline.study import Study
+from study.pipeline.summary import Preview, minutes, processor_seconds, shortened, summary
+
+FIGURES = ("results/figures/a.pdf", "results/figures/b.pdf")
+TABLES = ("results/tables/claims.csv",)
+
+
+@pytest.fixture(autouse=True)
+def project(tmp_path, monkeypatch):
+    """A folder with some results."""
+    monkeypatch.chdir(tmp_path)
+    Path("results/figures").mkdir(parents=True)
+    Path(FIGURES[0]).touch()
+    claims = pd.DataFrame(
+        {"claim": ["C1", "C2"], "verdict": ["holds", "fails"], "verdict_beyond": ["depends", "x"]}
+    )
+    write_table(claims, TABLES[0])
+
+
+def lines(*arguments: str, words: str = "") -> dict[str, str]:
+    text = summary(CommandLine.parse(arguments), Folders(), FIGURES, TABLES, words)
+    assert text.endswith("\n")
+    said = [line.removeprefix("pdrom: ") for line in text.splitlines()]
+    return dict(line.split(": ", 1) for line in said)
+
+
+def test_a_whole_study():
+    said = lines("--config", "ranks=[3]")
+    assert said["configuration"] == "config/default.yaml, ranks=[3]"
+    assert said["verdicts (as published / beyond)"] == "C1 holds / depends, C2 fails / x"
+    assert said["manuscript"] == "paper/main.pdf, paper/supplement.pdf"
+    assert said["figures"] == "1 in results/figures"
+    assert said["tables"] == "1 in results/tables"
+    assert said["report"] == "./reproduce --report report.html"
+    assert "of processor time" in said["time"]
+
+
+def test_verdicts_of_another_study_are_told_from_those_of_the_full_one():
+    words = "of coarse meshes, not those of the study"
+    said = lines("--configfile", "my.yaml", words=words)
+    assert said[f"verdicts (as published / beyond; {words})"].startswith("C1 holds")
+
+
+@pytest.mark.parametrize(
+    ("config", "words"),
+    [
+        ({}, ""),
+        ({"coarsen": {"resolution": 0.4}}, "of coarse meshes, not"),
+        ({"coarsen": {"resolution": 0.4, "frames": 0.5}}, "of coarse meshes and short runs, not"),
+        ({"ranks": [3]}, "of this configuration, not those of the study"),
+    ],
+)
+def test_a_study_says_how_it_differs_from_the_full_one(config, words):
+    found = apart(Study.load({**read_yaml(ROOT / "config" / "default.yaml"), **config}, ROOT))
+    assert found.startswith(words)
+    assert bool(found) == bool(words)
+
+
+def test_single_files():
+    said = lines("--configfile", "my.yaml", "--", "results/x", "results/y")
+    assert list(said) == ["configuration", "made", "time"]
+    assert said["configuration"] == "my.yaml"
+    assert said["made"] == "results/x, results/y"
+
+
+def test_without_verdicts_the_rest_is_said():
+    Path(TABLES[0]).unlink()
+    assert not [word for word in lines() if word.startswith("verdicts")]
+
+
+def test_processor_time_counts_what_this_process_waited_for():
+    work = "import time\nwhile time.process_time() < 0.3: pass"
+    before = processor_seconds()
+    subprocess.run([sys.executable, "-c", work], check=True)
+    assert processor_seconds() - before >= 0.2
+
+
+def test_minutes():
+    assert (minutes(59.4), minutes(60), minutes(125)) == ("59 s", "1 min 0 s", "2 min 5 s")
+
+
+@pytest.mark.parametrize(
+    ("reason", "words"),
+    [
+        ("Missing output files: a.h5; Input files updated by another job: b.h5",
+         {"output is missing"}),
+        ("Input files updated by another job: a.h5, b.h5", {"input is made again"}),
+        ("Updated input files: a.yaml; Code has changed since last execution; Params have changed "
+         "since last execution: {}",
+         {"input is newer", "script has changed", "settings or code have changed"}),
+        ("Rules with neither input nor output files are always executed.", set()),
+    ],
+)  # fmt: skip
+def test_reasons_are_told_without_the_files(reason, words):
+    assert shortened(reason) == words
+
+
+def job(rule, reason, *logs, threads=1):
+    return logging.makeLogRecord(
+        {
+            "event": LogEvent.JOB_INFO, "rule_name": rule, "reason": reason, "threads": threads,
+            "log": logs,
+        }
+    )  # fmt: skip
+
+
+END = logging.makeLogRecord({"msg": "This was a dry-run (flag -n). The order of jobs ..."})
+
+
+def test_jobs_are_counted_by_rule_and_their_times_added():
+    seconds = {"fom/a.log": 600.0, "fom/b.log": 1800.0, "timing.log": 1200.0}
+    preview = Preview(seconds.__getitem__, cores=2)
+    preview.emit(job("fom", "Missing output files: a", "fom/a.log"))
+    preview.emit(job("fom", "Params have changed since last execution: {}", "fom/b.log"))
+    preview.emit(job("timing", "Missing output files: a", "timing.log", threads=8))
+    preview.emit(job("all", "Input files updated by another job: a"))
+    assert preview.text() == ""
+    preview.emit(END)
+    assert preview.text().splitlines() == [
+        "    2 fom     output is missing, settings or code have changed",
+        "    1 timing  output is missing",
+        "    1 all     input is made again",
+        "pdrom: 4 jobs, about 40 min on 2 cores, about 60 min of processor time",
+    ]
+
+
+def test_what_has_nothing_to_do_says_no_more():
+    preview = Preview(lambda log: 1.0, cores=1)
+    preview.emit(logging.makeLogRecord({"msg": "Nothing to be done"}))
+    assert preview.text() == ""

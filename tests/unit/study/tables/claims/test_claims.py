@@ -1,0 +1,610 @@
+"""Verdicts: every branch, every metric by hand, and thresholds that decide."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from pdrom.core.errors import ConfigurationError
+from pdrom.core.yamlfile import validate
+from places import ROOT
+from study.tables import declared
+from study.tables.claims import (
+    DEPENDS,
+    FAILS,
+    HOLDS,
+    MACHINE,
+    METRICS,
+    UNDECIDED,
+    ClaimRule,
+    TestRule,
+    answer_of,
+    claims_rows,
+    load_claims,
+    timed_columns,
+    values_of,
+)
+from study.tables.claims import evaluate as evaluated
+from study.tables.claims.claims import claims
+from study.tables.claims.rules import MARGIN
+from study.tables.claims.verdicts import answer
+
+RERUNS = [
+    # scene, group, method, position_basis, k, r, frames, blowup, error within, local_ms
+    ("a", "spring", "deim", "full", None, 6, 10, None, 0.1, 4.0),
+    ("a", "spring", "deim", "full", None, 10, 10, None, 0.4, 2.0),
+    ("a", "spring", "deim", "full", None, 20, 0, None, None, None),
+    ("b", "spring", "deim", "full", None, 6, 10, None, 0.2, 1.0),
+    ("b", "spring", "deim", "full", None, 30, 3, 2, None, 3.0),
+    ("b", "spring", "pod", "full", None, 6, 0, 0, None, None),
+    ("c", "spring", "deim", "full", None, 6, 0, 0, None, None),
+    ("c", "spring", "deim", "full", None, 20, 10, None, 0.3, None),
+    ("c", "spring", "deim-joint", "full", None, 6, 10, None, 0.7, None),
+    ("c", "spring", "deim-joint", "full", None, 20, 0, 0, None, None),
+    ("c", "spring", "qdeim", "full", None, 6, 0, None, None, None),
+    ("d", "spring", "deim", "full", None, 6, 10, None, 0.1, None),
+    ("d", "spring", "deim", "full", None, 10, 10, None, 0.4, None),
+    ("d", "spring", "deim", "full", None, 20, 5, 5, None, None),
+    ("d", "spring", "deim", "full", None, 40, 10, None, 0.3, None),
+    ("d", "spring", "deim", "full", None, 99, 0, None, None, None),
+    ("d", "spring", "qdeim", "full", None, 6, 1, 1, None, None),
+    ("d", "spring", "qdeim", "full", None, 10, 2, 2, None, None),
+    ("d", "spring", "qdeim", "full", None, 20, 3, 3, None, None),
+    ("b", "all", "full", "pod", 8, 99, 10, None, 0.02, 1.0),
+    ("b", "all", "full", "skinning", 8, 99, 10, None, 0.2, 1.0),
+    ("b", "all", "full", "pod", 16, 99, 10, None, 0.01, 1.0),
+]
+
+
+def tables() -> dict[str, pd.DataFrame]:
+    reruns = pd.DataFrame(
+        RERUNS,
+        columns=[
+            "scene", "group", "method", "position_basis", "k", "r", "frames", "blowup_frame",
+            "relative_error_within_horizon", "local_ms",
+        ],
+    )  # fmt: skip
+    reruns["speedup"] = 2.0 / reruns.local_ms
+    twice = reruns.assign(relative_error_within_horizon=2.0 * reruns.relative_error_within_horizon)
+    return {
+        "reduced_reruns": reruns,
+        "heldout_reruns": pd.concat([reruns, twice, twice]).assign(horizon_frame=9),
+        "breakeven": pd.DataFrame(
+            {
+                "scene": ["a", "a", "b"],
+                "group": "spring",
+                "method": "deim",
+                "factor": 1.0,
+                "threads": 1,
+                "r": [6, 20, 6],
+                "ratio": [0.5, 1.5, 0.25],
+                "solve_ratio": [0.1, 0.2, 0.05],
+                "lift_ratio": [0.3, 1.1, 0.15],
+            }
+        ),
+        "noise": pd.DataFrame(
+            {
+                "scene": "a",
+                "r": [6, 10, 20],
+                "rank": [12, 12, 12],
+                "relative_error": [1e-9, None, None],
+            }
+        ),
+        "local_share": pd.DataFrame(
+            {
+                "scene": ["a", "a", "b"],
+                "implementation": ["compiled", "numpy", "compiled"],
+                "local_ms": [8.0, 80.0, 2.0],
+                "local_share": [0.75, 0.95, 0.5],
+            }
+        ),
+        "singular_values": pd.DataFrame(
+            {
+                "scene": ["a"] * 3 + ["b"] * 2,
+                "group": "spring",
+                "component": [1, 2, 3, 1, 2],
+                "relative": [1.0, 1e-2, 1e-9, 1.0, 0.5],
+                "above_roundoff": [True, True, False, False, False],
+            }
+        ),
+        "repetitions": pd.DataFrame(
+            {
+                "scene": ["a", "b"] * 3 + ["a"],
+                "group": "spring",
+                "method": "deim",
+                "r": [20, 20, 6, 6, 10, 10, 40],
+                "varied": ["training"] * 6 + ["start"],
+                "error_median": [np.inf, 3.0, 0.1, 1.0, 0.2, 2.0, 0.0],
+            }
+        ),
+        "reconstruction_error": pd.DataFrame(
+            {
+                "scene": ["a", "a", "b"],
+                "group": "spring",
+                "method": ["deim", "deim", "deim"],
+                "r": [6, 10, 20],
+                "split": "train",
+                "relative_error": [0.3, None, None],
+                "relative_error_x": [0.2, None, None],
+                "relative_error_y": [0.4, None, None],
+                "relative_error_z": [None, None, None],
+                "gain": [2.0, np.inf, None],
+                "elements_sampled": [6, 9, None],
+            }
+        ),
+    }
+
+
+def rule(metric: str, compare: str = "<=", threshold: float = 1.0, **settings) -> TestRule:
+    base = {"what": "rows", "metric": metric, "compare": compare, "threshold": threshold}
+    return validate(TestRule, base | settings, "test")
+
+
+def measured(metric: str, accuracy: float = 0.1, **where) -> list[float]:
+    chosen = {k: v if isinstance(v, tuple) else (v,) for k, v in where.items()}
+    return METRICS[metric].values(tables(), chosen, accuracy).value.tolist()
+
+
+@pytest.mark.parametrize(
+    ("metric", "where", "expected"),
+    [
+        ("local_share", {"implementation": "compiled"}, [0.75, 0.5]),
+        # sizes that were not run do not count, blow-ups are infinite
+        ("rerun_error", {"scene": "a"}, [0.1, 0.4]),
+        ("rerun_error", {"scene": "b", "group": "spring"}, [0.2, np.inf, np.inf]),
+        ("rerun_error", {"scene": ("a", "b"), "method": "deim", "r": "full"}, [0.4, np.inf]),
+        ("rerun_error", {"scene": "a", "r": 6}, [0.1]),
+        # two sizes have no trend; ranks of (0.1, 0.4, blow-up, 0.3) at r = 6, 10, 20, 40
+        ("error_trend", {"scene": "a", "method": "deim"}, []),
+        ("error_trend", {"scene": "d", "method": "deim"}, [0.4]),
+        ("error_trend", {"scene": "d", "method": "qdeim"}, [0.0]),
+        # blocks of different lengths, and one block alone, have no joint trend
+        ("trend_p_value", {"scene": "d", "method": "deim"}, []),
+        # two blocks of three sizes, both ascending: one of 3!^2 orders
+        ("repeated_trend_p_value", {"varied": "training"}, [1.0 / 36.0]),
+        ("repeated_trend_p_value", {"varied": "training", "scene": "a"}, []),
+        # full rank blew up at once: the smaller size must not stand in for it
+        ("rerun_error", {"scene": "c", "method": "deim-joint", "r": "full"}, [np.inf]),
+        ("rerun_error", {"scene": "c", "method": "qdeim"}, []),
+        # a group whose singular values are all round-off has no decay
+        ("singular_value_decay", {"component": 2}, [1e-2]),
+        ("reconstruction_error", {}, [0.3, np.inf]),
+        # x and y of two sizes, the second one singular; z is round-off at every size
+        ("axis_reconstruction_error", {}, [0.2, np.inf, 0.4, np.inf]),
+        ("axis_reconstruction_error", {"axis": "y", "scene": "a"}, [0.4, np.inf]),
+        # a size beyond the rank does not run, a run that ends early has failed
+        ("noise_error", {}, [1e-9, np.inf]),
+        ("elements_per_entry", {}, [1.0, 0.9]),
+        # a run that is wrong buys nothing; the largest over the sizes of a scene
+        ("useful_speedup", {"scene": "a", "method": "deim"}, [0.5, 0.0]),
+        ("useful_speedup", {"scene": "a", "accuracy": 0.5}, [0.5, 1.0]),
+        ("best_useful_speedup", {"scene": ("a", "b"), "accuracy": 0.5}, [1.0, 2.0]),
+        # the largest size of each curve
+        ("local_time_ratio", {"group": "spring"}, [1.5, 0.25]),
+        ("local_time_ratio", {"scene": "b"}, [0.25]),
+        ("solve_time_ratio", {"scene": "a"}, [0.2]),
+        ("lift_time_ratio", {}, [1.1, 0.15]),
+        ("position_basis_ratio", {"scene": "b"}, [0.1]),
+        # neither basis is accurate
+        ("position_basis_ratio", {"scene": "b", "accuracy": 0.01}, []),
+    ],
+)
+def test_metrics_by_hand(metric, where, expected):
+    assert measured(metric, **where) == pytest.approx(expected)
+
+
+def test_the_trend_of_all_experiments_together(monkeypatch):
+    """Three blocks of three sizes, all ascending: one of 3!^3 orders, SciPy's smallest p-value."""
+    columns = [(s, r, 10, None, float(r)) for s in "efg" for r in (6, 10, 20)]
+    rising = [(s, "spring", "deim", "full", None, r, f, b, e, 1.0) for s, r, f, b, e in columns]
+    monkeypatch.setitem(globals(), "RERUNS", rising)
+    where = {"method": "deim"}
+    assert measured("trend_p_value", **where) == pytest.approx([1.0 / 216.0])
+    # a twin and another method add no block
+    more = [(f"{s}_twin", *rest) for s, *rest in rising]
+    more += [(*row[:2], "qdeim", *row[3:]) for row in rising]
+    monkeypatch.setitem(globals(), "RERUNS", [*rising, *more])
+    assert measured("trend_p_value") == pytest.approx([1.0 / 216.0])
+    # a run that ended early is the worst of its block
+    failed = [(*row[:8], np.nan if row[5] == 20 else row[8], 1.0) for row in rising]
+    monkeypatch.setitem(globals(), "RERUNS", failed)
+    assert measured("trend_p_value", **where) == pytest.approx([1.0 / 216.0])
+    falling = [(*row[:8], 1.0 / row[8], 1.0) for row in rising]
+    monkeypatch.setitem(globals(), "RERUNS", falling)
+    assert measured("trend_p_value", **where) == pytest.approx([1.0])
+
+
+@pytest.mark.parametrize("metric", ["rerun_error", "error_trend"])
+def test_runs_with_reduced_positions_count_only_if_asked_for(metric, monkeypatch):
+    """A method of the same name in a subspace does not change the verdict on unreduced runs."""
+    before = measured(metric, method="deim")
+    both = [("b", "all", "deim", "pod", 8, r, 10, None, 0.25 * r, 7.0) for r in (50, 100, 200)]
+    monkeypatch.setitem(globals(), "RERUNS", RERUNS + both)
+    assert before
+    assert measured(metric, method="deim") == before
+    inside = measured(metric, method="deim", position_basis="pod")
+    expected = {"rerun_error": [12.5, 25.0, 50.0], "error_trend": [1.0]}
+    assert inside == pytest.approx(expected[metric])
+
+
+@pytest.mark.parametrize(
+    ("compare", "threshold", "share", "expected"),
+    [
+        (">=", 0.5, 1.0, HOLDS),
+        (">=", 0.6, 1.0, DEPENDS),
+        (">=", 0.8, 1.0, FAILS),
+        (">=", 0.6, 0.5, HOLDS),
+        (">=", 0.8, 0.5, FAILS),
+        ("<=", 0.75, 1.0, HOLDS),
+        ("<=", 0.74, 1.0, DEPENDS),
+        ("<=", 0.74, 0.5, HOLDS),
+        ("<=", 0.4, 0.75, FAILS),
+    ],
+)
+def test_share_of_rows_that_must_agree(compare, threshold, share, expected):
+    test = rule("local_share", compare, threshold, share=share, margin=1.0,
+                where={"implementation": ["compiled"]})  # fmt: skip
+    outcome = evaluated(test, tables())
+    assert outcome.verdict == expected
+    assert outcome.measured == "0.5 to 0.75"
+
+
+@given(st.floats(0.5, 1.0), st.integers(0, 60), st.integers(0, 60))
+def test_the_opposite_comparison_gives_the_opposite_answer(share, good, bad):
+    opposite = {HOLDS: FAILS, FAILS: HOLDS, DEPENDS: DEPENDS, UNDECIDED: UNDECIDED}
+    first, second = answer(share, good, good + bad), answer(share, bad, good + bad)
+    if share * (good + bad) == good == bad:  # half and half satisfies the share of a half
+        assert first == second
+    else:
+        assert second == opposite[first]
+
+
+def test_a_condition_breaks_the_answer_down():
+    exact = {"where": {"implementation": ["compiled"]}, "margin": 1.0}
+    test = rule("local_share", ">=", 0.6, **exact, by="scene")
+    assert evaluated(test, tables()).condition == "rows, at least 0.6: a 1 of 1, b 0 of 1"
+    plain = rule("local_share", ">=", 0.6, **exact)
+    assert evaluated(plain, tables()).condition == "rows, at least 0.6: 1 of 2"
+    clear = rule("local_share", ">=", 0.5, by="scene", margin=1.0)
+    assert evaluated(clear, tables()).condition == ""
+
+
+COMPILED = {"where": {"implementation": ["compiled"]}}  # shares 0.75 and 0.5: ratios 3 and 1
+
+
+@pytest.mark.parametrize(
+    ("compare", "threshold", "margin", "expected"),
+    [
+        (">=", 0.6, 1.0, DEPENDS),  # 0.6: ratio 1.5, from 3 and 1 a factor 2 and 1.5 away
+        (">=", 0.6, 1.49, DEPENDS),
+        (">=", 0.6, 1.51, MACHINE),
+        ("<=", 0.6, 1.51, MACHINE),
+        (">=", 0.4, 1.49, HOLDS),  # 0.4: ratio 2/3
+        (">=", 0.4, 1.51, MACHINE),
+        ("<=", 0.4, 1.49, FAILS),
+        ("<=", 0.4, 1.51, MACHINE),
+    ],
+)
+def test_ratios_of_times_close_to_the_limit_decide_nothing(compare, threshold, margin, expected):
+    test = rule("local_share", compare, threshold, margin=margin, share=0.75, **COMPILED)
+    assert evaluated(test, tables()).verdict == expected
+
+
+def test_what_enough_clear_rows_decide_those_in_between_do_not_change():
+    test = rule("local_share", ">=", 0.4, margin=1.51, share=0.5, **COMPILED)
+    assert evaluated(test, tables()).verdict == HOLDS
+
+
+def test_a_verdict_that_depends_on_the_machine_says_what_was_measured():
+    outcome = evaluated(
+        rule("local_share", ">=", 0.6, margin=1.6, by="scene", **COMPILED), tables()
+    )
+    assert outcome.condition == (
+        "rows, at least 0.6: a 1 of 1, b 0 of 1 "
+        "(measured 0.5 to 0.75; 1 of 2 within a factor 1.6 of it, which decides nothing)"
+    )
+
+
+@given(st.lists(st.floats(0.01, 100.0), min_size=1, max_size=20), st.data())
+def test_no_machine_refutes_what_holds_on_one_twice_as_fast(ratios, data):
+    """Ratios that move by less than the margin squared do not cross both of its ends."""
+    test = rule("solve_time_ratio", ">=", 1.0)
+    moves = data.draw(arrays(float, len(ratios), elements=st.floats(0.45, 2.2)))
+    answers = {answer_of(test, np.array(ratios)), answer_of(test, np.array(ratios) * moves)}
+    assert answers != {HOLDS, FAILS}
+
+
+def test_runs_that_are_not_accurate_are_no_times():
+    """Their speed-up counts as 0, clearly below any limit."""
+    test = rule("useful_speedup", "<=", 1.0)
+    assert answer_of(test, np.array([0.0, 0.0, 0.0, 0.9])) == HOLDS
+    assert answer_of(test, np.array([0.0, 0.0, 1.1, 0.9])) == MACHINE
+
+
+def test_what_compares_no_times_has_no_margin():
+    assert rule("rerun_error").factor == 1.0
+    assert rule("local_share").factor == MARGIN == 1.5
+
+
+def test_sentence_counts_and_shows_the_spread():
+    where = {"method": ["deim"], "scene": ["a", "b"]}
+    outcome = evaluated(rule("rerun_error", "<=", 0.3, where=where), tables())
+    assert outcome.sentence == "rows: 2 of 4 at most 0.3 (measured 0.1 to blow-up, median 0.3)"
+    one = evaluated(rule("position_basis_ratio", "<=", 1.0), tables())
+    assert one.sentence == "rows: 1 of 1 at most 1 (measured 0.1)"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(1234.0, "1200"), (123456.0, "1.2e+05"), (99.4, "99"), (0.0123, "0.012")]
+)
+def test_measured_numbers_have_two_digits(value, text):
+    changed = tables()
+    changed["local_share"] = changed["local_share"].assign(local_share=value)
+    assert evaluated(rule("local_share"), changed).measured == text
+
+
+WORDS = dict.fromkeys(
+    ("text", "source", "paper", "section", "shown", "qualifiers", "figure_or_table"), "w"
+)
+
+
+def claim(*tests: dict) -> dict:
+    base = {
+        "what": "rows", "metric": "local_share", "compare": ">=", "threshold": 0.4, "margin": 1.0,
+    }  # fmt: skip
+    return {
+        **WORDS,
+        "published": [base | test for test in tests],
+        "beyond": [base],
+        "changes": [{"date": "2026-01-31", "after_data": False, "reason": "First version."}],
+    }
+
+
+def verdict(tmp_path, *tests: dict) -> pd.Series:
+    path = tmp_path / "claims.yaml"
+    path.write_text(yaml.safe_dump({"C1": claim(*tests)}))
+    return claims(path, **whole()).iloc[0]
+
+
+def whole() -> dict[str, pd.DataFrame]:
+    """A table for each that some metric reads."""
+    return {m.table: tables().get(m.table, pd.DataFrame()) for m in METRICS.values()}
+
+
+MIXED = {"threshold": 0.6, "where": {"implementation": ["compiled"]}}
+ABSENT = {"where": {"scene": ["absent"]}}
+FALSE = {"threshold": 0.99}
+
+
+@pytest.mark.parametrize(
+    ("tests", "expected"),
+    [
+        ([{}], HOLDS),
+        ([FALSE], FAILS),
+        ([MIXED], DEPENDS),
+        ([ABSENT], UNDECIDED),
+        ([{}, MIXED], DEPENDS),
+        ([FALSE, MIXED], FAILS),
+        ([ABSENT, MIXED], UNDECIDED),
+        ([{}, {}], HOLDS),
+        ([{}, FALSE], FAILS),
+        ([FALSE, FALSE], FAILS),
+        ([{}, ABSENT], UNDECIDED),
+        ([FALSE, ABSENT], UNDECIDED),
+        ([{}, FALSE | {"decides": False}], HOLDS),
+        ([{}, ABSENT | {"decides": False}], HOLDS),
+        ([FALSE, {"decides": False}], FAILS),
+        ([ABSENT, {"decides": False}], UNDECIDED),
+    ],
+)
+def test_every_verdict(tmp_path, tests, expected):
+    row = verdict(tmp_path, *tests)
+    assert row.verdict == expected
+    assert row.verdict_beyond == HOLDS
+    assert row["why"].count("rows:") == len(tests)
+    assert row.answer.startswith(f"as published it {expected},")
+    assert row.measured.count(";") == sum(t.get("decides", True) for t in tests) - 1
+
+
+def test_missing_data_are_said_to_be_missing(tmp_path):
+    row = verdict(tmp_path, ABSENT)
+    assert row.verdict == "cannot be decided"
+    assert row.measured == "no data"
+    assert row["why"] == "rows: nothing to compare in this configuration."
+
+
+def test_a_group_of_rank_zero_is_no_missing_scene():
+    """The run is in the configuration; it is the data that hold nothing to reduce."""
+    where = {"scene": ["c"], "method": ["qdeim"]}
+    outcome = evaluated(rule("rerun_error", where=where), tables())
+    assert outcome.verdict == UNDECIDED
+    assert outcome.sentence == "rows: no size can run, the numerical rank allows none"
+    where = {"scene": ["absent"], "method": ["qdeim"]}
+    outcome = evaluated(rule("rerun_error", where=where), tables())
+    assert outcome.sentence == "rows: nothing to compare in this configuration"
+
+
+def test_a_threshold_flips_the_verdict(tmp_path):
+    where = {"where": {"implementation": ["compiled"]}}
+    assert verdict(tmp_path, where | {"threshold": 0.5}).verdict == HOLDS
+    assert verdict(tmp_path, where | {"threshold": 0.5001}).verdict == DEPENDS
+    assert verdict(tmp_path, where | {"threshold": 0.7501}).verdict == FAILS
+    assert verdict(tmp_path, where | {"threshold": 0.7501, "compare": "<="}).verdict == HOLDS
+
+
+@pytest.mark.parametrize(
+    ("fault", "message"),
+    [
+        ({"metric": "beauty"}, "metric = 'beauty': allowed are local_share, rerun_error"),
+        ({"treshold": 1.0}, r"unknown key 'published\.0\.treshold' \(allowed: what, metric"),
+        ({"compare": "=="}, r"published\.0\.compare = '=='"),
+        ({"share": 0.4}, r"published\.0\.share"),
+        ({"share": 1.1}, r"published\.0\.share"),
+        ({"threshold": float("nan")}, r"published\.0\.threshold"),
+        ({"decides": False}, "published: none of them decides"),
+        ({"margin": 0.9}, r"published\.0\.margin = 0\.9"),
+        ({"metric": "rerun_error", "margin": 2}, "margin = 2: rerun_error compares no times"),
+        ({"by": "colour"}, "by: no column 'colour'"),
+        ({"where": {"scene": ["@al"]}}, "no set 'al'"),
+    ],
+)
+def test_faulty_rules_name_file_claim_and_key(tmp_path, fault, message):
+    with pytest.raises(ConfigurationError, match=rf"claims\.yaml: C1: .*{message}"):
+        verdict(tmp_path, fault)
+
+
+def test_a_set_stands_for_its_values(tmp_path):
+    path = tmp_path / "claims.yaml"
+    where = {"scene": ["@ends", "b"], "implementation": ["compiled"]}
+    content = {"sets": {"ends": ["a", "z"]}, "C1": claim({"where": where})}
+    path.write_text(yaml.safe_dump(content))
+    (test,) = load_claims(path)["C1"].published
+    assert test.where["scene"] == ("a", "z", "b")
+    assert len(METRICS["local_share"].values(tables(), dict(test.where), 0.1)) == 2
+
+
+def test_a_study_adds_scenes_to_sets_that_exist(tmp_path):
+    path = tmp_path / "claims.yaml"
+    content = {"sets": {"ends": ["a"]}, "C1": claim({"where": {"scene": ["@ends"]}})}
+    path.write_text(yaml.safe_dump(content))
+    (test,) = load_claims(path, {"ends": ("z",)})["C1"].published
+    assert test.where["scene"] == ("a", "z")
+    with pytest.raises(ConfigurationError, match=r"claim_sets: no set 'end'.*ends"):
+        load_claims(path, {"end": ("z",)})
+
+
+def test_changes_are_told_in_their_order(tmp_path):
+    path = tmp_path / "claims.yaml"
+    first, second = (
+        {"date": date, "after_data": known, "reason": "A long enough reason."}
+        for date, known in (("2026-01-31", False), ("2026-02-01", True))
+    )
+    path.write_text(yaml.safe_dump({"C1": claim({}) | {"changes": [first, second]}}))
+    told = claims(path, **whole()).history[0]
+    assert told == (
+        "2026-01-31: A long enough reason. 2026-02-01 (results were known): A long enough reason."
+    )
+    path.write_text(yaml.safe_dump({"C1": claim({}) | {"changes": [second, first]}}))
+    with pytest.raises(ConfigurationError, match="dates must not go back"):
+        load_claims(path)
+
+
+@pytest.mark.parametrize("content", ["", "[]", "C1: 3", "C1: {published: []}", "sets: {a: [b]}"])
+def test_files_that_hold_no_claims_are_refused(tmp_path, content):
+    path = tmp_path / "claims.yaml"
+    path.write_text(content)
+    with pytest.raises(ConfigurationError, match=r"claims\.yaml"):
+        load_claims(path)
+
+
+def test_unknown_columns_are_named():
+    with pytest.raises(ConfigurationError, match=r"no column 'scen' \(allowed: scene, "):
+        evaluated(rule("local_share", where={"scen": ["a"]}), tables())
+
+
+RULES = load_claims(ROOT / "config" / "claims.yaml")
+
+
+@pytest.mark.parametrize("name", RULES)
+def test_the_last_change_of_a_claim_is_that_of_its_rules(name):
+    """A rule that is edited needs an entry: its date, its reason, whether results were known."""
+    rule = RULES[name]
+    assert rule.changes[-1].rules == rule.fingerprint, (
+        f"config/claims.yaml: {name}: the rules have the fingerprint {rule.fingerprint}: say when "
+        "and why they changed, below 'changes'"
+    )
+
+
+def test_a_fingerprint_changes_with_every_rule_but_not_with_its_words():
+    def fingerprint(**changed) -> str:
+        return validate(ClaimRule, claim(changed), "test").fingerprint
+
+    same = fingerprint()
+    assert fingerprint(what="other words") == same
+    others = [
+        {"threshold": 0.41}, {"share": 0.6}, {"where": {"scene": ["a"]}}, {"compare": "<="},
+        {"margin": 1.2},
+    ]  # fmt: skip
+    assert len({same, *(fingerprint(**other) for other in others)}) == 1 + len(others)
+
+
+def test_the_claims_are_those_of_the_paper():
+    assert list(RULES) == [f"C{i}" for i in range(1, 13)]
+
+
+def test_without_data_nothing_is_decided():
+    """Every rule names columns that exist, and none passes for lack of rows."""
+    empty = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
+    rows = claims_rows(RULES, empty)
+    assert rows.claim.tolist() == list(RULES)
+    assert (rows[["verdict", "verdict_beyond"]] == UNDECIDED).all(axis=None)
+
+
+def test_held_out_motions_decide_by_their_median():
+    where = {"position_basis": ["full"]}
+    names = ("rerun_error", "heldout_rerun_error")
+    own, unseen = (values_of(rule(name, where=where), tables()) for name in names)
+    assert unseen.value.tolist() == (2.0 * own.value).tolist()
+    assert unseen.method.tolist() == own.method.tolist()
+    none = tables()
+    none["heldout_reruns"] = none["heldout_reruns"].assign(horizon_frame=0)
+    assert values_of(rule("heldout_rerun_error"), none).empty
+
+
+# Which cells a clock decides ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", RULES)
+def test_a_metric_reads_no_column_that_it_does_not_name(name):
+    """So that a claim counts as timed if and only if it uses times."""
+    for test in (*RULES[name].published, *RULES[name].beyond):
+        metric = METRICS[test.metric]
+        whole = tables()
+        absent = {
+            c: allowed[0]
+            for c, allowed in test.where.items()
+            if c not in whole[metric.table] and c not in metric.labels
+        }
+        whole[metric.table] = whole[metric.table].assign(**absent)
+        kept = {*metric.columns, *test.where} & set(whole[metric.table].columns)
+        part = {**whole, metric.table: whole[metric.table][sorted(kept)]}
+        where = dict(test.where)
+        few, every = (metric.values(of, where, test.accuracy).value for of in (part, whole))
+        np.testing.assert_array_equal(few, every)
+
+
+def test_only_claims_about_times_are_timed():
+    timed = {name: timed_columns(rule) for name, rule in RULES.items()}
+    one = {"measured", "verdict", "condition", "why"}
+    both = one | {f"{name}_beyond" for name in one} | {"answer"}
+    assert timed["C1"] == timed["C9"] == both
+    assert timed["C11"] == {f"{name}_beyond" for name in one} | {"answer"}
+    assert timed["C2"] == timed["C7"] == timed["C12"] == set()
+
+
+def test_another_verdict_is_seen_where_no_clock_decides():
+    made = pd.DataFrame(
+        [{"claim": c, "verdict": HOLDS, "why": "a", "measured": "1"} for c in RULES]
+    )
+    made = made.reindex(columns=claims.column_names, fill_value="")
+    kept = claims.without_times(made, ROOT)
+    for place, name in enumerate(RULES):
+        other = made.copy()
+        other.loc[place, "verdict"] = UNDECIDED
+        changed = not claims.without_times(other, ROOT).equals(kept)
+        assert changed == ("verdict" not in timed_columns(RULES[name])), name
+
+
+def test_a_test_beside_the_verdict_makes_its_reason_timed():
+    own = {"what": "rows", "compare": ">=", "threshold": 0.5}
+    decides = own | {"metric": "rerun_error"}
+    beside = own | {"metric": "local_share", "decides": False}
+
+    def rules(*tests: dict) -> ClaimRule:
+        return validate(ClaimRule, claim() | {"published": tests, "beyond": [decides]}, "test")
+
+    assert timed_columns(rules(decides, beside)) == {"why"}
+    assert timed_columns(rules(decides)) == set()

@@ -1,0 +1,62 @@
+"""Table claims_tests: every test with what it found; the verdicts are those of the table claims."""
+
+import pandas as pd
+import pytest
+
+from places import ROOT
+from study.tables import declared
+from study.tables.claims import MACHINE, UNDECIDED, load_claims, outcome_rows
+from study.tables.claims.claims_tests import claims_tests
+from study.tables.claims.verdicts import claims_rows, combined
+
+RULES = load_claims(ROOT / "config" / "claims.yaml")
+SHARES = pd.DataFrame(
+    {"scene": ["a", "b", "c"], "implementation": "compiled", "local_share": [0.2, 0.8, 0.9]}
+)
+
+
+@pytest.fixture(scope="module")
+def tables() -> dict[str, pd.DataFrame]:
+    empty = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
+    return empty | {"local_share": SHARES}
+
+
+@pytest.fixture(scope="module")
+def outcomes(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
+    return outcome_rows(RULES, tables)
+
+
+def test_what_a_test_found(outcomes):
+    found = claims_tests.checked(outcomes)
+    one = found[(found.claim == "C1") & (found.part == "beyond") & found.decides].iloc[0]
+    assert (one.satisfied, one.of, one.close, one.verdict) == (2, 3, 2, MACHINE)
+    assert one.margin == 4.0
+    assert (one.least, one["median"], one.most) == (0.2, 0.8, 0.9)
+
+
+def test_a_test_without_rows_is_undecided(outcomes):
+    nothing = outcomes[outcomes.of == 0]
+    assert (nothing.verdict == UNDECIDED).all()
+    assert nothing[["least", "median", "most"]].isna().all(axis=None)
+
+
+def test_the_tests_that_decide_give_the_verdicts(tables, outcomes):
+    for row in claims_rows(RULES, tables).itertuples():
+        for part, verdict in (("published", row.verdict), ("beyond", row.verdict_beyond)):
+            mine = outcomes[(outcomes.claim == row.claim) & (outcomes.part == part)]
+            mine = mine[mine.decides]
+            assert combined(list(mine.verdict)) == verdict
+
+
+def test_words_tell_the_tests_of_a_part_apart(outcomes):
+    assert not outcomes.duplicated(["claim", "part", "what"]).any()
+
+
+@pytest.mark.parametrize(("claim", "timed"), [("C2", False), ("C9", True)])
+def test_a_clock_has_its_say_where_times_are_compared(claim, timed, outcomes):
+    said = outcomes.query("claim == @claim").head(1)
+    one, other = (
+        claims_tests.without_times(claims_tests.checked(said.assign(satisfied=n)), ROOT)
+        for n in (1, 2)
+    )
+    assert one.equals(other) == timed

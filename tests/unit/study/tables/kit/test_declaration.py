@@ -1,0 +1,170 @@
+"""Declarations: what they refuse, what they make of a frame, and that the study's are sound."""
+
+from collections import Counter
+
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pdrom.core.errors import StorageError
+from pdrom.core.store import read_table, write_table
+from study.artifact.artifact import load
+from study.artifact.reads import Setting
+from study.tables import declared
+from study.tables.kit.declaration import flag, integer, number, table, text, timed
+
+COLUMNS = (
+    text("name", "a word"),
+    integer("count", "a count"),
+    number("size", "a size", "m"),
+    flag("good", "yes or no"),
+    timed(number("seconds", "a time", "s")),
+)
+
+
+@table(title="An invented table", columns=COLUMNS, reads={"rows": Setting("rows")})
+def invented(rows: list[dict]) -> pd.DataFrame:
+    """Rows as they are."""
+    return pd.DataFrame(rows)
+
+
+ROW = {"name": "a", "count": 3, "size": 0.5, "good": True, "seconds": 1.5}
+CELLS = {
+    "name": st.sampled_from(["a", "b c", None]),
+    "count": st.integers(-9, 9) | st.none(),
+    "size": st.floats(allow_nan=False) | st.none(),
+    "good": st.booleans() | st.none(),
+    "seconds": st.floats(0.0, 1.0) | st.none(),
+}
+
+
+@given(st.lists(st.fixed_dictionaries(CELLS), min_size=1, max_size=6))
+def test_whatever_is_empty_the_types_are_the_declared_ones(rows):
+    made = invented(rows)
+    assert tuple(made.columns) == invented.column_names
+    assert [str(made[c].dtype) for c in ("count", "size", "good")] == [
+        "Int64",
+        "float64",
+        "boolean",
+    ]
+    for name in CELLS:
+        assert [None if pd.isna(v) else v for v in made[name]] == [row[name] for row in rows]
+
+
+def test_columns_are_put_in_order_and_others_dropped():
+    rows = pd.DataFrame([{name: ROW[name] for name in reversed(ROW)} | {"more": 1}], index=[5])
+    made = invented.checked(rows)
+    assert tuple(made.columns) == invented.column_names
+    assert list(made.index) == [0]
+
+
+@pytest.mark.parametrize("content", [pd.DataFrame(), pd.DataFrame(columns=["name"])])
+def test_a_table_without_rows_has_its_columns_in_a_file_too(content, tmp_path):
+    write_table(invented.checked(content), tmp_path / "t.csv")
+    assert tuple(read_table(tmp_path / "t.csv").columns) == invented.column_names
+
+
+def test_flags_survive_a_part_without_any():
+    """A file in which nothing ran has a column of empty numbers."""
+    parts = [pd.DataFrame([ROW]), pd.DataFrame([ROW | {"good": float("nan")}])]
+    for order in (parts, parts[::-1], [parts[0], parts[1], parts[0].astype({"good": float})]):
+        made = invented.checked(pd.concat(order, ignore_index=True))
+        expected = [pd.notna(part.good[0]) for part in order]
+        assert made.good.notna().tolist() == expected
+        assert made.good.dropna().all()
+
+
+def test_numbers_are_written_alike_whatever_type_they_came_with(tmp_path):
+    """A column of objects would be written with all digits."""
+    rows = pd.DataFrame([ROW | {"size": 1.0 / 3.0}, ROW]).astype({"size": object})
+    write_table(invented.checked(rows), tmp_path / "t.csv")
+    assert "0.3333333333," in (tmp_path / "t.csv").read_text()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"count": 1.5}, "table invented: column 'count' is no integer"),
+        ({"count": "many"}, "column 'count' is no integer"),
+        ({"size": "large"}, "column 'size' is no number"),
+        ({"good": "perhaps"}, "column 'good' is no flag"),
+    ],
+)
+def test_a_value_that_does_not_fit_is_named_with_its_column(changes, message):
+    with pytest.raises(StorageError, match=message):
+        invented([ROW | changes])
+
+
+def test_missing_columns_are_named():
+    with pytest.raises(StorageError, match=r"invented: lacks the column\(s\) count, good"):
+        invented([{"name": "a", "size": 1.0, "seconds": 2.0}])
+
+
+def test_a_function_must_take_what_it_reads():
+    declare = table(title="", columns=COLUMNS, reads={"rows": Setting("a"), "other": Setting("b")})
+    with pytest.raises(TypeError, match=r"lonely_table: .*other"):
+
+        @declare
+        def lonely(rows):
+            """Nothing."""
+
+
+def test_a_column_is_declared_once():
+    declare = table(title="", columns=(*COLUMNS, integer("count", "again")), reads={})
+    with pytest.raises(TypeError, match=r"table double: .*count"):
+
+        @declare
+        def double():
+            """Nothing."""
+
+
+# Times --------------------------------------------------------------------------------------------
+
+
+def test_only_times_may_differ(tmp_path):
+    def seen(**changes):
+        return invented([ROW | changes]).pipe(invented.without_times, tmp_path)
+
+    assert seen(seconds=9.0).equals(seen())
+    assert seen(seconds=None).equals(seen())
+    for name, other in {"name": "b", "count": 4, "size": 0.25, "good": False}.items():
+        assert not seen(**{name: other}).equals(seen())
+        assert not seen(**{name: None}).equals(seen())
+
+
+def test_timing_columns_are_those_declared():
+    found = {name: made.timing_columns for name, made in declared().items()}
+    assert found["local_share"] == ("local_ms", "assembly_ms", "global_ms", "local_share")
+    assert found["accuracy_cost"] == ("ms_per_frame", "pareto", "pareto_heldout")
+    untimed = ("singular_values", "reconstruction_error", "sensitivity", "stability", "targets")
+    assert not any(found[name] for name in untimed)
+
+
+# The study's tables -------------------------------------------------------------------------------
+
+
+def test_every_table_is_declared_in_a_module_that_has_no_other():
+    modules = Counter(made.module for made in declared().values())
+    assert set(modules.values()) == {1}
+    for name, made in declared().items():
+        assert load(made.address) is made
+        assert made.name == name
+
+
+def test_a_time_in_seconds_or_milliseconds_is_timed_unless_it_is_no_clocks():
+    no_clocks = {"budget_ms", "h", "contact_delay"}  # set, or seconds of the simulation
+    recorded = {"large_meshes"}  # measured once, kept with the sources
+    for name, made in declared().items():
+        if name in recorded:
+            continue
+        for column in made.columns:
+            if column.unit in ("s", "ms") and column.name not in no_clocks:
+                assert column.timed, (name, column.name)
+
+
+def test_every_column_says_what_it_is():
+    for made in declared().values():
+        assert made.title
+        for column in made.columns:
+            assert column.meaning, column.name

@@ -1,0 +1,172 @@
+"""Tables of budgets, break-even sizes and effects, against brute force and synthetic data."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pdrom.core.store import write_table
+from study.artifact.paths import File
+from study.tables.break_even import breakeven
+from study.tables.budget import budget
+from study.tables.effects_contribution import effects_contribution
+from study.tables.effects_cost import effects_cost
+from study.tables.effects_left_out import effects_left_out
+
+METHODS = ("fom", "fewer-iterations", "full", "block-deim")
+
+
+def points(rows) -> pd.DataFrame:
+    """Table accuracy_cost of (scene, method, error, time)."""
+    table = pd.DataFrame(
+        rows, columns=["scene", "method", "relative_error_within_horizon", "ms_per_frame"]
+    )
+    return table.assign(position_basis="full", k=None, r=range(len(table)), iterations=10)
+
+
+ROWS = st.lists(
+    st.tuples(
+        st.sampled_from("ab"), st.sampled_from(METHODS), st.integers(0, 4), st.integers(1, 5)
+    ),
+    min_size=1,
+    max_size=15,
+)
+
+
+@given(ROWS)
+def test_a_budget_buys_the_smallest_error_that_fits(rows):
+    limits = (0.5, 2.0, 9.0)
+    table = budget(points(rows), limits)
+    for row in table.itertuples():
+        rivals = [
+            (error, cost)
+            for scene, method, error, cost in rows
+            if scene == row.scene
+            and (method == "fom") == (row.reference == "converged")
+            and cost <= row.budget_ms
+        ]
+        if not rivals:
+            assert pd.isna(row.method)
+            continue
+        assert (row.relative_error_within_horizon, row.ms_per_frame) == min(rivals)
+    pairs = {(scene, method == "fom") for scene, method, _, _ in rows}
+    assert len(table) == len(limits) * len(pairs)
+
+
+def test_a_budget_that_buys_nothing_is_a_row():
+    table = budget(points([("a", "block-deim", 0.1, 5.0)]), [1.0, 10.0])
+    assert table.budget_ms.tolist() == [1.0, 10.0]
+    assert table.method.isna().tolist() == [True, False]
+    assert table.reference.tolist() == ["own iterations"] * 2
+
+
+# Break-even ---------------------------------------------------------------------------------------
+
+
+def curve(folder, scene: str, offset: float, slope: float, full: float, sizes, shuffle=0) -> File:
+    """A local step that costs offset + slope r, as a file."""
+    r = np.array(sizes)
+    table = pd.DataFrame({"r": r, "local_ms": offset + slope * r}).assign(
+        scene=scene, group="spring", method="block-deim", factor=1.0, vertices=9, elements=20,
+        threads=1, full_ms=full, solve_ms=0.5 * offset, lift_ms=slope * r,
+    )  # fmt: skip
+    write_table(table.sample(frac=1.0, random_state=shuffle), folder / f"{scene}.csv")
+    return File(str(folder / f"{scene}.csv"), {})
+
+
+@pytest.mark.parametrize(
+    ("offset", "slope", "full", "expected"),
+    [
+        (1.0, 0.1, 4.0, 30),  # 1 + 0.1 r = 4
+        (1.0, 0.1, 4.05, 31),  # r = 30.5
+        (1.0, 0.1, 100.0, None),
+        (5.0, 0.1, 4.0, 5),  # it never pays
+        (1.0, 0.03, 4.0, 100),  # exactly at the last size
+    ],
+)
+def test_break_even_of_a_line(tmp_path, offset, slope, full, expected):
+    path = curve(tmp_path, "a", offset, slope, full, [5, 10, 20, 40, 100])
+    table = breakeven([path], [])
+    np.testing.assert_allclose(table.ratio, (offset + slope * table.r) / full)
+    np.testing.assert_allclose(
+        table.solve_ratio + table.lift_ratio, table.ratio - 0.5 * offset / full
+    )
+    if expected is None:
+        assert table.breakeven_r.isna().all()
+    else:
+        assert table.breakeven_r.tolist() == [expected] * 5
+
+
+def test_every_curve_has_its_own_break_even(tmp_path):
+    paths = [
+        curve(tmp_path, "a", 1.0, 0.1, 4.0, [5, 20, 40]),
+        curve(tmp_path, "b", 1.0, 0.1, 2.0, [5, 20, 40]),
+    ]
+    table = breakeven(paths, [])
+    assert table.groupby("scene").breakeven_r.unique().map(list).to_dict() == {"a": [30], "b": [10]}
+
+
+# Effects ------------------------------------------------------------------------------------------
+
+
+def test_effects_are_joined_and_scenes_without_rows_left_out(tmp_path):
+    cost = {"scene": "a", "effect": "spring", "elements": 3, "ms_per_frame": 1.0, "share": 1.0}
+    write_table(pd.DataFrame([cost]), tmp_path / "a.csv")
+    write_table(pd.DataFrame([cost | {"scene": "b"}]), tmp_path / "b.csv")
+    files = [File(str(tmp_path / f"{name}.csv"), {}) for name in "ab"]
+    times = pd.DataFrame({"scene": ["b"], "ms_per_frame": [3.0]})
+    table = effects_cost(files, times)
+    assert table.scene.tolist() == ["a", "b"]
+    # the one time of scene b; a was not timed in several processes
+    assert table.ms_per_frame.tolist() == [1.0, 3.0]
+    empty = pd.DataFrame(columns=effects_left_out.column_names)
+    write_table(empty, tmp_path / "none.csv")
+    table = effects_left_out([File(str(tmp_path / "none.csv"), {})], times)
+    assert tuple(table.columns) == effects_left_out.column_names
+    assert len(table) == 0
+
+
+def test_contributions_are_judged_before_the_horizon_and_bring_their_times(tmp_path):
+    """Two frames count; bending moves less than the floor, the only group of b cannot go."""
+    rows = [
+        (scene, effect, role, frame, force, energy)
+        for scene, effects in (
+            ("a", [("spring", "constraint group", 3.0), ("bending", "constraint group", 1.0)]),
+            ("b", [("strain", "constraint group", 4.0)]),
+        )
+        for effect, role, force in effects
+        for frame, energy in enumerate([1.0, 5.0, 2.0])
+    ]
+    rows.append(("b", "kick", "start", 0, 4.0 * np.sqrt(3.0), 7.0))
+    header = ["scene", "effect", "role", "frame", "force", "energy"]
+    write_table(pd.DataFrame(rows, columns=header), tmp_path / "all.csv")
+    drifts = {
+        ("a", "1e-10"): [1e-6, 1e-5, 1.0], ("a", "without bending"): [1e-7, 1e-7, 9.0],
+        ("a", "without spring"): [1e-2, 1e-1, 1.0], ("b", "1e-10"): [1e-6, 1e-6, 1e-6],
+        ("b", "without kick"): [0.5, 0.6, 0.7],
+    }  # fmt: skip
+    sensitivity = pd.DataFrame(
+        [
+            (*key, frame, value)
+            for key, drift in drifts.items()
+            for frame, value in enumerate(drift)
+        ],
+        columns=["scene", "perturbation", "frame", "relative_difference"],
+    )
+    costs = pd.DataFrame({"scene": ["a"], "effect": ["bending"], "ms_per_frame": [0.25]})
+    removed = pd.DataFrame({"scene": ["a"], "left_out": ["bending"], "saved_ms": [0.2]})
+    file = File(str(tmp_path / "all.csv"), {})
+    made = effects_contribution([file], sensitivity, 1e-10, 1e-3, costs, removed)
+    by = made.set_index(["scene", "effect"])
+    assert by.moved[("a", "bending")] == 1e-7
+    assert by.moved[("a", "spring")] == 1e-1
+    assert by.moved[("b", "kick")] == 0.7
+    assert pd.isna(by.moved[("b", "strain")])
+    assert by.above_floor.tolist() == [True, False, pd.NA, True]
+    assert by.sensitivity_floor[("a", "bending")] == 1e-5
+    assert by.force_share.to_numpy() == pytest.approx([0.75, 0.25, 0.5, 0.5])
+    assert by.energy.tolist() == [4.0, 4.0, 4.0, 7.0]
+    assert by.acting_frames.tolist() == [3, 3, 3, 1]
+    assert by.loc[("a", "bending"), ["own_ms", "saved_ms"]].tolist() == [0.25, 0.2]
+    assert pd.isna(by.own_ms[("b", "kick")])

@@ -1,0 +1,136 @@
+"""Times over processes: intervals, what a control confirms, one time for each scene."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binom
+
+from pdrom.core.store import write_table
+from study.artifact.paths import File
+from study.experiments.kit.fresh_process import COLUMNS
+from study.tables.frame_times import frame_times
+from study.tables.kit.intervals import confirmed, in_words, median_interval
+from study.tables.kit.one_time import in_one_time
+from study.tables.repetitions import repetitions
+from study.tables.speedups import speedups
+
+VALUES = st.lists(st.floats(0.1, 10.0), min_size=1, max_size=12)
+
+
+@given(VALUES)
+def test_interval_of_a_median_encloses_it_and_lies_within_the_values(values):
+    median, low, high = median_interval(values)
+    assert min(values) <= low <= median <= high <= max(values)
+    assert median == np.median(values)
+
+
+def test_interval_is_that_of_the_binomial_distribution():
+    """The bootstrap's median of odd n is at most the k-th value if n // 2 + 1 draws are."""
+    n = 11
+    _, low, high = median_interval(np.arange(1.0, n + 1))
+    share = binom.sf(n // 2, n, np.arange(1, n + 1) / n)
+    assert abs(low - (1 + np.searchsorted(share, 0.025))) <= 1.0
+    assert abs(high - (1 + np.searchsorted(share, 0.975))) <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "agrees"), [(0.9, 1.01, True), (1.06, 1.1, True), (0.5, 1.0, False)]
+)
+def test_a_control_confirms_what_it_repeats(low, high, agrees):
+    assert confirmed(low, high) == agrees
+
+
+def test_words_show_the_median_and_its_interval():
+    assert in_words(66.2, 63.7, 68.2) == "66 (64 to 68)"
+    assert in_words(0.0551, 0.051, 0.059) == "0.055 (0.051 to 0.059)"
+    assert in_words(100.4, 81.2, 107.3) == "100 (81 to 110)"
+
+
+@pytest.fixture
+def measured(tmp_path) -> list[File]:
+    """Three processes: scene a with its twin and two reductions; the machine's speed varies."""
+    rows = []
+    for process, speed in ((1, 1.0), (2, 2.0), (3, 1.5)):
+        times = {
+            ("a", "full"): 2.0, ("a", "control"): 2.02, ("a_twin", "full"): 2.2,
+            ("a_twin", "control"): 4.0, ("a", "ecsw"): 0.5, ("a", "deim"): 4.0,
+        }  # fmt: skip
+        for (scene, name), time in times.items():
+            role = name if name in ("full", "control") else "reduced"
+            row = {"process": process, "scene": scene, "vertices": 9, "frames": 100, "role": role}
+            if name == "ecsw":
+                row |= {"group": "all", "method": name, "position_basis": "pod", "k": 4, "r": 7}
+            if name == "deim":
+                row |= {"group": "spring", "method": name, "position_basis": "full", "r": 6}
+            rows.append(row | {"ms_per_frame": time * speed})
+    path = tmp_path / "times.csv"
+    table = pd.DataFrame(rows, columns=COLUMNS)
+    write_table(table.astype({"k": "Int64", "r": "Int64"}), path)
+    return [File(str(path), {})]
+
+
+def test_each_scene_has_one_time_and_its_control(measured):
+    table = frame_times(measured).set_index("scene")
+    assert table.ms_per_frame.to_dict() == {"a": 3.0, "a_twin": pytest.approx(3.3)}
+    assert (table.processes == 3).all()
+    # the ratios do not see how fast the machine was
+    assert table.control_ratio["a"] == pytest.approx(1.01)
+    assert table.confirmed.to_dict() == {"a": True, "a_twin": False}
+    assert not table.control_agrees["a"]
+    assert table.twin_ratio["a"] == pytest.approx(1.1)
+    assert np.isnan(table.twin_ratio["a_twin"])
+
+
+def test_a_speedup_stands_beside_its_costs_and_errors(measured, tmp_path):
+    models = {"scene": ["a"], "position_basis": ["pod"], "k": [4], "method": ["ecsw"]}
+    write_table(pd.DataFrame({**models, "reduction_s": [0.15]}), tmp_path / "seconds.csv")
+    steps = {"scene": ["a"], "group": ["spring"], "method": ["deim"], "r": [6]}
+    write_table(pd.DataFrame({**steps, "reduction_s": [0.1]}), tmp_path / "projections.csv")
+    runs = pd.concat([
+        pd.DataFrame(models).assign(group="all", r=7, relative_error_within_horizon=0.01),
+        pd.DataFrame(steps).assign(position_basis="full", relative_error_within_horizon=0.2),
+    ])  # fmt: skip
+    unseen = runs[runs.method == "ecsw"].assign(frames=9, blowup_frame=None, horizon_frame=9)
+    table = speedups(
+        measured, frame_times(measured), [File(str(tmp_path / "projections.csv"), {})],
+        [File(str(tmp_path / "seconds.csv"), {})], [], runs, unseen,
+    ).set_index("method")  # fmt: skip
+    assert table.speedup.to_dict() == {"ecsw": pytest.approx(4.0), "deim": pytest.approx(0.5)}
+    assert table.shown.to_dict() == {"ecsw": "4.0 (4.0 to 4.0)", "deim": "0.50 (0.50 to 0.50)"}
+    assert table.loses.to_dict() == {"ecsw": False, "deim": True}
+    # 100 frames of 3 ms and 0.15 s, paid back by 3 - 0.75 ms a frame
+    assert table.training_s["ecsw"] == pytest.approx(0.3)
+    assert table.frames_to_break_even["ecsw"] == pytest.approx(450.0 / 2.25)
+    assert pd.isna(table.frames_to_break_even["deim"])
+    assert table.error_train.to_dict() == {"ecsw": 0.01, "deim": 0.2}
+    assert table.error_heldout["ecsw"] == 0.01
+    assert pd.isna(table.error_heldout["deim"])
+
+
+def test_no_process_leaves_empty_tables():
+    assert len(frame_times([])) == 0
+    empty = speedups([], frame_times([]), [], [], [], pd.DataFrame(), pd.DataFrame())
+    assert tuple(empty.columns) == speedups.column_names
+
+
+def test_times_of_a_job_are_told_in_the_one_time():
+    job = pd.DataFrame({"scene": ["a", "a", "b"], "ms": [2.0, 1.0, 5.0], "r": [1, 2, 3]})
+    times = pd.DataFrame({"scene": ["a"], "ms_per_frame": [3.0]})
+    told = in_one_time(job, pd.Series({"a": 2.0, "b": 5.0}), times, ["ms"])
+    assert told.ms.tolist() == [3.0, 1.5, 5.0]
+    assert told.r.tolist() == [1, 2, 3]
+
+
+def test_repetitions_are_told_by_median_and_range(tmp_path):
+    errors, gains = [0.2, 0.1, float("inf")], [4.0, 3.0, 5.0]
+    rows = pd.DataFrame({"seed": [1, 2, 3], "error": errors, "gain": gains}).assign(
+        scene="a", group="spring", method="deim", r=6, varied="training", finite=True
+    )
+    write_table(rows, tmp_path / "a.csv")
+    (row,) = repetitions([File(str(tmp_path / "a.csv"), {})]).itertuples()
+    assert (row.repetitions, row.ended) == (3, 1)
+    assert (row.error_low, row.error_median, row.error_high) == (0.1, 0.2, np.inf)
+    assert (row.gain_low, row.gain_median, row.gain_high) == (3.0, 4.0, 5.0)
+    assert len(repetitions([])) == 0

@@ -1,0 +1,213 @@
+"""Tables about the gain, from small reruns, against values worked out by hand."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from study.tables.gain_interventions import gain_interventions
+from study.tables.gain_prediction import (
+    best_threshold,
+    failures_ordered,
+    gain_prediction,
+    judged_runs,
+)
+from study.tables.targets import targets
+
+# scene, method, r, error within the horizon (None: ended before), gain, elements, frames
+RUNS = [
+    ("calm", "pod", 20, 1e-3, 1.0, 100, 50),
+    ("calm", "block-deim", 20, 1e-2, 8.0, 20, 50),
+    ("calm", "bounded", 20, 1.4e-3, 2.0, 25, 50),
+    ("calm", "deim-joint", 21, None, 500.0, 21, 3),
+    ("calm", "deim", 20, 0.5, 50.0, 19, 50),
+    ("quiet", "pod", 20, 1e-9, 1.0, 100, 50),
+    ("quiet", "bounded", 20, 5e-9, 2.0, 25, 50),
+    ("wild", "pod", 20, 1e-2, 1.0, 100, 50),
+    ("wild", "deim", 20, 0.2, 9.0, 20, 50),
+    ("hopeless", "pod", 20, 0.9, 1.0, 100, 50),
+    ("hopeless", "deim", 20, 0.9, 5.0, 20, 50),
+]
+HORIZONS = {"calm": 50, "quiet": 50, "wild": 30, "hopeless": 50}
+FLOORS = {"calm": 1e-8, "quiet": 1e-8, "wild": 1e-3, "hopeless": 1e-8}
+
+
+def tables() -> tuple[pd.DataFrame, pd.DataFrame]:
+    """reduced_reruns and reconstruction_error with what the two tables read."""
+    reruns, reconstruction = [], []
+    for scene, method, r, error, gain, elements, frames in RUNS:
+        key = {"scene": scene, "group": "spring", "method": method, "r": r}
+        reruns.append(
+            key | {
+                "position_basis": "full", "frames": frames, "finite": error is not None,
+                "blowup_frame": None if error is not None else frames, "max_extent": 1.0,
+                "relative_error": error, "relative_error_within_horizon": error,
+                "horizon_frame": HORIZONS[scene], "sensitivity_floor": FLOORS[scene],
+            }
+        )  # fmt: skip
+        for split in ("train", "test"):
+            rec = 1e-4 * gain if split == "train" else 1.0
+            reconstruction.append(
+                key | {"split": split, "relative_error": rec, "gain": gain,
+                       "elements_sampled": elements}
+            )  # fmt: skip
+    marked = reruns[0] | {"r": 99, "frames": 0, "max_extent": None, "finite": None,
+                          "relative_error_within_horizon": None}  # fmt: skip
+    subspace = reruns[1] | {"position_basis": "pod"}
+    return pd.DataFrame([*reruns, marked, subspace]), pd.DataFrame(reconstruction)
+
+
+def test_targets_compare_with_the_orthogonal_projection():
+    table = targets(*tables())
+    rows = table.set_index(["scene", "method"])
+    # the horizon of "wild" ends before its run
+    assert set(rows.index.get_level_values("scene")) == {"calm", "quiet", "hopeless"}
+    assert "pod" not in set(table.method)
+    assert rows.ratio["calm", "bounded"] == pytest.approx(1.4)
+    assert rows.ratio["calm", "block-deim"] == pytest.approx(10.0)
+    assert table.asked.all()
+    assert rows.within["calm", "bounded"]
+    assert not rows.within["calm", "block-deim"]
+    # one mode more than the orthogonal projection has: compared with its largest size
+    assert np.isinf(rows.ratio["calm", "deim-joint"])
+    assert rows.orthogonal_error["calm", "deim-joint"] == 1e-3
+    # both errors are below the floor, where nothing can be told
+    assert rows.ratio["quiet", "bounded"] == 1.0
+    assert rows.elements_share["calm", "bounded"] == 0.25
+    assert rows.spread["calm", "bounded"] == pytest.approx(1.0)
+
+
+def test_only_runs_whose_basis_suffices_count():
+    runs = judged_runs(*tables())
+    assert set(runs.scene) == {"calm", "quiet", "wild"}
+    assert runs.set_index(["scene", "method"]).failed.to_dict() == {
+        ("calm", "block-deim"): False, ("calm", "bounded"): False, ("calm", "deim-joint"): True,
+        ("calm", "deim"): True, ("quiet", "bounded"): False, ("wild", "deim"): True,
+    }  # fmt: skip
+
+
+def test_prediction_counts_decades_and_judges_predictors():
+    table = gain_prediction(*tables())
+    decades = table[table.lower != "all"].set_index("upper")
+    assert decades.runs.to_dict() == {"10": 4, "100": 1, "1000": 1}
+    assert decades.failed.to_dict() == {"10": 1, "100": 1, "1000": 1}
+    assert decades.failed_share["10"] == 0.25
+    whole = table[table.lower == "all"].set_index("predictor")
+    assert list(whole.index) == ["gain", "reconstruction error", "gain x best error"]
+    assert (whole.runs == 6).all()
+    assert (whole.failed == 3).all()
+    # gains 2, 2, 8 | 9, 50, 500
+    assert whole.threshold["gain"] == 8.0
+    assert whole.misclassified_share["gain"] == 0.0
+    assert whole.failures_ordered["gain"] == 1.0
+    assert whole.rank_correlation["gain"] == pytest.approx(0.971, abs=0.02)
+
+
+def test_a_singular_interpolation_counts_among_the_largest_gains():
+    reruns, reconstruction = tables()
+    lost = reconstruction.method == "deim-joint"
+    reconstruction.loc[lost, ["gain", "relative_error"]] = [np.inf, np.nan]
+    table = gain_prediction(reruns, reconstruction)
+    row = table[table.upper == "inf"].iloc[0]
+    assert (row.lower, row.runs, row.failed, row.median_error) == ("10000", 1, 1, np.inf)
+    whole = table[table.lower == "all"].set_index("predictor")
+    assert whole.misclassified_share["reconstruction error"] == 0.0
+
+
+def test_no_runs_give_an_empty_table():
+    reruns, reconstruction = tables()
+    table = gain_prediction(reruns[reruns.method == "pod"], reconstruction)
+    assert table.empty
+
+
+@given(st.lists(st.tuples(st.floats(0.1, 1e3), st.booleans()), min_size=1, max_size=12))
+def test_no_threshold_makes_fewer_mistakes(runs):
+    x, failed = np.array([a for a, _ in runs]), np.array([b for _, b in runs])
+    threshold, mistakes = best_threshold(x, failed)
+    assert mistakes == np.sum((x > threshold) != failed)
+    assert mistakes == min(np.sum((x > t) != failed) for t in [0.0, *(x - 1e-9), *(x + 1e-9)])
+
+
+@given(st.lists(st.tuples(st.integers(0, 5), st.booleans()), min_size=2, max_size=12))
+def test_order_is_the_share_of_pairs(runs):
+    x, failed = np.array([a for a, _ in runs], float), np.array([b for _, b in runs])
+    pairs = [(a > b) + 0.5 * (a == b) for a in x[failed] for b in x[~failed]]
+    value = failures_ordered(x, failed)
+    assert value is None if not pairs else value == pytest.approx(np.mean(pairs))
+
+
+def square(*runs: tuple) -> pd.DataFrame:
+    """Rows of the ladder's two by two: scene, rung, rows of an element, gain and error."""
+    names = ["scene", "rung", "rows_per_element", "gain", "relative_error_within_horizon"]
+    return pd.DataFrame(runs, columns=names).assign(direction="square", group="spring", r=20)
+
+
+def test_samples_and_coefficients_are_exchanged_at_equal_entries():
+    """A scene and its twin are one family; elements of a single row are no other sample."""
+    reruns, reconstruction = tables()
+    runs = [
+        (scene, rung, p, gain, error)
+        for scene, p in (("calm", 2), ("calm_twin", 2), ("wild", 1))
+        for rung, gain, error in (
+            ("single rows, separate", 1000.0, 0.5),
+            ("single rows, shared", 50.0, 0.05),
+            ("whole elements, separate", 100.0, 0.6),
+            ("whole elements, shared", 8.0, 0.05),
+        )
+    ]
+    twins = [t.assign(scene="calm_twin")[t.scene == "calm"] for t in (reruns, reconstruction)]
+    both = [pd.concat(two) for two in zip((reruns, reconstruction), twins, strict=True)]
+    table = gain_interventions(*both, square(*runs)).set_index("step")
+    shared = table.loc["shared coefficients, single rows"]
+    assert (shared.pairs, shared.scenes, shared.families, shared.families_fallen) == (3, 3, 2, 2)
+    assert (shared.gain_ratio, shared.error_ratio, shared.p_value) == (0.05, 0.1, 0.5)
+    elements = table.loc["whole elements, separate coefficients"]
+    # the gain falls tenfold and the error does not
+    assert (elements.pairs, elements.families, elements.unexplained_share) == (2, 1, 1.0)
+
+
+def test_interventions_compare_runs_on_one_basis():
+    table = gain_interventions(*tables(), square()).set_index("step")
+    # block-deim ran in one scene only, where its gain and its error are below those of deim
+    step = table.loc["whole elements for single entries"]
+    assert (step.pairs, step.scenes, step.scenes_fallen) == (1, 1, 1)
+    assert step.gain_ratio == pytest.approx(8.0 / 50.0)
+    assert step.error_ratio == step.error_ratio_low == pytest.approx(0.02)
+    assert step.p_value == 1.0
+    assert "a gain of at most two" not in table.index
+
+
+def test_scenes_count_once_however_many_sizes_they_have():
+    reruns, _ = tables()
+    parts = []
+    for scene, ratio, sizes in (
+        ("s", 0.5, 40),
+        ("t", 2.0, 2),
+        ("u", 0.25, 3),
+        ("v", 0.1, 2),
+        ("w", 1.0, 2),
+    ):
+        for r in range(1, sizes + 1):
+            for method, gain, error in (
+                ("pod", 1, 1e-3),
+                ("block-deim", 8, 1e-2),
+                # one error of "u" rises so much that its mean would rise, its median falls
+                ("gappy", 4, 1e-2 * (9.0 if (scene, r) == ("u", 3) else ratio)),
+            ):
+                row = reruns.iloc[0].to_dict() | {"scene": scene, "r": r, "method": method}
+                row |= {"relative_error_within_horizon": error}
+                gains = {"scene": scene, "group": "spring", "method": method, "r": r, "gain": gain}
+                gains |= {"split": "train", "relative_error": 0.1, "elements_sampled": 9}
+                parts.append((row, gains))
+    read = (pd.DataFrame(list(rows)) for rows in zip(*parts, strict=True))
+    step, ordered = gain_interventions(*read, square()).itertuples()
+    assert (step.pairs, step.scenes, step.scenes_fallen, step.families) == (49, 5, 3, 5)
+    assert step.families_fallen == 3
+    # the gain falls everywhere, the error not in the two pairs of t and of w and in one of u
+    assert step.unexplained_share == pytest.approx(5 / 49)
+    assert (ordered.step, ordered.pairs) == ("lower gain, shared coefficients", 49)
+    assert step.error_ratio == 0.5
+    # sign test by hand, the tie of "w" counted as no fall: 2 (10 + 5 + 1) / 32
+    assert step.p_value == pytest.approx(1.0)
+    assert step.error_ratio_low < 0.5 <= step.error_ratio_high

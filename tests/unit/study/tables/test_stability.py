@@ -1,0 +1,115 @@
+"""Table stability: outcomes against their definition, one row for every run."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pdrom.core.store import write_hdf5, write_table
+from study.artifact import paths
+from study.artifact.paths import File
+from study.tables.stability import OUTCOMES, outcomes, stability
+
+RERUN = {"scene": "a", "group": "spring", "frames": 9, "finite": True, "blowup_frame": None,
+         "max_extent": 1.1, "relative_error": 7.0, "energy_ratio": 1.0, "gain": 2.0,
+         "guard_frame": 4, "guard_reason": "extent", "guard_count": 2}  # fmt: skip
+FULL = {
+    "experiment": "rerun", "scene": "a", "h": 0.016, "stiffness_ratio": 1.0, "method": "full",
+    "position_basis": "full", "finite": True, "max_extent": 1.2, "relative_error": 0.0,
+}  # fmt: skip
+
+
+@pytest.fixture
+def files(tmp_path):
+    """One scene with three sizes of one method, two subspace runs, and a sweep of two rows."""
+    positions = np.zeros((4, 2, 3))
+    positions[:, 1, 0] = [1.0, 1.1, 1.2, 0.9]
+    fom = tmp_path / "fom" / "a" / "train.h5"
+    with write_hdf5(fom) as file:
+        file["positions"] = positions
+    local = pd.DataFrame(
+        [
+            RERUN | {"method": "deim", "r": 6},
+            RERUN | {"method": "deim", "r": 10, "finite": False, "blowup_frame": 3},
+            {"scene": "a", "group": "spring", "method": "deim", "r": 20, "frames": 0},
+        ]
+    )
+    inside = pd.DataFrame(
+        [RERUN | {"group": "all", "method": "full", "position_basis": "pod", "k": k, "r": 50}
+         for k in (10, 20)]
+    ).drop(columns=["gain", "guard_frame", "guard_reason", "guard_count"])  # fmt: skip
+    own = {"method": "deim", "r": 6, "group": "spring", "relative_error": 0.3}
+    rows = [FULL | {"h": 0.2, "frames": 5}, FULL | {"h": 0.2} | own]
+    sweep = pd.DataFrame(rows).drop(columns="experiment")
+    sweep = sweep.assign(blowup_frame=None, energy_ratio=1.0, gain=None, k=None)
+    written = {}
+    for name, table in (("reruns", local), ("subspaces", inside), ("sweep", sweep)):
+        written[name] = [File(str(tmp_path / name / "a.csv"), {"scene": "a"})]
+        write_table(table, written[name][0].path)
+    judged = pd.concat([local.assign(position_basis="full", k=np.nan), inside])
+    errors = [0.05, None, None, 0.01, 0.5]
+    judged = judged.assign(relative_error_within_horizon=errors)
+    runs = paths.TRAIN.files([str(fom)])
+    return runs, written["reruns"], written["subspaces"], written["sweep"], judged
+
+
+def test_every_run_has_its_row_and_outcome(files):
+    table = stability(*files, {"a": 0.016}, 0.1, 2.0)
+    assert table.outcome.tolist() == [
+        "accurate", "accurate", "blow-up", "not run", "accurate", "wrong", "accurate", "wrong",
+    ]  # fmt: skip
+    assert table.experiment.tolist() == ["rerun"] * 6 + ["sweep"] * 2
+    assert table.h.tolist() == [0.016] * 6 + [0.2] * 2
+    assert table.stiffness_ratio.tolist()[:6] == [1.0] * 6
+    assert table.guard_count.tolist()[1:3] == [2, 2]
+    assert table.guard_count.isna().tolist() == [True, False, False] + [True] * 5
+    full = table[(table.method == "full") & (table.position_basis == "full")]
+    assert full.max_extent.tolist() == [1.2, 1.2]
+    assert (full.energy_ratio == 1.0).all()
+    keys = [
+        "experiment",
+        "scene",
+        "h",
+        "stiffness_ratio",
+        "group",
+        "method",
+        "position_basis",
+        "k",
+        "r",
+    ]
+    assert not table.duplicated(keys).any()
+
+
+def test_errors_are_those_within_the_horizon(files):
+    table = stability(*files, {"a": 0.016}, 0.1, 2.0)
+    rerun = table[(table.experiment == "rerun") & (table.method == "deim")]
+    assert rerun.relative_error.tolist()[0] == 0.05
+    assert rerun.relative_error.isna().tolist() == [False, True, True]
+
+
+def test_without_sweeps_and_subspaces(files):
+    fom, reruns, _, _, judged = files
+    table = stability(
+        fom, reruns, [], [], judged[judged.position_basis == "full"], {"a": 1.0}, 0.1, 2.0
+    )
+    assert table.outcome.tolist() == ["accurate", "accurate", "blow-up", "not run"]
+
+
+@given(
+    error=st.floats(0.0, 10.0) | st.none(),
+    extent=st.floats(0.1, 50.0),
+    finite=st.booleans() | st.none(),
+)
+def test_an_outcome_follows_from_the_cells(error, extent, finite):
+    """The classes exclude each other, in the order of their severity."""
+    row = FULL | {"method": "m", "finite": finite, "max_extent": extent, "relative_error": error}
+    (_, found) = outcomes(pd.DataFrame([FULL, row]), 0.1, 2.0)
+    assert found in OUTCOMES
+    assert (found == "not run") == (finite is None)
+    assert (found == "blow-up") == (finite is False)
+    if finite:
+        assert (found == "left the scene") == (extent > 2.4)
+        if extent <= 2.4:
+            expected = "not judged" if error is None else "wrong" if error > 0.1 else "accurate"
+            assert found == expected

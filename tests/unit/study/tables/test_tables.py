@@ -1,0 +1,461 @@
+"""Tables of the study from small files, against values worked out by hand."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pdrom.core.errors import StorageError
+from pdrom.core.store import write_hdf5, write_table
+from pdrom.model.held_out import MOTIONS
+from pdrom.reduction.basis import Basis, save_basis
+from study.artifact import paths
+from study.artifact.paths import File, Place
+from study.experiments.kit.horizon import floor_of
+from study.tables.accuracy_cost import accuracy_cost, pareto, reference_of
+from study.tables.heldout_reruns import heldout_reruns
+from study.tables.local_share import local_share
+from study.tables.reconstruction_error import reconstruction_error
+from study.tables.reduced_reruns import reduced_reruns
+from study.tables.sensitivity import sensitivity
+from study.tables.singular_values import singular_values
+
+TIMING = [
+    "scene", "group", "method", "position_basis", "k", "r", "iterations", "vertices",
+    "implementation", "ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms",
+    "global_ms", "repeats",
+]  # fmt: skip
+SWEEP = [
+    "scene", "iterations", "window", "frames", "error_converged", "error_scene", "residual",
+]  # fmt: skip
+RERUN = [
+    "scene", "group", "method", "r", "frames", "finite", "blowup_frame", "max_extent",
+    "relative_error",
+]  # fmt: skip
+HYPER = [
+    "scene", "group", "method", "position_basis", "k", "r", "frames", "finite", "blowup_frame",
+    "max_extent", "relative_error",
+]  # fmt: skip
+
+
+def written(path, columns, *rows) -> File:
+    """CSV of rows given as mappings; missing cells stay empty."""
+    write_table(pd.DataFrame(list(rows), columns=columns), path)
+    return File(str(path), {})
+
+
+# Singular values ----------------------------------------------------------------------------------
+
+
+def basis_file(path, sigma, rank) -> File:
+    basis = Basis(
+        np.zeros((6, rank)), np.zeros(6), np.array(sigma), rank, 1e-9, 1, False, (True,) * 3,
+        np.zeros((1, 2, rank)),
+    )  # fmt: skip
+    path.parent.mkdir(parents=True, exist_ok=True)
+    save_basis(basis, path)
+    return paths.BASIS.file(str(path))
+
+
+def test_singular_values_with_their_share_and_round_off(tmp_path):
+    bases = [
+        basis_file(tmp_path / "pod" / "b_scene" / "spring" / "x.h5", [4.0, 1.0, 1e-12], 2),
+        basis_file(tmp_path / "pod" / "a_scene" / "bending" / "x.h5", [0.0, 0.0], 0),
+    ]
+    table = singular_values(bases)
+    assert table.scene.tolist() == ["b_scene"] * 3 + ["a_scene"] * 2
+    assert table.group.tolist() == ["spring"] * 3 + ["bending"] * 2
+    assert table.component.tolist() == [1, 2, 3, 1, 2]
+    assert table.relative[:3].tolist() == [1.0, 0.25, 2.5e-13]
+    assert table.relative[3:].isna().all()
+    assert table.above_roundoff.tolist() == [True, True, False, False, False]
+
+
+# Reconstruction -----------------------------------------------------------------------------------
+
+
+def test_reconstruction_keeps_order_and_empty_cells(tmp_path):
+    columns = reconstruction_error.column_names
+    row = dict.fromkeys(columns, 1.0) | {"scene": "s", "group": "g", "method": "deim"}
+    empty = row | {"rows_sampled": None, "elements_sampled": None, "relative_error_z": None}
+    parts = [
+        written(tmp_path / "one.csv", columns, row | {"r": 20}, empty | {"r": 30}),
+        written(tmp_path / "two.csv", columns, row | {"r": 6}),
+    ]
+    table = reconstruction_error(parts)
+    assert table.r.tolist() == [20, 30, 6]
+    assert table.rows_sampled.dtype == "Int64"
+    assert table.elements_sampled.isna().tolist() == [False, True, False]
+    write_table(table, tmp_path / "t.csv")
+    cells = (tmp_path / "t.csv").read_text().splitlines()[2].split(",")
+    assert cells[columns.index("rows_sampled")] == cells[columns.index("relative_error_z")] == ""
+
+
+# Sensitivity --------------------------------------------------------------------------------------
+
+
+def sensitivity_files(tmp_path) -> list[File]:
+    """Scene a leaves the threshold in frame 2 (held out: 1), scene b never does."""
+    columns = ["scene", "perturbation", "seed", "frame", "relative_difference"]
+    values = {
+        ("a", "1e-10", 1): [0.0, 1e-9, 5e-3, 1e-9],
+        ("a", "1e-10", 2): [0.0, 2e-9, 1e-9, 1.0],
+        ("a", "1e-06", 1): [1.0] * 4,
+        ("a", "heldout", 1): [1e-12, 1.0, 1.0, 1.0],
+        ("b", "1e-10", 1): [1e-12, 3e-12, 2e-12, 1e-12],
+        ("b", "heldout", 1): [1e-12] * 4,
+    }
+    parts = []
+    for scene in ("a", "b"):
+        rows = [
+            dict(zip(columns, (*key, frame, v), strict=True))
+            for key, series in values.items()
+            if key[0] == scene
+            for frame, v in enumerate(series)
+        ]
+        parts.append(written(tmp_path / f"sensitivity_{scene}.csv", columns, *rows))
+    return parts
+
+
+def test_floor_is_the_largest_over_the_seeds(tmp_path):
+    table = sensitivity(sensitivity_files(tmp_path))
+    assert floor_of(table, "a", 1e-10).tolist() == [0.0, 2e-9, 5e-3, 1.0]
+    assert floor_of(table, "a", "heldout").tolist() == [1e-12, 1.0, 1.0, 1.0]
+
+
+# Reruns -------------------------------------------------------------------------------------------
+
+NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # table frame_times without rows
+DISPLACEMENT = np.array([1.0, 2.0, 3.0, 4.0])
+ENERGY, CONTACT = [1.0, 0.9], np.array([0, 0, 1, 1], dtype=np.uint8)
+STEP = DISPLACEMENT / 2.0  # of the velocities; their differences are thrice those of the positions
+
+
+@dataclass(frozen=True)
+class Files:
+    """What the tables of the reruns read: paths of runs, timings and the table sensitivity."""
+
+    reruns: list[str]
+    subspaces: list[str]
+    timings: list[File]
+    sensitivity: pd.DataFrame
+
+    def reduced(self) -> pd.DataFrame:
+        """The table reduced_reruns of these files."""
+        return reduced_reruns(
+            **self._beside(paths.RERUNS_TRAIN, paths.SUBSPACES_TRAIN, ""),
+            timings=self.timings,
+            frame_times=NOT_TIMED,
+            sensitivity=self.sensitivity,
+            perturbation=1e-10,
+            threshold=1e-3,
+        )
+
+    def heldout(self) -> pd.DataFrame:
+        """The table heldout_reruns of these files."""
+        return heldout_reruns(
+            **self._beside(paths.RERUNS_HELDOUT, paths.SUBSPACES_HELDOUT, "_heldout"),
+            sensitivity=self.sensitivity,
+            threshold=1e-3,
+        )
+
+    def _beside(self, rows: Place, subspace_rows: Place, suffix: str) -> dict[str, list[File]]:
+        """Runs with the tables of one motion."""
+        return {
+            "runs": paths.RERUNS.files(self.reruns),
+            "rows": rows.files(p.replace(".h5", f"{suffix}.csv") for p in self.reruns),
+            "subspaces": paths.SUBSPACES.files(self.subspaces),
+            "subspace_rows": subspace_rows.files(
+                p.replace(".h5", f"{suffix}.csv") for p in self.subspaces
+            ),
+        }
+
+
+def store_series(run, difference):
+    """Series of a run with these differences; it touches the floor at once."""
+    run["difference"], run["shape_difference"] = difference, np.divide(difference, 10.0)
+    run["step_difference"] = np.multiply(difference, 3.0)
+    run["energy"], run["contact"] = [1.0, 0.7], np.ones(len(difference), dtype=np.uint8)
+
+
+@pytest.fixture
+def files(tmp_path) -> Files:
+    """Reruns of scene a (horizon 2) and b (whole), subspace runs of b, and their timings."""
+    reruns = []
+    cases = {
+        # differences of each run by frame; short ones blew up
+        "a": {6: [0.1, 0.2, 9.0, 9.0], 10: [0.5], 20: None},
+        "b": {6: [0.1, 0.1, 0.1, 0.1], 10: [0.2, 0.2]},
+    }
+    for scene, runs in cases.items():
+        folder = tmp_path / "reruns" / scene / "spring"
+        folder.mkdir(parents=True)
+        rows = []
+        with write_hdf5(folder / "deim.h5") as file:
+            file.attrs.update(extent_norm=2.0, time_step=0.1)
+            for store in (file, *map(file.create_group, MOTIONS)):
+                store["displacement"], store["step"] = DISPLACEMENT, STEP
+                store["energy"], store["contact"] = ENERGY, CONTACT
+                for r, difference in runs.items():
+                    run = store.create_group(f"r{r:04d}")
+                    if difference is not None:
+                        store_series(run, difference)
+        for r, difference in runs.items():
+            row = {"scene": scene, "group": "spring", "method": "deim", "r": r, "frames": 0}
+            if difference is not None:
+                whole = len(difference) == 4
+                row |= {
+                    "frames": len(difference), "finite": whole, "max_extent": 1.5,
+                    "blowup_frame": None if whole else len(difference),
+                    "relative_error": 0.5 if whole else None,
+                }  # fmt: skip
+            rows.append(row)
+        for name, more in {"deim.csv": {}, "deim_heldout.csv": {"motion": "heldout"}}.items():
+            written(folder / name, [*RERUN, *more], *({**row, **more} for row in rows))
+        reruns.append(str(folder / "deim.h5"))
+    folder = tmp_path / "subspaces" / "b"
+    folder.mkdir(parents=True)
+    models = {("pod", 8, "full"): [0.4] * 4, ("pod", 8, "ecsw-1e-02"): [0.8] * 4}
+    with write_hdf5(folder / "models.h5") as file:
+        file.attrs.update(extent_norm=4.0, time_step=0.1)
+        for motion in ("train", *MOTIONS):
+            file[f"displacement/{motion}"], file[f"step/{motion}"] = DISPLACEMENT, STEP
+            file[f"energy/{motion}"], file[f"contact/{motion}"] = ENERGY, CONTACT
+        for (base, k, method), difference in models.items():
+            for motion in ("train", "heldout"):
+                store_series(
+                    file.create_group(f"models/{base}_k{k:03d}_{method}/{motion}"), difference
+                )
+    rows = [
+        {"scene": "b", "group": "all", "method": m, "position_basis": p, "k": k, "r": 33,
+         "frames": 4, "finite": True, "max_extent": 1.0, "relative_error": 0.1}
+        for p, k, m in models
+    ]  # fmt: skip
+    for name, more in {"models.csv": {}, "models_heldout.csv": {"motion": "heldout"}}.items():
+        written(folder / name, [*HYPER, *more], *({**row, **more} for row in rows))
+    subspaces = [str(folder / "models.h5")]
+
+    def time(scene, implementation="compiled", ms=8.0, **labels):
+        return {
+            "scene": scene, "implementation": implementation, "ms_per_frame": ms,
+            "local_ms": ms / 4, "assembly_ms": ms / 8, "lift_ms": ms / 8, "global_ms": ms / 4,
+            "vertices": 9, "iterations": 10, **labels,
+        }  # fmt: skip
+
+    local = {"group": "spring", "method": "deim"}
+    timings = [
+        written(
+            tmp_path / "timing_a.csv", TIMING, time("a"), time("a", "numpy", 80.0),
+            time("a", "interpreted", 900.0), time("a", ms=4.0, r=6, **local),
+            time("a", ms=5.0, r=10, **local), time("a", ms=2.5, method="fom", iterations=2),
+            time("a", ms=24.0, method="fom", iterations=40),
+            time("a", ms=9.0, method="fom-anderson", iterations=10),
+        ),
+        written(
+            tmp_path / "timing_b.csv", TIMING, time("b", ms=10.0), time("b", ms=2.0, r=6, **local),
+            time("b", ms=1.0, group="all", method="full", position_basis="pod", k=8),
+            time("b", ms=0.5, group="all", method="ecsw-1e-02", position_basis="pod", k=8),
+        ),
+    ]  # fmt: skip
+    return Files(reruns, subspaces, timings, sensitivity(sensitivity_files(tmp_path)))
+
+
+def test_errors_in_units_of_the_extent(files):
+    """Root mean squares before the horizon, which is 2 for scene a, over the norm of the extent."""
+    table = files.reduced()
+    assert table.error_over_extent[0] == pytest.approx(np.sqrt(0.025) / 2.0)
+    assert table.error_over_extent[[3, 5]].tolist() == pytest.approx([0.05, 0.1])
+    assert table.error_over_extent[[1, 2, 4]].isna().all()
+    np.testing.assert_allclose(table.shape_error, table.error_over_extent / 10.0)
+    # over the frames before the horizon, too: three times the difference over half the norm
+    np.testing.assert_allclose(table.velocity_error, 6.0 * table.relative_error_within_horizon)
+    shape = table.relative_shape_error
+    np.testing.assert_allclose(shape, table.relative_error_within_horizon / 10.0)
+
+
+def test_energy_and_first_contact_before_the_horizon(files):
+    """Scene a ends before the second sample of the energy and before its first contact."""
+    table = files.reduced()
+    assert table.energy_drift.isna().tolist() == [True, True, True, False, True, False, False]
+    assert table.energy_drift[[3, 5, 6]].tolist() == pytest.approx([0.2] * 3)
+    assert table.contact_delay[0] == -np.inf
+    assert table.contact_delay[[3, 5, 6]].tolist() == pytest.approx([-0.2] * 3)
+    assert table.contact_delay[[1, 2, 4]].isna().all()
+
+
+def error(difference, end) -> float:
+    return np.linalg.norm(difference[:end]) / np.linalg.norm(DISPLACEMENT[:end])
+
+
+def test_errors_within_the_horizon(files):
+    table = files.reduced()
+    within = table.relative_error_within_horizon
+    assert table.scene.tolist() == ["a", "a", "a", "b", "b", "b", "b"]
+    assert within[0] == pytest.approx(error([0.1, 0.2], 2))
+    assert within[[1, 2, 4]].isna().all()
+    assert within[3] == pytest.approx(error([0.1] * 4, 4))
+    assert within[5] == pytest.approx(error([0.4] * 4, 4))
+    assert within[6] == pytest.approx(error([0.8] * 4, 4))
+    assert table.horizon_frame.tolist() == [2, 2, 2, 4, 4, 4, 4]
+    assert table.sensitivity_floor[0] == 2e-9
+    assert table.sensitivity_floor[3] == 3e-12
+    assert table.position_basis.tolist() == ["full"] * 5 + ["pod"] * 2
+    assert table.k.isna().tolist() == [True] * 5 + [False] * 2
+    assert table.blowup_frame.isna().tolist() == [True, False, True, True, False, True, True]
+    assert table.finite.isna().tolist() == [False, False, True, False, False, False, False]
+
+
+def test_times_go_to_their_runs(files):
+    table = files.reduced()
+    expected = [4.0, 5.0, np.nan, 2.0, np.nan, 1.0, 0.5]
+    np.testing.assert_array_equal(table.ms_per_frame, expected)
+    np.testing.assert_allclose(table.speedup, [2.0, 1.6, np.nan, 5.0, np.nan, 10.0, 20.0])
+    np.testing.assert_allclose(table.local_ms, np.array(expected) / 2)
+    np.testing.assert_allclose(table.global_ms, np.array(expected) / 4)
+
+
+def test_there_need_be_no_subspace(files):
+    table = replace(files, subspaces=[]).reduced()
+    assert len(table) == 5
+    assert table.k.isna().all()
+    assert table.ms_per_frame.notna().sum() == 3
+
+
+def test_held_out_runs_are_judged_by_their_own_horizon(files):
+    table = files.heldout()
+    assert table.horizon_frame.tolist() == [1, 1, 1, 4, 4, 4, 4]
+    assert set(table.motion) == {"heldout"}
+    assert table.relative_error_within_horizon[0] == pytest.approx(0.1)
+    # it blew up in frame 1, which is behind the horizon
+    assert table.relative_error_within_horizon[1] == pytest.approx(0.5)
+
+
+def test_damaged_runs_are_named(files):
+    with open(files.reruns[0], "r+b") as file:
+        file.truncate(100)
+    with pytest.raises(StorageError, match=r"deim\.h5"):
+        files.reduced()
+
+
+# Accuracy against cost ----------------------------------------------------------------------------
+
+
+def test_pareto_by_hand():
+    assert pareto([0.0, 1.0, 2.0, 1.0], [5.0, 3.0, 1.0, 4.0]) == [True, True, True, False]
+    assert pareto([1.0, 1.0], [2.0, 2.0]) == [True, True]
+    assert pareto([1.0, 1.0], [2.0, 3.0]) == [True, False]
+    assert pareto([], []) == []
+
+
+POINTS = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=12)
+
+
+@given(POINTS)
+def test_pareto_keeps_what_nothing_beats(points):
+    error, cost = zip(*points, strict=True)
+    kept = pareto(np.array(error, float), np.array(cost, float))
+    front = [p for p, keep in zip(points, kept, strict=True) if keep]
+    assert front
+    for point, keep in zip(points, kept, strict=True):
+        beaten = any(q != point and q[0] <= point[0] and q[1] <= point[1] for q in front)
+        assert keep != beaten
+
+
+def no_sweep(folder) -> File:
+    return written(folder / "sweep.csv", SWEEP, {"scene": "absent"})
+
+
+def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
+    runs, unseen, timings = files.reduced(), files.heldout(), files.timings
+    table = accuracy_cost(
+        runs, unseen, timings, NOT_TIMED, [no_sweep(tmp_path)], [], {"a": 10, "b": 20}
+    )
+    points = list(zip(table.scene, table.method, table.ms_per_frame, strict=True))
+    assert points == [
+        ("a", "full", 8.0), ("a", "deim", 4.0),
+        ("b", "full", 10.0), ("b", "deim", 2.0), ("b", "full", 1.0), ("b", "ecsw-1e-02", 0.5),
+    ]  # fmt: skip
+    assert table.position_basis.tolist() == ["full", "full", "full", "full", "pod", "pod"]
+    assert table.iterations.tolist() == [10, 10, 20, 20, 20, 20]
+    assert table.relative_error_within_horizon[[0, 2]].tolist() == [0.0, 0.0]
+    assert table.pareto.tolist() == [True] * 6
+    slow = runs.assign(ms_per_frame=100.0)
+    table = accuracy_cost(
+        slow, unseen, timings, NOT_TIMED, [no_sweep(tmp_path)], [], {"a": 1, "b": 1}
+    )
+    assert table.pareto.tolist() == [True, False, True, False, False, False]
+    table = accuracy_cost(
+        runs, unseen.iloc[:0], timings, NOT_TIMED, [no_sweep(tmp_path)], [], {"a": 1, "b": 1}
+    )
+    # nothing is said of a reduction that no held-out motion judged
+    assert table.pareto_heldout.tolist() == [True, False, True, False, False, False]
+
+
+def sweep(folder, **changes) -> File:
+    """Scene a with K = 2, 10 (its own) and 40, and the converged run."""
+    rows = [
+        {"iterations": 2, "window": 0, "error_converged": 0.4, "error_scene": 0.3},
+        {"iterations": 10, "window": 0, "error_converged": 0.1, "error_scene": 0.0},
+        {"iterations": 40, "window": 0, "error_converged": 0.02, "error_scene": 0.09},
+        {"iterations": 10, "window": 5, "error_converged": 0.01, "error_scene": 0.1},
+        {"error_converged": 0.0, "error_scene": 0.1, "residual": 1e-9},
+    ]
+    rows = [{"scene": "a", "frames": 2} | row | changes for row in rows]
+    return written(folder / "sweep.csv", SWEEP, *rows)
+
+
+def test_runs_with_other_iterations_have_their_own_reference(files, tmp_path):
+    runs, unseen, timings = files.reduced(), files.heldout(), files.timings
+    model = {"scene": "b", "position_basis": "pod", "k": 8, "method": "ecsw-1e-02"}
+    model["error_converged"] = 0.3
+    inside = written(tmp_path / "models.csv", list(model), model)
+    own = {"a": 10, "b": 20}
+    table = accuracy_cost(runs, unseen, timings, NOT_TIMED, [sweep(tmp_path)], [inside], own)
+    assert table[table.position_basis == "pod"].error_converged.tolist()[1:] == [0.3]
+    assert table[table.method == "full"].error_converged.tolist()[:1] == [0.1]
+    fom = table[table.method == "fom"]
+    assert fom.iterations.tolist() == [2, 10, 40]
+    assert fom.relative_error_within_horizon.tolist() == [0.4, 0.1, 0.02]
+    assert fom.ms_per_frame.tolist() == [2.5, 8.0, 24.0]
+    # the accelerated run beats 40 plain iterations in both
+    assert fom.pareto.tolist() == [True, True, False]
+    fast = table[table.method == "fom-anderson"]
+    assert list(zip(fast.iterations, fast.relative_error_within_horizon, strict=True)) == [
+        (10, 0.01)
+    ]
+    assert fast.ms_per_frame.tolist() == [9.0]
+    early = table[table.method == "fewer-iterations"]
+    assert early.iterations.tolist() == [2]
+    assert early.relative_error_within_horizon.tolist() == [0.3]
+    # 0.3 in 2.5 ms beats no point with the same reference: the reduced run has 0.1 in 4 ms
+    assert early.pareto.tolist() == [True]
+    # against the converged run 0.1 takes 8 ms; the reduced run, 0.1 in 4 ms, is no rival of it
+    assert fom.position_basis.unique().tolist() == ["full"]
+    assert reference_of(table).tolist() == [
+        "converged" if m.startswith("fom") else "own iterations" for m in table.method
+    ]
+
+
+def test_without_a_converged_run_there_is_no_point_against_it(files, tmp_path):
+    runs, unseen, timings = files.reduced(), files.heldout(), files.timings
+    sweeps = [sweep(tmp_path, error_converged=None)]
+    table = accuracy_cost(runs, unseen, timings, NOT_TIMED, sweeps, [], {"a": 10, "b": 20})
+    assert "fom" not in set(table.method)
+    assert (table.method == "fewer-iterations").sum() == 1
+
+
+# Local share --------------------------------------------------------------------------------------
+
+
+def test_local_share_counts_assembly_with_the_local_step(tmp_path, files):
+    table = local_share(files.timings, NOT_TIMED)
+    assert table.scene.tolist() == ["a", "a", "a", "b"]
+    assert table.implementation.tolist() == ["interpreted", "numpy", "compiled", "compiled"]
+    assert table.local_share.tolist() == pytest.approx([0.6] * 4)
+    row = {"scene": "c", "implementation": "numpy", "vertices": 4, "local_ms": 2.0,
+           "assembly_ms": 1.0, "global_ms": 1.0}  # fmt: skip
+    path = written(tmp_path / "c.csv", TIMING, row)
+    assert local_share([path], NOT_TIMED).local_share.tolist() == [0.75]

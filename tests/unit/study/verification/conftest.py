@@ -1,0 +1,121 @@
+"""The tracked tables of the tiny study as a folder of results that agrees with its references."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pdrom.core.store import read_table, write_hdf5, write_table, write_text
+from places import ROOT
+from study.artifact.paths import TABLE
+from study.artifact.reads import TableOf
+from study.tables import declared
+from study.verification.again import is_derived, made
+from study.verification.examine import Examination
+from study.verification.references import folder_of, read_reference, write_reference
+from study.verification.subject import Subject
+
+REFERENCES = ROOT / "results" / "reference"
+RESULTS = "results/studies/tiny"
+
+
+@pytest.fixture(scope="session")
+def subject():
+    """The tiny study, planned once, where its configuration lies."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(ROOT)
+        subject = Subject.of(["config/tiny.yaml"], [])
+        assert subject.plan.figure_jobs
+    return subject
+
+
+@pytest.fixture(scope="session")
+def tracked():
+    """Expected tables of the tiny study as they are kept; a new one may have none yet."""
+    folder = REFERENCES / "studies" / "tiny" / "tables"
+    read = {name: read_reference(table, folder) for name, table in declared().items()}
+    return {name: reference.frame for name, reference in read.items() if reference is not None}
+
+
+def make(path):
+    """A small file with its checksum."""
+    if path.endswith(".h5"):
+        with write_hdf5(path):
+            return
+    write_text("there\n", path)
+
+
+def timed(table, frame):
+    """A table with numbers in place of times, which references do not have."""
+    rows = np.arange(len(frame))
+    columns = [c.name for c in table.columns if c.timed and c.kind == "number"]
+    return frame.assign(**{name: 0.5 + (7 * rows + i) % 11 for i, name in enumerate(columns)})
+
+
+@pytest.fixture(scope="session")
+def project(tracked, subject, tmp_path_factory):
+    """A project whose results are the expected ones, with every file that figures read."""
+    folder = tmp_path_factory.mktemp("project")
+    for name in ("config", "paper", "src"):
+        (folder / name).symlink_to(ROOT / name)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.setattr("os.fsync", lambda descriptor: None)
+        for name, table in declared().items():
+            frame = tracked.get(name, table.checked(pd.DataFrame()))
+            write_table(timed(table, frame), TABLE.at(RESULTS, name=name))
+        for name in derived_tables():
+            with made(subject.plan.job(declared()[name])) as files:
+                [(path, new)] = files.items()
+                write_table(read_table(new), path)
+        for name, table in declared().items():
+            frame = table.checked(read_table(TABLE.at(RESULTS, name=name)))
+            write_reference(table, frame, folder_of(RESULTS))
+        figures = subject.plan.figure_jobs.values()
+        read = {path for job in figures for path in job.job.files if path.startswith("results/")}
+        for path in read | {p for job in figures for p in (job.pdf, job.png)}:
+            if not Path(path).exists():
+                make(path)
+    return folder
+
+
+def derived_tables():
+    """Tables that are made from others, these first."""
+    names = [name for name in declared() if is_derived(name)]
+
+    def rank(name):
+        reads = declared()[name].reads.values()
+        return max([1 + rank(r.name) for r in reads if isinstance(r, TableOf)], default=0)
+
+    return sorted(names, key=rank)
+
+
+@pytest.fixture
+def results(project, monkeypatch):
+    """The project as the current folder; its tables are as they were when the test ends."""
+    monkeypatch.chdir(project)
+    monkeypatch.setattr("os.fsync", lambda descriptor: None)
+    kept = project.with_name("kept")
+    shutil.copytree(project / RESULTS, kept)
+    yield project
+    shutil.rmtree(project / RESULTS)
+    kept.rename(project / RESULTS)
+
+
+@pytest.fixture(scope="session")
+def expected(project, subject):
+    """Expected tables by name, all their columns among them, and what they say of each other."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(project)
+        examination = Examination(subject)
+        return examination.expected, examination.context
+
+
+@pytest.fixture
+def examination(results, subject, expected):
+    """An examination of the results as they are when it is asked."""
+    found = Examination(subject)
+    found.expected, found.context = expected
+    return found

@@ -1,0 +1,118 @@
+"""Expected tables: what is kept, how it is packed, and who may change it."""
+
+from datetime import date
+
+import pandas as pd
+import pytest
+
+from pdrom.core.errors import ConfigurationError, StorageError
+from places import ROOT
+from study.tables import declared
+from study.verification import references
+from study.verification.compare import NOT_COMPARED
+from study.verification.references import (
+    compact,
+    folder_of,
+    note,
+    read_reference,
+    write_reference,
+)
+from study.verification.subject import Subject
+from study.verification.update import update
+
+TABLE = declared()["reduced_reruns"]
+LIMIT = 1_250_000  # bytes
+
+
+@pytest.fixture
+def frame(tracked):
+    """Some rows of a table."""
+    return tracked[TABLE.name].head(20)
+
+
+def test_a_reference_comes_back_as_it_was_kept(frame, tmp_path):
+    write_reference(TABLE, frame, tmp_path)
+    found = read_reference(TABLE, tmp_path)
+    pd.testing.assert_frame_equal(
+        found.frame, TABLE.checked(compact(TABLE, frame).reindex(columns=list(TABLE.column_names)))
+    )
+    assert [path.name for path in tmp_path.iterdir()] == ["reduced_reruns.csv"]
+    assert read_reference(declared()["claims"], tmp_path) is None
+
+
+def test_what_a_clock_has_a_say_in_is_not_kept(frame, tmp_path):
+    write_reference(TABLE, frame, tmp_path)
+    columns = read_reference(TABLE, tmp_path).columns
+    assert set(columns) == {c.name for c in TABLE.columns if c.quantity not in NOT_COMPARED}
+    assert "relative_error" in columns
+    assert "speedup" not in columns
+
+
+def test_a_large_table_is_packed_and_leaves_no_other_form(frame, tmp_path, monkeypatch):
+    write_reference(TABLE, frame, tmp_path)
+    plain = read_reference(TABLE, tmp_path).frame
+    monkeypatch.setattr(references, "PACKED_FROM", 100)
+    write_reference(TABLE, frame, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["reduced_reruns.csv.xz"]
+    pd.testing.assert_frame_equal(read_reference(TABLE, tmp_path).frame, plain)
+
+
+def test_a_damaged_reference_is_named(tmp_path):
+    (tmp_path / "reduced_reruns.csv.xz").write_bytes(b"no archive")
+    with pytest.raises(StorageError, match=r"reduced_reruns\.csv\.xz: cannot be read"):
+        read_reference(TABLE, tmp_path)
+
+
+def test_reasons_are_noted_in_their_order(tmp_path):
+    for reason in ("first", "second"):
+        note(tmp_path, reason, date(2026, 1, 2), "0.1.0 (abc)")
+    text = (tmp_path / references.LOG).read_text(encoding="utf-8")
+    assert text.endswith(
+        "- 2026-01-02, code 0.1.0 (abc): first\n- 2026-01-02, code 0.1.0 (abc): second\n"
+    )
+
+
+def test_tracked_references_are_small_and_whole():
+    folder = ROOT / "results" / "reference"
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    studies = folder / "studies"
+    assert sum(p.stat().st_size for p in files if studies not in p.parents) < LIMIT
+    for own in (folder / "tables", studies / "tiny" / "tables"):
+        names = {path.name.partition(".")[0] for path in own.glob("*.csv*")}
+        assert names <= set(declared())
+        assert all(read_reference(declared()[name], own) for name in names)
+        assert {"claims", "reduced_reruns", "reconstruction_error"} <= names
+
+
+def test_folders_of_references():
+    assert str(folder_of("results")) == "results/reference/tables"
+    assert str(folder_of("results/studies/tiny")) == "results/reference/studies/tiny/tables"
+
+
+@pytest.fixture
+def subject(tmp_path, monkeypatch):
+    """A configuration without results."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "config").symlink_to(ROOT / "config")
+    return Subject.of(["config/tiny.yaml"], [])
+
+
+@pytest.mark.parametrize("reason", ["", "  \n"])
+def test_without_a_reason_nothing_is_updated(subject, reason):
+    with pytest.raises(ConfigurationError, match="say why"):
+        update(subject, reason)
+
+
+def test_from_missing_tables_nothing_is_updated(subject, tmp_path):
+    with pytest.raises(StorageError, match=r"not there; make it by ./reproduce --configfile"):
+        update(subject, "a reason")
+    assert not (tmp_path / "results" / "reference").exists()
+
+
+def test_from_a_damaged_table_nothing_is_updated(subject, tmp_path):
+    folder = tmp_path / "results" / "studies" / "tiny" / "tables"
+    folder.mkdir(parents=True)
+    (folder / f"{min(declared())}.csv").write_text("scene\n")
+    with pytest.raises(StorageError, match="damaged"):
+        update(subject, "a reason")
+    assert not (tmp_path / "results" / "reference").exists()

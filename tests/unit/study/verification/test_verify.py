@@ -1,0 +1,163 @@
+"""``./reproduce verify`` on a folder of results: outcomes, exit codes, the page."""
+
+import io
+import json
+from contextlib import redirect_stdout
+from pathlib import Path
+from subprocess import CompletedProcess
+from types import SimpleNamespace
+
+import pytest
+
+from pdrom.core.errors import ConfigurationError, StorageError
+from pdrom.core.store import read_table, write_table, write_text
+from study.article.verified import INDEX, NAME
+from study.artifact.paths import ARTICLE, TABLE
+from study.figures.kit.catalogue import declarations
+from study.tables import declared
+from study.verification.again import made
+from study.verification.command import parser, verify, verify_tables
+from study.verification.lines import Line, Outcome, status_of
+from study.verification.references import LOG, folder_of
+from study.verification.status import Status
+from study.verification.update import NOTHING, update
+
+RESULTS = "results/studies/tiny"
+CLAIMS = ("claims", "claims_tests", "claims_sensitivity")
+
+
+def verified(subject):
+    """Exit code and printed lines."""
+    printed = io.StringIO()
+    with redirect_stdout(printed):
+        status = verify_tables(subject)
+    return status, printed.getvalue().splitlines()
+
+
+def test_expected_results_hold(results, subject):
+    status, printed = verified(subject)
+    page = (results / RESULTS / "verification.md").read_text(encoding="utf-8")
+    assert not any("differs" in line or "not there" in line for line in printed)
+    assert status == Status.HOLDS
+    names = {line.split(":")[0] for line in printed}
+    assert {f"table {name}" for name in declared()} <= names
+    assert {"claim C1", "claim C12", "figure singular_values"} <= names
+    assert any(line.startswith("table effects_left_out: not comparable") for line in printed)
+    assert "| C1 | reproduced |" in page
+    assert not Path(ARTICLE.at(RESULTS, name=NAME)).exists()
+
+
+def test_outcomes_reach_the_article_where_it_was_made(results, subject):
+    place = Path(ARTICLE.at(RESULTS, name=NAME))
+    write_text("<!DOCTYPE html>", place.with_name(INDEX))
+    *lines, _, _ = verified(subject)[1]
+    text = place.read_text(encoding="utf-8")
+    found = json.loads(text.removeprefix("window.pdromVerified=").removesuffix(";\n"))
+    assert found == dict(line.split(": ", 1) for line in lines)
+    assert {f"figure {name}" for name in declarations()} <= found.keys()
+
+
+def decide_again(subject):
+    """The tables of the claims, as the tables at hand give them."""
+    for name in CLAIMS:
+        with made(subject.plan.job(declared()[name])) as files:
+            [(path, new)] = files.items()
+            write_table(read_table(new), path)
+
+
+def test_a_verdict_that_times_have_changed_is_shown_and_not_judged(examination, subject):
+    path = TABLE.at(RESULTS, name="local_share")
+    shares = read_table(path)
+    slow = shares.local_share.median() >= 0.7
+    write_table(shares.assign(local_share=0.1 if slow else 0.9), path)
+    decide_again(subject)
+    [line] = [line for line in examination.claims() if line.name == "C1"]
+    assert line.outcome is Outcome.NOT_COMPARABLE
+    now = "does not hold" if slow else "holds"
+    assert f"found '{now}', which rests on times" in line.text
+    assert [str(examination.table(n)) for n in CLAIMS if examination.table(n).details] == []
+
+
+def test_a_verdict_that_errors_have_changed_is_a_difference(examination, subject):
+    path = TABLE.at(RESULTS, name="reconstruction_error")
+    errors = read_table(path)
+    entries = errors.elements_sampled.notna()
+    write_table(errors.assign(elements_sampled=errors.elements_sampled.where(~entries, 1)), path)
+    decide_again(subject)
+    [line] = [line for line in examination.claims() if line.name == "C8"]
+    assert line.outcome is Outcome.DIFFERS
+    assert examination.table("claims").outcome is Outcome.DIFFERS
+
+
+def test_what_is_missing_has_its_own_code_and_names_its_command(results, subject):
+    reference = folder_of(RESULTS) / "alarms.csv"
+    kept = reference.read_bytes()
+    for path in (TABLE.at(RESULTS, name="stability"), f"{RESULTS}/figures/ladder.png", reference):
+        Path(path).unlink()
+    status, printed = verified(subject)
+    reference.write_bytes(kept)
+    assert status == Status.MISSING
+    assert "table alarms: no reference, run verify --update" in printed
+    [line] = [line for line in printed if line.startswith("table stability")]
+    assert line.endswith("make it by ./reproduce --configfile config/tiny.yaml -- stability")
+    assert any(line.startswith("figure stability_map: not there") for line in printed)
+    [line] = [line for line in printed if line.startswith("figure ladder:")]
+    assert "ladder.png is not there; make it by ./reproduce" in line
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "status"),
+    [
+        ([Outcome.REPRODUCED, Outcome.NOT_COMPARABLE], Status.HOLDS),
+        ([Outcome.NO_REFERENCE, Outcome.REPRODUCED], Status.DIFFERS),
+        ([Outcome.REPRODUCED, Outcome.DIFFERS, Outcome.NOT_COMPARABLE], Status.DIFFERS),
+        ([Outcome.MISSING, Outcome.DIFFERS], Status.MISSING),
+    ],
+)
+def test_the_code_is_that_of_the_worst_outcome(outcomes, status):
+    assert status_of([Line("table", "a", outcome) for outcome in outcomes]) == status
+
+
+def test_a_configuration_without_references_is_refused(results, tmp_path):
+    own = tmp_path / "other.yaml"
+    own.write_text("ranks: [6]\n")
+    with pytest.raises(ConfigurationError, match="no expected tables of this configuration"):
+        verify(["--configfile", str(own)])
+
+
+def test_update_goes_with_nothing_else():
+    with pytest.raises(SystemExit):
+        parser().parse_args(["--no-such-option"])
+    assert parser().parse_args(["--update", "--reason", "why"]).reason == "why"
+
+
+def plan_says(monkeypatch, code: int, words: str) -> None:
+    """In place of Snakemake, which would plan the tables: its exit code and ``words``."""
+    done = CompletedProcess([], code, words, "")
+    run = SimpleNamespace(run=lambda *_, **__: done)
+    monkeypatch.setattr("study.verification.update.subprocess", run)
+
+
+def test_an_update_writes_every_table_and_notes_the_reason(results, subject, monkeypatch):
+    plan_says(monkeypatch, 0, NOTHING)
+    folder = folder_of(RESULTS)
+    before = {path.name: path.read_bytes() for path in folder.glob("*.csv*")}
+    (folder / "ladder.csv").unlink()
+    (folder / "of_an_older_version.csv.xz").touch()
+    assert update(subject, " a new\n method ") == folder
+    assert (folder / LOG).read_text("utf-8").endswith("): a new method\n")
+    (folder / LOG).unlink()
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize(
+    ("code", "words", "fault"),
+    [(1, "", "the run cannot be planned"), (0, "Job stats", "older than what they are made from")],
+)
+def test_tables_that_a_run_would_make_again_are_not_expected(
+    results, subject, monkeypatch, code, words, fault
+):
+    plan_says(monkeypatch, code, words)
+    with pytest.raises(StorageError, match=fault):
+        update(subject, "a new method")
+    assert not (folder_of(RESULTS) / LOG).exists()
