@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 50_930,
-    "modules of src": 521,
-    "lines of tests": 33_000,
-    "words of documentation": 29_860,
-    "tables": 48,
-    "figures": 27,
-    "experiments": 29,
-    "percent of src in decorators, signatures and imports": 24.0,
+    "lines of src": 49_545,
+    "modules of src": 502,
+    "lines of tests": 32_843,
+    "words of documentation": 29_327,
+    "tables": 44,
+    "figures": 26,
+    "experiments": 28,
+    "percent of src in decorators, signatures and imports": 23.6,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

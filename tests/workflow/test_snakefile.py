@@ -34,7 +34,6 @@ MICRO = {
 # Folders of results that belong to no single scene.
 SHARED = (
     "tables", "figures", "paper", "article", "hard_cases", "guard", "frame_times",
-    "roofline",
 )  # fmt: skip
 MICRO_FILE = "micro.yaml"
 EDITED = ("workflow", "config", "paper", "src", "Snakefile", MICRO_FILE)

@@ -37,7 +37,7 @@ class Kernels(_Record):
 
 
 class Units(_Record):
-    """Seconds of three loops that anyone can measure, see `study.experiments.roofline.units`."""
+    """Seconds of three loops that anyone can measure, see `study.experiments.machine`."""
 
     unit_scalar_s: float
     unit_vector_s: float

@@ -1,10 +1,29 @@
-"""Record of the machine, its units of time, and the library versions."""
+"""Record of the machine, its units of time, and the library versions.
+
+``./reproduce run python -m study.experiments.machine`` measures the units in a few seconds: the
+processor time on one thread of 1e9 steps x <- a x + b that wait for each other (scalar), 1e9 sums
+and products in independent vectors of four doubles (vector), 1e9 bytes read from an array of
+256 MiB (memory). Each is the least of some repeats in turns, scaled from a smaller number of steps.
+"""
+
+import sys
+from collections.abc import Callable
+from time import thread_time
+
+import numpy as np
 
 from pdrom.core import machine as this
+from pdrom.core.machine import Units
 from pdrom.core.store import write_text
+from pdrom.model.compiled.arithmetic import add, add_product, constant, total
+from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.rows import WIDTH, load
 from study.artifact.paths import MACHINE, File
 from study.experiments.kit.declaration import experiment
-from study.experiments.roofline.units import units
+
+AT_ONCE = 8  # independent vectors, enough to hide the latency of what is measured
+SCALAR_STEPS, VECTOR_TIMES, MEMORY_BYTES = 10**7, 10**6, 2**28
+REPEATS = 15
 
 
 @experiment(
@@ -16,3 +35,78 @@ from study.experiments.roofline.units import units
 def machine(out: File) -> None:
     """Measure the units, and write them to ``out`` with what is known of the machine."""
     write_text(this.machine(units()).model_dump_json(indent=2) + "\n", out.path)
+
+
+def units(repeats: int = REPEATS, memory_bytes: int = MEMORY_BYTES) -> Units:
+    """Measure this machine.
+
+    Parameters
+    ----------
+    repeats : measurements, of which the fastest counts
+    memory_bytes : size of the array that is read, larger than every cache
+    """
+    numbers = np.ones(memory_bytes // 8)
+    # amount of one call in units of 1e9, and the call
+    trials: list[tuple[float, Callable[[int], object]]] = [
+        (1e-9 * SCALAR_STEPS, lambda share: _chain(SCALAR_STEPS // share)),
+        (
+            2e-9 * AT_ONCE * WIDTH * VECTOR_TIMES,
+            lambda share: _products(numbers, VECTOR_TIMES // share),
+        ),
+        (1e-9 * numbers.nbytes, lambda _: _read(numbers)),
+    ]
+    for _, run in trials:
+        run(1000)  # compiles
+    found = [[_seconds(run) / amount for amount, run in trials] for _ in range(repeats)]
+    scalar, vector, memory = np.min(found, axis=0).tolist()
+    return Units(unit_scalar_s=scalar, unit_vector_s=vector, unit_memory_s=memory)
+
+
+def _seconds(run: Callable[[int], object]) -> float:
+    before = thread_time()
+    run(1)
+    return thread_time() - before
+
+
+@compiled(nogil=True)
+def _chain(times):
+    """The end of so many ``times`` x <- x / 2 + 1, each of which waits for the one before."""
+    x = 0.0
+    for _ in range(times):
+        x = 0.5 * x + 1.0
+    return x
+
+
+@compiled(nogil=True)
+def _products(numbers, times):
+    """So many ``times`` x <- one + x one in `AT_ONCE` independent vectors, from the ``numbers``."""
+    one = load(numbers, 0)
+    a, b = load(numbers, WIDTH), load(numbers, 2 * WIDTH)
+    c, d = load(numbers, 3 * WIDTH), load(numbers, 4 * WIDTH)
+    e, f = load(numbers, 5 * WIDTH), load(numbers, 6 * WIDTH)
+    g, h = load(numbers, 7 * WIDTH), load(numbers, 8 * WIDTH)
+    for _ in range(times):
+        a, b = add_product(one, a, one), add_product(one, b, one)
+        c, d = add_product(one, c, one), add_product(one, d, one)
+        e, f = add_product(one, e, one), add_product(one, f, one)
+        g, h = add_product(one, g, one), add_product(one, h, one)
+    return total(add(add(add(a, b), add(c, d)), add(add(e, f), add(g, h))))
+
+
+@compiled(nogil=True)
+def _read(numbers):
+    """Sum of the numbers, a multiple of 32 of them."""
+    a, b, c, d = constant(0.0), constant(0.0), constant(0.0), constant(0.0)
+    e, f, g, h = constant(0.0), constant(0.0), constant(0.0), constant(0.0)
+    for i in range(0, len(numbers), AT_ONCE * WIDTH):
+        a, b = add(a, load(numbers, i)), add(b, load(numbers, i + WIDTH))
+        c, d = add(c, load(numbers, i + 2 * WIDTH)), add(d, load(numbers, i + 3 * WIDTH))
+        e, f = add(e, load(numbers, i + 4 * WIDTH)), add(f, load(numbers, i + 5 * WIDTH))
+        g, h = add(g, load(numbers, i + 6 * WIDTH)), add(h, load(numbers, i + 7 * WIDTH))
+    return total(add(add(add(a, b), add(c, d)), add(add(e, f), add(g, h))))
+
+
+if __name__ == "__main__":
+    measured = units()
+    for name, seconds in [*measured.model_dump().items(), ("unit_s", measured.unit_s)]:
+        sys.stdout.write(f"{name} {seconds:.4f}\n")

@@ -9,7 +9,7 @@ from pdrom.view.text import escape
 from study.experiments.hard_cases.catalogue import CASES
 from study.experiments.hard_cases.expectations import FAILURES, HOLDS, NOT_TAKEN, NOTHING
 from study.paper.macros import format_number
-from study.paper.tabular import longtable, name, tabular
+from study.paper.tabular import longtable, name
 
 Tables = Mapping[str, pd.DataFrame]
 
@@ -61,24 +61,3 @@ def hard_reductions(tables: Tables) -> str:
     ]  # fmt: skip
     left = r">{\raggedright\arraybackslash}"
     return longtable(header, rows, rf"lrrrrrr{left}p{{5.2cm}}")
-
-
-def kernel_accuracy(tables: Tables) -> str:
-    """Worst error of each group's projections over its condition number, by class of matrix."""
-    table = tables["kernel_accuracy"]
-    rows = []
-    for group, part in table.groupby("group", sort=False):
-        worst = part.loc[part.worst_over_condition.idxmax()]
-        far = part.loc[part.worst_relative_error.idxmax()]
-        rows.append(
-            [
-                escape(group.replace("_", " ")), str(len(part)), str(int(part.cases.sum())),
-                format_number(worst.worst_over_condition), escape(worst.matrix_class),
-                format_number(far.worst_relative_error), escape(far.matrix_class),
-                format_number(far.condition),
-            ]
-        )  # fmt: skip
-    header = [
-        "group", "classes", "cases", "error/cond.", "in class", "error", "in class", "cond.",
-    ]  # fmt: skip
-    return tabular(header, rows, "lrrrlrlr")

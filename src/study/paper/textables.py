@@ -9,7 +9,7 @@ import pandas as pd
 from pdrom.view.text import escape
 from study.paper.claim_tables import claims, claims_in_full
 from study.paper.cost_tables import break_even, exponents, iterations, positions
-from study.paper.hard_tables import hard_cases, hard_reductions, kernel_accuracy
+from study.paper.hard_tables import hard_cases, hard_reductions
 from study.paper.macros import format_number
 from study.paper.speedup_tables import large_meshes, payoff, pays, speedups
 from study.paper.tabular import longtable, name, tabular
@@ -191,5 +191,4 @@ TEX_TABLES = {
     "tab_large_meshes": large_meshes,
     "tab_hard_cases": hard_cases,
     "tab_hard_reductions": hard_reductions,
-    "tab_kernel_accuracy": kernel_accuracy,
 }

@@ -31,7 +31,6 @@ from study.experiments.online import Online
 from study.experiments.published_choices.experiment import PublishedChoices
 from study.experiments.repetitions import RepetitionSection
 from study.experiments.requested_tolerances import RequestedTolerances
-from study.experiments.roofline.experiment import Roofline
 from study.experiments.scaling import Scaling
 from study.experiments.sensitivity import Sensitivity
 from study.experiments.stability import Stability
@@ -76,7 +75,6 @@ class StudySettings(ConfigModel):
     budgets: tuple[Annotated[float, Field(gt=0.0)], ...] = (0.1, 1.0, 10.0)
     subspace: Subspace = Subspace()
     scaling: Scaling = Scaling()
-    roofline: Roofline = Roofline()
     stability: Stability = Stability()
     noise: Noise = Noise()
     published_choices: PublishedChoices = PublishedChoices()

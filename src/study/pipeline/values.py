@@ -147,12 +147,6 @@ def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
     return found | study.named_methods(section.breakeven.methods, "scaling.breakeven.methods")
 
 
-def _sizes_of_scenes(study: Study, labels: Labels) -> dict[str, tuple[float, ...]]:
-    """Factors of the meshes on which scenes of the study are timed."""
-    sizes = study.settings.scaling.scenes
-    return {name: factors for name, factors in sizes.items() if name in study.scenes}
-
-
 def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
     """The cells of a scene, a method after the other; the methods need not be among the study's."""
     cells = [c for c in study.settings.repetitions.cells if labels["scene"] in c.scenes]
@@ -192,7 +186,6 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "method": _method,
     "methods": lambda study, labels: study.methods,
     "every_scene": lambda study, labels: study.scenes,
-    "sizes": _sizes_of_scenes,
     "every_method": lambda study, labels: study.every_method,
     "scaled_methods": scaled_methods,
     "noise_methods": _noise_methods,

@@ -1,1 +1,1 @@
-"""Hard cases: scenes at the edge of what may happen, what must hold, accuracy of kernels."""
+"""Hard cases: scenes at the edge of what may happen, what must hold."""

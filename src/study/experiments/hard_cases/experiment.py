@@ -1,19 +1,18 @@
-"""Every reduction in the hard cases, and the accuracy of the kernels."""
+"""Every reduction in the hard cases."""
 
 import logging
 from pathlib import Path
 from typing import Annotated
 
 import pandas as pd
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator
 
 from pdrom.core.errors import choices
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.reduction.method import MethodSpec
-from study.artifact.paths import HARD_CASES, KERNEL_ACCURACY, File
+from study.artifact.paths import HARD_CASES, File
 from study.artifact.reads import ProjectFile, ProjectFiles, Setting
-from study.experiments.hard_cases.accuracy import kernel_accuracy
 from study.experiments.hard_cases.catalogue import CASES, MESHES, modules_of, reducible_cases
 from study.experiments.hard_cases.expectations import load_expectations, surprise
 from study.experiments.hard_cases.outcomes import rows
@@ -34,10 +33,9 @@ def _known(case: str) -> str:
 
 
 class HardCases(ConfigModel):
-    """Section ``hard_cases``: the cases (all that are not slow if empty), matrices a class."""
+    """Section ``hard_cases``: the cases, all that are not slow if empty."""
 
     cases: tuple[Annotated[str, AfterValidator(_known)], ...] = ()
-    matrices: Annotated[int, Field(ge=1, le=10_000)] = 40
 
     @property
     def modules(self) -> list[str]:
@@ -46,14 +44,14 @@ class HardCases(ConfigModel):
 
 
 @experiment(
-    "Hard cases of every reduction, and accuracy of the kernels",
+    "Hard cases of every reduction",
     reads={
         "expectations": ProjectFile("config/hard_cases.yaml"),
         "meshes": ProjectFiles(tuple(f"config/scenes/meshes/{name}" for name in MESHES)),
         "every_method": Setting("every_method"),
         "asked": Setting("hard_cases"),
     },
-    writes={"cases": HARD_CASES, "kernels": KERNEL_ACCURACY},
+    writes={"cases": HARD_CASES},
 )
 def hard_cases(
     expectations: Path,
@@ -61,7 +59,6 @@ def hard_cases(
     every_method: dict[str, MethodSpec],
     asked: HardCases,
     cases: File,
-    kernels: File,
 ) -> None:
     """Put every reduction through the cases; log what contradicts the expectations.
 
@@ -77,6 +74,4 @@ def hard_cases(
                 log.warning("%s, %s: %s", name, row["method"], contradiction)
         log.info("%s: done", name)
     whole = dict.fromkeys(["k", "r", "frames", "blowup_frame"], "Int64")
-    table = pd.DataFrame(found, columns=COLUMNS).astype(whole)
-    write_table(table, cases.path)
-    write_table(pd.DataFrame(kernel_accuracy(asked.matrices)), kernels.path)
+    write_table(pd.DataFrame(found, columns=COLUMNS).astype(whole), cases.path)

@@ -2,8 +2,6 @@
 
 from study.tables.kit.declaration import compared, flag, integer, number, text, timed
 
-# Tolerance of numbers that are rounding errors.
-ROUNDING = 1e-14
 SCENE = text("scene", "name of the scene")
 GROUP = text("group", "constraint group whose projections are reduced; all in a position subspace")
 METHOD = text("method", "reduction of the projections; full without one")

@@ -29,12 +29,10 @@ from study.artifact.paths import (
     SNAPSHOTS,
     TABLE,
 )
-from study.experiments.kit.names import GLOBAL, RIGHT
 from study.figures.kit.catalogue import declarations, load_choices
 from study.figures.kit.holdings import GroupHolding, Holdings, MethodHolding, SceneHolding
 from study.figures.kit.options import Options
 from study.figures.kit.results import Results
-from study.tables.roofline import WHOLE
 from study.tables.scaling_fit import scaling_fit
 
 FRAMES = 20
@@ -337,12 +335,6 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for r in (20, 50)
         for variant, gain, error in variants
     ]
-    rates = [("bytes read", 2.0**k, f"L{k // 20 + 1}", 90.0, 80.0, 95.0) for k in range(14, 26)]
-    phases = [
-        (scene, phase, 3e5, 1.0, np.nan if phase == "bending" else 3.0, limit)
-        for scene, phase in (*pairs, *((s, p) for s in scenes for p in (RIGHT, GLOBAL, WHOLE)))
-        for limit in ("bytes", "sums and products")
-    ]
     noise = [
         (scene, "bending", axes, method, r, 9, None if axes in fails else 1e-12)
         for scene in FLAT
@@ -405,8 +397,6 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "breakeven": (ratios, "scene group method factor vertices threads r ratio breakeven_r"),
         "effects_cost": (shares, "scene effect ms_per_frame share"),
         "effects_left_out": (removed, "scene left_out groups ms_per_frame own_ms"),
-        "machine_rates": (rates, "quantity working_set level rate low high"),
-        "roofline": (phases, "scene phase working_set bound_us measured_us limit"),
         "reduced_reruns": (reruns, "scene group method r position_basis max_extent blowup_frame"
          " relative_error relative_error_within_horizon ms_per_frame k"),
         "gain_prediction": (predictions, "predictor lower upper runs failed_share threshold"),

@@ -275,16 +275,6 @@ TABLES = {
         ],
         columns=["case", "method", "gain", "blowup_frame", "max_extent", "outcome", "why"],
     ),
-    "kernel_accuracy": pd.DataFrame(
-        {
-            "group": ["spring", "strain", "strain"],
-            "matrix_class": ["random", "zero", "huge (1e150)"],
-            "cases": [4, 5, 6],
-            "condition": [1.0, 1.0, 1e6],
-            "worst_relative_error": [1e-16, 3e-16, 1e-12],
-            "worst_over_condition": [1e-16, 3e-16, 1e-18],
-        }
-    ),
 }
 
 
@@ -412,14 +402,6 @@ def test_hard_reductions_count_outcomes():
     pod, deim = rows(TEX_TABLES["tab_hard_reductions"](TABLES))
     assert pod == r"\texttt{pod} & 1 & 1 & 0 & 0 & 0 & 0 & -- \\"
     assert deim == r"\texttt{deim\_x} & 0 & 0 & 0 & 1 & 1 & 1 & a \% reason \\"
-
-
-def test_kernel_accuracy_names_the_worst_class():
-    spring, strain = rows(TEX_TABLES["tab_kernel_accuracy"](TABLES))
-    assert spring.startswith("spring & 1 & 4 & ")
-    assert strain.startswith("strain & 2 & 11 & ")
-    assert "& zero &" in strain
-    assert "& huge (1e150) &" in strain
 
 
 def test_verdicts_have_their_colour():

@@ -1,4 +1,4 @@
-"""The job of the hard cases: both tables, the same bytes twice, and contradictions in the log."""
+"""The job of the hard cases: the same bytes twice, and contradictions in the log."""
 
 import logging
 
@@ -18,31 +18,29 @@ METHODS = {
 
 
 def make(folder, expectations=ROOT / "config" / "hard_cases.yaml"):
-    paths = [folder / name for name in ("hard_cases.csv", "kernel_accuracy.csv")]
-    asked = HardCases(cases=("one_triangle", "flat_bending"), matrices=1)
-    cases, kernels = (File(str(path), {}) for path in paths)
+    path = folder / "hard_cases.csv"
+    asked = HardCases(cases=("one_triangle", "flat_bending"))
     hard_cases(
         expectations=expectations,
         meshes=[],
         every_method=METHODS,
         asked=asked,
-        cases=cases,
-        kernels=kernels,
+        cases=File(str(path), {}),
     )
-    return paths
+    return path
 
 
 @pytest.fixture(scope="module")
-def tables(tmp_path_factory):
+def table_file(tmp_path_factory):
     return make(tmp_path_factory.mktemp("first"))
 
 
-def test_tables_have_their_columns(tables):
-    assert pd.read_csv(tables[0]).columns.tolist() == COLUMNS
+def test_the_table_has_its_columns(table_file):
+    assert pd.read_csv(table_file).columns.tolist() == COLUMNS
 
 
-def test_a_failure_is_listed_with_its_reason(tables):
-    table = pd.read_csv(tables[0]).set_index(["case", "method"])
+def test_a_failure_is_listed_with_its_reason(table_file):
+    table = pd.read_csv(table_file).set_index(["case", "method"])
     joint = table.loc["one_triangle", "deim-joint"]
     assert (joint.outcome, joint.finite, joint.blowup_frame) == ("singular", False, 0)
     assert "One row serves x, y and z" in joint.why
@@ -52,9 +50,8 @@ def test_a_failure_is_listed_with_its_reason(tables):
     assert set(table.index.unique("method")) >= {"pod-full", "pod-ecsw", "skinning-full"}
 
 
-def test_the_same_bytes_twice(tables, tmp_path):
-    for first, second in zip(tables, make(tmp_path), strict=True):
-        assert first.read_bytes() == second.read_bytes()
+def test_the_same_bytes_twice(table_file, tmp_path):
+    assert table_file.read_bytes() == make(tmp_path).read_bytes()
 
 
 def test_a_failure_that_nothing_expects_is_logged(tmp_path, caplog):

@@ -1,1 +1,0 @@
-"""Rates of the machine, and the work of an iteration (Williams et al. 2009)."""

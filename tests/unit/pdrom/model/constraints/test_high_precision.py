@@ -1,0 +1,306 @@
+"""Compiled projections against mpmath on hard matrices, straight from their definitions.
+
+Where the nearest point is not unique, its distance is compared, and that it lies on the manifold.
+"""
+
+import math
+from itertools import pairwise
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from mpmath import mp
+
+from builders import random_rotation
+from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.effects import EFFECTS
+from pdrom.model.mesh.generators import cloth
+from pdrom.model.mesh.types import Mesh
+from strategies import SEEDS
+
+# A backward stable projection is wrong by a few round-offs times the condition number.
+STABLE = 20.0 * np.finfo(float).eps
+GRID = 60
+CORNERS = np.eye(4, 3, k=-1)
+
+
+def groups_on(manifold: str) -> list[str]:
+    """Registered groups that project on ``manifold``, see `ConstraintGroup`."""
+    return [name for name in EFFECTS if getattr(EFFECTS.load(name), "manifold", None) == manifold]
+
+
+def unit_group(effect: str) -> ConstraintGroup:
+    """Group ``effect`` of one element with unit vectors as rest edges: S q is q itself."""
+    kind = EFFECTS.load(effect)
+    cells = np.array([[0, 1, 2, 3]], dtype=np.int32)
+    if kind.rows_per_element == 3:
+        mesh = Mesh(CORNERS, np.empty((0, 3), dtype=np.int32), cells)
+    else:
+        mesh = Mesh(CORNERS[:3], cells[:, :3])
+    return kind(kind.Config(weight=1.0), mesh, np.ones(mesh.vertices))
+
+
+CLAMPED, SIZED = groups_on("clamped"), groups_on("size")
+UNITS = {name: unit_group(name) for name in (*CLAMPED, *SIZED, *groups_on("length"))}
+
+
+def test_groups_are_those_of_the_registry():
+    """A further group that says what it projects on is tested, without a list of names."""
+    assert CLAMPED == ["strain", "tetrahedron_strain", "deformation_gradient"]
+    assert SIZED == ["volume", "area"]
+    assert groups_on("length") == ["spring"]
+    assert groups_on("half sphere") == ["bending"]
+
+
+def projected(group: ConstraintGroup, d: np.ndarray) -> np.ndarray:
+    y = np.zeros((group.S.shape[1], 3))
+    y[1 : 1 + len(d)] = d
+    return group.project_elements(y, np.array([0]))
+
+
+def with_singular_values(*values: float):
+    def make(rng: np.random.Generator, rows: int) -> np.ndarray:
+        left = random_rotation(rng)
+        if rows == 2:
+            a, b = np.array([[0.0, 1.0], [-1.0, 0.0]]), rng.uniform(0.0, 2.0 * np.pi)
+            left = np.cos(b) * np.eye(2) - np.sin(b) * a
+        return left @ np.diag(values[:rows]) @ random_rotation(rng)[:rows]
+
+    return make
+
+
+def one_row_times(size: float):
+    def make(rng: np.random.Generator, rows: int) -> np.ndarray:
+        d = rng.standard_normal((rows, 3))
+        d[rng.integers(rows)] *= size
+        return d
+
+    return make
+
+
+def half_turn(rng: np.random.Generator, rows: int) -> np.ndarray:
+    axis = random_rotation(rng)[0]
+    frame = random_rotation(rng)
+    stretch = frame.T @ np.diag([1.3, 1.0, 0.8]) @ frame
+    return ((2.0 * np.outer(axis, axis) - np.eye(3)) @ stretch)[:rows]
+
+
+def mirror(rng: np.random.Generator, rows: int) -> np.ndarray:
+    d = np.eye(3)[rng.permutation(3)]
+    d[0] *= -np.linalg.det(d)
+    return d[:rows]
+
+
+MATRICES = {
+    "random": lambda rng, rows: rng.standard_normal((rows, 3)),
+    "in range": with_singular_values(1.005, 1.0, 0.995),
+    "nearly singular (1e-8)": with_singular_values(1.0, 0.7, 1e-8),
+    "nearly singular (1e-16)": with_singular_values(1.0, 0.7, 1e-16),
+    "one row times 1e-100": one_row_times(1e-100),
+    "one row times 1e-300": one_row_times(1e-300),
+    "nearly rank one (1e-6)": with_singular_values(1.0, 1e-6, 4e-7),
+    "repeated": with_singular_values(1.3, 1.3, 1.3),
+    "nearly repeated (1e-9)": with_singular_values(1.3, 1.3 + 1e-9, 1.3 - 1e-9),
+    "rotation by pi": half_turn,
+    "inverted": with_singular_values(1.2, 1.0, -0.6),
+    "nearly mirrored (1e-6)": with_singular_values(1.2, 1.0, -1.0 + 1e-6),
+    "ill-scaled": lambda rng, rows: rng.standard_normal((rows, 3)) * 10.0 ** rng.uniform(
+        -8, 8, (rows, 3)
+    ),
+    "huge (1e150)": lambda rng, rows: 1e150 * rng.standard_normal((rows, 3)),
+    "tiny (1e-150)": lambda rng, rows: 1e-150 * rng.standard_normal((rows, 3)),
+    "mirrored": mirror,
+    "rank one": lambda rng, rows: np.outer(
+        rng.integers(1, 9, rows), rng.integers(1, 9, 3)
+    ).astype(float),
+    "zero": lambda rng, rows: np.zeros((rows, 3)),
+}  # fmt: skip
+AMBIGUOUS = ("mirrored", "rank one", "zero")
+
+
+def digits_for(*arrays: np.ndarray) -> int:
+    """Digits that keep 50 after squares and differences of the entries of ``arrays``."""
+    entries = np.abs(np.concatenate([np.ravel(a) for a in arrays]))
+    entries = entries[entries > 0.0]
+    spread = np.ptp(np.log10(entries)) if len(entries) else 0.0
+    return 50 + 2 * math.ceil(spread)
+
+
+def exact(a: np.ndarray) -> mpmath.matrix:
+    return mpmath.matrix(a.tolist())
+
+
+def nearest(group: ConstraintGroup, d: np.ndarray) -> tuple[mpmath.matrix, mpmath.mpf]:
+    """Nearest point of the manifold to d = F^T, and the condition number (inf: not unique).
+
+    The singular values, of three the last with the sign of det F, are clamped to the range of the
+    group, or changed so that their product is in it.
+    """
+    low, high = (mpmath.mpf(end) for end in group.kernel_parameters())
+    u, sigma, vt = mp.svd_r(exact(d))
+    values = list(sigma)
+    if len(values) == 3:
+        sign = mp.sign(mp.det(u) * mp.det(vt))
+        values[2] *= sign
+        for i in range(3):
+            u[i, 2] *= sign
+    if group.manifold == "clamped":
+        found = [min(max(v, low), high) for v in values]
+        gap = values[1] + (values[2] if len(values) == 3 else 0)
+        condition = values[0] / gap if gap > 0 else mp.inf
+    else:
+        product = mp.fprod(values)
+        limit = min(max(product, low), high)
+        if product == limit:
+            return exact(d), mpmath.mpf(1)
+        found = with_product(values, limit)
+        condition = condition_of_product(values, found)
+    return u * mpmath.diag(found) * vt, condition
+
+
+def with_product(values: list[mpmath.mpf], limit: mpmath.mpf) -> list[mpmath.mpf]:
+    """Nearest t_i > 0 to ``values`` with the product ``limit``: all t_i (t_i - s_i) are equal.
+
+    The last one is the unknown, every sign change of the product on a grid holds a candidate.
+    """
+    last, count = values[-1], len(values)
+
+    def belonging(t: mpmath.mpf) -> list[mpmath.mpf]:
+        m = t * (t - last)
+        return [(s + mp.sqrt(max(s * s + 4 * m, 0))) / 2 for s in values[:-1]] + [t]
+
+    def excess(t: mpmath.mpf) -> mpmath.mpf:
+        return mp.fprod(belonging(t)) / limit - 1
+
+    if mp.fprod(values) < limit:
+        grid = [mpmath.mpf(0), 2 * max(last, mp.root(limit, count))]
+    else:
+        least = limit / mp.fprod(values[:-1])
+        grid = [least * (last / least) ** (mpmath.mpf(i) / GRID) for i in range(GRID + 1)]
+    ends = [(a, b) for a, b in pairwise(grid) if excess(a) <= 0 < excess(b)]
+    roots = [mp.findroot(excess, pair, solver="anderson", verify=False) for pair in ends]
+    return min(
+        (belonging(t) for t in roots),
+        key=lambda found: mp.fsum((a - s) ** 2 for a, s in zip(found, values, strict=True)),
+    )
+
+
+def condition_of_product(values: list[mpmath.mpf], found: list[mpmath.mpf]) -> mpmath.mpf:
+    """Largest factor by which a relative change of ``values``, or of their directions, grows."""
+    pairs = list(zip(values, found, strict=True))
+    slopes = [2 * t - s for s, t in pairs]
+    curved = mp.fsum(1 / (a * t) for a, (_, t) in zip(slopes, pairs, strict=True))
+    factors = []
+    for i, (s, t) in enumerate(pairs):
+        # dt_j / ds_i from t_j (t_j - s_j) = m and sum_j dt_j / t_j = 0
+        m = -1 / (slopes[i] * curved)
+        factors += [((t if i == j else 0) + m) / a for j, a in enumerate(slopes)]
+        for other, end in pairs[i + 1 :]:
+            factors.append((t + end) / (s + other) if s + other else mp.inf)
+            tie = t / slopes[i] if t == end else mp.inf
+            factors.append((t - end) / (s - other) if s != other else tie)
+        if len(pairs) == 2:
+            factors.append(t / s if s else mp.inf)
+    return max(abs(f) for f in factors) * mp.norm(values) / mp.norm(found)
+
+
+def outside(group: ConstraintGroup, p: np.ndarray) -> float:
+    """Distance of the singular values of p, or of their product, from the range of the group.
+
+    A wrong orientation counts fully. The product of what is long and thin is known only as exactly
+    as its smallest value.
+    """
+    low, high = group.kernel_parameters()
+    sigma = np.linalg.svd(p, compute_uv=False)
+    if len(p) == 3 and np.linalg.det(p) < 0.0:
+        return 1.0
+    size = group.manifold == "size"
+    measured = np.array([sigma.prod()]) if size else sigma
+    stretch = sigma[0] / sigma[-1] if size else 1.0
+    return float(np.max(np.maximum(low - measured, measured - high), initial=0.0)) / stretch
+
+
+@settings(max_examples=3)
+@given(seed=SEEDS)
+@pytest.mark.parametrize("effect", [*CLAMPED, *SIZED])
+def test_projections_of_matrices_are_backward_stable(effect, seed):
+    group, rng = UNITS[effect], np.random.default_rng(seed)
+    for name, make in MATRICES.items():
+        d = make(rng, group.rows_per_element)
+        found = projected(group, d)
+        assert np.isfinite(found).all(), name
+        with mp.workdps(digits_for(d, found)):
+            p, condition = nearest(group, d)
+            ambiguous = name in AMBIGUOUS and (name != "mirrored" or len(d) == 3)
+            if condition < mp.inf and not ambiguous:
+                error = mp.norm(exact(found) - p) / mp.norm(p)
+                assert error <= STABLE * max(1.0, condition), name
+            else:
+                distance, best = mp.norm(exact(d) - exact(found)), mp.norm(exact(d) - p)
+                assert abs(distance - best) <= STABLE * max(mp.norm(exact(d)), mp.norm(p)), name
+                assert outside(group, found) <= STABLE, name
+
+
+@pytest.mark.parametrize("size", [1.0, 1e300, 1e-300, 0.0])
+def test_springs(size, rng):
+    group = UNITS["spring"]
+    for _ in range(20):
+        d = size * rng.standard_normal((1, 3)) * 10.0 ** rng.uniform(-8, 0, (1, 3))
+        with mp.workdps(digits_for(d, group.rest[0])):
+            rest, length = exact(group.rest[:1]), mp.norm(exact(d))
+            p = exact(d) * (mp.norm(rest) / length) if length else rest
+            assert mp.norm(exact(projected(group, d)) - p) <= STABLE * mp.norm(p)
+
+
+CURVED = {
+    "random": lambda x, rng: rng.standard_normal(x.shape),
+    "nearly at rest (1e-6)": lambda x, rng: x + 1e-6 * rng.standard_normal(x.shape),
+    "mirrored": lambda x, rng: x * [1.0, -1.0, 1.0] + 1e-3 * rng.standard_normal(x.shape),
+    "nearly flat (1e-6)": lambda x, rng: x * [1.0, 1e-6, 1.0],
+    "far away (1e6)": lambda x, rng: x + 1e6,
+    "huge (1e150)": lambda x, rng: 1e150 * rng.standard_normal(x.shape),
+    "tiny (1e-150)": lambda x, rng: 1e-150 * rng.standard_normal(x.shape),
+}
+
+
+@pytest.mark.parametrize("state", CURVED)
+def test_bending(state, rng):
+    """The condition number: the terms that cancel in H = row y over |H|, and where H is on the
+    wrong side, over the distance of its direction from the opposite pole."""
+    mesh, kind = cloth(6, 6, "xz", wave=0.1), EFFECTS.load("bending")
+    group = kind(kind.Config(weight=1.0), mesh, np.ones(mesh.vertices))
+    y = CURVED[state](mesh.points, rng)
+    group.begin_frame(mesh.points)  # normals of the rest shape in every state
+    for element in rng.permutation(group.elements)[:16]:
+        row, pole = group.S[[element]].toarray(), group.side[element] * group.normals[element]
+        used = np.flatnonzero(row)
+        with mp.workdps(digits_for(row[:, used], y[used])):
+            h, n = exact(row[:, used]) * exact(y[used]), exact(pole[None])
+            direction = h / mp.norm(h)
+            terms = exact(np.abs(row[:, used])) * exact(np.abs(y[used]))
+            condition = mp.norm(terms) / mp.norm(h)
+            height = mp.fsum(direction[i] * n[i] for i in range(3))
+            if height < 0:
+                direction -= height * n
+                condition /= mp.norm(direction)
+                direction /= mp.norm(direction)
+            p = direction * mpmath.mpf(group.magnitude[element])
+            found = group.project_elements(y, np.array([element]))
+            assert mp.norm(exact(found) - p) <= STABLE * max(1.0, condition) * mp.norm(p)
+
+
+def test_references_of_known_matrices():
+    """Equal values shrink alike as long as that is nearest, of unequal ones a flat last gives way;
+    two values whose product is 1 lie where the normal of the hyperbola meets them."""
+    with mp.workdps(60):
+        rotation = UNITS["deformation_gradient"]
+        p, condition = nearest(rotation, np.diag([3.0, 0.5, -0.25]))
+        assert (p, float(condition)) == (mpmath.eye(3), 12.0)
+        assert nearest(rotation, np.diag([1.0, 1.0, -1.0]))[1] == mp.inf
+        one = mpmath.mpf(1)
+        assert [float(t) for t in with_product([mpmath.mpf("1.9")] * 3, one)] == [1.0] * 3
+        flat = with_product([mpmath.mpf(100), mpmath.mpf(90), mpmath.mpf(-1e-3)], one)
+        assert [float(t) for t in flat] == pytest.approx([100.0, 90.0, 1.0 / 9000.0], rel=1e-6)
+        a, b = with_product([mpmath.mpf(3), mpmath.mpf(0)], one)
+        assert (float(a * b), float((3 - a) * a)) == pytest.approx((1.0, float(-b * b)))
