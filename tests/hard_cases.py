@@ -5,14 +5,15 @@ from functools import cache
 
 import pytest
 
+from pdrom.core.yamlfile import read_yaml
 from pdrom.reduction.method import load_methods
 from places import ROOT
 from study.experiments.hard_cases.catalogue import CASES
-from study.experiments.hard_cases.expectations import load_expectations
+from study.experiments.hard_cases.experiment import HardCases
 from study.experiments.hard_cases.reductions import Training
 
 METHODS = load_methods(ROOT / "config" / "methods.yaml")
-EXPECTED = load_expectations(ROOT / "config" / "hard_cases.yaml")
+EXPECTED = HardCases(**read_yaml(ROOT / "config" / "default.yaml")["hard_cases"]).expected
 
 
 def parameters(names: Iterable[str]) -> list:

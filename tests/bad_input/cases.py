@@ -4,10 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from bad_input.project import MESH, SCENE, SMALL_SCENE, SMALL_STUDY, STUDY, Content, LinkTo, Replace
+import yaml
 
-METHODS, FIGURES = "config/methods.yaml", "config/figures.yaml"
-CLAIMS, LADDER = "config/claims.yaml", "config/ladder.yaml"
+from bad_input.project import MESH, SCENE, SMALL_SCENE, SMALL_STUDY, STUDY, Content, LinkTo, Replace
+from pdrom.core.yamlfile import read_yaml
+from places import CONFIG
+
+METHODS, FIGURES, CLAIMS = (f"config/{name}.yaml" for name in ("methods", "figures", "claims"))
+LADDER = yaml.safe_dump({"ladder": read_yaml(CONFIG / "default.yaml")["ladder"]}, sort_keys=False)
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,11 @@ def mesh_path(name: str, path: str, *parts: str, **changes: Content) -> Case:
 def other(name: str, path: str, old: str, new: str, *parts: str) -> Case:
     """Another configuration file with one text replaced."""
     return Case(name, {path: Replace(old, new)}, (path, *parts))
+
+
+def ladder(name: str, old: str, new: str, *parts: str) -> Case:
+    """The section ``ladder`` of the full study with one text replaced."""
+    return more(name, LADDER.replace(old, new, 1), *parts)
 
 
 BOMB = "a: &a [x, x]\n" + "".join(
@@ -354,14 +363,14 @@ OTHER_CASES = [
     other("claim at infinity", CLAIMS, "threshold: 0.7", "threshold: .inf", "C1", "threshold"),
     other("claim with a wrong comparison", CLAIMS, 'compare: ">="', 'compare: ">"', "C1",
           "'>=' or '<='"),
-    Case("ladder as a list", {LADDER: "- 20\n"}, (LADDER, "a mapping of keys is required")),
-    other("ladder without rungs", LADDER, "\ndown:", "\ndwn:", "unknown key 'dwn'",
-          "did you mean 'down'?"),
-    other("ladder of an unknown scene", LADDER, "scenes: [", "scenes: [nowhere, ", "scenes",
-          "'nowhere'"),
-    other("ladder of too many signs", LADDER, "signs: 5", "signs: 5000", "signs = 5000"),
-    other("rung that contradicts itself", LADDER, "rows: element, solve: qr}",
-          "rows: element, solve: square}", "up.6", "allowed are qr, tikhonov"),
+    more("ladder as a list", "ladder: [20]\n", "ladder = [20]"),
+    ladder("ladder without rungs", "  down:", "  dwn:", "unknown key 'ladder.dwn'",
+           "did you mean 'down'?"),
+    ladder("ladder of an unknown scene", "scenes:", "scenes:\n  - nowhere", "ladder.scenes",
+           "'nowhere'"),
+    ladder("ladder of too many signs", "signs: 5", "signs: 5000", "ladder.signs = 5000"),
+    ladder("rung that contradicts itself", "rows: element\n    solve: qr",
+           "rows: element\n    solve: square", "ladder.up.6", "allowed are qr, tikhonov"),
 ]  # fmt: skip
 
 CASES = STUDY_CASES + SCENE_CASES + MESH_CASES + OTHER_CASES

@@ -13,10 +13,10 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 49_545,
+    "lines of src": 49_532,
     "modules of src": 502,
     "lines of tests": 32_843,
-    "words of documentation": 29_327,
+    "words of documentation": 29_218,
     "tables": 44,
     "figures": 26,
     "experiments": 28,

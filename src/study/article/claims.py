@@ -5,8 +5,8 @@ from html import escape
 
 import pandas as pd
 
-from study.article.tables import argument
 from pdrom.view.page import filled
+from study.article.tables import argument
 from study.tables.claims.metrics import METRICS
 from study.tables.claims.rules import ClaimRule, TestRule
 

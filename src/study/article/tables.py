@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pandas as pd
 
+from pdrom.view.page import filled
 from study.artifact.paths import RESULTS, TABLE
 from study.figures.kit.catalogue import declarations
-from pdrom.view.page import filled
 from study.tables import declared
 from study.tables.kit.quantities import QUANTITIES
 

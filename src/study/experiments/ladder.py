@@ -47,11 +47,11 @@ class Ladder(Repetitions):
         rows are sampled p times as often as elements, which have p of them: as many entries
     """
 
-    r: Annotated[int, Field(ge=1, le=100_000)]
-    signs: Annotated[int, Field(ge=0, le=100)]
+    r: Annotated[int, Field(ge=1, le=100_000)] = 20
+    signs: Annotated[int, Field(ge=0, le=100)] = 0
     repeated: tuple[str, ...] = ()
-    up: Rungs
-    down: Rungs
+    up: Rungs = ()
+    down: Rungs = ()
     square: tuple[MethodSpec, ...] = ()
     sizes: tuple[Modes, ...] = ()
 
@@ -65,10 +65,10 @@ class Ladder(Repetitions):
         return rows + [("square", method, None, r) for r in self.sizes for method in square]
 
 
-class LadderFile(Ladder):
-    """Content of config/ladder.yaml: the rungs, and ``scenes`` where it is climbed if held."""
+class LadderSection(Ladder):
+    """Section ``ladder``: the rungs, and ``scenes`` whose reduced groups are run with them."""
 
-    scenes: tuple[str, ...]
+    scenes: tuple[str, ...] = ()
 
 
 @experiment(

@@ -107,12 +107,12 @@ def _article(study: Study, given: Mapping[str, Paths], settings: Row, results: s
 
 def check_texts(study: Study) -> None:
     """ConfigurationError for a text of ``study`` that figures or TeX cannot typeset."""
-    folder = study.root / "config"
+    folder, ladder = study.root / "config", study.settings.ladder
     for name, method in study.methods.items():
         require_typeset(method.title, f"{folder / 'methods.yaml'}: {name}.title")
-    for key, rungs in {"up": study.ladder.up, "down": study.ladder.down}.items():
+    for key, rungs in {"up": ladder.up, "down": ladder.down}.items():
         for i, rung in enumerate(rungs):
-            require_typeset(rung.title, f"{folder / 'ladder.yaml'}: {key}.{i}.title")
+            require_typeset(rung.title, f"ladder.{key}.{i}.title")
     for variant in study.ablation.variants:
         require_typeset(variant, f"{folder / 'subspace_ablation.yaml'}: variants")
     for name, claim in load_claims(folder / "claims.yaml").items():

@@ -13,7 +13,6 @@ from study.artifact.artifact import Artifact
 from study.artifact.logs import planning_log
 from study.artifact.paths import TABLE
 from study.artifact.reads import Labels
-from study.experiments.hard_cases.expectations import load_expectations
 from study.experiments.kit.declaration import experiments
 from study.live.page import live_page
 from study.pipeline.contents import paths_of
@@ -86,7 +85,6 @@ class Plan:
         """Read every file of the configuration, so that a fault shows early."""
         folder = self.root / "config"
         load_claims(folder / "claims.yaml", self.settings.claim_sets)
-        load_expectations(folder / "hard_cases.yaml")
         self._check_scenes(folder)
         check_subspaces(self.study)
         check_live(self.study)
@@ -98,7 +96,7 @@ class Plan:
     def _check_scenes(self, folder: Path) -> None:
         settings = self.settings
         named = {
-            f"{folder / 'ladder.yaml'}: scenes": self.study.ladder.scenes,
+            "ladder.scenes": settings.ladder.scenes,
             f"{folder / 'subspace_ablation.yaml'}: scenes": self.study.ablation.scenes,
             "live.scenes": settings.live.scenes,
             "subspace.scenes": settings.subspace.scenes,

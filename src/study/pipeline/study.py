@@ -24,7 +24,7 @@ from study.experiments.hard_cases.experiment import HardCases
 from study.experiments.iterations import IterationSweep
 from study.experiments.kit.sampling import Sweep
 from study.experiments.kit.settings import BlowupExtent, Solver, Threads
-from study.experiments.ladder import LadderFile
+from study.experiments.ladder import LadderSection
 from study.experiments.live import Live
 from study.experiments.noise import Noise
 from study.experiments.online import Online
@@ -77,6 +77,7 @@ class StudySettings(ConfigModel):
     scaling: Scaling = Scaling()
     stability: Stability = Stability()
     noise: Noise = Noise()
+    ladder: LadderSection = LadderSection()
     published_choices: PublishedChoices = PublishedChoices()
     repetitions: RepetitionSection = RepetitionSection()
     guard: GuardSection = GuardSection()
@@ -146,12 +147,6 @@ class Study:
         """
         settings = validate(StudySettings, config, source)
         return cls(settings, Path(root))
-
-    @cached_property
-    def ladder(self) -> LadderFile:
-        """Ladder of config/ladder.yaml."""
-        path = self.root / "config" / "ladder.yaml"
-        return validate(LadderFile, read_yaml(path), str(path))
 
     @cached_property
     def ablation(self) -> AblationFile:

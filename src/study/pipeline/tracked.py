@@ -7,7 +7,7 @@ of a job, which the requests of `workflow/profiles/slurm` are to cover. A kind i
 is named by below ``logs``: an experiment, or ``tables``, ``figures`` or ``paper``.
 
 ``./reproduce run python -m study.pipeline.tracked meshes`` writes the file of the table
-`large_meshes` again, from a finished run of ``config/alternatives.yaml``, which takes too long for
+`large_meshes` again, from a finished run of ``config/extended.yaml``, which takes too long for
 the default run. Its times are those of one machine, so that the record names both.
 
 ``./reproduce run python -m study.pipeline.tracked replication`` writes the file of the table
@@ -35,7 +35,7 @@ from study.tables.large_meshes import RECORDED
 COSTS = Path("config/reference/job_costs.csv")
 COLUMNS = ["kind", "seconds", "coarse_seconds", "longest_s", "memory_mb"]
 COARSE = "config/tiny.yaml"
-LARGE = "config/alternatives.yaml"
+LARGE = "config/extended.yaml"
 SAMPLE = "config/replication.yaml"
 
 

@@ -206,6 +206,5 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "projection_cases": _projection_cases,
     "projection_methods": _projection_methods,
     "heldout_ranks": _heldout_ranks,
-    "ladder": lambda study, labels: study.ladder,
     "ablation": lambda study, labels: study.ablation,
 }

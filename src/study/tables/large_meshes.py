@@ -32,5 +32,5 @@ LATER = (
     reads={"recorded": ProjectFile(RECORDED)},
 )
 def large_meshes(recorded: Path) -> pd.DataFrame:
-    """The rows of the table winners of the study ``config/alternatives.yaml``."""
+    """The rows of the table winners of the study ``config/extended.yaml``."""
     return pd.read_csv(recorded)

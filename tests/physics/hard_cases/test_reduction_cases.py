@@ -1,4 +1,4 @@
-"""Every reduction in every hard case: it holds, or an entry of config/hard_cases.yaml says why."""
+"""Every reduction in every hard case: it holds, or hard_cases.expected says why."""
 
 from itertools import cycle
 

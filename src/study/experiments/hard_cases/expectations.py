@@ -1,16 +1,24 @@
-"""Outcomes that are expected of reductions in the hard cases (config/hard_cases.yaml)."""
+"""Outcomes that are expected of reductions in the hard cases."""
 
-from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import AfterValidator, Field, model_validator
 
-from pdrom.core.errors import ConfigurationError
-from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
+from pdrom.core.errors import choices
+from pdrom.core.yamlfile import ConfigModel, shown
 from study.experiments.hard_cases.catalogue import CASES
 
 HOLDS, NOTHING, NOT_TAKEN = "holds", "nothing to reduce", "not taken"
 FAILURES = ("refused", "singular", "blow-up", "distorted", "objective rises", "momentum changes")
+
+
+def _known(case: str) -> str:
+    if case not in CASES:
+        raise ValueError(f"unknown case {shown(case, 60)}{choices(case, CASES)}")
+    return case
+
+
+Cases = tuple[Annotated[str, AfterValidator(_known)], ...]
 
 
 class Expectation(ConfigModel):
@@ -21,30 +29,16 @@ class Expectation(ConfigModel):
     """
 
     why: Annotated[str, Field(min_length=20)]
-    fails: tuple[str, ...] = ()
-    may_fail: tuple[str, ...] = ()
+    fails: Cases = ()
+    may_fail: Cases = ()
 
-
-def load_expectations(path: Path) -> dict[str, Expectation]:
-    """Content of ``path``, config/hard_cases.yaml, by reduction; one not named never fails.
-
-    Raises
-    ------
-    ConfigurationError
-        An unknown key or case, or a case in both lists.
-    """
-    content = read_yaml(path)
-    if not isinstance(content, dict):
-        raise ConfigurationError(f"{path}: a mapping of reductions is required")
-    expected = {n: validate(Expectation, e, f"{path}: '{n}'") for n, e in content.items()}
-    for name, entry in expected.items():
-        listed = [*entry.fails, *entry.may_fail]
-        unknown = sorted(set(listed) - set(CASES))
-        if unknown:
-            raise ConfigurationError(f"{path}: '{name}': unknown case '{unknown[0]}'")
-        if len(set(listed)) < len(listed):
-            raise ConfigurationError(f"{path}: '{name}': a case is listed twice")
-    return expected
+    @model_validator(mode="after")
+    def _listed_once(self) -> Self:
+        listed = [*self.fails, *self.may_fail]
+        for case in listed:
+            if listed.count(case) > 1:
+                raise ValueError(f"case '{case}' is listed twice")
+        return self
 
 
 def surprise(outcome: str, case: str, expected: Expectation | None) -> str:

@@ -5,16 +5,16 @@ from pathlib import Path
 from typing import Annotated
 
 import pandas as pd
-from pydantic import AfterValidator
+from pydantic import AfterValidator, Field
 
 from pdrom.core.errors import choices
 from pdrom.core.store import write_table
-from pdrom.core.yamlfile import ConfigModel
+from pdrom.core.yamlfile import ConfigModel, shown
 from pdrom.reduction.method import MethodSpec
 from study.artifact.paths import HARD_CASES, File
-from study.artifact.reads import ProjectFile, ProjectFiles, Setting
+from study.artifact.reads import ProjectFiles, Setting
 from study.experiments.hard_cases.catalogue import CASES, MESHES, modules_of, reducible_cases
-from study.experiments.hard_cases.expectations import load_expectations, surprise
+from study.experiments.hard_cases.expectations import Expectation, surprise
 from study.experiments.hard_cases.outcomes import rows
 from study.experiments.kit.declaration import experiment
 
@@ -28,14 +28,18 @@ COLUMNS = [
 
 def _known(case: str) -> str:
     if case not in reducible_cases():
-        raise ValueError(f"unknown case '{case}'{choices(case, reducible_cases())}")
+        raise ValueError(f"unknown case {shown(case, 60)}{choices(case, reducible_cases())}")
     return case
 
 
 class HardCases(ConfigModel):
-    """Section ``hard_cases``: the cases, all that are not slow if empty."""
+    """Section ``hard_cases``: the cases, all that are not slow if empty.
+
+    expected : by reduction, where it fails and why; one not named never fails
+    """
 
     cases: tuple[Annotated[str, AfterValidator(_known)], ...] = ()
+    expected: dict[str, Expectation] = Field(default_factory=dict)
 
     @property
     def modules(self) -> list[str]:
@@ -46,7 +50,6 @@ class HardCases(ConfigModel):
 @experiment(
     "Hard cases of every reduction",
     reads={
-        "expectations": ProjectFile("config/hard_cases.yaml"),
         "meshes": ProjectFiles(tuple(f"config/scenes/meshes/{name}" for name in MESHES)),
         "every_method": Setting("every_method"),
         "asked": Setting("hard_cases"),
@@ -54,7 +57,6 @@ class HardCases(ConfigModel):
     writes={"cases": HARD_CASES},
 )
 def hard_cases(
-    expectations: Path,
     meshes: list[Path],
     every_method: dict[str, MethodSpec],
     asked: HardCases,
@@ -64,12 +66,11 @@ def hard_cases(
 
     The cases find the ``meshes`` themselves.
     """
-    expected = load_expectations(expectations)
     found = []
     for name in asked.cases or reducible_cases():
-        for row in rows(CASES[name], every_method, expected):
+        for row in rows(CASES[name], every_method, asked.expected):
             found.append(row)
-            contradiction = surprise(row["outcome"], name, expected.get(row["method"]))
+            contradiction = surprise(row["outcome"], name, asked.expected.get(row["method"]))
             if contradiction:
                 log.warning("%s, %s: %s", name, row["method"], contradiction)
         log.info("%s: done", name)

@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from pdrom.core.yamlfile import read_yaml, validate
+from pdrom.core.yamlfile import read_yaml
 from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.sampling import Reduction, select
 from places import ROOT
-from study.experiments.ladder import LadderFile
+from study.experiments.ladder import LadderSection
 
-FILE = ROOT / "config" / "ladder.yaml"
-LADDER = validate(LadderFile, read_yaml(FILE), str(FILE))
+LADDER = LadderSection(**read_yaml(ROOT / "config" / "default.yaml")["ladder"])
 
 
 @pytest.mark.parametrize("direction", ["up", "down"])

@@ -14,7 +14,7 @@ from bad_input.project import make_project
 from pdrom import api
 from pdrom.command import main
 from pdrom.core.store import open_hdf5, read_table
-from pdrom.core.yamlfile import read_yaml, validate
+from pdrom.core.yamlfile import read_yaml
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.mesh.types import Mesh, stored_mesh
 from places import CONFIG
@@ -23,7 +23,7 @@ from study.artifact import paths
 from study.artifact.paths import File, Place
 from study.experiments.companion_times import companion_times
 from study.experiments.kit.settings import Horizon
-from study.experiments.ladder import LadderFile, ladder
+from study.experiments.ladder import LadderSection, ladder
 from study.pipeline.study import Study
 
 SCENE, GROUP, METHOD = "small", "spring", "block-deim"
@@ -279,9 +279,8 @@ def test_a_moved_start_changes_nothing_and_other_training_does(table):
 
 def test_every_rung_of_a_ladder_is_run_and_judged(study, at, array, tmp_path):
     """Whole elements with shared coefficients are worse than the best by their gain at most."""
-    path = CONFIG / "ladder.yaml"
     few = {"r": 2, "signs": 2, "repetitions": 3, "sizes": (2, 50), "repeated": (SCENE,)}
-    asked = validate(LadderFile, read_yaml(path), str(path)).model_copy(update=few)
+    asked = LadderSection(**read_yaml(CONFIG / "default.yaml")["ladder"]).model_copy(update=few)
     section = study.settings.sensitivity
     out = File(str(tmp_path / "ladder.csv"), {"scene": SCENE, "group": GROUP})
     ladder(

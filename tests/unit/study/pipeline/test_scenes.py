@@ -3,7 +3,6 @@
 import re
 
 import pytest
-import yaml
 from pydantic import ValidationError
 
 from pdrom.core.errors import ConfigurationError
@@ -95,10 +94,3 @@ def test_an_unknown_scene_is_named() -> None:
 def test_an_entry_that_is_given_twice_is_refused() -> None:
     with pytest.raises(ValidationError, match="twice"):
         Variants(seeds=(1, 1))
-
-
-def test_the_sweep_has_more_than_five_hundred_jobs() -> None:
-    config = yaml.safe_load((ROOT / "config" / "sweep.yaml").read_text("utf-8"))
-    scenes = list(Variants.model_validate(config["variants"]).of(read))
-    of_a_scene = 2 + 1 + len(config["methods"])  # runs, snapshots, reruns; bases come on top
-    assert len(scenes) * of_a_scene > 500

@@ -5,6 +5,7 @@ import logging
 import pandas as pd
 import pytest
 
+from pdrom.core.yamlfile import read_yaml
 from pdrom.reduction.method import load_methods
 from places import ROOT
 from study.artifact.paths import File
@@ -17,11 +18,13 @@ METHODS = {
 }
 
 
-def make(folder, expectations=ROOT / "config" / "hard_cases.yaml"):
+EXPECTED = read_yaml(ROOT / "config" / "default.yaml")["hard_cases"]["expected"]
+
+
+def make(folder, expected=EXPECTED):
     path = folder / "hard_cases.csv"
-    asked = HardCases(cases=("one_triangle", "flat_bending"))
+    asked = HardCases(cases=("one_triangle", "flat_bending"), expected=expected)
     hard_cases(
-        expectations=expectations,
         meshes=[],
         every_method=METHODS,
         asked=asked,
@@ -55,8 +58,6 @@ def test_the_same_bytes_twice(table_file, tmp_path):
 
 
 def test_a_failure_that_nothing_expects_is_logged(tmp_path, caplog):
-    empty = tmp_path / "hard_cases.yaml"
-    empty.write_text("{}", encoding="utf-8")
     with caplog.at_level(logging.WARNING, logger="pdrom"):
-        make(tmp_path, empty)
+        make(tmp_path, {})
     assert "one_triangle, deim-joint: singular, but no entry expects a failure" in caplog.text
