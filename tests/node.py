@@ -34,7 +34,7 @@ const all = data.models.map((model) => {
     run.step();
     coordinates.push(Array.from(run.z));
   }
-  return { family: model.family, elements: run.elements, distance: run.distance(), coordinates };
+  return { family: model.family, elements: run.elements, coordinates };
 });
 return all;
 """

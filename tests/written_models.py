@@ -8,7 +8,6 @@ from pdrom.core.store import write_hdf5
 from pdrom.model.mesh.types import save_mesh
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
-from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
 from pdrom.reduction.subspace.store import store_columns, store_model
 from places import ROOT
@@ -43,11 +42,9 @@ def write_models(
         labels = {"method": "ecsw-1e-02", "position_basis": "pod", "k": k, "base": "own"}
         store_model(file.create_group("models/own"), labels, samples)
     asked = LiveModels(sizes=(k,))
-    options = Options(
-        scene=scene.config, title="A title", live=asked, guard=GuardSettings(), joint_rows=()
-    )
+    options = Options(scene=scene.config, title="A title", live=asked, joint_rows=())
     mesh, train, models, out = (
         File(str(folder / name), {}) for name in ("mesh.h5", "train.h5", "models.h5", "test.js")
     )
-    live(mesh, train, [models], [], [], [], [], options, out)
+    live(mesh, train, [models], [], [], [], options, out)
     return folder / "test.js", model

@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 49_532,
-    "modules of src": 502,
-    "lines of tests": 32_843,
-    "words of documentation": 29_218,
-    "tables": 44,
-    "figures": 26,
-    "experiments": 28,
-    "percent of src in decorators, signatures and imports": 23.6,
+    "lines of src": 47_700,
+    "modules of src": 485,
+    "lines of tests": 31_744,
+    "words of documentation": 28_523,
+    "tables": 40,
+    "figures": 25,
+    "experiments": 24,
+    "percent of src in decorators, signatures and imports": 23.2,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

@@ -33,8 +33,7 @@ MICRO = {
 }
 MICRO_FILE = "micro.yaml"
 TIMED_FOLDERS = (
-    "timings", "frame_times", "seconds", "breakeven", "effects", "left_out", "guard",
-    "logs",
+    "timings", "frame_times", "seconds", "breakeven", "effects", "left_out", "logs",
 )  # fmt: skip
 TIMED_FIGURES = ("local_share", "accuracy_cost", "alternatives")
 SHIM = '#!/bin/sh\nPYTHONPATH="{hooks}" exec "{python}" {module} "$@"\n'

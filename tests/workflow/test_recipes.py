@@ -42,7 +42,6 @@ STUDY = {
     "ranks": [2],
     "heldout_ranks": [],
     "coarsen": {"resolution": 0.25, "frames": 0.05},
-    "guard": {"cases": []},
     "sensitivity": {"perturbations": [1e-10], "seeds": [1]},
 }
 ARGUMENTS = ("--configfile", "own.yaml")

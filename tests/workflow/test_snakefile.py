@@ -33,7 +33,7 @@ MICRO = {
 }
 # Folders of results that belong to no single scene.
 SHARED = (
-    "tables", "figures", "paper", "article", "hard_cases", "guard", "frame_times",
+    "tables", "figures", "paper", "article", "hard_cases", "frame_times",
 )  # fmt: skip
 MICRO_FILE = "micro.yaml"
 EDITED = ("workflow", "config", "paper", "src", "Snakefile", MICRO_FILE)

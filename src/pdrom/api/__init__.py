@@ -3,7 +3,7 @@
 docs/python.md has a worked example.
 """
 
-from pdrom.api.arguments import GuardSettings, methods
+from pdrom.api.arguments import methods
 from pdrom.api.files import load, save
 from pdrom.api.pictures import plot, view
 from pdrom.api.records import AskedRun, FullRun, ReducedRun
@@ -13,7 +13,6 @@ from pdrom.api.scenes import build_scene, load_scene
 __all__ = [
     "AskedRun",
     "FullRun",
-    "GuardSettings",
     "ReducedRun",
     "basis",
     "build_scene",

@@ -6,30 +6,17 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from pydantic import ValidationError
 
 from pdrom.api.records import FullRun
 from pdrom.core.errors import ConfigurationError, SnapshotError, choices
 from pdrom.core.project import config_file
 from pdrom.core.store import require_finite
-from pdrom.core.yamlfile import describe, shown
+from pdrom.core.yamlfile import shown
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.reduction.basis import Basis
-from pdrom.reduction.local import guard_settings
 from pdrom.reduction.method import MethodSpec, load_methods
 
 T = TypeVar("T")
-
-
-class GuardSettings(guard_settings.GuardSettings):
-    __doc__ = guard_settings.GuardSettings.__doc__
-
-    def __init__(self, **keys: Any) -> None:
-        try:
-            super().__init__(**keys)
-        except ValidationError as error:
-            reported = describe(error, guard_settings.GuardSettings)
-            raise ConfigurationError(f"GuardSettings: {reported}") from error
 
 
 def require(kind: type[T] | tuple[type[T], ...], value: Any, name: str, source: str) -> T:

@@ -2,9 +2,7 @@
 
 import json
 import os
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -25,7 +23,6 @@ from pdrom.core.yamlfile import validate
 from pdrom.model.mesh.config import MeshConfig, MeshFile
 from pdrom.model.mesh.types import store_mesh, stored_mesh
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.local.guard import GuardRecord
 from pdrom.reduction.requested.calibration import Request
 from pdrom.reduction.requested.run import Outcome
 from pdrom.reduction.rerun import Rerun, displacement_norms
@@ -58,12 +55,6 @@ def save(reduced: ReducedRun | AskedRun, path: str | os.PathLike[str]) -> None:
     with made_by("pdrom.api.save", {"scene": config, **labels}), write_hdf5(path) as file:
         file.attrs.update(labels | {"gain": reduced.gain, "ms_per_frame": reduced.ms})
         file.attrs["blowup_frame"] = -1 if outcome.blowup_frame is None else outcome.blowup_frame
-        seen = {
-            key: reported
-            for key, reported in reduced.seen.columns().items()
-            if reported is not None
-        }
-        file.attrs.update({**seen, "guard_stopped": reduced.seen.stopped})
         store_mesh(reduced.full.scene.mesh, file.create_group("mesh"))
         _store(file, "reduced", outcome.positions.astype(np.float32), "m")
         _store(file, "full", reduced.full.positions.astype(np.float32), "m")
@@ -180,23 +171,7 @@ def _reduced(scene: Scene, file: h5py.File) -> ReducedRun:
     )
     group, method = str(file.attrs["group"]), str(file.attrs["method"])
     r, gain, ms = int(file.attrs["r"]), float(file.attrs["gain"]), float(file.attrs["ms_per_frame"])
-    return ReducedRun(full, group, method, r, gain, outcome, ms, _seen(file.attrs))
-
-
-def _seen(reported: Mapping[str, Any]) -> GuardRecord:
-    """Record of the guard; nothing in a file without one."""
-    if "guard_count" not in reported:
-        return GuardRecord.unwatched()
-    frame, reason = reported.get("guard_frame"), reported.get("guard_reason")
-    estimate = reported.get("guard_estimate")
-    return GuardRecord(
-        frame=None if frame is None else int(frame),
-        reason=None if reason is None else str(reason),
-        count=int(reported["guard_count"]),
-        fallback_frames=int(reported["fallback_frames"]),
-        estimate=None if estimate is None else float(estimate),
-        stopped=bool(reported["guard_stopped"]),
-    )
+    return ReducedRun(full, group, method, r, gain, outcome, ms)
 
 
 def _scene(file: h5py.File, path: Path) -> Scene:

@@ -1,6 +1,6 @@
 """Records that `run` and `reduce` return."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import h5py
 import numpy as np
@@ -8,7 +8,6 @@ import numpy as np
 from pdrom.core.brief import brief
 from pdrom.model.scene import Scene
 from pdrom.reduction.deviations import Yardstick
-from pdrom.reduction.local.guard import GuardRecord
 from pdrom.reduction.requested.calibration import Request
 from pdrom.reduction.requested.run import Outcome
 from pdrom.reduction.rerun import Rerun, mean_motion
@@ -49,8 +48,7 @@ class ReducedRun:
 
     gain : norm of the sampled equations' solution operator; 1 if every projection is evaluated
     outcome : positions (F' + 1, N, 3) m, differences, and whether it blew up
-    ms : milliseconds a frame (median), those of a guard included
-    seen : what the guard saw, if there was one
+    ms : milliseconds a frame (median)
     """
 
     full: FullRun
@@ -60,7 +58,6 @@ class ReducedRun:
     gain: float
     outcome: Rerun
     ms: float
-    seen: GuardRecord = field(default_factory=GuardRecord.unwatched)
 
     def __repr__(self) -> str:
         name, outcome = self.full.scene.config.name, self.outcome

@@ -29,8 +29,8 @@ from pdrom.model.runs.bounded import Advance, BoundedRun, frame_by_frame
 from pdrom.model.runs.full_order import run as run_full_order
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis import Basis, compute_basis
-from pdrom.reduction.local.guard_settings import GuardSettings
-from pdrom.reduction.local.guarded import Trained, guarded
+from pdrom.reduction.local.local_step import ReducedLocalStep
+from pdrom.reduction.local.rerun import replace_group
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.requested.calibration import Request, read_request
 from pdrom.reduction.requested.levels import OnWork, silent
@@ -38,13 +38,10 @@ from pdrom.reduction.rerun import compare
 from pdrom.reduction.sampling import Reduction
 from pdrom.reduction.sampling.select import select
 from pdrom.reduction.snapshots import row_masses, training_frames
-from pdrom.reduction.subspace.companion import CompanionSpec, companion_model
-from pdrom.reduction.subspace.model import SubspaceModel
 
 SNAPSHOTS = 100  # at most, of a group for which the scene names no number
 # A reduced run ends when its bounding box exceeds this multiple of the mesh's.
 BLOWUP_EXTENT = 100.0
-UNGUARDED = GuardSettings(action="none")
 GROUP = "the name of a constraint group"
 FULL_RUN = "pdrom.api.run makes one, load reads one"
 
@@ -134,7 +131,6 @@ def reduce(
     method: str | MethodSpec = "gappy",
     r: int = 20,
     basis_of_group: Basis | None = None,
-    guard: GuardSettings = UNGUARDED,
 ) -> ReducedRun: ...
 
 
@@ -144,14 +140,13 @@ def reduce(
     method: str | MethodSpec = "gappy",
     r: int = 20,
     basis_of_group: Basis | None = None,
-    guard: GuardSettings = UNGUARDED,
     error: Wish | None = None,
     scene: Scene | None = None,
     on_work: OnWork = silent,
 ) -> ReducedRun | AskedRun:
     """The scene again, with the projections of one group reduced to r modes.
 
-    A run that blows up, or that its guard stops, ends there and is a result like any other.
+    A run that blows up ends there and is a result like any other.
 
     Parameters
     ----------
@@ -160,8 +155,6 @@ def reduce(
     method : name in config/methods.yaml, or a specification
     r : number of modes, from 1 to the rank of the basis
     basis_of_group : of the group, by `basis` for the same method; made of ``full`` without it
-    guard : what watches the run, and what follows from an alarm; an auxiliary model that estimates
-        its error is trained on ``full``
     error : in place of all these: largest relative error that is allowed, 0.01 or "velocity=0.05",
         against the implicit step solved to convergence. The whole scene is reduced as far as that
         allows, or not at all.
@@ -172,7 +165,7 @@ def reduce(
     -------
     ReducedRun, or AskedRun with an ``error``
         ``outcome`` (positions, differences, the frame of a blow-up), ``error`` of each frame,
-        ``gain``, ``ms`` a frame, what the guard has ``seen``.
+        ``gain``, ``ms`` a frame.
 
     Raises
     ------
@@ -181,9 +174,6 @@ def reduce(
         snapshots.
     RankError
         The snapshots have fewer than r modes above round-off.
-    NotReducibleError
-        An auxiliary model is asked for, and the scene has an effect that no position subspace
-        takes.
     """
     require(FullRun, full, "full", source=FULL_RUN)
     if error is not None:
@@ -196,34 +186,21 @@ def reduce(
     scene, spec = full.scene, method_spec(method)
     r, chosen = modes(r), scene.group(group)
     require_positions(full)
-    require(GuardSettings, guard, "guard", source="as in GuardSettings(action='stop')")
     if basis_of_group is None:
         made = basis(full, group, spec)
     else:
         made = fitting_basis(basis_of_group, chosen, spec)
     reduction = Reduction(made, select(made, spec, r), spec, r=r)
-    trained = _trained(full, group, guard)
-    loop, seen = guarded(
-        scene, scene.system, group, reduction=reduction, settings=guard, trained=trained
-    )
+    steps = replace_group(scene, group, ReducedLocalStep(chosen, reduction))
+    loop = scene.stepper(scene.system, steps, track_objective=False)
     seconds: list[float] = []
     start, frames, unit = scene.initial_state(), scene.config.frames, scene.mesh.extent
     clocked = frame_by_frame(_clocked(loop.step, seconds))
     run = BoundedRun(clocked, start, frames, BLOWUP_EXTENT, unit)
-    outcome = compare(run, full.positions, lambda: seen.stopped)
+    outcome = compare(run, full.positions)
     ms = 1e3 * float(np.median(seconds))
     name = method if isinstance(method, str) else method.title
-    return ReducedRun(full, group, name, r, float(reduction.gain), outcome, ms, seen)
-
-
-def _trained(full: FullRun, group: str, guard: GuardSettings) -> Trained:
-    """Training run of the guard."""
-    companion: SubspaceModel | None = None
-    if guard.action != "none" and guard.alarm == "estimate":
-        frames = _training_frames(full.scene, group)
-        training = full.positions[1:][frames]
-        companion = companion_model(full.scene, training, frames, spec=CompanionSpec())
-    return Trained.on(full.positions, companion)
+    return ReducedRun(full, group, name, r, float(reduction.gain), outcome, ms)
 
 
 def _clocked(advance: Advance, seconds: list[float]) -> Advance:

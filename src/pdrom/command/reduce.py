@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from pdrom.command.base import Command, Status, declare_unchecked, require_output
 
 if TYPE_CHECKING:
-    from pdrom.api import GuardSettings, ReducedRun
+    from pdrom.api import ReducedRun
 
 WRONG = 0.1  # relative error above which the study calls a run wrong
 PICTURES = {"pdf": "Creator", "png": "Software", "svg": "Creator"}  # where each says its maker
@@ -45,24 +45,6 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", metavar="FILE", help="file to write (HDF5); SCENE_G_M_R.h5 without it"
     )
-    parser.add_argument(
-        "--guard",
-        choices=("report", "stop", "fall-back"),
-        help="watch the run, and what follows from an alarm: it is reported, the run ends, or the "
-        "frame is repeated with full projections",
-    )
-    parser.add_argument(
-        "--alarm",
-        choices=("trained-range", "estimate"),
-        help="what gives the alarm: the run leaves what its basis was trained on (without this "
-        "option), or its error, estimated by a finer model that runs beside it, is too large",
-    )
-    parser.add_argument(
-        "--threshold",
-        metavar="E",
-        type=float,
-        help="largest estimated error that is no alarm, relative to the motion (0.15)",
-    )
     parser.add_argument("--plot", metavar="FILE", help="picture of the error against time to write")
     declare_unchecked(parser)
 
@@ -79,7 +61,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.core.store import atomic_path
     from pdrom.core.store.atomic import MARK
 
-    guard, out = _guard(arguments), arguments.out or _file(arguments)
+    out = arguments.out or _file(arguments)
     _check_outputs(arguments, out)
     scene = load_scene(arguments.scene)
     scene.group(arguments.group)
@@ -91,7 +73,7 @@ def perform(arguments: argparse.Namespace) -> Status:
             raise StorageError(f"{arguments.run}: a run of another scene than {arguments.scene}")
     else:
         full = run(scene, on_frame=Progress(scene.config.name, scene.config.frames))
-    reduced = reduce(full, arguments.group, arguments.method, r=arguments.r, guard=guard)
+    reduced = reduce(full, arguments.group, arguments.method, r=arguments.r)
     save(reduced, out)
     if arguments.plot:
         picture = plot(reduced)
@@ -118,21 +100,6 @@ def _check_outputs(arguments: argparse.Namespace, out: str) -> None:
     require_output(arguments.plot, [*read, out])
 
 
-def _guard(arguments: argparse.Namespace) -> "GuardSettings":
-    from pdrom.api import GuardSettings
-    from pdrom.core.errors import ConfigurationError
-    from pdrom.core.yamlfile import validate
-
-    asked = {"alarm": arguments.alarm, "threshold": arguments.threshold}
-    given = {key: value for key, value in asked.items() if value is not None}
-    if given and not arguments.guard:
-        raise ConfigurationError(f"--{next(iter(given))}: --guard is required with it")
-    if arguments.threshold is not None and arguments.alarm != "estimate":
-        raise ConfigurationError("--threshold: --alarm estimate is required with it")
-    action = arguments.guard or "none"
-    return validate(GuardSettings, {"action": action, **given}, "pdrom reduce")
-
-
 def _file(arguments: argparse.Namespace) -> str:
     path = Path(arguments.scene)
     name = f"{path.stem}_{arguments.group}_{arguments.method}_{arguments.r}.h5"
@@ -148,7 +115,7 @@ def _told(reduced: "ReducedRun") -> str:
     else:
         speed = f"{reduced.ms:.2f} ms a frame (full order {np.median(full.ms):.2f})"
         reported = f"{_error(reduced)}, {_gain(reduced)}, {speed}"
-    return f"{reduced.title}: {reported}{_seen(reduced)}"
+    return f"{reduced.title}: {reported}"
 
 
 def _gain(reduced: "ReducedRun") -> str:
@@ -158,8 +125,6 @@ def _gain(reduced: "ReducedRun") -> str:
 def _error(reduced: "ReducedRun") -> str:
     from pdrom.reduction.rerun import displacement_norms
 
-    if reduced.seen.stopped:
-        return f"stopped after frame {reduced.outcome.frames - 1}"
     error = reduced.outcome.error(displacement_norms(reduced.full.positions))
     if error is None:
         return "no error: nothing moves"
@@ -168,18 +133,6 @@ def _error(reduced: "ReducedRun") -> str:
         f"relative error {error:.2g} of the full order's motion, over all frames (largest of one "
         f"frame {largest:.2g}; {'accurate' if error <= WRONG else 'wrong'}: {WRONG:g} is the limit)"
     )
-
-
-def _seen(reduced: "ReducedRun") -> str:
-    """Record of the guard, if there was one."""
-    seen = reduced.seen
-    if not seen.watched:
-        return ""
-    reported = "; no alarm"
-    if seen.frame is not None:
-        reported = f"; alarms in {seen.count} frames, first in {seen.frame} ({seen.reason})"
-        reported += f", {seen.fallback_frames} repeated" if seen.fallback_frames else ""
-    return reported if seen.estimate is None else f"{reported}; estimated error {seen.estimate:.2g}"
 
 
 COMMAND = Command(

@@ -10,9 +10,6 @@ from pdrom.command.base import Status, require_output
 if TYPE_CHECKING:
     from pdrom.api import AskedRun
 
-# Options of a single group.
-OF_A_GROUP = ("guard", "alarm", "threshold", "plot")
-
 
 def perform_request(arguments: argparse.Namespace) -> Status:
     """Calibrate on the training run, run, and say what was done and what it cost."""
@@ -30,9 +27,8 @@ def perform_request(arguments: argparse.Namespace) -> Status:
             "--group or --error: one is required (or reduce.error in the scene)"
         )
     request = read_request(wish, source)
-    for option in OF_A_GROUP:
-        if getattr(arguments, option) is not None:
-            raise ConfigurationError(f"--{option}: only together with --group")
+    if arguments.plot is not None:
+        raise ConfigurationError("--plot: only together with --group")
     if not arguments.run:
         raise ConfigurationError(
             f"{source}: --run is required with it: a training run, which pdrom run makes"

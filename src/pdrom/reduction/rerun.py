@@ -1,6 +1,5 @@
 """A run of a reduced model, compared with the full-order run frame by frame."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,15 +57,8 @@ class Rerun:
         return trajectory_error(self.difference, displacement)
 
 
-def compare(
-    run: BoundedRun, reference: np.ndarray, stopped: Callable[[], bool] = lambda: False
-) -> Rerun:
-    """Do a run and compare it with ``reference``, (F + 1, N, 3) positions of the full-order run.
-
-    Parameters
-    ----------
-    stopped : called after every frame: whether the run ends there
-    """
+def compare(run: BoundedRun, reference: np.ndarray) -> Rerun:
+    """Do a run and compare it with ``reference``, (F + 1, N, 3) positions of the full-order run."""
     coordinates = [run.state.positions]
     positions = [run.positions(run.state.positions)]
     difference, extents = [], []
@@ -75,8 +67,6 @@ def compare(
         positions.append(frame.positions)
         difference.append(float(np.linalg.norm(frame.positions - reference[frame.number + 1])))
         extents.append(frame.extent)
-        if stopped():
-            break
     stacked = np.stack(positions)
     same = positions[0] is coordinates[0]
     return Rerun(

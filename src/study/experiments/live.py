@@ -15,8 +15,6 @@ from pdrom.core.store import write_text
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, load_basis
-from pdrom.reduction.local.guard_settings import GuardSettings
-from pdrom.reduction.local.trained_range import largest_extent
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import mean_motion
 from pdrom.reduction.subspace.columns import Columns
@@ -25,7 +23,6 @@ from pdrom.reduction.subspace.exported import (
     export_model,
     export_scene,
     needed_vertices,
-    trained_box,
 )
 from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.joint import interpolation_of
@@ -33,7 +30,6 @@ from pdrom.reduction.subspace.model import SubspaceModel, ecsw_name
 from pdrom.reduction.subspace.store import load_models
 from study.artifact.paths import (
     BASIS,
-    COMPANION,
     LIVE_MODEL,
     MESH,
     ONLINE_MODELS,
@@ -74,6 +70,17 @@ class Live(LiveModels):
     scenes: tuple[SceneName, ...] = ()
 
 
+class OfScene(ConfigModel):
+    """Names a file of a scene."""
+
+    scene: str
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Labels of the file."""
+        return {"scene": self.scene}
+
+
 class JointRows(ConfigModel):
     """Joint rows of a group, which the study has samples of."""
 
@@ -93,7 +100,6 @@ class Options(ConfigModel):
     scene: SceneConfig
     title: str
     live: LiveModels
-    guard: GuardSettings
     joint_rows: tuple[JointRows, ...]
 
 
@@ -104,7 +110,6 @@ class Options(ConfigModel):
         "train": TRAIN,
         "subspaces": EachOf(SUBSPACES, "with_subspaces"),
         "online": EachOf(ONLINE_MODELS, "with_online_models"),
-        "companions": EachOf(COMPANION, "with_companion"),
         "bases": EachOf(BASIS, "joint_rows"),
         "samplings": EachOf(SAMPLING, "joint_rows"),
         "settings": Settings(Options),
@@ -116,7 +121,6 @@ def live(
     train: File,
     subspaces: list[File],
     online: list[File],
-    companions: list[File],
     bases: list[File],
     samplings: list[File],
     settings: Options,
@@ -141,21 +145,14 @@ def live(
     for case, basis, sampling in zip(settings.joint_rows, bases, samplings, strict=True):
         joint = _Joint(case, load_basis(basis.path), sampling.path, size)
         chosen += list(joint.models(scene, [model for _, model in chosen]))
-    beside = [model for file in companions for _, model in load_models(file.path)]
-    chosen += [({"family": "companion", "k": model.columns.modes}, model) for model in beside]
     content = {
         "format": FORMAT,
         "scene": settings.scene.name,
         "title": settings.title,
         **export_scene(scene),
-        **_models(scene, chosen, reference),
+        **_models(scene, chosen),
         "shown": _shown(scene, reference),
-        "guard": {
-            "margin": settings.guard.margin,
-            "extent": settings.guard.extent * largest_extent(reference),
-            "threshold": settings.guard.threshold,
-            "motion": mean_motion(reference),
-        },
+        "motion": mean_motion(reference),
     }
     text = f"pdromLive({json.dumps(content, separators=(',', ':'), allow_nan=False)});\n"
     if len(text) > LARGEST:
@@ -198,7 +195,7 @@ class _Joint:
             yield labels, SubspaceModel(model.position_basis, model.columns, samples)
 
 
-def _models(scene: Scene, chosen: list[Labelled], reference: np.ndarray) -> dict[str, Any]:
+def _models(scene: Scene, chosen: list[Labelled]) -> dict[str, Any]:
     """Bases and models; a model knows the place of its basis."""
     columns: dict[int, Columns] = {id(model.columns): model.columns for _, model in chosen}
     places = {key: place for place, key in enumerate(columns)}
@@ -207,10 +204,7 @@ def _models(scene: Scene, chosen: list[Labelled], reference: np.ndarray) -> dict
     ]
     return {
         "bases": [
-            {
-                **export_basis(scene, own, rows),
-                "trained": pack_array(trained_box(scene, own, reference), "f8"),
-            }
+            export_basis(scene, own, rows)
             for own, rows in zip(columns.values(), needed, strict=True)
         ],
         "models": [

@@ -15,17 +15,14 @@ from pdrom.model.held_out import FIRST
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, load_basis
 from pdrom.reduction.deviations import Yardstick
-from pdrom.reduction.local.guard import GUARD_COLUMNS, GuardRecord
-from pdrom.reduction.local.guard_settings import GuardSettings
-from pdrom.reduction.local.guarded import Trained, guarded_rerun
+from pdrom.reduction.local.local_step import ReducedLocalStep
 from pdrom.reduction.local.ranks import Rank, resolve_ranks
+from pdrom.reduction.local.rerun import replace_group, rerun
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.snapshots import load_snapshots
-from pdrom.reduction.subspace.store import load_models
 from study.artifact.paths import (
     BASIS,
-    COMPANION,
     FULL_ORDER,
     MESH,
     RECONSTRUCTION,
@@ -37,7 +34,7 @@ from study.artifact.paths import (
     TRAIN,
     File,
 )
-from study.artifact.reads import EachOf, Every, Settings
+from study.artifact.reads import Every, Settings
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.load_reduction import load_reduction
 from study.experiments.kit.sampling import Sweep, sample
@@ -49,21 +46,9 @@ log = logging.getLogger(__name__)
 
 COLUMNS = [
     "scene", "group", "method", "r", "frames", "finite", "blowup_frame", "max_extent",
-    "relative_error", "energy_ratio", "gain", *GUARD_COLUMNS,
+    "relative_error", "energy_ratio", "gain",
 ]  # fmt: skip
 MOTION = "motion"  # column of the held-out rows only
-UNWATCHED = GuardSettings(action="none")
-
-
-class OfScene(ConfigModel):
-    """Names a file of a scene."""
-
-    scene: str
-
-    @property
-    def labels(self) -> dict[str, str]:
-        """Labels of the file."""
-        return {"scene": self.scene}
 
 
 class Options(ConfigModel):
@@ -75,7 +60,6 @@ class Options(ConfigModel):
     ranks: tuple[Rank, ...]
     heldout_ranks: tuple[Rank, ...]
     blowup_extent: BlowupExtent
-    guard: GuardSettings
     solver: Solver
 
 
@@ -87,7 +71,6 @@ class Options(ConfigModel):
         "motions": Every(FULL_ORDER),
         "snapshots": SNAPSHOTS,
         "basis": BASIS,
-        "companions": EachOf(COMPANION, "companions"),
         "settings": Settings(Options),
     },
     writes={
@@ -104,7 +87,6 @@ def reruns(
     motions: list[File],
     snapshots: File,
     basis: File,
-    companions: list[File],
     settings: Options,
     sampling: File,
     errors: File,
@@ -128,8 +110,6 @@ def reruns(
         errors=errors,
     )
     labels = runs.labels
-    models = [model for file in companions for _, model in load_models(file.path)]
-    trained = Trained.on(positions_of(fom), models[0] if models else None)
     full = tuple(rank for rank in settings.heldout_ranks if rank == "full")
     ranks = {TRAINING: settings.ranks, FIRST: settings.heldout_ranks}
     found = {}
@@ -137,14 +117,12 @@ def reruns(
         for run in motions:
             motion, reference = run["run"], positions_of(run)
             scene = scene_of(settings.scene, mesh, motion)
-            case = _Case(scene, motion, labels, settings, space, sampling.path, trained)
+            case = _Case(scene, motion, labels, settings, space, sampling.path)
             yardstick = Yardstick(scene, reference)
             file.attrs.update(yardstick.units)
             store = file if motion == TRAINING else file.create_group(motion)
             rows = case.run(store, ranks.get(motion, full), yardstick)
-            whole = ["guard_frame", "guard_count", "fallback_frames"]
-            table = pd.DataFrame(rows, columns=COLUMNS).astype(dict.fromkeys(whole, "Int64"))
-            found[motion] = table
+            found[motion] = pd.DataFrame(rows, columns=COLUMNS)
     write_table(found.pop(TRAINING), out.path)
     heldout = [table.assign(**{MOTION: motion}) for motion, table in found.items()]
     write_table(pd.concat(heldout, ignore_index=True), heldout_table.path)
@@ -160,7 +138,6 @@ class _Case:
     settings: Options
     basis: Basis
     sampling: str
-    trained: Trained
 
     def run(
         self, file: h5py.Group, ranks: tuple[Rank, ...], yardstick: Yardstick
@@ -171,7 +148,7 @@ class _Case:
         ----------
         yardstick : the motion's full-order run
         """
-        settings, reference = self.settings, yardstick.reference
+        settings, group, reference = self.settings, self.labels["group"], yardstick.reference
         for name, values in yardstick.series.items():
             file[name] = values
         system = self.scene.system_with(settings.solver)
@@ -184,46 +161,28 @@ class _Case:
                 rows.append({**self.labels, "r": r, "frames": 0})
                 continue
             reduction = load_reduction(self.basis, self.sampling, settings.method, r=r)
-            watched = self._watched(r)
-            guard = settings.guard if watched else UNWATCHED
-            outcome, seen = guarded_rerun(
-                self.scene, system, self.labels["group"], reduction=reduction, reference=reference,
-                blowup_extent=settings.blowup_extent, settings=guard, trained=self.trained,
-            )  # fmt: skip
+            step = ReducedLocalStep(self.scene.group(group), reduction)
+            steps = replace_group(self.scene, group, step)
+            outcome = rerun(self.scene, system, steps, reference, settings.blowup_extent)
             apart = yardstick.deviations(outcome)
             for name, values in apart.items():
                 store[name] = values
-            _store(store, outcome, yardstick.displacement, seen)
-            if watched:  # the error of these is estimated, too
+            _store(store, outcome, yardstick.displacement)
+            if self.motion == TRAINING:  # of which figures are drawn
                 store["positions"] = outcome.positions.astype(np.float32)
-            measured = {
-                "energy_ratio": largest(apart["energy"]),
-                "gain": reduction.gain,
-                **seen.columns(),
-            }
+            measured = {"energy_ratio": largest(apart["energy"]), "gain": reduction.gain}
             rows.append(
                 {**self.labels, "r": r, **_row(outcome, yardstick.displacement), **measured}
             )
             log.info("r = %d: %d frames, blow-up %s", r, outcome.frames, outcome.blowup_frame)
         return rows
 
-    def _watched(self, r: int) -> bool:
-        """Whether the guard sees a run, which doubles its time.
 
-        One that acts sees all. One that only reports sees those whose alarms are counted: all of
-        the training motion, those of full rank of the held-out ones.
-        """
-        if self.settings.guard.action not in ("none", "report") or self.motion == TRAINING:
-            return True
-        return r == self.basis.rank
-
-
-def _store(store: h5py.Group, outcome: Rerun, displacement: np.ndarray, seen: GuardRecord) -> None:
+def _store(store: h5py.Group, outcome: Rerun, displacement: np.ndarray) -> None:
     store["error"] = outcome.difference / np.sqrt(np.mean(displacement**2))
     store["extent"] = outcome.extent
     blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
     store.attrs.update(finite=outcome.finite, blowup_frame=blowup, max_extent=outcome.max_extent)
-    store.attrs.update({k: v for k, v in seen.columns().items() if v is not None})
 
 
 def _row(outcome: Rerun, displacement: np.ndarray) -> dict[str, Any]:

@@ -389,8 +389,8 @@ const pdromEngine = (() => {
       if (stored.exact) stored.exact.vertices.forEach((v, i) => {
         this.B.set(stored.exact.rows.subarray(this.size * i, this.size * (i + 1)), this.size * v);
       });
-      Object.assign(this, { free: stored.free, atoms: stored.atoms, atomColumns: stored.atomColumns,
-        inertia: stored.inertia, forces: stored.forces, start: stored, trained: stored.trained });
+      Object.assign(this, { atoms: stored.atoms, atomColumns: stored.atomColumns,
+        inertia: stored.inertia, forces: stored.forces, start: stored });
       this.file = file;
       this.moves = this.atoms.map((atom, a) => this._translation(atom, this.atomColumns[a]));
     }
@@ -558,19 +558,6 @@ const pdromEngine = (() => {
     get finite() {
       return this.z.every(Number.isFinite);
     }
-
-    // How far the shape lies outside the box of the recorded run, as a fraction of the box's diagonal. Affine motions
-    // do not count: a body that is carried about is no new shape.
-    distance() {
-      const { free, trained, size: K } = this.basis, shapes = free.slice(4);
-      let out = 0, diagonal = 0;
-      for (const k of shapes) for (let axis = 0; axis < 3; axis++) {
-        const low = trained[3 * k + axis], high = trained[3 * K + 3 * k + axis], x = this.z[3 * k + axis];
-        out += Math.max(low - x, x - high, 0) ** 2;
-        diagonal += (high - low) ** 2;
-      }
-      return Math.sqrt(out / diagonal);
-    }
   }
 
   // Rounds as NumPy does: halves to the even neighbour.
@@ -579,30 +566,5 @@ const pdromEngine = (() => {
     return half < 0.5 || (half === 0.5 && below % 2 === 0) ? below : below + 1;
   }
 
-  // Distance of two runs in all vertices, m, from Gram matrices of their bases, which do not grow with the mesh.
-  class Distance {
-    constructor(first, second) {
-      this.parts = [[first, first], [first, second], [second, second]].map(([a, b]) => {
-        const gram = new Float64Array(a.size * b.size);
-        for (let v = 0; v < a.vertices; v++) for (let i = 0; i < a.size; i++) {
-          const value = a.B[a.size * v + i];
-          if (value !== 0) for (let j = 0; j < b.size; j++) gram[b.size * i + j] += value * b.B[b.size * v + j];
-        }
-        return { gram, rows: a.size, size: b.size };
-      });
-    }
-
-    of(first, second) {
-      const [own, cross, other] = this.parts, form = ({ gram, rows, size }, x, y) => {
-        let total = 0;
-        const product = times(gram, y, size, new Float64Array(3 * rows));
-        for (let i = 0; i < product.length; i++) total += product[i] * x[i];
-        return total;
-      };
-      const square = form(own, first, first) - 2 * form(cross, first, second) + form(other, second, second);
-      return Math.sqrt(Math.max(square, 0));
-    }
-  }
-
-  return { Basis, Run, Distance, clamp3, clamp2 };
+  return { Basis, Run, clamp3, clamp2 };
 })();

@@ -7,7 +7,7 @@
   const KEY_STEP = 0.04; // of the scene's size
   const ROOM = 1.35; // of the picture about the shape at rest
   const LAG = 0.1; // part of its way to the shape that the camera goes in a frame
-  const SAMPLE = 400; // vertices that the size of the shape is looked at, at most
+  const SAMPLE = 400; // vertices by which the camera follows the shape, at most
   const TOLD = 200; // ms between two updates of the numbers
   const MOST_ITERATIONS = 40; // that a reader may choose, unless the scene has more
   const EARLY = 4; // ms: screens do not keep time exactly
@@ -17,7 +17,7 @@
   const loaded = new Map(); // scene -> promise of its unpacked file
   const waiting = new Map(); // scene -> takes its file when that has come
   let shown = null; // {data, frames, bases}: the scene
-  let run = null, companion = null, apart = null, handles = [], times = [], estimateSquares = 0, alarmed = "", dragging = false;
+  let run = null, handles = [], times = [], dragging = false;
   let playing = true, told = 0, due = 0, drawing = null, layers = {};
 
   window.pdromLive = (content) => waiting.get(content.scene)(content);
@@ -55,7 +55,7 @@
   const distinct = (values) => [...new Set(values)];
 
   function chosen() {
-    const models = shown.data.models.filter((model) => model.family !== "companion");
+    const { models } = shown.data;
     fill("method", distinct(models.map((model) => model.family)), (family) => METHODS[family]);
     const ofMethod = models.filter((model) => model.family === at("method").value);
     fill("k", distinct(ofMethod.map((model) => model.k)));
@@ -86,7 +86,6 @@
     if (sizes.includes(20)) at("k").value = 20;
     chosen();
     if ([...at("tau").options].some((option) => option.value === "0.01")) at("tau").value = 0.01;
-    at("estimate").disabled = !models.some((model) => model.family === "companion");
     start();
   }
 
@@ -95,15 +94,10 @@
   function start() {
     const model = chosen(), { data } = shown;
     run = new pdromEngine.Run(data, model, basis(model.basis));
-    const beside = data.models.find((other) => other.family === "companion");
-    companion = at("estimate").checked && beside ? new pdromEngine.Run(data, beside, basis(beside.basis)) : null;
-    apart = companion && new pdromEngine.Distance(run.basis, companion.basis);
     iterations();
     handles = run.basis.atoms.map((vertices, number) => ({ number, vertices, own: false, held: true, offset: [0, 0, 0],
       wanted: [0, 0, 0], name: nameOf(vertices, number) }));
     times = [];
-    estimateSquares = 0;
-    alarmed = "";
     measured = "";
     make();
     buttons();
@@ -156,50 +150,17 @@
     const own = performance.now() - before;
     times.push(own);
     if (times.length > 60) times.shift();
-    if (companion) {
-      companion.step(where);
-      estimateSquares += apart.of(run.z, companion.z) ** 2;
-    }
-    alarmed = alarm();
     if (!run.finite) playing = false;
     if (!playing) pressed();
   }
 
   const mine = () => handles.some((handle) => handle.own);
 
-  // ---- the monitor ----
-
-  const estimated = () => Math.sqrt(estimateSquares / run.frame) / shown.data.guard.motion;
-
-  function alarm() {
-    const { guard } = shown.data;
-    if (!run.finite) return "the run is no longer finite";
-    const out = run.distance();
-    if (out > guard.margin) return "the shape is unlike all that was trained";
-    if (size() > guard.extent) return "the shape is larger than any that was trained";
-    if (companion && run.frame > 0 && !(estimated() <= guard.threshold)) return "the estimated error is too large";
-    return "";
-  }
-
   // Positions of some vertices.
   function sampled() {
     const { vertices } = shown.data.shown, every = Math.ceil(vertices.length / SAMPLE);
     if (!run.sample) run.sample = vertices.filter((_, i) => i % every === 0);
     return run.basis.lift(run.z, run.sample, new Float64Array(3 * run.sample.length));
-  }
-
-  function size() {
-    const q = sampled();
-    let largest = 0;
-    for (let axis = 0; axis < 3; axis++) {
-      let low = Infinity, high = -Infinity;
-      for (let i = axis; i < q.length; i += 3) {
-        low = Math.min(low, q[i]);
-        high = Math.max(high, q[i]);
-      }
-      largest = Math.max(largest, high - low);
-    }
-    return largest;
   }
 
   // ---- pictures ----
@@ -276,15 +237,12 @@
   }
 
   function tell() {
-    if (alarmed) say(`Outside the trained range: ${alarmed}.`, true);
-    else say("Inside the trained range.", false);
+    say(run.finite ? "" : "The run is no longer finite.", !run.finite);
     const { data } = shown, sorted = [...times].sort((a, b) => a - b), recorded = recordedAt(run.frame);
     at("frame").textContent = `${run.frame}, ${(run.frame * data.timeStep).toFixed(2)} s`;
     at("ms").textContent = sorted.length ? `${sorted[sorted.length >> 1].toFixed(2)} ms` : "";
     if (recorded && !mine() && run.frame % data.shown.stride === 0) measured = percent(difference(recorded));
     at("distance").textContent = mine() ? "your motion was not recorded" : recorded ? measured : "the recording has ended";
-    at("estimated").textContent = companion && run.frame ? percent(estimated()) : "not estimated";
-    at("outside").textContent = percent(run.distance());
     document.body.dataset.frame = run.frame;
     at("handles").querySelectorAll("button.hold").forEach((button, i) => {
       const { held: on, name } = handles[i], text = on ? `Let go of ${name}` : `Hold ${name}`;
@@ -298,7 +256,7 @@
     const { vertices } = shown.data.shown, q = run.basis.lift(run.z, vertices, new Float64Array(3 * vertices.length));
     let square = 0;
     for (let i = 0; i < q.length; i++) square += (q[i] - recorded[i]) ** 2;
-    return Math.sqrt(square * shown.data.masses.length / vertices.length) / shown.data.guard.motion;
+    return Math.sqrt(square * shown.data.masses.length / vertices.length) / shown.data.motion;
   }
 
   // ---- handles ----
@@ -392,7 +350,7 @@
   at("choice").addEventListener("submit", (event) => event.preventDefault());
   at("scene").addEventListener("change", scene);
   const whileRunning = (id, event, action) => at(id).addEventListener(event, () => run && action());
-  for (const id of ["method", "k", "tau", "estimate"]) whileRunning(id, "change", start);
+  for (const id of ["method", "k", "tau"]) whileRunning(id, "change", start);
   whileRunning("ghost", "change", show);
   whileRunning("iterations", "input", iterations);
   whileRunning("again", "click", start);

@@ -151,26 +151,6 @@ def _full_order(table: pd.DataFrame) -> pd.Series:
     return (table.method == "full") & (table.position_basis == "full")
 
 
-def guard(tables: Tables) -> str:
-    """Cost of watching, and gain of falling back."""
-    rows = []
-    for row in tables["guard"].itertuples():
-        full = row.method == "full"
-        action = "full order" if full else row.action
-        alarm = "--" if pd.isna(row.alarm) else row.alarm.removeprefix("trained-")
-        estimate = "--" if pd.isna(row.guard_estimate) else format_number(row.guard_estimate)
-        method = "" if full else name(f"{row.method}, r = {int(row.r)}")
-        share = "--" if pd.isna(row.fallback_share) else format_number(row.fallback_share)
-        first = "--" if pd.isna(row.guard_frame) else f"{int(row.guard_frame)}, {row.guard_reason}"
-        error = "blow-up" if pd.isna(row.relative_error) else format_number(row.relative_error)
-        cells = [error, estimate, format_number(row.energy_ratio), first, share]
-        ms = format_number(row.ms_per_frame)
-        rows.append([name(row.scene), method, action, alarm, *cells, ms])
-    header = ["scene", "method", "action", "trigger", "error", "estimate", "energy", "first",
-              "repeated", "ms"]  # fmt: skip
-    return tabular(header, rows, "llllrrrlrr")
-
-
 TEX_TABLES = {
     "tab_claims": claims,
     "tab_claims_in_full": claims_in_full,
@@ -180,7 +160,6 @@ TEX_TABLES = {
     "tab_reruns": reruns,
     "tab_local_share": local_share,
     "tab_stability": stability,
-    "tab_guard": guard,
     "tab_iterations": iterations,
     "tab_positions": positions,
     "tab_break_even": break_even,

@@ -82,11 +82,7 @@ def _with_subspaces(study: Study) -> tuple[str, ...]:
     section = study.settings.subspace
     if not (section.bases and section.sizes):
         return ()
-    return section.scenes or _with_companions(study)
-
-
-def _with_companions(study: Study) -> tuple[str, ...]:
-    return tuple(name for name, config in study.scenes.items() if not not_taken(config))
+    return section.scenes or tuple(s for s, config in study.scenes.items() if not not_taken(config))
 
 
 def _repeated(study: Study, scene: str, group: str) -> bool:
@@ -114,7 +110,7 @@ def _live(study: Study) -> Iterator[Labels]:
     return ({"scene": scene} for scene in study.settings.live.scenes if scene in held)
 
 
-_subspaces, _companions = _scenes(_with_subspaces), _scenes(_with_companions)
+_subspaces = _scenes(_with_subspaces)
 _sizes = _sized(lambda study: study.settings.scaling.scenes)
 _online = [paths.ONLINE, paths.ONLINE_MODELS]
 _in_subspaces = [
@@ -123,7 +119,6 @@ _in_subspaces = [
 
 SOME: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     **dict.fromkeys(_in_subspaces, _subspaces),
-    **dict.fromkeys([paths.COMPANION, paths.ESTIMATES, paths.COMPANION_TIMES], _companions),
     **dict.fromkeys([paths.SCALING, paths.BREAK_EVEN_SIZED, paths.EFFECTS_SIZED], _sizes),
     **dict.fromkeys(_online, lambda study: ({"scene": scene} for scene in study.online)),
     **dict.fromkeys([paths.REPETITIONS, paths.REPEATED_FRAMES], _groups(_repeated)),

@@ -102,7 +102,6 @@ class Plan:
             "subspace.scenes": settings.subspace.scenes,
             "scaling.scenes": tuple(settings.scaling.scenes),
             "stability.scenes": settings.stability.scenes,
-            "guard.cases": tuple(case.scene for case in settings.guard.cases),
         }
         for place, scenes in named.items():
             require_scenes(self.root, scenes, place)

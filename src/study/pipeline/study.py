@@ -17,9 +17,7 @@ from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.local.ranks import Rank
 from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
 from study.experiments.alternatives.settings import Alternatives
-from study.experiments.companion import Companion
 from study.experiments.frame_times import FrameTimes
-from study.experiments.guard import GuardSection
 from study.experiments.hard_cases.experiment import HardCases
 from study.experiments.iterations import IterationSweep
 from study.experiments.kit.sampling import Sweep
@@ -80,8 +78,6 @@ class StudySettings(ConfigModel):
     ladder: LadderSection = LadderSection()
     published_choices: PublishedChoices = PublishedChoices()
     repetitions: RepetitionSection = RepetitionSection()
-    guard: GuardSection = GuardSection()
-    companion: Companion = Companion()
     hard_cases: HardCases = HardCases()
     online: Online = Online()
     live: Live = Live()

@@ -14,7 +14,7 @@ log = logging.getLogger(__name__)
 
 
 def check_subspaces(study: Study) -> None:
-    """Say which scenes of ``study`` go without subspaces, auxiliary model and estimates.
+    """Say which scenes of ``study`` go without subspaces.
 
     Raises
     ------
@@ -31,27 +31,25 @@ def check_subspaces(study: Study) -> None:
             if name in outside:
                 raise ConfigurationError(
                     f"{key}: scene '{name}' has the effect '{outside[name][0]}', which no position "
-                    "subspace (and no auxiliary model) takes"
+                    "subspace takes"
                 )
     for name, effects in outside.items():
         log.warning(
-            "%s: no position subspaces, no auxiliary model and no estimated errors, since none "
-            "takes the effect '%s'", name, "', '".join(effects),
-        )  # fmt: skip
+            "%s: no position subspaces, since none takes the effect '%s'",
+            name,
+            "', '".join(effects),
+        )
 
 
 def _asking(study: Study) -> dict[str, tuple[str, ...]]:
     """Keys that ask for a subspace of the scenes that they name."""
-    settings, guard = study.settings, study.settings.guard
-    estimated = guard.action != "none" and guard.alarm == "estimate"
+    settings = study.settings
     return {
         "subspace.scenes": settings.subspace.scenes,
         "scaling.scenes": tuple(settings.scaling.scenes),
         "online.scenes": settings.online.scenes,
         "alternatives.scenes": tuple(settings.alternatives.scenes),
         "config/subspace_ablation.yaml: scenes": study.ablation.scenes,
-        "guard.cases": tuple(case.scene for case in guard.cases),
-        "guard.alarm = 'estimate'": tuple(study.scenes) if estimated else (),
     }
 
 

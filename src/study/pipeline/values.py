@@ -14,11 +14,9 @@ from pdrom.reduction.method import BasisSpec, MethodSpec
 from study.artifact import paths
 from study.artifact.paths import Place
 from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
-from study.experiments.guard import Trial
 from study.experiments.kit.settings import Horizon
-from study.experiments.live import JOINT, JointRows
+from study.experiments.live import JOINT, JointRows, OfScene
 from study.experiments.repetitions import Repeated
-from study.experiments.reruns import OfScene
 from study.experiments.stability import Stability
 from study.pipeline.contents import labels_of
 from study.pipeline.study import Study
@@ -57,34 +55,6 @@ def _stability(study: Study, labels: Labels) -> Stability:
     section = study.settings.stability
     held = tuple(r for r in section.ranks if r in study.settings.ranks)
     return section.model_copy(update={"ranks": held})
-
-
-def _trials(study: Study, labels: Labels) -> tuple[Trial, ...]:
-    """The guard's cases that the study holds, one for each reduced group."""
-    settings = study.settings
-    held = [
-        case
-        for case in settings.guard.cases
-        if case.scene in study.scenes and case.method in study.methods and case.r in settings.ranks
-    ]
-    return tuple(
-        Trial(
-            scene=study.scenes[case.scene],
-            group=group,
-            name=case.method,
-            method=study.methods[case.method],
-            r=case.r,
-        )
-        for case in held
-        for group in study.scenes[case.scene].reduce
-    )
-
-
-def _companions(study: Study, labels: Labels) -> tuple[OfScene, ...]:
-    """The auxiliary model that a job's guard estimates errors with, if it does."""
-    guard = study.settings.guard
-    estimates = guard.action != "none" and guard.alarm == "estimate"
-    return (OfScene(scene=labels["scene"]),) if estimates else ()
 
 
 def _held(place: Place) -> Callable[[Study, Labels], tuple[OfScene, ...]]:
@@ -194,11 +164,8 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "basis": _basis,
     "horizon": _horizon,
     "stability": _stability,
-    "trials": _trials,
-    "companions": _companions,
     "with_subspaces": _held(paths.SUBSPACES),
     "with_online_models": _held(paths.ONLINE_MODELS),
-    "with_companion": _held(paths.COMPANION),
     "joint_rows": _joint_rows,
     "timed_scenes": _timed_scenes,
     "large_scenes": _large_scenes,

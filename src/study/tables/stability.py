@@ -19,9 +19,6 @@ from study.tables.kit.vocabulary import (
     FINITE,
     GAIN,
     GROUP,
-    GUARD_COUNT,
-    GUARD_FRAME,
-    GUARD_REASON,
     MAX_EXTENT,
     METHOD,
     POSITION_BASIS,
@@ -55,9 +52,6 @@ SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # what has one full-o
         text("experiment", "rerun (of the study) or sweep (a short run)"),
         RELATIVE_ERROR,
         compared("error", text("outcome", f"one of: {', '.join(OUTCOMES)}")),
-        GUARD_FRAME,
-        GUARD_REASON,
-        GUARD_COUNT,
     ),
     reads={
         "full_order": Every(paths.TRAIN),
@@ -81,9 +75,6 @@ def stability(
     departure: float,
 ) -> pd.DataFrame:
     """Rows of the study's reruns (experiment "rerun"), then of the short runs ("sweep").
-
-    What the guard saw (first frame and reason, number of frames) is known for reruns with unreduced
-    positions; nobody watches the others.
 
     Method "full" with position basis "full" is the full-order run. The error of a rerun is the one
     within the horizon, that of a short run is over all of it.

@@ -5,8 +5,7 @@ p_j = p_j(y) and a global step (M/h^2 + sum S^T W S) y = (M/h^2) s + sum S^T W p
 v = (y - q) / h and q = y. What replaces the projections of a group is a `LocalStep`.
 """
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Protocol
@@ -33,19 +32,6 @@ class LocalStep(Protocol):
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         """Add S^T W p(y) of ``y`` (N, 3) to ``rhs`` (N, 3); return the energy W(y), J, or nan."""
-
-
-class WatchedStep(ABC):
-    """A `LocalStep` that takes a look at some iterations, which are then not compiled ones."""
-
-    @property
-    @abstractmethod
-    def watched(self) -> Collection[int]:
-        """Iterations of the coming frame at which it looks."""
-
-    @abstractmethod
-    def look(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Do `accumulate` (``y``, ``rhs``) in these iterations."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +95,6 @@ class Stepper:
         self._whole: CompiledFrames | None = None
         if self._compiled is not None:
             self._whole = space.whole(self.local_steps, self._compiled, acceleration)
-        self._watching = [local for local in local_steps if isinstance(local, WatchedStep)]
 
     def step(
         self,
@@ -146,7 +131,7 @@ class Stepper:
 
     def _at_once(self, state: State, frames: range) -> Sequence[tuple[State, FrameReport]]:
         """The first of the frames, as many as compiled code can do in one call; none or more."""
-        if self._whole is None or self._watching:
+        if self._whole is None:
             return ()
         q, v, h = state.positions, state.velocities, self.time_step
         started = perf_counter()
@@ -189,18 +174,16 @@ class Stepper:
         objective = np.full(self.iterations if self._track else 0, np.nan)
         if self._acceleration is not None:
             self._acceleration.begin_frame(y)
-        watched = {k for local in self._watching for k in local.watched}
         compiled = self._compiled
         k, last = 0, self.iterations - 1
         while k <= last:
             if on_last_iterate is not None and k == last:
                 on_last_iterate(y)
-            if k in watched or compiled is None or not compiled.takes(elimination):
+            if compiled is None or not compiled.takes(elimination):
                 self._in_python(k, s, base, elimination, y, objective, seconds)
                 k += 1
                 continue
-            unseen = last if on_last_iterate is not None and k < last else self.iterations
-            end = min((j for j in watched if k < j < unseen), default=unseen)
+            end = last if on_last_iterate is not None and k < last else self.iterations
             which = range(k, end)
             compiled.run(which, self.iterations, objective, y, s, base, elimination, seconds)
             k = end
@@ -222,10 +205,7 @@ class Stepper:
         rhs = space.copy(base)
         energy = 0.0
         for local in self.local_steps:
-            if isinstance(local, WatchedStep) and k in local.watched:
-                energy += local.look(y, rhs)
-            else:
-                energy += local.accumulate(y, rhs)
+            energy += local.accumulate(y, rhs)
         between = perf_counter()
         seconds[1] += between - before
         if self._track and energy == energy:

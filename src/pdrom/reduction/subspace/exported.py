@@ -23,7 +23,6 @@ from pdrom.reduction.subspace.model import Samples, SubspaceModel
 from pdrom.reduction.subspace.space import (
     PROBES,
     ReducedSpace,
-    coordinates,
     probe_vertices,
     reduced_state,
 )
@@ -111,7 +110,6 @@ def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str
             "vertices": pack_array(rows, "u4"),
             "rows": pack_array(columns.B[rows], "f8"),
         },
-        "free": columns.free.tolist(),
         "atoms": [atom.tolist() for atom in columns.atoms],
         "atomColumns": [own.tolist() for own in columns.atom_columns],
         "inertia": pack_array(space.inertia_matrix, "f8"),
@@ -169,16 +167,3 @@ def needed_vertices(scene: Scene, models: Iterable[SubspaceModel]) -> np.ndarray
             chosen = np.arange(group.elements) if elements is None else elements
             found.append(_stencil(group)[chosen].ravel())
     return np.unique(np.concatenate(found))
-
-
-def trained_box(scene: Scene, columns: Columns, reference: np.ndarray) -> np.ndarray:
-    """Least and largest coordinates (2, K, 3) in ``columns`` of a run of ``scene``.
-
-    Parameters
-    ----------
-    reference : (F + 1, N, 3) m, positions of the run, which are projected on the subspace
-    """
-    frames, n, _ = reference.shape
-    together = coordinates(columns, scene.masses, reference.transpose(1, 0, 2).reshape(n, -1))
-    z = together.reshape(-1, frames, 3)
-    return np.stack([z.min(axis=1), z.max(axis=1)])

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from study.tables.kit.declaration import compared, integer, number
+from study.tables.kit.declaration import integer, number
 from study.tables.kit.reruns import KEYS
 
 MEDIAN, LOW, HIGH, COUNT = "error_heldout", "error_heldout_low", "error_heldout_high", "motions"
@@ -15,7 +15,6 @@ COLUMNS = (
     number(HIGH, "the largest"),
     integer(COUNT, "held-out motions that were run and can be judged"),
 )
-AS_ERRORS = tuple(compared("error", column) for column in COLUMNS[:3])
 _WHOLE = {"k": "Int64", "r": "Int64"}
 
 

@@ -80,14 +80,6 @@ HORIZON_FRAME = integer("horizon_frame", "first frame that cannot be judged: the
 FLOOR = compared(
     "error", number("sensitivity_floor", "largest drift of perturbed runs before the horizon")
 )
-GUARD_FRAME = compared(
-    "error", integer("guard_frame", "first frame in which the guard saw something")
-)
-GUARD_REASON = compared("error", text("guard_reason", "what the guard saw there"))
-GUARD_COUNT = compared("error", integer("guard_count", "frames in which the guard saw something"))
-GUARD_ESTIMATE = compared(
-    "error", number("guard_estimate", "estimated error over the run, where that is the alarm")
-)
 MS_PER_FRAME = timed(number("ms_per_frame", "time of a frame", "ms"))
 LOCAL_MS = timed(number("local_ms", "time of the local step in a frame", "ms"))
 GLOBAL_MS = timed(number("global_ms", "time of the global solve in a frame", "ms"))

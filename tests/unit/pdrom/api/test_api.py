@@ -90,16 +90,6 @@ def test_files_are_read_back(full, tmp_path):
     assert np.array_equal(again.scene.mesh.triangles, full.scene.mesh.triangles)
 
 
-@pytest.mark.parametrize("action", ["none", "report", "stop", "fall-back"])
-def test_what_a_guard_saw_is_read_back(full, tmp_path, action):
-    guard = api.GuardSettings(action=action, alarm="estimate", threshold=1e-9)
-    reduced = api.reduce(full, "spring", "block-deim", 1, guard=guard)
-    assert (reduced.seen.count > 0) == (action != "none")
-    api.save(reduced, tmp_path / "guarded.h5")
-    # which group gave the alarm is the run's own
-    assert api.load(tmp_path / "guarded.h5").seen == replace(reduced.seen, group=None)
-
-
 def test_a_file_without_a_run_is_refused(tmp_path):
     with pytest.raises(StorageError, match="no such file"):
         api.load(tmp_path / "none.h5")
@@ -179,9 +169,6 @@ FAULTY = {
     "motion that is none": (
         lambda full, _: api.reduce(full, error=0.1, scene=full), "scene = FullRun.*a Scene is",
     ),
-    "guard a text": (lambda full, _: api.reduce(full, "spring", guard="stop"), "guard = 'stop'"),
-    "guard NaN": (lambda *_: api.GuardSettings(threshold=np.nan), "threshold = nan"),
-    "guard misspelt": (lambda *_: api.GuardSettings(action="halt"), "GuardSettings: action"),
     "plot of a run": (lambda full, _: api.plot(full), "plot = FullRun.*a ReducedRun"),
     "plot of nothing": (lambda *_: api.plot(), "at least one run"),
     "view of a scene": (lambda full, p: api.view(p / "v", full.scene), "view = Scene"),

@@ -181,21 +181,6 @@ def test_an_unchecked_run_has_to_be_sound(folder, finished, change, words, capsy
     assert words in told
 
 
-def test_a_run_is_watched_by_its_companion(folder, capsys):
-    run(["run", "small.yaml"])
-    capsys.readouterr()
-    asked = ["reduce", "small.yaml", "--group", "spring", "--r", "1", "--run", "small.h5"]
-    asked += ["--method", "block-deim", "--alarm", "estimate"]
-    assert run([*asked, "--guard", "report", "--threshold", "1e6"]) == Status.DONE
-    assert "; no alarm; estimated error " in capsys.readouterr().out
-    assert run([*asked, "--guard", "fall-back", "--threshold", "0"]) == Status.DONE
-    told = capsys.readouterr().out
-    assert "relative error 0 of" in told
-    assert "; alarms in 12 frames, first in 0 (estimate), 12 repeated" in told
-    assert run([*asked, "--guard", "stop", "--threshold", "0"]) == Status.DONE
-    assert "stopped after frame 0" in capsys.readouterr().out
-
-
 def test_runs_are_put_on_a_page(folder, capsys):
     asked = ["reduce", "small.yaml", "--group", "spring", "--r"]
     assert [run([*asked, r]) for r in ("1", "2")] == [Status.DONE] * 2
@@ -316,7 +301,6 @@ def test_what_an_obstacle_moves_at_rest_is_said_once(folder, caplog):
 
 
 ASK = ["reduce", "small.yaml", "--error"]
-GUARDED = ["reduce", "small.yaml", "--group", "spring", "--guard", "stop"]
 
 
 @pytest.mark.parametrize(
@@ -327,9 +311,6 @@ GUARDED = ["reduce", "small.yaml", "--group", "spring", "--guard", "stop"]
         (["reduce", "small.yaml", "--group", "sprin"], "no group 'sprin'"),
         (["reduce", "small.yaml", "--group", "spring", "--method", "gapy"], "did you mean 'gappy'"),
         (["reduce", "small.yaml", "--group", "spring", "--r", "99"], "r = 99"),
-        (["reduce", "small.yaml", "--group", "spring", "--alarm", "estimate"], "--guard is"),
-        ([*GUARDED, "--threshold", "1"], "--alarm estimate is required"),
-        ([*GUARDED, "--alarm", "estimate", "--threshold", "-1"], "threshold = -1"),
         (["run", "small.yaml", "--out", "nowhere.d/../small.yaml/x.h5"], "cannot be written"),
         (["new", "nowhere/x"], "No such file"),
         (["run", f"{'a' * 5000}.yaml"], "File name too long"),
@@ -347,7 +328,7 @@ GUARDED = ["reduce", "small.yaml", "--group", "spring", "--guard", "stop"]
             "unknown quantity 'velocty' (allowed: position, velocity), did you",
         ),
         ([*ASK, "0.1"], "--error: --run is required with it: a training run"),
-        ([*ASK, "0.1", "--guard", "stop"], "--guard: only together with --group"),
+        ([*ASK, "0.1", "--plot", "a.png"], "--plot: only together with --group"),
     ],
 )
 def test_faults_are_one_line_and_code_1(folder, arguments, words, capsys):

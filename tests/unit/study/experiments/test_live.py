@@ -70,7 +70,7 @@ def test_a_large_basis_is_short_but_for_what_is_computed_with(tmp_path, monkeypa
 
 
 def test_a_handle_takes_its_vertices_where_the_reader_does(tmp_path):
-    """Offsets are from where it was taken hold of; what moves only that is no new shape."""
+    """Offsets are from where it was taken hold of."""
     file, model = write_models(scene_with("spring"), tmp_path)
     script = """
     const run = new engine.Run(data, data.models[0], new engine.Basis(data, data.bases[0]));

@@ -1,4 +1,4 @@
-"""Experiments stability, guard and bounds on a small study, made by the experiments before."""
+"""Experiments stability and bounds on a small study, made by the experiments before."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,24 +10,10 @@ from builders import make_scene
 from pdrom.core.store import read_table, write_table
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.scene import SceneConfig
-from pdrom.reduction.local.guard_settings import GuardSettings
 from pdrom.reduction.method import MethodSpec, load_methods
-from pdrom.reduction.subspace.companion import CompanionSpec
 from places import ROOT
 from study.artifact.paths import File
-from study.experiments import (
-    bounds,
-    companion,
-    fom,
-    guard,
-    mesh,
-    pod,
-    reruns,
-    snapshots,
-    stability,
-    subspaces,
-)  # fmt: skip
-from study.experiments.guard import Trial, TriedGuard
+from study.experiments import bounds, fom, mesh, pod, reruns, snapshots, stability, subspaces
 from study.experiments.kit.sampling import Sweep
 from study.experiments.kit.settings import Horizon
 from study.experiments.stability import ShortRuns
@@ -56,7 +42,6 @@ class Made:
     bases: list[File]
     samplings: list[File]
     subspaces: File
-    companion: File
     tables: dict[str, File]
 
 
@@ -92,11 +77,11 @@ def study(tmp_path_factory) -> Made:
         outputs = {kind: file(f"{name}/{kind}", **labels) for kind in names}
         settings = reruns.Options(
             scene=scene, method=spec, sweep=Sweep(dense_to=4, step=4), ranks=(4,),
-            heldout_ranks=(), guard=GuardSettings(), **LIMITS,
+            heldout_ranks=(), **LIMITS,
         )  # fmt: skip
         reruns.reruns(
             mesh=grid, fom=runs["train"], motions=list(runs.values()), snapshots=stored,
-            basis=bases[-1], companions=[], settings=settings, **outputs,
+            basis=bases[-1], settings=settings, **outputs,
         )  # fmt: skip
         samplings.append(outputs["sampling"])
     models = file("models.h5")
@@ -113,10 +98,7 @@ def study(tmp_path_factory) -> Made:
         heldout_table=tables["heldout"],
         seconds_table=file("seconds.csv"),
     )
-    beside = file("companion.h5")
-    spec = CompanionSpec(modes=4)
-    companion.companion(mesh=grid, train=runs["train"], config=scene, spec=spec, out=beside)
-    return Made(scene, folder, grid, runs, bases, samplings, models, beside, tables)
+    return Made(scene, folder, grid, runs, bases, samplings, models, tables)
 
 
 @pytest.fixture(scope="module")
@@ -126,14 +108,6 @@ def table(study) -> pd.DataFrame:
         mesh=study.mesh, bases=study.bases, samplings=study.samplings, subspaces=[study.subspaces],
         config=study.scene, methods=METHODS, short=SHORT, **LIMITS, out=output,
     )  # fmt: skip
-    return read_table(output.path)
-
-
-def try_guard(folder: Path, trials: tuple[Trial, ...], *files: list[File]) -> pd.DataFrame:
-    output = File(str(folder / "guard.csv"), {})
-    asked = TriedGuard(margin=1e-6, repeats=1)
-    settings = guard.Options(trials=trials, guard=asked, **LIMITS)
-    guard.guard(*files, settings=settings, out=output)
     return read_table(output.path)
 
 
@@ -173,41 +147,6 @@ def test_the_subspaces_know_their_energy(study):
     for motion in ("train", "heldout"):
         ratios = read_table(study.tables[motion].path).energy_ratio
         assert ((ratios > 0.5) & (ratios < 1.5)).all()
-
-
-def test_guard_compares_its_actions_with_the_full_order(study):
-    name = "deim-joint"
-    index = list(METHODS).index(name)
-    trial = Trial(scene=study.scene, group="strain", name=name, r=4, method=METHODS[name])
-    files = (
-        study.mesh, study.runs["train"], study.bases[index], study.samplings[index],
-        study.companion,
-    )  # fmt: skip
-    table = try_guard(study.folder, (trial,), *([file] for file in files))
-    assert table.columns.tolist() == guard.COLUMNS
-    full, plain, reported, fallen, told, mended = (row for _, row in table.iterrows())
-    assert [full.method, plain.action, reported.action, fallen.action] == [
-        "full", "none", "report", "fall-back",
-    ]  # fmt: skip
-    assert [(row.action, row.alarm) for row in (told, mended)] == [
-        ("report", "estimate"), ("fall-back", "estimate"),
-    ]  # fmt: skip
-    assert told.relative_error == plain.relative_error
-    assert told.guard_estimate > 0.0
-    assert table.guard_estimate.notna().sum() == 2
-    assert full.relative_cost == 1.0
-    assert reported.relative_error == plain.relative_error
-    assert reported.fallback_frames == 0
-    assert 0 < fallen.fallback_frames <= 16
-    assert fallen.fallback_share == fallen.fallback_frames / 16
-    assert fallen.relative_error < plain.relative_error
-    assert (table.ms_per_frame > 0.0).all()
-
-
-def test_guard_without_cases_is_an_empty_table(tmp_path):
-    table = try_guard(tmp_path, (), [], [], [], [], [])
-    assert table.columns.tolist() == guard.COLUMNS
-    assert len(table) == 0
 
 
 def bound_rows(study: Made, methods: dict[str, MethodSpec] = METHODS) -> pd.DataFrame:

@@ -37,7 +37,7 @@ from study.tables.scaling_fit import scaling_fit
 
 FRAMES = 20
 SETTINGS = {"sensitivity.reference": 1e-10, "sensitivity.threshold": 1e-3,
-            "stability.wrong": 0.1, "stability.left": 2.0, "guard.threshold": 0.12}  # fmt: skip
+            "stability.wrong": 0.1, "stability.left": 2.0}  # fmt: skip
 ROWS = {"bending": 1, "spring": 1, "strain": 2, "deformation_gradient": 3, "tetrahedron_strain": 3}
 METHOD_ROWS = {"pod": "all", "deim": "scalar", "qdeim": "scalar", "deim-joint": "joint",
                "published": "joint", "block-deim": "element"}  # fmt: skip
@@ -312,13 +312,6 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for method in methods
         for r in (8, 14)
     ]
-    estimates = [
-        (scene, basis, split, error, 1.2 * error, 1.2, True, error > 1e-3)
-        for scene in scenes
-        for basis in ("full", "pod", "skinning")
-        for split in ("train", "heldout")
-        for error in (1e-5, 1e-2)
-    ]
     repetitions = [
         (scene, group, method, r, "training", 0.01, 0.1, np.inf, 1.0, 2.0, 3.0)
         for scene, group, method, r, *_ in reruns
@@ -407,8 +400,6 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "alternatives": (others, "scene vertices stiffness motion method substeps"
          " ms_per_frame"
          " error_implicit error_continuous"),
-        "estimates": (estimates, "scene position_basis split relative_error_within_horizon"
-         " estimate ratio within resolved"),
         "effects_contribution": (moved, "scene effect role moved sensitivity_floor above_floor"),
         "published_choices": (chosen, "scene group direction choice axis r error reference"),
         "published_distance": (distances, "scene group direction choice distance"),

@@ -197,16 +197,6 @@ def test_a_run_that_ended_early_lies_on_the_rim(study):
     assert [bar.get_height() for bar in right.patches] == [25.0, 100.0]
 
 
-def test_unresolved_estimates_are_open_dots_on_the_rim(study):
-    left, right = draw(study, "estimates").axes
-    for ax in (left, right):
-        dots = [line for line in ax.lines if line.get_marker() == "o"]
-        assert len(dots) == 6
-        open_ones = [line for line in dots if line.get_markerfacecolor() == "none"]
-        assert {x for line in open_ones for x in line.get_xdata()} == {ax.get_xlim()[0]}
-        assert ax.get_title().endswith("within the band")
-
-
 def test_a_failure_later_than_the_drawn_instant_is_no_failure(study):
     figure = draw(study, "spring_runs", scenes=(BLOWN_UP[0],), frames=(0.1,))
     assert not any("blew up" in text for text in texts(figure))

@@ -17,7 +17,7 @@ PAPER = ROOT / "paper"
 
 def test_figures_are_numbered_as_the_source_places_them(tmp_path):
     (tmp_path / "paper" / "sections").mkdir(parents=True)
-    text = "\\figureof{ladder}\n% \\figureof{estimates}\n\\input{sections/a.tex}\\figureof{scaling}"
+    text = "\\figureof{ladder}\n% \\figureof{noise}\n\\input{sections/a.tex}\\figureof{scaling}"
     (tmp_path / "paper" / "main.tex").write_text(text)
     (tmp_path / "paper" / "supplement.tex").write_text(r"\figureof{singular_values}")
     section = tmp_path / "paper" / "sections" / "a.tex"

@@ -7,7 +7,6 @@ from study.paper.cost_tables import break_even, exponents, iterations, positions
 from study.paper.textables import (
     TEX_TABLES,
     claims,
-    guard,
     local_share,
     longtable,
     ranks,
@@ -115,27 +114,6 @@ TABLES = {
             ("ecsw", "pod", "rerun", "accurate", 0.5),
         ],
         columns=["method", "position_basis", "experiment", "outcome", "energy_ratio"],
-    ),
-    "guard": pd.DataFrame(
-        [
-            ("bar_a", "full", None, "none", None, 0.0, None, 1.0, None, None, None, 2.0),
-            ("bar_a", "deim", 20, "none", None, 0.5, None, 4.0, None, None, None, 1.0),
-            ("bar_a", "deim", 20, "fall-back", "trained-b", None, 0.4, 1.0, 3, "extent", 0.25, 1.5),
-        ],
-        columns=[
-            "scene",
-            "method",
-            "r",
-            "action",
-            "alarm",
-            "relative_error",
-            "guard_estimate",
-            "energy_ratio",
-            "guard_frame",
-            "guard_reason",
-            "fallback_share",
-            "ms_per_frame",
-        ],
     ),
     "local_share": pd.DataFrame(
         {
@@ -440,10 +418,3 @@ def test_stability_counts_what_ran():
     assert cells[1:5] == ["1", "1", "0", "1"]
     assert cells[5:] == ["3", r"\ensuremath{\infty}", "0 of 1", "2"]
     assert second.startswith(r"\texttt{ecsw, pod subspace} & 1 & 0 & 0 & 0 & 0.50 & 0.50 & 0 of 0")
-
-
-def test_guard_shows_what_was_seen_and_repeated():
-    full, plain, fallen = rows(guard(TABLES))
-    assert full == r"\texttt{bar\_a} &  & full order & -- & 0 & -- & 1 & -- & -- & 2 \\"
-    assert plain.endswith(r"& none & -- & 0.50 & -- & 4 & -- & -- & 1 \\")
-    assert fallen.endswith(r"& fall-back & b & blow-up & 0.40 & 1 & 3, extent & 0.25 & 1.5 \\")

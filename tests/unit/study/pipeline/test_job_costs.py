@@ -60,7 +60,7 @@ def test_a_job_takes_what_jobs_of_its_kind_took_on_meshes_like_its_own(log, kind
 def test_times_are_scaled_by_the_units_of_the_last_run(tmp_path):
     """A machine with twice the units takes twice as long; an older record has none."""
     asked = SimpleNamespace(**vars(plan()) | {"results": str(tmp_path)})
-    log, usual = f"{tmp_path}/logs/guard.log", TABLE.seconds["guard"]
+    log, usual = f"{tmp_path}/logs/frame_times.log", TABLE.seconds["frame_times"]
     there = units_of("full", ROOT).model_dump()
     twice = Units(**{name: 2.0 * seconds for name, seconds in there.items()})
     for units, factor in ((twice, 2.0), (None, 1.0)):
@@ -97,15 +97,15 @@ def test_costs_are_read_from_the_logs_of_two_runs(tmp_path):
     full, coarse = tmp_path / "full", tmp_path / "coarse"
     say(full, "fom/a.log", 3.0, wall=4.0, memory=210.0)
     say(full, "fom/b.log", 5.0, wall=3.0, memory=250.4)
-    say(full, "guard.log", 7.0, wall=8.0, memory=200.0)
+    say(full, "frame_times.log", 7.0, wall=8.0, memory=200.0)
     say(coarse, "fom/a.log", 0.5)
-    say(coarse, "guard.log", 0.25)
+    say(coarse, "frame_times.log", 0.25)
     (full / "logs" / "fom" / "failed.log").write_text("ERROR pdrom: no\n", encoding="utf-8")
     table = measured_costs(str(full), str(coarse))
     assert list(table.columns) == COLUMNS
     assert table.to_numpy().tolist() == [
         ["fom", 4.0, 0.5, 4.0, 250],
-        ["guard", 7.0, 0.25, 8.0, 200],
+        ["frame_times", 7.0, 0.25, 8.0, 200],
     ]
 
 

@@ -13,10 +13,9 @@ from study.pipeline.contents import labels_of
 from study.pipeline.study import Study
 from study.pipeline.subspace_scenes import check_live, check_subspaces
 
-# What only a position subspace, or an auxiliary model, has.
+# What only a position subspace has.
 INSIDE = (
     paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,
-    paths.COMPANION, paths.ESTIMATES, paths.COMPANION_TIMES,
 )  # fmt: skip
 
 
@@ -60,10 +59,7 @@ def test_everything_else_is_held(root):
 
 def test_one_line_says_what_the_scene_goes_without(root, caplog):
     check_subspaces(study(root))
-    assert caplog.messages == [
-        "windy: no position subspaces, no auxiliary model and no estimated errors, since none "
-        "takes the effect 'wind'"
-    ]
+    assert caplog.messages == ["windy: no position subspaces, since none takes the effect 'wind'"]
     caplog.clear()
     check_subspaces(study(root, scenes=["spring_oop"]))
     assert caplog.messages == []
@@ -76,17 +72,11 @@ def test_one_line_says_what_the_scene_goes_without(root, caplog):
         ("scaling.scenes", {"scaling": {"scenes": {"windy": [1.0]}}}),
         ("online.scenes", {"online": {"scenes": ["windy"]}}),
         ("alternatives.scenes", {"alternatives": {"scenes": {"windy": [1.0]}}}),
-        ("guard.cases", {"guard": {"cases": [{"scene": "windy", "method": "deim", "r": 6}]}}),
-        ("guard.alarm = 'estimate'", {"guard": {"action": "report", "alarm": "estimate"}}),
     ],
 )
 def test_where_a_subspace_is_asked_for_the_scene_is_refused(root, key, section):
     with pytest.raises(ConfigurationError, match=rf"{key}: scene 'windy' has the effect 'wind'"):
         check_subspaces(study(root, **section))
-
-
-def test_a_guard_that_does_not_act_needs_no_companion(root):
-    check_subspaces(study(root, guard={"action": "none", "alarm": "estimate"}))
 
 
 @pytest.mark.parametrize(

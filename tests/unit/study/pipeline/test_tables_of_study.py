@@ -25,7 +25,7 @@ def made(name: str, **changes) -> Job:
 
 
 def test_verdicts_are_a_table_like_others():
-    assert {"claims", "singular_values", "guard"} <= set(declared())
+    assert {"claims", "singular_values", "winners"} <= set(declared())
     assert list(declared()) == sorted(declared())
 
 

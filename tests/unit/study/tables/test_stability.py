@@ -12,8 +12,7 @@ from study.artifact.paths import File
 from study.tables.stability import OUTCOMES, outcomes, stability
 
 RERUN = {"scene": "a", "group": "spring", "frames": 9, "finite": True, "blowup_frame": None,
-         "max_extent": 1.1, "relative_error": 7.0, "energy_ratio": 1.0, "gain": 2.0,
-         "guard_frame": 4, "guard_reason": "extent", "guard_count": 2}  # fmt: skip
+         "max_extent": 1.1, "relative_error": 7.0, "energy_ratio": 1.0, "gain": 2.0}  # fmt: skip
 FULL = {
     "experiment": "rerun", "scene": "a", "h": 0.016, "stiffness_ratio": 1.0, "method": "full",
     "position_basis": "full", "finite": True, "max_extent": 1.2, "relative_error": 0.0,
@@ -38,7 +37,7 @@ def files(tmp_path):
     inside = pd.DataFrame(
         [RERUN | {"group": "all", "method": "full", "position_basis": "pod", "k": k, "r": 50}
          for k in (10, 20)]
-    ).drop(columns=["gain", "guard_frame", "guard_reason", "guard_count"])  # fmt: skip
+    ).drop(columns="gain")  # fmt: skip
     own = {"method": "deim", "r": 6, "group": "spring", "relative_error": 0.3}
     rows = [FULL | {"h": 0.2, "frames": 5}, FULL | {"h": 0.2} | own]
     sweep = pd.DataFrame(rows).drop(columns="experiment")
@@ -62,8 +61,6 @@ def test_every_run_has_its_row_and_outcome(files):
     assert table.experiment.tolist() == ["rerun"] * 6 + ["sweep"] * 2
     assert table.h.tolist() == [0.016] * 6 + [0.2] * 2
     assert table.stiffness_ratio.tolist()[:6] == [1.0] * 6
-    assert table.guard_count.tolist()[1:3] == [2, 2]
-    assert table.guard_count.isna().tolist() == [True, False, False] + [True] * 5
     full = table[(table.method == "full") & (table.position_basis == "full")]
     assert full.max_extent.tolist() == [1.2, 1.2]
     assert (full.energy_ratio == 1.0).all()

@@ -131,14 +131,14 @@ def all_errors_move_a_little(frame):
     frame["shape_error"] *= 1 + 1e-3
 
 
-@edit("alarms")
+@edit("gain_interventions")
 def a_share_is_another_one(frame):
-    frame.loc[0, "detected_share"] = 1 - frame.detected_share[0]
+    frame.loc[0, "fallen_share"] = 1 - frame.fallen_share[0]
 
 
-@edit("alarms")
+@edit("gain_interventions")
 def runs_are_counted_twice(frame):
-    frame["failed"] *= 2
+    frame["pairs"] *= 2
 
 
 @edit("reconstruction_error")
@@ -197,7 +197,7 @@ def nothing_is_left(frame):
     return frame.head(0)
 
 
-@edit("estimates")
+@edit("reconstruction_error")
 def splits_are_swapped(frame):
     frame["split"] = frame.split.map({"train": "heldout", "heldout": "train"})
 

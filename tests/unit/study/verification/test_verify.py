@@ -90,14 +90,14 @@ def test_a_verdict_that_errors_have_changed_is_a_difference(examination, subject
 
 
 def test_what_is_missing_has_its_own_code_and_names_its_command(results, subject):
-    reference = folder_of(RESULTS) / "alarms.csv"
+    reference = folder_of(RESULTS) / "winners.csv"
     kept = reference.read_bytes()
     for path in (TABLE.at(RESULTS, name="stability"), f"{RESULTS}/figures/ladder.png", reference):
         Path(path).unlink()
     status, printed = verified(subject)
     reference.write_bytes(kept)
     assert status == Status.MISSING
-    assert "table alarms: no reference, run verify --update" in printed
+    assert "table winners: no reference, run verify --update" in printed
     [line] = [line for line in printed if line.startswith("table stability")]
     assert line.endswith("make it by ./reproduce --configfile config/tiny.yaml -- stability")
     assert any(line.startswith("figure stability_map: not there") for line in printed)
