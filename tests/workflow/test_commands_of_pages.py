@@ -32,8 +32,6 @@ LEFT_OUT = {
     r"^\.venv/bin/(ruff|snakefmt|mypy)": "executed by .ci/run",
     r"^\./reproduce --report": "executed by test_report.py",
     r"^\./reproduce (verify|bundle)": "needs a study; has tests of its own",
-    r"^\./reproduce (pages|docs)": "executed by tests/unit/study/verification",
-    r"^\.venv/bin/python -m pdrom\.verification": "executed by tests/unit/study/verification",
     r"^\./reproduce (figure [^8]|reduced_reruns)": "planned by test_measured_claim_map.py",
     r"rest_shapes|mesh_sizes|rest_lengths|leverage": "recipes, executed by test_recipes.py",
     r"^(docker|(sh |bash )?tests/)": "makes a machine of its own",
@@ -74,7 +72,6 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
     mesh = made.folder / yaml.safe_load(scene)["mesh"]["path"]
     mesh.parent.mkdir()
     sheet(mesh)
-    (made.folder / "docs").mkdir()
     shutil.copy(ROOT / "CITATION.cff", made.folder)
     return made
 

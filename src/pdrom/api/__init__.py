@@ -1,6 +1,6 @@
 """pdrom from Python: a scene, its run, a basis of projections, the run with them reduced, pictures.
 
-docs/python.md has a worked example.
+docs/library.md has a worked example.
 """
 
 from pdrom.api.arguments import methods

@@ -18,7 +18,9 @@ from pdrom.reduction.snapshots import training_frames
 from places import CONFIG, ROOT
 from study.pipeline.scenes import load_bound_scene
 
-PAGE = (ROOT / "docs" / "python.md").read_text("utf-8")
+PAGE = (
+    (ROOT / "docs" / "library.md").read_text("utf-8").split("## From Python")[1].split("\n## ")[0]
+)
 EFFECTS = [
     {"effect": "gravity"},
     {"effect": "pins", "select": "left"},
@@ -37,7 +39,7 @@ def test_the_pages_example_runs_and_is_short(tmp_path, monkeypatch, capsys):
     (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     assert len(code.strip().splitlines()) <= 15
     monkeypatch.chdir(tmp_path)
-    exec(compile(code, "python.md", "exec"), {})
+    exec(compile(code, "library.md", "exec"), {})
     said = capsys.readouterr().out
     assert "rank of the projections" in said
     assert said.count("error at the end") == 3
