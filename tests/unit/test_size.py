@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 47_700,
-    "modules of src": 485,
-    "lines of tests": 31_744,
+    "lines of src": 46_607,
+    "modules of src": 475,
+    "lines of tests": 31_320,
     "words of documentation": 25_115,
-    "tables": 40,
+    "tables": 35,
     "figures": 25,
-    "experiments": 24,
-    "percent of src in decorators, signatures and imports": 23.2,
+    "experiments": 23,
+    "percent of src in decorators, signatures and imports": 23.0,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

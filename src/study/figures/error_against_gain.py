@@ -11,10 +11,11 @@ from study.figures.kit.declaration import figure
 from study.figures.kit.legends import method_handles
 from study.figures.kit.options import Experiments, Methods
 from study.figures.kit.results import NothingToDraw, Results
-from study.tables.gain_prediction import EVERY, FAILED, judged_runs
+from study.tables.kit.gains import FAILED, judged_runs
 
 ERRORS, GAINS = (1e-5, 1e2), (1.0, 1e5)  # limits; what lies outside is drawn on the rim
 ENDS = ("low", "median", "high")
+DECADES = 4  # gains above 10^4 are counted together
 _KEYS = ["scene", "group", "method", "r"]
 
 
@@ -27,15 +28,13 @@ class Options(Experiments, Methods):
     caption=(
         "Left: every run of a sampled method whose basis suffices (the orthogonal projection does "
         "not fail at the same size), over all scenes and sizes. Dashed: the error from which on a "
-        "run counts as failed; dotted: the gain that separates failed runs from others with the "
-        "fewest mistakes. Arrows on the rim lie outside the axes. Crosses: range and median over "
-        "runs, in some scenes, that are trained on as many resampled frames. Right: how many of "
-        "them failed, by decade of the gain."
+        "run counts as failed. Arrows on the rim lie outside the axes. Crosses: range and median "
+        "over runs, in some scenes, that are trained on as many resampled frames. Right: how many "
+        "of them failed, by decade of the gain."
     ),
     reads=(
         TableOf("reduced_reruns"),
         TableOf("reconstruction_error"),
-        TableOf("gain_prediction"),
         TableOf("repetitions"),
     ),
     options=Options,
@@ -44,9 +43,8 @@ def error_against_gain(results: Results, options: Options) -> Figure:
     """Draw a dot per run, error within the horizon over gain, and failures by decade of gain.
 
     Runs that ended before their horizon lie on the upper rim, singular interpolations on the right
-    one. Shown are the runs that the table gain_prediction counts.
+    one.
     """
-    prediction = results.table("gain_prediction")
     runs = judged_runs(results.table("reduced_reruns"), results.table("reconstruction_error"))
     runs = results.held_rows(runs, options)
     if runs.empty:
@@ -59,8 +57,8 @@ def error_against_gain(results: Results, options: Options) -> Figure:
     for method in methods:
         _draw_method(left, runs[runs.method == method], *styles[method])
         _draw_ranges(left, ranges[ranges.method == method], styles[method][0])
-    _draw_limits(left, prediction)
-    _draw_decades(right, prediction[prediction.lower != EVERY])
+    _draw_limits(left)
+    _draw_decades(right, runs)
     style.legend(figure, method_handles(results, styles, linestyle="none"), 4)
     return figure
 
@@ -89,31 +87,26 @@ def _draw_ranges(ax: Axes, ranges: pd.DataFrame, colour: str) -> None:
     ax.hlines(errors[1], gains[0], gains[2], **bars)
 
 
-def _draw_limits(ax: Axes, prediction: pd.DataFrame) -> None:
-    """Axes, the error above which a run counts as failed, and the best threshold of the gain."""
+def _draw_limits(ax: Axes) -> None:
+    """Axes, and the error above which a run counts as failed."""
     log_axes(ax, GAINS, ERRORS)
     ax.set_xlabel("gain of the interpolation")
     ax.set_ylabel("error within the horizon (relative)")
     ax.axhline(FAILED, color="#333333", linewidth=0.8, linestyle="--", zorder=0)
     ax.text(GAINS[1], FAILED * 1.1, "failed ", ha="right", va="bottom", fontsize=7)
     ax.text(GAINS[0] * 1.1, ERRORS[1] * 0.8, "ended early: upper rim", va="top", fontsize=7)
-    whole = prediction[(prediction.lower == EVERY) & (prediction.predictor == "gain")]
-    threshold = float(whole.threshold.iloc[0]) if len(whole) else np.nan
-    if GAINS[0] < threshold < GAINS[1]:
-        ax.axvline(threshold, color="#333333", linewidth=0.8, linestyle=":", zorder=0)
-        ax.text(
-            threshold * 1.08, ERRORS[0] * 1.3, f"best threshold {threshold:.2g}", fontsize=7,
-            va="bottom",
-        )  # fmt: skip
 
 
-def _draw_decades(ax: Axes, decades: pd.DataFrame) -> None:
-    """Share of failed runs, the number of runs above each bar."""
+def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
+    """Share of failed runs by decade of the gain, the number of runs above each bar."""
+    # the last decade holds all that is above, singular interpolations too
+    upper = np.ceil(np.log10(runs.gain.clip(upper=10.0**DECADES + 1.0))).clip(lower=1)
+    decades = runs.groupby(upper.astype(int)).failed.agg(["size", "mean"])
     places = np.arange(len(decades))
-    ax.bar(places, 100.0 * decades.failed_share, width=0.7, color=style.FAILED, alpha=0.75)
-    for place, row in zip(places, decades.itertuples(), strict=True):
-        ax.text(place, 100.0 * row.failed_share + 1.5, f"{row.runs}", ha="center", fontsize=7)
-    ax.set_xticks(places, [_span(row.lower, row.upper) for row in decades.itertuples()])
+    ax.bar(places, 100.0 * decades["mean"], width=0.7, color=style.FAILED, alpha=0.75)
+    for place, count, share in zip(places, decades["size"], decades["mean"], strict=True):
+        ax.text(place, 100.0 * share + 1.5, f"{count}", ha="center", fontsize=7)
+    ax.set_xticks(places, [_span(decade) for decade in decades.index])
     ax.set_ylim(0, 112)
     ax.set_yticks([0, 25, 50, 75, 100])
     ax.tick_params(axis="x", labelrotation=35)
@@ -123,9 +116,8 @@ def _draw_decades(ax: Axes, decades: pd.DataFrame) -> None:
     style.grid(ax)
 
 
-def _span(lower: str, upper: str) -> str:
-    """Name of a decade."""
-    low = round(np.log10(float(lower)))
-    if np.isinf(float(upper)):
-        return rf"over $10^{{{low}}}$"
-    return rf"$10^{{{low}}}$ to $10^{{{low + 1}}}$"
+def _span(upper: int) -> str:
+    """Name of the decade that ends at 10 to the power of ``upper``."""
+    if upper > DECADES:
+        return rf"over $10^{{{DECADES}}}$"
+    return rf"$10^{{{upper - 1}}}$ to $10^{{{upper}}}$"

@@ -14,9 +14,9 @@ import numpy as np
 import pandas as pd
 
 from study.artifact.reads import TableOf
-from study.tables.gain_prediction import judged_runs
 from study.tables.kit.declaration import compared, integer, number, table, text
 from study.tables.kit.families import families
+from study.tables.kit.gains import judged_runs
 
 RESAMPLES, SEED = 2000, 1
 STEPS = {
@@ -84,7 +84,7 @@ _CELL = ["scene", "group", "r"]
 def gain_interventions(
     reruns: pd.DataFrame, reconstruction: pd.DataFrame, ladder: pd.DataFrame
 ) -> pd.DataFrame:
-    """One row per step; counted are the runs of `study.tables.gain_prediction`.
+    """One row per step; counted are the runs of `judged_runs`.
 
     Sizes and groups of one scene are no independent observations, nor are a scene and its twin:
     intervals draw whole families, the test counts them. Errors below the sensitivity floor count as

@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 
 from study.artifact.reads import TableOf
-from study.tables.gain_prediction import FAILED
 from study.tables.kit.declaration import compared, integer, number, table, timed
+from study.tables.kit.gains import FAILED
 from study.tables.kit.held_out import with_held_out
 from study.tables.kit.vocabulary import METHOD, POSITION_BASIS
 

@@ -1,7 +1,7 @@
 """Tetrahedra that keep their volume: det F within a range (Bouaziz et al. 2014, 5.1).
 
-The set of such F is unbounded: a tetrahedron may become as long and thin as it likes, so that no
-bound on the projections exists (`study.experiments.kit.boundedness`).
+The set of such F is unbounded: a tetrahedron may become as long and thin as it likes, so that
+the projections have no bound.
 """
 
 from typing import Literal

@@ -119,7 +119,7 @@ class Force(Effect):
 
     rate: float | np.ndarray | None = None
     """Rate c, a number or (N,) 1/s, of an acceleration that is -c v and a part that does not depend
-    on the motion; None for any other (see `study.experiments.kit.premise`)."""
+    on the motion; None for any other."""
 
     @abstractmethod
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
@@ -144,10 +144,6 @@ class Boundary(Effect):
 
     moves: bool
     """Whether the targets move while held."""
-
-    by_offsets: bool = False
-    """Whether the targets are where vertices were taken hold of and offsets that do not depend on
-    it (see `study.experiments.kit.premise`)."""
 
     @abstractmethod
     def active(self, frame: int) -> bool:

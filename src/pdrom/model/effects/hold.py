@@ -67,7 +67,6 @@ class Pins(Hold):
         effect: Literal["pins"] = "pins"
 
     moves = False
-    by_offsets = True
 
     def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
         return anchor
@@ -96,7 +95,6 @@ class Translate(Hold):
             return self.model_copy(update={"offset": tuple(-x for x in self.offset)})
 
     moves = True
-    by_offsets = True
 
     def path(self, frames: range, current: np.ndarray) -> np.ndarray:
         first = self.targets(frames.start, current)

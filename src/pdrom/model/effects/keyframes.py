@@ -75,7 +75,6 @@ class Keyframes(Hold):
         poses = [np.concatenate([key.offset, key.turn]) for key in config.keys]
         self._times = np.array([0, *(key.at for key in config.keys)], dtype=float)
         self._poses = np.stack([np.zeros(6), *poses])
-        self.by_offsets = not any(any(key.turn) for key in config.keys)
         self._smooth = config.interpolation == "smooth"
 
     def _pose(self, time: float) -> tuple[np.ndarray, np.ndarray]:

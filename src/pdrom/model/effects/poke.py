@@ -39,7 +39,6 @@ class Poke(Boundary):
             return self.model_copy(update={"amplitude": -self.amplitude})
 
     moves = True
-    by_offsets = True
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)

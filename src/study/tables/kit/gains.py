@@ -5,6 +5,7 @@ import pandas as pd
 
 EXPERIMENT = ["scene", "group"]
 ORTHOGONAL = "pod"  # the method that evaluates and projects everything
+FAILED = 0.1  # error within the horizon above which a run counts as failed
 _TRAINING = ["gain", "elements_sampled", "relative_error"]
 
 
@@ -38,3 +39,16 @@ def reruns_with_gain(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.D
     order = runs.assign(place=range(len(runs))).sort_values("r", kind="stable")
     paired = pd.merge_asof(order, orthogonal.sort_values("r"), on="r", by=EXPERIMENT)
     return paired.sort_values("place").drop(columns="place").reset_index(drop=True)
+
+
+def judged_runs(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFrame:
+    """Runs of sampled methods whose basis suffices, with the columns of `reruns_with_gain`.
+
+    The basis suffices where the orthogonal projection on it does not fail. ``failed`` marks runs
+    that end before the horizon or whose error there exceeds `FAILED`.
+    """
+    runs = reruns_with_gain(reruns, reconstruction)
+    fine = (runs.orthogonal_error <= FAILED) & (runs.method != ORTHOGONAL) & runs.error.notna()
+    runs = runs[fine & runs.gain.notna()].copy()
+    runs["failed"] = runs.error > FAILED
+    return runs

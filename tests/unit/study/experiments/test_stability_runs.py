@@ -1,4 +1,4 @@
-"""Experiments stability and bounds on a small study, made by the experiments before."""
+"""Experiment stability on a small study, made by the experiments before."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,15 +7,14 @@ import pandas as pd
 import pytest
 
 from builders import make_scene
-from pdrom.core.store import read_table, write_table
+from pdrom.core.store import read_table
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.scene import SceneConfig
-from pdrom.reduction.method import MethodSpec, load_methods
+from pdrom.reduction.method import load_methods
 from places import ROOT
 from study.artifact.paths import File
-from study.experiments import bounds, fom, mesh, pod, reruns, snapshots, stability, subspaces
+from study.experiments import fom, mesh, pod, reruns, snapshots, stability, subspaces
 from study.experiments.kit.sampling import Sweep
-from study.experiments.kit.settings import Horizon
 from study.experiments.stability import ShortRuns
 from study.experiments.subspaces import SubspaceModels
 
@@ -147,41 +146,3 @@ def test_the_subspaces_know_their_energy(study):
     for motion in ("train", "heldout"):
         ratios = read_table(study.tables[motion].path).energy_ratio
         assert ((ratios > 0.5) & (ratios < 1.5)).all()
-
-
-def bound_rows(study: Made, methods: dict[str, MethodSpec] = METHODS) -> pd.DataFrame:
-    output = File(str(study.folder / "bounds.csv"), {"scene": "test"})
-    perturbed = File(str(study.folder / "sensitivity.csv"), {"scene": "test"})
-    floor = {"scene": "test", "perturbation": "1e-10", "frame": range(16)}
-    write_table(pd.DataFrame(floor).assign(relative_difference=1e-9), perturbed.path)
-    horizon = Horizon(perturbation=1e-10, threshold=1e-3)
-    asked = bounds.Options(scene=study.scene, methods=methods, ranks=(2, 4, 30), horizon=horizon)
-    bounds.bounds(
-        mesh=study.mesh, fom=study.runs["train"], perturbed=perturbed, bases=study.bases,
-        samplings=study.samplings, settings=asked, out=output,
-    )  # fmt: skip
-    return read_table(output.path)
-
-
-def test_every_reduction_that_exists_has_its_bounds(study):
-    """Sizes 2 and 4 of two methods; 30 exceeds the rank. The runs of size 4 stay below theirs."""
-    rows = bound_rows(study)
-    assert rows.groupby("method").r.apply(list).to_dict() == {m: [2, 4] for m in METHODS}
-    assert (rows.bound >= 1.0 + rows.growth * rows.reach * 0.99).all()
-    assert (rows.spectral_radius <= rows.contraction * (1.0 + 1e-6)).all()
-    for method in METHODS:
-        extents = read_table(str(study.folder / method / "out")).max_extent
-        assert extents.max() <= rows[(rows.method == method) & (rows.r == 4)].bound.iloc[0]
-
-
-def test_clipped_coefficients_have_no_bound_but_a_contraction(study):
-    spec = MethodSpec(title="x", centring="affine", rows="all", bounds="training")
-    rows = bound_rows(study, METHODS | {"pod": spec})
-    clipped = rows[rows.method == "pod"]
-    assert clipped[["reach", "bound"]].isna().all(axis=None)
-    assert clipped.contraction.notna().all()
-
-
-def test_a_scene_too_large_for_dense_matrices_has_no_bounds(study, monkeypatch):
-    monkeypatch.setattr(bounds, "MOST_VERTICES", 10)
-    assert len(bound_rows(study)) == 0

@@ -316,11 +316,6 @@ def _write_tables(results, scenes, methods, rng) -> None:
         (scene, group, method, r, "training", 0.01, 0.1, np.inf, 1.0, 2.0, 3.0)
         for scene, group, method, r, *_ in reruns
     ]
-    predictions = [
-        ("gain", "10", "100", 40, 0.25, np.nan),
-        ("gain", "10000", "inf", 2, 1.0, np.nan),
-        ("gain", "all", "all", 42, 0.3, 30.0),
-    ]
     variants = [("plain", 9.0, 0.5), ("refused", None, None), ("both + more", 2.0, None)]
     ablation = [
         (scene, "pod", 20, r, variant, gain, error, 0.01)
@@ -392,7 +387,6 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "effects_left_out": (removed, "scene left_out groups ms_per_frame own_ms"),
         "reduced_reruns": (reruns, "scene group method r position_basis max_extent blowup_frame"
          " relative_error relative_error_within_horizon ms_per_frame k"),
-        "gain_prediction": (predictions, "predictor lower upper runs failed_share threshold"),
         "noise": (noise, "scene group noisy_axes method r rank relative_error"),
         "claims_sensitivity": (variations, "claim part varied variation verdict_of_rules same"),
         "subspace_ablation": (ablation, "scene position_basis k r variant gain"

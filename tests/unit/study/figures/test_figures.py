@@ -194,7 +194,10 @@ def test_a_run_that_ended_early_lies_on_the_rim(study):
     )
     assert (dots.get_ydata() == left.get_ylim()[1]).all()
     assert dots.get_xdata().tolist() == [24.0, 42.0]
-    assert [bar.get_height() for bar in right.patches] == [25.0, 100.0]
+    # gains from ten to a hundred, where all of the two runs failed
+    assert [bar.get_height() for bar in right.patches] == [100.0]
+    assert [text.get_text() for text in right.texts] == ["2"]
+    assert [tick.get_text() for tick in right.get_xticklabels()] == ["$10^{1}$ to $10^{2}$"]
 
 
 def test_a_failure_later_than_the_drawn_instant_is_no_failure(study):

@@ -1,19 +1,10 @@
 """Tables about the gain, from small reruns, against values worked out by hand."""
 
-import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from study.tables.gain_interventions import gain_interventions
-from study.tables.gain_prediction import (
-    best_threshold,
-    failures_ordered,
-    gain_prediction,
-    judged_runs,
-)
-from study.tables.targets import targets
+from study.tables.kit.gains import judged_runs
 
 # scene, method, r, error within the horizon (None: ended before), gain, elements, frames
 RUNS = [
@@ -58,26 +49,6 @@ def tables() -> tuple[pd.DataFrame, pd.DataFrame]:
     return pd.DataFrame([*reruns, marked, subspace]), pd.DataFrame(reconstruction)
 
 
-def test_targets_compare_with_the_orthogonal_projection():
-    table = targets(*tables())
-    rows = table.set_index(["scene", "method"])
-    # the horizon of "wild" ends before its run
-    assert set(rows.index.get_level_values("scene")) == {"calm", "quiet", "hopeless"}
-    assert "pod" not in set(table.method)
-    assert rows.ratio["calm", "bounded"] == pytest.approx(1.4)
-    assert rows.ratio["calm", "block-deim"] == pytest.approx(10.0)
-    assert table.asked.all()
-    assert rows.within["calm", "bounded"]
-    assert not rows.within["calm", "block-deim"]
-    # one mode more than the orthogonal projection has: compared with its largest size
-    assert np.isinf(rows.ratio["calm", "deim-joint"])
-    assert rows.orthogonal_error["calm", "deim-joint"] == 1e-3
-    # both errors are below the floor, where nothing can be told
-    assert rows.ratio["quiet", "bounded"] == 1.0
-    assert rows.elements_share["calm", "bounded"] == 0.25
-    assert rows.spread["calm", "bounded"] == pytest.approx(1.0)
-
-
 def test_only_runs_whose_basis_suffices_count():
     runs = judged_runs(*tables())
     assert set(runs.scene) == {"calm", "quiet", "wild"}
@@ -85,56 +56,6 @@ def test_only_runs_whose_basis_suffices_count():
         ("calm", "block-deim"): False, ("calm", "bounded"): False, ("calm", "deim-joint"): True,
         ("calm", "deim"): True, ("quiet", "bounded"): False, ("wild", "deim"): True,
     }  # fmt: skip
-
-
-def test_prediction_counts_decades_and_judges_predictors():
-    table = gain_prediction(*tables())
-    decades = table[table.lower != "all"].set_index("upper")
-    assert decades.runs.to_dict() == {"10": 4, "100": 1, "1000": 1}
-    assert decades.failed.to_dict() == {"10": 1, "100": 1, "1000": 1}
-    assert decades.failed_share["10"] == 0.25
-    whole = table[table.lower == "all"].set_index("predictor")
-    assert list(whole.index) == ["gain", "reconstruction error", "gain x best error"]
-    assert (whole.runs == 6).all()
-    assert (whole.failed == 3).all()
-    # gains 2, 2, 8 | 9, 50, 500
-    assert whole.threshold["gain"] == 8.0
-    assert whole.misclassified_share["gain"] == 0.0
-    assert whole.failures_ordered["gain"] == 1.0
-    assert whole.rank_correlation["gain"] == pytest.approx(0.971, abs=0.02)
-
-
-def test_a_singular_interpolation_counts_among_the_largest_gains():
-    reruns, reconstruction = tables()
-    lost = reconstruction.method == "deim-joint"
-    reconstruction.loc[lost, ["gain", "relative_error"]] = [np.inf, np.nan]
-    table = gain_prediction(reruns, reconstruction)
-    row = table[table.upper == "inf"].iloc[0]
-    assert (row.lower, row.runs, row.failed, row.median_error) == ("10000", 1, 1, np.inf)
-    whole = table[table.lower == "all"].set_index("predictor")
-    assert whole.misclassified_share["reconstruction error"] == 0.0
-
-
-def test_no_runs_give_an_empty_table():
-    reruns, reconstruction = tables()
-    table = gain_prediction(reruns[reruns.method == "pod"], reconstruction)
-    assert table.empty
-
-
-@given(st.lists(st.tuples(st.floats(0.1, 1e3), st.booleans()), min_size=1, max_size=12))
-def test_no_threshold_makes_fewer_mistakes(runs):
-    x, failed = np.array([a for a, _ in runs]), np.array([b for _, b in runs])
-    threshold, mistakes = best_threshold(x, failed)
-    assert mistakes == np.sum((x > threshold) != failed)
-    assert mistakes == min(np.sum((x > t) != failed) for t in [0.0, *(x - 1e-9), *(x + 1e-9)])
-
-
-@given(st.lists(st.tuples(st.integers(0, 5), st.booleans()), min_size=2, max_size=12))
-def test_order_is_the_share_of_pairs(runs):
-    x, failed = np.array([a for a, _ in runs], float), np.array([b for _, b in runs])
-    pairs = [(a > b) + 0.5 * (a == b) for a in x[failed] for b in x[~failed]]
-    value = failures_ordered(x, failed)
-    assert value is None if not pairs else value == pytest.approx(np.mean(pairs))
 
 
 def square(*runs: tuple) -> pd.DataFrame:

@@ -151,20 +151,20 @@ def a_time_step_is_another_one(frame):
     frame.loc[0, "h"] *= 2
 
 
-@edit("bounds")
+@edit("singular_values")
 def a_number_is_missing(frame):
-    frame.loc[0, "growth"] = np.nan
+    frame.loc[0, "singular_value"] = np.nan
 
 
-@edit("bounds")
+@edit("singular_values")
 def a_number_is_infinite(frame):
-    frame.loc[0, "growth"] = np.inf
+    frame.loc[0, "singular_value"] = np.inf
 
 
-@edit("bounds")
+@edit("singular_values")
 def a_number_is_a_word(frame):
-    frame["growth"] = frame.growth.astype(object)
-    frame.loc[0, "growth"] = "large"
+    frame["singular_value"] = frame.singular_value.astype(object)
+    frame.loc[0, "singular_value"] = "large"
 
 
 @edit("ladder")

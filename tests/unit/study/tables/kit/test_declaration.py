@@ -137,7 +137,7 @@ def test_timing_columns_are_those_declared():
     found = {name: made.timing_columns for name, made in declared().items()}
     assert found["local_share"] == ("local_ms", "assembly_ms", "global_ms", "local_share")
     assert found["accuracy_cost"] == ("ms_per_frame", "pareto", "pareto_heldout")
-    untimed = ("singular_values", "reconstruction_error", "sensitivity", "stability", "targets")
+    untimed = ("singular_values", "reconstruction_error", "sensitivity", "stability")
     assert not any(found[name] for name in untimed)
 
 
