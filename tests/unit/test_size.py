@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 46_607,
-    "modules of src": 475,
-    "lines of tests": 31_320,
-    "words of documentation": 25_115,
-    "tables": 35,
-    "figures": 25,
-    "experiments": 23,
-    "percent of src in decorators, signatures and imports": 23.0,
+    "lines of src": 45_813,
+    "modules of src": 465,
+    "lines of tests": 31_019,
+    "words of documentation": 25_107,
+    "tables": 33,
+    "figures": 24,
+    "experiments": 22,
+    "percent of src in decorators, signatures and imports": 22.9,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

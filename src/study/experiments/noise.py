@@ -1,7 +1,7 @@
 """Reductions of a group whose projections are round-off, on bases of that noise."""
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -23,7 +23,6 @@ from pdrom.reduction.snapshots import row_masses, training_frames
 from study.artifact.paths import MESH, NOISE, NOISE_RUNS, SENSITIVITY, File
 from study.artifact.reads import Settings
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.last_iterates import last_iterates
 from study.experiments.kit.scenes import scene_of
 from study.experiments.kit.sensitivity import perturbation_field
 from study.experiments.kit.settings import BlowupExtent, Horizon, Modes
@@ -148,14 +147,28 @@ def noise_basis(
     return replace(basis, active_axes=(True, True, True))
 
 
+def _full_order(
+    scene: Scene, look: Callable[[np.ndarray], np.ndarray], start: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (F + 1, N, 3) of a run, and ``look`` at the last iterates of its frames (F, ...).
+
+    ``start`` (N, 3) m is added to the initial positions.
+    """
+    loop, state = scene.stepper(), scene.initial_state(start)
+    positions, seen = [state.positions], []
+    for frame in range(scene.config.frames):
+        state, _ = loop.step(state, frame, lambda y: seen.append(look(y)))
+        positions.append(state.positions)
+    return np.stack(positions), np.stack(seen)
+
+
 def _runs(
     scene: Scene, name: str, axes: str, seed: int, settings: Options
 ) -> Iterator[tuple[dict[str, Any], Rerun | None]]:
     """Rows and runs of one start: its full-order run, then the reductions trained on it."""
     group, plan = scene.group(name), scene.config.reduce[name]
     start = roundoff_field(scene, axes, settings.noise.perturbation, seed=seed)
-    reference, seen = last_iterates(scene, scene.stepper(), group.project, start=start)
-    projections = np.stack(seen)
+    reference, projections = _full_order(scene, group.project, start)
     even = training_frames(scene.config.frames, min(plan.train, (scene.config.frames + 1) // 2))
     masses = row_masses(group, scene.masses)
     displacement = displacement_norms(reference)

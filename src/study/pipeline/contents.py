@@ -93,11 +93,6 @@ def _noisy(study: Study, scene: str, group: str) -> bool:
     return study.settings.noise.cases.get(scene) == group
 
 
-def _published(study: Study, scene: str, group: str) -> bool:
-    cases = study.settings.published_choices.cases
-    return any((case.scene, case.group) == (scene, group) for case in cases)
-
-
 def _requested(study: Study) -> Iterator[Labels]:
     """The listed scenes, or all, the large ones among them."""
     held, listed = (*study.scenes, *study.online), study.settings.requested_tolerances.scenes
@@ -124,7 +119,6 @@ SOME: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     **dict.fromkeys([paths.REPETITIONS, paths.REPEATED_FRAMES], _groups(_repeated)),
     **dict.fromkeys([paths.NOISE, paths.NOISE_RUNS], _groups(_noisy)),
     paths.LADDER: _groups(lambda study, scene, group: scene in study.settings.ladder.scenes),
-    paths.PUBLISHED_CHOICES: _groups(_published),
     paths.LIVE_MODEL: _live,
     paths.STABILITY: _scenes(lambda study: study.settings.stability.scenes),
     paths.SUBSPACE_ABLATION: _scenes(lambda study: study.ablation.scenes),

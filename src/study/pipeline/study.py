@@ -26,7 +26,6 @@ from study.experiments.ladder import LadderSection
 from study.experiments.live import Live
 from study.experiments.noise import Noise
 from study.experiments.online import Online
-from study.experiments.published_choices.experiment import PublishedChoices
 from study.experiments.repetitions import RepetitionSection
 from study.experiments.requested_tolerances import RequestedTolerances
 from study.experiments.scaling import Scaling
@@ -76,7 +75,6 @@ class StudySettings(ConfigModel):
     stability: Stability = Stability()
     noise: Noise = Noise()
     ladder: LadderSection = LadderSection()
-    published_choices: PublishedChoices = PublishedChoices()
     repetitions: RepetitionSection = RepetitionSection()
     hard_cases: HardCases = HardCases()
     online: Online = Online()

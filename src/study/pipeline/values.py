@@ -132,13 +132,6 @@ def _noise_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
     return study.named_methods(study.settings.noise.methods, "noise.methods")
 
 
-def _published_experiment(study: Study, labels: Labels) -> str:
-    """Name of the scene in the stored output of the published code."""
-    cases = study.settings.published_choices.cases
-    named = {(case.scene, case.group): case.experiment for case in cases}
-    return named[labels["scene"], labels["group"]]
-
-
 def _projection_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
     return {case.method: study.methods[case.method] for case in _projection_cases(study, labels)}
 
@@ -159,7 +152,6 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "every_method": lambda study, labels: study.every_method,
     "scaled_methods": scaled_methods,
     "noise_methods": _noise_methods,
-    "published_experiment": _published_experiment,
     "repeated": _repeated,
     "basis": _basis,
     "horizon": _horizon,

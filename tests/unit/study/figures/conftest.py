@@ -347,18 +347,6 @@ def _write_tables(results, scenes, methods, rng) -> None:
             ("kick", "start", 1e-15),
         )
     ]
-    steps = [
-        ("cumulative", "as in this study"), ("cumulative", "nothing is pinned"),
-        ("alone", "nothing is pinned"), ("signs", "draw 1"), ("ties", "draw 1"),
-    ]  # fmt: skip
-    chosen = [
-        (scene, group, *step, axis, r, 0.1 * r, 0.2)
-        for scene, group in pairs
-        for step in steps
-        for axis in "xyz"
-        for r in (1, 2, 5)
-    ]
-    distances = [(scene, group, *step, 0.5) for scene, group in pairs for step in steps]
     requests = [
         (scene, tolerance, met, reduced, 0.5 * tolerance if met else 2.0, time)
         for scene in scenes
@@ -395,8 +383,6 @@ def _write_tables(results, scenes, methods, rng) -> None:
          " ms_per_frame"
          " error_implicit error_continuous"),
         "effects_contribution": (moved, "scene effect role moved sensitivity_floor above_floor"),
-        "published_choices": (chosen, "scene group direction choice axis r error reference"),
-        "published_distance": (distances, "scene group direction choice distance"),
     }  # fmt: skip
     for name, (rows, header) in made.items():
         _write(TABLE.at(results.folder, name=name), header, rows)
