@@ -18,7 +18,6 @@ class Rerun:
     extent : (F',) longest side of the bounding box over the rest extent
     blowup_frame : first frame whose extent exceeds the limit or is not finite, else None
     coordinates : (F' + 1, K, 3) of the step loop; the positions themselves outside a subspace
-    fallbacks : frames that a safeguard repeated
     """
 
     positions: np.ndarray
@@ -26,7 +25,6 @@ class Rerun:
     extent: np.ndarray
     blowup_frame: int | None
     coordinates: np.ndarray
-    fallbacks: int = 0
 
     __repr__ = brief
 

@@ -33,8 +33,6 @@ METHODS: dict[str, tuple[str, str]] = {
     "pod subspace, ecsw-1e-02": ("#1B6E6E", ">"),
     "pod subspace, ecsw-1e-03": ("#3F6B00", "d"),
     "skinning subspace": ("#8B1A4A", "h"),
-    "pod subspace, block-deim": ("#4FA3C7", "H"),
-    "pod subspace, gappy": ("#C08A00", "8"),
     "pod subspace, hrpd": ("#B05CC6", "|"),
     "skinning subspace, hrpd": ("#D98BA6", "+"),
 }

@@ -24,8 +24,7 @@ from pdrom.reduction.subspace.exported import (
     export_scene,
     needed_vertices,
 )
-from pdrom.reduction.subspace.interpolation import Interpolation
-from pdrom.reduction.subspace.joint import interpolation_of
+from pdrom.reduction.subspace.interpolation import interpolation_of
 from pdrom.reduction.subspace.model import SubspaceModel, ecsw_name
 from pdrom.reduction.subspace.store import load_models
 from study.artifact.paths import (
@@ -189,7 +188,7 @@ class _Joint:
         """One for each subspace of the models ``beside``; other groups are sampled as there."""
         group = scene.group(self._group)
         for model in {id(model.columns): model for model in beside}.values():
-            joint: Interpolation = interpolation_of(group, model.columns, self._reduction)
+            joint = interpolation_of(group, model.columns, self._reduction)
             labels = {"family": "joint", "k": model.columns.modes, "r": self._reduction.r}
             samples = {**model.samples, self._group: joint}
             yield labels, SubspaceModel(model.position_basis, model.columns, samples)

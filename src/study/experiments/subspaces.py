@@ -1,14 +1,11 @@
-"""Position subspaces with full projections, with sampled elements and with interpolation."""
+"""Position subspaces with full projections, with sampled elements and with those of hrpd."""
 
 import logging
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from itertools import chain
 from typing import Any
 
-import numpy as np
 import pandas as pd
-from pydantic import Field
 
 from pdrom.core.names import SceneName
 from pdrom.core.store import write_hdf5, write_table
@@ -17,8 +14,7 @@ from pdrom.model.energy import largest
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.subspace.columns import Columns
-from pdrom.reduction.subspace.hrpd import hrpd, sampled_space
-from pdrom.reduction.subspace.interpolated import Training, interpolate
+from pdrom.reduction.subspace.hrpd import HrpdSpec, SampledSpace, hrpd, sampled_space
 from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.model import (
     ECSW,
@@ -28,7 +24,6 @@ from pdrom.reduction.subspace.model import (
     make_columns,
     sample_elements,
 )
-from pdrom.reduction.subspace.specs import HrpdSpec, InterpolationSpec
 from pdrom.reduction.subspace.store import store_columns, store_model
 from pdrom.reduction.subspace.training import Norm
 from study.artifact.paths import (
@@ -55,36 +50,36 @@ COLUMNS = [
 ]  # fmt: skip
 
 SECONDS_COLUMNS = ["scene", "position_basis", "k", "method", "reduction_s"]
-FULL = "full"
+FULL, HRPD = "full", "hrpd"
 
 Sampled = Mapping[str, Samples | Interpolation]
+
+
+class Hrpd(HrpdSpec):
+    """Sampled constraints with interpolation, and the numbers of modes k that have them."""
+
+    sizes: tuple[Modes, ...] = ()
 
 
 class SubspaceModels(ConfigModel):
     """Position subspaces: kinds of basis, numbers of modes, tolerances of the sampling, its norm.
 
-    At the ``interpolated_sizes`` the projections are interpolated, too: by ``hrpd`` (None leaves it
-    out), and on the snapshot basis by every method of ``interpolations``.
+    ``hrpd`` adds models with interpolated projections; None leaves them out.
     """
 
     bases: tuple[PositionBasis, ...] = ("pod", "skinning")
     sizes: tuple[Modes, ...] = (10, 20, 40)
     tolerances: tuple[Tolerance, ...] = (3e-2, 1e-2, 1e-3)
     norm: Norm = "energy"
-    interpolated_sizes: tuple[Modes, ...] = ()
-    hrpd: HrpdSpec | None = None
-    interpolations: dict[str, InterpolationSpec] = Field(default_factory=dict)
+    hrpd: Hrpd | None = None
 
     def methods(self, kind: str, k: int) -> list[str]:
         """Names of the models on a basis of ``kind`` with k modes."""
         if kind not in self.bases or k not in self.sizes:
             return []
-        trained = kind == "pod"
-        names = [FULL, *(ecsw_name(tolerance) for tolerance in self.tolerances if trained)]
-        if k in self.interpolated_sizes:
-            names += ["hrpd"] if self.hrpd is not None else []
-            names += list(self.interpolations) if trained else []
-        return names
+        tolerances = self.tolerances if kind == "pod" else ()
+        interpolated = self.hrpd is not None and k in self.hrpd.sizes
+        return [FULL, *map(ecsw_name, tolerances), *([HRPD] if interpolated else [])]
 
 
 class Subspace(SubspaceModels):
@@ -168,21 +163,29 @@ def _subspaces(
 ) -> Iterator[tuple[str, Columns, str, int, Iterator[tuple[str, Sampled]]]]:
     """Name, columns, kind and size of every subspace, with the models in it."""
     scene, training = motion.scene, training_positions(motion)
-    spaces = _sampled_spaces(scene, settings.hrpd)
+    spaces: dict[str, SampledSpace | None] = {}
+    if settings.hrpd is not None:
+        points = scene.mesh.points
+        spaces = {g.name: sampled_space(g, points, settings.hrpd) for g in scene.groups}
     for kind in settings.bases:
         for k in settings.sizes:
             columns = make_columns(scene, training, kind, k=k)
-            models = _samplings(scene, columns, kind, settings)
-            if k in settings.interpolated_sizes:
-                more = _interpolations(scene, columns, training, kind, settings, spaces)
-                models = chain(models, more)
+            own = spaces if HRPD in settings.methods(kind, k) else {}
+            models = _samplings(scene, columns, kind, settings, own)
             yield f"{kind}_k{k:03d}", columns, kind, k, models
 
 
 def _samplings(
-    scene: Scene, columns: Columns, kind: str, settings: SubspaceModels
+    scene: Scene,
+    columns: Columns,
+    kind: str,
+    settings: SubspaceModels,
+    spaces: Mapping[str, SampledSpace | None],
 ) -> Iterator[tuple[str, Sampled]]:
-    """(method, samples) pairs: full projections, and element sampling on the snapshot basis."""
+    """(method, samples) pairs: full projections, element sampling on the snapshot basis, hrpd.
+
+    The ``spaces`` of projections of each group are those of hrpd; without any it is left out.
+    """
     yield FULL, {}
     if kind == "pod":
         tolerances = settings.tolerances
@@ -190,30 +193,8 @@ def _samplings(
         found = sample_elements(scene, columns, frames, tolerances=tolerances, norm=settings.norm)
         for tolerance, samples in zip(tolerances, found, strict=True):
             yield ecsw_name(tolerance), samples
-
-
-def _sampled_spaces(scene: Scene, spec: HrpdSpec | None) -> dict[str, Any]:
-    """Spaces of projections for hrpd, by group; they depend on the rest shape only."""
-    if spec is None:
-        return {}
-    return {group.name: sampled_space(group, scene.mesh.points, spec) for group in scene.groups}
-
-
-def _interpolations(
-    scene: Scene,
-    columns: Columns,
-    training: np.ndarray,
-    kind: str,
-    settings: SubspaceModels,
-    spaces: dict[str, Any],
-) -> Iterator[tuple[str, Sampled]]:
-    """(method, interpolations) pairs: hrpd, and the trained ones on the snapshot basis."""
     if spaces:
-        yield "hrpd", {g.name: hrpd(g, columns, spaces[g.name]) for g in scene.groups}
-    if kind == "pod":
-        states = Training(scene, columns, training)
-        for method, spec in settings.interpolations.items():
-            yield method, interpolate(scene, columns, states, spec=spec)
+        yield HRPD, {g.name: hrpd(g, columns, spaces[g.name]) for g in scene.groups}
 
 
 def _row(

@@ -47,9 +47,9 @@ def positions(tables: Tables) -> str:
         rows.append([name(scene), *_of_subspaces(largest, tables["heldout_reruns"])])
     header = [
         "scene", "all", "all, held out", "sampled", "sampled, held out", "elements", "speed-up",
-        "gappy", "hrpd", "skinning, all",
+        "hrpd", "skinning, all",
     ]  # fmt: skip
-    return tabular(header, rows, "l" + "r" * 9)
+    return tabular(header, rows, "l" + "r" * 8)
 
 
 def _of_subspaces(runs: pd.DataFrame, heldout: pd.DataFrame) -> list[str]:
@@ -72,7 +72,6 @@ def _of_subspaces(runs: pd.DataFrame, heldout: pd.DataFrame) -> list[str]:
         _cell(sampled, unseen),
         _cell(sampled, lambda run: str(int(run.r))),
         _cell(sampled, lambda run: format_number(run.speedup)),
-        _cell(_rows(runs, position_basis="pod", method="gappy"), error),
         _cell(_rows(runs, position_basis="pod", method="hrpd"), error),
         _cell(_rows(runs, position_basis="skinning", method="full"), error),
     ]

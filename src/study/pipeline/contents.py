@@ -121,7 +121,6 @@ SOME: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     paths.LADDER: _groups(lambda study, scene, group: scene in study.settings.ladder.scenes),
     paths.LIVE_MODEL: _live,
     paths.STABILITY: _scenes(lambda study: study.settings.stability.scenes),
-    paths.SUBSPACE_ABLATION: _scenes(lambda study: study.ablation.scenes),
     paths.REQUESTED_TOLERANCES: _requested,
     paths.ALTERNATIVES: _sized(lambda study: study.settings.alternatives.scenes),
     paths.ALTERNATIVE_TIMES: _sized(lambda study: study.settings.alternatives.scenes),

@@ -113,8 +113,6 @@ def check_texts(study: Study) -> None:
     for key, rungs in {"up": ladder.up, "down": ladder.down}.items():
         for i, rung in enumerate(rungs):
             require_typeset(rung.title, f"ladder.{key}.{i}.title")
-    for variant in study.ablation.variants:
-        require_typeset(variant, f"{folder / 'subspace_ablation.yaml'}: variants")
     for name, claim in load_claims(folder / "claims.yaml").items():
         words = ("text", "source", "paper", "section", "shown", "qualifiers")
         texts = {key: getattr(claim, key) for key in words}

@@ -97,7 +97,6 @@ class Plan:
         settings = self.settings
         named = {
             "ladder.scenes": settings.ladder.scenes,
-            f"{folder / 'subspace_ablation.yaml'}: scenes": self.study.ablation.scenes,
             "live.scenes": settings.live.scenes,
             "subspace.scenes": settings.subspace.scenes,
             "scaling.scenes": tuple(settings.scaling.scenes),

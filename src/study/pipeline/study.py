@@ -31,7 +31,6 @@ from study.experiments.requested_tolerances import RequestedTolerances
 from study.experiments.scaling import Scaling
 from study.experiments.sensitivity import Sensitivity
 from study.experiments.stability import Stability
-from study.experiments.subspace_ablation import AblationFile
 from study.experiments.subspaces import Subspace
 from study.experiments.timing import Timing
 from study.pipeline.scenes import (
@@ -141,12 +140,6 @@ class Study:
         """
         settings = validate(StudySettings, config, source)
         return cls(settings, Path(root))
-
-    @cached_property
-    def ablation(self) -> AblationFile:
-        """Ablation of config/subspace_ablation.yaml."""
-        path = self.root / "config" / "subspace_ablation.yaml"
-        return validate(AblationFile, read_yaml(path), str(path))
 
     @cached_property
     def every_method(self) -> dict[str, MethodSpec]:

@@ -49,7 +49,6 @@ def _asking(study: Study) -> dict[str, tuple[str, ...]]:
         "scaling.scenes": tuple(settings.scaling.scenes),
         "online.scenes": settings.online.scenes,
         "alternatives.scenes": tuple(settings.alternatives.scenes),
-        "config/subspace_ablation.yaml: scenes": study.ablation.scenes,
     }
 
 

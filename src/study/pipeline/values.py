@@ -165,5 +165,4 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "projection_cases": _projection_cases,
     "projection_methods": _projection_methods,
     "heldout_ranks": _heldout_ranks,
-    "ablation": lambda study, labels: study.ablation,
 }

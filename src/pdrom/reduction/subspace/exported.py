@@ -143,10 +143,6 @@ def _export_samples(group: ConstraintGroup, chosen: Samples | Interpolation) -> 
         factors = np.ones(len(elements)) if chosen.factors is None else chosen.factors
         weights = group.weights[elements] * factors
         return {"stencil": pack_array(stencil, "u4"), "weights": pack_array(weights, "f8")}
-    if chosen.residual or chosen.lower is not None:
-        raise SceneError(
-            f"group '{group.name}': the page's engine interpolates projections without bounds only"
-        )
     arrays = ("operator", "modes", "offset", "stiffness")
     return {"stencil": pack_array(stencil, "u4")} | {
         name: pack_array(getattr(chosen, name), "f8") for name in arrays

@@ -9,10 +9,14 @@ skinning space); they are left out, since S annihilates translations and their v
 arbitrary frame of each element.
 """
 
+from typing import Annotated
+
 import numpy as np
+from pydantic import Field
 from scipy import linalg, sparse
 
 from pdrom.core.errors import SamplingError
+from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.mesh.select import farthest_points
 from pdrom.reduction.basis.pod import pod
@@ -20,10 +24,20 @@ from pdrom.reduction.sampling.solve import norm_and_condition, solution_operator
 from pdrom.reduction.subspace.columns import DEPENDENT, Columns, orthonormal
 from pdrom.reduction.subspace.interpolation import Interpolation, element_rows, reduced_strain
 from pdrom.reduction.subspace.skinning import skinning_weights
-from pdrom.reduction.subspace.specs import HrpdSpec
 
 # Condition number of the sampled equations from which on their solution is noise.
 SINGULAR = 1e8
+
+
+class HrpdSpec(ConfigModel):
+    """Sampled constraints with interpolation (Brandt et al. 2018).
+
+    dimension : dimension of the space of projections (fewer if there are fewer)
+    samples : sampled elements (all, if there are fewer)
+    """
+
+    dimension: Annotated[int, Field(ge=1, le=10_000)] = 60
+    samples: Annotated[int, Field(ge=1, le=1_000_000)] = 250
 
 
 def hrpd(group: ConstraintGroup, columns: Columns, sampled: "SampledSpace | None") -> Interpolation:

@@ -10,12 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.reduction.sampling.reduction import Reduction
 from pdrom.reduction.subspace.columns import Columns
 
-_ARRAYS = (
-    "elements", "operator", "modes", "offset", "stiffness", "lower", "upper",
-    "control", "control_factors",
-)  # fmt: skip
+_ARRAYS = ("elements", "operator", "modes", "offset", "stiffness")
 
 
 @dataclass(frozen=True)
@@ -29,9 +27,6 @@ class Interpolation:
     offset : (K, 3) what is added whatever the coefficients
     stiffness : (K, K) B^T S^T W S B of all elements
     gain : || operator ||_2
-    residual : whether p - S y is interpolated, instead of p
-    lower, upper : (r, 1) bounds of the coefficients, or None
-    control, control_factors : (m',) sampled elements of the safeguard and their factors, or None
     """
 
     elements: np.ndarray
@@ -40,11 +35,6 @@ class Interpolation:
     offset: np.ndarray
     stiffness: np.ndarray
     gain: float
-    residual: bool = False
-    lower: np.ndarray | None = None
-    upper: np.ndarray | None = None
-    control: np.ndarray | None = None
-    control_factors: np.ndarray | None = None
 
     @classmethod
     def of_constant(cls, stiffness: np.ndarray, offset: np.ndarray) -> "Interpolation":
@@ -61,18 +51,15 @@ class Interpolation:
 
     def save(self, store) -> None:
         """Write into the HDF5 group ``store``."""
-        store.attrs["gain"], store.attrs["residual"] = self.gain, self.residual
+        store.attrs["gain"] = self.gain
         for name in _ARRAYS:
-            if getattr(self, name) is not None:
-                store[name] = getattr(self, name)
+            store[name] = getattr(self, name)
 
     @classmethod
     def load(cls, store) -> "Interpolation":
         """Read what `save` wrote into the HDF5 group ``store``."""
-        arrays = {name: store[name][...] for name in _ARRAYS if name in store}
-        return cls(
-            **arrays, gain=float(store.attrs["gain"]), residual=bool(store.attrs["residual"])
-        )
+        arrays = {name: store[name][...] for name in _ARRAYS}
+        return cls(**arrays, gain=float(store.attrs["gain"]))
 
 
 class InterpolatedLocalStep:
@@ -90,7 +77,6 @@ class InterpolatedLocalStep:
         factors = np.ones(len(self._elements))
         self.group, vertices = group.restricted(interpolation.elements, factors)
         self._rows = np.ascontiguousarray(columns.B[vertices])
-        self._strain = self.group.S @ self._rows
 
     def begin_frame(self, q: np.ndarray) -> None:
         """Freeze frame-lagged data of the sampled elements at the coordinates q (K, 3)."""
@@ -104,12 +90,7 @@ class InterpolatedLocalStep:
         if len(self._elements) == 0:
             return float("nan")
         values = self.group.project_elements(self._rows @ y, self._elements)
-        if i.residual:
-            values -= self._strain @ y
-            rhs += i.stiffness @ y
         coefficients = i.operator @ values.reshape(i.operator.shape[1], -1)
-        if i.lower is not None:
-            np.clip(coefficients, i.lower, i.upper, out=coefficients)
         rhs += (i.modes @ coefficients).reshape(rhs.shape)
         return float("nan")
 
@@ -123,3 +104,29 @@ def reduced_strain(group: ConstraintGroup, columns: Columns) -> tuple[np.ndarray
 def element_rows(elements: np.ndarray, size: int) -> np.ndarray:
     """Rows (m size,) of ``elements`` (m,) with ``size`` rows each, in the order of the elements."""
     return (elements[:, None] * size + np.arange(size)).ravel()
+
+
+def interpolation_of(
+    group: ConstraintGroup, columns: Columns, reduction: Reduction
+) -> Interpolation:
+    """Interpolation in ``columns`` by a ``reduction`` of full-order projections (joint rows, say).
+
+    The reduction has no limits of its coefficients.
+    Coefficients of blocks that serve one axis each stand below each other.
+    """
+    strain, stiffness = reduced_strain(group, columns)
+    weighted = group.row_weights[:, None] * strain
+    elements = np.sort(reduction.elements)
+    entries = element_rows(elements, 3 * group.rows_per_element)
+    count, mean = sum(len(block.operator) for block in reduction.blocks), reduction.basis.mean
+    operator, modes = np.zeros((count, len(entries))), np.zeros((strain.shape[1], 3, count))
+    last = 0
+    for block in reduction.blocks:
+        own = slice(last, last := last + len(block.operator))
+        operator[own, np.searchsorted(entries, block.entries)] = block.operator
+        for axis in range(3) if block.axis is None else (block.axis,):
+            modes[:, axis, own] = weighted.T @ reduction.v[axis::3]
+    lifted = modes.reshape(-1, count)
+    offset = weighted.T @ mean.reshape(-1, 3)
+    offset -= (lifted @ (operator @ mean[entries])).reshape(-1, 3)
+    return Interpolation(elements, operator, lifted, offset, stiffness, reduction.gain)

@@ -14,7 +14,6 @@ from pdrom.reduction.subspace.ecsw import ecsw_elements
 from pdrom.reduction.subspace.fused import FusedStepper
 from pdrom.reduction.subspace.interpolation import InterpolatedLocalStep, Interpolation
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
-from pdrom.reduction.subspace.safeguard import ControlStepper, SafeguardedStepper
 from pdrom.reduction.subspace.skinning import skinning_modes
 from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
 from pdrom.reduction.subspace.training import Norm, training_run
@@ -46,7 +45,7 @@ class SubspaceModel:
     samples: Mapping[str, Samples | Interpolation] = field(default_factory=dict)
 
     def elements_evaluated(self, scene: Scene) -> int:
-        """Elements that a local step of ``scene`` evaluates; those of a safeguard do not count."""
+        """Elements that a local step of ``scene`` evaluates."""
         return sum(self.evaluated(group) for group in scene.groups)
 
     def evaluated(self, group: ConstraintGroup) -> int:
@@ -66,24 +65,7 @@ class SubspaceModel:
         space = ReducedSpace(scene, self.columns, [step.matrix for step in steps])
         h, iterations = scene.config.time_step, scene.config.iterations
         start = reduced_state(scene, self.columns)
-        control = self._control(scene)
-        if control is not None:
-            return SafeguardedStepper(space, h, iterations, steps, control), start
         return FusedStepper(space, h, iterations, steps, scene.acceleration()), start
-
-    def _control(self, scene: Scene) -> ControlStepper | None:
-        """Iterations of the sampled elements that control an interpolation; None without any."""
-        chosen = [(group, self.samples.get(group.name)) for group in scene.groups]
-        steps = [
-            SubspaceLocalStep(group, self.columns, own.control, own.control_factors)
-            for group, own in chosen
-            if isinstance(own, Interpolation) and own.control is not None
-        ]
-        if len(steps) < len(chosen):
-            return None
-        space = ReducedSpace(scene, self.columns, [step.matrix for step in steps])
-        h, iterations = scene.config.time_step, scene.config.iterations
-        return ControlStepper(space, h, iterations, steps, track_objective=False)
 
     def positions(self, z: np.ndarray) -> np.ndarray:
         """Vertex positions (N, 3) m of coordinates ``z`` (K, 3)."""

@@ -1,14 +1,11 @@
 """A run of a position subspace, compared with the full-order run."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from pdrom.model.runs.bounded import BoundedRun
 from pdrom.model.scene import Scene
 from pdrom.reduction.rerun import Rerun, compare
 from pdrom.reduction.subspace.model import SubspaceModel
-from pdrom.reduction.subspace.safeguard import SafeguardedStepper
 
 
 def rerun_model(
@@ -23,7 +20,4 @@ def rerun_model(
     loop, start = model.loop(scene)
     frames, unit = scene.config.frames, scene.mesh.extent
     run = BoundedRun(loop.run, start, frames, blowup_extent, unit, model.positions)
-    outcome = compare(run, reference)
-    if isinstance(loop, SafeguardedStepper):
-        return replace(outcome, fallbacks=loop.fallbacks)
-    return outcome
+    return compare(run, reference)

@@ -15,14 +15,10 @@ from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.snapshots import row_masses
 from pdrom.reduction.subspace.columns import Columns
-from pdrom.reduction.subspace.hrpd import hrpd, sampled_space
-from pdrom.reduction.subspace.interpolated import Training as States
-from pdrom.reduction.subspace.interpolated import interpolate
+from pdrom.reduction.subspace.hrpd import HrpdSpec, hrpd, sampled_space
 from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
-from pdrom.reduction.subspace.safeguard import SafeguardedStepper
 from pdrom.reduction.subspace.space import coordinates
-from pdrom.reduction.subspace.specs import HrpdSpec, InterpolationSpec
 from study.experiments.hard_cases.case import HardCase
 from study.experiments.hard_cases.record import Record, Watched, record
 from study.experiments.hard_cases.roundoff import Roundoff
@@ -31,29 +27,20 @@ from study.experiments.hard_cases.runs import full_order
 R, K, TOLERANCE = 10, 6, 1e-2
 
 HRPD = HrpdSpec(dimension=20, samples=60)
-INTERPOLATIONS = {
-    "gappy": InterpolationSpec(modes=R, states="projected", oversampling=3, margin=0.1),
-    "safeguarded": InterpolationSpec(
-        modes=R, states="projected", oversampling=3, margin=0.1, safeguard=0.1
-    ),
-}
-BASES = {"pod": ("full", "ecsw", "hrpd", *INTERPOLATIONS), "skinning": ("full", "hrpd")}
+BASES = {"pod": ("full", "ecsw", "hrpd"), "skinning": ("full", "hrpd")}
 
 
 def _samples(
-    sampling: str, scene: Scene, columns: Columns, positions: np.ndarray, start: State
+    sampling: str, scene: Scene, columns: Columns, start: State
 ) -> Mapping[str, Samples | Interpolation]:
-    """Samples of each group in a position subspace, from a run's ``positions`` (n, N, 3) m."""
+    """Samples of each group in a position subspace; those of "ecsw" from a run from ``start``."""
     if sampling == "full":
         return {}
     if sampling == "ecsw":
         frames = np.arange(scene.config.frames)
         return sample_elements(scene, columns, frames, tolerances=[TOLERANCE], start=start)[0]
-    if sampling == "hrpd":
-        points = scene.mesh.points
-        return {g.name: hrpd(g, columns, sampled_space(g, points, HRPD)) for g in scene.groups}
-    states = States(scene, columns, positions, start)
-    return interpolate(scene, columns, states, spec=INTERPOLATIONS[sampling])
+    points = scene.mesh.points
+    return {g.name: hrpd(g, columns, sampled_space(g, points, HRPD)) for g in scene.groups}
 
 
 class Training:
@@ -141,20 +128,19 @@ def _local(training: Training, spec: MethodSpec, limit: float) -> ReducedRun:
 
 
 def _subspace(training: Training, kind: str, sampling: str, limit: float) -> ReducedRun:
-    scene, positions = training.scene, training.run.positions
-    columns = make_columns(scene, positions[1::2], kind, k=K)
+    scene = training.scene
+    columns = make_columns(scene, training.run.positions[1::2], kind, k=K)
     start = training.state()
     fields = (start.positions, start.velocities)
     state = State(*(coordinates(columns, scene.masses, field) for field in fields))
-    samples = _samples(sampling, scene, columns, positions[1::2], state)
-    model = SubspaceModel(kind, columns, samples)
+    model = SubspaceModel(kind, columns, _samples(sampling, scene, columns, state))
     untracked, _ = model.loop(scene)
-    steps = untracked.local_steps
-    loop: Stepper = untracked
-    if not isinstance(untracked, SafeguardedStepper):
-        loop = Stepper(
-            untracked.space, untracked.time_step, untracked.iterations, local_steps=steps
-        )
+    loop = Stepper(
+        untracked.space,
+        untracked.time_step,
+        untracked.iterations,
+        local_steps=untracked.local_steps,
+    )
     roundoff = Roundoff(scene, loop, columns)
     run = record(scene, loop, state, roundoff=roundoff, positions=model.positions, limit=limit)
     return ReducedRun(run, model.elements_evaluated(scene), columns.B.shape[1], None)

@@ -86,7 +86,7 @@ def study(tmp_path_factory) -> Made:
     models = file("models.h5")
     tables = {run: file(f"models_{run}.csv") for run in runs}
     asked = SubspaceModels(
-        bases=("pod",), sizes=(2, 4), tolerances=(1e-2,), interpolated_sizes=(),
+        bases=("pod",), sizes=(2, 4), tolerances=(1e-2,),
     )  # fmt: skip
     subspaces.subspaces(
         mesh=grid,

@@ -316,13 +316,6 @@ def _write_tables(results, scenes, methods, rng) -> None:
         (scene, group, method, r, "training", 0.01, 0.1, np.inf, 1.0, 2.0, 3.0)
         for scene, group, method, r, *_ in reruns
     ]
-    variants = [("plain", 9.0, 0.5), ("refused", None, None), ("both + more", 2.0, None)]
-    ablation = [
-        (scene, "pod", 20, r, variant, gain, error, 0.01)
-        for scene in scenes
-        for r in (20, 50)
-        for variant, gain, error in variants
-    ]
     noise = [
         (scene, "bending", axes, method, r, 9, None if axes in fails else 1e-12)
         for scene in FLAT
@@ -377,8 +370,6 @@ def _write_tables(results, scenes, methods, rng) -> None:
          " relative_error relative_error_within_horizon ms_per_frame k"),
         "noise": (noise, "scene group noisy_axes method r rank relative_error"),
         "claims_sensitivity": (variations, "claim part varied variation verdict_of_rules same"),
-        "subspace_ablation": (ablation, "scene position_basis k r variant gain"
-         " relative_error_within_horizon relative_error_full_projections"),
         "alternatives": (others, "scene vertices stiffness motion method substeps"
          " ms_per_frame"
          " error_implicit error_continuous"),

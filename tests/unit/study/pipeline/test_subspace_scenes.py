@@ -24,7 +24,7 @@ def root(tmp_path):
     """A project with a scene of its own, in which wind blows."""
     scenes = tmp_path / "config" / "scenes"
     scenes.mkdir(parents=True)
-    files = ("methods.yaml", "subspace_ablation.yaml", "scenes/spring_oop.yaml")
+    files = ("methods.yaml", "scenes/spring_oop.yaml")
     for name in files:
         shutil.copy(ROOT / "config" / name, tmp_path / "config" / name)
     scene = yaml.safe_load((scenes / "spring_oop.yaml").read_text())
@@ -53,8 +53,7 @@ def test_everything_else_is_held(root):
         if {"scene": "spring_oop"} in labels_of(held, place)
         and {"scene": "windy"} not in labels_of(held, place)
     }
-    naming = {paths.SUBSPACE_ABLATION}  # their scenes are listed
-    assert without - naming == set(INSIDE)
+    assert without == set(INSIDE)
 
 
 def test_one_line_says_what_the_scene_goes_without(root, caplog):

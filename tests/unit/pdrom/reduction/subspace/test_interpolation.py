@@ -9,18 +9,21 @@ from builders import GROUPS, make_scene, random_rotation
 from pdrom.core.store import open_hdf5, write_hdf5
 from pdrom.model.constraints.lanes import LANES
 from pdrom.model.runs.full_order import trajectory
-from pdrom.reduction.subspace.block_deim import block_deim, train_basis
-from pdrom.reduction.subspace.hrpd import hrpd, sampled_space
-from pdrom.reduction.subspace.interpolated import Training, interpolate
-from pdrom.reduction.subspace.interpolation import InterpolatedLocalStep, Interpolation
+from pdrom.reduction.basis import compute_basis
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.sampling.reduction import Reduction
+from pdrom.reduction.sampling.select import select
+from pdrom.reduction.subspace.hrpd import HrpdSpec, hrpd, sampled_space
+from pdrom.reduction.subspace.interpolation import (
+    InterpolatedLocalStep,
+    Interpolation,
+    interpolation_of,
+)
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns
 from pdrom.reduction.subspace.space import coordinates
-from pdrom.reduction.subspace.specs import HrpdSpec, InterpolationSpec
 
-FEW = {"kind": "bar", "nx": 3, "ny": 2, "nz": 2}
-EVERYTHING = {"modes": 10_000, "oversampling": 100}
-GAPPY = InterpolationSpec(modes=8, states="visited", oversampling=3, margin=0.1)
+R = 4
 HRPD = HrpdSpec(dimension=8, samples=20)
 
 
@@ -39,47 +42,10 @@ def right_hand_sides(scene, columns, interpolation, q, y):
     return found
 
 
-def interpolations_of(scene, columns, training, method):
-    if method == "hrpd":
-        return {
-            g.name: hrpd(g, columns, sampled_space(g, scene.mesh.points, HRPD))
-            for g in scene.groups
-        }
-    return interpolate(scene, columns, Training(scene, columns, training), GAPPY)
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {},
-        {"centring": "affine"},
-        {"interpolates": "residual"},
-        {"test": "interpolated"},
-        {"interpolates": "both"},
-        {"interpolates": "both", "test": "interpolated"},
-    ],
-    ids=str,
-)
-@pytest.mark.parametrize("name", GROUPS)
-def test_the_whole_space_from_all_elements_is_the_full_projection(name, rng, changes):
-    """Random states in number enough span every projection; nothing is left to interpolate.
-
-    The bar has few elements: the basis is as large as all projections together.
-    """
-    mesh = GROUPS[name] if GROUPS[name]["kind"] == "cloth" else FEW
-    scene = make_scene({"effect": name, "weight": 1e4}, mesh=mesh)
-    (group,) = scene.groups
-    points = scene.mesh.points
-    count = 3 * group.elements * group.rows_per_element + 5
-    states = [(points, points + rng.standard_normal(points.shape)) for _ in range(count)]
-    spec = InterpolationSpec(**EVERYTHING, **changes)
-    columns = whole_space(scene)
-    found = block_deim(group, columns, train_basis(group, states, spec), spec)
-    assert len(found.elements) == group.elements
-    assert found.gain == pytest.approx(1.0, abs=1e-9)
-    y = points + 0.1 * rng.standard_normal(points.shape)
-    one, two = right_hand_sides(scene, columns, found, points, y)
-    np.testing.assert_allclose(one, two, atol=1e-8 * np.abs(two).max())
+def hrpd_of(scene, columns):
+    return {
+        g.name: hrpd(g, columns, sampled_space(g, scene.mesh.points, HRPD)) for g in scene.groups
+    }
 
 
 def test_hrpd_with_all_elements_and_dimensions_is_the_full_projection(group_scene, rng):
@@ -106,54 +72,13 @@ def test_hrpd_is_exact_for_the_rest_shape_in_every_orientation(group_scene, rng)
     np.testing.assert_allclose(one, two, atol=1e-9 * np.abs(two).max())
 
 
-def test_interpolation_is_linear_algebra_of_the_definition(group_scene, rng):
-    """B^T S^T W (mean + V (P^T V)^+ P^T (p - mean)), with dense matrices."""
-    scene, group = group_scene, group_scene.groups[0]
-    points = scene.mesh.points
-    states = [(points, points + 0.3 * rng.standard_normal(points.shape)) for _ in range(12)]
-    spec = InterpolationSpec(modes=6, centring="affine", oversampling=2)
-    basis = train_basis(group, states, spec)
-    columns = make_columns(scene, points[None], "skinning", 4)
-    found = block_deim(group, columns, basis, spec)
-    y = columns.B @ rng.standard_normal((columns.B.shape[1], 3))
-    group.begin_frame(points)
-    p = group.project(y).ravel()
-    size = 3 * group.rows_per_element
-    entries = np.concatenate([np.arange(size * e, size * (e + 1)) for e in found.elements])
-    V = basis.V[:, :6]
-    fit = np.linalg.pinv(V[entries]) @ (p - basis.mean)[entries]
-    reduced = (basis.mean + V @ fit).reshape(-1, 3)
-    expected = (group.S.toarray() @ columns.B).T @ (group.row_weights[:, None] * reduced)
-    one, _ = right_hand_sides(scene, columns, found, points, y)
-    np.testing.assert_allclose(one, expected, atol=1e-9 * np.abs(expected).max())
-    assert found.gain == pytest.approx(np.linalg.norm(np.linalg.pinv(V[entries]), 2), rel=1e-9)
-
-
-def test_galerkin_tests_with_interpolated_strains(group_scene, rng):
-    """The reduced right-hand side is T^T W V c, T the interpolated strains of every coordinate."""
-    scene, group = group_scene, group_scene.groups[0]
-    points = scene.mesh.points
-    states = [(points, points + 0.3 * rng.standard_normal(points.shape)) for _ in range(12)]
-    spec = InterpolationSpec(modes=5, oversampling=2, test="interpolated")
-    basis = train_basis(group, states, spec)
-    columns = make_columns(scene, points[None], "skinning", 2)
-    found = block_deim(group, columns, basis, spec)
-    V, size = basis.V[:, :5], 3 * group.rows_per_element
-    entries = np.concatenate([np.arange(size * e, size * (e + 1)) for e in found.elements])
-    strains = np.kron(group.S.toarray() @ columns.B, np.eye(3))
-    tests = V @ found.operator @ strains[entries]
-    expected = tests.T @ (np.repeat(group.row_weights, 3)[:, None] * V)
-    np.testing.assert_allclose(found.modes, expected, atol=1e-9 * np.abs(expected).max())
-
-
-@pytest.mark.parametrize("method", ["hrpd", "gappy"])
 @pytest.mark.parametrize("kind", ["pod", "skinning"])
 @pytest.mark.parametrize("name", ["pins", "handles", "bar"])
-def test_pins_and_handles_are_met_exactly(name, kind, method):
+def test_pins_and_handles_are_met_exactly(name, kind):
     scene = SCENES[name]()
     reference = trajectory(scene)
     columns = make_columns(scene, reference[1:], kind, 3)
-    found = interpolations_of(scene, columns, reference[1:], method)
+    found = hrpd_of(scene, columns)
     result = run_model(scene, SubspaceModel(kind, columns, found))
     assert np.isfinite(result).all()
     for boundary in scene.boundaries:
@@ -161,16 +86,15 @@ def test_pins_and_handles_are_met_exactly(name, kind, method):
         np.testing.assert_allclose(result[1:, held], reference[1:, held], atol=1e-12)
 
 
-@pytest.mark.parametrize("method", ["hrpd", "gappy"])
 @pytest.mark.parametrize("name", ["handles", "bending", "bar", "poke", "damped"])
-def test_a_step_reads_nothing_of_the_mesh(name, method):
+def test_a_step_reads_nothing_of_the_mesh(name):
     """With everything of the length of the mesh overwritten the second run is the same."""
     config = SCENES[name]().config
     effects = [e.model_dump() for e in config.effects]
     scene = make_scene(*effects, mesh=config.mesh.model_dump(), frames=config.frames)
     reference = trajectory(scene)
     columns = make_columns(scene, reference[1:], "pod", 3)
-    found = interpolations_of(scene, columns, reference[1:], method)
+    found = hrpd_of(scene, columns)
     loop, start = SubspaceModel("pod", columns, found).loop(scene)
     assert_reads_nothing_of_the_mesh(scene, columns, loop, start)
 
@@ -210,63 +134,47 @@ def test_projections_that_are_round_off_need_no_element():
     scene = make_scene({"effect": "bending", "weight": 10.0}, SPRING, GRAVITY, PINS, frames=5)
     reference = trajectory(scene)
     columns = make_columns(scene, reference[1:], "pod", 3)
-    for method in ("hrpd", "gappy"):
-        found = interpolations_of(scene, columns, reference[1:], method)
-        assert len(found["bending"].elements) == 0
-        kept = {"bending": found["bending"]}
-        one = run_model(scene, SubspaceModel("pod", columns, kept))
-        np.testing.assert_allclose(one, run_model(scene, SubspaceModel("pod", columns)), atol=1e-9)
+    found = hrpd_of(scene, columns)
+    assert len(found["bending"].elements) == 0
+    kept = {"bending": found["bending"]}
+    one = run_model(scene, SubspaceModel("pod", columns, kept))
+    np.testing.assert_allclose(one, run_model(scene, SubspaceModel("pod", columns)), atol=1e-9)
 
 
-def test_bounds_stop_coefficients_at_the_edge_of_the_training_range(rng):
+def test_interpolations_survive_a_file(tmp_path):
     scene = SCENES["pins"]()
-    group, points = scene.groups[0], scene.mesh.points
-    states = [(points, points + 0.1 * rng.standard_normal(points.shape)) for _ in range(10)]
-    columns = whole_space(scene)
-    far = points + 50.0 * rng.standard_normal(points.shape)
-    seen = {}
-    for margin in (None, 0.0, 0.5):
-        spec = InterpolationSpec(modes=4, margin=margin)
-        found = block_deim(group, columns, train_basis(group, states, spec), spec)
-        rhs = right_hand_sides(scene, columns, found, far, far)[0] - found.offset
-        seen[margin] = np.linalg.lstsq(found.modes, rhs.ravel(), rcond=None)[0]
-        if margin is not None:
-            low, high = found.lower.ravel(), found.upper.ravel()
-            assert (seen[margin] >= low - 1e-6).all()
-            assert (seen[margin] <= high + 1e-6).all()
-    assert np.abs(seen[None] - seen[0.0]).max() > 0.1
-    np.testing.assert_allclose(seen[0.5].shape, (4,))
+    found = hrpd_of(scene, make_columns(scene, trajectory(scene)[1:], "pod", 3))["spring"]
+    with write_hdf5(tmp_path / "it.h5") as file:
+        found.save(file.create_group("it"))
+    with open_hdf5(tmp_path / "it.h5") as file:
+        loaded = Interpolation.load(file["it"])
+    assert loaded.gain == found.gain
+    for name, value in vars(found).items():
+        np.testing.assert_array_equal(getattr(loaded, name), value)
 
 
-def test_interpolations_survive_a_file(tmp_path, rng):
-    scene = SCENES["pins"]()
-    reference = trajectory(scene)
-    columns = make_columns(scene, reference[1:], "pod", 3)
-    for method in ("hrpd", "gappy"):
-        found = interpolations_of(scene, columns, reference[1:], method)["spring"]
-        path = tmp_path / f"{method}.h5"
-        with write_hdf5(path) as file:
-            found.save(file.create_group("it"))
-        with open_hdf5(path) as file:
-            loaded = Interpolation.load(file["it"])
-        for name, value in vars(found).items():
-            if isinstance(value, np.ndarray):
-                np.testing.assert_array_equal(getattr(loaded, name), value)
-            else:
-                assert getattr(loaded, name) == value
-
-
-def test_both_sides_with_galerkin_are_a_symmetric_system(group_scene, rng):
-    """What the iteration converges to has the matrix (T^T W T), symmetric and semi-definite."""
-    scene, group = group_scene, group_scene.groups[0]
-    points = scene.mesh.points
-    states = [(points, points + 0.3 * rng.standard_normal(points.shape)) for _ in range(12)]
-    spec = InterpolationSpec(modes=5, oversampling=2, interpolates="both", test="interpolated")
-    columns = make_columns(scene, points[None], "skinning", 2)
-    found = block_deim(group, columns, train_basis(group, states, spec), spec)
-    size = 3 * group.rows_per_element
-    entries = np.concatenate([np.arange(size * e, size * (e + 1)) for e in found.elements])
-    strains = np.kron(group.S.toarray() @ columns.B, np.eye(3))
-    matrix = found.modes @ found.operator @ strains[entries]
-    np.testing.assert_allclose(matrix, matrix.T, atol=1e-9 * np.abs(matrix).max())
-    assert np.linalg.eigvalsh(matrix)[0] > -1e-9 * np.abs(matrix).max()
+@pytest.mark.parametrize(
+    "choices",
+    [
+        {"rows": "joint", "centring": "none", "solve": "square"},
+        {"rows": "element", "centring": "affine"},
+    ],
+    ids=["joint rows", "whole elements"],
+)
+def test_the_right_hand_side_by_a_reduction_is_that_of_its_reconstruction(choices):
+    pull, pins = {"effect": "gravity"}, {"effect": "pins", "select": "left"}
+    scene = make_scene(pull, pins, {"effect": "strain", "weight": 1e4}, mesh=GROUPS["strain"])
+    (group,) = scene.groups
+    run = trajectory(scene, track_objective=False)
+    snapshots = np.stack([group.project(q) for q in run])
+    spec = MethodSpec(title="x", **choices)
+    basis = compute_basis(snapshots, np.ones(len(group.row_weights)), 1e-12, 2, spec)
+    reduction = Reduction(basis, select(basis, spec, R), spec, R)
+    columns = make_columns(scene, run, "pod", 3)
+    step = InterpolatedLocalStep(group, columns, interpolation_of(group, columns, reduction))
+    z = np.random.default_rng(0).standard_normal((columns.B.shape[1], 3))
+    rhs = np.zeros_like(z)
+    step.accumulate(z, rhs)
+    p = reduction.reconstruct(group.project(columns.B @ z)[None])[0]
+    strain = group.S @ columns.B
+    assert rhs == pytest.approx(strain.T @ (group.row_weights[:, None] * p), rel=1e-9, abs=1e-9)
