@@ -1,16 +1,24 @@
-"""Position subspaces with full projections, with sampled elements and with those of hrpd."""
+"""Position subspaces with full projections, with sampled elements and with those of hrpd.
+
+The models of a large scene are made and run in one job with its full-order runs, which no other job
+reads; `study.experiments.frame_times` times them.
+"""
 
 import logging
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
+import h5py
 import pandas as pd
 
 from pdrom.core.names import SceneName
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.energy import largest
+from pdrom.model.held_out import MOTIONS
+from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.subspace.columns import Columns
@@ -29,27 +37,31 @@ from pdrom.reduction.subspace.training import Norm
 from study.artifact.paths import (
     FULL_ORDER,
     MESH,
+    ONLINE,
+    ONLINE_MODELS,
     SUBSPACES,
     SUBSPACES_HELDOUT,
     SUBSPACES_SECONDS,
     SUBSPACES_TRAIN,
     File,
 )
-from study.artifact.reads import Every, Settings
+from study.artifact.reads import Every, Settings, SourcesOf
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.measurement import clocked
 from study.experiments.kit.motion import Motion, training_indices, training_positions
-from study.experiments.kit.scenes import TRAIN, scene_of
+from study.experiments.kit.scenes import TRAIN, positions_of, scene_of
 from study.experiments.kit.settings import BlowupExtent, Modes, PositionBasis, Tolerance
 
 log = logging.getLogger(__name__)
 
-COLUMNS = [
+_RUN = [
     "scene", "group", "method", "position_basis", "k", "r", "frames", "finite", "blowup_frame",
-    "max_extent", "relative_error", "energy_ratio",
+    "max_extent", "relative_error",
 ]  # fmt: skip
-
+COLUMNS = [*_RUN, "energy_ratio"]
+_MADE = [*COLUMNS, "motion", "reduction_s"]
 SECONDS_COLUMNS = ["scene", "position_basis", "k", "method", "reduction_s"]
+LARGE_COLUMNS = [*_RUN, "motion", "tau", "vertices", "elements", "iterations", "reduction_s"]
 FULL, HRPD = "full", "hrpd"
 
 Sampled = Mapping[str, Samples | Interpolation]
@@ -88,11 +100,37 @@ class Subspace(SubspaceModels):
     scenes: tuple[SceneName, ...] = ()
 
 
+class LargeModels(SubspaceModels):
+    """Models of a large scene; none evaluates all projections, which takes too long."""
+
+    bases: tuple[PositionBasis, ...] = ("pod",)
+    sizes: tuple[Modes, ...] = (20,)
+    tolerances: tuple[Tolerance, ...] = (1e-2,)
+
+    def methods(self, kind: str, k: int) -> list[str]:
+        """Names of the models on a basis of ``kind`` with k modes."""
+        return [method for method in super().methods(kind, k) if method != FULL]
+
+
+class Online(LargeModels):
+    """Section ``online``: the models, and the large ``scenes`` that are reduced by them."""
+
+    scenes: tuple[str, ...] = ()
+
+
 class Options(ConfigModel):
     """Settings of the position subspaces of a scene."""
 
     scene: SceneConfig
     subspace: SubspaceModels
+    blowup_extent: BlowupExtent
+
+
+class LargeOptions(ConfigModel):
+    """Settings of the position subspaces of a large scene."""
+
+    scene: SceneConfig
+    online: LargeModels
     blowup_extent: BlowupExtent
 
 
@@ -117,45 +155,100 @@ def subspaces(
 ) -> None:
     """Build every model (bases, sizes, tolerances) and run all motions with it."""
     motions = {
-        run["run"]: Motion(scene_of(settings.scene, mesh, run["run"]), run) for run in full_order
+        run["run"]: Motion(scene_of(settings.scene, mesh, run["run"]), positions_of(run))
+        for run in full_order
     }
-    rows: dict[str, list[dict[str, Any]]] = {name: [] for name in motions}
-    seconds = []
     with write_hdf5(out.path) as file:
         for name, motion in motions.items():
             for series, values in motion.series.items():
                 file[f"{series}/{name}"] = values
-        start = motions[TRAIN]
-        file.attrs.update(start.units)
-        made = clocked(_subspaces(start, settings.subspace))
+        file.attrs.update(motions[TRAIN].units)
+        runs = _Runs(file, settings.blowup_extent, compared=True)
+        rows = runs.of_models(motions, settings.subspace)
+    train = rows.pop(TRAIN)
+    write_table(train[COLUMNS], train_table.path)
+    heldout = pd.concat(rows.values(), ignore_index=True)
+    write_table(heldout[[*COLUMNS, "motion"]], heldout_table.path)
+    write_table(train[SECONDS_COLUMNS], seconds_table.path)
+
+
+@experiment(
+    "Reduction of {scene}",
+    reads={"sources": SourcesOf("scene.mesh"), "settings": Settings(LargeOptions)},
+    writes={"out": ONLINE, "models": ONLINE_MODELS},
+)
+def online(sources: list[Path], settings: LargeOptions, out: File, models: File) -> None:
+    """Reduce a large scene by every model and run all motions with each.
+
+    Its mesh is made of the ``sources``, its full-order runs are made here and not kept.
+    """
+    config, mesh = settings.scene, settings.scene.mesh.build(Path())
+    variants = {TRAIN: config} | {str(name): config.heldout_variant(name) for name in MOTIONS}
+    scenes = {name: Scene.build(variant, mesh) for name, variant in variants.items()}
+    motions = {
+        name: Motion(scene, trajectory(scene, track_objective=False))
+        for name, scene in scenes.items()
+    }
+    log.info("%s: full-order runs of %d vertices", config.name, mesh.vertices)
+    with write_hdf5(models.path) as file:
+        runs = _Runs(file, settings.blowup_extent, compared=False)
+        rows = runs.of_models(motions, settings.online)
+    table = pd.concat(rows.values(), ignore_index=True)
+    tolerances = {ecsw_name(tolerance): tolerance for tolerance in settings.online.tolerances}
+    table = table.assign(
+        tau=table.method.map(tolerances),
+        vertices=mesh.vertices,
+        elements=sum(group.elements for group in scenes[TRAIN].groups),
+        iterations=config.iterations,
+    )
+    write_table(table[LARGE_COLUMNS], out.path)
+
+
+class _Runs:
+    """Runs of all motions of a scene with every model, which is stored in a file.
+
+    limit : extent of a blow-up over that of the rest shape
+    compared : whether the file receives coordinates and deviations of each run, too
+    """
+
+    def __init__(self, file: h5py.File, limit: float, compared: bool) -> None:
+        self._file, self._limit, self._compared = file, limit, compared
+
+    def of_models(
+        self, motions: Mapping[str, Motion], settings: SubspaceModels
+    ) -> dict[str, pd.DataFrame]:
+        """Rows of each motion: every model of ``settings``, trained on the training motion."""
+        rows: dict[str, list[dict[str, Any]]] = {name: [] for name in motions}
+        made = clocked(_subspaces(motions[TRAIN], settings))
         for of_columns, (base, columns, kind, k, models) in made:
-            store_columns(file.create_group(f"columns/{base}"), columns)
+            store_columns(self._file.create_group(f"columns/{base}"), columns)
             spent: dict[str, float] = defaultdict(float)
             for of_model, (method, samples) in clocked(models):
                 # samplings of all tolerances are made together, for the first of them
                 family = ECSW if method.startswith(ECSW) else method
                 spent[family] += of_model
-                seconds.append(
-                    (start.scene.config.name, kind, k, method, of_columns + spent[family])
-                )
                 model = SubspaceModel(kind, columns, samples)
-                labels = {"method": method, "position_basis": kind, "k": k, "base": base}
-                store = file.create_group(f"models/{base}_{method}")
-                store_model(store, labels, samples)
+                labels = {"method": method, "position_basis": kind, "k": k}
+                store = self._file.create_group(f"models/{base}_{method}")
+                store_model(store, {**labels, "base": base}, samples)
+                labels["reduction_s"] = of_columns + spent[family]
                 for name, motion in motions.items():
-                    outcome = motion.run(model, settings.blowup_extent)
-                    seen = motion.deviations(outcome)
-                    kept = {"coordinates": outcome.coordinates, "extent": outcome.extent, **seen}
-                    for series, values in kept.items():
-                        store[f"{name}/{series}"] = values
-                    energy = largest(seen["energy"])
-                    rows[name].append(_row(motion, labels, model, outcome, energy))
+                    outcome = motion.run(model, self._limit)
+                    row = _row(motion, model, outcome) | labels | {"motion": name}
+                    if self._compared:
+                        row["energy_ratio"] = _store_run(store, name, motion, outcome)
+                    rows[name].append(row)
                 log.info("%s %s: error %s", base, method, rows[TRAIN][-1]["relative_error"])
-    tables = {name: pd.DataFrame(own, columns=COLUMNS) for name, own in rows.items()}
-    write_table(tables.pop(TRAIN), train_table.path)
-    heldout = [table.assign(motion=name) for name, table in tables.items()]
-    write_table(pd.concat(heldout, ignore_index=True), heldout_table.path)
-    write_table(pd.DataFrame(seconds, columns=SECONDS_COLUMNS), seconds_table.path)
+        return {name: pd.DataFrame(own, columns=_MADE) for name, own in rows.items()}
+
+
+def _store_run(store: h5py.Group, name: str, motion: Motion, outcome: Rerun) -> float | None:
+    """Store an ``outcome`` of the motion ``name``; its largest energy over the full order's."""
+    seen = motion.deviations(outcome)
+    kept = {"coordinates": outcome.coordinates, "extent": outcome.extent, **seen}
+    for series, values in kept.items():
+        store[f"{name}/{series}"] = values
+    return largest(seen["energy"])
 
 
 def _subspaces(
@@ -170,50 +263,39 @@ def _subspaces(
     for kind in settings.bases:
         for k in settings.sizes:
             columns = make_columns(scene, training, kind, k=k)
-            own = spaces if HRPD in settings.methods(kind, k) else {}
-            models = _samplings(scene, columns, kind, settings, own)
+            models = _samplings(scene, columns, settings.methods(kind, k), settings, spaces)
             yield f"{kind}_k{k:03d}", columns, kind, k, models
 
 
 def _samplings(
     scene: Scene,
     columns: Columns,
-    kind: str,
+    methods: list[str],
     settings: SubspaceModels,
     spaces: Mapping[str, SampledSpace | None],
 ) -> Iterator[tuple[str, Sampled]]:
-    """(method, samples) pairs: full projections, element sampling on the snapshot basis, hrpd.
-
-    The ``spaces`` of projections of each group are those of hrpd; without any it is left out.
-    """
-    yield FULL, {}
-    if kind == "pod":
+    """(method, samples) pairs of the ``methods``; ``spaces`` of projections are those of hrpd."""
+    if FULL in methods:
+        yield FULL, {}
+    if any(method.startswith(ECSW) for method in methods):
         tolerances = settings.tolerances
         frames = training_indices(scene)
         found = sample_elements(scene, columns, frames, tolerances=tolerances, norm=settings.norm)
         for tolerance, samples in zip(tolerances, found, strict=True):
             yield ecsw_name(tolerance), samples
-    if spaces:
+    if HRPD in methods:
         yield HRPD, {g.name: hrpd(g, columns, spaces[g.name]) for g in scene.groups}
 
 
-def _row(
-    motion: Motion,
-    labels: dict[str, Any],
-    model: SubspaceModel,
-    outcome: Rerun,
-    energy: float | None,
-) -> dict[str, Any]:
+def _row(motion: Motion, model: SubspaceModel, outcome: Rerun) -> dict[str, Any]:
     scene = motion.scene
     return {
         "scene": scene.config.name,
         "group": "all",
-        **labels,
         "r": model.elements_evaluated(scene),
         "frames": outcome.frames,
         "finite": outcome.finite,
         "blowup_frame": outcome.blowup_frame,
         "max_extent": outcome.max_extent,
         "relative_error": outcome.error(motion.displacement),
-        "energy_ratio": energy,
     }

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.names import SceneName
-from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
+from pdrom.core.yamlfile import ConfigModel, validate
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import Scene, SceneConfig
@@ -25,13 +25,12 @@ from study.experiments.kit.settings import BlowupExtent, Solver, Threads
 from study.experiments.ladder import LadderSection
 from study.experiments.live import Live
 from study.experiments.noise import Noise
-from study.experiments.online import Online
 from study.experiments.repetitions import RepetitionSection
 from study.experiments.requested_tolerances import RequestedTolerances
 from study.experiments.scaling import Scaling
 from study.experiments.sensitivity import Sensitivity
 from study.experiments.stability import Stability
-from study.experiments.subspaces import Subspace
+from study.experiments.subspaces import Online, Subspace
 from study.experiments.timing import Timing
 from study.pipeline.scenes import (
     Changes,

@@ -6,7 +6,9 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, TableOf
 from study.tables.kit.declaration import compared, integer, number, table, timed
+from study.tables.kit.held_out import HIGH, LOW, MEDIAN
 from study.tables.kit.parts import joined
+from study.tables.kit.reruns import TRAIN
 from study.tables.kit.vocabulary import (
     ELEMENTS_SAMPLED,
     MS_PER_FRAME,
@@ -18,9 +20,13 @@ from study.tables.kit.vocabulary import (
     VERTICES,
     K,
 )
-from study.tables.speedups import timed_reductions
+from study.tables.speedups import large_errors, timed_reductions
 
 _KEYS = ["scene", "position_basis", "k", "method"]
+_ERRORS = {
+    "error_train": "relative_error_train", MEDIAN: "relative_error_heldout",
+    LOW: "relative_error_heldout_low", HIGH: "relative_error_heldout_high",
+}  # fmt: skip
 _TIMES = ["ms_per_frame", "fom_ms_per_frame", "speedup", "speedup_low", "speedup_high"]
 
 
@@ -58,5 +64,7 @@ def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.D
         return rows
     found = pd.DataFrame(list(timed_reductions(joined(measured), times)))
     found = found.rename(columns={"full_ms": "fom_ms_per_frame"})
-    made = rows.merge(found[[*_KEYS, *_TIMES]], on=_KEYS, how="left")
+    made = rows[rows.motion == TRAIN].rename(columns={"r": "elements_sampled"})
+    made = made.merge(large_errors(rows).rename(columns=_ERRORS), on=_KEYS, how="left")
+    made = made.merge(found[[*_KEYS, *_TIMES]], on=_KEYS, how="left")
     return made.assign(ms_per_iteration=made.ms_per_frame / made.iterations)

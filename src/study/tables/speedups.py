@@ -12,6 +12,7 @@ from study.tables.kit.declaration import compared, flag, integer, number, table,
 from study.tables.kit.held_out import COLUMNS, HIGH, LOW, MEDIAN, over_motions
 from study.tables.kit.intervals import in_words, median_interval
 from study.tables.kit.parts import joined
+from study.tables.kit.reruns import TRAIN
 from study.tables.kit.vocabulary import (
     GROUP,
     METHOD,
@@ -93,10 +94,12 @@ def speedups(
     extra = [
         _costs(joined(projections), _REDUCTION),
         _costs(joined(subspaces), _MODEL),
-        _costs(joined(large), _MODEL),
     ]
     errors = [_errors(reruns, heldout, keys) for keys in (_REDUCTION, _MODEL)]
-    errors.append(_large_errors(joined(large)))
+    own = joined(large)
+    if len(own):
+        extra.append(_costs(own[own.motion == TRAIN], _MODEL))
+        errors.append(large_errors(own))
     made = _first_known(made, extra, "reduction_s")
     for column in ("error_train", MEDIAN, LOW, HIGH):
         made = _first_known(made, errors, column)
@@ -149,10 +152,11 @@ def _errors(reruns: pd.DataFrame, heldout: pd.DataFrame, keys: list[str]) -> pd.
     return train.astype(sizes).merge(over_motions(unseen, keys), on=keys, how="outer")
 
 
-def _large_errors(large: pd.DataFrame) -> pd.DataFrame:
-    names = {"relative_error_train": "error_train", "relative_error_heldout": MEDIAN}
-    names |= {"relative_error_heldout_low": LOW, "relative_error_heldout_high": HIGH}
-    return large.reindex(columns=[*_MODEL, *names]).rename(columns=names)
+def large_errors(large: pd.DataFrame) -> pd.DataFrame:
+    """Errors of each model of large scenes over whole runs, from the rows of all motions."""
+    whole = large.rename(columns={"relative_error": _ERROR}).assign(horizon_frame=1)
+    own, unseen = whole[whole.motion == TRAIN], whole[whole.motion != TRAIN]
+    return _errors(own, unseen, _MODEL)
 
 
 def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -> pd.DataFrame:

@@ -8,15 +8,10 @@ from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.snapshots import training_frames
 from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.rerun import rerun_model
-from study.artifact.paths import File
-from study.experiments.kit.scenes import positions_of
 
 
 class Motion(Yardstick):
-    """A motion of a scene with its full-order run, which is read from its file."""
-
-    def __init__(self, scene: Scene, full_order: File) -> None:
-        super().__init__(scene, positions_of(full_order))
+    """A motion of a scene with its full-order run."""
 
     def run(self, model: SubspaceModel, limit: float) -> Rerun:
         """Run a model; a blow-up, an extent above ``limit`` m, ends the run and is recorded."""

@@ -5,17 +5,18 @@ import pytest
 
 from builders import make_scene
 from pdrom.core.errors import ConfigurationError, PdromError
-from pdrom.core.store import read_table
+from pdrom.core.store import read_table, write_table
 from pdrom.core.yamlfile import validate
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
+from pdrom.model.held_out import MOTIONS
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import SceneConfig
-from pdrom.reduction.subspace.model import SubspaceModel, make_columns
+from pdrom.reduction.subspace.store import load_models
 from study.artifact.paths import File
-from study.experiments import online as experiment
+from study.experiments import subspaces as experiment
 from study.experiments.kit.fresh_process import Request, Subspaces, TimedScene, in_fresh_process
 from study.experiments.kit.measurement import Protocol
-from study.experiments.online import COLUMNS, Online, OnlineModels, relative_error
+from study.experiments.subspaces import LARGE_COLUMNS, Hrpd, LargeModels, LargeOptions, Online
 from study.tables.frame_times import frame_times
 from study.tables.online import online
 
@@ -32,10 +33,13 @@ def written(tmp_path_factory):
     scene = make_scene(*EFFECTS, mesh={"kind": "cloth", "rows": 8, "columns": 7}, frames=10)
     config = SceneConfig.model_validate(scene.config.model_dump(mode="json") | CHANGES)
     path = tmp_path_factory.mktemp("online") / "scene.csv"
-    asked = OnlineModels(bases=("pod", "skinning"), sizes=(3,), tolerances=(0.3, 1e-2))
+    asked = LargeModels(
+        bases=("pod", "skinning"), sizes=(3,), tolerances=(0.3, 1e-2), hrpd=Hrpd(sizes=(3,))
+    )
     models = path.with_suffix(".h5")
     out, stored = File(str(path), {"scene": "test"}), File(str(models), {})
-    experiment.online(sources=[], config=config, asked=asked, out=out, models=stored)
+    settings = LargeOptions(scene=config, online=asked, blowup_extent=10.0)
+    experiment.online(sources=[], settings=settings, out=out, models=stored)
     timed = TimedScene(scene=config, subspaces=Subspaces(path=str(models)))
     request = Request(
         scenes=(timed,), timing=Protocol(frames=3, warmup=1, repeats=1), solver=DEFAULT_SOLVER,
@@ -46,11 +50,16 @@ def written(tmp_path_factory):
 
 
 def test_rows_of_a_scene(written):
-    scene, path, _ = written
-    table = read_table(path)
-    assert table.columns.tolist() == COLUMNS
-    assert table.position_basis.tolist() == ["pod", "pod", "skinning", "skinning"]
-    assert table.tau.tolist() == [0.3, 1e-2] * 2
+    scene, path, times = written
+    rows = read_table(path)
+    assert rows.columns.tolist() == LARGE_COLUMNS
+    assert rows.motion.unique().tolist() == ["train", *MOTIONS]
+    train = rows[rows.motion == "train"]
+    assert train.position_basis.tolist() == ["pod", "pod", "pod", "skinning"]
+    assert train.method.tolist() == ["ecsw-3e-01", "ecsw-1e-02", "hrpd", "hrpd"]
+    assert train.tau.tolist()[:2] == [0.3, 1e-2]
+    table = online([File(str(path), {})], [times], frame_times([times]))
+    assert len(table) == len(train)
     assert (table.vertices == 56).all()
     assert (table.elements == scene.groups[0].elements).all()
     assert (table.elements_sampled > 0).all()
@@ -90,14 +99,15 @@ def test_a_process_that_fails_is_told(written, tmp_path):
         in_fresh_process(request, tmp_path)
 
 
-def test_a_motion_that_blows_up_has_an_infinite_error(written, tmp_path, monkeypatch):
-    scene = written[0].config.model_dump(mode="json") | CHANGES
-    errors = iter((0.1, 0.2, None, 0.3))
-    monkeypatch.setattr(experiment, "relative_error", lambda *given: next(errors))
-    files = {key: File(str(tmp_path / key), {}) for key in ("out", "models")}
-    config = SceneConfig.model_validate(scene)
-    experiment.online(sources=[], config=config, asked=OnlineModels(sizes=(3,)), **files)
-    row = read_table(tmp_path / "out").iloc[0]
+def test_a_motion_that_blows_up_has_an_infinite_error(written, tmp_path):
+    _, path, times = written
+    rows = read_table(path)
+    chosen = rows[(rows.method == "ecsw-1e-02")].copy()
+    chosen["relative_error"] = [0.1, 0.2, None, 0.3]
+    chosen["blowup_frame"] = [None, None, 3, None]
+    write_table(chosen, tmp_path / "rows.csv")
+    table = online([File(str(tmp_path / "rows.csv"), {})], [times], frame_times([times]))
+    (row,) = table.itertuples()
     assert (row.relative_error_train, row.relative_error_heldout_low) == (0.1, 0.2)
     assert (row.relative_error_heldout, row.relative_error_heldout_high) == (0.3, np.inf)
 
@@ -109,9 +119,9 @@ def test_no_scene_leaves_an_empty_table():
 
 
 def test_error_is_that_of_the_trajectories(written):
-    scene, _, _ = written
+    scene, path, _ = written
+    (_, model), *_ = load_models(path.with_suffix(".h5"))
     reference = trajectory(scene)
-    model = SubspaceModel("pod", make_columns(scene, reference[1:], "pod", 3))
     loop, state = model.loop(scene)
     run = [reference[0]]
     for frame in range(scene.config.frames):
@@ -119,7 +129,7 @@ def test_error_is_that_of_the_trajectories(written):
         run.append(model.positions(state.positions))
     moved = np.linalg.norm(reference - reference[0])
     expected = np.linalg.norm(np.stack(run) - reference) / moved
-    assert relative_error(scene, model, reference) == pytest.approx(expected, rel=1e-9)
+    assert read_table(path).relative_error[0] == pytest.approx(expected, rel=1e-9)
 
 
 def test_faulty_settings_are_refused():

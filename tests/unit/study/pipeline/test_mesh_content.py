@@ -6,8 +6,8 @@ import pytest
 
 from bad_input.project import MESH, SCENE, SQUARE, STUDY, Replace, load_project, make_project
 from study.experiments.mesh import mesh
-from study.experiments.online import online
 from study.experiments.scaling import scaling
+from study.experiments.subspaces import online
 
 USED = Replace("{kind: cloth, rows: 5, columns: 4, plane: xz}", f"{{kind: file, path: {MESH}}}")
 
