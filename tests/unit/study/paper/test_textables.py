@@ -292,7 +292,7 @@ def test_iterations_have_error_and_time():
 
 def test_positions_show_the_subspace_and_its_sample():
     assert rows(positions(TABLES)) == [
-        r"\texttt{b} & 0.12 & 0.50 & 0.38 & -- & 90 & 4 & -- & -- & -- \\"
+        r"\texttt{b} & 0.12 & 0.50 & 0.38 & -- & 90 & 4 & -- & -- \\"
     ]
 
 
