@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 45_813,
-    "modules of src": 465,
-    "lines of tests": 31_019,
-    "words of documentation": 25_107,
-    "tables": 33,
-    "figures": 24,
-    "experiments": 22,
-    "percent of src in decorators, signatures and imports": 22.9,
+    "lines of src": 44_893,
+    "modules of src": 456,
+    "lines of tests": 30_489,
+    "words of documentation": 25_014,
+    "tables": 32,
+    "figures": 23,
+    "experiments": 21,
+    "percent of src in decorators, signatures and imports": 22.8,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 
