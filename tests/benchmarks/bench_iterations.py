@@ -1,6 +1,6 @@
 """One frame (K = 10 local/global iterations) of the full-order model, a scene a family.
 
-Plain with one thread and with two, and with Anderson acceleration.
+Plain and with Anderson acceleration.
 """
 
 import numpy as np
@@ -15,14 +15,7 @@ WINDOW = 5
 
 
 def plain(scene: Scene) -> Stepper:
-    """One thread."""
-    return scene.stepper(track_objective=False)
-
-
-def two_threads(scene: Scene) -> Stepper:
-    """The local step of large groups is shared."""
-    for group in scene.groups:
-        group.threads = 2
+    """Every iteration from the last one."""
     return scene.stepper(track_objective=False)
 
 
@@ -33,7 +26,7 @@ def accelerated(scene: Scene) -> Stepper:
     return Stepper(space, config.time_step, config.iterations, scene.groups, False, acceleration)
 
 
-LOOPS = {"plain": plain, "two threads": two_threads, "accelerated": accelerated}
+LOOPS = {"plain": plain, "accelerated": accelerated}
 
 
 @pytest.mark.parametrize("kind", LOOPS)

@@ -132,21 +132,19 @@ class Scene:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy, also a pickled one, is built again: compiled kernels cannot be pickled."""
-        return Scene.build, (self.config, self.mesh, self.groups[0].threads, self.masses)
+        return Scene.build, (self.config, self.mesh, self.masses)
 
     @classmethod
     def build(
         cls,
         config: SceneConfig,
         mesh: Mesh,
-        threads: int = 1,
         masses: np.ndarray | None = None,
     ) -> "Scene":
         """Bind ``config`` to ``mesh``.
 
         Parameters
         ----------
-        threads : 1 or 2 of them share the local step of large groups
         masses : (N,) kg in place of those of ``config``
 
         Raises
@@ -170,8 +168,6 @@ class Scene:
             starts=[e for e in effects if isinstance(e, Start)],
         )
         check_holds(scene.boundaries, config.name, config.frames)
-        for group in scene.groups:
-            group.threads = threads
         for force in scene.forces:
             force.time_step = config.time_step
         return scene

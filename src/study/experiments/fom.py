@@ -7,7 +7,7 @@ from study.artifact.paths import FULL_ORDER, MESH, File
 from study.artifact.reads import Setting
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.scenes import SPLITS, TRAIN, scene_of
-from study.experiments.kit.settings import Solver, Threads
+from study.experiments.kit.settings import Solver
 
 
 @experiment(
@@ -16,17 +16,16 @@ from study.experiments.kit.settings import Solver, Threads
         "mesh": MESH,
         "config": Setting("scene"),
         "solver": Setting("solver"),
-        "threads": Setting("threads"),
     },
     writes={"out": FULL_ORDER},
 )
-def fom(mesh: File, config: SceneConfig, solver: Solver, threads: Threads, out: File) -> None:
+def fom(mesh: File, config: SceneConfig, solver: Solver, out: File) -> None:
     """Simulate one of a scene's runs; the first held-out one stores the odd frames only.
 
     Of the other held-out ones nothing but the positions is used.
     """
     motion = out["run"]
-    scene = scene_of(config, mesh, motion, threads=threads)
+    scene = scene_of(config, mesh, motion)
     frames = scene.config.frames
     plans = scene.config.reduce if motion in SPLITS else {}
     wanted = {

@@ -41,7 +41,7 @@ from study.experiments.kit.fresh_process import (
     in_fresh_process,
 )
 from study.experiments.kit.measurement import Protocol
-from study.experiments.kit.settings import Count, Modes, PositionBasis, Repeats, Solver, Threads
+from study.experiments.kit.settings import Count, Modes, PositionBasis, Repeats, Solver
 
 log = logging.getLogger(__name__)
 
@@ -115,7 +115,6 @@ class Options(ConfigModel):
     projection_cases: tuple[ProjectionCase, ...]
     projection_methods: dict[str, MethodSpec]
     solver: Solver
-    threads: Threads
 
 
 @experiment(
@@ -156,7 +155,6 @@ def frame_times(
                 scenes=scenes,
                 timing=Protocol(frames=asked.frames, warmup=asked.warmup, repeats=asked.repeats),
                 solver=settings.solver,
-                threads=settings.threads,
                 seed=process,
                 result=str(Path(folder) / f"{process}.csv"),
             )

@@ -39,7 +39,7 @@ from study.experiments.kit.training import Training, train
 log = logging.getLogger(__name__)
 
 ITERATIONS = [
-    "scene", "method", "threads", "vertices", "elements", "r", "k", "elements_sampled",
+    "scene", "method", "vertices", "elements", "r", "k", "elements_sampled",
     "factorisation_ms", "memory_mb", "ms_per_iteration", "local_ms", "global_ms", "local_share",
 ]  # fmt: skip
 STATES = 4  # states of the training run at which local steps are timed alone
@@ -114,15 +114,13 @@ def scaling(
     training = train(scene, system, max(sized.training_frames, alone.training_frames))
     first = training.first(sized.training_frames)
     basis = _basis(scene, first, specs[sized.method])
-    two = Scene.build(config, scene.mesh, threads=2)
     variants = [
         _full_order(scene, system, sized, measured),
-        _full_order(two, system, sized, {"threads": 2}),
         _reduced(scene, system, basis, specs[sized.method], sized),
         _subspace(scene, first, sized),
     ]
     results = measure(variants, sized.warmup, sized.repeats)
-    rows = [{"scene": config.name, "threads": 1, **m.labels, **_times(scene, m)} for m in results]
+    rows = [{"scene": config.name, **m.labels, **_times(scene, m)} for m in results]
     write_table(pd.DataFrame(rows, columns=ITERATIONS), iterations.path)
     costs = effect_costs(scene, system, sized.frames, warmup=sized.warmup, repeats=sized.repeats)
     write_table(costs, effects.path)

@@ -80,8 +80,8 @@ class SubspaceModels(ConfigModel):
     """
 
     bases: tuple[PositionBasis, ...] = ("pod", "skinning")
-    sizes: tuple[Modes, ...] = (10, 20, 40)
-    tolerances: tuple[Tolerance, ...] = (3e-2, 1e-2, 1e-3)
+    sizes: tuple[Modes, ...] = (10, 40)
+    tolerances: tuple[Tolerance, ...] = (3e-2, 1e-2)
     norm: Norm = "energy"
     hrpd: Hrpd | None = None
 

@@ -44,7 +44,7 @@ from study.experiments.kit.local_costs import local_costs
 from study.experiments.kit.measurement import Measurement, Protocol, Variant, measure
 from study.experiments.kit.names import ANDERSON, FOM
 from study.experiments.kit.scenes import scene_of
-from study.experiments.kit.settings import Count, Solver, Threads
+from study.experiments.kit.settings import Count, Solver
 
 log = logging.getLogger(__name__)
 
@@ -83,7 +83,6 @@ class Options(ConfigModel):
     iterations: IterationCounts
     timing: Timing
     solver: Solver
-    threads: Threads
 
 
 @experiment(
@@ -112,7 +111,7 @@ def timing(
     without: File,
 ) -> None:
     """Measure frames (``out``), local steps alone, effects, and frames ``without`` each of them."""
-    scene = scene_of(settings.scene, mesh, threads=settings.threads)
+    scene = scene_of(settings.scene, mesh)
     system, asked = scene.system_with(settings.solver), settings.timing
     frames, name = min(asked.frames, scene.config.frames), scene.config.name
     variants, alone = _variants(scene, system, frames, settings, samplings, bases, subspaces)

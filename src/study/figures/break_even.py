@@ -30,7 +30,7 @@ class Options(Experiments, Methods, Columns):
 def break_even(results: Results, options: Options) -> Figure:
     """Draw a panel per constraint group, a line per scene and method; above 1 it costs more."""
     table = results.held_rows(results.table("breakeven"), options)
-    table = table[(table.factor == 1.0) & (table.threads == 1)]
+    table = table[table.factor == 1.0]
     if table.empty:
         raise NothingToDraw("no reduced local step was timed")
     groups = [g for g in group_looks(results.holdings) if (table.group == g).any()]

@@ -16,31 +16,29 @@ PHASES = {
     "local_ms": ("local step", "--"),
     "global_ms": ("global solve", ":"),
 }
-TWO = "two threads"  # a method of its own here: the full-order run with two threads
-NAMES = {"fom": "full order", TWO: "full order, two threads", "ecsw": "POD subspace, ecsw"}
-COLOURS = {"fom": style.BLACK, TWO: "#8C8C8C", "ecsw": "#1B6E6E"}
+NAMES = {"fom": "full order", "ecsw": "POD subspace, ecsw"}
+COLOURS = {"fom": style.BLACK, "ecsw": "#1B6E6E"}
 FITTED = ("fom", "ecsw")  # whose exponent is printed
 ROOM = 2.6  # factor by which the axis goes on beyond the last mesh, for the exponents
-MARKERS = {"fom": "o", TWO: "s", "ecsw": ">"}
+MARKERS = {"fom": "o", "ecsw": ">"}
 
 
 @figure(
     title="Cost against mesh size",
     caption=(
-        "Time of one local/global iteration against the number of vertices: the full-order run "
-        "with one thread and with two, the same with only the local step reduced, and the "
-        "hyper-reduced run in a position subspace, whose cost hardly depends on the mesh. Beside "
+        "Time of one local/global iteration against the number of vertices: the full-order "
+        "run, the same with only the local step reduced, and the hyper-reduced run in a position "
+        "subspace, whose cost hardly depends on the mesh. Beside "
         "the ends of curves stands the exponent of a fitted power law, where there are three sizes "
         "of the mesh or more. Assembly and "
         "factorisation before the first frame are in the table `scaling`."
     ),
-    reads=(TableOf("scaling"), TableOf("scaling_fit")),
+    reads=(TableOf("scaling"),),
     options=Scenes,
 )
 def scaling(results: Results, options: Scenes) -> Figure:
     """Draw a panel per scene: the time of an iteration, by phase."""
-    table = _two_threads_apart(results.table("scaling"))
-    fits = _two_threads_apart(results.table("scaling_fit"))
+    table = results.table("scaling")
     asked = options.scenes or tuple(dict.fromkeys(table.scene))
     scenes = [scene for scene in asked if (table.scene == scene).any()]
     if not scenes:
@@ -49,7 +47,7 @@ def scaling(results: Results, options: Scenes) -> Figure:
     times = figure.subplots(1, len(scenes), sharex=True, sharey=True, squeeze=False)[0]
     for ax, scene in zip(times, scenes, strict=True):
         rows = table[table.scene == scene].sort_values("vertices")
-        _draw_times(ax, rows, fits[fits.scene == scene])
+        _draw_times(ax, rows)
         ax.set_title(style.words(scene))
         ax.set_xlabel("vertices")
     sizes = table[table.scene.isin(scenes)].vertices
@@ -62,28 +60,21 @@ def scaling(results: Results, options: Scenes) -> Figure:
     return figure
 
 
-def _two_threads_apart(table: pd.DataFrame) -> pd.DataFrame:
-    return table.assign(method=table.method.mask(table.threads == 2, TWO))
-
-
-def _draw_times(ax: Axes, rows: pd.DataFrame, fits: pd.DataFrame) -> None:
+def _draw_times(ax: Axes, rows: pd.DataFrame) -> None:
     ax.set_xscale("log")
     ax.set_yscale("log")
     style.grid(ax)
     for method, part in rows.groupby("method", sort=False):
         colour, marker = _style(str(method))
         for quantity, (_, line) in PHASES.items():
-            if (method, quantity) == (TWO, "global_ms"):
-                continue  # the solves have one thread
             ax.plot(
                 part.vertices, part[quantity], line, color=colour,
                 marker=marker if line == "-" else None, linewidth=1.3 if line == "-" else 0.9,
             )  # fmt: skip
-        own = (fits.method == method) & (fits.quantity == "ms_per_iteration")
-        if own.any() and method in FITTED:
-            end = part.iloc[-1]
+        end = part.iloc[-1]
+        if method in FITTED and end.exponent == end.exponent:
             ax.annotate(
-                rf"$N^{{{fits[own].exponent.iloc[0]:.2f}}}$",
+                rf"$N^{{{end.exponent:.2f}}}$",
                 (end.vertices, end.ms_per_iteration), xytext=(5, 0),
                 textcoords="offset points", va="center", color=colour, fontsize=7.5,
             )  # fmt: skip

@@ -86,15 +86,10 @@ def break_even(tables: Tables) -> str:
     rows = []
     keys = ["scene", "group", "vertices"]
     for (scene, group, vertices), part in table.groupby(keys, sort=False):
-        cells = [
-            _break_even(_rows(part, method=method, threads=threads))
-            for method in _METHODS
-            for threads in (1, 2)
-        ]
+        cells = [_break_even(_rows(part, method=method)) for method in _METHODS]
         rows.append([name(scene), escape(group.replace("_", " ")), str(int(vertices)), *cells])
-    titles = [f"{escape(method)}, {n}" for method in _METHODS for n in (1, 2)]
-    narrow = r">{\raggedleft\arraybackslash}p{1.2cm}"
-    return tabular(["scene", "group", "vertices", *titles], rows, "llr" + narrow * len(titles))
+    titles = [escape(method) for method in _METHODS]
+    return tabular(["scene", "group", "vertices", *titles], rows, "llr" + "r" * len(titles))
 
 
 def _break_even(part: pd.DataFrame) -> str:
@@ -105,28 +100,20 @@ def _break_even(part: pd.DataFrame) -> str:
 
 
 _EXPONENTS = (
-    ("fom", "ms_per_iteration"), ("fom", "local_ms"), ("fom", "global_ms"),
-    ("block-deim", "ms_per_iteration"), ("ecsw", "ms_per_iteration"),
+    ("fom", "exponent"), ("fom", "local_exponent"), ("fom", "global_exponent"),
+    ("block-deim", "exponent"), ("ecsw", "exponent"),
 )  # fmt: skip
 
 
 def exponents(tables: Tables) -> str:
     """Powers of the number of vertices with which times grow."""
-    table = _rows(tables["scaling_fit"], threads=1)
-    rows = [
-        [
-            name(scene),
-            str(int(part.points.max())),
-            *(
-                _cell(
-                    _rows(part, method=method, quantity=quantity),
-                    lambda fit: format_number(fit.exponent),
-                )
-                for method, quantity in _EXPONENTS
-            ),
-        ]
-        for scene, part in table.groupby("scene", sort=False)
-    ]
+    rows = []
+    for scene, part in tables["scaling"].groupby("scene", sort=False):
+        curves = part.dropna(subset=["exponent"]).drop_duplicates("method")
+        if len(curves):
+            found = (_rows(curves, method=m)[column].dropna() for m, column in _EXPONENTS)
+            cells = (format_number(own.iloc[0]) if len(own) else NONE for own in found)
+            rows.append([name(scene), str(int(curves.meshes.max())), *cells])
     header = [
         "scene", "meshes", "full order", "its local step", "its solve", "block DEIM",
         "sampled subspace",

@@ -71,7 +71,7 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> Rule:
         log=f"{plan.results}/logs/{experiment.rule}{'/' if labels else ''}{labels}.log",
         # scenes have no job in common but their meshes, so that each is a batch on a cluster
         group=None if experiment.alone or "scene" not in experiment.labels else "scene",
-        threads=_threads(plan, experiment, cores),
+        threads=cores if experiment.alone else 1,
         # a job that is to be alone gets a whole node of a cluster
         resources={"slurm_extra": "--exclusive"} if experiment.alone else {},
         params={
@@ -82,12 +82,6 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> Rule:
         },
         message=f"{title} (alone on the machine)" if experiment.alone else title,
     )
-
-
-def _threads(plan: Plan, experiment: Experiment, cores: int) -> int:
-    if experiment.alone:
-        return cores
-    return plan.settings.threads if "threads" in experiment.reads else 1
 
 
 def _figure(plan: Plan, figure: FigureJob) -> Rule:

@@ -21,7 +21,7 @@ from study.experiments.frame_times import FrameTimes
 from study.experiments.hard_cases.experiment import HardCases
 from study.experiments.iterations import IterationSweep
 from study.experiments.kit.sampling import Sweep
-from study.experiments.kit.settings import BlowupExtent, Solver, Threads
+from study.experiments.kit.settings import BlowupExtent, Solver
 from study.experiments.ladder import LadderSection
 from study.experiments.live import Live
 from study.experiments.noise import Noise
@@ -54,11 +54,10 @@ class StudySettings(ConfigModel):
 
     scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
     methods: Annotated[tuple[str, ...], Field(min_length=1)]
-    ranks: Annotated[tuple[Rank, ...], Field(min_length=1)] = (6, 10, 20, 50, "full")
+    ranks: Annotated[tuple[Rank, ...], Field(min_length=1)] = (6, 10, 20, "full")
     heldout_ranks: tuple[Rank, ...] | None = None
     sweep: Sweep = Sweep()
     solver: Solver = DEFAULT_SOLVER
-    threads: Threads = 1
     blowup_extent: BlowupExtent = 100.0
     coarsen: Coarsen = Coarsen()
     replicate: Replicate = Replicate()

@@ -8,10 +8,10 @@ from study.artifact.paths import File
 from study.artifact.reads import Every
 from study.tables.kit.declaration import compared, integer, number, table, timed
 from study.tables.kit.parts import joined
-from study.tables.kit.vocabulary import ELEMENTS, GROUP, METHOD, SCENE, THREADS, VERTICES, R
+from study.tables.kit.vocabulary import ELEMENTS, GROUP, METHOD, SCENE, VERTICES, R
 
 # What the sizes r of one line of the table have in common.
-CURVE = ["scene", "group", "method", "factor", "threads"]
+CURVE = ["scene", "group", "method", "factor"]
 OWN_MESH = "1"  # factor of a scene's own mesh, whose curve is measured with its other timings
 
 
@@ -24,7 +24,6 @@ OWN_MESH = "1"  # factor of a scene's own mesh, whose curve is measured with its
         compared("exact", number("factor", "on the vertices along a side of the scene's own mesh")),
         VERTICES,
         ELEMENTS,
-        THREADS,
         R,
         timed(number("local_ms", "time of the reduced local step", "ms")),
         timed(number("full_ms", "time of the full local step of the group", "ms")),

@@ -22,7 +22,6 @@ RESAMPLES, SEED = 2000, 1
 STEPS = {
     "whole elements for single entries": ("deim", "block-deim"),
     "three elements a mode for one": ("block-deim", "gappy"),
-    "a gain of at most two": ("gappy", "bounded"),
 }
 # Steps between the runs of the ladder's two by two; those from rows to elements need more than one
 # row an element.
@@ -34,7 +33,7 @@ SQUARE = {
 }
 # Methods by the kind of their coefficients, ordered by their gain: does the error follow?
 KINDS = {
-    "lower gain, shared coefficients": ("deim", "block-deim", "gappy", "bounded"),
+    "lower gain, shared coefficients": ("deim", "block-deim", "gappy"),
     "lower gain, separate coefficients": ("deim-joint", "published"),
 }
 _CELL = ["scene", "group", "r"]

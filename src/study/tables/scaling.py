@@ -1,23 +1,27 @@
 """Table scaling: time and memory against the number of vertices."""
 
+import numpy as np
 import pandas as pd
 
-from pdrom.core.store import read_table
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every
 from study.experiments.kit.names import FOM
 from study.tables.kit.declaration import integer, number, table, text, timed
+from study.tables.kit.parts import joined
 from study.tables.kit.vocabulary import (
     ELEMENTS_SAMPLED,
     LOCAL_SHARE,
     SCENE,
     SPEEDUP,
-    THREADS,
     VERTICES,
     K,
     R,
 )
+
+EXPONENTS = {"ms_per_iteration": "exponent", "local_ms": "local_exponent",
+             "global_ms": "global_exponent"}  # fmt: skip
+FEWEST = 3  # meshes, for an exponent
 
 
 @table(
@@ -25,7 +29,6 @@ from study.tables.kit.vocabulary import (
     columns=(
         SCENE,
         text("method", f"{FOM} (full order), a reduced local step, or ecsw"),
-        THREADS,
         VERTICES,
         integer("elements", "elements of all groups"),
         R,
@@ -39,21 +42,41 @@ from study.tables.kit.vocabulary import (
         LOCAL_SHARE,
         SPEEDUP,
         timed(number("local_speedup", "the same of the local step alone")),
+        integer("meshes", "sizes of the mesh of the curve"),
+        timed(number("exponent", "of the time of an iteration in the number of vertices")),
+        timed(number("local_exponent", "of the time of the local step")),
+        timed(number("global_exponent", "of the time of the global solve")),
     ),
     reads={"parts": Every(paths.SCALING)},
 )
 def scaling(parts: list[File]) -> pd.DataFrame:
     """All scenes of ``parts``, one row per mesh size and method.
 
-    The speed-ups, of an iteration and of its local step, are over the full-order run on one thread.
+    The speed-ups, of an iteration and of its local step, are over the full-order run. Exponents are
+    those of power laws fitted to the logarithms of a curve, all meshes of a scene and method, which
+    has them in all its rows. Any two points lie on a power law: a curve of fewer than three meshes
+    has no exponent, and no quantity that was too small to be measured on so many.
     """
-    sizes = [_with_speedups(read_table(part.path)) for part in parts]
-    return pd.concat(sizes, ignore_index=True) if sizes else pd.DataFrame()
+    rows = joined(parts)
+    if rows.empty:
+        return rows
+    own = rows[rows.method == FOM].set_index(["scene", "vertices"])
+    mesh = pd.MultiIndex.from_frame(rows[["scene", "vertices"]])
+    for name, column in (("speedup", "ms_per_iteration"), ("local_speedup", "local_ms")):
+        rows[name] = own[column].loc[mesh].to_numpy() / rows[column]
+    curves = rows.groupby(["scene", "method"], sort=False)
+    rows["meshes"] = curves.vertices.transform("nunique")
+    for quantity, name in EXPONENTS.items():
+        rows[name] = np.nan
+        for _, curve in curves:
+            rows.loc[curve.index, name] = _exponent(curve.vertices, curve[quantity])
+    return rows
 
 
-def _with_speedups(part: pd.DataFrame) -> pd.DataFrame:
-    (own,) = part[(part.method == FOM) & (part.threads == 1)].itertuples()
-    return part.assign(
-        speedup=own.ms_per_iteration / part.ms_per_iteration,
-        local_speedup=own.local_ms / part.local_ms,
-    )
+def _exponent(vertices: pd.Series, values: pd.Series) -> float:
+    """Slope of the logarithms of what was measured; nan of fewer than three meshes."""
+    measured = values > 0.0
+    if vertices[measured].nunique() < FEWEST:
+        return np.nan
+    x, y = (np.log(series[measured].to_numpy(float)) for series in (vertices, values))
+    return float(np.polyfit(x, y, 1)[0])

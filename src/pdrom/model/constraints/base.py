@@ -65,8 +65,6 @@ class ConstraintGroup(Effect):
     always is one part does not set it."""
     S: sparse.csr_array
     weights: np.ndarray
-    threads: int = 1
-    """Threads of `accumulate`, 1 or 2; the result is the same bit for bit."""
     gradient_kernel: Any = None
     """Compiled projection from S q (module `gradient_kernel` beside), if there is one."""
     local_kernel: LocalKernel | None = None
@@ -156,7 +154,7 @@ class ConstraintGroup(Effect):
             raise NotImplementedError(f"{self.name} has neither a local kernel nor its own")
         if self._pass is None or self._pass.kernels != (self.local_kernel,):
             self._pass = LocalPass([self.local_kernel])
-        return self._pass.accumulate(y, rhs, self.threads)
+        return self._pass.accumulate(y, rhs)
 
     @abstractmethod
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@
 A local kernel reads what it needs from a record of addresses and numbers, so that one loop serves
 every mix of groups and reduced local steps. The units (blocks of elements, rows) of a large step
 are done in two parts, always the same ones: the first adds to the right-hand side itself, the
-second to an array of its own that is added afterwards. Two threads therefore change no bits.
+second to an array of its own that is added afterwards.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,7 +16,6 @@ from numba.extending import intrinsic
 
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.functions import Callback, compiled
-from pdrom.model.constraints.second_thread import both
 
 # Entries of every record: number of vertices, and the units of part k are those from FIRST + k to
 # FIRST + k + 1. What a kernel has of its own begins at OWN.
@@ -141,38 +140,25 @@ class LocalPass:
                 rows.WIDTH * max(int(kernel.record[VERTICES]) for kernel in kernels)
             )
 
-    @property
-    def parts(self) -> int:
-        """1 or 2."""
-        return 2 if self.touched else 1
-
-    def add(self, y: np.ndarray, rhs: np.ndarray, threads: int) -> float:
-        """Add S^T W p(y) of ``y`` (4 N,) to ``rhs`` (4 N,) by so many ``threads``; energy, J."""
-        places = y.ctypes.data, rhs.ctypes.data
-        add_part(*self.preparing, PREPARE, *places)
-        if not self.touched:
-            return add_part(self.addresses, self.records, PARTS[0], *places)
-        own = slice(rows.WIDTH * self.touched.start, rows.WIDTH * self.touched.stop)
-
-        def second() -> float:
-            self.other[own] = 0.0
-            return add_part(*self.second, PARTS[1], y.ctypes.data, self.other.ctypes.data)
-
-        def first() -> float:
-            return add_part(self.addresses, self.records, PARTS[0], *places)
-
-        energies = both(first, second, threads)
-        rhs[own] += self.other[own]
-        return sum(energies)
-
-    def accumulate(self, y: np.ndarray, rhs: np.ndarray, threads: int) -> float:
-        """Do `add` for ``y`` and ``rhs`` (N, 3) that need not be padded; ``threads`` as there."""
+    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
+        """Add S^T W p(y) of ``y`` (N, 3) to ``rhs`` (N, 3), which need not be padded; energy, J."""
         right = rows.flat(rhs)
         if rows.shares(rhs, right):
-            return self.add(rows.flat(y), right, threads)
+            return self._add(rows.flat(y), right)
         added = rows.zeros(len(right))
-        energy = self.add(rows.flat(y), added, threads)
+        energy = self._add(rows.flat(y), added)
         rhs += rows.unflat(added)
+        return energy
+
+    def _add(self, y: np.ndarray, rhs: np.ndarray) -> float:
+        places = y.ctypes.data, rhs.ctypes.data
+        add_part(*self.preparing, PREPARE, *places)
+        energy = add_part(self.addresses, self.records, PARTS[0], *places)
+        if self.touched:
+            own = slice(rows.WIDTH * self.touched.start, rows.WIDTH * self.touched.stop)
+            self.other[own] = 0.0
+            energy += add_part(*self.second, PARTS[1], y.ctypes.data, self.other.ctypes.data)
+            rhs[own] += self.other[own]
         return energy
 
 

@@ -1,8 +1,4 @@
-"""All iterations of a frame in one compiled loop, for local steps and solvers that are compiled.
-
-With two threads the second one does the second parts of the local steps while the first does the
-first parts; they hand over through counters in memory, without leaving compiled code.
-"""
+"""All iterations of a frame in one compiled loop, for local steps and solvers that are compiled."""
 
 from collections.abc import Sequence
 from typing import Any, TypeGuard
@@ -14,7 +10,6 @@ from pdrom.model.compiled.clock import clock, now
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH, write
 from pdrom.model.constraints.local_kernel import PARTS, PREPARE, LocalPass, add_part
-from pdrom.model.constraints.second_thread import LINE, both, publish, wait_for
 from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, combine, refuse
 from pdrom.model.dynamics.frames import inertia_energy
 from pdrom.model.dynamics.sweeps import sweep
@@ -26,7 +21,7 @@ class CompiledIterations:
 
     Parameters
     ----------
-    local_steps : objects with ``local_kernel`` and ``threads``
+    local_steps : objects with ``local_kernel``
     inertia : (N,) M / h^2
     acceleration : begun with each frame by the step loop
     """
@@ -37,16 +32,13 @@ class CompiledIterations:
         inertia: np.ndarray,
         acceleration: Anderson | None = None,
     ) -> None:
-        self._steps = list(local_steps)
         local = self._pass = LocalPass([step.local_kernel for step in local_steps])
         self._inertia = inertia
         self._acceleration = acceleration
-        self._counters = np.zeros(3 * LINE, np.int64)
         # what every call hands to compiled code
         touched = local.touched
         self._tables = (local.addresses, local.records, local.preparing, local.second)
-        self._shared = (np.zeros(1), local.other, touched.start, touched.stop)
-        self._places = (self._counters.ctypes.data, self._counters[LINE:].ctypes.data)
+        self._second = (local.other, touched.start, touched.stop)
         self._clock = clock()
 
     def takes(self, elimination: object) -> TypeGuard[Elimination]:
@@ -54,16 +46,9 @@ class CompiledIterations:
         return isinstance(elimination, Elimination) and elimination.factor is not None
 
     @property
-    def threads(self) -> int:
-        """Threads that share a local step, 1 or 2."""
-        if self._pass.parts == 1:
-            return 1
-        return max((step.threads for step in self._steps), default=1)
-
-    @property
     def compiled_arguments(self) -> tuple[Any, ...]:
         """Arguments of `all_iterations` that are the same for all frames."""
-        return self._inertia, self._tables, self._shared, self._places, self._clock
+        return self._inertia, self._tables, self._second, self._clock
 
     def run(
         self,
@@ -86,56 +71,29 @@ class CompiledIterations:
         elimination : the factored system, see `takes`
         seconds : (4,) times of the local and of the global steps are added to entries 1 and 2
         """
-        count = len(which)
         history = NO_HISTORY if self._acceleration is None else self._acceleration.history
         tracked = len(objective) > 0 or self._acceleration is not None
         right = rows.empty(WIDTH * len(y))
         iterate, start = rows.flat(y), rows.flat(base)
         prediction = rows.flat(s) if tracked else start
-        factor = elimination.factor
-        threads = self.threads
-        tables, shared, places = self._tables, self._shared, self._places
-        self._counters[:] = 0
-
-        def first() -> float:
-            return all_iterations(
-                which.start, which.stop, iterations, iterate, prediction, start, right,
-                self._inertia, tables, shared, places, threads == 2, factor, history, objective,
-                seconds, self._clock,
-            )  # fmt: skip
-
-        def second() -> float:
-            return _assist(count, iterate, tables, shared, places)
-
-        if threads == 2:
-            both(first, second, threads)
-        else:
-            first()
+        all_iterations(
+            which.start, which.stop, iterations, iterate, prediction, start, right, self._inertia,
+            self._tables, self._second, elimination.factor, history, objective, seconds,
+            self._clock,
+        )  # fmt: skip
 
 
 @compiled(nogil=True)
-def _second_part(second, y, other, start, stop):
+def _second_part(kernels, y, other, start, stop):
     """The second parts of all local steps into an array of their own; their energy."""
     other[WIDTH * start : WIDTH * stop] = 0.0
-    return add_part(second[0], second[1], PARTS[1], y.ctypes.data, other.ctypes.data)
-
-
-@compiled(nogil=True)
-def _assist(count, y, tables, shared, places):
-    """The second thread's share of all iterations."""
-    energy, other, start, stop = shared
-    given, done = places
-    for k in range(count):
-        wait_for(given, k + 1)
-        energy[0] = _second_part(tables[3], y, other, start, stop)
-        publish(done, k + 1)
-    return 0.0
+    return add_part(kernels[0], kernels[1], PARTS[1], y.ctypes.data, other.ctypes.data)
 
 
 @compiled(nogil=True)
 def all_iterations(
-    first, end, iterations, y, s, base, rhs, inertia, tables, shared, places, assisted, factor,
-    history, objective, seconds, watch,
+    first, end, iterations, y, s, base, rhs, inertia, tables, second, factor, history, objective,
+    seconds, watch,
 ):  # fmt: skip
     """Do iterations of a frame in place, see `CompiledIterations.run`.
 
@@ -144,30 +102,22 @@ def all_iterations(
     first, end : those from ``first`` to before ``end`` of ``iterations``
     y, s, base, rhs : rows of four, flat: iterate, prediction, (M/h^2) s, working array
     inertia : (N,) M/h^2, kg/s^2
-    tables, shared, places : of the local steps, see `CompiledIterations.compiled_arguments`
-    assisted : whether a second thread does its parts
+    tables, second : of the local steps, see `CompiledIterations.compiled_arguments`
     factor : of the system; ``history`` of the acceleration
     objective, seconds : as there
     watch : see `pdrom.model.compiled.clock`
     """
-    addresses, records, preparing, second = tables
-    shared_energy, other, start, stop = shared
-    given, done = places
+    addresses, records, preparing, kernels = tables
+    other, start, stop = second
     panels, vertices, loads, work = factor
     window = len(history[5])
     for k in range(first, end):
         before = now(watch)
         write(base, rhs)
         add_part(preparing[0], preparing[1], PREPARE, y.ctypes.data, rhs.ctypes.data)
-        if assisted:
-            publish(given, k - first + 1)
         energy = add_part(addresses, records, PARTS[0], y.ctypes.data, rhs.ctypes.data)
         if stop > start:
-            if assisted:
-                wait_for(done, k - first + 1)
-            else:
-                shared_energy[0] = _second_part(second, y, other, start, stop)
-            energy += shared_energy[0]
+            energy += _second_part(kernels, y, other, start, stop)
             for i in range(WIDTH * start, WIDTH * stop):
                 rhs[i] += other[i]
         between = now(watch)

@@ -85,12 +85,11 @@ class WholeFrames:
     ) -> Blocks | None:
         """Run as many of ``frames`` as one call can do, from q and v (N, 3) with step h (s).
 
-        ``track`` asks for the objectives. None where the iterations take two threads or another
-        solver.
+        ``track`` asks for the objectives. None where the iterations take another solver.
         """
         fixed, targets = self._space.held_path(frames[:BLOCK], q)
         system = self._space.system.eliminate(fixed)
-        if not self._loop.takes(system) or self._loop.threads == 2:
+        if not self._loop.takes(system):
             return None
         count, history = len(targets), NO_HISTORY
         positions, velocities = np.empty((2, count + 1, *q.shape))
@@ -136,7 +135,7 @@ def _correct(y, floors, fixed, targets):
 @compiled(nogil=True)
 def _frames(
     positions, velocities, constants, rates, acceleration, h, fixed, targets, coupling, floors,
-    work, iterations, history, objective, seconds, inertia, tables, shared, places, watch, factor,
+    work, iterations, history, objective, seconds, inertia, tables, second, watch, factor,
 ):  # fmt: skip
     y, rhs = work
     beside, indptr, indices, data = coupling
@@ -154,8 +153,8 @@ def _frames(
             forget(history)
         seconds[f, 0] = now(watch) - began
         all_iterations(
-            0, iterations, iterations, y, s, base, rhs, inertia, tables, shared, places, False,
-            factor, history, objective[f], seconds[f], watch,
+            0, iterations, iterations, y, s, base, rhs, inertia, tables, second, factor, history,
+            objective[f], seconds[f], watch,
         )  # fmt: skip
         began = now(watch)
         if len(floors):

@@ -7,7 +7,6 @@ import numpy as np
 from pdrom.model.compiled.rows import as_vertices, flat, shares, unflat
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.constraints.local_kernel import LocalKernel, LocalPass
-from pdrom.model.constraints.second_thread import both
 from pdrom.reduction.local.lift import Lift, coefficients, lift
 from pdrom.reduction.sampling.reduction import Block, Reduction
 
@@ -17,7 +16,7 @@ class ReducedLocalStep:
 
     Precomputed: the offset S^T W mean (N, 3), the reconstruction S^T W V for each coefficient
     block, and the solution operators. Online: the projections of the sampled elements, a small
-    dense product for c, and the dense reconstruction, shared by the group's threads.
+    dense product for c, and the dense reconstruction.
 
     Attributes
     ----------
@@ -39,11 +38,6 @@ class ReducedLocalStep:
             self._pass = LocalPass([self.local_kernel])
 
     @property
-    def threads(self) -> int:
-        """Threads of the group."""
-        return self._group.threads
-
-    @property
     def frame_lagged(self) -> bool:
         """Whether ``begin_frame`` freezes anything."""
         return self._group.frame_lagged
@@ -55,7 +49,7 @@ class ReducedLocalStep:
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         """Add the reduced S^T W p(y) of ``y`` (N, 3) m to ``rhs`` (N, 3); energy unknown: nan."""
         if self._pass is not None:
-            return self._pass.accumulate(y, rhs, self.threads)
+            return self._pass.accumulate(y, rhs)
         self.solve(self.sample(y))
         self.lift(rhs)
         return float("nan")
@@ -76,25 +70,17 @@ class ReducedLocalStep:
         """Add S^T W (mean + V c) with the coefficients of the last `solve` to ``rhs`` (N, 3)."""
         data, right = self._lift, flat(rhs)
         added = right if shares(rhs, right) else np.zeros_like(right)
-
-        def rows(first: int, last: int) -> float:
-            lift(
-                data.coefficients, data.axes, data.own_sets, data.lifted, data.offset, first, last,
-                added,
-            )  # fmt: skip
-            return 0.0
-
-        vertices = data.lifted.shape[1]
-        middle = vertices // 2 if data.split else vertices
-        both(lambda: rows(0, middle), lambda: rows(middle, vertices), self.threads)
+        lift(
+            data.coefficients, data.axes, data.own_sets, data.lifted, data.offset, 0,
+            data.lifted.shape[1], added,
+        )  # fmt: skip
         if added is not right:
             rhs += unflat(added)
 
     @property
     def lift_seconds(self) -> float:
-        """Time of the reconstruction so far; two threads do its parts at once."""
-        seconds = self._lift.seconds
-        return float(seconds.max() if self.threads == 2 else seconds.sum())
+        """Time of the reconstruction so far."""
+        return float(self._lift.seconds.sum())
 
     @lift_seconds.setter
     def lift_seconds(self, seconds: float) -> None:

@@ -39,17 +39,15 @@ class Timed:
 
     Attributes
     ----------
-    local_kernel, threads : of a group, whose kernel is timed inside the compiled loop
+    local_kernel : of a group, whose kernel is timed inside the compiled loop
     """
 
     def __init__(self, effect: Effect, questions: Sequence[str]) -> None:
         self.name = effect.name
         self._asked, self._kernel = 0.0, np.zeros(1)
         self.local_kernel: LocalKernel | None = None
-        if isinstance(effect, ConstraintGroup):
-            self.threads = effect.threads
-            if effect.local_kernel is not None:
-                self.local_kernel, self._kernel = timed(effect.local_kernel)
+        if isinstance(effect, ConstraintGroup) and effect.local_kernel is not None:
+            self.local_kernel, self._kernel = timed(effect.local_kernel)
         for question in questions:
             setattr(self, question, self._timed(getattr(effect, question)))
 

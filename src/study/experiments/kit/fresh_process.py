@@ -26,7 +26,7 @@ from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.subspace.store import load_models
 from study.experiments.kit.load_reduction import load_reduction
 from study.experiments.kit.measurement import Protocol, Variant, measure
-from study.experiments.kit.settings import Solver, Threads
+from study.experiments.kit.settings import Solver
 
 FULL, CONTROL, REDUCED = "full", "control", "reduced"
 COLUMNS = [
@@ -75,7 +75,6 @@ class Request(ConfigModel):
     scenes: tuple[TimedScene, ...]
     timing: Protocol
     solver: Solver
-    threads: Threads
     seed: int
     result: str
 
@@ -119,7 +118,7 @@ def timed(request: Request) -> pd.DataFrame:
 def _variants(asked: TimedScene, request: Request) -> Iterator[Variant]:
     config = asked.scene
     mesh = config.mesh.build(Path()) if asked.mesh is None else load_mesh(asked.mesh)
-    scene = Scene.build(config, mesh, request.threads)
+    scene = Scene.build(config, mesh)
     system = scene.system_with(request.solver)
     frames = min(request.timing.frames, config.frames)
     common = {"scene": config.name, "vertices": mesh.vertices, "frames": config.frames}

@@ -12,10 +12,9 @@ from pdrom.reduction.local.local_step import ReducedLocalStep
 from study.experiments.kit.measurement import measure_calls
 
 COLUMNS = [
-    "scene", "group", "method", "vertices", "elements", "threads", "r", "local_ms", "full_ms",
-    "solve_ms", "lift_ms",
+    "scene", "group", "method", "vertices", "elements", "r", "local_ms", "full_ms", "solve_ms",
+    "lift_ms",
 ]  # fmt: skip
-THREADS = (1, 2)
 
 
 def local_costs(
@@ -25,13 +24,12 @@ def local_costs(
     warmup: int,
     repeats: int,
 ) -> pd.DataFrame:
-    """Milliseconds of one local step, mean over some states, with one thread and with two.
+    """Milliseconds of one local step, mean over some states.
 
     Of a reduced one also the dense product that solves for its coefficients, and its
     reconstruction, alone.
 
-    The steps of a number of threads are interleaved; a second thread that waits for work would
-    disturb those that have one.
+    All steps are interleaved.
 
     Parameters
     ----------
@@ -48,21 +46,15 @@ def local_costs(
     calls = {key: _all_states(step, states) for key, step in steps.items()}
     for key, own in reduced.items():
         calls["solve", key], calls["lift", key] = _solve_and_lift(own, states)
-    before = {name: group.threads for name, group in groups.items()}
+    with np.errstate(over="ignore", invalid="ignore"):
+        times = measure_calls(calls, warmup, repeats)
     rows = []
-    for threads in THREADS:
-        for group in groups.values():
-            group.threads = threads
-        with np.errstate(over="ignore", invalid="ignore"):
-            times = measure_calls(calls, warmup, repeats)
-        for name, method, r in reduced:
-            labels = (name, method, scene.mesh.vertices, groups[name].elements, threads, r)
-            key = (name, method, r)
-            measured = (times[key], times[name], times["solve", key], times["lift", key])
-            means = (time / len(states) for time in measured)
-            rows.append((scene.config.name, *labels, *means))
-    for name, group in groups.items():
-        group.threads = before[name]
+    for key in reduced:
+        name, method, r = key
+        measured = (times[key], times[name], times["solve", key], times["lift", key])
+        means = (time / len(states) for time in measured)
+        labels = (scene.config.name, name, method, scene.mesh.vertices, groups[name].elements, r)
+        rows.append((*labels, *means))
     return pd.DataFrame(rows, columns=COLUMNS)
 
 

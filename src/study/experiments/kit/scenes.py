@@ -14,10 +14,10 @@ TRAIN = "train"
 SPLITS = (TRAIN, FIRST)  # what experiments on a single held-out motion run
 
 
-def scene_of(config: SceneConfig, mesh: File, run: str = TRAIN, threads: int = 1) -> Scene:
+def scene_of(config: SceneConfig, mesh: File, run: str = TRAIN) -> Scene:
     """Scene of ``config`` and ``run`` ("train" or a held-out motion) on its mesh file."""
     chosen = config if run == TRAIN else config.heldout_variant(cast(HeldOutMotion, run))
-    scene = Scene.build(chosen, load_mesh(mesh.path), threads)
+    scene = Scene.build(chosen, load_mesh(mesh.path))
     scene.log_holds()
     return scene
 

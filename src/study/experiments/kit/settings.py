@@ -18,7 +18,6 @@ def _known(solver: str) -> str:
 
 
 Solver = Annotated[str, AfterValidator(_known)]
-Threads = Literal[1, 2]
 # a run ends when its bounding box exceeds this multiple of the rest extent
 BlowupExtent = Annotated[float, Field(gt=1.0, le=1e12)]
 Count = Annotated[int, Field(ge=1, le=100_000)]

@@ -7,7 +7,7 @@ from pdrom.model.compiled.clock import clock, now
 from pdrom.model.constraints.local_kernel import OWN, PREPARE, LocalKernel, call, local_kernel
 
 # Entries of the record: address and record of the kernel, the places of the seconds and clocks of
-# its two parts and of its preparation, which two threads may run at once.
+# its two parts and of its preparation.
 KERNEL, RECORD, SECONDS, CLOCKS, SIZE = range(OWN, OWN + 5)
 
 

@@ -70,7 +70,7 @@ def _elements_per_entry(tables: Tables, where: dict, accuracy: float) -> pd.Data
 def _local_ratio(column: str, tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
     """Time of a reduced local step (or part) over the full compiled one's, at the largest size.
 
-    One value per scene, group, method, mesh and number of threads: whether the dense solve costs
+    One value per scene, group, method and mesh: whether the dense solve costs
     more from some size on shows at the largest size that the basis has.
     """
     rows = filtered(tables["breakeven"], where).dropna(subset=[column]).sort_values("r")

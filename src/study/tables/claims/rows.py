@@ -11,7 +11,7 @@ Value = str | int | float
 VALUE = "value"
 LABELS = (
     "scene", "group", "method", "position_basis", "k", "r", "split", "axis", "noisy_axes", "seed",
-    "component", "implementation", "factor", "threads",
+    "component", "implementation", "factor",
 )  # fmt: skip
 AXES = ("x", "y", "z")
 

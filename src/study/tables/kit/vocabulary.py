@@ -13,7 +13,6 @@ R = compared(
 VERTICES = integer("vertices", "vertices of the mesh")
 ELEMENTS = integer("elements", "elements of the group")
 ELEMENTS_SAMPLED = compared("value", integer("elements_sampled", "elements that are evaluated"))
-THREADS = integer("threads", "threads of the local step")
 FRAMES = compared("error", integer("frames", "frames that the run reached"))
 FINITE = compared("error", flag("finite", "no frame blew up"))
 BLOWUP_FRAME = compared("error", integer("blowup_frame", "first frame that blew up"))

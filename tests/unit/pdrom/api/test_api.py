@@ -278,11 +278,6 @@ def test_scenes_and_runs_are_copied_and_pickled(full):
         assert np.array_equal(one.outcome.positions, reduced.outcome.positions)
 
 
-def test_a_scene_that_shares_its_work_among_threads_does_so_as_a_copy(full):
-    scene = Scene.build(full.scene.config, full.scene.mesh, threads=2)
-    assert [s.groups[0].threads for s in copies(scene)] == [2, 2]
-
-
 def test_representations_are_one_line(full):
     made, reduced = api.basis(full, "spring"), api.reduce(full, "spring", "pod", 2)
     shown = [

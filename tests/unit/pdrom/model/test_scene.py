@@ -180,7 +180,6 @@ def test_every_scene_file_is_valid():
         ({"scenes": ["bend_fall"], "methods": ["pod"], "rank": [1]}, "unknown key 'rank'"),
         ({"scenes": [], "methods": ["pod"]}, "scenes"),
         ({"scenes": ["bend_fall"], "methods": ["pod"], "solver": "lu"}, "splu, splu-columns"),
-        ({"scenes": ["bend_fall"], "methods": ["pod"], "threads": 3}, "threads = 3.*1 or 2"),
         ({"scenes": ["bend_fall", "bend_fall"], "methods": ["pod"]}, "twice"),
     ],
 )

@@ -43,7 +43,7 @@ def written(tmp_path_factory):
     timed = TimedScene(scene=config, subspaces=Subspaces(path=str(models)))
     request = Request(
         scenes=(timed,), timing=Protocol(frames=3, warmup=1, repeats=1), solver=DEFAULT_SOLVER,
-        threads=1, seed=1, result=str(path.parent / "times.csv"),
+        seed=1, result=str(path.parent / "times.csv"),
     )  # fmt: skip
     in_fresh_process(request, path.parent)
     return scene, path, File(request.result, {})
@@ -92,7 +92,7 @@ def test_a_process_that_fails_is_told(written, tmp_path):
         scene=written[0].config, subspaces=Subspaces(path=str(tmp_path / "none.h5"))
     )
     request = Request(
-        scenes=(missing,), timing=Protocol(), solver=DEFAULT_SOLVER, threads=1, seed=1,
+        scenes=(missing,), timing=Protocol(), solver=DEFAULT_SOLVER, seed=1,
         result=str(tmp_path / "times.csv"),
     )  # fmt: skip
     with pytest.raises(PdromError, match=r"none\.h5"):

@@ -33,7 +33,6 @@ from study.figures.kit.catalogue import declarations, load_choices
 from study.figures.kit.holdings import GroupHolding, Holdings, MethodHolding, SceneHolding
 from study.figures.kit.options import Options
 from study.figures.kit.results import Results
-from study.tables.scaling_fit import scaling_fit
 
 FRAMES = 20
 SETTINGS = {"sensitivity.reference": 1e-10, "sensitivity.threshold": 1e-3,
@@ -243,11 +242,10 @@ def _write_tables(results, scenes, methods, rng) -> None:
         )
     ]
     ratios = [
-        (scene, group, method, factor, 400 * factor**2, threads, r, *_ratio(method, r, threads))
+        (scene, group, method, factor, 400 * factor**2, r, *_ratio(method, r))
         for scene, group in pairs
         for method in methods
         for factor in (1, 2, 5)
-        for threads in (1, 2)
         for r in (6, 14, 40)
     ]
     shares = [
@@ -363,7 +361,7 @@ def _write_tables(results, scenes, methods, rng) -> None:
          " blowup_frame h stiffness_ratio"),
         "budget": (bought, "scene budget_ms reference method position_basis k r iterations"
          " relative_error_within_horizon"),
-        "breakeven": (ratios, "scene group method factor vertices threads r ratio breakeven_r"),
+        "breakeven": (ratios, "scene group method factor vertices r ratio breakeven_r"),
         "effects_cost": (shares, "scene effect ms_per_frame share"),
         "effects_left_out": (removed, "scene left_out groups ms_per_frame own_ms"),
         "reduced_reruns": (reruns, "scene group method r position_basis max_extent blowup_frame"
@@ -439,31 +437,24 @@ def _write_sensitivity(results, scene) -> None:
     _write(results.path(SENSITIVITY, scene), "scene perturbation frame relative_difference", rows)
 
 
-def _ratio(method, r, threads):
+def _ratio(method, r):
     """Ratio and break-even size: block-deim pays always, qdeim never, the others up to 20."""
     if method == "block-deim":
         return 0.01 * r, np.nan
-    return (0.2 * r, 6) if method == "qdeim" else (0.05 * r * threads, 20 // threads)
+    return (0.2 * r, 6) if method == "qdeim" else (0.05 * r, 20)
 
 
 def _write_scaling(results, scenes) -> None:
-    header = (
-        "scene method threads vertices ms_per_iteration local_ms global_ms factorisation_ms"
-        " memory_mb"
-    )
+    header = "scene method vertices ms_per_iteration local_ms global_ms exponent"
     rows = [
-        (scene, method, threads, n, n * cost, 0.6 * n * cost, 0.4 * n * cost, *extra)
+        (scene, method, n, n * cost, 0.6 * n * cost, 0.4 * n * cost, exponent)
         for scene in scenes
         for n in (400, 1600, 10000)
-        for method, threads, cost, extra in (
-            ("fom", 1, 1e-4, (0.01 * n, 0.001 * n)),
-            ("fom", 2, 7e-5, (np.nan, np.nan)),
-            ("block-deim", 1, 5e-5, (np.nan, np.nan)),
-            ("ecsw", 1, 1e-2 / n, (np.nan, np.nan)),
+        for method, cost, exponent in (
+            ("fom", 1e-4, 1.0), ("block-deim", 5e-5, 1.0), ("ecsw", 1e-2 / n, 0.0)
         )
-    ]
-    table = _write(TABLE.at(results.folder, name="scaling"), header, rows)
-    write_table(scaling_fit(table), TABLE.at(results.folder, name="scaling_fit"))
+    ]  # fmt: skip
+    _write(TABLE.at(results.folder, name="scaling"), header, rows)
 
 
 @pytest.fixture(scope="session")

@@ -69,7 +69,7 @@ def curve(folder, scene: str, offset: float, slope: float, full: float, sizes, s
     r = np.array(sizes)
     table = pd.DataFrame({"r": r, "local_ms": offset + slope * r}).assign(
         scene=scene, group="spring", method="block-deim", factor=1.0, vertices=9, elements=20,
-        threads=1, full_ms=full, solve_ms=0.5 * offset, lift_ms=slope * r,
+        full_ms=full, solve_ms=0.5 * offset, lift_ms=slope * r,
     )  # fmt: skip
     write_table(table.sample(frac=1.0, random_state=shuffle), folder / f"{scene}.csv")
     return File(str(folder / f"{scene}.csv"), {})

@@ -4,50 +4,50 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pdrom.core.store import write_table
 from pdrom.reduction.method import MethodSpec
 from places import ROOT
 from study.artifact.paths import File
-from study.experiments.scaling import Options, Sized, SizedBreakEven
+from study.experiments.scaling import ITERATIONS, Options, Sized, SizedBreakEven
 from study.experiments.scaling import scaling as experiment
 from study.pipeline.scenes import read_scene
 from study.tables.break_even import CURVE, breakeven
-from study.tables.scaling import scaling
-from study.tables.scaling_fit import QUANTITIES, scaling_fit
+from study.tables.scaling import EXPONENTS, scaling
 
 SPEC = MethodSpec(title="block DEIM", centring="affine", rows="element")
 JOINT = MethodSpec(title="joint DEIM", centring="affine", rows="joint")
 
 
-def power_laws(exponents, sizes=(100, 1000, 10000)):
-    columns = {q: 0.25 * np.power(sizes, e) for q, e in zip(QUANTITIES, exponents, strict=True)}
-    return pd.DataFrame({"scene": "a", "method": "fom", "threads": 1, "vertices": sizes, **columns})
+def fitted(folder, exponents, sizes=(100, 1000, 10000), **columns) -> pd.Series:
+    """First row of the table on files of power laws with these ``exponents``."""
+    laws = {q: 0.25 * np.power(sizes, e) for q, e in zip(EXPONENTS, exponents, strict=True)}
+    rows = pd.DataFrame({"scene": "a", "method": "fom", "vertices": sizes, **laws, **columns})
+    rows = rows.reindex(columns=ITERATIONS)
+    for size, row in rows.groupby("vertices"):
+        write_table(row, folder / f"{size}.csv")
+    return scaling([File(str(folder / f"{size}.csv"), {}) for size in sizes]).iloc[0]
 
 
-def test_exponents_of_exact_power_laws():
-    exponents = [0.0, 1.0, 1.5, 2.0, 0.3]
-    fitted = scaling_fit(power_laws(exponents))
-    assert fitted.quantity.tolist() == list(QUANTITIES)
-    assert fitted.exponent.tolist() == pytest.approx(exponents, abs=1e-12)
-    assert fitted.points.tolist() == [3] * 5
+def test_exponents_of_exact_power_laws(tmp_path):
+    exponents = [0.0, 1.0, 1.5]
+    row = fitted(tmp_path, exponents)
+    assert row[list(EXPONENTS.values())].tolist() == pytest.approx(exponents, abs=1e-12)
+    assert row.meshes == 3
 
 
 @pytest.mark.parametrize("sizes", [(100,), (100, 1000)])
-def test_fewer_than_three_sizes_have_no_exponent(sizes):
-    assert scaling_fit(power_laws([1.0] * 5, sizes)).empty
+def test_fewer_than_three_sizes_have_no_exponent(tmp_path, sizes):
+    assert fitted(tmp_path, [1.0] * 3, sizes)[list(EXPONENTS.values())].isna().all()
 
 
-def test_what_was_not_measured_has_no_exponent():
-    table = power_laws([1.0] * 5)
-    table["memory_mb"] = [0.0, 0.0, 4.0]
-    fit = scaling_fit(table).set_index("quantity").loc["memory_mb"]
-    assert pd.isna(fit.exponent)
-    assert fit.points == 1
+def test_what_was_not_measured_has_no_exponent(tmp_path):
+    row = fitted(tmp_path, [1.0] * 3, global_ms=[0.0, 0.0, 4.0])
+    assert pd.isna(row.global_exponent)
+    assert row.local_exponent == pytest.approx(1.0)
 
 
-def test_no_scene_gives_empty_tables():
-    table = scaling([])
-    assert tuple(table.columns) == scaling.column_names
-    assert tuple(scaling_fit(table).columns) == scaling_fit.column_names
+def test_no_scene_gives_an_empty_table():
+    assert tuple(scaling([]).columns) == scaling.column_names
 
 
 @pytest.mark.parametrize("name", ["strain_oop", "bar_release"])
@@ -72,15 +72,14 @@ def test_every_size_is_measured(tmp_path, name):
 
 
 def _check_iterations(table: pd.DataFrame, sizes: list[int]) -> None:
-    assert table.method.tolist() == 2 * ["fom", "fom", "block-deim", "ecsw"]
-    assert table.threads.tolist() == 2 * [1, 2, 1, 1]
-    assert table.vertices.tolist() == [n for n in sizes for _ in range(4)]
+    assert table.method.tolist() == 2 * ["fom", "block-deim", "ecsw"]
+    assert table.vertices.tolist() == [n for n in sizes for _ in range(3)]
     assert (table.ms_per_iteration >= table.local_ms + table.global_ms).all()
     assert table.local_share.between(0.0, 1.0).all()
     fom, reduced = table[table.method == "fom"], table[table.method != "fom"]
-    assert (fom[fom.threads == 1].factorisation_ms > 0.0).all()
-    assert (fom[fom.threads == 1].speedup == 1.0).all()
-    own = fom[fom.threads == 1].set_index("vertices").local_ms
+    assert (fom.factorisation_ms > 0.0).all()
+    assert (fom.speedup == 1.0).all()
+    own = fom.set_index("vertices").local_ms
     np.testing.assert_allclose(table.local_speedup * table.local_ms, table.vertices.map(own))
     assert fom.elements_sampled.isna().all()
     assert (reduced.elements_sampled <= reduced.elements).all()
@@ -90,8 +89,8 @@ def _check_alone(table: pd.DataFrame, sizes: list[int]) -> None:
     assert (table.local_ms > 0.0).all()
     assert (table[["full_ms", "solve_ms", "lift_ms"]] > 0.0).all(axis=None)
     curves = table.groupby(CURVE)
-    assert len(curves) == 2 * 2 * 2
-    assert [g.vertices.iloc[0] for _, g in curves if g.threads.iloc[0] == 1] == 2 * sizes
+    assert len(curves) == 2 * 2
+    assert [g.vertices.iloc[0] for _, g in curves] == 2 * sizes
     for _, curve in curves:
         # the largest size is the numerical rank, not what was asked for
         assert curve.r.tolist()[:2] == [2, 3]

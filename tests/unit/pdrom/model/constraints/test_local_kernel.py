@@ -1,4 +1,4 @@
-"""Two threads give the bits of one, and the split of large groups is only a matter of order."""
+"""Kernels in two parts: the split of large groups is only a matter of order."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,6 @@ from pdrom.model.constraints.local_kernel import (
     local_kernel,
 )
 from pdrom.model.effects import EFFECTS
-from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
 
 GRAVITY = {"effect": "gravity"}
@@ -31,48 +30,40 @@ def group_of(name: str, split: bool, monkeypatch: pytest.MonkeyPatch):
 
 
 @pytest.mark.parametrize("name", SPLIT)
-def test_two_threads_give_the_bits_of_one(name, rng, monkeypatch):
-    scene = group_of(name, True, monkeypatch)
-    group, points = scene.groups[0], scene.mesh.points
-    assert group.local_kernel.touched
-    for size in (0.0, 1e-3, 1.0):
-        y = points + size * rng.standard_normal(points.shape)
-        group.begin_frame(y)
-        start = rng.standard_normal(points.shape)
-        results = []
-        for threads in (1, 2):
-            group.threads = threads
-            rhs = start.copy()
-            energies = [group.accumulate(y, rhs) for _ in range(20)]
-            assert len(set(energies)) == 1
-            results.append((energies[0], rhs))
-        assert results[0][0] == results[1][0]
-        assert np.array_equal(results[0][1], results[1][1])
-
-
-@pytest.mark.parametrize("name", SPLIT)
 def test_parts_change_the_order_of_summation_only(name, rng, monkeypatch):
     whole, split = (group_of(name, s, monkeypatch) for s in (False, True))
     y = whole.mesh.points + 0.05 * rng.standard_normal(whole.mesh.points.shape)
     sums = []
     for scene in (whole, split):
         rhs = np.zeros_like(y)
-        scene.groups[0].begin_frame(y)
-        sums.append((scene.groups[0].accumulate(y, rhs), rhs))
+        group = scene.groups[0]
+        assert bool(group.local_kernel.touched) == (scene is split)
+        group.begin_frame(y)
+        sums.append((group.accumulate(y, rhs), rhs))
     assert sums[0][0] == pytest.approx(sums[1][0], rel=1e-13)
     assert np.abs(sums[0][1] - sums[1][1]).max() <= 1e-13 * np.abs(sums[0][1]).max()
 
 
-def test_a_run_with_two_threads_is_the_run_with_one(monkeypatch):
-    """All groups of a scene, several frames; restricted groups inherit the setting."""
+def test_compiled_iterations_add_both_parts(monkeypatch):
+    """All groups of a scene, several frames: without the compiled loop each adds its own parts."""
     mesh = {"kind": "cloth", "rows": 9, "columns": 8, "plane": "xz", "wave": 0.1}
     effects = [{"effect": name, "weight": 1e3} for name in ("bending", "spring", "strain")]
     scene = make_scene(GRAVITY, {"effect": "pins", "select": "left"}, *effects, mesh=mesh)
     for group in scene.groups:
         monkeypatch.setattr(type(group), "split_from", 2)
-    one, two = (Scene.build(scene.config, scene.mesh, threads) for threads in (1, 2))
-    assert [g.threads for g in two.groups] == [2, 2, 2]
-    assert np.array_equal(trajectory(one), trajectory(two))
+    scene = Scene.build(scene.config, scene.mesh)
+    assert all(group.local_kernel.touched for group in scene.groups)
+    compiled, plain = scene.stepper(scene.system), scene.stepper(scene.system)
+    assert compiled._compiled is not None
+    plain._compiled = plain._whole = None
+    states = [scene.initial_state(), scene.initial_state()]
+    for frame in range(5):
+        states = [
+            loop.step(state, frame)[0]
+            for loop, state in zip((compiled, plain), states, strict=True)
+        ]
+    moved = np.abs(states[0].positions - scene.mesh.points).max()
+    assert np.abs(states[0].positions - states[1].positions).max() <= 1e-11 * moved
 
 
 @local_kernel
@@ -98,24 +89,22 @@ def recording(split: bool, prepares: bool) -> tuple[LocalKernel, np.ndarray]:
 
 @pytest.mark.parametrize("prepares", [True, False])
 @pytest.mark.parametrize("split", [True, False])
-@pytest.mark.parametrize("threads", [1, 2])
-def test_parts_cover_all_units_once(threads, split, prepares):
+def test_parts_cover_all_units_once(split, prepares):
     kernel, notes = recording(split, prepares)
     local, rhs = LocalPass([kernel]), np.full((6, 3), 5.0)
-    assert local.parts == 1 + split
+    assert bool(local.touched) == split
     for _ in range(3):
-        assert local.accumulate(np.zeros((6, 3)), rhs, threads) == 5.0
+        assert local.accumulate(np.zeros((6, 3)), rhs) == 5.0
     expected = np.full((6, 3), 5.0)
     expected[:5, 0] += 3.0
     assert np.array_equal(rhs, expected)
     assert notes.tolist() == [3.0, 3.0 * split, 3.0 * prepares]
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_a_pass_adds_all_its_kernels(threads):
+def test_a_pass_adds_all_its_kernels():
     kernels = [recording(split, False)[0] for split in (True, False, True)]
     rhs = np.zeros((6, 3))
-    assert LocalPass(kernels).accumulate(np.zeros((6, 3)), rhs, threads) == 15.0
+    assert LocalPass(kernels).accumulate(np.zeros((6, 3)), rhs) == 15.0
     assert rhs[:, 0].tolist() == [3.0] * 5 + [0.0]
 
 

@@ -65,7 +65,7 @@ def test_a_timed_kernel_does_what_the_kernel_does(rng):
     kernel = LocalPass([stand.local_kernel])
     for _ in range(1000):
         other[...] = 0.0
-        energy = kernel.accumulate(y, other, 1)
+        energy = kernel.accumulate(y, other)
     assert energy == group.accumulate(y, own)
     assert (own == other).all()
     assert stand.seconds > 0.0

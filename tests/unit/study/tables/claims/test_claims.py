@@ -78,7 +78,6 @@ def tables() -> dict[str, pd.DataFrame]:
                 "group": "spring",
                 "method": "deim",
                 "factor": 1.0,
-                "threads": 1,
                 "r": [6, 20, 6],
                 "ratio": [0.5, 1.5, 0.25],
                 "solve_ratio": [0.1, 0.2, 0.05],
