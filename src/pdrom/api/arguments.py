@@ -20,7 +20,7 @@ T = TypeVar("T")
 
 
 def require(kind: type[T] | tuple[type[T], ...], value: Any, name: str, source: str) -> T:
-    """``value`` if it is a ``kind``; errors call it ``name`` and say its ``source``."""
+    """Return ``value`` if it is a ``kind``, else raise an error with ``name`` and ``source``."""
     if isinstance(value, kind):
         return value
     kinds = " or ".join(k.__name__ for k in (kind if isinstance(kind, tuple) else (kind,)))
@@ -28,7 +28,7 @@ def require(kind: type[T] | tuple[type[T], ...], value: Any, name: str, source: 
 
 
 def file_path(path: Any) -> Path:
-    """``path`` as a path; ConfigurationError if it is none."""
+    """Return ``path`` as a `Path`; ConfigurationError if it cannot be one."""
     if not isinstance(path, (str, os.PathLike)) or "\0" in str(path):
         raise ConfigurationError(f"{shown(path, 60)}: the name of a file is required")
     return Path(path)
@@ -46,14 +46,14 @@ def require_positions(full: FullRun) -> None:
 
 
 def modes(r: Any) -> int:
-    """Number of modes ``r`` as an int; which are allowed is checked where they are taken."""
+    """Return the number of modes ``r`` as an int; its range is checked with the basis."""
     if isinstance(r, bool) or not isinstance(r, Integral):
         raise ConfigurationError(f"r = {shown(r, 60)}: a whole number of modes is required")
     return int(r)
 
 
 def method_spec(method: str | MethodSpec) -> MethodSpec:
-    """The method of that name in config/methods.yaml, or the one that is given."""
+    """Return the method of that name in config/methods.yaml; a specification as it is."""
     if isinstance(method, MethodSpec):
         return method
     known = methods()
@@ -68,7 +68,7 @@ def methods() -> dict[str, MethodSpec]:
 
 
 def fitting_basis(made: Any, group: ConstraintGroup, spec: MethodSpec) -> Basis:
-    """``made`` if it is a basis of the group's projections that the method ``spec`` can use."""
+    """Return ``made`` if the method ``spec`` can use it as a basis of the group, else raise."""
     basis = require(Basis, made, "basis_of_group", source="pdrom.api.basis makes one")
     found, needed = ((each.elements, each.rows_per_element) for each in (basis, group))
     if found != needed:

@@ -145,7 +145,7 @@ def _store(file: h5py.File, name: str, values: np.ndarray, unit: str) -> None:
 
 
 def _requested(scene: Scene, file: h5py.File) -> AskedRun:
-    """A run within a requested tolerance; what its calibration cost is not kept."""
+    """Load a run within a requested tolerance; the cost of its calibration is not stored."""
     kept, timings = file.attrs, file["timings"][...].sum(axis=1)
     request = Request(error=float(kept["requested_error"]), quantity=str(kept["quantity"]))
     estimate = kept.get("estimate")
@@ -177,7 +177,7 @@ def _reduced(scene: Scene, file: h5py.File) -> ReducedRun:
 def _scene(file: h5py.File, path: Path) -> Scene:
     """The scene of a run; its mesh from the file, where it was stored."""
     settings = json.loads(file.attrs["configuration"])
-    # the pipeline's job names its setting `config`
+    # a run of the pipeline holds the scene under the key `config`
     scene = validate(SceneConfig, settings.get("config") or settings["scene"], str(path))
     if "mesh" in file:
         return Scene.build(scene, stored_mesh(file["mesh"]))
@@ -185,7 +185,7 @@ def _scene(file: h5py.File, path: Path) -> Scene:
 
 
 def _project(path: Path, mesh: MeshConfig) -> Path:
-    """Folder that the file of a ``mesh`` is named from: of those above the run's file, ``path``."""
+    """Folder above the run's file ``path`` that the path of a ``mesh`` file starts from."""
     if not isinstance(mesh, MeshFile):
         return Path()
     above = path.resolve().parents

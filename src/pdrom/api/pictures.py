@@ -82,7 +82,7 @@ def view(path: str | os.PathLike[str], *runs: AnyRun) -> None:
 
 
 def viewed_scenes(*runs: AnyRun) -> list[ViewedScene]:
-    """Scenes as pictures and pages show them, each with its runs; errors as `view` raises them.
+    """Collect runs by scene, for pictures and pages; the errors are those of `view`.
 
     Parameters
     ----------
@@ -107,12 +107,12 @@ def _scene(run: AnyRun) -> Scene:
 
 
 def _alike(scene: Scene) -> SceneConfig:
-    """Configuration without the error that its file may request."""
+    """Configuration without the tolerance that its file may request: runs do not depend on it."""
     return scene.config.model_copy(update={"asked": None})
 
 
 def _viewed(runs: list[AnyRun]) -> ViewedScene:
-    """Runs of one scene; the full order is the first of them, if it is there."""
+    """Runs of one scene, the full-order run first if there is one."""
     full = [run.full if isinstance(run, ReducedRun) else run for run in runs]
     known: list[FullRun | AskedRun] = [run for run in full if isinstance(run, FullRun)]
     first = [*known, *(run for run in runs if isinstance(run, AskedRun))][0]

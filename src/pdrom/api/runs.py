@@ -39,7 +39,7 @@ from pdrom.reduction.sampling import Reduction
 from pdrom.reduction.sampling.select import select
 from pdrom.reduction.snapshots import row_masses, training_frames
 
-SNAPSHOTS = 100  # at most, of a group for which the scene names no number
+SNAPSHOTS = 100  # training snapshots of a group, at most, where the scene gives no number
 # A reduced run ends when its bounding box exceeds this multiple of the mesh's.
 BLOWUP_EXTENT = 100.0
 GROUP = "the name of a constraint group"
@@ -204,7 +204,7 @@ def reduce(
 
 
 def _clocked(advance: Advance, seconds: list[float]) -> Advance:
-    """``advance`` that adds the time of every frame to ``seconds``."""
+    """Wrap ``advance`` so that it adds the time of every frame to ``seconds``."""
 
     def step(state: State, frame: int) -> tuple[State, FrameReport]:
         started = perf_counter()
@@ -224,7 +224,7 @@ def _training_frames(scene: Scene, group: str) -> np.ndarray:
 
 @contextmanager
 def _place(out: str | os.PathLike[str] | None) -> Iterator[Path]:
-    """File to which a run is written; one that nobody asked for goes away."""
+    """Yield the file to write a run to: ``out``, or a temporary one that is deleted afterwards."""
     if out is not None:
         yield Path(out)
         return

@@ -59,7 +59,7 @@ def build_scene(folder: str | os.PathLike[str] = ".", mesh: Any = None, **keys: 
 
 
 def bound(config: SceneConfig, folder: Path, source: str) -> Scene:
-    """``config`` with its mesh, files below ``folder``; errors open with ``source``."""
+    """Bind ``config`` to its mesh, read below ``folder``; errors begin with ``source``."""
     try:
         return Scene.build(config, config.mesh.build(folder))
     except PdromError as error:

@@ -48,7 +48,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Do what the ``arguments`` of the command line ask; the exit code."""
+    """Run the command that ``arguments`` name; return the exit code."""
     try:
         os.getcwd()
     except OSError:
@@ -58,12 +58,12 @@ def run(arguments: Sequence[str]) -> int:
             asked = _asked(arguments)
             return int(asked.perform(asked))
         finally:
-            sys.stdout.flush()  # here, not at the end of the process, a failure can be reported
+            sys.stdout.flush()  # fails here, not at exit
     except PdromError as error:
         return _fail(str(error))
     except MemoryError:
         return _fail("out of memory")
-    except BrokenPipeError:  # who read the output has had enough
+    except BrokenPipeError:  # the reader of the output has closed the pipe
         _drop_output()
         return Status.DONE
     except OSError as error:
@@ -75,7 +75,7 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _asked(arguments: Sequence[str]) -> argparse.Namespace:
-    """The command line, understood; a misspelt option gets a suggestion."""
+    """Parse the command line; a misspelt option gets a suggestion."""
     asked, unknown = parser().parse_known_args(arguments)
     if unknown:
         known = re.findall(r"--[a-z-]+", asked.parser.format_usage())
@@ -84,7 +84,7 @@ def _asked(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _drop_output() -> None:
-    """Drop the rest of the output, at which the end of the process would fail again."""
+    """Discard the rest of the output: flushing it at exit would fail again."""
     with suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
@@ -97,7 +97,7 @@ def _fail(message: str) -> int:
 def main() -> None:
     """Run the command line of this process in the project's environment; end with its code."""
     root = checkout()
-    if root and os.access(root / ".cache", os.W_OK):  # compiled kernels: those of ./reproduce
+    if root and os.access(root / ".cache", os.W_OK):  # compiled kernels are shared with ./reproduce
         os.environ.setdefault("NUMBA_CACHE_DIR", str(root / ".cache" / "numba"))
         os.environ.setdefault("MPLCONFIGDIR", str(root / ".cache" / "matplotlib"))
     settle()

@@ -58,7 +58,7 @@ VOLUME = """\
   - {effect: tetrahedron_strain, weight: 1.0e+6}
   # - {effect: volume, weight: 1.0e+6}
 """
-ENOUGH = 3  # held vertices, with which a body does not turn about a line
+ENOUGH = 3  # fewest held vertices with which a body cannot turn about a line
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -105,7 +105,7 @@ def template(stem: str, file: str | None = None, mesh: "Mesh | None" = None) -> 
 
 
 def _read(file: str, scene: Path) -> "tuple[str, Mesh]":
-    """The mesh file as the scene's file names it, and its mesh."""
+    """Path of the mesh file, from the folder of the scene's file on, and its mesh."""
     from pdrom.core.errors import ConfigurationError
     from pdrom.core.yamlfile import validate
     from pdrom.model.mesh.config import MeshFile
@@ -146,7 +146,7 @@ def _sides(mesh: "Mesh") -> dict[str, int]:
     for side in SIDES:
         try:
             found[side] = len(select_vertices(mesh, side))
-        except SceneError:  # it is flat in this direction
+        except SceneError:  # the mesh is flat in this direction
             continue
     return found
 

@@ -38,7 +38,7 @@ class Progress:
         elif done < self._frames and done % max(1, self._frames // 10):
             return
         self._shown = now
-        # by the later half: kernels are compiled in the first frames and between them
+        # estimated by the later half: kernels are compiled in the first frames and between them
         half = done // 2
         left = (now - self._ends[half]) / (done - half) * (self._frames - done)
         text = line(self._name, done, self._frames, ms=1e3 * float(report.seconds.sum()), left=left)
@@ -65,7 +65,7 @@ def kernels_are_kept() -> bool:
 
 
 class WorkProgress:
-    """A line about the work of the moment and the time so far, every few seconds.
+    """Write the current step and the time so far, every few seconds.
 
     Called with the title and the counted work of what was just done.
     """
@@ -85,7 +85,7 @@ class WorkProgress:
             self._stream.write("\n")
 
     def __call__(self, title: str, work: float) -> None:
-        """Some ``work`` (ns, counted) on what has this ``title`` is done."""
+        """Count ``work`` (estimated, ns) done in the step called ``title``."""
         now = monotonic()
         if now - self._shown < (EVERY if self._terminal else self._every):
             return

@@ -1,4 +1,4 @@
-"""``pdrom reduce SCENE.yaml``: a run with one group's projections reduced, or with an error."""
+"""``pdrom reduce SCENE.yaml``: a run with one group reduced, or within a tolerance."""
 
 import argparse
 import sys
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from pdrom.api import ReducedRun
 
 WRONG = 0.1  # relative error above which the study calls a run wrong
-PICTURES = {"pdf": "Creator", "png": "Software", "svg": "Creator"}  # where each says its maker
+PICTURES = {"pdf": "Creator", "png": "Software", "svg": "Creator"}  # key of its maker
 
 
 def _size(text: str) -> int:

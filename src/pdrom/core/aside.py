@@ -1,4 +1,4 @@
-"""Setting damaged files aside: for jobs of the workflow alone, whose next run makes them again.
+"""Renaming damaged results: only jobs of the workflow do it, whose next run makes them again.
 
 Nobody else renames a file that it reads: it may be the only copy of somebody's run.
 """
@@ -12,7 +12,7 @@ _ASIDE: ContextVar[bool] = ContextVar("damaged results are set aside", default=F
 
 @contextmanager
 def damaged_set_aside() -> Iterator[None]:
-    """Damaged results that are read meanwhile are set aside."""
+    """Inside this context a damaged result that is read is renamed to ``NAME.damaged``."""
     previous = _ASIDE.set(True)
     try:
         yield
@@ -21,5 +21,5 @@ def damaged_set_aside() -> Iterator[None]:
 
 
 def sets_aside() -> bool:
-    """Whether a damaged result that is read now is set aside."""
+    """Whether a damaged result that is read now is renamed."""
     return _ASIDE.get()

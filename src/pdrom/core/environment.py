@@ -15,7 +15,7 @@ import platform
 from collections.abc import Mapping
 from pathlib import Path
 
-# Settings of numerical libraries, of Python, Matplotlib and TeX.
+# Variables that set up numerical libraries, Python, Matplotlib and TeX.
 CLEARED = (
     "OPENBLAS_", "GOTO_", "BLIS_", "MKL_", "VECLIB_", "OMP_", "GOMP_", "KMP_",
     "NPY_", "NUMPY_", "SCIPY_", "NUMBA_", "NUMEXPR_", "PYTHON", "MPL", "MATPLOTLIB",

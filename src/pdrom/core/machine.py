@@ -45,7 +45,7 @@ class Units(_Record):
 
     @property
     def unit_s(self) -> float:
-        """Geometric mean of the three: what times of other machines are compared by."""
+        """Geometric mean of the three, by which times of two machines are compared."""
         return (self.unit_scalar_s * self.unit_vector_s * self.unit_memory_s) ** (1 / 3)
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-LEVELS = 65535  # of a quantised coordinate, over the run's bounding box
+LEVELS = 65535  # steps of a quantised coordinate from end to end of the run's bounding box
 
 
 def pack_text(values: np.ndarray) -> str:
@@ -15,7 +15,7 @@ def pack_text(values: np.ndarray) -> str:
 
 
 def pack_array(values: np.ndarray, kind: str) -> dict[str, Any]:
-    """An array ``values`` of any shape; ``kind`` is "f8", "f4", "u4" or "u1", little-endian."""
+    """Pack ``values`` of any shape; ``kind`` is "f8", "f4", "u4" or "u1", little-endian."""
     shape, data = list(np.shape(values)), np.asarray(values).astype(f"<{kind}")
     return {"kind": kind, "shape": shape, "data": pack_text(data)}
 

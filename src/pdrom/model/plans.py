@@ -1,4 +1,4 @@
-"""Section ``reduce`` of a scene: the groups that are reduced, and an error that is asked for."""
+"""Section ``reduce`` of a scene: the groups that are reduced, and a requested tolerance."""
 
 from typing import Annotated, Any
 
@@ -14,7 +14,7 @@ class ReductionPlan(ConfigModel):
 
 
 def with_asked(keys: Any) -> Any:
-    """Take ``reduce.error``, the asked error of the whole scene, out of the groups' plans.
+    """Separate ``reduce.error``, the requested tolerance of the scene, from the groups' plans.
 
     ``keys`` are those of a scene file as read, and come back unchanged where no error is asked for.
     """

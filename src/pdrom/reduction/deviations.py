@@ -48,7 +48,7 @@ class Yardstick:
 
     @cached_property
     def scale(self) -> EnergyScale:
-        """Reference for the energies of runs."""
+        """Energy by which those of runs are divided."""
         return EnergyScale.of(self.scene, self.reference)
 
     @cached_property

@@ -18,7 +18,7 @@ from pdrom.view.run_rows import Row, draw_rows
 from pdrom.view.runs import ViewedRun, ViewedScene
 from pdrom.view.text import plain_words
 
-INSTANTS = (0.25, 0.5, 0.75, 1.0)  # of the run
+INSTANTS = (0.25, 0.5, 0.75, 1.0)  # fractions of the run
 CAMERA = Camera(30.0, 20.0)
 NO_LIMIT = 100.0  # inches: the picture need not fit on a page
 SHOWN = 20  # modes

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.transforms import Bbox
 
-DIGITS = 6  # of positions, in parts of the figure
+DIGITS = 6  # decimals of positions, which are fractions of the figure
 
 
 class RoundedLayout(ConstrainedLayoutEngine):

@@ -12,8 +12,8 @@ from pdrom.model.mesh.types import Mesh
 from pdrom.view.runs import ViewedRun, ViewedScene
 from pdrom.view.view import view_of
 
-FRAMES = 75  # stored of a run, at most
-ROOM = 0.2  # around a run, of its longest side
+FRAMES = 75  # frames that the page holds of a run, at most
+ROOM = 0.2  # margin around a run, over its longest side
 
 
 def pack_scene(scene: ViewedScene) -> dict[str, Any]:

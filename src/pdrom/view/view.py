@@ -30,7 +30,7 @@ def rotation_to(up: np.ndarray) -> np.ndarray:
     if square == 0.0:
         return np.eye(3)
     turn = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    # not over 1 + cosine, of which half a turn leaves no digits
+    # not divided by 1 + cosine, which loses all digits near half a turn
     return np.eye(3) + turn + turn @ turn * ((1.0 - cosine) / square)
 
 

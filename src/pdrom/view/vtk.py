@@ -20,7 +20,7 @@ def vtk(scene: ViewedScene, collection: Path) -> None:
     for frame, name in enumerate(names):
         data = point_data(scene, frame)
         _write(scene.mesh, scene.positions[frame], data, collection.with_name(name))
-    for path in collection.parent.glob("frame_*.vtu"):  # of an earlier, longer run
+    for path in collection.parent.glob("frame_*.vtu"):  # files of an earlier, longer run
         if path.name not in names:
             path.unlink()
     _write_collection(collection, names, scene.time_step)

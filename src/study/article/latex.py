@@ -105,7 +105,7 @@ def _figure(found: re.Match[str]) -> str:
 
 
 def _apart(found: re.Match[str]) -> str:
-    """Mathematics, with the numbers in it between its parts: a link cannot stand inside."""
+    """Split mathematics at its numbers: a link cannot stand inside a formula."""
     if not _VAL.search(found[1]):
         return found[0]
     parts = re.split(r"(\\val\{[^{}]*\})", found[1])

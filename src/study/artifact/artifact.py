@@ -104,7 +104,7 @@ class Artifact:
         return found
 
     def plain(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """``settings`` as plain data; of a section as much as the function is annotated for."""
+        """``settings`` as plain data; a section has the annotated fields only."""
         return {k: self.types[k].dump_python(v, mode="json") for k, v in settings.items()}
 
     def perform(

@@ -21,7 +21,7 @@ FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
 
 
 class _LogFile(logging.FileHandler):
-    """A log whose disk is full is cut short; the job's own files say that there is no space."""
+    """Log file that ends early on a full disk: the job's own outputs report that."""
 
     stream: TextIOWrapper
 

@@ -72,7 +72,7 @@ class Place:
 
 
 class _Fixed(dict[str, str]):
-    """Values of some labels; the others stay in braces."""
+    """Mapping for `str.format_map` with some labels; the others stay in braces."""
 
     def __missing__(self, label: str) -> str:
         return f"{{{label}}}"

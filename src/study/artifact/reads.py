@@ -60,7 +60,7 @@ class Sources(Protocol):
 class FileRead:
     """Something that is read from files."""
 
-    edited = False  # by people, so that the content decides and not the date
+    edited = False  # edited by people: a change of the content counts, not of the date
 
     def paths(self, sources: Sources, labels: Labels) -> Paths:
         """Return the path, or all paths, among ``sources`` for a job with these ``labels``."""

@@ -40,7 +40,7 @@ class Usage:
 
 
 class Meter:
-    """Measures from its making on; processor time and memory are those of the whole process.
+    """Measures from its creation on; processor time and memory are those of the whole process.
 
     A job that is a fork begins with no processor time of its own.
     """

@@ -162,7 +162,7 @@ def _basis(data: SnapshotSet, method: MethodSpec, seed: int | None) -> Basis:
 
 
 def _reduce(basis: Basis, method: MethodSpec, r: int) -> Reduction | None:
-    """Reduction of a rung; None where the group is round-off."""
+    """Reduction of a rung; None if the projections of the group are only round-off."""
     size = min(r, basis.rank)
     return Reduction(basis, select(basis, method, size), method, r=size) if size else None
 

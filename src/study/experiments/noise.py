@@ -105,7 +105,7 @@ def irregular(runs: Runs) -> bool:
 
 
 def kinds(scene: Scene) -> tuple[str, ...]:
-    """Axes of ``scene`` that round-off may reach: all.
+    """Names of the sets of coordinates of ``scene`` that a start perturbs.
 
     Of a flat mesh, too, those of its plane alone, and these with the axis across it at a single
     vertex.

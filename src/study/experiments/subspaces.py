@@ -224,7 +224,7 @@ class _Runs:
             store_columns(self._file.create_group(f"columns/{base}"), columns)
             spent: dict[str, float] = defaultdict(float)
             for of_model, (method, samples) in clocked(models):
-                # samplings of all tolerances are made together, for the first of them
+                # one call samples for all tolerances: it is made at the first of them
                 family = ECSW if method.startswith(ECSW) else method
                 spent[family] += of_model
                 model = SubspaceModel(kind, columns, samples)

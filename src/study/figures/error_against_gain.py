@@ -13,7 +13,7 @@ from study.figures.kit.options import Experiments, Methods
 from study.figures.kit.results import NothingToDraw, Results
 from study.tables.kit.gains import FAILED, judged_runs
 
-ERRORS, GAINS = (1e-5, 1e2), (1.0, 1e5)  # limits; what lies outside is drawn on the rim
+ERRORS, GAINS = (1e-5, 1e2), (1.0, 1e5)  # limits of the axes; points outside are drawn on the rim
 ENDS = ("low", "median", "high")
 DECADES = 4  # gains above 10^4 are counted together
 _KEYS = ["scene", "group", "method", "r"]

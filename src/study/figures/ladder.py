@@ -12,7 +12,7 @@ from study.figures.kit.declaration import figure
 from study.figures.kit.options import Scenes
 from study.figures.kit.results import NothingToDraw, Results
 
-ERRORS, GAINS = (1e-4, 1e2), (1.0, 1e5)  # limits; what lies outside is drawn on the rim
+ERRORS, GAINS = (1e-4, 1e2), (1.0, 1e5)  # limits of the axes; points outside are drawn on the rim
 
 
 @figure(

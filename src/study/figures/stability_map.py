@@ -56,7 +56,7 @@ def stability_map(results: Results, options: Options) -> Figure:
 
 @dataclass(frozen=True)
 class _Strip:
-    """Blocks side by side over the same rows.
+    """A strip of the map: blocks of columns side by side that share their rows.
 
     rows : (scene, group) -> label
     lookups : for each block the (scene, group) -> rows of the table, by column

@@ -118,7 +118,7 @@ class Batch:
     log: str
 
     def line(self) -> str:
-        """Name and cause."""
+        """Name of the batch and the cause, on one line."""
         found = _BY_SLURM.search(_content(self.log))
         how = (found["why"] or found["status"]).lower() if found else "a job of it failed"
         return f"pdrom: batch {self.name} failed: {how} (log: {self.log})"

@@ -63,7 +63,7 @@ class Estimate:
         self._jobs: dict[int, _Job] = {}
 
     def expect(self, jobs: Mapping[int, Expected]) -> None:
-        """All jobs of the run, by their numbers."""
+        """Set the expected times of all jobs of the run, by their numbers."""
         self._jobs = {number: _Job(expected) for number, expected in jobs.items()}
 
     def start(self, job: int, now: float) -> None:

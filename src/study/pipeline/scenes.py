@@ -144,7 +144,7 @@ def scene_file(root: Path, name: str) -> Path:
 
 
 def not_taken(scene: SceneConfig) -> list[str]:
-    """Effects of a scene that no position subspace takes."""
+    """Effects of a scene that a position subspace cannot represent."""
     return [e.effect for e in scene.effects if not EFFECTS.load(e.effect).in_subspace]
 
 

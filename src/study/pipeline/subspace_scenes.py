@@ -1,4 +1,4 @@
-"""Scenes with an effect that no position subspace takes: what they go without, and what asks."""
+"""Refuse or skip position subspaces of scenes whose effects they cannot represent."""
 
 import logging
 
@@ -42,7 +42,7 @@ def check_subspaces(study: Study) -> None:
 
 
 def _asking(study: Study) -> dict[str, tuple[str, ...]]:
-    """Keys that ask for a subspace of the scenes that they name."""
+    """Scenes of which each key of the configuration requests a subspace."""
     settings = study.settings
     return {
         "subspace.scenes": settings.subspace.scenes,

@@ -45,7 +45,7 @@ def processor_seconds() -> float:
     for process in (own, *own.children(recursive=True)):
         try:
             times = process.cpu_times()
-        except psutil.Error:  # it has ended meanwhile
+        except psutil.Error:  # the process has ended meanwhile
             continue
         total += times.user + times.system
         total += getattr(times, "children_user", 0.0) + getattr(times, "children_system", 0.0)
@@ -102,7 +102,7 @@ def configuration(command: CommandLine) -> str:
 def _verdicts(folders: Folders, apart: str) -> list[str]:
     """All verdicts in one line; none where the table cannot be read."""
     path = paths.TABLE.at(folders.results, name="claims")
-    # only looked at: a job sets a damaged one aside
+    # a damaged file is only reported here: the job that reads it renames it
     if not Path(path).is_file() or check_file(path) is not Condition.INTACT:
         return []
     table = read_table(path, ["claim", "verdict", "verdict_beyond"])

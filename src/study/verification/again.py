@@ -16,7 +16,7 @@ from study.artifact.reads import Every
 from study.pipeline.resolve import Job
 from study.tables import declared
 
-# Faults that edited tables lead a job to.
+# Errors that a job may raise when its tables were edited.
 FAULTS = (PdromError, ArithmeticError, LookupError, TypeError, ValueError)
 
 

@@ -91,7 +91,7 @@ class Comparison:
 
     @cached_property
     def _timed(self) -> list[set[str]]:
-        """Names of the timed cells of each row, where they differ from row to row."""
+        """Names of the timed columns of each row, where they differ from row to row."""
         if self.table.timed_cells is None:
             return [set()] * len(self.e)
         reads = self.table.reads.items()

@@ -50,7 +50,7 @@ def write(results: str, frames: Mapping[str, pd.DataFrame], reason: str) -> Path
         write_reference(declared()[name], frame, folder)
     for path in [*folder.glob("*.csv"), *folder.glob("*.csv.xz")]:
         if path.name.partition(".")[0] not in frames:
-            path.unlink()  # a table that there is no longer
+            path.unlink()  # a table that no longer exists
     here = machine()
     code = f"{here.pdrom} ({here.commit})"
     note(folder, reason, datetime.now(UTC).date(), code)

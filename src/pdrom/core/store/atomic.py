@@ -21,7 +21,7 @@ from pdrom.core.store.checksum import (
     reason,
 )
 
-# What pages and pictures of this package hold within their first or last bytes.
+# Mark in the first or last bytes of every page and picture of this package.
 MARK, MARKED = b"made by pdrom", 65_536
 # Part of the names of temporary files, so that no machine removes those of another one.
 _MACHINE = hashlib.blake2b(platform.node().encode(), digest_size=2).hexdigest()
@@ -60,7 +60,7 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
             _rename(temporary, checksum, target)
         else:
             os.replace(temporary, target)
-            _remove_checksum(checksum_path(target))  # of an earlier file
+            _remove_checksum(checksum_path(target))  # checksum of an earlier file
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
     finally:
@@ -119,7 +119,7 @@ def _require_file(target: Path) -> None:
 
 
 def _remove_checksum(place: Path) -> None:
-    """Remove the file ``place`` if it is a checksum, and nobody else's hidden file."""
+    """Remove the hidden file ``place`` if it is a checksum, else leave it."""
     content = place.read_bytes() if place.is_file() else b""
     if content and Checksum.parse(content).content == content:
         place.unlink()
@@ -140,7 +140,7 @@ def _runs(process: int) -> bool:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except PermissionError:  # of another user
+    except PermissionError:  # a process of another user
         pass
     return True
 

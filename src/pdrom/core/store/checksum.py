@@ -160,7 +160,7 @@ def check_file(path: str | os.PathLike[str]) -> Condition:
         )
         return Condition.INTACT if fits else Condition.DAMAGED
     except OSError as error:
-        if error.errno == errno.EIO:  # the disk has lost some of it
+        if error.errno == errno.EIO:  # the disk cannot read a part of it
             return Condition.DAMAGED
         raise StorageError(f"{path}: cannot be read ({reason(error)})") from error
 

@@ -54,7 +54,7 @@ class _Sink:
 
     def readinto(self, buffer: memoryview) -> int:
         count = self._handle.readinto(buffer)
-        buffer[count:] = bytes(len(buffer) - count)  # what was thrown away
+        buffer[count:] = bytes(len(buffer) - count)  # zeros for what `write` has dropped
         return len(buffer)
 
     def truncate(self, size: int) -> int:
@@ -88,7 +88,7 @@ def open_hdf5(path: str | os.PathLike[str], unchecked: bool = False) -> Iterator
     except KeyError as error:
         raise StorageError(f"{path}: {error.args[0]}") from error
     except OSError as error:
-        require_intact(path, unchecked)  # damaged since?
+        require_intact(path, unchecked)  # refuses a file that was damaged since the first check
         raise StorageError(f"{path}: cannot be read ({reason(error)})") from error
 
 

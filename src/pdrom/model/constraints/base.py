@@ -20,7 +20,7 @@ from pdrom.model.mesh.select import select_vertices
 from pdrom.model.mesh.selection import Selection
 from pdrom.model.mesh.types import Mesh
 
-# What an element may lie on, and all of its kind on a mesh, as vertices.
+# Kinds of cells that elements lie on, with a function: mesh -> vertices of all such cells.
 CELLS: dict[str, Callable[[Mesh], np.ndarray]] = {
     "vertex": lambda mesh: np.arange(mesh.vertices)[:, None],
     "edge": lambda mesh: mesh.edges(),
@@ -87,7 +87,7 @@ class ConstraintGroup(Effect):
         return CELLS[cls.cells](mesh)
 
     def element_weights(self, mesh: Mesh) -> float | np.ndarray:
-        """w of each element of ``mesh`` before its rest measure, (e,), or one number for all.
+        """Weight of each element of ``mesh`` without its rest measure, (e,), or one number for all.
 
         Raises
         ------

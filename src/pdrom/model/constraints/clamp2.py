@@ -36,7 +36,7 @@ EQUAL = 1e-17
 
 @lane_function
 def _closed_form(f0, f1, low, high):
-    """Nearest matrix and whether F is suited; the matrix means nothing where it is not."""
+    """Nearest matrix, and whether the closed form suits F: where not, the matrix is meaningless."""
     a, b, off = dot(f0, f0), dot(f1, f1), dot(f0, f1)
     mean, half = 0.5 * (a + b), 0.5 * (a - b)
     h = np.sqrt(half * half + off * off) + EQUAL * mean

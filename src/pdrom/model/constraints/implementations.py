@@ -14,7 +14,7 @@ from pdrom.model.constraints.base import ConstraintGroup
 
 
 class _Slower:
-    """Base of the implementations; the time of their products with S^T is counted apart."""
+    """Base of the implementations; the time of their products with S^T is counted separately."""
 
     implementation: str
 

@@ -56,7 +56,7 @@ def _start(f, at_f, p, at_p, state):
 
 @lane_function
 def _advance(p, at_p, state):
-    """One Newton step of the open lanes; the others stay, so that neighbours change no bits."""
+    """One Newton step of the lanes that still iterate; the others keep their bits."""
     for lane in range(LANES):
         x0, x1, x2 = load(p, at_p, lane), load(p, at_p + 3, lane), load(p, at_p + 6, lane)
         n0, n1, n2 = _newton_step(x0, x1, x2)

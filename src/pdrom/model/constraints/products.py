@@ -22,7 +22,7 @@ from pdrom.model.constraints.lanes import LANES, SMALLEST, lane_function, load, 
 # numbers of a lane in the working array: the values, in and out, before what is needed meanwhile
 VALUES, SCALE, TARGET, LARGEST, LEAST, MARK, SIZE = 0, 3, 4, 5, 6, 7, 8
 STEPS = 60
-# an open lane goes on, one that is not has arrived or gone astray; _INSIDE: nothing to do
+# open lanes still iterate; the others have converged or diverged; _INSIDE: nothing to do
 _OPEN, _CLOSED, _INSIDE = 1.0, 0.0, 2.0
 # a step below this fraction of t is round-off, and so is what is left of c
 LAST_STEP, ROUNDOFF = 1e-15, 1e-10
@@ -49,7 +49,7 @@ def _product(t, values, solid):
 
 @lane_function
 def _start(work, low, high, solid):
-    """Scale the values and set where the iterations begin; how many lanes need the second."""
+    """Scale the values, set the starting points; return how many lanes need the second start."""
     low_root = low ** (1.0 / 3.0) if solid else np.sqrt(low)
     high_root = high ** (1.0 / 3.0) if solid else np.sqrt(high)
     several = 0.0
@@ -61,7 +61,7 @@ def _start(work, low, high, solid):
         scale = s[0] if s[0] > root else root
         inverse = 1.0 / scale
         target = bound * inverse * inverse * (inverse if solid else 1.0)
-        # less is nothing beside values that are so large
+        # smaller numbers are negligible next to values this large
         target = target if target > SMALLEST else SMALLEST
         first, second = s[0] * inverse, s[1] * inverse if solid else 1.0
         # t_1 >= s_1, t_2 >= s_2, t_1 >= t_2 >= t where the values grow
@@ -103,7 +103,7 @@ def _advance(work, place, side, solid):
 
 @lane_function
 def _reopen(work):
-    """Open the lanes that have a least solution to look for."""
+    """Open the lanes whose smallest solution is still to be found."""
     for lane in range(LANES):
         mark = work[MARK * LANES + lane]
         again = mark == _CLOSED and work[LEAST * LANES + lane] > 0.0

@@ -125,7 +125,7 @@ class SingularValueGroup(SimplexGroup):
 
     @property
     def allowed(self) -> tuple[float, float]:
-        """Ends of the range."""
+        """Least and largest allowed singular value."""
         return self.config.minimum, self.config.maximum
 
     def _set_up(self, mesh: Mesh, inverse: np.ndarray) -> None:

@@ -189,7 +189,7 @@ class EdgeSpring(SimplexGroup):
         self._assemble(mesh.vertices)
 
     def _assemble(self, vertices: int) -> None:
-        # apart from the geometry: only an edge of length zero looks its rest edge up
+        # not part of the geometry: only an edge of length zero needs its rest edge
         self._rest = pack(self.rest)
         self._taken_rest = np.empty(REST * LANES)
         super()._assemble(vertices)

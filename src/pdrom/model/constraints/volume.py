@@ -30,7 +30,7 @@ WORK = FOUND + 1
 
 @lane_function
 def _within_range(work, low, high):
-    """Copy F to P and mark it where det F lies in the range; how many lanes are left."""
+    """Copy F to P and mark it where det F is in the range; return how many lanes are left."""
     left = 0.0
     for lane in range(LANES):
         f0, f1, f2 = load(work, F, lane), load(work, F + 3, lane), load(work, F + 6, lane)

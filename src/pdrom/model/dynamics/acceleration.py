@@ -114,7 +114,7 @@ def _history(window: int, n: int) -> tuple[np.ndarray, ...]:
     return (*vectors, *differences, np.empty((window, window)), np.zeros(2, np.int64), np.empty(1))
 
 
-# Of iterations without acceleration.
+# Arguments of iterations without acceleration.
 NO_HISTORY = _history(0, 0)
 
 
@@ -159,5 +159,5 @@ class Anderson:
 
 
 def _numbers(y: np.ndarray) -> np.ndarray:
-    """All numbers of y, not copied: of a view of rows of four with their zeros."""
+    """All numbers of y as a flat view; rows padded to four come with their zeros."""
     return y.reshape(-1) if y.flags.c_contiguous else flat(y)

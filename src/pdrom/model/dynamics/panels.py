@@ -91,7 +91,7 @@ def _rows_below(indptr, indices, n, widest):
 
 @compiled
 def _partition(below, widths):
-    """Last columns plus one of the cheapest panels, ascending."""
+    """End column (exclusive) of each panel in the cheapest partition, ascending."""
     n = below.shape[1]
     cost = np.full(n + 1, np.inf)
     cost[0] = 0.0

@@ -57,7 +57,7 @@ class FrameReport:
 
 
 class CompiledFrames(Protocol):
-    """Frames that need nothing of Python, see `pdrom.model.dynamics.whole_frames`."""
+    """Frames that run in compiled code alone, see `pdrom.model.dynamics.whole_frames`."""
 
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
@@ -130,7 +130,7 @@ class Stepper:
                 yield after
 
     def _at_once(self, state: State, frames: range) -> Sequence[tuple[State, FrameReport]]:
-        """The first of the frames, as many as compiled code can do in one call; none or more."""
+        """Do as many of the first frames as one compiled call can; return them, perhaps none."""
         if self._whole is None:
             return ()
         q, v, h = state.positions, state.velocities, self.time_step
@@ -138,7 +138,7 @@ class Stepper:
         done = self._whole.run(q, v, frames, h, self.iterations, self._track)
         if done is None:
             return ()
-        # what the interpreter takes for a call belongs to the beginnings of its frames
+        # the interpreter's time of the call is shared by the beginnings of its frames
         beside = perf_counter() - started - float(done[3].sum())
         done[3][:, 0] += max(beside, 0.0) / len(done[3])
         return [

@@ -55,7 +55,7 @@ class WholeFrames:
         ).reshape(-1, vertices, 3)
         rates = [np.broadcast_to(np.asarray(f.rate, float), vertices) for f in forces]
         self._rates = np.array(rates).reshape(-1, vertices)
-        # one for all vertices where no force tells them apart
+        # one row for all vertices where all forces are uniform
         alike = not self._rates.any() and bool((self._constants == self._constants[:, :1]).all())
         self._acceleration = np.zeros((1 if alike else vertices, 3))
         self._floors = np.array([contact.height for contact in contacts], dtype=float)
@@ -122,7 +122,7 @@ def _accelerate(constants, rates, velocities, result):
 
 @compiled(nogil=True)
 def _correct(y, floors, fixed, targets):
-    """Lift vertices that no one holds to the floors."""
+    """Lift free vertices onto the floors."""
     for height in floors:
         for i in range(1, len(y), WIDTH):
             if y[i] < height:

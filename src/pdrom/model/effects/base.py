@@ -72,7 +72,7 @@ class EffectConfig(ConfigModel):
         return self
 
     def body(self, low: np.ndarray, high: np.ndarray) -> Mesh | None:
-        """The surface that pictures of the region from ``low`` to ``high`` (3,) m show of it."""
+        """Surface that pictures of the region from ``low`` to ``high`` (3,) m show."""
         return None
 
 
@@ -162,7 +162,7 @@ class Boundary(Effect):
         """
 
     def takes_hold(self, frame: int) -> bool:
-        """Whether the targets of ``frame`` need the positions at its beginning, none before."""
+        """Whether the targets of ``frame`` depend on the positions at its beginning."""
         return True
 
     def path(self, frames: range, current: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ import numpy as np
 
 from pdrom.model.mesh.types import Mesh
 
-RINGS = 24  # of a ball from pole to pole; twice as many corners around
+RINGS = 24  # steps of a ball from pole to pole; twice as many corners around
 
 
 def square(point: np.ndarray, normal: np.ndarray, low: np.ndarray, high: np.ndarray) -> Mesh:

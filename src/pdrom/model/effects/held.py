@@ -27,7 +27,7 @@ def held_targets(
 def held_path(
     boundaries: Sequence[Boundary], frames: range, positions: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """`held_targets` of the first of ``frames`` and of those after it whose targets it knows.
+    """`held_targets` of the first of ``frames``, and of those whose targets are known by then.
 
     Targets are (n, m, 3) m for n >= 1 frames: up to the first in which others are held, or in which
     any are taken hold of.

@@ -1,4 +1,4 @@
-"""Vertices of one body keep apart."""
+"""Vertices of one body keep their distance."""
 
 from typing import Annotated, Literal
 
@@ -107,7 +107,7 @@ def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
             length = np.sqrt(ex * ex + ey * ey + ez * ez)
             gap = thickness - distance
             if length > 0.0 and dx * ex + dy * ey + dz * ez <= 0.0:
-                # it passed, or lies where no side can be determined: back to the side it came from
+                # it passed through, or its side cannot be determined: back to where it came from
                 along = (dx * ex + dy * ey + dz * ez) / length
                 dx, dy, dz, distance, gap = ex, ey, ez, length, thickness - along
             elif distance == 0.0:

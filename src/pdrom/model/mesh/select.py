@@ -22,7 +22,7 @@ SIDES = {
     "back": (2, -1),
     "front": (2, 1),
 }
-TOLERANCE = 1e-6  # of the extent
+TOLERANCE = 1e-6  # relative to the extent
 
 
 def select_vertices(mesh: Mesh, selection: kinds.Selection) -> np.ndarray:

@@ -168,7 +168,7 @@ def _check_order(content: bytes) -> None:
 
 
 def without_faces(cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """``cells`` by kind; without triangles that are faces of tetrahedra beside them, if all are.
+    """Drop the triangles of ``cells`` (by kind) if all of them are faces of its tetrahedra.
 
     Meshers write the boundary of a volume, which says no more than the tetrahedra do.
     """

@@ -375,7 +375,7 @@ def exact_level(level: Level) -> Level:
 
 
 def _full(settings: ToleranceSettings, most: int) -> Iterator[Level]:
-    """The full order; also with the ``most`` iterations of a reference, and with half of many."""
+    """Full-order levels: of ``settings``, the reference's ``most`` iterations, half of them."""
     yield Level(most, WINDOW)
     if most > CONVERGED.iterations:
         yield Level(most // 2, WINDOW)

@@ -26,7 +26,7 @@ SAMPLED, DENSE, ITERATION = 12.5, 0.23, 1.2e3
 REDUCED_FRAME, REDUCED_IN_PYTHON = 4e4, 2.3e5
 # Entries of the factor of a matrix with n entries and N rows: FILL n log2 N.
 FILL = 0.35
-# A second start differs from the first by so many extents of the mesh in every coordinate.
+# Shift of the second start in every coordinate, over the extent of the mesh.
 MOVED, SEED = 1e-10, 0
 
 FULL_ORDER = "full order"
@@ -35,7 +35,7 @@ OnWork = Callable[[str, float], None]
 
 
 def silent(title: str, work: float) -> None:
-    """Tell nobody of ``work``."""
+    """Report no progress of ``work``."""
 
 
 @dataclass(frozen=True)

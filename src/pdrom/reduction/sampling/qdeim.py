@@ -49,7 +49,7 @@ class _Left:
         self._error = self._rounding(self._squares)
 
     def pick_among(self, count: int, most: int) -> int:
-        """Pick among ``count`` candidates, up to ``most`` in all; how many were found."""
+        """Pick from ``count`` candidates, up to ``most`` in all; return how many were found."""
         candidates, rest = self._highest(count)
         left = self._rows.reshape(self.total, self._size, -1)[candidates]
         left = left.reshape(len(candidates) * self._size, -1)
@@ -82,7 +82,7 @@ class _Left:
         return np.sort(split[self.total - count :]), float(rest)
 
     def _take(self, group: np.ndarray) -> np.ndarray:
-        """The unit direction that dominates what is left of a group, from now on removed.
+        """Remove the dominant direction of what is left of a group; return it, of unit length.
 
         Zero where nothing is left: then the modes depend on each other.
         """

@@ -165,12 +165,12 @@ class _Sampled:
         return half @ half.T
 
     def _from_scratch(self) -> np.ndarray:
-        """All M (e, s, s)."""
+        """M (e, s, s) of every element, computed anew."""
         columns = self._blocks[:, :, : self._modes]
         return columns @ self._inverse() @ columns.transpose(0, 2, 1)
 
     def _shifted(self) -> np.ndarray:
-        """All I + M."""
+        """I + M of every element."""
         return self._products + np.eye(self._products.shape[1])
 
     def _log_determinants(self) -> np.ndarray:

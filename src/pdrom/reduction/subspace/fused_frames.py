@@ -99,7 +99,7 @@ def frames(
             for axis in range(3):
                 s[3 * fixed[i] + axis] = held[3 * i + axis] = targets[f, i, axis]
         product(response, len(free), len(before), nothing, s, constant)
-        # those that rest have done it in the first frame
+        # targets that stay the same have the product of the frame before
         if f == 0 or (targets[f] != targets[f - 1]).any():
             product(coupling, rows, len(fixed), nothing, held, offset)
         for i in range(len(free)):

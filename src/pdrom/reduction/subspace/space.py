@@ -117,7 +117,7 @@ class ReducedSpace(Space):
 
 
 def _require_reducible(effects: Sequence[Effect]) -> None:
-    """NotReducibleError for the first effect that no position subspace takes."""
+    """NotReducibleError for the first effect that a position subspace cannot represent."""
     for effect in effects:
         if not effect.in_subspace:
             raise NotReducibleError(f"effect '{effect.name}' needs all vertices in every frame")
@@ -177,7 +177,7 @@ def _reduce_force(force, columns: Columns, mass: np.ndarray, scene: Scene):
 
 
 class _ReducedBoundary:
-    """A boundary whose vertices are met exactly by the coordinates of their atoms."""
+    """Dirichlet condition imposed exactly: atoms of held vertices have coordinates of their own."""
 
     def __init__(self, boundary: Boundary, columns: Columns) -> None:
         self.boundary = boundary

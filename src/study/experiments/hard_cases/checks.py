@@ -121,7 +121,7 @@ CHECKS: dict[str, Check] = {
 
 
 def refused(case: HardCase) -> str:
-    """The scene, or its first frames, end in a named error."""
+    """Building the scene, or its first frames, must raise a named error."""
     try:
         full_order(case, case.scene())
     except PdromError:

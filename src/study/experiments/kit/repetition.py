@@ -1,4 +1,4 @@
-"""A reduced run repeated: trained on other frames, and started a hair beside.
+"""A reduced run repeated: trained on other frames, or from a slightly moved start.
 
 A run is one draw of what nobody means to choose: which frames train, and the last digits of the
 start. Where an error of the run decides something, its repetitions say how much of it is that.

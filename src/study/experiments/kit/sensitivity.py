@@ -14,7 +14,7 @@ from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 
 COLUMNS = ["scene", "perturbation", "seed", "frame", "relative_difference"]
-# The first that is not the one that the run uses.
+# A run is repeated with the first of these that it does not use itself.
 OTHER_SOLVERS = ("splu", "splu-columns")
 
 

@@ -70,7 +70,7 @@ def of_this_user(connection: socket.socket) -> bool:
 
 
 def ask(connection: socket.socket) -> bytes:
-    """Request a fork by ``connection``; its process number, nothing if the server is gone."""
+    """Request a fork over ``connection``; its process number, b"" if the server is gone."""
     environment = [f"{key}={value}" for key, value in os.environ.items() if key != ADDRESS]
     parts = [os.getcwd(), os.path.abspath(sys.argv[1]), *environment]
     request = "\0".join(parts).encode("utf-8", "surrogateescape")

@@ -99,7 +99,7 @@ class Server:
                 self._accept()
 
     def _clients(self) -> list[socket.socket]:
-        """Connections of jobs and of requests."""
+        """Sockets of clients: those of running jobs and of incomplete requests."""
         jobs = [job.client for job in self.jobs.values()]
         return jobs + [request.client for request in self.requests]
 
@@ -127,7 +127,7 @@ class Server:
             client.close()
 
     def _drop(self, request: Request) -> None:
-        """Leave a client alone, which runs its job itself if it is there."""
+        """Close the connection to a client, which then runs its job itself."""
         self.requests.remove(request)
         request.close_streams()
         request.client.close()

@@ -119,7 +119,7 @@ def _page(rows: pd.DataFrame, error: str) -> pd.DataFrame:
     ]
     lengths = [len(run) for run in runs]
     common = max(set(lengths), key=lambda n: (lengths.count(n), n), default=0)
-    # a second of every plan, which reads the claims but computes none, were it imported above
+    # imported here: at the top it would cost a second of every plan
     from scipy.stats import page_trend_test, rankdata
 
     ranks: dict[str, list[np.ndarray]] = {}

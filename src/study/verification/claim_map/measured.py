@@ -126,5 +126,5 @@ def _machine(results: str) -> str:
 
 
 def _intact(path: str) -> bool:
-    """Whether a file is there as it was written; a job sets a damaged one aside, not this."""
+    """Whether a file is there as it was written; a damaged one stays where it is."""
     return Path(path).is_file() and check_file(path) is Condition.INTACT
