@@ -5,9 +5,7 @@ import pytest
 from scipy import linalg
 
 from pdrom.reduction.basis.pod import pod
-from pdrom.reduction.sampling.block import block_elements
-from pdrom.reduction.sampling.deim import deim_entries, tie_weights
-from pdrom.reduction.sampling.joint import joint_rows
+from pdrom.reduction.sampling.deim import block_elements, deim_entries, joint_rows, tie_weights
 from pdrom.reduction.sampling.qdeim import qdeim_elements
 from pdrom.reduction.sampling.s_opt import s_opt_path
 

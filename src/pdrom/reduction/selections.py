@@ -6,7 +6,7 @@ SELECTIONS = Registry(
     "selection",
     {
         "greedy": "pdrom.reduction.sampling.greedy:Greedy",
-        "pivoted-qr": "pdrom.reduction.sampling.pivoted_qr:PivotedQR",
+        "pivoted-qr": "pdrom.reduction.sampling.qdeim:PivotedQR",
         "s-opt": "pdrom.reduction.sampling.s_opt:SOpt",
     },
 )

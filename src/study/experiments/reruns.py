@@ -16,7 +16,6 @@ from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, load_basis
 from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.ranks import Rank, resolve_ranks
 from pdrom.reduction.local.rerun import replace_group, rerun
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun
@@ -40,7 +39,7 @@ from study.experiments.kit.load_reduction import load_reduction
 from study.experiments.kit.sampling import Sweep, sample
 from study.experiments.kit.scenes import TRAIN as TRAINING
 from study.experiments.kit.scenes import positions_of, scene_of
-from study.experiments.kit.settings import BlowupExtent, Solver
+from study.experiments.kit.settings import BlowupExtent, Rank, Solver, resolve_ranks
 
 log = logging.getLogger(__name__)
 

@@ -16,20 +16,18 @@ from pdrom.model.energy import EnergyScale
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import load_basis
 from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.ranks import Rank, resolve_ranks
 from pdrom.reduction.local.rerun import replace_group, rerun
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling import Reduction
-from pdrom.reduction.subspace.model import SubspaceModel
-from pdrom.reduction.subspace.rerun import rerun_model
+from pdrom.reduction.subspace.model import SubspaceModel, rerun_model
 from pdrom.reduction.subspace.store import load_models
 from study.artifact.paths import BASIS, MESH, SAMPLING, STABILITY, SUBSPACES, File
 from study.artifact.reads import Every, Setting
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.load_reduction import basis_of, load_reduction
 from study.experiments.kit.scenes import scene_of
-from study.experiments.kit.settings import BlowupExtent, Solver
+from study.experiments.kit.settings import BlowupExtent, Rank, Solver, resolve_ranks
 from study.experiments.kit.variation import varied
 
 log = logging.getLogger(__name__)

@@ -22,6 +22,7 @@ from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.subspace.columns import Columns
+from pdrom.reduction.subspace.ecsw import Norm
 from pdrom.reduction.subspace.hrpd import HrpdSpec, SampledSpace, hrpd, sampled_space
 from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.model import (
@@ -33,7 +34,6 @@ from pdrom.reduction.subspace.model import (
     sample_elements,
 )
 from pdrom.reduction.subspace.store import store_columns, store_model
-from pdrom.reduction.subspace.training import Norm
 from study.artifact.paths import (
     FULL_ORDER,
     MESH,

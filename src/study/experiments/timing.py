@@ -19,7 +19,6 @@ from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import load_basis
 from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.ranks import Rank, resolve_ranks
 from pdrom.reduction.local.rerun import replace_group
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.subspace.store import load_models
@@ -44,7 +43,7 @@ from study.experiments.kit.local_costs import local_costs
 from study.experiments.kit.measurement import Measurement, Protocol, Variant, measure
 from study.experiments.kit.names import ANDERSON, FOM
 from study.experiments.kit.scenes import scene_of
-from study.experiments.kit.settings import Count, Solver
+from study.experiments.kit.settings import Count, Rank, Solver, resolve_ranks
 
 log = logging.getLogger(__name__)
 

@@ -14,14 +14,13 @@ from pdrom.core.yamlfile import ConfigModel, validate
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.local.ranks import Rank
 from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
 from study.experiments.alternatives.settings import Alternatives
 from study.experiments.frame_times import FrameTimes
 from study.experiments.hard_cases.experiment import HardCases
 from study.experiments.iterations import IterationSweep
 from study.experiments.kit.sampling import Sweep
-from study.experiments.kit.settings import BlowupExtent, Solver
+from study.experiments.kit.settings import BlowupExtent, Rank, Solver
 from study.experiments.ladder import LadderSection
 from study.experiments.live import Live
 from study.experiments.noise import Noise

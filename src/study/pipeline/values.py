@@ -9,12 +9,11 @@ from typing import Any
 
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import SceneConfig
-from pdrom.reduction.local.ranks import Rank
 from pdrom.reduction.method import BasisSpec, MethodSpec
 from study.artifact import paths
 from study.artifact.paths import Place
 from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
-from study.experiments.kit.settings import Horizon
+from study.experiments.kit.settings import Horizon, Rank
 from study.experiments.live import JOINT, JointRows, OfScene
 from study.experiments.repetitions import Repeated
 from study.experiments.stability import Stability

@@ -5,8 +5,7 @@ from scipy import linalg
 
 from pdrom.core.errors import SnapshotError
 from pdrom.core.store import require_finite
-from pdrom.reduction.basis.pod import fix_signs, pod
-from pdrom.reduction.basis.rank import numerical_rank
+from pdrom.reduction.basis.pod import fix_signs, numerical_rank, pod
 from pdrom.reduction.basis.types import Basis
 from pdrom.reduction.method import BasisSpec
 

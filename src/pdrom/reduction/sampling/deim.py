@@ -1,4 +1,8 @@
-"""Discrete empirical interpolation (Chaturantabut and Sorensen 2010, algorithm 1)."""
+"""Discrete empirical interpolation (Chaturantabut and Sorensen 2010, algorithm 1), greedy.
+
+Of single entries, of whole elements (all 3p entries of an element are taken at once), and the
+preprint's variant: one row for x, y and z by the joint residual norm.
+"""
 
 import numpy as np
 from scipy import linalg
@@ -35,3 +39,95 @@ def tie_weights(n: int) -> np.ndarray:
     one that stands d entries later wins if it is larger by more than TIE d / n of its size.
     """
     return 1.0 - TIE * np.arange(n) / n
+
+
+BLOCK = 16  # columns that LAPACK eliminates at a time
+
+
+class GrowingFit:
+    """Least squares whose equations and unknowns grow together: each mode fitted by earlier ones.
+
+    Coefficients of a mode in the earlier modes at sampled rows, (S V_k) c = S v_k.
+
+    Kept is the triangular factor R (r, r) of the sampled rows of all modes, into which further rows
+    are rotated: of the first k + 1 columns, R[:k, :k] c = R[:k, k] has the same least-squares
+    solutions as the equations themselves. That takes O(s r^2) for s rows, where a factorisation of
+    all rows takes O(m k^2).
+    """
+
+    def __init__(self, modes: int) -> None:
+        self._factor = np.zeros((modes, modes), order="F")
+
+    def add(self, rows: np.ndarray) -> None:
+        """Sample ``rows`` (s, r) of the modes."""
+        block = min(BLOCK, len(self._factor))
+        self._factor = linalg.lapack.dtpqrt(0, block, self._factor, rows, overwrite_a=True)[0]
+
+    def triangle(self, k: int) -> np.ndarray:
+        """R (k, k) of the first k modes: R^T R is the Gram matrix of their sampled rows."""
+        return self._factor[:k, :k]
+
+    def coefficients(self, k: int) -> np.ndarray:
+        """c (k,) of mode k; of several solutions, up to round-off, the shortest."""
+        factor, target = self.triangle(k), self._factor[:k, k]
+        if linalg.lapack.dtrcon(factor)[0] > k * np.finfo(float).eps:
+            return linalg.solve_triangular(factor, target, check_finite=False)
+        return np.linalg.lstsq(factor, target, rcond=None)[0]
+
+
+def block_elements(v: np.ndarray, size: int) -> np.ndarray:
+    """Element indices of the basis ``v`` (size e, r), one per mode (all e if e < r), nested in r.
+
+    Mode k is fitted by the earlier modes on the entries of the elements taken so far (least
+    squares, more equations than unknowns); the element with the largest residual norm (times
+    `tie_weights`) follows.
+    """
+    modes, total = np.asfortranarray(v), len(v) // size
+    fit, weights = GrowingFit(v.shape[1]), tie_weights(total) ** 2
+    elements = np.empty(min(v.shape[1], total), dtype=np.int64)
+    for k in range(len(elements)):
+        residual = modes[:, k]
+        if k:
+            residual = residual - modes[:, :k] @ fit.coefficients(k)
+        norm = weights * np.square(residual).reshape(total, size).sum(axis=1)
+        norm[elements[:k]] = -1.0
+        elements[k] = element = int(np.argmax(norm))
+        fit.add(v[size * element : size * (element + 1)])
+    return elements
+
+
+def joint_rows(
+    v: np.ndarray,
+    active: tuple[bool, ...],
+    repeat: bool,
+    factors: np.ndarray | None = None,
+) -> np.ndarray:
+    """Row indices (r,) of the basis ``v`` (3 rows, r), nested in r.
+
+    For mode k each axis a has its own system (P^T V_a) c_a = P^T v_{k,a}; the row with the largest
+    sum of the squared residuals of the three axes (times `tie_weights`) is taken for all of them. A
+    singular system is solved in the least-squares sense: the row was chosen for the joint norm and
+    may be useless for one axis. The published code does not exclude rows that it has already
+    (``repeat``); otherwise there are fewer than r rows if the basis has no more. ``factors``
+    (rows,) take the place of `tie_weights`.
+
+    Parameters
+    ----------
+    active : which of the three axes move
+    """
+    rows, r = len(v) // 3, v.shape[1]
+    axes = [(np.asfortranarray(v[a::3]), GrowingFit(r)) for a in np.flatnonzero(active)]
+    weights = (tie_weights(rows) if factors is None else factors) ** 2
+    picked = np.empty(r if repeat else min(r, rows), dtype=np.int64)
+    for k in range(len(picked)):
+        norm = np.zeros(rows)
+        for modes, fit in axes:
+            residual = modes[:, k] - modes[:, :k] @ fit.coefficients(k) if k else modes[:, k]
+            norm += residual**2
+        norm *= weights
+        if not repeat:
+            norm[picked[:k]] = -1.0
+        picked[k] = row = int(np.argmax(norm))
+        for modes, fit in axes:
+            fit.add(modes[row : row + 1])
+    return picked

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pdrom.reduction.sampling.block import block_elements
-from pdrom.reduction.sampling.deim import deim_entries
+from pdrom.reduction.sampling.deim import block_elements, deim_entries
 from pdrom.reduction.sampling.selection import Selection
 
 

@@ -1,8 +1,11 @@
 """Q-DEIM: blocks of rows by a pivoted QR factorisation (Drmac and Gugercin 2016)."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pdrom.reduction.sampling.deim import tie_weights
+from pdrom.reduction.sampling.selection import Selection
 
 EPS = np.finfo(float).eps
 # Rows of candidates for each mode, and how few pivots among them ask for twice as many.
@@ -99,3 +102,10 @@ class _Left:
     def _rounding(self, squares: np.ndarray) -> np.ndarray:
         """Bound on the errors of differences of ``squares`` and of those of their directions."""
         return 4.0 * self._rows.shape[1] * EPS * squares
+
+
+class PivotedQR(Selection):
+    """Q-DEIM, not nested in r."""
+
+    def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
+        return {r: qdeim_elements(v[:, :r], size) for r in ranks}

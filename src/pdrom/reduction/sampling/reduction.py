@@ -4,11 +4,98 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy import linalg
 
+from pdrom.core.errors import SamplingError
 from pdrom.reduction.basis.types import Basis
-from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.sampling.solve import norm_and_condition, solution_operator
-from pdrom.reduction.sampling.types import Sampling
+from pdrom.reduction.method import MethodSpec, Solve
+
+
+def solution_operator(a: np.ndarray, solve: Solve, tikhonov: float) -> np.ndarray:
+    """Matrix (r, m) that maps values b sampled by ``a`` (m, r) to coefficients c, by ``solve``.
+
+    square : A^-1; nan where A is singular to working precision or not square: the interpolation
+        does not exist, a run with it ends in its first frame
+    qr : least squares A^+ by a QR factorisation; nan where A has no full column rank
+    tikhonov : (A^T A + t I)^-1 A^T, the normal equations of the published code
+    """
+    if solve == "tikhonov":
+        gram = a.T @ a + tikhonov * np.eye(a.shape[1])
+        return linalg.solve(gram, a.T, assume_a="pos", check_finite=False)
+    if solve == "square":
+        return _inverse(a)
+    q, r = linalg.qr(a, mode="economic", check_finite=False)
+    if a.shape[0] < a.shape[1] or _singular(np.abs(np.diag(r))):
+        return np.full((a.shape[1], a.shape[0]), np.nan)
+    return linalg.solve_triangular(r, q.T, check_finite=False)
+
+
+def _inverse(a: np.ndarray) -> np.ndarray:
+    if a.shape[0] != a.shape[1]:
+        return np.full(a.shape[::-1], np.nan)
+    lu, pivots, info = linalg.lapack.dgetrf(a)
+    if info > 0 or _singular(np.abs(np.diag(lu))):
+        return np.full(a.shape, np.nan)
+    return linalg.lu_solve((lu, pivots), np.eye(len(a)), check_finite=False)
+
+
+def _singular(diagonal: np.ndarray) -> bool:
+    """A factor's diagonal with a zero, or with one that is round-off of the largest."""
+    return bool(diagonal.min() <= np.finfo(float).eps * diagonal.max())
+
+
+def norm_and_condition(a: np.ndarray, operator: np.ndarray) -> tuple[float, float]:
+    """2-norm of ``operator`` (the gain) and condition number of ``a`` (m, r); inf if singular."""
+    if not np.isfinite(operator).all():
+        return np.inf, np.inf
+    sigma = linalg.svdvals(a, check_finite=False)
+    condition = float(sigma[0] / sigma[-1]) if sigma[-1] > 0.0 else np.inf
+    return float(linalg.svdvals(operator, check_finite=False)[0]), condition
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Entries and elements that a method evaluates online.
+
+    entries : indices into the vectorised projection (length 3 e p), in order of selection; for
+        "joint" rows the x entry of each row stands for the row
+    elements : indices of the elements that must be evaluated for them, unique, in order of need
+    """
+
+    entries: np.ndarray
+    elements: np.ndarray
+
+    @classmethod
+    def of_entries(
+        cls, entries: np.ndarray, rows_per_element: int, elements: int, repeats: bool = False
+    ) -> "Sampling":
+        """Sampling of entries; SamplingError for one out of range or, unless allowed, repeated.
+
+        Parameters
+        ----------
+        entries : (m,) indices of a vectorised projection of all ``elements``
+        rows_per_element : p
+        repeats : whether an entry may come twice
+        """
+        entries = np.asarray(entries, dtype=np.int64)
+        size = 3 * rows_per_element
+        if len(entries) == 0 or entries.min() < 0 or entries.max() >= size * elements:
+            raise SamplingError(
+                f"entries {entries[:5].tolist()}...: allowed are 0 to {size * elements - 1}"
+            )
+        if not repeats and len(np.unique(entries)) < len(entries):
+            raise SamplingError(f"{len(entries)} entries, some of them repeated")
+        touched = entries // size
+        first = np.sort(np.unique(touched, return_index=True)[1])
+        return cls(entries, touched[first])
+
+    @classmethod
+    def of_elements(cls, elements: np.ndarray, rows_per_element: int, total: int) -> "Sampling":
+        """Sampling of all 3p entries of ``elements`` (m,) of ``total``, p ``rows_per_element``."""
+        elements = np.asarray(elements, dtype=np.int64)
+        size = 3 * rows_per_element
+        entries = (size * elements[:, None] + np.arange(size)).ravel()
+        return cls.of_entries(entries, rows_per_element, total)
 
 
 @dataclass(frozen=True)

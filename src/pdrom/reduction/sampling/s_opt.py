@@ -11,7 +11,7 @@ import numpy as np
 from scipy import linalg
 
 from pdrom.core.errors import SamplingError
-from pdrom.reduction.sampling.growing_fit import GrowingFit
+from pdrom.reduction.sampling.deim import GrowingFit
 from pdrom.reduction.sampling.selection import Selection
 
 # Columns of length one depend on each other when what the others leave of one of them is below

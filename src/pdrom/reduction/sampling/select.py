@@ -6,10 +6,10 @@ import numpy as np
 
 from pdrom.reduction.basis.types import Basis
 from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.sampling.deim import joint_rows
 from pdrom.reduction.sampling.gappy_pod_e import bound_gain
-from pdrom.reduction.sampling.joint import joint_rows
+from pdrom.reduction.sampling.reduction import Sampling
 from pdrom.reduction.sampling.selection import Selection
-from pdrom.reduction.sampling.types import Sampling
 from pdrom.reduction.selections import SELECTIONS
 
 

@@ -24,11 +24,10 @@ from pdrom.model.dynamics.space import Solve
 from pdrom.model.dynamics.stepper import LocalStep, Stepper
 from pdrom.model.dynamics.whole_frames import BLOCK, Blocks
 from pdrom.reduction.subspace.dense import blocks, product, read, vectors, write
-from pdrom.reduction.subspace.elimination import DenseElimination
 from pdrom.reduction.subspace.fused_frames import frames as run_frames
 from pdrom.reduction.subspace.fused_frames import iterations as run_iterations
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
-from pdrom.reduction.subspace.space import ReducedSpace
+from pdrom.reduction.subspace.space import DenseElimination, ReducedSpace
 
 
 class FusedStepper(Stepper):

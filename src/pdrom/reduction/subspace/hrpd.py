@@ -20,10 +20,9 @@ from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.mesh.select import farthest_points
 from pdrom.reduction.basis.pod import pod
-from pdrom.reduction.sampling.solve import norm_and_condition, solution_operator
-from pdrom.reduction.subspace.columns import DEPENDENT, Columns, orthonormal
+from pdrom.reduction.sampling.reduction import norm_and_condition, solution_operator
+from pdrom.reduction.subspace.columns import DEPENDENT, Columns, orthonormal, skinning_weights
 from pdrom.reduction.subspace.interpolation import Interpolation, element_rows, reduced_strain
-from pdrom.reduction.subspace.skinning import skinning_weights
 
 # Condition number of the sampled equations from which on their solution is noise.
 SINGULAR = 1e8

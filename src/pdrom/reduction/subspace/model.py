@@ -7,16 +7,21 @@ import numpy as np
 
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import State, Stepper
+from pdrom.model.runs.bounded import BoundedRun
 from pdrom.model.scene import Scene
-from pdrom.reduction.subspace.atoms import atoms
-from pdrom.reduction.subspace.columns import Columns, build_columns, displacement_modes
-from pdrom.reduction.subspace.ecsw import ecsw_elements
+from pdrom.reduction.rerun import Rerun, compare
+from pdrom.reduction.subspace.columns import (
+    Columns,
+    atoms,
+    build_columns,
+    displacement_modes,
+    skinning_modes,
+)
+from pdrom.reduction.subspace.ecsw import Norm, ecsw_elements, training_run
 from pdrom.reduction.subspace.fused import FusedStepper
 from pdrom.reduction.subspace.interpolation import InterpolatedLocalStep, Interpolation
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
-from pdrom.reduction.subspace.skinning import skinning_modes
 from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
-from pdrom.reduction.subspace.training import Norm, training_run
 
 # Training frames that the element sampling looks at, at most.
 FRAMES = 70
@@ -103,7 +108,7 @@ def sample_elements(
 
     They are trained on iterates of the subspace with all projections, in some of the training
     ``frames`` of a run that begins at ``start`` (coordinates) or where the scene does, and meet the
-    tolerances in ``norm`` (see module `training`).
+    tolerances in ``norm`` (see module `ecsw`).
     """
     chosen = frames[np.unique(np.linspace(0, len(frames) - 1, FRAMES).round().astype(int))]
     training = training_run(scene, columns, chosen, start, norm)
@@ -114,3 +119,18 @@ def sample_elements(
         {name: Samples(*solutions[i]) for name, solutions in found.items()}
         for i in range(len(tolerances))
     ]
+
+
+def rerun_model(
+    scene: Scene, model: SubspaceModel, reference: np.ndarray, blowup_extent: float = np.inf
+) -> Rerun:
+    """Outcome of a run of ``scene`` with ``model``; a blow-up ends it and is recorded.
+
+    Parameters
+    ----------
+    reference, blowup_extent : see `pdrom.reduction.local.rerun.rerun`
+    """
+    loop, start = model.loop(scene)
+    frames, unit = scene.config.frames, scene.mesh.extent
+    run = BoundedRun(loop.run, start, frames, blowup_extent, unit, model.positions)
+    return compare(run, reference)

@@ -7,8 +7,7 @@ from pdrom.core.errors import StorageError
 from pdrom.core.store import open_hdf5
 from pdrom.reduction.basis.types import Basis
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.sampling.reduction import Reduction
-from pdrom.reduction.sampling.types import Sampling
+from pdrom.reduction.sampling.reduction import Reduction, Sampling
 from study.artifact.paths import File
 
 

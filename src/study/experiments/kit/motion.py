@@ -6,8 +6,7 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.snapshots import training_frames
-from pdrom.reduction.subspace.model import SubspaceModel
-from pdrom.reduction.subspace.rerun import rerun_model
+from pdrom.reduction.subspace.model import SubspaceModel, rerun_model
 
 
 class Motion(Yardstick):

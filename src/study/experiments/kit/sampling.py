@@ -11,12 +11,11 @@ from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.metrics import relative_errors
 from pdrom.reduction.basis import Basis
-from pdrom.reduction.local.ranks import Rank, resolve_ranks
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, Sampling, select_path
 from pdrom.reduction.snapshots import SPLITS, SnapshotSet
 from study.artifact.paths import File
-from study.experiments.kit.settings import Count
+from study.experiments.kit.settings import Count, Rank, resolve_ranks
 
 log = logging.getLogger(__name__)
 

@@ -1,5 +1,6 @@
 """Kinds of values that the settings of several experiments share."""
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
@@ -41,3 +42,12 @@ class Horizon(ConfigModel):
         label = self.perturbation if run == "train" else run
         spread = floor_of(read_table(perturbed.path), perturbed["scene"], label)
         return horizon(spread, self.threshold)
+
+
+Rank = Annotated[int, Field(ge=1, le=100_000)] | Literal["full"]
+
+
+def resolve_ranks(ranks: Sequence[Rank], rank: int) -> list[int]:
+    """``ranks`` ascending, "full" replaced by the numerical ``rank`` (left out if 0)."""
+    full = [rank] if "full" in ranks and rank > 0 else []
+    return sorted({*(int(r) for r in ranks if r != "full"), *full})

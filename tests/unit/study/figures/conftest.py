@@ -13,8 +13,7 @@ from pdrom.core.store import write_hdf5, write_table
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh, save_mesh
-from pdrom.reduction.sampling.block import block_elements
-from pdrom.reduction.sampling.deim import deim_entries
+from pdrom.reduction.sampling.deim import block_elements, deim_entries
 from places import ROOT
 from study.artifact.paths import (
     BASIS,

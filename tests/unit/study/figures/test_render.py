@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.model.mesh.files import read_mesh_file
 from pdrom.model.mesh.generators import bar, cloth
-from pdrom.reduction.sampling.block import block_elements
-from pdrom.reduction.sampling.deim import deim_entries
+from pdrom.reduction.sampling.deim import block_elements, deim_entries
 from pdrom.view import style
 from pdrom.view.camera import Camera, Window, bounds, window_of
 from pdrom.view.mesh_render import (

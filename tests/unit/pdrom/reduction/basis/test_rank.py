@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pdrom.reduction.basis.rank import numerical_rank
+from pdrom.reduction.basis.pod import numerical_rank
 
 EPS = np.finfo(float).eps
 

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from pdrom.reduction.sampling.block import block_elements
-from pdrom.reduction.sampling.deim import deim_entries, tie_weights
+from pdrom.reduction.sampling.deim import block_elements, deim_entries, tie_weights
 from pdrom.reduction.sampling.qdeim import qdeim_elements
 
 Select = Callable[[np.ndarray, int], np.ndarray]

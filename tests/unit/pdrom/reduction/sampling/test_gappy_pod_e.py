@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pdrom.core.errors import SamplingError
-from pdrom.reduction.sampling.block import block_elements
+from pdrom.reduction.sampling.deim import block_elements
 from pdrom.reduction.sampling.gappy_pod_e import bound_gain, eigenvalue_growth, oversample
 from pdrom.reduction.sampling.qdeim import qdeim_elements
 

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pdrom.reduction.sampling.deim import deim_entries
-from pdrom.reduction.sampling.joint import joint_rows
+from pdrom.reduction.sampling.deim import deim_entries, joint_rows
 
 ALL = (True, True, True)
 SIZES = st.tuples(st.integers(2, 30), st.integers(1, 12), st.integers(0, 2**32 - 1))

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pdrom.reduction.sampling.solve import norm_and_condition, solution_operator
+from pdrom.reduction.sampling.reduction import norm_and_condition, solution_operator
 
 SEEDS = st.integers(0, 2**32 - 1)
 

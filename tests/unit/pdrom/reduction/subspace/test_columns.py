@@ -7,15 +7,16 @@ from hypothesis import strategies as st
 
 from builders import make_scene, random_rotation
 from pdrom.model.runs.full_order import trajectory
-from pdrom.reduction.subspace.atoms import atoms
 from pdrom.reduction.subspace.columns import (
     affine_columns,
+    atoms,
     build_columns,
     displacement_modes,
     orthonormal,
+    skinning_modes,
+    skinning_weights,
 )
 from pdrom.reduction.subspace.model import make_columns
-from pdrom.reduction.subspace.skinning import skinning_modes, skinning_weights
 from pdrom.reduction.subspace.space import coordinates
 
 

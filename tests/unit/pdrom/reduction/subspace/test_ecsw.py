@@ -12,12 +12,15 @@ from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.subspace import ecsw
 from pdrom.reduction.subspace.columns import build_columns
-from pdrom.reduction.subspace.ecsw import ecsw_elements, training_equations
+from pdrom.reduction.subspace.ecsw import (
+    TrainingFrame,
+    ecsw_elements,
+    training_equations,
+    training_run,
+)
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
-from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
-from pdrom.reduction.subspace.rerun import rerun_model
+from pdrom.reduction.subspace.model import SubspaceModel, make_columns, rerun_model, sample_elements
 from pdrom.reduction.subspace.space import ReducedSpace, coordinates
-from pdrom.reduction.subspace.training import TrainingFrame, training_run
 
 SCENES = {
     name: make_scene({"effect": name, "weight": 1e4}, {"effect": "gravity"}, mesh=GROUPS[name])

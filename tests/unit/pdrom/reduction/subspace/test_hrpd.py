@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 
 from builders import GROUPS, make_scene
 from pdrom.core.errors import SamplingError
+from pdrom.reduction.subspace.columns import skinning_weights
 from pdrom.reduction.subspace.hrpd import (
     HrpdSpec,
     SampledSpace,
     element_centres,
     sampled_space,
 )
-from pdrom.reduction.subspace.skinning import skinning_weights
 
 
 def test_centres_are_the_mean_of_the_elements_vertices(group_scene):

@@ -7,9 +7,8 @@ import pytest
 
 from builders import make_scene
 from pdrom.core.errors import SolverError
-from pdrom.reduction.subspace.elimination import DenseElimination
 from pdrom.reduction.subspace.model import make_columns
-from pdrom.reduction.subspace.space import coordinates
+from pdrom.reduction.subspace.space import DenseElimination, coordinates
 
 NOTHING = np.empty(0, dtype=np.int64)
 

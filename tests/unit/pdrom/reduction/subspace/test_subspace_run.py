@@ -11,8 +11,7 @@ from pdrom.core.errors import SceneError
 from pdrom.core.store import write_hdf5
 from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.runs.full_order import trajectory
-from pdrom.reduction.subspace.atoms import atoms
-from pdrom.reduction.subspace.columns import build_columns
+from pdrom.reduction.subspace.columns import atoms, build_columns
 from pdrom.reduction.subspace.fused import FusedStepper
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns, sample_elements

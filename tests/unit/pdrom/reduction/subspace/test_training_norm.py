@@ -5,10 +5,10 @@ import pytest
 
 from builders import make_scene
 from pdrom.model.runs.full_order import trajectory
+from pdrom.reduction.subspace.ecsw import training_run
 from pdrom.reduction.subspace.local_step import SubspaceLocalStep
 from pdrom.reduction.subspace.model import make_columns, sample_elements
 from pdrom.reduction.subspace.space import ReducedSpace
-from pdrom.reduction.subspace.training import training_run
 
 FRAME = 5
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pdrom.reduction.local.ranks import resolve_ranks
+from study.experiments.kit.settings import resolve_ranks
 
 
 @pytest.mark.parametrize(
