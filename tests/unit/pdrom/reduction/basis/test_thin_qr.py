@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import linalg
 
-from pdrom.reduction.basis import thin_qr as module
+from pdrom.reduction.basis import pod as module
 from pdrom.reduction.basis.pod import thin_qr
 
 SHAPES = st.tuples(st.integers(1, 60), st.integers(1, 12), st.integers(0, 2**32 - 1))
