@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 44_565,
-    "modules of src": 454,
-    "lines of tests": 30_206,
+    "lines of src": 44_481,
+    "modules of src": 439,
+    "lines of tests": 30_202,
     "words of documentation": 24_900,
     "tables": 31,
     "figures": 23,
     "experiments": 21,
-    "percent of src in decorators, signatures and imports": 22.8,
+    "percent of src in decorators, signatures and imports": 22.7,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 
