@@ -134,7 +134,7 @@ def _viewed(runs: list[AnyRun]) -> ViewedScene:
 
 
 def _shown(run: AnyRun, positions: np.ndarray) -> ViewedRun:
-    """A ``run`` beside the first one's ``positions`` (F + 1, N, 3) m."""
+    """A ``run`` with its distance to the first one's ``positions`` (F + 1, N, 3) m."""
     if isinstance(run, ReducedRun):
         return ViewedRun(
             group=run.group,

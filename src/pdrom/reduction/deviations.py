@@ -15,7 +15,7 @@ from pdrom.model.metrics import shape_differences, trajectory_error
 from pdrom.model.scene import Scene
 from pdrom.reduction.rerun import Rerun, displacement_norms, extent_norm, step_norms
 
-# Frames that are compared at a time: what is kept beside the run does not grow with it.
+# Frames that are compared at a time: the memory for it does not grow with the run.
 BLOCK = 32
 # A vertex that is closer to an obstacle than this part of the extent touches it; in a subspace
 # vertices do not end on its surface.
@@ -68,7 +68,7 @@ class Yardstick:
 
     @property
     def units(self) -> dict[str, float]:
-        """Extent norm, m, and time step, s, which `errors_within` needs beside the series."""
+        """Extent norm, m, and time step, s, which `errors_within` needs with the series."""
         extent = extent_norm(self.reference, self.scene.mesh.extent)
         return {"extent_norm": extent, "time_step": self.scene.config.time_step}
 

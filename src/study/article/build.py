@@ -63,7 +63,7 @@ def write_article(
     tables, machine : CSV of the tables and the record of the machine
     inputs : what the manuscript reads, with `NUMBERS`
     figures : PDF and PNG of each
-    facts, claims : stated beside results, and the file of the claims' rules
+    facts, claims : facts that are no results, and the file of the claims' rules
     added : values that the study adds to sets of ``claims``, see `load_claims`
     assets : templates, style and script, see `ASSETS`
     """

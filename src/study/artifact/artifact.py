@@ -38,7 +38,7 @@ class Artifact:
     title : printed by a run, with labels in braces
     reads : by the names of the function's parameters
     writes : kinds of files by the names of the parameters that receive them
-    alone : it measures times, so that nothing else may run beside it
+    alone : it measures times, so that nothing else may run at the same time
     """
 
     name: str

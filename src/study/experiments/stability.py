@@ -44,8 +44,8 @@ class ShortRuns(ConfigModel):
     The bases and samplings are those of the scene's own setting.
 
     ranks : basis sizes, as far as the study holds them; position subspaces run at their largest
-    time_steps : h in seconds, beside the scene's own
-    stiffness_ratios : factors on the weights of the reduced groups, beside 1
+    time_steps : h in seconds, in addition to the scene's own
+    stiffness_ratios : factors on the weights of the reduced groups, in addition to 1
     duration : seconds of simulated time, within ``min_frames`` and ``max_frames``
     """
 

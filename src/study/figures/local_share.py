@@ -29,7 +29,7 @@ CLAIM = 70.0  # per cent, claim C1
         "local step, that is of both shades of orange: the projections and the right-hand side "
         "that is assembled from them, in one pass where they are compiled. The dashed line is the "
         "70 % of claim C1; beside the bar stands the time per frame. An interpreted loop confirms "
-        "the claim everywhere, compiled code only where projections are dear."
+        "the claim everywhere, compiled code only where projections are expensive."
     ),
     reads=(TableOf("local_share"),),
     options=Scenes,

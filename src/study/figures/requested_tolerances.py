@@ -32,7 +32,7 @@ KINDS = {
     options=Options,
 )
 def requested_tolerances(results: Results, options: Options) -> Figure:
-    """Draw errors and times beside each other."""
+    """Draw errors and times side by side."""
     table = results.table("requested_tolerances")
     table = table[table.error.notna()]
     if table.empty:

@@ -1,4 +1,4 @@
-"""The preprint's reduction, what mends it and what pays, in one scene at one instant."""
+"""The preprint's reduction, a sound one and one that pays, in one scene at one instant."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -29,7 +29,7 @@ PAGES = {"main": 16}  # at most: all else belongs in the supplement
 
 
 class Facts(BaseModel):
-    """Facts that the manuscript states beside results.
+    """Facts that the manuscript states and that are no results.
 
     captions : titles and captions of the figures, as TeX, by name
     part : what the study was read from where it is not the full one, else None

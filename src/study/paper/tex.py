@@ -86,7 +86,7 @@ def build_pdfs(
     Parameters
     ----------
     documents : PDF of each source; the sources lie in one folder
-    search : folders in which \\input and \\includegraphics look, beside the source's own
+    search : folders in which \\input and \\includegraphics look, in addition to the source's own
     most : pages that a document may have, by the name of its source
 
     Raises

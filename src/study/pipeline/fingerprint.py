@@ -1,9 +1,9 @@
 """Fingerprints of code: what a workflow step runs, comments and docstrings left aside.
 
 Snakemake notices a change of a rule's parameters but not of a module that its script imports. A
-rule therefore carries the fingerprint of the modules it uses as a parameter. A script it runs again
-when the script is younger than its results, as all are after a wrong clock or a copy: the code of a
-script is a parameter of its rule as well.
+rule therefore carries the fingerprint of the modules it uses as a parameter. Snakemake also reruns
+a job if its script's mtime is newer than its results; a clock error or a copy makes every script
+newer, so that the code of a script is a parameter of its rule as well.
 """
 
 import ast

@@ -112,13 +112,13 @@ def own_files(plan: Plan, folders: Folders) -> set[str]:
 
 
 def study_files(plan: Plan, folders: Folders) -> Iterator[str]:
-    """Files on the disk that belong to a study: its own, and what was asked for beside them."""
+    """Files on the disk that belong to a study: its own, and those that targets have requested."""
     yield from (path for path in own_files(plan, folders) if Path(path).is_file())
     yield from asked_for(_visible(folders.results), plan, folders)
 
 
 def asked_for(found: Iterable[str], plan: Plan, folders: Folders) -> Iterator[str]:
-    """Paths among ``found`` that a target may name beside the study's own files."""
+    """Paths among ``found`` that a target may name and that are not the study's own files."""
     own = own_files(plan, folders)
     scenes, methods = set(scene_names(plan.root)), set(plan.study.methods)
     for path in found:

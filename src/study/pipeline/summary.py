@@ -20,7 +20,7 @@ from study.pipeline.folders import Folders
 from study.pipeline.progress import rounded
 
 # Snakemake's reasons, as they begin, and in fewer words. The last one follows from other jobs and
-# is left out beside another one.
+# is left out if there is another one.
 FOLLOWS = "Input files updated by another job"
 REASONS = {
     "Forced execution": "forced",

@@ -1,4 +1,4 @@
-"""Table effects_contribution: what each effect of a scene does, beside what it costs."""
+"""Table effects_contribution: what each effect of a scene does, and what it costs."""
 
 import numpy as np
 import pandas as pd

@@ -1,7 +1,7 @@
 """Triangles that keep their area: the product of F's singular values within a range.
 
 What Bouaziz et al. 2014, 5.1, do for volumes, in the plane of each triangle. The set of such F is
-unbounded, see module `volume` beside.
+unbounded, see module `volume`.
 """
 
 from typing import Literal

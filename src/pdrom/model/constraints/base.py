@@ -66,7 +66,7 @@ class ConstraintGroup(Effect):
     S: sparse.csr_array
     weights: np.ndarray
     gradient_kernel: Any = None
-    """Compiled projection from S q (module `gradient_kernel` beside), if there is one."""
+    """Compiled projection from S q (module `gradient_kernel`), if there is one."""
     local_kernel: LocalKernel | None = None
     """Compiled `accumulate`, for loops in compiled code; a group without one writes its own."""
     _pass: LocalPass | None = None
@@ -121,7 +121,7 @@ class ConstraintGroup(Effect):
         """Freeze what depends on first positions ``q`` (N, 3) m, for ``elements`` (m,) or all."""
 
     def kernel_parameters(self) -> np.ndarray:
-        """Numbers that ``gradient_kernel`` needs beside S q, in the order that it expects.
+        """Numbers that ``gradient_kernel`` needs in addition to S q, in the order that it expects.
 
         Frame-lagged ones are those of the last ``begin_frame``.
         """
@@ -129,7 +129,7 @@ class ConstraintGroup(Effect):
 
     @property
     def streamed(self) -> tuple[np.ndarray, ...]:
-        """Arrays that a pass of the local kernel reads once each, beside the positions."""
+        """Arrays that a pass of the local kernel reads once each, not counting the positions."""
         return ()
 
     def project(self, y: np.ndarray) -> np.ndarray:

@@ -195,7 +195,7 @@ class MeshFile(MeshModel):
 
 
 class GivenMesh(MeshModel):
-    """Arrays that were given from Python; the file of a run holds them, beside the configuration.
+    """Arrays that were given from Python; the file of a run holds them with the configuration.
 
     blake2b : digest of the arrays, so that two meshes have two configurations
     """

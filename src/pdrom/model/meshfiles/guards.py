@@ -128,7 +128,7 @@ def check_before(name: str, content: bytes) -> None:
 
 
 def check_after(name: str, content: bytes, mesh: Any) -> None:
-    """Refuse, or mend, the ``mesh`` that meshio's reader ``name`` has read from ``content``.
+    """Refuse, or repair, the ``mesh`` that meshio's reader ``name`` has read from ``content``.
 
     Raises
     ------

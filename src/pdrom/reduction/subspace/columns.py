@@ -20,7 +20,7 @@ from pdrom.reduction.basis.pod import fix_signs, pod
 # Columns that add less than this (relative) to the span are dropped.
 DEPENDENT = 1e-9
 
-# An atom's own motion, beside its affine one, is represented down to this part of it.
+# An atom's own motion, in addition to its affine one, is represented down to this part of it.
 OWN_MOTION = 1e-3
 
 # Motion below this fraction of the positions is round-off.
@@ -35,7 +35,7 @@ class Columns:
     free : indices of the columns of the free vertices
     atoms : vertex sets that are held together, and ...
     atom_columns : ... the columns that each of them has
-    modes : number k of modes beside the affine columns
+    modes : number k of modes, not counting the affine columns
     """
 
     B: np.ndarray

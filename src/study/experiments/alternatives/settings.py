@@ -12,7 +12,7 @@ from study.experiments.kit.measurement import Protocol
 from study.experiments.kit.settings import Count, Modes, Repeats, Tolerance
 
 REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # the others are full-order ones
-OWN: Final = "own iterations"  # frames that a reduction may be trained on, beside converged ones
+OWN: Final = "own iterations"  # frames that a reduction may be trained on, as may converged ones
 # What the text says is decided by these: the best of the others at large errors, and reductions.
 TWO_LEVEL: Final = "two-level"  # full order, with a trained subspace for its coarse level
 TRAINED: Final = (TWO_LEVEL, *REDUCTIONS)

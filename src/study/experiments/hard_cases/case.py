@@ -44,7 +44,7 @@ class HardCase:
 
     scene : builds the scene; a case that must be refused raises here
     why : what makes it hard
-    holds : names of the checks that its full-order run must pass (module `checks` beside)
+    holds : names of the checks that its full-order run must pass (module `checks`)
     start : the state before the first frame
     bound : largest extent that is no blow-up, over that of start, rest and handles
     slow : left to the slow tests

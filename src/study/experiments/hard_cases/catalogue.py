@@ -44,7 +44,7 @@ ROTATION = {"effect": "deformation_gradient", "weight": 1e8}
 VOLUME = {"effect": "volume", "weight": 1e6}
 AREA = {"effect": "area", "weight": 1e6}
 
-# Nothing pushes, nothing is held: everything that theory promises.
+# Nothing pushes, nothing is held: everything that theory guarantees.
 FREE = ("finite", "bounded", "objective", "momentum", "determinism")
 CALM = (*FREE, "energy")
 FORCED = ("finite", "bounded", "objective", "determinism")
@@ -59,7 +59,7 @@ def _scene(mesh: Callable[[], Mesh], *effects: dict, **settings: Any) -> Recipe:
 
 
 def _heavy_and_light(mesh: Callable[[], Mesh], *effects: dict, **settings: Any) -> Recipe:
-    """Masses over eight decades, heavy beside light."""
+    """Masses over eight decades, heavy next to light."""
 
     def masses(made: Mesh) -> np.ndarray:
         order = np.random.default_rng(3).permutation(made.vertices)

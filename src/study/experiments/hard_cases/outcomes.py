@@ -41,7 +41,7 @@ def outcome_of(case: HardCase, training: Training, reduced: ReducedRun) -> str:
     if run.extent > DISTORTED * scale_of(training):
         return "distorted"
     # in a position subspace the objective has to fall in every iteration, as in the full order;
-    # interpolated projections of unreduced positions promise nothing of the kind
+    # interpolated projections of unreduced positions do not guarantee it
     if reduced.k is not None and run.excess.max() > 0.0:
         return "objective rises"
     # S^T W p sums to zero whatever p is

@@ -12,7 +12,7 @@ computed differs in two ways (u = eps, c a small constant for the length of the 
   d <= c u cond(A) |z|, where the scaling of the columns does not count.
 
 lambda_min is bounded by the smallest mass over h^2, as if nothing were held: where masses are
-round-off beside the weights and pins alone make the system solvable, the bound means little.
+round-off compared with the weights and pins alone make the system solvable, the bound means little.
 """
 
 from dataclasses import dataclass

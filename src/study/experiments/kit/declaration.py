@@ -21,7 +21,7 @@ def experiment(
 ) -> Callable[[Callable[..., None]], Experiment]:
     """Declare the function below as an experiment, see `Artifact`.
 
-    ``title`` names its jobs; nothing runs beside those of one that wants to be ``alone``.
+    ``title`` names its jobs; nothing runs at the same time as those of an ``alone`` one.
 
     Raises
     ------

@@ -84,7 +84,7 @@ def effect_costs(
     An effect that a scene lists several times has one row. Elements are those of a group, the
     vertices that a hold may ever hold, else all vertices. The shares add up to one. What the
     compiled loop does in each iteration has its time there, too; the right-hand side is what the
-    loop's local steps take beside the groups.
+    loop's local steps take in addition to the groups.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Time of local steps alone: reduced ones beside the full one of their group (claim C9)."""
+"""Time of local steps alone: the reduced ones and the full one of their group (claim C9)."""
 
 from collections.abc import Callable, Hashable, Mapping
 

@@ -61,7 +61,7 @@ def load_choices(path: Path | str) -> dict[str, Options]:
     ------
     ConfigurationError
         Unknown figure, a key that the figure does not have, a value outside its range, or a scene
-        that config/scenes (beside the file) does not hold.
+        that config/scenes (next to the file) does not hold.
     """
     path = Path(path)
     content = read_yaml(path)

@@ -8,7 +8,7 @@ from study.artifact.reads import Chosen, Setting
 from study.experiments.kit.horizon import floor_of, horizon
 from study.figures.kit.results import Results
 
-# What a figure that asks for floors reads.
+# What a figure with sensitivity floors reads.
 FLOORS = (
     Chosen(SENSITIVITY), Setting("sensitivity.reference"), Setting("sensitivity.threshold"),
 )  # fmt: skip

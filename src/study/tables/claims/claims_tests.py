@@ -31,7 +31,7 @@ def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         text("part", f"which verdict: {', '.join(PARTS)}"),
         text("what", "words for the rows that are compared"),
         text("metric", "what is compared"),
-        flag("decides", "the verdict rests on it; the others stand beside it"),
+        flag("decides", "the verdict rests on it; the others are for information"),
         text("compare", "comparison with the threshold"),
         number("threshold", "what a value is compared with"),
         number("share", "of the rows that must agree for a clear answer"),

@@ -83,7 +83,7 @@ class Metric:
     """Metric of a test: values from some columns of one table.
 
     values : from tables, ``where`` and ``accuracy`` to a row of labels and a `VALUE` for each
-    labels : columns that rows may be chosen by, beside those of the table
+    labels : columns that rows may be chosen by, in addition to those of the table
     ratio : a value as the ratio of two times, where it is made of times in another way
     beside : further tables that it reads
     """

@@ -1,4 +1,4 @@
-"""Reruns with positions unreduced, beside what their reduction says about itself."""
+"""Reruns with positions unreduced, with the gain and the errors of their reduction."""
 
 import numpy as np
 import pandas as pd
