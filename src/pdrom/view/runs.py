@@ -15,7 +15,7 @@ class ViewedRun:
     group, method, title : names of what is reduced and how, and the method in words
     positions : (F' + 1, N, 3) m, finite, the initial ones first; it may have ended early
     error : (F',) relative error of each frame
-    blowup_frame : None for a run that lived
+    blowup_frame : None for a run that reached its end
     ms : milliseconds a frame, None where nobody measured
     """
 

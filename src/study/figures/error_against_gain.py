@@ -79,7 +79,7 @@ def _ranges(repetitions: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _draw_ranges(ax: Axes, ranges: pd.DataFrame, colour: str) -> None:
-    """A cross from least to largest gain and error, at the medians."""
+    """Draw for each run a cross from its least to its largest gain and error, at the medians."""
     gains = [clipped(ranges[f"gain_{e}"].to_numpy(float), *GAINS) for e in ENDS]
     errors = [clipped(ranges[f"error_{e}"].to_numpy(float), *ERRORS) for e in ENDS]
     bars = {"color": colour, "linewidth": 0.9, "zorder": 3}

@@ -64,7 +64,7 @@ class CommandLine:
         ConfigurationError
             A target was taken for a value of ``--config`` or ``--configfile``.
         """
-        # late: Snakemake's jobs import this module, too, and need no parser
+        # imported late: Snakemake's jobs import this module, too, and need no parser
         from snakemake.cli import get_argument_parser
 
         found = vars(get_argument_parser().parse_args(list(arguments)))
@@ -172,7 +172,7 @@ def merged(default: Path, configfiles: Iterable[str], settings: Iterable[str]) -
     ConfigurationError
         A file is missing or no mapping.
     """
-    # late: Snakemake's jobs import this module, too
+    # imported late: Snakemake's jobs import this module, too
     from snakemake.cli import parse_config
     from snakemake.settings.types import ConfigSettings
     from snakemake.utils import update_config
@@ -195,7 +195,7 @@ def check_or_exit(*paths: str | Path) -> None:
 
 def remember(command: CommandLine) -> None:
     """Note which configuration runs, that of ``command``."""
-    # late: it loads NumPy, which the environment is to be settled before
+    # imported late: it loads NumPy, which the environment is to be settled before
     from pdrom.core.store import atomic_path
 
     text = json.dumps({"configfiles": command.configfiles, "settings": command.settings})

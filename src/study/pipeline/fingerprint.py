@@ -219,7 +219,7 @@ def track_scripts(workflow: Any) -> None:
 
 
 def _triggers(workflow: Any) -> frozenset[Any]:
-    # late: a plan is made without Snakemake, too
+    # imported late: a plan is made without Snakemake, too
     from snakemake.settings.types import RerunTrigger
 
     return frozenset(workflow.dag_settings.rerun_triggers) - {RerunTrigger.CODE}

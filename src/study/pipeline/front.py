@@ -42,7 +42,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
         there is no such figure.
     """
     if arguments[:1] == ["figure"]:
-        # late: it loads the whole package
+        # imported late: it loads the whole package
         from study.pipeline.figure_command import figure_arguments
 
         arguments = figure_arguments(arguments[1:])
@@ -64,7 +64,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
 
 def files_of(targets: Sequence[str], own: Folders) -> dict[str, list[str]]:
     """Files of the folders ``own`` to make for each of ``targets``, see `Names.files`."""
-    # late: it loads the whole package
+    # imported late: it loads the whole package
     from study.figures.kit.catalogue import declarations
     from study.pipeline.targets import Names
     from study.tables import declared
@@ -74,7 +74,7 @@ def files_of(targets: Sequence[str], own: Folders) -> dict[str, list[str]]:
 
 
 def _described(target: str) -> str:
-    # late, as above
+    # imported late, as above
     from study.pipeline.figure_command import described
 
     return described(target)

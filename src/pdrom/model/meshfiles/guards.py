@@ -155,7 +155,7 @@ def check_after(name: str, content: bytes, mesh: Any) -> None:
 
 
 def _check_order(content: bytes) -> None:
-    """Vertices of .su2 may be followed by their number, which no reader takes notice of."""
+    """Refuse a .su2 file whose vertices are numbered out of order: meshio ignores the numbers."""
     dimension = re.search(rb"^[ \t]*NDIME[ \t]*=[ \t]*(\d+)", content, re.M)
     points = re.search(rb"^[ \t]*NPOIN[ \t]*=[ \t]*(\d+)[^\n]*\n", content, re.M)
     if dimension is None or points is None:

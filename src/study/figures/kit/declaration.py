@@ -76,7 +76,7 @@ class Declaration(Artifact):
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
     ) -> None:
         """Draw the figure in a job and write both of its files."""
-        # late: a plan needs no plotting library
+        # imported late: a plan needs no plotting library
         from study.figures.kit.output import draw_figure, write_figure
 
         order = Order.model_validate(settings["order"])

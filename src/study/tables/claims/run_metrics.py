@@ -108,7 +108,7 @@ def trend_p_value(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
 
 
 def repeated_trend_p_value(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
-    """p-value of the trend of medians over repetitions, which exclude a single run's chance."""
+    """p-value of the trend of the medians over repetitions, as one run may rise by chance."""
     return _page(filtered(tables["repetitions"], where), "error_median")
 
 
