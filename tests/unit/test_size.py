@@ -13,11 +13,11 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 44_481,
-    "modules of src": 439,
-    "lines of tests": 30_202,
+    "lines of src": 44_328,
+    "modules of src": 437,
+    "lines of tests": 30_115,
     "words of documentation": 24_899,
-    "tables": 31,
+    "tables": 29,
     "figures": 23,
     "experiments": 21,
     "percent of src in decorators, signatures and imports": 22.7,

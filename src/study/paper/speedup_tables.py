@@ -9,6 +9,7 @@ from pdrom.view.text import escape
 from study.paper.macros import format_number
 from study.paper.tabular import name, tabular
 from study.tables.kit.intervals import in_words
+from study.tables.winners import CURVE
 
 Tables = Mapping[str, pd.DataFrame]
 FULL = "full"  # position basis of unreduced positions
@@ -59,47 +60,25 @@ def payoff(tables: Tables) -> str:
 
 def pays(tables: Tables) -> str:
     """Mesh sizes from which a reduction is faster than others, for each error that it reaches."""
-    rows = [
-        [
-            name(row.scene) + ("" if row.stiffness == 1.0 else rf" $\times {row.stiffness:g}$"),
-            row.reference,
-            format_number(row.limit),
-            str(row.smallest)
-            if row.smallest == row.largest
-            else f"{row.smallest} to {row.largest}",
-            _size(row.from_plain),
-            _size(row.from_best),
-            in_words(row.speedup, row.speedup_low, row.speedup_high),
-            f"{row.reached} of {row.motions}",
-        ]
-        for row in tables["reduction_pays"].itertuples()
-        if not pd.isna(row.speedup)
-    ]
+    rows = []
+    for _, curve in tables["winners"].groupby(CURVE, sort=False):
+        row, smallest, largest = curve.iloc[0], curve.vertices.min(), curve.vertices.max()
+        if not pd.isna(row.speedup):
+            stiffness = "" if row.stiffness == 1.0 else rf" $\times {row.stiffness:g}$"
+            rows.append(
+                [
+                    name(row.scene) + stiffness,
+                    row.reference,
+                    format_number(row.limit),
+                    str(smallest) if smallest == largest else f"{smallest} to {largest}",
+                    _size(row.from_plain),
+                    _size(row.from_best),
+                    in_words(row.speedup, row.speedup_low, row.speedup_high),
+                    f"{row.reached} of {row.motions}",
+                ]
+            )
     header = ["scene", "against", "error", "vertices", "plain", "all", "speed-up", "motions"]
     return tabular(header, rows, "lllrrrrr")
-
-
-def large_meshes(tables: Tables) -> str:
-    """First to reach each error on each mesh; the scene and the weights are all the same."""
-    rows = [
-        [
-            str(row.vertices),
-            row.reference,
-            format_number(row.limit),
-            "--" if pd.isna(row.method) else f"{name(row.method)}, {_steps(row)}",
-            _number(row.ms_per_frame),
-            "--" if pd.isna(row.second) else name(row.second),
-            _number(row.second_ms),
-            _number(row.reduced_ms),
-        ]
-        for row in tables["large_meshes"].itertuples()
-    ]
-    header = ["vertices", "against", "error", "fastest", "ms", "next", "ms", "reduction (ms)"]
-    return tabular(header, rows, "rlllrlrr")
-
-
-def _steps(row: Any) -> str:
-    return rf"${int(row.substeps)} \times {int(row.iterations)}$"
 
 
 def _size(vertices: Any) -> str:

@@ -11,7 +11,7 @@ from study.paper.claim_tables import claims, claims_in_full
 from study.paper.cost_tables import break_even, exponents, iterations, positions
 from study.paper.hard_tables import hard_cases, hard_reductions
 from study.paper.macros import format_number
-from study.paper.speedup_tables import large_meshes, payoff, pays, speedups
+from study.paper.speedup_tables import payoff, pays, speedups
 from study.paper.tabular import longtable, name, tabular
 
 Tables = Mapping[str, pd.DataFrame]
@@ -167,7 +167,6 @@ TEX_TABLES = {
     "tab_speedups": speedups,
     "tab_payoff": payoff,
     "tab_pays": pays,
-    "tab_large_meshes": large_meshes,
     "tab_hard_cases": hard_cases,
     "tab_hard_reductions": hard_reductions,
 }

@@ -1,14 +1,10 @@
-"""Measurements that git keeps: costs of jobs, winners on large meshes, verdicts on another sample.
+"""Measurements that git keeps: costs of jobs, and verdicts on another sample.
 
 ``./reproduce run python -m study.pipeline.tracked costs`` writes `config/reference/job_costs.csv`
 again, from the logs of the full and of the tiny study in ``results``. It holds the mean processor
 seconds of a kind of job on the meshes of both studies, with the longest time and the largest memory
 of a job, which the requests of `workflow/profiles/slurm` are to cover. A kind is what a job's log
 is named by below ``logs``: an experiment, or ``tables``, ``figures`` or ``paper``.
-
-``./reproduce run python -m study.pipeline.tracked meshes`` writes the file of the table
-`large_meshes` again, from a finished run of ``config/extended.yaml``, which takes too long for
-the default run. Its times are those of one machine, so that the record names both.
 
 ``./reproduce run python -m study.pipeline.tracked replication`` writes the file of the table
 `replication` again, from the table claims of ``config/replication.yaml``.
@@ -22,7 +18,6 @@ from pathlib import Path
 import pandas as pd
 
 from pdrom.core.errors import ConfigurationError, PdromError, choices
-from pdrom.core.machine import machine
 from pdrom.core.store import atomic_path, read_table
 from study.artifact.paths import TABLE
 from study.artifact.usage import usage_of
@@ -30,12 +25,10 @@ from study.pipeline.folders import folders
 from study.tables.claims import load_claims
 from study.tables.claims.replication import MEASURED, RULES
 from study.tables.claims.replication import RECORDED as REPLICATED
-from study.tables.large_meshes import RECORDED
 
 COSTS = Path("config/reference/job_costs.csv")
 COLUMNS = ["kind", "seconds", "coarse_seconds", "longest_s", "memory_mb"]
 COARSE = "config/tiny.yaml"
-LARGE = "config/extended.yaml"
 SAMPLE = "config/replication.yaml"
 
 
@@ -72,19 +65,6 @@ def measured_costs(results: str, coarse: str) -> pd.DataFrame:
     return pd.concat(columns, axis=1, keys=COLUMNS[1:]).reset_index()
 
 
-def recorded_meshes(winners: Path, processor: str) -> pd.DataFrame:
-    """Table ``winners`` with the machine, its ``processor``, and the day on which it was made.
-
-    Raises
-    ------
-    StorageError
-        The table is missing or damaged.
-    """
-    table = read_table(winners)
-    day = datetime.fromtimestamp(winners.stat().st_mtime, UTC).date().isoformat()
-    return table.assign(processor=processor, date=day)
-
-
 def recorded_verdicts(claims: Path, rules: Path) -> pd.DataFrame:
     """The verdicts of the table claims, the fingerprints of their rules, and the day.
 
@@ -119,17 +99,12 @@ def _costs() -> tuple[Path, pd.DataFrame]:
     return COSTS, measured_costs(folders([], []).results, folders([COARSE], []).results)
 
 
-def _meshes() -> tuple[Path, pd.DataFrame]:
-    winners = Path(TABLE.at(folders([LARGE], []).results, name="winners"))
-    return Path(RECORDED), recorded_meshes(winners, machine().cpu)
-
-
 def _verdicts() -> tuple[Path, pd.DataFrame]:
     claims = Path(TABLE.at(folders([SAMPLE], []).results, name="claims"))
     return Path(REPLICATED), recorded_verdicts(claims, Path(RULES))
 
 
-KEPT = {"costs": _costs, "meshes": _meshes, "replication": _verdicts}
+KEPT = {"costs": _costs, "replication": _verdicts}
 
 
 def main(words: Sequence[str]) -> None:

@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 
+import numpy as np
 import pandas as pd
 
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
-from study.experiments.alternatives.settings import OWN, REDUCED, REDUCTIONS
+from study.experiments.alternatives.settings import REDUCTIONS
 from study.tables.alternatives import ITERATIONS, MOTION, STIFFNESS, SUBSTEPS, beside
 from study.tables.kit.declaration import compared, integer, number, table, text, timed
 from study.tables.kit.intervals import median_interval
@@ -16,7 +17,11 @@ from study.tables.kit.vocabulary import METHOD, MS_PER_FRAME, SCENE, VERTICES
 
 REFERENCES = ("implicit", "continuous")
 CASE = ["scene", "vertices", "stiffness", "motion"]
+PAYS = (
+    "from_plain", "from_best", "motions", "reached", "speedup", "speedup_low", "speedup_high",
+)  # fmt: skip
 SPEEDUP = ("reduced_speedup", "reduced_speedup_low", "reduced_speedup_high")
+CURVE = ["scene", "stiffness", "reference", "limit"]
 PLAIN = "projective"
 KNOWN = 3.0  # a motion decides about an error only if it is known this many times better
 
@@ -53,7 +58,17 @@ LIMIT = compared("exact", number("limit", "error that is allowed"))
         timed(text("reduced_method", "the reduction that is the fastest to reach it")),
         timed(text("reduced_trained_on", "the frames that it is trained on")),
         timed(integer("reduced_iterations", "its iterations of a substep")),
-        timed(number("own_ms", f"time of the fastest plain one trained on {OWN}", "ms")),
+        timed(integer("from_plain", "vertices from which on a reduction beats plain iterations")),
+        timed(integer("from_best", "vertices from which on it beats the best full-order method")),
+        integer("motions", "held-out motions"),
+        timed(integer("reached", "motions in which it reaches the error on the largest mesh")),
+        timed(
+            number(
+                "speedup", "over the best full-order method there, median of motions that reach it"
+            )
+        ),
+        timed(number("speedup_low", "least 2.5 % quantile of a motion")),
+        timed(number("speedup_high", "largest 97.5 % quantile of a motion")),
     ),
     reads={
         "rows": TableOf("alternatives"),
@@ -80,7 +95,10 @@ def winners(rows: pd.DataFrame, times: list[File], limits: Sequence[float]) -> p
                     continue
                 row = {**named, "reference": reference, "limit": limit}
                 found.append({**row, **_best(known, limit, processes)})
-    return pd.DataFrame(found, columns=winners.column_names)
+    made = pd.DataFrame(found, columns=winners.column_names).drop(columns=list(PAYS))
+    pays = [{**dict(zip(CURVE, key, strict=True)), **_pays(own)}
+            for key, own in made.groupby(CURVE, sort=False)]  # fmt: skip
+    return made.merge(pd.DataFrame(pays, columns=[*CURVE, *PAYS]), on=CURVE, how="left")
 
 
 def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, object]:
@@ -96,10 +114,9 @@ def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, o
     if len(plain):
         made["plain_ms"] = plain.ms_per_frame.iloc[0]
     if len(reduced):
-        own = reduced[(reduced.method == REDUCED) & (reduced.trained_on == OWN)]
         first = reduced.iloc[0]
         made |= {f"reduced_{key}": first[key] for key in ("method", "trained_on", "iterations")}
-        made |= {"reduced_ms": first.ms_per_frame, "own_ms": own.ms_per_frame.min()}
+        made["reduced_ms"] = first.ms_per_frame
     if len(full):
         best = full.iloc[0]
         made |= best[["method", "substeps", "iterations", "error", "ms_per_frame"]].to_dict()
@@ -112,3 +129,32 @@ def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, o
             made |= {"second": second.method, "second_ms": second.ms_per_frame}
             made["margin"] = second.ms_per_frame / best.ms_per_frame
     return made
+
+
+def _pays(curve: pd.DataFrame) -> dict[str, object]:
+    """From what mesh on a reduction pays: where it does in every motion; empty if it never does."""
+    # NaN where one motion is not reached
+    every = curve.assign(plain=curve.plain_ms / curve.reduced_ms)
+    worst = every.groupby("vertices")[["plain", "reduced_speedup"]].agg(
+        lambda speedups: speedups.min(skipna=False)
+    )
+    sizes = worst.index.to_numpy(float)
+    plain, best = worst.to_numpy(float).T
+    last = every[every.vertices == sizes[-1]]
+    values = (
+        _pays_from(sizes, plain),
+        _pays_from(sizes, best),
+        len(last),
+        int(last.reduced_speedup.notna().sum()),
+        last.reduced_speedup.median(),
+        last.reduced_speedup_low.min(),
+        last.reduced_speedup_high.max(),
+    )
+    return dict(zip(PAYS, values, strict=True))
+
+
+def _pays_from(sizes: np.ndarray, speedups: np.ndarray) -> int | None:
+    """Smallest mesh from which on all ``speedups`` exceed one."""
+    losing = np.flatnonzero(~(speedups > 1.0))
+    first = int(losing[-1]) + 1 if len(losing) else 0
+    return int(sizes[first]) if first < len(sizes) else None

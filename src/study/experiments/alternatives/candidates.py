@@ -68,16 +68,16 @@ class Candidate:
 
 
 def candidates(
-    scene: Scene, models: Sequence[Trained], settings: Comparison, methods: Sequence[str]
+    scene: Scene, models: Sequence[Trained], settings: Comparison
 ) -> Iterator[Candidate]:
-    """``methods`` with each of their settings, on the motion of ``scene``.
+    """The methods that have steps in ``settings``, with each of these, on the motion of ``scene``.
 
     ``models`` are what `trained` made of another motion.
     """
     systems: dict[int, GlobalSystem] = {}
     start = scene.initial_state()
     reduced: list[tuple[str, int, int]] = []
-    for method in methods:
+    for method in settings.steps:
         pairs = settings.pairs(method, scene.mesh.vertices)
         if method in TRAINED:
             reduced += [(method, *pair) for pair in pairs]

@@ -92,8 +92,7 @@ def alternatives(sources: list[Path], settings: Options, out: File, times: File)
         own = {"scene": config.name, "factor": factor, "stiffness": stiffness}
         for motion in section.motions:
             scene = Scene.build(config.heldout_variant(motion), training.mesh)
-            methods = section.methods(decide=motion != FIRST)
-            for row in _rows(scene, models, methods, settings):
+            for row in _rows(scene, models, settings):
                 rows.append({**own, "motion": motion, **row})
             if motion == FIRST:
                 cases.append(Case(own, scene, models))
@@ -114,9 +113,7 @@ def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
     return finer.model_copy(update={"vertex_mass": mass, "effects": effects})
 
 
-def _rows(
-    scene: Scene, models: tuple[Trained, ...], methods: tuple[str, ...], settings: Options
-) -> Iterator[dict[str, Any]]:
+def _rows(scene: Scene, models: tuple[Trained, ...], settings: Options) -> Iterator[dict[str, Any]]:
     """Errors of every candidate in the motion of ``scene``, those of the reference first."""
     frames, against = scene.config.frames, references(scene, settings.alternatives)
     common = {
@@ -126,7 +123,7 @@ def _rows(
     }
     implicit = against.errors(against.implicit)
     yield {**common, "method": CONVERGED, "substeps": 1, "finite": True, **implicit}
-    for candidate in candidates(scene, models, settings.alternatives, methods):
+    for candidate in candidates(scene, models, settings.alternatives):
         with np.errstate(over="ignore", invalid="ignore"):
             reached = candidate.run(frames, settings.blowup_extent, scene.mesh.extent)
         made = {"finite": reached is not None, **against.errors(reached)}

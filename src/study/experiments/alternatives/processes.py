@@ -33,10 +33,7 @@ class Case:
 
 
 def in_processes(cases: Sequence[Case], settings: Comparison) -> pd.DataFrame:
-    """Rows of `COLUMNS`: a process after the other times all ``cases``.
-
-    The first one takes all methods, the others those that decide.
-    """
+    """Rows of `COLUMNS`: a process after the other times all ``cases``."""
     with TemporaryDirectory() as folder:
         asked, answer = Path(folder, "cases.pickle"), Path(folder, "rows.pickle")
         asked.write_bytes(pickle.dumps((cases, settings)))
@@ -49,11 +46,10 @@ def in_processes(cases: Sequence[Case], settings: Comparison) -> pd.DataFrame:
 
 def timed(cases: Sequence[Case], settings: Comparison, process: int) -> pd.DataFrame:
     """Time all candidates in the random order that the number of the ``process`` gives."""
-    methods = settings.methods(decide=process > 1)
     found = [
         ({**case.labels, **each.labels}, each)
         for case in cases
-        for each in candidates(case.scene, case.models, settings, methods)
+        for each in candidates(case.scene, case.models, settings)
     ]
     variants = [Variant(own, c.loop, c.start, c.steps * settings.frames) for own, c in found]
     order = np.random.default_rng(process).permutation(len(variants))

@@ -154,10 +154,7 @@ def test_every_table_is_declared_in_a_module_that_has_no_other():
 
 def test_a_time_in_seconds_or_milliseconds_is_timed_unless_it_is_no_clocks():
     no_clocks = {"budget_ms", "h", "contact_delay"}  # set, or seconds of the simulation
-    recorded = {"large_meshes"}  # measured once, kept with the sources
     for name, made in declared().items():
-        if name in recorded:
-            continue
         for column in made.columns:
             if column.unit in ("s", "ms") and column.name not in no_clocks:
                 assert column.timed, (name, column.name)
