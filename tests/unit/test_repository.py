@@ -8,7 +8,7 @@ import pytest
 from pdrom.core.yamlfile import read_yaml
 from places import ROOT
 from study.artifact.paths import FIGURE, RESULTS, TABLE
-from study.figures.kit.catalogue import declarations
+from study.figures.kit.declaration import declarations
 from study.pipeline.folders import Folders
 from study.tables import declared
 

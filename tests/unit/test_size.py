@@ -13,9 +13,9 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 44_328,
-    "modules of src": 437,
-    "lines of tests": 30_115,
+    "lines of src": 44_039,
+    "modules of src": 423,
+    "lines of tests": 29_978,
     "words of documentation": 24_899,
     "tables": 29,
     "figures": 23,

@@ -13,7 +13,7 @@ from sandbox import MICRO, MICRO_FILE
 from browser import browser_or_skip, page_at
 from places import MICRO_RESULTS
 from study.artifact.markup import to_plain
-from study.figures.kit.catalogue import declarations
+from study.figures.kit.declaration import declarations
 from study.tables import declared
 
 ARGUMENTS = ("--configfile", MICRO_FILE)

@@ -18,7 +18,7 @@ from checkout import Checkout, Made, copy_repository, only_line
 
 from pdrom.core.store import read_table
 from places import MICRO_MANUSCRIPT, MICRO_RESULTS
-from study.figures.kit.catalogue import declarations
+from study.figures.kit.declaration import declarations
 from study.pipeline.running import hold
 from study.tables import declared
 

@@ -17,10 +17,10 @@ from study.article.tables import FACTS, contents, list_page, table_page
 from study.article.tree import Labels, numbered, resolved
 from study.article.verified import INDEX, write_verified
 from study.artifact.files import Files
-from study.artifact.paths import ARTICLE, Place
-from study.artifact.reads import Given, ProjectFile, Setting
-from study.figures.kit.catalogue import declarations
-from study.paper.build import NUMBERS, Facts, fact_tables
+from study.artifact.paths import ARTICLE, FIGURE_PICTURE, File, Place
+from study.artifact.reads import Every, ProjectFile, Setting
+from study.figures.kit.declaration import declarations
+from study.paper.build import NUMBERS, Facts, fact_tables, paper, paper_inputs
 from study.paper.source import DOCUMENTS, documents
 from study.tables import declared
 from study.tables.claims.rules import Added, load_claims
@@ -43,12 +43,13 @@ _PREFIX = re.compile(r"\\renewcommand\{?\\thefigure\}?\{([A-Z]+)")
 
 
 def write_article(
-    source: list[str],
-    references: str,
-    tables: list[str],
-    machine: str,
-    inputs: list[str],
-    figures: list[str],
+    source: list[Path],
+    references: Path,
+    tables: list[File],
+    machine: File,
+    inputs: list[File],
+    figures: list[File],
+    pictures: list[File],
     facts: Facts,
     claims: Path,
     added: Added,
@@ -62,18 +63,18 @@ def write_article(
     source, references : TeX sources of the manuscript and its bibliography
     tables, machine : CSV of the tables and the record of the machine
     inputs : what the manuscript reads, with `NUMBERS`
-    figures : PDF and PNG of each
+    figures, pictures : PDF and PNG of each figure
     facts, claims : facts that are no results, and the file of the claims' rules
     added : values that the study adds to sets of ``claims``, see `load_claims`
     assets : templates, style and script, see `ASSETS`
     """
-    made = {Path(path).name: path for path in inputs}
+    made = {file["name"]: file.path for file in inputs}
     origins = Origins(**json.loads(read_text(made[NUMBERS])))
-    known = fact_tables(Path(machine), facts)
-    csv = contents(tables, known)
-    known |= {Path(path).stem: read_table(path) for path in tables}
+    known = fact_tables(Path(machine.path), facts)
+    csv = contents([table.path for table in tables], known)
+    known |= {table["name"]: read_table(table.path) for table in tables}
     templates = {name: path.read_text("utf-8") for name, path in assets.items()}
-    texts = documents(Path(source[0]).parent)
+    texts = documents(source[0].parent)
     pages = {name: PAGES[stem] for stem, text in texts.items() for name in _FIGURE.findall(text)}
     rules, plain = load_claims(claims, added), templates["plain"]
     written = {name: templates[name] for name in ("style", "script")}
@@ -81,7 +82,7 @@ def write_article(
         written[f"table_{name}"] = table_page(name, content, templates["table"])
     written["tables"] = list_page(sorted(csv), plain)
     written["claims"] = claims_page(rules, known["claims_tests"], known["claims"], pages, plain)
-    drawn = _write_figures(figures, outputs)
+    drawn = _write_figures(figures, pictures, outputs)
     files = _linked_inputs(made, origins, known)
     labels: dict[str, tuple[str, str]] = {}
     trees: dict[str, Tree] = {}
@@ -89,7 +90,7 @@ def write_article(
         tex = prepared(text, stem, origins, facts)
         prefix = _PREFIX.search(text)
         trees[stem] = numbered(
-            parsed(tex, files, Path(references)),
+            parsed(tex, files, references),
             Labels(prefix[1] if prefix else "", PAGES[stem], labels),
             lambda name, node: shown_figure(name, node, *drawn[name], pages),
         )
@@ -103,17 +104,18 @@ def write_article(
 
 
 def _write_figures(
-    figures: list[str], outputs: Mapping[str, str]
+    figures: list[File], pictures: list[File], outputs: Mapping[str, str]
 ) -> dict[str, tuple[tuple[int, int], bool]]:
     """Write pictures and PDF files; return the size of each, and whether it has a PDF here."""
-    made = {Path(path).name: Path(path) for path in figures}
     folder = Path(outputs["main"]).parent / "figures"
+    pdf = {figure["name"]: Path(figure.path) for figure in figures}
+    png = {picture["name"]: Path(picture.path) for picture in pictures}
     return {
         name: (
-            write_picture(made[f"{name}.png"], Path(outputs[f"picture_{name}"])),
-            copy_pdf(made[f"{name}.pdf"], folder / f"{name}.pdf"),
+            write_picture(png[name], Path(outputs[f"picture_{name}"])),
+            copy_pdf(pdf[name], folder / f"{name}.pdf"),
         )
-        for name in sorted({path.stem for path in made.values()})
+        for name in sorted(pdf)
     }
 
 
@@ -146,12 +148,11 @@ article = Files(
     "article",
     "The manuscript as a page",
     {
-        **dict.fromkeys(
-            ("source", "references", "tables", "machine", "inputs", "figures"), Given()
-        ),
+        **paper_inputs.reads,
+        **paper.reads,
+        "pictures": Every(FIGURE_PICTURE),
         "claims": ProjectFile(CLAIMS),
         **{name: ProjectFile(str(FOLDER / file)) for name, file in ASSETS.items()},
-        "facts": Setting("facts"),
         "added": Setting("claim_sets"),
     },
     _writes(),

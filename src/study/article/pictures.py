@@ -10,7 +10,7 @@ from PIL import Image
 from pdrom.core.store import atomic_path, require_intact
 from study.article.nodes import Node, attributes, link, plain, words
 from study.artifact.reads import TableOf
-from study.figures.kit.catalogue import declarations
+from study.figures.kit.declaration import declarations
 
 # Bytes: a larger picture loses what nobody sees; a larger PDF is left to the command.
 LOSSLESS, COPIED = 150_000, 200_000

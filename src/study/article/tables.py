@@ -10,7 +10,7 @@ import pandas as pd
 
 from pdrom.view.page import filled
 from study.artifact.paths import RESULTS, TABLE
-from study.figures.kit.catalogue import declarations
+from study.figures.kit.declaration import declarations
 from study.tables import declared
 from study.tables.kit.quantities import QUANTITIES
 

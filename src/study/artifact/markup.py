@@ -22,6 +22,11 @@ _RAISED = str.maketrans("0123456789−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
+def keys(text: str) -> list[str]:
+    """Settings that a text names."""
+    return list(dict.fromkeys(_KEY.findall(text)))
+
+
 def filled(text: str, settings: Mapping[str, float]) -> str:
     """``text`` with the settings that it names; ConfigurationError for one that is not there."""
 

@@ -36,16 +36,8 @@ class Sources(Protocol):
         """
         ...
 
-    def chosen(self, place: Place, first: bool) -> list[str]:
-        """Return the files of ``place`` that a figure's options choose, or the ``first`` only."""
-        ...
-
     def table(self, name: str) -> str:
         """Return the file of the table ``name``."""
-        ...
-
-    def published(self, name: str) -> list[str]:
-        """Return the published code's table ``name`` where the options request it."""
         ...
 
     def value(self, key: str, labels: Labels) -> Any:
@@ -110,13 +102,13 @@ class Every(FileRead):
 
 @dataclass(frozen=True)
 class EachOf(Every):
-    """One file of a kind for each entry of a setting, in order; an entry knows its ``labels``."""
+    """The file of a kind of each entry of a setting, in order; an entry knows its ``labels``."""
 
     key: str
 
     def paths(self, sources: Sources, labels: Labels) -> Paths:
         entries = sources.value(self.key, labels)
-        return [sources.file(self.place, entry.labels) for entry in entries]
+        return list(dict.fromkeys(sources.file(self.place, entry.labels) for entry in entries))
 
 
 @dataclass(frozen=True)
@@ -134,19 +126,6 @@ class Preferred(Every):
 
 
 @dataclass(frozen=True)
-class Chosen(Every):
-    """Files of a kind for the scenes, groups and methods that the artifact's options choose.
-
-    first : only for the first experiment and the first method that exist
-    """
-
-    first: bool = False
-
-    def paths(self, sources: Sources, labels: Labels) -> Paths:
-        return sources.chosen(self.place, self.first)
-
-
-@dataclass(frozen=True)
 class TableOf(FileRead):
     """A table of the study, by name."""
 
@@ -157,24 +136,6 @@ class TableOf(FileRead):
 
     def content(self, paths: Any) -> Any:
         return read_table(str(paths))
-
-
-@dataclass(frozen=True)
-class Published(FileRead):
-    """A table of the published code's own output, by name, where the options ask for one."""
-
-    name: str
-
-    def paths(self, sources: Sources, labels: Labels) -> Paths:
-        return sources.published(self.name)
-
-
-@dataclass(frozen=True)
-class Given(FileRead):
-    """Files that the plan itself names."""
-
-    def content(self, paths: Any) -> Any:
-        return str(paths) if isinstance(paths, str) else [str(path) for path in paths]
 
 
 @dataclass(frozen=True)

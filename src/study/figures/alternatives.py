@@ -17,8 +17,7 @@ from pdrom.view.multiples import (
 from study.artifact.reads import TableOf
 from study.experiments.alternatives.settings import ACCELERATED, CONVERGED, REDUCED, TWO_LEVEL
 from study.figures.kit.declaration import figure
-from study.figures.kit.options import Scenes
-from study.figures.kit.results import NothingToDraw, Results
+from study.figures.kit.options import NothingToDraw, Scenes
 
 LOW, HIGH = 1e-4, 1.0  # errors outside are drawn on the limit
 PAIRS = 2  # cases side by side
@@ -48,13 +47,12 @@ LOOKS = {
         "trained on another motion, on its frames as they are or converged. "
         "$\\times 100$: the same scene with stiffer weights. Errors outside are drawn on the rim."
     ),
-    reads=(TableOf("alternatives"),),
+    reads={"table": TableOf("alternatives")},
     options=Scenes,
 )
-def alternatives(results: Results, options: Scenes) -> Figure:
+def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
     """Draw a pair of panels for each scene, mesh and stiffness."""
-    table = results.asked_rows("alternatives", options)
-    table = table[table.motion == FIRST]
+    table = options.rows(table[table.motion == FIRST])
     cases = list(table.groupby(["scene", "vertices", "stiffness"]))
     if not cases:
         raise NothingToDraw("no alternatives")

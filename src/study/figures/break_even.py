@@ -5,11 +5,10 @@ import pandas as pd
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from pdrom.view.multiples import label_outer, small_multiples
-from study.artifact.reads import TableOf
+from study.artifact.reads import Settings, TableOf
 from study.figures.kit.declaration import figure
-from study.figures.kit.legends import group_looks, method_handles
-from study.figures.kit.options import Columns, Experiments, Methods
-from study.figures.kit.results import NothingToDraw, Results
+from study.figures.kit.legends import method_handles
+from study.figures.kit.options import Columns, Drawn, Experiments, Methods, NothingToDraw
 
 
 class Options(Experiments, Methods, Columns):
@@ -24,24 +23,24 @@ class Options(Experiments, Methods, Columns):
         "alone on states of the full-order run. Above the dashed line the reduction costs more "
         "than all projections. Lines end at the numerical rank."
     ),
-    reads=(TableOf("breakeven"),),
+    reads={"drawn": Settings(Drawn), "table": TableOf("breakeven")},
     options=Options,
 )
-def break_even(results: Results, options: Options) -> Figure:
+def break_even(options: Options, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a panel per constraint group, a line per scene and method; above 1 it costs more."""
-    table = results.held_rows(results.table("breakeven"), options)
+    table = drawn.rows(table)
     table = table[table.factor == 1.0]
     if table.empty:
         raise NothingToDraw("no reduced local step was timed")
-    groups = [g for g in group_looks(results.holdings) if (table.group == g).any()]
+    groups = [g for g in drawn.looks if (table.group == g).any()]
     figure, axes = small_multiples(len(groups), options.columns, legend_rows=2, height=1.8)
-    styles = style.method_styles([m for m in results.methods(options) if (table.method == m).any()])
+    styles = style.method_styles([m for m in drawn.methods if (table.method == m).any()])
     for ax, group in zip(axes, groups, strict=True):
         _draw_group(ax, table[table.group == group], styles)
         ax.set_title(style.words(group))
     label_outer(axes, options.columns, "basis vectors r", "reduced over full local step")
     one = style.handle("break-even", color=style.BLACK, linestyle="--")
-    style.legend(figure, [*method_handles(results, styles), one], 3)
+    style.legend(figure, [*method_handles(drawn, styles), one], 3)
     return figure
 
 

@@ -4,19 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from pdrom.model.mesh.types import Mesh, load_mesh
+from pdrom.model.mesh.types import Mesh
 from pdrom.view import style
 from pdrom.view.artists import Figure, ScalarMappable
 from pdrom.view.panels import RunPanel, fit_aspect, shared_window
-from pdrom.view.read import choose_ranks, positions_at, rerun_infos
+from pdrom.view.read import choose_ranks, rerun_infos
 from pdrom.view.run_rows import NOTHING_RAN, Row, draw_rows, run_panel
-from study.artifact.paths import FULL_ORDER, MESH, RERUNS
+from study.artifact.paths import File
+from study.experiments.kit.settings import Horizon
 from study.figures.kit.declaration import figure
 from study.figures.kit.elements import magnitudes
-from study.figures.kit.experiment_rows import RUNS
-from study.figures.kit.floor import Floors
-from study.figures.kit.options import ReducedRuns
-from study.figures.kit.results import NothingToDraw, Results, asked
+from study.figures.kit.options import Drawn, NothingToDraw, ReducedRuns
+from study.figures.runs import RUNS, Runs
 
 DISTANCES = (1e-4, 1.0)  # extents of the mesh, at the ends of the scale of colours
 FOOTER = 0.55  # inches, for the scale of colours
@@ -36,21 +35,21 @@ FOOTER = 0.55  # inches, for the scale of colours
     reads=RUNS,
     options=ReducedRuns,
 )
-def cloth_all_grid(results: Results, options: ReducedRuns) -> Figure:
+def cloth_all_grid(
+    options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
+) -> Figure:
     """Draw a row per reduced group (first the full-order run), the methods side by side.
 
     A method has a column for each instant; instants are shares of the scene's horizon. All pictures
     have the same camera and scale but for framed ones, whose scale is given. The size is the first
     of ``options.ranks`` that ran.
     """
-    camera = options.camera
-    found = results.holdings.first(options)
-    if found is None:
-        raise NothingToDraw(asked(options))
-    scene, methods = found[0], results.methods(options)
-    mesh = load_mesh(results.path(MESH, scene))
-    end = Floors(results).horizon(scene)
-    frames, full = positions_at(results.path(FULL_ORDER, scene), options.frames, end)
+    camera, methods, runs = options.camera, drawn.methods, Runs(horizon, **files)
+    if not drawn.experiments or not methods:
+        raise NothingToDraw(options.words())
+    one = drawn.experiments[0]
+    mesh, end = runs.mesh(one), runs.floors.horizon(one.scene)
+    frames, full = runs.at(one, options.frames, end)
     first = [
         RunPanel(f"frame {f}", style.FULL_ORDER, q, reference=True)
         for f, q in zip(frames, full, strict=True)
@@ -58,10 +57,13 @@ def cloth_all_grid(results: Results, options: ReducedRuns) -> Figure:
     rows: list[tuple[str, list[RunPanel], str | None]] = [
         ("full order", first * len(methods), None)
     ]
-    for group in results.holdings.scenes[scene].groups:
-        runs = [_run(results, options, (scene, group, m), frames, full, mesh) for m in methods]
-        label, ran = f"{style.words(group)} reduced", any(runs)
-        panels = [panel for run in runs for panel in run or _blank(len(frames))]
+    for each in drawn.of(one.scene):
+        reduced = [
+            _run(each.path(runs.reruns, method=m), options, drawn.title(m), frames, full, mesh)
+            for m in methods
+        ]
+        label, ran = f"{style.words(each.group)} reduced", any(reduced)
+        panels = [panel for run in reduced for panel in run or _blank(len(frames))]
         rows.append((label, panels, None if ran else NOTHING_RAN))
     windows = [shared_window(camera, q, [], margin=0.04) for q in full]
     size = (max(w.width for w in windows), max(w.height for w in windows))
@@ -81,15 +83,14 @@ def _blank(count: int) -> list[RunPanel]:
 
 
 def _run(
-    results: Results,
+    path: str,
     options: ReducedRuns,
-    experiment: tuple[str, str, str],
+    title: str,
     frames: list[int],
     full: np.ndarray,
     mesh: Mesh,
 ) -> list[RunPanel] | None:
     """A reduced run at every instant, coloured by its distance; None if no size ran."""
-    path = results.path(RERUNS, *experiment)
     infos = choose_ranks(rerun_infos(path), options.ranks)
     info = next((i for i in infos if not i.marked), None)
     if info is None:
@@ -100,8 +101,7 @@ def _run(
         for frame, q in zip(frames, full, strict=True)
     ]
     middle = len(panels) // 2
-    title = f"{results.method_title(experiment[2])}, {info.title}"
-    panels[middle] = replace(panels[middle], title=title)
+    panels[middle] = replace(panels[middle], title=f"{title}, {info.title}")
     return panels
 
 

@@ -9,13 +9,12 @@ from pdrom.view.artists import Axes, Figure
 from pdrom.view.camera import Camera, window_of
 from pdrom.view.mesh_render import draw_surface, set_window
 from pdrom.view.read import SamplingView, read_samplings
-from study.artifact.paths import MESH, SAMPLING, SNAPSHOTS
-from study.artifact.reads import Chosen
+from study.artifact.paths import MESH, SAMPLING, SNAPSHOTS, File
+from study.artifact.reads import EachOf, Settings
 from study.figures.kit.declaration import figure
 from study.figures.kit.elements import NEUTRAL, ElementMap, element_map
 from study.figures.kit.legends import method_handles
-from study.figures.kit.options import Experiments, Methods, Ranks, View
-from study.figures.kit.results import NothingToDraw, Results, asked
+from study.figures.kit.options import Drawn, Experiments, Methods, NothingToDraw, Ranks, View
 
 SEVERAL = "#333333"
 ROW_HEIGHT = 1.85  # inches
@@ -34,46 +33,51 @@ class Options(Experiments, Methods, Ranks, View):
         "contributes. Right: numbers that have to be computed for $r$ interpolation entries, "
         "because a projection yields all entries of its element at once."
     ),
-    reads=(Chosen(MESH), Chosen(SNAPSHOTS), Chosen(SAMPLING)),
+    reads={
+        "drawn": Settings(Drawn),
+        "meshes": EachOf(MESH, "experiments"),
+        "snapshots": EachOf(SNAPSHOTS, "experiments"),
+        "samples": EachOf(SAMPLING, "runs"),
+    },
     options=Options,
 )
-def deim_entries(results: Results, options: Options) -> Figure:
+def deim_entries(
+    options: Options, drawn: Drawn, meshes: list[File], snapshots: list[File], samples: list[File]
+) -> Figure:
     """Draw a row per experiment: the elements hit, entries per element, and numbers computed.
 
     Single-entry methods are compared with the other methods of the specification, which sample
     whole elements or rows; the first of them is drawn on the mesh, at the largest r.
     """
-    methods = results.methods(options)
-    scalar = [m for m in methods if results.holdings.methods[m].rows == "scalar"]
+    methods = drawn.methods
+    scalar = [m for m in methods if drawn.reductions[m].rows == "scalar"]
     if not scalar:
         raise NothingToDraw("no method that samples single entries (deim, qdeim)")
-    drawn = []
-    for scene, group in results.experiments(options):
-        samplings = {m: read_samplings(results.path(SAMPLING, scene, group, m)) for m in methods}
+    sampled = []
+    for each in drawn.experiments:
+        samplings = {m: read_samplings(each.path(samples, method=m)) for m in methods}
         if samplings[scalar[0]]:
-            drawn.append((scene, group, samplings))
-    if not drawn:
-        raise NothingToDraw(f"samples of {asked(options)}")
-    figure = style.new_figure(ROW_HEIGHT * len(drawn) + 0.55)
-    axes = figure.subplots(len(drawn), 3, squeeze=False, width_ratios=[1.25, 1.0, 1.1])
-    for row, (scene, group, samplings) in zip(axes, drawn, strict=True):
-        elements, per_element = _elements(results, scene, group)
+            sampled.append((each, samplings))
+    if not sampled:
+        raise NothingToDraw(f"samples of {options.words()}")
+    figure = style.new_figure(ROW_HEIGHT * len(sampled) + 0.55)
+    axes = figure.subplots(len(sampled), 3, squeeze=False, width_ratios=[1.25, 1.0, 1.1])
+    for row, (each, samplings) in zip(axes, sampled, strict=True):
+        elements, per_element = _elements(each.group, each.path(meshes), each.path(snapshots))
         chosen = _at(samplings[scalar[0]], options.ranks)
         _draw_hits(row[0], elements, axes_hit(chosen.entries, per_element), options.camera)
-        row[0].set_title(f"{results.experiment_title(scene, group)}\nr = {chosen.r} entries")
+        row[0].set_title(f"{each.title}\nr = {chosen.r} entries")
         _draw_counts(row[1], chosen, per_element)
         _draw_evaluations(row[2], samplings, per_element)
-    _legend(figure, results, methods)
+    _legend(figure, drawn, methods)
     return figure
 
 
-def _elements(results: Results, scene: str, group: str) -> tuple[ElementMap, int]:
-    """Elements of a group, and the number of entries of each."""
-    path = results.path(SNAPSHOTS, scene, group)
-    with open_hdf5(path) as file:
+def _elements(group: str, mesh: str, snapshots: str) -> tuple[ElementMap, int]:
+    """Elements of a group, and the number of entries of each; from its files."""
+    with open_hdf5(snapshots) as file:
         count, rows = int(file.attrs["elements"]), int(file.attrs["rows_per_element"])
-    mesh = load_mesh(results.path(MESH, scene))
-    return element_map(group, mesh, count, source=str(path)), 3 * rows
+    return element_map(group, load_mesh(mesh), count, source=snapshots), 3 * rows
 
 
 def _at(samplings: list[SamplingView], ranks: tuple[int | str, ...]) -> SamplingView:
@@ -142,10 +146,10 @@ def _draw_evaluations(ax: Axes, samplings: dict[str, list[SamplingView]], per_el
     style.grid(ax)
 
 
-def _legend(figure: Figure, results: Results, methods: list[str]) -> None:
+def _legend(figure: Figure, drawn: Drawn, methods: list[str]) -> None:
     dots = {"linestyle": "none", "marker": "o", "markersize": 4.5}
     named = {**{f"{a} entry": c for a, c in style.AXES.items()}, "several axes": SEVERAL}
     handles = [style.handle(label, color=c, **dots) for label, c in named.items()]
-    handles += method_handles(results, style.method_styles(methods))
+    handles += method_handles(drawn, style.method_styles(methods))
     handles.append(style.handle("numbers that DEIM uses (r)", color=style.GREY, linestyle="--"))
     style.legend(figure, handles, 4)

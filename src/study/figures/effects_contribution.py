@@ -6,12 +6,10 @@ import pandas as pd
 from pdrom.core.store import read_table
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
-from study.artifact.paths import CONTRIBUTIONS
-from study.artifact.reads import Chosen, TableOf
+from study.artifact.paths import CONTRIBUTIONS, File
+from study.artifact.reads import EachOf, Settings, TableOf
 from study.figures.kit.declaration import figure
-from study.figures.kit.legends import group_looks
-from study.figures.kit.options import Scenes
-from study.figures.kit.results import Results
+from study.figures.kit.options import Drawn, Scenes
 
 FRAMES = ["effect", "frame", "force"]
 SHOWN = 3  # scenes whose forces are drawn
@@ -32,21 +30,27 @@ Looks = dict[str, tuple[str, str]]
         "lie below the floor, at the left edge where nothing changes at all. The only group of a "
         "scene cannot be left out."
     ),
-    reads=(TableOf("effects_contribution"), Chosen(CONTRIBUTIONS)),
+    reads={
+        "drawn": Settings(Drawn),
+        "table": TableOf("effects_contribution"),
+        "contributions": EachOf(CONTRIBUTIONS, "experiments"),
+    },
     options=Scenes,
 )
-def effects_contribution(results: Results, options: Scenes) -> Figure:
+def effects_contribution(
+    options: Scenes, drawn: Drawn, table: pd.DataFrame, contributions: list[File]
+) -> Figure:
     """Draw the forces of the first scenes over time, and beside them every scene and effect."""
-    table = results.table("effects_contribution")
-    scenes = results.scenes_of(table, options, "no contributions of effects")
+    scenes = drawn.scenes_of(table, "no contributions of effects")
     rows = table[table.scene.isin(scenes)]
-    drawn = sorted(scenes, key=lambda scene: -len(results.holdings.scenes[scene].groups))[:SHOWN]
-    looks = _looks(results, rows[rows.moved.notna() | rows.scene.isin(drawn)])
+    forces = {file["scene"]: read_table(file.path, FRAMES) for file in contributions}
+    shown = sorted(scenes, key=lambda scene: -len(drawn.of(scene)))[:SHOWN]
+    looks = _looks(drawn, rows[rows.moved.notna() | rows.scene.isin(shown)])
     figure = style.new_figure(0.24 * len(scenes) + 2.0)
     left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.15))
-    axes = left.subplots(len(drawn), 1, squeeze=False)[:, 0]
-    for ax, scene in zip(axes, drawn, strict=True):
-        _draw_forces(ax, read_table(results.path(CONTRIBUTIONS, scene), FRAMES), looks)
+    axes = left.subplots(len(shown), 1, squeeze=False)[:, 0]
+    for ax, scene in zip(axes, shown, strict=True):
+        _draw_forces(ax, forces[scene], looks)
         ax.set_title(style.words(scene))
     axes[-1].set_xlabel("frame")
     axes[len(axes) // 2].set_ylabel("norm of the force (N)")
@@ -56,9 +60,9 @@ def effects_contribution(results: Results, options: Scenes) -> Figure:
     return figure
 
 
-def _looks(results: Results, rows: pd.DataFrame) -> Looks:
+def _looks(drawn: Drawn, rows: pd.DataFrame) -> Looks:
     """Colours and markers: those of a group as everywhere else, of other effects in their order."""
-    known = group_looks(results.holdings)
+    known = drawn.looks
     others = [effect for effect in dict.fromkeys(rows.effect) if effect not in known]
     groups = {effect: known[effect] for effect in dict.fromkeys(rows.effect) if effect in known}
     return groups | {

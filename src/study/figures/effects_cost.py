@@ -4,12 +4,10 @@ import pandas as pd
 
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
-from study.artifact.reads import TableOf
+from study.artifact.reads import Settings, TableOf
 from study.experiments.kit.names import GLOBAL, REST, RIGHT
 from study.figures.kit.declaration import figure
-from study.figures.kit.legends import group_looks
-from study.figures.kit.options import Scenes
-from study.figures.kit.results import Results
+from study.figures.kit.options import Drawn, Scenes
 
 OTHERS = "forces, holds, contacts"
 COLOURS = {OTHERS: style.VERMILLION, RIGHT: style.SKY, GLOBAL: "#3A5A78", REST: "#C9C4BA"}
@@ -23,24 +21,28 @@ COLOURS = {OTHERS: style.VERMILLION, RIGHT: style.SKY, GLOBAL: "#3A5A78", REST: 
         "the whole less what these effects cost in it. A bar that ends at the tick pays nothing "
         "for what the scene does not list."
     ),
-    reads=(TableOf("effects_cost"), TableOf("effects_left_out")),
+    reads={
+        "drawn": Settings(Drawn),
+        "costs": TableOf("effects_cost"),
+        "removed": TableOf("effects_left_out"),
+    },
     options=Scenes,
 )
-def effects_cost(results: Results, options: Scenes) -> Figure:
+def effects_cost(
+    options: Scenes, drawn: Drawn, costs: pd.DataFrame, removed: pd.DataFrame
+) -> Figure:
     """Draw a bar per scene, divided by effect; on the right one scene without some of its effects.
 
     On the right a tick marks the time of the whole scene less what the missing effects cost in it.
     A bar that ends there pays nothing for what it does not list.
     """
-    costs = results.table("effects_cost")
-    removed = results.table("effects_left_out")
-    scenes = results.scenes_of(costs, options, "no timings of effects")
+    scenes = drawn.scenes_of(costs, "no timings of effects")
     several = [scene for scene in scenes if (removed.scene == scene).any()]
     rows = removed[removed.scene == several[0]] if several else removed[:0]
     height = 0.27 * max(len(scenes), len(rows)) + 1.3
     figure = style.new_figure(height)
     axes = figure.subplots(1, 2 if several else 1, squeeze=False)[0]
-    looks = group_looks(results.holdings)
+    looks = drawn.looks
     colours = {**{group: colour for group, (colour, _) in looks.items()}, **COLOURS}
     parts = _draw_scenes(axes[0], costs, scenes, colours)
     handles: list = [style.patch(style.words(part), color=colours[part]) for part in parts]

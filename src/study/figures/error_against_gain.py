@@ -6,11 +6,10 @@ import pandas as pd
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from pdrom.view.multiples import clipped, log_axes, rim_arrows
-from study.artifact.reads import TableOf
+from study.artifact.reads import Settings, TableOf
 from study.figures.kit.declaration import figure
 from study.figures.kit.legends import method_handles
-from study.figures.kit.options import Experiments, Methods
-from study.figures.kit.results import NothingToDraw, Results
+from study.figures.kit.options import Drawn, Experiments, Methods, NothingToDraw
 from study.tables.kit.gains import FAILED, judged_runs
 
 ERRORS, GAINS = (1e-5, 1e2), (1.0, 1e5)  # limits of the axes; points outside are drawn on the rim
@@ -32,34 +31,40 @@ class Options(Experiments, Methods):
         "over runs, in some scenes, that are trained on as many resampled frames. Right: how many "
         "of them failed, by decade of the gain."
     ),
-    reads=(
-        TableOf("reduced_reruns"),
-        TableOf("reconstruction_error"),
-        TableOf("repetitions"),
-    ),
+    reads={
+        "drawn": Settings(Drawn),
+        "reruns": TableOf("reduced_reruns"),
+        "errors": TableOf("reconstruction_error"),
+        "repetitions": TableOf("repetitions"),
+    },
     options=Options,
 )
-def error_against_gain(results: Results, options: Options) -> Figure:
+def error_against_gain(
+    options: Options,
+    drawn: Drawn,
+    reruns: pd.DataFrame,
+    errors: pd.DataFrame,
+    repetitions: pd.DataFrame,
+) -> Figure:
     """Draw a dot per run, error within the horizon over gain, and failures by decade of gain.
 
     Runs that ended before their horizon lie on the upper rim, singular interpolations on the right
     one.
     """
-    runs = judged_runs(results.table("reduced_reruns"), results.table("reconstruction_error"))
-    runs = results.held_rows(runs, options)
+    runs = drawn.rows(judged_runs(reruns, errors))
     if runs.empty:
         raise NothingToDraw("no run with a gain")
     figure = style.new_figure(3.0)
     left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
-    ranges = _ranges(results.table("repetitions"), runs)
-    methods = [m for m in results.holdings.methods if (runs.method == m).any()]
+    ranges = _ranges(repetitions, runs)
+    methods = [m for m in drawn.methods if (runs.method == m).any()]
     styles = style.method_styles(methods)
     for method in methods:
         _draw_method(left, runs[runs.method == method], *styles[method])
         _draw_ranges(left, ranges[ranges.method == method], styles[method][0])
     _draw_limits(left)
     _draw_decades(right, runs)
-    style.legend(figure, method_handles(results, styles, linestyle="none"), 4)
+    style.legend(figure, method_handles(drawn, styles, linestyle="none"), 4)
     return figure
 
 

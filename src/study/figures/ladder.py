@@ -9,8 +9,7 @@ from pdrom.view.multiples import clipped
 from pdrom.view.text import plain_words
 from study.artifact.reads import TableOf
 from study.figures.kit.declaration import figure
-from study.figures.kit.options import Scenes
-from study.figures.kit.results import NothingToDraw, Results
+from study.figures.kit.options import NothingToDraw, Scenes
 
 ERRORS, GAINS = (1e-4, 1e2), (1.0, 1e5)  # limits of the axes; points outside are drawn on the rim
 
@@ -25,10 +24,10 @@ ERRORS, GAINS = (1e-4, 1e2), (1.0, 1e5)  # limits of the axes; points outside ar
         "Bars show the range over runs that are trained on as many resampled frames, on some "
         "scenes; pale ones that over choices of the arbitrary signs of the singular vectors."
     ),
-    reads=(TableOf("ladder"),),
+    reads={"table": TableOf("ladder")},
     options=Scenes,
 )
-def ladder(results: Results, options: Scenes) -> Figure:
+def ladder(options: Scenes, table: pd.DataFrame) -> Figure:
     """Draw rungs from top (published) to bottom; left the error of the rerun, right the gain.
 
     Below the line each row lacks one ingredient of the sound method. A bar shows the range over
@@ -36,7 +35,7 @@ def ladder(results: Results, options: Scenes) -> Figure:
     published method. Runs that blew up before their horizon, and singular interpolations, lie on
     the right rim.
     """
-    table = results.asked_rows("ladder", options)
+    table = options.rows(table)
     table = table[table.gain.notna() & (table.direction != "square")]
     if table.empty:
         raise NothingToDraw("no scene that climbs the ladder")

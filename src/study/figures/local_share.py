@@ -5,10 +5,9 @@ import pandas as pd
 
 from pdrom.view import style
 from pdrom.view.artists import Artist, Axes, Figure
-from study.artifact.reads import TableOf
+from study.artifact.reads import Settings, TableOf
 from study.figures.kit.declaration import figure
-from study.figures.kit.options import Scenes
-from study.figures.kit.results import Results
+from study.figures.kit.options import Drawn, Scenes
 
 # the local step, whose share is printed, is what has a shade of orange
 PHASES = {
@@ -31,13 +30,12 @@ CLAIM = 70.0  # per cent, claim C1
         "70 % of claim C1; beside the bar stands the time per frame. An interpreted loop confirms "
         "the claim everywhere, compiled code only where projections are expensive."
     ),
-    reads=(TableOf("local_share"),),
+    reads={"drawn": Settings(Drawn), "table": TableOf("local_share")},
     options=Scenes,
 )
-def local_share(results: Results, options: Scenes) -> Figure:
+def local_share(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a panel per implementation, a bar per scene with the time per frame at its end."""
-    table = results.table("local_share")
-    scenes = results.scenes_of(table, options, "no timings")
+    scenes = drawn.scenes_of(table, "no timings")
     present = set(table[table.scene.isin(scenes)].implementation)
     implementations = [i for i in (*ORDER, *sorted(present - set(ORDER))) if i in present]
     figure = style.new_figure(0.27 * len(scenes) + 1.15)

@@ -8,8 +8,7 @@ from pdrom.view.artists import Axes, Figure
 from pdrom.view.multiples import clipped, log_axes
 from study.artifact.reads import TableOf
 from study.figures.kit.declaration import figure
-from study.figures.kit.options import Options
-from study.figures.kit.results import NothingToDraw, Results
+from study.figures.kit.options import NothingToDraw, Options
 
 TOLERANCES, TIMES, REACHED = (5e-3, 2e-1), (1e-2, 1e1), (1e-4, 1e0)
 # Colour of each kind of answer, and a factor that moves its dots along the axis of tolerances.
@@ -28,12 +27,11 @@ KINDS = {
         "its time over that of a frame with the scene's own iterations, checks and failed levels "
         "included. What lies outside is drawn on the rim."
     ),
-    reads=(TableOf("requested_tolerances"),),
+    reads={"table": TableOf("requested_tolerances")},
     options=Options,
 )
-def requested_tolerances(results: Results, options: Options) -> Figure:
+def requested_tolerances(options: Options, table: pd.DataFrame) -> Figure:
     """Draw errors and times side by side."""
-    table = results.table("requested_tolerances")
     table = table[table.error.notna()]
     if table.empty:
         raise NothingToDraw("no tolerance was requested")

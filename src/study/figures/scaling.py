@@ -6,10 +6,9 @@ import pandas as pd
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from pdrom.view.multiples import plain_ticks
-from study.artifact.reads import TableOf
+from study.artifact.reads import Settings, TableOf
 from study.figures.kit.declaration import figure
-from study.figures.kit.options import Scenes
-from study.figures.kit.results import NothingToDraw, Results
+from study.figures.kit.options import Drawn, NothingToDraw, Scenes
 
 PHASES = {
     "ms_per_iteration": ("whole iteration", "-"),
@@ -33,12 +32,11 @@ MARKERS = {"fom": "o", "ecsw": ">"}
         "of the mesh or more. Assembly and "
         "factorisation before the first frame are in the table `scaling`."
     ),
-    reads=(TableOf("scaling"),),
+    reads={"drawn": Settings(Drawn), "table": TableOf("scaling")},
     options=Scenes,
 )
-def scaling(results: Results, options: Scenes) -> Figure:
+def scaling(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a panel per scene: the time of an iteration, by phase."""
-    table = results.table("scaling")
     asked = options.scenes or tuple(dict.fromkeys(table.scene))
     scenes = [scene for scene in asked if (table.scene == scene).any()]
     if not scenes:
@@ -56,7 +54,7 @@ def scaling(results: Results, options: Scenes) -> Figure:
         low, high = np.log10(axis.get_view_interval())
         plain_ticks(axis, high - low)
     times[0].set_ylabel("time of an iteration (ms)")
-    _legend(figure, results, list(dict.fromkeys(table.method)))
+    _legend(figure, drawn, list(dict.fromkeys(table.method)))
     return figure
 
 
@@ -85,7 +83,7 @@ def _style(method: str) -> tuple[str, str]:
     return COLOURS.get(method, colour), MARKERS.get(method, marker)
 
 
-def _legend(figure: Figure, results: Results, methods: list[str]) -> None:
-    named = {NAMES.get(m) or results.method_title(m): _style(m) for m in methods}
+def _legend(figure: Figure, drawn: Drawn, methods: list[str]) -> None:
+    named = {NAMES.get(m) or drawn.title(m): _style(m) for m in methods}
     lines = [style.handle(label, color="#555555", linestyle=s) for label, s in PHASES.values()]
     style.legend(figure, [*style.handles(named), *lines], 4)

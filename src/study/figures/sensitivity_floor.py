@@ -2,13 +2,16 @@
 
 import numpy as np
 
+from pdrom.model.effects import EFFECTS
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from pdrom.view.multiples import clipped, label_outer, log_axis, small_multiples
+from study.artifact.paths import File
+from study.artifact.reads import Settings
+from study.experiments.kit.settings import Horizon
 from study.figures.kit.declaration import figure
 from study.figures.kit.floor import FLOORS, Floors
-from study.figures.kit.options import Columns, Scenes
-from study.figures.kit.results import NothingToDraw, Results
+from study.figures.kit.options import Columns, Drawn, NothingToDraw, Scenes
 
 LOW, HIGH = 1e-12, 1e2
 TWIN = "_twin"
@@ -26,20 +29,22 @@ class Options(Scenes, Columns):
         "frame above the threshold of {sensitivity.threshold}: beyond it a reduced run cannot be "
         "judged by its error. Dashed lines are twins, scenes that end before."
     ),
-    reads=FLOORS,
+    reads={"drawn": Settings(Drawn), **FLOORS},
     options=Options,
 )
-def sensitivity_floor(results: Results, options: Options) -> Figure:
+def sensitivity_floor(
+    options: Options, drawn: Drawn, sensitivity: list[File], horizon: Horizon
+) -> Figure:
     """Draw a panel per kind of scene, a line per scene: its spread under a perturbed start.
 
     The grey line is the threshold; a dot marks the frame at which a scene crosses it, its horizon,
     given in the legend. A twin has the colour of its scene and is dashed.
     """
-    floors = Floors(results)
+    floors = Floors(sensitivity, horizon)
     kinds: dict[str, list[str]] = {}
-    for scene in results.scenes(options):
+    for scene in drawn.scenes:
         if len(floors.of(scene)):
-            kinds.setdefault(_kind(results, scene), []).append(scene)
+            kinds.setdefault(_kind(drawn, scene), []).append(scene)
     if not kinds:
         raise NothingToDraw(f"no run perturbed by {floors.perturbation:g}")
     columns = min(options.columns, len(kinds))
@@ -66,11 +71,11 @@ def sensitivity_floor(results: Results, options: Options) -> Figure:
     return figure
 
 
-def _kind(results: Results, scene: str) -> str:
-    groups = results.holdings.scenes[scene].groups
+def _kind(drawn: Drawn, scene: str) -> str:
+    groups = [experiment.group for experiment in drawn.of(scene)]
     if len(groups) > 1:
         return "several groups"
-    on_volume = results.holdings.groups[groups[0]].cells == "tetrahedron"
+    on_volume = EFFECTS.load(groups[0]).cells == "tetrahedron"
     return "tetrahedra" if on_volume else style.words(groups[0])
 
 

@@ -1,19 +1,21 @@
 """Decay of the singular values of the snapshot matrices."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 
+from pdrom.core.store import read_table
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from pdrom.view.multiples import label_outer, log_axis, small_multiples
-from study.artifact.reads import Published, TableOf
+from study.artifact.reads import ProjectFile, Settings, TableOf
 from study.figures.kit.declaration import figure
-from study.figures.kit.legends import group_looks
-from study.figures.kit.options import Beside, Columns, Experiments
-from study.figures.kit.results import NothingToDraw, Results, asked
+from study.figures.kit.options import Beside, Columns, Drawn, Experiments, NothingToDraw
 
 LOW, HIGH = 1e-17, 3.0
 PUBLISHED = "#B5B5B5"
+PUBLISHED_VALUES = "config/reference/published_code/singular_values.csv"
 REGION = "#F1EFEB"
 PUBLISHED_COLUMNS = ["experiment", "group", "component", "singular_value"]
 
@@ -30,34 +32,37 @@ class Options(Experiments, Columns, Beside):
         "the round-off of the projections and are noise. Grey lines are the output of the "
         "published code for the scene that comes closest."
     ),
-    reads=(TableOf("singular_values"), Published("singular_values")),
+    reads={
+        "drawn": Settings(Drawn),
+        "table": TableOf("singular_values"),
+        "published": ProjectFile(PUBLISHED_VALUES),
+    },
     options=Options,
 )
-def singular_values(results: Results, options: Options) -> Figure:
+def singular_values(options: Options, drawn: Drawn, table: pd.DataFrame, published: Path) -> Figure:
     """Draw a panel per experiment: singular values relative to the first one.
 
     Values that are pure round-off are hollow, and the region below the round-off is shaded.
     """
-    table = results.table("singular_values")
     pairs = [
-        (scene, group, rows.sort_values("component"))
-        for scene, group in results.experiments(options)
-        if len(rows := table[(table.scene == scene) & (table.group == group)])
+        (each, rows.sort_values("component"))
+        for each in drawn.experiments
+        if len(rows := table[(table.scene == each.scene) & (table.group == each.group)])
     ]
     if not pairs:
-        raise NothingToDraw(f"singular values of {asked(options)}")
-    looks = group_looks(results.holdings)
-    published = results.published_table("singular_values", PUBLISHED_COLUMNS)
+        raise NothingToDraw(f"singular values of {options.words()}")
+    looks = drawn.looks
+    output = read_table(published, PUBLISHED_COLUMNS, result=False)
     figure, axes = small_multiples(len(pairs), options.columns, legend_rows=2)
     reference_drawn = False
-    for ax, (scene, group, rows) in zip(axes, pairs, strict=True):
+    for ax, (each, rows) in zip(axes, pairs, strict=True):
         log_axis(ax, LOW, HIGH)
-        if published is not None and scene in options.published:
-            reference_drawn |= _draw_published(ax, published, options.published[scene], group)
-        _draw_values(ax, rows, looks[group])
-        ax.set_title(results.experiment_title(scene, group))
+        if experiment := options.published.get(each.scene):
+            reference_drawn |= _draw_published(ax, output, experiment, each.group)
+        _draw_values(ax, rows, looks[each.group])
+        ax.set_title(each.title)
     label_outer(axes, options.columns, "component", y="singular value / first")
-    _legend(figure, {group: looks[group] for _, group, _ in pairs}, reference_drawn)
+    _legend(figure, {each.group: looks[each.group] for each, _ in pairs}, reference_drawn)
     return figure
 
 

@@ -10,12 +10,19 @@ from pdrom.view.camera import Camera, Window, window_of
 from pdrom.view.mesh_render import set_window
 from pdrom.view.panels import fit_aspect
 from pdrom.view.read import BasisView, positions_at, read_basis
-from study.artifact.paths import BASIS, FULL_ORDER, MESH, SNAPSHOTS
-from study.artifact.reads import Chosen
+from study.artifact.paths import BASIS, MESH, SNAPSHOTS, TRAIN, File
+from study.artifact.reads import EachOf, Settings
 from study.figures.kit.declaration import figure
 from study.figures.kit.elements import SIGNED, ElementMap, element_map, signed, signed_entry
-from study.figures.kit.options import Count, Experiments, Instants, Methods, View
-from study.figures.kit.results import NothingToDraw, Results, asked
+from study.figures.kit.options import (
+    Count,
+    Drawn,
+    Experiments,
+    Instants,
+    Methods,
+    NothingToDraw,
+    View,
+)
 
 # inches: (left end, width, height) of the four matrices, whose upper ends are level
 BLOCKS = ((0.75, 1.6, 1.9), (2.8, 1.6, 1.9), (4.8, 0.85, 0.85), (6.0, 0.85, 0.85))
@@ -38,31 +45,37 @@ class Options(Experiments, Methods, Instants, Count, View):
         "the first modes on the mesh at rest: an element has the colour of one of its entries, "
         "whose axis and row are named, relative to the largest."
     ),
-    reads=(
-        Chosen(MESH, first=True),
-        Chosen(FULL_ORDER, first=True),
-        Chosen(SNAPSHOTS, first=True),
-        Chosen(BASIS, first=True),
-    ),
+    reads={
+        "drawn": Settings(Drawn),
+        "meshes": EachOf(MESH, "first_run"),
+        "full_order": EachOf(TRAIN, "first_run"),
+        "sets": EachOf(SNAPSHOTS, "first_run"),
+        "bases": EachOf(BASIS, "first_run"),
+    },
     options=Options,
 )
-def snapshots_and_modes(results: Results, options: Options) -> Figure:
+def snapshots_and_modes(
+    options: Options,
+    drawn: Drawn,
+    meshes: list[File],
+    full_order: list[File],
+    sets: list[File],
+    bases: list[File],
+) -> Figure:
     """Draw snapshots less their mean = modes x singular values x coefficients, as matrices.
 
     Below them columns of the first matrix, on the moving mesh, and of the second, on the mesh at
     rest; each is coloured by one of the entries that an element has, with its sign: the one that is
     largest somewhere. The first experiment and method that exist are drawn.
     """
-    found = results.holdings.first(options)
-    if found is None:
-        raise NothingToDraw(asked(options))
-    scene, group, method = found
-    path = results.path(BASIS, scene, group, method)
-    basis, snapshots = read_basis(path), load_snapshots(results.path(SNAPSHOTS, scene, group))
-    mesh = load_mesh(results.path(MESH, scene))
-    elements = element_map(group, mesh, snapshots.elements, source=str(path))
+    if not bases:
+        raise NothingToDraw(options.words())
+    experiment, path = drawn.experiments[0], bases[0].path
+    basis, snapshots = read_basis(path), load_snapshots(sets[0].path)
+    mesh = load_mesh(meshes[0].path)
+    elements = element_map(experiment.group, mesh, snapshots.elements, source=str(path))
     centred = snapshots.train.reshape(len(snapshots.train), -1).T - basis.mean[:, None]
-    frames, positions = positions_at(results.path(FULL_ORDER, scene), options.frames)
+    frames, positions = positions_at(full_order[0].path, options.frames)
     camera = options.camera
     taken = [int(np.argmin(np.abs(snapshots.frames["train"] - (f - 1)))) for f in frames]
     moving = _same_size([window_of(camera, [q], 0.04) for q in positions])
@@ -71,7 +84,7 @@ def snapshots_and_modes(results: Results, options: Options) -> Figure:
     heights = [_height(moving[0], len(frames)), _height(resting, count) if count else 0.3]
     total = ABOVE + BLOCKS[0][2] + sum(heights) + 2 * TITLE + FOOTER
     figure = style.new_figure(total, None)
-    _draw_product(figure, basis, centred, results.experiment_title(scene, group))
+    _draw_product(figure, basis, centred, experiment.title)
     bottom = total - ABOVE - BLOCKS[0][2] - TITLE - heights[0]
     axes = _row(figure, len(frames), bottom, heights[0], "snapshots\nless mean")
     for ax, k, q, window in zip(axes, taken, positions, moving, strict=True):

@@ -1,7 +1,6 @@
 """The preprint's reduction, a sound one and one that pays, in one scene at one instant."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -10,15 +9,13 @@ from pdrom.core.store import open_hdf5
 from pdrom.view import style
 from pdrom.view.artists import Figure
 from pdrom.view.panels import RunPanel
-from pdrom.view.read import positions_at
 from pdrom.view.run_rows import Row, draw_rows
-from study.artifact.paths import FULL_ORDER, SUBSPACES
-from study.artifact.reads import Chosen, TableOf
+from study.artifact.paths import SUBSPACES, File
+from study.artifact.reads import EachOf, TableOf
+from study.experiments.kit.settings import Horizon
 from study.figures.kit.declaration import figure
-from study.figures.kit.experiment_rows import RUNS, experiment_rows
-from study.figures.kit.floor import Floors
-from study.figures.kit.options import ReducedRuns
-from study.figures.kit.results import NothingToDraw, Results, asked
+from study.figures.kit.options import Drawn, Experiment, NothingToDraw, ReducedRuns
+from study.figures.runs import RUNS, Runs, experiment_rows
 
 TOLERANCE = "ecsw-1e-02"
 
@@ -39,44 +36,52 @@ class Options(ReducedRuns):
         "numbers of modes, errors are relative to the motion; the outline is the full order. "
         "A framed picture is drawn to the smaller scale given below it."
     ),
-    reads=(*RUNS, Chosen(SUBSPACES), TableOf("reduced_reruns")),
+    reads={
+        **RUNS,
+        "subspaces": EachOf(SUBSPACES, "drawn_subspaces"),
+        "errors": TableOf("reduced_reruns"),
+    },
     options=Options,
 )
-def teaser(results: Results, options: Options) -> Figure:
+def teaser(
+    options: Options,
+    drawn: Drawn,
+    horizon: Horizon,
+    subspaces: list[File],
+    errors: pd.DataFrame,
+    **files: list[File],
+) -> Figure:
     """Draw a row per experiment: the full order, a panel per method, a sampled subspace."""
-    experiments, floors = results.experiments(options), Floors(results)
-    if not experiments or not results.methods(options):
-        raise NothingToDraw(asked(options))
-    errors = results.table("reduced_reruns")
-    rows = [
-        _merged(results, options, experiment_rows(results, options, floors, *each), errors, each)
-        for each in experiments
-    ]
+    if not drawn.experiments or not drawn.methods:
+        raise NothingToDraw(options.words())
+    runs, rows = Runs(horizon, **files), []
+    for each in drawn.experiments:
+        found = experiment_rows(options, drawn, runs, each)
+        subspace = _subspace(options, runs, each, each.find(subspaces))
+        rows.append(_merged(drawn, each, found, errors, subspace))
     return draw_rows(rows, options.camera)
 
 
 def _merged(
-    results: Results,
-    options: Options,
+    drawn: Drawn,
+    experiment: Experiment,
     rows: list[Row],
     errors: pd.DataFrame,
-    experiment: tuple[str, str],
+    subspace: RunPanel | None,
 ) -> Row:
     """Rows of an experiment as one, its panels named by their methods."""
-    scene, group = experiment
-    first = rows[0]
+    scene, group, first = experiment.scene, experiment.group, rows[0]
     panels = first.panels[:1]
     if first.note is None:
         own = errors[(errors.scene == scene) & (errors.group == group)]
-        for method, row in zip(results.methods(options), rows, strict=True):
+        for method, row in zip(drawn.methods, rows, strict=True):
             found = own[(own.method == method) & (own.position_basis == "full")]
             panels += [_with_error(p, method, found, "r") for p in row.panels[1:]]
-    subspace = _subspace(results, options, scene)
     if subspace is not None:
         found = errors[(errors.scene == scene) & (errors.position_basis == "pod")]
         found = found[found.method == TOLERANCE]
         panels.append(_with_error(subspace, "ecsw", found, "k"))
-    label = f"{results.experiment_title(scene, group)}\n{first.label.splitlines()[-1]}"
+    label = f"{experiment.title}\n{first.label.splitlines()[-1]}"
     ghosts = np.repeat(first.ghosts[:1], len(panels), axis=0)
     windows = first.windows[:1] * len(panels)
     return replace(first, label=label, panels=panels, windows=windows, ghosts=ghosts)
@@ -90,14 +95,15 @@ def _with_error(panel: RunPanel, method: str, rows: pd.DataFrame, size: str) -> 
     return replace(panel, title=f"{method}, {size} = {number}", remark=remark)
 
 
-def _subspace(results: Results, options: Options, scene: str) -> RunPanel | None:
+def _subspace(
+    options: Options, runs: Runs, experiment: Experiment, path: str | None
+) -> RunPanel | None:
     """Panel of the run with sampled elements; None where a configuration has none of that size."""
-    path = results.path(SUBSPACES, scene)
     base = f"pod_k{options.modes:03d}"
-    if not Path(path).is_file():
+    if path is None:
         return None
     title, colour = f"k = {options.modes}", style.surface_colour(style.GREEN)
-    (frame,), _ = positions_at(results.path(FULL_ORDER, scene), options.frames[-1:])
+    (frame,), _ = runs.at(experiment, options.frames[-1:])
     with open_hdf5(path) as file:
         run = file["models"].get(f"{base}_{TOLERANCE}")
         if run is None:

@@ -15,8 +15,8 @@ from pdrom.core.store import read_table, read_text, require_intact, write_text
 from pdrom.core.yamlfile import describe
 from pdrom.view.text import replaced
 from study.artifact.files import Files
-from study.artifact.paths import PAPER_INPUT
-from study.artifact.reads import Given, Setting
+from study.artifact.paths import FIGURE, MACHINE, PAPER_INPUT, TABLE, File
+from study.artifact.reads import Every, One, ProjectFile, Setting, SourcesOf
 from study.paper.bibliography import bibliography
 from study.paper.figuretex import captions
 from study.paper.known import decisions, provenance
@@ -46,10 +46,10 @@ class Facts(BaseModel):
 
 
 def write_inputs(
-    source: list[str],
-    references: str,
-    tables: list[str],
-    machine: str,
+    source: list[Path],
+    references: Path,
+    tables: list[File],
+    machine: File,
     facts: Facts,
     outputs: Mapping[str, str],
 ) -> None:
@@ -61,17 +61,17 @@ def write_inputs(
     `NUMBERS` says of every ``\val`` key and TeX table where its numbers come from, and which blocks
     of each document are shown (`decisions`).
     """
-    texts = documents(Path(source[0]).parent)
+    texts = documents(source[0].parent)
     whole = "".join(texts.values())
-    data = {Path(path).stem: read_table(path) for path in tables}
-    data |= fact_tables(Path(machine), facts)
+    data = {table["name"]: read_table(table.path) for table in tables}
+    data |= fact_tables(Path(machine.path), facts)
     decided = {document: decisions(text, data) for document, text in texts.items()}
     known = provenance(decided, facts.part, facts.full_study)
     written = {"macros": macros(whole, data) + known, "figures": captions(facts.captions)}
     watched = {name: _Watched(data) for name in TEX_TABLES}
     written |= {name: make(watched[name]) for name, make in TEX_TABLES.items()}
     for document, text in texts.items():
-        written[document] = bibliography(text, Path(references))
+        written[document] = bibliography(text, references)
     origins = {
         "known": decided,
         "numbers": {key: asdict(number_of(key, data)) for key in keys_of(whole)},
@@ -118,9 +118,9 @@ def _machine_table(path: Path) -> pd.DataFrame:
 
 
 def build(
-    source: list[str],
-    figures: list[str],
-    inputs: list[str],
+    source: list[Path],
+    figures: list[File],
+    inputs: list[File],
     facts: Facts,
     outputs: Mapping[str, str],
 ) -> None:
@@ -129,14 +129,15 @@ def build(
     Each links into the other, as long as both lie in one folder. ``source`` and ``outputs`` are TeX
     and PDF of each, ``figures`` and ``inputs`` files that they read, with ``facts``.
     """
-    results = [Path(path) for path in (*figures, *inputs)]
+    results = [Path(file.path) for file in (*figures, *inputs)]
     for path in results:
         require_intact(path)
-    folder = Path(source[0]).parent
+    folder = source[0].parent
     made = {folder / f"{name}.tex": Path(outputs[name]) for name in DOCUMENTS}
     build_pdfs(made, sorted({path.parent for path in results}), PAGES)
 
 
+REFERENCES = "paper/references.bib"
 NUMBERS = "numbers.json"
 FILES = (
     NUMBERS, "macros.tex", "figures.tex", *(f"{document}.bbl" for document in DOCUMENTS),
@@ -146,16 +147,25 @@ paper_inputs = Files(
     "paper_inputs",
     "Numbers, tables and references of the manuscript",
     {
-        **dict.fromkeys(("source", "references", "tables", "machine"), Given()),
+        "source": SourcesOf("manuscript"),
+        "references": ProjectFile(REFERENCES),
+        "tables": Every(TABLE),
+        "machine": One(MACHINE),
         "facts": Setting("facts"),
     },
     {Path(name).stem: PAPER_INPUT.where(name=name) for name in FILES},
     write_inputs,
 )
+# its files lie where the configuration says, see `study.pipeline.folders`
 paper = Files(
     "paper",
     "Manuscript",
-    {**dict.fromkeys(("source", "figures", "inputs"), Given()), "facts": Setting("facts")},
+    {
+        "source": SourcesOf("manuscript"),
+        "figures": Every(FIGURE),
+        "inputs": Every(PAPER_INPUT),
+        "facts": Setting("facts"),
+    },
     {},
     build,
 )

@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from pdrom.view.text import escape
-from study.figures.kit.catalogue import declarations
+from study.figures.kit.declaration import declarations
 from study.paper.macros import format_number
 from study.paper.tabular import longtable, name, tabular
 

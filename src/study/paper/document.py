@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 from study.artifact.markup import to_plain
-from study.artifact.reads import Chosen, Every, Published, Read, Setting, TableOf
-from study.figures.kit.catalogue import declarations
+from study.artifact.reads import Every, ProjectFile, Read, TableOf
+from study.figures.kit.declaration import declarations
 from study.paper.figure_numbers import figure_numbers
 
 HEAD = """\
@@ -26,10 +26,10 @@ def figures_page(root: Path = Path()) -> str:
     for name, figure in declarations().items():
         number = f" ({numbers[name].words})" if numbers[name].words else ""
         keys = ", ".join(f"`{key}`" for key in figure.options.model_fields)
-        reads = ", ".join(dict.fromkeys(_words(read) for read in figure.reads.values()))
+        read = filter(None, map(_words, figure.reads.values()))
         parts.append(
             f"## `{name}`{number}\n\n**{_text(figure.title)}.**\n{_lines(figure.caption)}\n\n"
-            f"Keys: {keys}.\nReads: {reads}.\n"
+            f"Keys: {keys}.\nReads: {', '.join(dict.fromkeys(read))}.\n"
         )
     return "\n".join(parts)
 
@@ -47,14 +47,13 @@ def _text(marked: str) -> str:
     return re.sub(r"@([a-z_.]+)@", r"`\1`", words)
 
 
-def _words(read: Read) -> str:
+def _words(read: Read) -> str | None:
+    """Words for a table or files that are read; None for settings."""
     match read:
         case TableOf():
             return f"table `{read.name}`"
-        case Chosen() | Every():
+        case Every():
             return f"`{read.place.pattern}`"
-        case Published():
-            return f"`config/reference/published_code/{read.name}.csv`"
-        case Setting():
-            return f"`{read.key}`"
-    raise TypeError(f"{read}: no figure reads it")
+        case ProjectFile():
+            return f"`{read.path}`"
+    return None

@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from study.figures.kit.catalogue import declarations
+from study.figures.kit.declaration import declarations
 from study.paper.source import documents
 
 SUPPLEMENT = "S"  # before a number of the supplement

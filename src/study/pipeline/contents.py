@@ -4,13 +4,16 @@ What the labels of a kind can be follows from the scenes, their groups and the m
 A kind that only some of them have is listed here.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from pdrom.model.held_out import MOTIONS
 from study.artifact import paths
 from study.artifact.paths import Place
+from study.figures.kit.declaration import declarations
+from study.paper.build import FILES
 from study.pipeline.scenes import not_taken
 from study.pipeline.study import Study
+from study.tables import declared
 
 Labels = dict[str, str]
 Factors = dict[str, tuple[float, ...]]
@@ -112,7 +115,16 @@ _in_subspaces = [
     paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,
 ]  # fmt: skip
 
+
+def _named(names: Callable[[], Iterable[str]]) -> Callable[[Study], Iterator[Labels]]:
+    """Files that every study has, by their names."""
+    return lambda study: ({"name": name} for name in names())
+
+
 SOME: dict[Place, Callable[[Study], Iterator[Labels]]] = {
+    paths.TABLE: _named(declared),
+    **dict.fromkeys([paths.FIGURE, paths.FIGURE_PICTURE], _named(declarations)),
+    paths.PAPER_INPUT: _named(lambda: FILES),
     **dict.fromkeys(_in_subspaces, _subspaces),
     **dict.fromkeys([paths.SCALING, paths.BREAK_EVEN_SIZED, paths.EFFECTS_SIZED], _sizes),
     **dict.fromkeys(_online, lambda study: ({"scene": scene} for scene in study.online)),

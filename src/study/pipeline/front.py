@@ -65,7 +65,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
 def files_of(targets: Sequence[str], own: Folders) -> dict[str, list[str]]:
     """Files of the folders ``own`` to make for each of ``targets``, see `Names.files`."""
     # imported late: it loads the whole package
-    from study.figures.kit.catalogue import declarations
+    from study.figures.kit.declaration import declarations
     from study.pipeline.targets import Names
     from study.tables import declared
 

@@ -1,9 +1,10 @@
 """Whether a configuration is that of the full study."""
 
 from pdrom.core.yamlfile import read_yaml, validate
+from study.pipeline.folders import DEFAULT
 from study.pipeline.study import Study, StudySettings
 
-FULL_STUDY = "config/default.yaml"
+FULL_STUDY = DEFAULT
 
 
 def is_full(study: Study) -> bool:

@@ -102,24 +102,20 @@ def read_manifest(results: str) -> Manifest:
         raise StorageError(f"{path}: {fault}") from error
 
 
-def own_files(plan: Plan, folders: Folders) -> set[str]:
-    """Files in ``folders`` that a whole run of a study makes by ``plan``."""
-    return {
-        *folders.documents.values(), *plan.paper.files, *plan.table_paths,
-        *plan.figures, *(job.png for job in plan.figure_jobs.values()),
-        *plan.measured, *plan.page.outputs.values(), *plan.paper.article.outputs.values(),
-    }  # fmt: skip
+def own_files(plan: Plan) -> set[str]:
+    """Files that a whole run of a study makes by ``plan``."""
+    return {*plan.made, *plan.measured}
 
 
 def study_files(plan: Plan, folders: Folders) -> Iterator[str]:
     """Files on the disk that belong to a study: its own, and those that targets have requested."""
-    yield from (path for path in own_files(plan, folders) if Path(path).is_file())
+    yield from (path for path in own_files(plan) if Path(path).is_file())
     yield from asked_for(_visible(folders.results), plan, folders)
 
 
 def asked_for(found: Iterable[str], plan: Plan, folders: Folders) -> Iterator[str]:
     """Paths among ``found`` that a target may name and that are not the study's own files."""
-    own = own_files(plan, folders)
+    own = own_files(plan)
     scenes, methods = set(scene_names(plan.root)), set(plan.study.methods)
     for path in found:
         if path not in own and _is_target(path, folders.results, scenes, methods):

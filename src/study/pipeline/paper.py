@@ -1,4 +1,4 @@
-"""Jobs of the manuscript."""
+"""Facts of a study that the manuscript states beside its results."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,61 +6,36 @@ from typing import Any
 
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.view.text import require_typeset
-from study.article.build import article
-from study.artifact.paths import MACHINE, TABLE
-from study.artifact.reads import Paths, ProjectFile
-from study.paper.build import Facts, paper, paper_inputs
+from study.artifact.markup import to_tex
+from study.figures.kit.declaration import Declaration, declarations
+from study.paper.build import Facts
 from study.paper.source import source_files
-from study.pipeline.figures import FigureJob
-from study.pipeline.fingerprint import digest, fingerprint
+from study.pipeline.figures import words
 from study.pipeline.full import FULL_STUDY, is_full
-from study.pipeline.resolve import Job, listed
 from study.pipeline.study import Study
-from study.tables import declared
 from study.tables.claims import load_claims
 
+Labels = Mapping[str, str]
 Row = dict[str, Any]
-REFERENCES = "paper/references.bib"
 
 
 @dataclass(frozen=True)
-class PaperJobs:
-    """The manuscript: the job of the files that its source reads, its own, that of its pages."""
+class Manuscript:
+    """Files of the manuscript's source: both documents, then what they read."""
 
-    inputs: Job
-    manuscript: Job
-    article: Job
-
-    @property
-    def files(self) -> list[str]:
-        """Generated files that its source reads."""
-        return list(self.inputs.outputs.values())
-
-    @property
-    def sources(self) -> list[str]:
-        """Its source: both documents, then what they read."""
-        return listed(self.manuscript.inputs["source"])
+    sources: list[str]
 
 
-def paper_jobs(
-    study: Study,
-    figures: Mapping[str, FigureJob],
-    configuration: str,
-    results: str,
-    documents: dict[str, str],
-) -> PaperJobs:
-    """The manuscript of a study.
+def manuscript(study: Study, labels: Labels) -> Manuscript:
+    """Files of the manuscript's source below the root of ``study``."""
+    return Manuscript(source_files(study.root))
 
-    Parameters
-    ----------
-    figures : by name
-    configuration : what the study was read from, for a manuscript that is not of the full one
-    results : folder of the results
-    documents : files of the PDFs by the name of their source
-    """
-    facts = Facts(
-        captions={name: figure.tex for name, figure in figures.items()},
-        part=None if is_full(study) else configuration,
+
+def facts(study: Study, labels: Labels) -> Facts:
+    """Facts that the manuscript states beside results of ``study``."""
+    return Facts(
+        captions={name: _caption(study, figure) for name, figure in declarations().items()},
+        part=None if is_full(study) else study.configuration,
         full_study=FULL_STUDY,
         tables={
             "study": [_study(study)],
@@ -71,38 +46,11 @@ def paper_jobs(
             "scenes": [_scene(study, name) for name in study.scenes],
         },
     )
-    settings, code = {"facts": facts.model_dump(mode="json")}, fingerprint(paper.module)
-    sources = source_files(study.root)
-    read: dict[str, Paths] = {
-        "source": sources,
-        "references": REFERENCES,
-        "tables": [TABLE.at(results, name=name) for name in declared()],
-        "machine": MACHINE.at(results),
-    }
-    made = {name: place.at(results) for name, place in paper_inputs.writes.items()}
-    content = digest(study.root, *sources, REFERENCES)
-    inputs = Job(paper_inputs, {}, read, made, settings, content, code)
-    pictures = [figure.pdf for figure in figures.values()]
-    read = {"source": sources, "inputs": list(made.values()), "figures": pictures}
-    content = digest(study.root, *sources)
-    manuscript = Job(paper, {}, read, documents, settings, content, code)
-    given = {
-        **inputs.inputs,
-        **read,
-        "figures": [f for one in figures.values() for f in (one.pdf, one.png)],
-    }
-    return PaperJobs(inputs, manuscript, _article(study, given, settings, results))
 
 
-def _article(study: Study, given: Mapping[str, Paths], settings: Row, results: str) -> Job:
-    """The manuscript as pages; ``given`` is what the plan names of its inputs."""
-    edited = {name: r.path for name, r in article.files.items() if isinstance(r, ProjectFile)}
-    places = {name: place.at(results) for name, place in article.writes.items()}
-    content = digest(study.root, *listed(given["source"]), REFERENCES, *edited.values())
-    read = {**given, **edited}
-    added = {name: list(scenes) for name, scenes in study.settings.claim_sets.items()}
-    settings = {**settings, "added": added}
-    return Job(article, {}, read, places, settings, content, fingerprint(article.module))
+def _caption(study: Study, figure: Declaration) -> str:
+    title, caption = words(study, figure)
+    return f"{to_tex(title)}. {to_tex(caption)}"
 
 
 def check_texts(study: Study) -> None:
@@ -160,3 +108,6 @@ def _scene(study: Study, name: str) -> Row:
         "time_step": config.time_step,
         "vertex_mass": config.vertex_mass,
     }
+
+
+DERIVED = {"manuscript": manuscript, "facts": facts}

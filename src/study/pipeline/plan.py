@@ -3,23 +3,25 @@
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from pdrom.core.errors import ConfigurationError, PdromError
+from study.article.build import article
 from study.artifact.artifact import Artifact
 from study.artifact.logs import planning_log
-from study.artifact.paths import TABLE
 from study.artifact.reads import Labels
 from study.experiments.kit.declaration import experiments
+from study.figures.kit.declaration import declarations
 from study.live.page import live_page
+from study.paper.build import paper, paper_inputs
 from study.pipeline.contents import paths_of
-from study.pipeline.figures import FigureJob, figure_jobs
 from study.pipeline.folders import Folders
 from study.pipeline.full import FULL_STUDY
-from study.pipeline.paper import PaperJobs, check_texts, paper_jobs
+from study.pipeline.paper import check_texts
 from study.pipeline.resolve import Job, Resolver
 from study.pipeline.scenes import require_scenes
 from study.pipeline.study import Study, StudySettings
@@ -50,7 +52,7 @@ def load_plan(
     try:
         others = ", ".join(sorted({*names} - {FULL_STUDY})) or "the command line"
         with planning_log(quiet):
-            plan = Plan(Study.load(config, root, source), folders, others)
+            plan = Plan(Study.load(config, root, source, others), folders)
             plan.check()
         return plan
     except PdromError as error:
@@ -60,14 +62,11 @@ def load_plan(
 class Plan:
     """Everything that depends on the configuration and is needed to write the rules."""
 
-    def __init__(
-        self, study: Study, folders: Folders = OF_STUDY, configuration: str = FULL_STUDY
-    ) -> None:
+    def __init__(self, study: Study, folders: Folders = OF_STUDY) -> None:
         self.study = study
         self.root = study.root
         self.results = folders.results
         self.documents = folders.documents
-        self.configuration = configuration
         self.experiments = experiments()
         self.tables = declared()
         self._resolver = Resolver(study, folders.results)
@@ -78,7 +77,7 @@ class Plan:
         return self.study.settings
 
     def job(self, artifact: Artifact, labels: Labels = MappingProxyType({})) -> Job:
-        """Job of an experiment or table, ``artifact``, with these ``labels``."""
+        """Job of an ``artifact`` with these ``labels``."""
         return self._resolver.job(artifact, labels)
 
     def check(self) -> None:
@@ -88,10 +87,10 @@ class Plan:
         self._check_scenes(folder)
         check_subspaces(self.study)
         check_live(self.study)
-        self.figure_jobs  # noqa: B018 : every figure and text is checked
         check_texts(self.study)
         scaled_methods(self.study, {})
         self._check_tables()
+        self.fixed  # noqa: B018 : every figure and text is checked
 
     def _check_scenes(self, folder: Path) -> None:
         settings = self.settings
@@ -112,13 +111,6 @@ class Plan:
             except ConfigurationError as error:
                 raise ConfigurationError(f"table {table.name} reads {error}") from error
 
-    # Tables, figures and manuscript ---------------------------------------------------------
-
-    @property
-    def table_paths(self) -> list[str]:
-        """File of every table."""
-        return [TABLE.at(self.results, name=name) for name in self.tables]
-
     @property
     def measured(self) -> list[str]:
         """Every file that an experiment of the study writes."""
@@ -126,33 +118,28 @@ class Plan:
         return [path for place in places for path in paths_of(self.study, place, self.results)]
 
     @cached_property
-    def figure_jobs(self) -> dict[str, FigureJob]:
-        """Every figure by name."""
-        return figure_jobs(self.study, self.results)
+    def fixed(self) -> dict[str, list[Job]]:
+        """Jobs of tables, figures, pages and manuscript by the folder of their logs, in order."""
+        return {
+            "tables": [self.job(table) for table in self.tables.values()],
+            "figures": [self.job(figure) for figure in declarations().values()],
+            "article": [self.job(live_page), self.job(article)],
+            # the manuscript lies where the configuration has it
+            "paper": [self.job(paper_inputs), replace(self.job(paper), outputs=self.documents)],
+        }
+
+    @property
+    def made(self) -> list[str]:
+        """Every file of `fixed`."""
+        jobs = [job for jobs in self.fixed.values() for job in jobs]
+        return [path for job in jobs for path in job.outputs.values()]
+
+    @property
+    def table_paths(self) -> list[str]:
+        """File of every table."""
+        return [job.outputs["table"] for job in self.fixed["tables"]]
 
     @property
     def figures(self) -> list[str]:
         """PDF of every figure."""
-        return [figure.pdf for figure in self.figure_jobs.values()]
-
-    @property
-    def fixed(self) -> dict[str, list[Job]]:
-        """Jobs of tables, figures, page and manuscript by the folder of their logs, in order."""
-        return {
-            "tables": [self.job(table) for table in self.tables.values()],
-            "figures": [figure.job for figure in self.figure_jobs.values()],
-            "article": [self.page, self.paper.article],
-            "paper": [self.paper.inputs, self.paper.manuscript],
-        }
-
-    @property
-    def page(self) -> Job:
-        """The page on which models run."""
-        return self.job(live_page)
-
-    @cached_property
-    def paper(self) -> PaperJobs:
-        """The manuscript."""
-        return paper_jobs(
-            self.study, self.figure_jobs, self.configuration, self.results, self.documents
-        )
+        return [job.outputs["pdf"] for job in self.fixed["figures"]]

@@ -11,7 +11,7 @@ from study.artifact.paths import TABLE, Place
 from study.artifact.reads import Labels, Paths
 from study.pipeline.contents import labels_of
 from study.pipeline.fingerprint import digest, fingerprint
-from study.pipeline.study import Study
+from study.pipeline.study import Study, part_of
 from study.pipeline.values import DERIVED
 from study.tables import declared
 
@@ -133,17 +133,6 @@ class Resolver:
                 chosen[others] = labels
         return [place.at(self.results, **labels) for labels in chosen.values()]
 
-    def chosen(self, place: Place, first: bool) -> list[str]:
-        """Paths of ``place`` by the options of a figure; a study has none.
-
-        ``first`` limits them to the first of each experiment and method.
-        """
-        raise NotImplementedError
-
-    def published(self, name: str) -> list[str]:
-        """Tables ``name`` of the published code that the options of a figure ask for."""
-        raise NotImplementedError
-
     def table(self, name: str) -> str:
         """File of the table ``name``; ConfigurationError if there is no such table."""
         if name not in declared():
@@ -152,17 +141,11 @@ class Resolver:
 
     def value(self, key: str, labels: Labels) -> Any:
         """Value of the configuration by its ``key``, or one derived (`DERIVED`) for ``labels``."""
-        head, *parts = key.split(".")
-        if head in DERIVED:
-            value = DERIVED[head](self.study, labels)
-        else:
-            value, parts = self.study.settings, [head, *parts]
-        for part in parts:
-            if not hasattr(value, part):
-                known = choices(part, getattr(type(value), "model_fields", ()))
-                raise ConfigurationError(f"the key '{key}': unknown{known}")
-            value = getattr(value, part)
-        return value
+        head, _, parts = key.partition(".")
+        if head not in DERIVED:
+            return self.study.value(key)
+        value = DERIVED[head](self.study, labels)
+        return part_of(value, parts, key) if parts else value
 
     def per_scene(self, key: str) -> dict[str, Any]:
         """Value of ``key`` of every scene by its name."""

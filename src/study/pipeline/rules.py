@@ -4,13 +4,16 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from study.artifact.artifact import Artifact
+from study.artifact.markup import to_plain, to_rst
 from study.experiments.kit.declaration import Experiment
-from study.pipeline.figures import FigureJob
+from study.figures.kit.declaration import Declaration
+from study.paper.figure_numbers import Numbers, figure_numbers
+from study.pipeline.figures import words
 from study.pipeline.plan import Plan
 from study.pipeline.resolve import Job
+from study.tables.kit.declaration import Table
 
-KINDS = {"table": "tables", "figure": "figures", "article": "article", "paper": "paper"}
+UNNUMBERED = "–"
 
 
 @dataclass(frozen=True)
@@ -36,22 +39,10 @@ def rules(plan: Plan, cores: int) -> Iterator[Rule]:
     """Rule of every artifact of ``plan``; one that measures times claims all ``cores``."""
     for experiment in plan.experiments.values():
         yield _experiment(plan, experiment, cores)
-    for table in plan.tables.values():
-        labels = {"table": table.name, "title": table.title}
-        shown = {"table": {"category": "Tables", "labels": labels}}
-        yield _fixed(plan, plan.job(table), "table", f"Table {table.name}", shown)
-    for figure in plan.figure_jobs.values():
-        yield _figure(plan, figure)
-    page = plan.page
-    shown = {"out": {"category": "Page"}}
-    yield _fixed(plan, page, "article", f"Page {page.outputs['out']}", shown)
-    paper = plan.paper
-    yield _fixed(plan, paper.inputs, "paper", paper.inputs.artifact.title, {})
-    files = paper.manuscript.outputs
-    shown = {document: {"category": "Manuscript"} for document in files}
-    yield _fixed(plan, paper.manuscript, "paper", f"Manuscript {', '.join(files.values())}", shown)
-    pages = paper.article
-    yield _fixed(plan, pages, "article", pages.artifact.title, {"main": {"category": "Page"}})
+    numbers = figure_numbers(plan.root)
+    for folder, jobs in plan.fixed.items():
+        for job in jobs:
+            yield _fixed(plan, job, folder, numbers.get(job.artifact.name))
 
 
 def _experiment(plan: Plan, experiment: Experiment, cores: int) -> Rule:
@@ -84,37 +75,60 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> Rule:
     )
 
 
-def _figure(plan: Plan, figure: FigureJob) -> Rule:
-    # a PNG is what every browser shows
-    shown = {"caption": "../report/figure.rst", "category": figure.category}
-    rule = _fixed(
-        plan,
-        figure.job,
-        "figure",
-        f"Figure {figure.job.artifact.name}",
-        {"png": {**shown, "labels": figure.labels}},
-    )
-    rule.params["rst"] = figure.rst
-    return rule
-
-
-def _fixed(plan: Plan, job: Job, kind: str, message: str, shown: dict[str, dict[str, Any]]) -> Rule:
-    """Rule of a single job, without labels."""
-    artifact: Artifact = job.artifact
+def _fixed(plan: Plan, job: Job, folder: str, numbers: Numbers | None) -> Rule:
+    """Rule of a single job, without labels; ``numbers`` of a figure of its name."""
+    artifact = job.artifact
+    params = {
+        "artifact": artifact.address,
+        "settings": job.settings,
+        "content": job.content,
+        "code": job.code,
+    }
+    message, shown = _presented(job)
+    if isinstance(artifact, Declaration) and numbers is not None:
+        title, caption = words(plan.study, artifact)
+        params["rst"] = f"**{to_rst(title)}.** {to_rst(caption)}"
+        # a PNG is what every browser shows
+        shown = {"png": {"caption": "../report/figure.rst", **_figure(artifact, numbers)}}
     return Rule(
         name=artifact.rule,
         input=job.inputs,
         output=job.outputs,
-        log=f"{plan.results}/logs/{KINDS[kind]}/{artifact.name}.log",
+        log=f"{plan.results}/logs/{folder}/{artifact.name}.log",
         group="report",
         threads=1,
         resources={},
-        params={
-            "artifact": artifact.address,
-            "settings": job.settings,
-            "content": job.content,
-            "code": job.code,
-        },
+        params=params,
         message=message,
         shown=shown,
     )
+
+
+def _presented(job: Job) -> tuple[str, dict[str, dict[str, Any]]]:
+    """Message of a job, and what Snakemake's report shows of its outputs."""
+    artifact, paths = job.artifact, job.outputs
+    match artifact.name:
+        case _ if isinstance(artifact, Table):
+            labels = {"table": artifact.name, "title": artifact.title}
+            return f"Table {artifact.name}", {"table": {"category": "Tables", "labels": labels}}
+        case _ if isinstance(artifact, Declaration):
+            return f"Figure {artifact.name}", {}
+        case "live_page":
+            return f"Page {paths['out']}", {"out": {"category": "Page"}}
+        case "article":
+            return artifact.title, {"main": {"category": "Page"}}
+        case "paper":
+            shown = {document: {"category": "Manuscript"} for document in paths}
+            return f"Manuscript {', '.join(paths.values())}", shown
+    return artifact.title, {}
+
+
+def _figure(figure: Declaration, numbers: Numbers) -> dict[str, Any]:
+    """Category and labels of a figure in the report, which is sorted by the first label."""
+    own = {"paper": numbers.manuscript or UNNUMBERED, "name": figure.name}
+    title = {"title": to_plain(figure.title)}
+    if numbers.preprint is None:
+        labels = {"name": figure.name, "paper": own["paper"], **title}
+        return {"category": "Figures of this study", "labels": labels}
+    labels = {"preprint": str(numbers.preprint), **own, **title}
+    return {"category": "Figures of the preprint", "labels": labels}

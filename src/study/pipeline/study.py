@@ -12,6 +12,7 @@ from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.names import SceneName
 from pdrom.core.yamlfile import ConfigModel, validate
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
+from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
@@ -31,6 +32,9 @@ from study.experiments.sensitivity import Sensitivity
 from study.experiments.stability import Stability
 from study.experiments.subspaces import Online, Subspace
 from study.experiments.timing import Timing
+from study.figures.kit.declaration import load_choices
+from study.figures.kit.options import Options
+from study.pipeline.folders import DEFAULT
 from study.pipeline.scenes import (
     Changes,
     Coarsen,
@@ -106,9 +110,11 @@ class StudySettings(ConfigModel):
 class Study:
     """Settings with the scenes and methods that they name, all checked."""
 
-    def __init__(self, settings: StudySettings, root: Path) -> None:
+    def __init__(self, settings: StudySettings, root: Path, configuration: str = DEFAULT) -> None:
+        """Take checked ``settings``; ``configuration`` names what they were read from."""
         self.settings = settings
         self.root = root
+        self.configuration = configuration
         self.titles: dict[str, str] = {}  # for what prints them
         self.vertices: dict[str, int] = {}
         self.bound: dict[str, Scene] = {
@@ -126,9 +132,12 @@ class Study:
         cls,
         config: dict[str, Any],
         root: Path | str = ".",
-        source: str = "configuration (config/default.yaml)",
+        source: str = f"configuration ({DEFAULT})",
+        configuration: str = DEFAULT,
     ) -> "Study":
         """Study of a (merged) ``config`` below ``root``; ``source`` opens the messages about it.
+
+        ``configuration`` names what it was read from for readers of the manuscript.
 
         Raises
         ------
@@ -136,7 +145,17 @@ class Study:
             Naming file, key, value and what is allowed, before anything is computed.
         """
         settings = validate(StudySettings, config, source)
-        return cls(settings, Path(root))
+        return cls(settings, Path(root), configuration)
+
+    @cached_property
+    def figures(self) -> dict[str, Options]:
+        """Options of every figure, see config/figures.yaml."""
+        known = {"methods": self.every_method, "groups": EFFECTS, "scenes": scene_names(self.root)}
+        return load_choices(self.root / "config" / "figures.yaml", known)
+
+    def value(self, key: str) -> Any:
+        """Value of the configuration by its ``key``; ConfigurationError if there is none."""
+        return part_of(self.settings, key, key)
 
     @cached_property
     def every_method(self) -> dict[str, MethodSpec]:
@@ -224,3 +243,19 @@ class Study:
             if name not in known:
                 raise ConfigurationError(f"{key}: unknown method '{name}'{choices(name, known)}")
         return {name: known[name] for name in names}
+
+
+def part_of(value: Any, parts: str, key: str) -> Any:
+    """Part of a ``value`` that ``parts`` names, with dots between them.
+
+    Raises
+    ------
+    ConfigurationError
+        There is none; ``key`` is named.
+    """
+    for part in parts.split("."):
+        if not hasattr(value, part):
+            known = choices(part, getattr(type(value), "model_fields", ()))
+            raise ConfigurationError(f"the key '{key}': unknown{known}")
+        value = getattr(value, part)
+    return value

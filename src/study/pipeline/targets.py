@@ -9,6 +9,7 @@ from typing import Protocol
 from pdrom.core.errors import ConfigurationError, StorageError
 from study.artifact import paths
 from study.artifact.paths import RESULTS, Place
+from study.figures.kit.declaration import declarations
 from study.pipeline.figure_command import WORD
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
@@ -128,7 +129,7 @@ def _suggestion(value: str, allowed: Iterable[str]) -> str:
 
 def known(plan: Plan) -> Known:
     """Collect the names and files of a plan's study."""
-    study, names = plan.study, Names(list(plan.figure_jobs), declared())
+    study, names = plan.study, Names(declarations(), declared())
 
     def mesh(scene: str) -> str:
         return read_scene(study.root, scene, study.settings.changes).mesh.identifier

@@ -17,6 +17,7 @@ from study.experiments.kit.settings import Horizon, Rank
 from study.experiments.live import JOINT, JointRows, OfScene
 from study.experiments.repetitions import Repeated
 from study.experiments.stability import Stability
+from study.pipeline import figures, paper
 from study.pipeline.contents import labels_of
 from study.pipeline.study import Study
 
@@ -142,6 +143,8 @@ def _heldout_ranks(study: Study, labels: Labels) -> tuple[Rank, ...]:
 
 
 DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
+    **figures.DERIVED,
+    **paper.DERIVED,
     "scene": _scene,
     "title": _title,
     "mesh": _mesh,

@@ -11,7 +11,7 @@ import pandas as pd
 from pdrom.core.errors import StorageError
 from pdrom.core.store import Condition, check_file, read_table
 from study.artifact.paths import TABLE
-from study.pipeline.figures import FigureJob
+from study.pipeline.resolve import Job
 from study.tables import declared
 from study.tables.claims import is_timed, load_claims
 from study.verification.again import is_derived, made
@@ -163,20 +163,21 @@ class Examination:
     def _figures(self, tables: list[Line]) -> list[Line]:
         by_name = {line.name: line for line in tables}
         return [
-            self._figure(name, job, by_name) for name, job in self.subject.plan.figure_jobs.items()
+            self._figure(job.artifact.name, job, by_name)
+            for job in self.subject.plan.fixed["figures"]
         ]
 
-    def _figure(self, name: str, figure: FigureJob, tables: Mapping[str, Line]) -> Line:
-        missing = self._missing("figure", name, [figure.pdf, figure.png])
+    def _figure(self, name: str, figure: Job, tables: Mapping[str, Line]) -> Line:
+        missing = self._missing("figure", name, list(figure.outputs.values()))
         if missing is not None:
             return missing
         paths = {TABLE.at(self.subject.results, name=table): table for table in declared()}
-        read = [paths[path] for path in figure.job.files if path in paths]
+        read = [paths[path] for path in figure.files if path in paths]
         bad = [tables[table] for table in read if tables[table].outcome not in GOOD]
         if bad:
             text = f"reads the table(s) {', '.join(line.name for line in bad)}"
             return Line("figure", name, bad[0].outcome, text)
-        files = [path for path in _results(figure.job.files) if path not in paths]
+        files = [path for path in _results(figure.files) if path not in paths]
         for path in files:
             if self.condition(path) is not Condition.INTACT:
                 text = f"{path}, which it reads, is not there or damaged"

@@ -45,7 +45,7 @@ def verify_files(subject: Subject) -> Status:
 def _compare(subject: Subject, manifest: Manifest) -> Status:
     plan, folders = subject.plan, subject.folders
     entries = {_normal(subject.results, name): entry for name, entry in manifest.files.items()}
-    own = own_files(plan, folders)
+    own = own_files(plan)
     ours = own | set(asked_for(entries, plan, folders))
     faults = {path: _fault(path, entry, path in ours) for path, entry in entries.items()}
     faults |= {path: _unlisted(path) for path in sorted(own - set(entries))}

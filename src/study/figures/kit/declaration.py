@@ -1,64 +1,52 @@
 """Declaration of a figure: title, caption, reads, and the function that draws it.
 
-A module of `study.figures` holds one figure, a function under its declaration::
+A figure is a function under its declaration in a module of `study.figures`::
 
     @figure(
         title="Rest shapes",
         caption="Vertices of each mesh.",
-        reads=(Chosen(MESH),),
+        reads={"drawn": Settings(Drawn), "meshes": EachOf(MESH, "experiments")},
         options=Scenes,
     )
-    def rest_shapes(results: Results, options: Scenes) -> Figure: ...
+    def rest_shapes(options: Scenes, drawn: Drawn, meshes: list[File]) -> Figure: ...
 """
 
-from collections.abc import Callable, Mapping
+import logging
+import os
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, JsonValue
-
+from pdrom.core.errors import ConfigurationError, choices
+from pdrom.core.store import atomic_path
+from pdrom.core.yamlfile import read_yaml, validate
+from pdrom.view import style
 from pdrom.view.artists import Figure
-from study.artifact.artifact import Artifact
-from study.artifact.paths import FIGURE, FIGURE_PICTURE, TABLE
-from study.artifact.reads import Chosen, Every, Published, Setting, TableOf
-from study.figures.kit.holdings import Holdings
-from study.figures.kit.options import Options
-from study.figures.kit.results import Results
+from study.artifact.artifact import Artifact, declare, declared_in
+from study.artifact.markup import to_plain
+from study.artifact.paths import FIGURE, FIGURE_PICTURE
+from study.artifact.reads import Labels, Paths, Read, Setting, Sources
+from study.figures.kit.options import NothingToDraw, Options
 
-FigureRead = TableOf | Chosen | Every | Published | Setting
-OptionsT = TypeVar("OptionsT", bound=Options)
+log = logging.getLogger(__name__)
 
-
-class Order(BaseModel):
-    """Settings of a drawing: the figure's title and options, and the contents of the configuration.
-
-    published : folder with the published code's output, None where none of it is drawn
-    full : whether the configuration is that of the full study
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    title: str
-    options: dict[str, JsonValue]
-    holdings: Holdings
-    settings: dict[str, float]
-    published: str | None
-    full: bool
+PACKAGE = "study.figures"
+PNG_DPI = 200
+RASTER_DPI = 300  # of rasterised artists inside a PDF
+ELSEWHERE = "the full study (config/default.yaml) draws it"
 
 
 @dataclass(frozen=True)
 class Declaration(Artifact):
     """A figure, named as the function that draws it.
 
-    The function gets the ``results`` of the study and its own ``options``. It raises
-    `NothingToDraw` where the configuration holds nothing of what the figure shows, StorageError
-    for a file that is missing or damaged.
+    The function gets its ``options`` and what it reads. It raises `NothingToDraw` where the
+    configuration holds nothing of what the figure shows, StorageError for a file that is damaged.
 
-    title, caption : in light mark-up (`study.artifact.markup`); ``{key}`` stands for a setting
-        of the configuration that the figure reads
-    reads : everything that its function may read; of `Every` kind of file, those of the scenes and
-        groups that its options choose, where the configuration holds them
+    title, caption : in light mark-up (`study.artifact.markup`); ``{key}`` in a caption stands for
+        a setting of the configuration
     options : what a user may choose in config/figures.yaml, with the defaults
     number : number in the preprint that is reproduced; None for a figure of this study
     """
@@ -72,45 +60,137 @@ class Declaration(Artifact):
         """Name of the rule that makes it."""
         return f"figure_{self.name}"
 
+    def inputs(self, sources: Sources, labels: Labels) -> dict[str, Paths]:
+        """Paths by name; the figure's own name is a label, by which its options are found."""
+        return super().inputs(sources, {**labels, "figure": self.name})
+
+    def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
+        """Typed settings by name, see `inputs`."""
+        return super().settings(sources, {**labels, "figure": self.name})
+
     def perform(
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
     ) -> None:
         """Draw the figure in a job and write both of its files."""
-        # imported late: a plan needs no plotting library
-        from study.figures.kit.output import draw_figure, write_figure
+        drawn = self.draw(**self.read(settings, inputs))
+        write_figure(drawn, to_plain(self.title), outputs["pdf"], png=outputs["png"])
 
-        order = Order.model_validate(settings["order"])
-        published = Path(order.published) if order.published else None
-        read = Results(self._folder(inputs), order.holdings, order.settings, published=published)
-        drawn = draw_figure(self, read, self.options.model_validate(order.options), full=order.full)
-        write_figure(drawn, order.title, outputs["pdf"], png=outputs["png"])
+    def draw(self, **read: Any) -> Figure:
+        """Draw the figure from what it reads, or a note where that holds nothing of it.
 
-    def _folder(self, inputs: Mapping[str, Any]) -> str:
-        """Folder of the results, which the inputs lie in; empty without any."""
-        for name, read in self.files.items():
-            paths = [inputs[name]] if isinstance(inputs[name], str) else list(inputs[name])
-            place = TABLE if isinstance(read, TableOf) else getattr(read, "place", None)
-            if paths and place is not None:
-                return str(Path(paths[0]).parents[place.pattern.count("/")])
-        return ""
+        Raises
+        ------
+        StorageError
+            A file is missing or damaged.
+        """
+        with style.look():
+            try:
+                return self.function(**read)
+            except NothingToDraw as nothing:
+                log.info("figure %s: %s", self.name, nothing)
+                return style.note(f"no data in this configuration: {nothing}\n{ELSEWHERE}")
 
 
 def figure(
     *,
     title: str,
     caption: str,
-    reads: tuple[FigureRead, ...],
-    options: type[OptionsT],
+    reads: Mapping[str, Read],
+    options: type[Options],
     number: int | None = None,
-) -> Callable[[Callable[[Results, OptionsT], Figure]], Declaration]:
-    """Declare the function below as a figure."""
+) -> Callable[[Callable[..., Figure]], Declaration]:
+    """Declare the function below as a figure; it gets ``options``, and what it reads by name.
 
-    def declare(function: Callable[[Results, OptionsT], Figure]) -> Declaration:
+    Raises
+    ------
+    TypeError
+        If the function does not take what it reads.
+    """
+
+    def decorate(function: Callable[..., Figure]) -> Declaration:
         name = function.__name__
         writes = {"pdf": FIGURE.where(name=name), "png": FIGURE_PICTURE.where(name=name)}
-        named = {f"read{i}": read for i, read in enumerate(reads)}
-        return Declaration(
-            name, title, named, writes, function, caption=caption, options=options, number=number
+        given = {"options": Setting("options"), **reads}
+        made = Declaration(
+            name, title, given, writes, function, caption=caption, options=options, number=number
         )
+        return declare(made)
 
-    return declare
+    return decorate
+
+
+def write_figure(
+    figure: Figure,
+    title: str,
+    pdf: str | os.PathLike[str],
+    png: str | os.PathLike[str],
+    with_checksum: bool = True,
+) -> None:
+    """Write ``figure`` as ``pdf`` (embedded TrueType fonts, no dates) and as its twin ``png``.
+
+    The PDF has a ``title``; both are the same bytes every time.
+
+    Either file appears only when complete. ``with_checksum`` as in `pdrom.core.store.atomic_path`.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    FigureCanvasAgg(figure)
+    document = {"Title": title, "Creator": "pdrom", "CreationDate": None, "ModDate": None}
+    with style.look():
+        with atomic_path(Path(pdf), with_checksum) as temporary:
+            figure.savefig(temporary, format="pdf", dpi=RASTER_DPI, metadata=document)
+        with atomic_path(Path(png), with_checksum) as temporary:
+            figure.savefig(temporary, format="png", dpi=PNG_DPI, metadata={"Title": title})
+
+
+@cache
+def declarations() -> dict[str, Declaration]:
+    """Every figure by name: those of the preprint by their number there, then the others by name.
+
+    Raises
+    ------
+    ConfigurationError
+        Two figures have the same number.
+    """
+    found = declared_in(PACKAGE, Declaration)
+    numbers = [made.number for made in found.values() if made.number is not None]
+    for number in numbers:
+        if numbers.count(number) > 1:
+            raise ConfigurationError(f"{PACKAGE}: two figures have the number {number}")
+    last = len(found) + max(numbers, default=0)
+    return dict(sorted(found.items(), key=lambda item: (item[1].number or last, item[0])))
+
+
+def load_choices(path: Path, known: Mapping[str, Collection[str]]) -> dict[str, Options]:
+    """Options of every figure: its defaults, and what ``path`` (config/figures.yaml) chooses.
+
+    Parameters
+    ----------
+    known : names that options may hold, by their key (scenes, groups, methods)
+
+    Raises
+    ------
+    ConfigurationError
+        Unknown figure, a key that the figure does not have, a value outside its range, or a name
+        that is not ``known``.
+    """
+    content = read_yaml(path)
+    content = {} if content is None else content
+    if not isinstance(content, dict):
+        raise ConfigurationError(f"{path}: a mapping of figure names is required")
+    figures = declarations()
+    for name in content:
+        if name not in figures:
+            raise ConfigurationError(f"{path}: unknown figure '{name}'{choices(name, figures)}")
+    chosen = {
+        name: validate(figure.options, content.get(name, {}), f"{path}: {name}")
+        for name, figure in figures.items()
+    }
+    for name, options in chosen.items():
+        for key, allowed in known.items():
+            asked = options.names(key)
+            for each in (*asked, *options.names("published")) if key == "scenes" else asked:
+                if each not in allowed:
+                    place = f"{path}: {name}.{key} = '{each}'"
+                    raise ConfigurationError(f"{place}: unknown{choices(each, allowed)}")
+    return chosen

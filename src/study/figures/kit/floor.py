@@ -1,33 +1,39 @@
 """Sensitivity floors and horizons of the scenes that a figure draws."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pdrom.core.store import read_table
-from study.artifact.paths import SENSITIVITY
-from study.artifact.reads import Chosen, Setting
+from study.artifact.paths import SENSITIVITY, File
+from study.artifact.reads import EachOf, Read, Setting
 from study.experiments.kit.horizon import floor_of, horizon
-from study.figures.kit.results import Results
+from study.experiments.kit.settings import Horizon
 
 # What a figure with sensitivity floors reads.
-FLOORS = (
-    Chosen(SENSITIVITY), Setting("sensitivity.reference"), Setting("sensitivity.threshold"),
-)  # fmt: skip
+FLOORS: dict[str, Read] = {
+    "sensitivity": EachOf(SENSITIVITY, "experiments"),
+    "horizon": Setting("horizon"),
+}
 COLUMNS = ["scene", "perturbation", "frame", "relative_difference"]
 
 
 class Floors:
     """Floor and horizon of a scene at the study's reference perturbation.
 
+    Parameters
+    ----------
+    sensitivity : table of the perturbed runs of each scene
+
     Raises
     ------
     StorageError
-        The file of a scene that is asked for is missing or lacks a column.
+        The file of a scene that is asked for is damaged or lacks a column.
     """
 
-    def __init__(self, results: Results) -> None:
-        self.perturbation = results.settings["sensitivity.reference"]
-        self.threshold = results.settings["sensitivity.threshold"]
-        self._results = results
+    def __init__(self, sensitivity: Sequence[File], horizon: Horizon) -> None:
+        self.perturbation, self.threshold = horizon.perturbation, horizon.threshold
+        self._paths = {file["scene"]: file.path for file in sensitivity}
         self._floors: dict[str, np.ndarray] = {}
 
     def of(self, scene: str) -> np.ndarray:
@@ -36,7 +42,7 @@ class Floors:
         It is empty without perturbed runs.
         """
         if scene not in self._floors:
-            table = read_table(self._results.path(SENSITIVITY, scene), COLUMNS)
+            table = read_table(self._paths[scene], COLUMNS)
             self._floors[scene] = floor_of(table, scene, self.perturbation)
         return self._floors[scene]
 

@@ -1,12 +1,11 @@
-"""Looks of groups and methods, and legends of several blocks, each with a title."""
+"""Legends of methods, and legends of several blocks, each with a title."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pdrom.view import style
 from pdrom.view.artists import Artist, Line2D, SubFigure
-from study.figures.kit.holdings import Holdings
-from study.figures.kit.results import Results
+from study.figures.kit.options import Drawn
 
 LINE = 0.145  # inches, of a line of text
 _GAP = 0.06  # inches, between rows of blocks
@@ -38,17 +37,11 @@ def draw_legend(figure: SubFigure, blocks: Sequence[Block], columns: int) -> Non
         top -= (LINE * (1.3 + max(len(entries) for _, entries in row)) + _GAP) / height
 
 
-def group_looks(holdings: Holdings) -> dict[str, tuple[str, str]]:
-    """(colour, marker) of every constraint group of ``holdings``, in the order of the groups."""
-    held = sorted(holdings.groups.items(), key=lambda item: item[1].place)
-    return {name: style.GROUP_LOOKS[group.place % len(style.GROUP_LOOKS)] for name, group in held}
-
-
 def method_handles(
-    results: Results, styles: Mapping[str, tuple[str, str]], **common: Any
+    drawn: Drawn, styles: Mapping[str, tuple[str, str]], **common: Any
 ) -> list[Line2D]:
-    """Entries of a legend: methods in their ``styles``, titled by ``results``; ``common`` looks."""
+    """Entries of a legend: methods in their ``styles``, titled by ``drawn``; ``common`` looks."""
     return [
-        style.handle(results.method_title(method), color=colour, marker=marker, **common)
+        style.handle(drawn.title(method), color=colour, marker=marker, **common)
         for method, (colour, marker) in styles.items()
     ]

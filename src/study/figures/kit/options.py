@@ -1,11 +1,17 @@
-"""Options of figures: the keys that several of them share."""
+"""Options of a figure, and the part of the study that it draws."""
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from pydantic import Field
+import pandas as pd
+from pydantic import BaseModel, ConfigDict, Field
 
 from pdrom.core.yamlfile import ConfigModel
+from pdrom.model.effects import EFFECTS
+from pdrom.view import style
 from pdrom.view.camera import Camera
+from pdrom.view.text import plain_words
+from study.artifact.paths import File
 
 Rank = Annotated[int, Field(ge=0)] | Literal["full"]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -13,16 +19,33 @@ Split = Literal["train", "test", "heldout"]
 Names = tuple[str, ...]
 
 
+class NothingToDraw(Exception):
+    """A configuration holds nothing of what a figure shows; the message names what is missing."""
+
+
 class Options(ConfigModel):
     """A figure without a choice; the others add keys.
 
-    Whatever a configuration does not hold is left out of the picture, and an empty list of names
-    means all there is.
+    Whatever a configuration does not hold is left out of the picture. An empty list of names means
+    all there is, as does a list of which a configuration holds no scene.
     """
 
     def names(self, key: str) -> Names:
         """Chosen names under ``key``; empty where the figure has no such choice."""
         return getattr(self, key, ())
+
+    def words(self) -> str:
+        """Words for what is chosen."""
+        scenes = ", ".join(self.names("scenes")) or "any scene"
+        methods = ", ".join(self.names("methods"))
+        return f"{scenes} with {methods}" if methods else scenes
+
+    def rows(self, table: pd.DataFrame) -> pd.DataFrame:
+        """Rows of ``table`` of the scenes and methods that are chosen, or of all."""
+        for key, column in (("scenes", "scene"), ("methods", "method")):
+            if names := self.names(key):
+                table = table[table[column].isin(names)]
+        return table
 
 
 class Scenes(Options):
@@ -97,3 +120,109 @@ class Reconstruction(Experiments, Methods, Splits, Columns, Beside):
 
 class ReducedRuns(Experiments, Methods, Ranks, Instants, View):
     """Full-order runs beside reduced ones."""
+
+
+class _Plain(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Experiment(_Plain):
+    """A constraint group that is reduced in a scene.
+
+    mesh : identifier of the scene's mesh
+    only : whether the scene reduces no other group
+    """
+
+    scene: str
+    group: str
+    mesh: str
+    only: bool
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """Code of the group, which says where its elements lie."""
+        return (EFFECTS[self.group],)
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Labels of its files."""
+        return {"scene": self.scene, "group": self.group, "mesh": self.mesh}
+
+    @property
+    def title(self) -> str:
+        """Words for a panel; the group is named only where the scene reduces several."""
+        name = self.scene.replace("_", " ")
+        return name if self.only else f"{name}: {self.group.replace('_', ' ')}"
+
+    def find(self, files: Sequence[File], **labels: str) -> str | None:
+        """Path of the first of ``files`` that belongs to it, and has further ``labels``."""
+        own = self.labels | labels
+        found = (f.path for f in files if all(own.get(k, v) == v for k, v in f.labels.items()))
+        return next(found, None)
+
+    def path(self, files: Sequence[File], **labels: str) -> str:
+        """`find` among ``files`` that hold one for each experiment; LookupError if they do not."""
+        path = self.find(files, **labels)
+        if path is None:
+            raise LookupError(f"no file of {self.labels | labels}")
+        return path
+
+
+class Reduction(_Plain):
+    """A reduction method: its title, and what it samples (`MethodSpec.rows`)."""
+
+    title: str
+    rows: str
+
+
+class Drawn(_Plain):
+    """Part of a study that a figure draws: what its options choose and the study holds.
+
+    experiments, reductions : in the order asked for; methods by name
+    groups : all constraint groups of the model, whose order decides their colours
+    """
+
+    experiments: tuple[Experiment, ...]
+    reductions: dict[str, Reduction]
+    groups: tuple[str, ...]
+
+    @property
+    def scenes(self) -> list[str]:
+        """Scenes in which a group is reduced."""
+        return list(dict.fromkeys(experiment.scene for experiment in self.experiments))
+
+    @property
+    def methods(self) -> list[str]:
+        """Names of the methods."""
+        return list(self.reductions)
+
+    @property
+    def looks(self) -> dict[str, tuple[str, str]]:
+        """(colour, marker) of every constraint group."""
+        looks = style.GROUP_LOOKS
+        return {group: looks[place % len(looks)] for place, group in enumerate(self.groups)}
+
+    def of(self, scene: str) -> list[Experiment]:
+        """Experiments of a scene."""
+        return [experiment for experiment in self.experiments if experiment.scene == scene]
+
+    def title(self, method: str) -> str:
+        """Title of a method, ready to be drawn; its name where it is not held."""
+        held = self.reductions.get(method)
+        return plain_words(held.title if held else method)
+
+    def scenes_of(self, table: pd.DataFrame, nothing: str) -> list[str]:
+        """Scenes that have a row in ``table``; without any, `NothingToDraw`.
+
+        nothing : its message
+        """
+        scenes = [scene for scene in self.scenes if (table.scene == scene).any()]
+        if not scenes:
+            raise NothingToDraw(nothing)
+        return scenes
+
+    def rows(self, table: pd.DataFrame) -> pd.DataFrame:
+        """Rows of ``table`` of the experiments and methods."""
+        pairs = pd.MultiIndex.from_frame(table[["scene", "group"]])
+        held = pairs.isin([(each.scene, each.group) for each in self.experiments])
+        return table[held & table.method.isin(self.methods)]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from study.artifact.markup import to_plain
 from study.artifact.paths import FIGURE, RESULTS, TABLE
-from study.figures.kit.catalogue import declarations
+from study.figures.kit.declaration import declarations
 from study.paper.macros import keys_of
 from study.paper.source import source_files
 from study.pipeline.figure_command import PREPRINT

@@ -7,7 +7,7 @@ import json
 import os
 import re
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from functools import cache
 from html.parser import HTMLParser
@@ -28,6 +28,7 @@ from study.article.build import ASSETS, FOLDER, PAGES, article
 from study.article.latex import linked_table, plain_columns
 from study.article.tables import FACTS
 from study.article.verified import write_verified
+from study.artifact.paths import File
 from study.paper.build import Facts
 from study.paper.figuretex import captions
 from study.paper.known import provenance
@@ -167,21 +168,26 @@ def write_study(folder: Path) -> dict[str, object]:
         with atomic_path(folder / "figures" / f"{name}.png") as path:
             Image.new("RGB", (40, 20), "white").save(path, "PNG")
     return {
-        "source": [str(folder / "paper" / "main.tex")],
-        "references": str(ROOT / "paper" / "references.bib"),
-        "tables": [str(folder / "tables" / f"{name}.csv") for name in tables],
-        "machine": str(folder / "machine.json"),
-        "inputs": [str(folder / "inputs" / n) for n in ("numbers.json", "tab_payoff.tex")],
-        "figures": [
-            str(folder / "figures" / f"{name}.{end}")
-            for name in facts.captions
-            for end in ("pdf", "png")
+        "source": [folder / "paper" / "main.tex"],
+        "references": ROOT / "paper" / "references.bib",
+        "tables": named(folder / "tables", [f"{name}.csv" for name in tables]),
+        "machine": File(str(folder / "machine.json"), {}),
+        "inputs": [
+            File(str(folder / "inputs" / name), {"name": name})
+            for name in ("numbers.json", "tab_payoff.tex")
         ],
+        "figures": named(folder / "figures", [f"{name}.pdf" for name in facts.captions]),
+        "pictures": named(folder / "figures", [f"{name}.png" for name in facts.captions]),
         "facts": facts,
         "claims": folder / "claims.yaml",
         "added": {"own": ["compiled"]},
         **{name: ROOT / FOLDER / file for name, file in ASSETS.items()},
     }
+
+
+def named(folder: Path, names: Iterable[str]) -> list[File]:
+    """Files of a folder, each with its name as its label."""
+    return [File(str(folder / name), {"name": Path(name).stem}) for name in names]
 
 
 def write_pages(given: dict[str, object], out: Path) -> Path:

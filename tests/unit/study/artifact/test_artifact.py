@@ -13,7 +13,6 @@ from pdrom.core.yamlfile import ConfigModel
 from study.artifact.artifact import Artifact, declare, declared_in, load, make, modules_in, normal
 from study.artifact.paths import File, Place
 from study.artifact.reads import (
-    Chosen,
     EachOf,
     Every,
     PerScene,
@@ -76,9 +75,6 @@ class Sources:
     def first(self, place, label, value):
         return [place.at("r", scene="s", **{label: value})]
 
-    def chosen(self, place, first):
-        return self.files(place, {})[: 1 if first else None]
-
     def table(self, name):
         return f"r/tables/{name}.csv"
 
@@ -129,7 +125,6 @@ def test_faulty_settings_are_refused(settings, tmp_path):
         (GROUP, "r/b/s/g.csv"),
         (Every(SCENE), ["r/a/s.csv", "r/a/t.csv"]),
         (Preferred(GROUP, "group", "h"), ["r/b/s/h.csv"]),
-        (Chosen(SCENE, first=True), ["r/a/s.csv"]),
         (TableOf("budget"), "r/tables/budget.csv"),
         (ProjectFile("config/claims.yaml"), "config/claims.yaml"),
         (SourcesOf("section"), ["mesh.obj"]),

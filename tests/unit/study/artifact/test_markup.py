@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pdrom.core.errors import ConfigurationError
-from study.artifact.markup import filled, number, to_plain, to_rst, to_tex
-from study.figures.kit.catalogue import declarations
+from study.artifact.markup import filled, keys, number, to_plain, to_rst, to_tex
+from study.figures.kit.declaration import declarations
 
 CAPTION = "The gain $\\gamma \\le 10^{-3}$ of `block_deim`: 70 % of r_k & more."
 
@@ -62,8 +62,7 @@ def test_any_caption_is_one_paragraph_of_text(text):
 
 def test_captions_of_all_figures_read_well_as_plain_text():
     for name, figure in declarations().items():
-        keys = [read.key for read in figure.reads.values() if hasattr(read, "key")]
-        settings = dict.fromkeys(keys, 1e-3)
+        settings = dict.fromkeys(keys(figure.caption), 1e-3)
         for text in (figure.title, figure.caption):
             plain = to_plain(filled(text, settings))
             assert not set(plain) & set("`$\\{}^"), name

@@ -1,68 +1,88 @@
 """Results of invented studies in the documented formats: bent sheets, a bar, random bases."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from copy import copy
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 from pdrom.core.store import write_hdf5, write_table
+from pdrom.core.yamlfile import read_yaml
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh, save_mesh
 from pdrom.reduction.sampling.deim import block_elements, deim_entries
-from places import ROOT
+from places import CONFIG, ROOT
 from study.artifact.paths import (
     BASIS,
     CONTRIBUTIONS,
-    FULL_ORDER,
     MESH,
     NOISE_RUNS,
-    REPEATED_FRAMES,
     RERUNS,
     SAMPLING,
     SENSITIVITY,
     SNAPSHOTS,
     TABLE,
+    TRAIN,
+    Place,
 )
-from study.figures.kit.catalogue import declarations, load_choices
-from study.figures.kit.holdings import GroupHolding, Holdings, MethodHolding, SceneHolding
-from study.figures.kit.options import Options
-from study.figures.kit.results import Results
+from study.figures.kit.declaration import declarations
+from study.pipeline.resolve import Job, Resolver
+from study.pipeline.study import Study
 
 FRAMES = 20
-SETTINGS = {"sensitivity.reference": 1e-10, "sensitivity.threshold": 1e-3,
-            "stability.wrong": 0.1, "stability.left": 2.0}  # fmt: skip
-ROWS = {"bending": 1, "spring": 1, "strain": 2, "deformation_gradient": 3, "tetrahedron_strain": 3}
-METHOD_ROWS = {"pod": "all", "deim": "scalar", "qdeim": "scalar", "deim-joint": "joint",
-               "published": "joint", "block-deim": "element"}  # fmt: skip
-SCENES = {
-    "cloth_all": ("bending", "spring", "strain"),
-    "bend_fall": ("bending",),
-    "bend_curved": ("bending",),
-    "spring_stretch": ("spring",),
-    "spring_twist": ("spring",),
-    "spring_twist_twin": ("spring",),
-    "strain_twist": ("strain",),
-    "strain_oop": ("strain",),
-    "bar_release": ("deformation_gradient",),
-    "bar_twist": ("tetrahedron_strain",),
-}
+METHODS = ("pod", "deim", "qdeim", "deim-joint", "published", "block-deim")
+SCENES = (
+    "cloth_all", "bend_fall", "bend_curved", "spring_stretch", "spring_twist", "spring_twist_twin",
+    "strain_twist", "strain_oop", "bar_release", "bar_twist",
+)  # fmt: skip
 FLAT = ("bend_fall",)  # scenes whose projections are round-off
 BLOWN_UP = ("spring_twist", "deim-joint", 10)  # scene, method, r of a run that fails
 BLOWUP_FRAME = 4
+SETTINGS = {
+    **read_yaml(CONFIG / "default.yaml"),
+    "noise": {"cases": {"bend_fall": "bending"}},
+    "subspace": {"sizes": []},
+}
 
 
-@dataclass
-class Study:
-    """An invented study on disk."""
+class Invented:
+    """An invented study on disk, below ``root``; a test may change its ``study``."""
 
-    root: Path
-    results: Results
-    specs: dict[str, Options]
+    def __init__(self, root: Path, scenes: Sequence[str], methods: Sequence[str]) -> None:
+        self.root = root
+        self.settings = SETTINGS | {"scenes": list(scenes), "methods": list(methods)}
+        self.study = Study.load(self.settings, ROOT)
+        make_results(self)
+
+    def path(self, place: Place, scene: str, group: str = "", method: str = "") -> str:
+        """Path of a file with these labels."""
+        labels = {"scene": scene, "group": group, "method": method}
+        return Resolver(self.study, str(self.root)).file(place, labels)
+
+    def table(self, name: str) -> str:
+        """Path of a table."""
+        return TABLE.at(str(self.root), name=name)
+
+    def job(self, name: str, root: Path | None = None, **changes: object) -> Job:
+        """Job of a figure whose options have ``changes``."""
+        study = copy(self.study)
+        options = study.figures[name].model_copy(update=changes)
+        study.figures = {**study.figures, name: options}
+        return Resolver(study, str(root or self.root)).job(declarations()[name], {})
+
+    def read(self, name: str, root: Path | None = None, **changes: object) -> dict[str, object]:
+        """What the function of a figure gets."""
+        job = self.job(name, root, **changes)
+        return job.artifact.read(job.settings, job.inputs)
+
+    def draw(self, name: str, **changes: object) -> Figure:
+        """Draw a figure."""
+        return declarations()[name].draw(**self.read(name, **changes))
 
 
 def mesh_of(scene: str) -> Mesh:
@@ -77,46 +97,24 @@ def element_count(mesh: Mesh, group: str) -> int:
     return len(EFFECTS.load(group).element_vertices(mesh))
 
 
-def group_holdings() -> dict[str, GroupHolding]:
-    """All constraint groups."""
-    return {
-        name: GroupHolding(
-            place=place, cells=EFFECTS.load(name).cells, unit=EFFECTS.load(name).unit
-        )
-        for place, name in enumerate(ROWS)
-    }
-
-
-def make_results(root: Path, scenes: dict[str, tuple[str, ...]], methods: list[str]) -> Holdings:
-    """Write the results of ``scenes`` and ``methods`` below ``root``."""
+def make_results(results: Invented) -> None:
+    """Write the results of a study."""
     rng = np.random.default_rng(7)
-    holdings = Holdings(
-        scenes={
-            name: SceneHolding(mesh="bar" if name.startswith("bar") else name, groups=groups)
-            for name, groups in scenes.items()
-        },
-        methods={
-            name: MethodHolding(title=name, basis="none-none-vectorised", rows=METHOD_ROWS[name])
-            for name in methods
-        },
-        groups=group_holdings(),
-    )
-    results = Results(str(root), holdings, SETTINGS)
-    for scene, groups in scenes.items():
+    for scene, config in results.study.scenes.items():
         mesh = mesh_of(scene)
         save_mesh(mesh, results.path(MESH, scene))
         positions = _trajectory(mesh)
-        with write_hdf5(results.path(FULL_ORDER, scene)) as file:
+        with write_hdf5(results.path(TRAIN, scene)) as file:
             file["positions"] = positions
-        for group in groups:
+        for group in config.reduce:
             rank = 0 if scene in FLAT else 14
-            count = element_count(mesh, group)
-            basis = _write_basis(results, scene, group, count, rank, methods[0], rng)
-            for method in methods:
-                _write_sampling(results.path(SAMPLING, scene, group, method), basis, group, method)
+            bases = _write_bases(results, scene, group, element_count(mesh, group), rank, rng)
+            for method, spec in results.study.methods.items():
+                path = results.path(SAMPLING, scene, group, method)
+                _write_sampling(path, bases, group, spec.rows)
                 _write_reruns(results, scene, group, method, positions, rank, rng)
-    _write_tables(results, scenes, methods, rng)
-    return holdings
+    scenes = {name: tuple(config.reduce) for name, config in results.study.scenes.items()}
+    _write_tables(results, scenes, list(results.study.methods), rng)
 
 
 def _trajectory(mesh: Mesh) -> np.ndarray:
@@ -128,13 +126,14 @@ def _trajectory(mesh: Mesh) -> np.ndarray:
     return q
 
 
-def _write_basis(results, scene, group, count, rank, method, rng) -> np.ndarray:
-    rows = ROWS[group]
+def _write_bases(results, scene, group, count, rank, rng) -> np.ndarray:
+    rows = EFFECTS.load(group).rows_per_element
     V = np.linalg.qr(rng.standard_normal((3 * rows * count, 14)))[0][:, :rank]
-    with write_hdf5(results.path(BASIS, scene, group, method)) as file:
-        file["V"], file["mean"] = V, np.zeros(len(V))
-        file["singular_values"] = 0.5 ** np.arange(14)
-        file.attrs.update(rank=rank, roundoff=1e-12, rows_per_element=rows)
+    for path in {results.path(BASIS, scene, group, method) for method in results.study.methods}:
+        with write_hdf5(path) as file:
+            file["V"], file["mean"] = V, np.zeros(len(V))
+            file["singular_values"] = 0.5 ** np.arange(14)
+            file.attrs.update(rank=rank, roundoff=1e-12, rows_per_element=rows)
     with write_hdf5(results.path(SNAPSHOTS, scene, group)) as file:
         for split in ("train", "test", "heldout"):
             file[split] = rng.standard_normal((10, rows * count, 3))
@@ -144,13 +143,13 @@ def _write_basis(results, scene, group, count, rank, method, rng) -> np.ndarray:
     return V
 
 
-def _write_sampling(path: str, V: np.ndarray, group: str, method: str) -> None:
-    size = 3 * ROWS[group]
+def _write_sampling(path: str, V: np.ndarray, group: str, rows: str) -> None:
+    size = 3 * EFFECTS.load(group).rows_per_element
     with write_hdf5(path) as file:
         for r in range(1, V.shape[1] + 1):
-            if METHOD_ROWS[method] == "scalar":
+            if rows == "scalar":
                 entries = deim_entries(V[:, :r])
-            elif METHOD_ROWS[method] == "joint":
+            elif rows == "joint":
                 entries = 3 * np.arange(r)
             else:
                 elements = block_elements(V[:, :r], size)
@@ -226,20 +225,6 @@ def _write_tables(results, scenes, methods, rng) -> None:
         if k < 10:
             early = ("fewer-iterations", "full", np.nan, np.nan, k, 0.5 / k, time, k == 2)
             costs += [(scene, *early) for scene in scenes]
-    bought = [
-        (scene, limit, reference, *best)
-        for scene in scenes
-        for limit, reference, best in (
-            (0.1, "own iterations", (None, None, np.nan, np.nan, np.nan, np.nan)),
-            (0.1, "converged", (None, None, np.nan, np.nan, np.nan, np.nan)),
-            (1.0, "own iterations", (methods[0], "full", np.nan, 14, 10, 0.02)),
-            (1.0, "converged", ("fom", "full", np.nan, np.nan, 2, 0.25)),
-            (3.0, "own iterations", ("ecsw-1e-02", "pod", 8, 33, 10, 1e-9)),
-            (3.0, "converged", ("fom", "full", np.nan, np.nan, 5, 0.04)),
-            (10.0, "own iterations", ("full", "full", np.nan, np.nan, 10, 0.0)),
-            (10.0, "converged", ("fom", "full", np.nan, np.nan, 10, 0.01)),
-        )
-    ]
     ratios = [
         (scene, group, method, factor, 400 * factor**2, r, *_ratio(method, r))
         for scene, group in pairs
@@ -320,13 +305,6 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for method in ("deim-joint", "published")
         for r in (6, 10)
     ]
-    variations = [
-        (claim, part, varied, f"v{n}", "holds", n == 0)
-        for claim in ("C1", "C2")
-        for part in ("published", "beyond")
-        for varied in ("threshold", "scenes")
-        for n in range(3)
-    ]
     moved = [
         (scene, effect, role, drift, 1e-6, None if drift is None else drift > 1e-6)
         for scene, groups in scenes.items()
@@ -358,25 +336,20 @@ def _write_tables(results, scenes, methods, rng) -> None:
          " error_high gain_low gain_median gain_high"),
         "stability": (runs, "scene group method position_basis k r experiment outcome"
          " blowup_frame h stiffness_ratio"),
-        "budget": (bought, "scene budget_ms reference method position_basis k r iterations"
-         " relative_error_within_horizon"),
         "breakeven": (ratios, "scene group method factor vertices r ratio breakeven_r"),
         "effects_cost": (shares, "scene effect ms_per_frame share"),
         "effects_left_out": (removed, "scene left_out groups ms_per_frame own_ms"),
         "reduced_reruns": (reruns, "scene group method r position_basis max_extent blowup_frame"
          " relative_error relative_error_within_horizon ms_per_frame k"),
         "noise": (noise, "scene group noisy_axes method r rank relative_error"),
-        "claims_sensitivity": (variations, "claim part varied variation verdict_of_rules same"),
         "alternatives": (others, "scene vertices stiffness motion method substeps"
          " ms_per_frame"
          " error_implicit error_continuous"),
         "effects_contribution": (moved, "scene effect role moved sensitivity_floor above_floor"),
     }  # fmt: skip
     for name, (rows, header) in made.items():
-        _write(TABLE.at(results.folder, name=name), header, rows)
+        _write(results.table(name), header, rows)
     _write_scaling(results, scenes)
-    for scene, group in pairs:
-        _write_repeated_frames(results, scene, group, methods)
     for scene in FLAT:
         if scene in scenes:
             _write_noise_runs(results, scene)
@@ -389,17 +362,6 @@ def _write(path: str, columns: str, rows: list[tuple]) -> pd.DataFrame:
     table = pd.DataFrame(rows, columns=columns.split())
     write_table(table, path)
     return table
-
-
-def _write_repeated_frames(results, scene, group, methods) -> None:
-    """Bands of a tenth to ten times a thousandth, open above in the last frame."""
-    rows = [
-        (scene, group, method, 6, "training", frame, 1e-4, 1e-3, 1e-2 if frame < FRAMES else np.inf)
-        for method in methods
-        for frame in range(1, FRAMES + 1)
-    ]
-    columns = "scene group method r varied frame error_low error_median error_high"
-    _write(results.path(REPEATED_FRAMES, scene, group), columns, rows)
 
 
 def _write_noise_runs(results, scene) -> None:
@@ -416,7 +378,7 @@ def _write_noise_runs(results, scene) -> None:
 
 def _write_contributions(results, scene) -> None:
     """Gravity always pulls, the groups ever more; a kick acts once."""
-    names = [*results.holdings.scenes[scene].groups, "gravity"]
+    names = [*results.study.scenes[scene].reduce, "gravity"]
     rows = [
         (scene, effect, "force", frame, 1.0 if effect == "gravity" else float(frame), None)
         for effect in names
@@ -453,46 +415,32 @@ def _write_scaling(results, scenes) -> None:
             ("fom", 1e-4, 1.0), ("block-deim", 5e-5, 1.0), ("ecsw", 1e-2 / n, 0.0)
         )
     ]  # fmt: skip
-    _write(TABLE.at(results.folder, name="scaling"), header, rows)
+    _write(results.table("scaling"), header, rows)
 
 
 @pytest.fixture(scope="session")
-def specs() -> dict[str, Options]:
-    """The figures of the project."""
-    return load_choices(ROOT / "config" / "figures.yaml")
-
-
-@pytest.fixture(scope="session")
-def study(tmp_path_factory, specs) -> Study:
+def study(tmp_path_factory) -> Invented:
     """An invented study with all methods."""
-    return make_study(tmp_path_factory.mktemp("results"), specs, SCENES, list(METHOD_ROWS))
-
-
-def make_study(
-    root: Path, specs: dict[str, Options], scenes: dict[str, tuple[str, ...]], methods: list[str]
-) -> Study:
-    """An invented study of some scenes, with their groups, and methods, written below ``root``."""
-    return Study(root, Results(str(root), make_results(root, scenes, methods), SETTINGS), specs)
+    return Invented(tmp_path_factory.mktemp("results"), SCENES, METHODS)
 
 
 @pytest.fixture
-def small_study(tmp_path, specs) -> Callable[..., Study]:
+def small_study(tmp_path) -> Callable[[Sequence[str], Sequence[str]], Invented]:
     """Maker of a study with other scenes and methods, which a test may change."""
-    return partial(make_study, tmp_path, specs)
+    return partial(Invented, tmp_path)
 
 
 @pytest.fixture(scope="session")
-def strain_only(tmp_path_factory, specs) -> Study:
+def strain_only(tmp_path_factory) -> Invented:
     """A study without most scenes and methods."""
-    scenes = {"strain_oop": ("strain",)}
-    return make_study(tmp_path_factory.mktemp("strain"), specs, scenes, ["deim", "block-deim"])
+    return Invented(tmp_path_factory.mktemp("strain"), ["strain_oop"], ["deim", "block-deim"])
 
 
 @pytest.fixture(scope="session")
-def round_off_only(tmp_path_factory, specs) -> Study:
+def round_off_only(tmp_path_factory) -> Invented:
     """A study of which the snapshots are round-off."""
     methods = ["deim", "deim-joint", "block-deim"]
-    return make_study(tmp_path_factory.mktemp("flat"), specs, {"bend_fall": ("bending",)}, methods)
+    return Invented(tmp_path_factory.mktemp("flat"), ["bend_fall"], methods)
 
 
 @pytest.fixture(params=list(declarations()))

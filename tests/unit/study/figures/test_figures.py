@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 import warnings
@@ -25,23 +24,15 @@ from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import save_mesh
 from pdrom.view.multiples import log_axes
 from pdrom.view.style import new_figure, note
-from study.artifact.paths import MESH, RERUNS, SUBSPACES, TABLE
-from study.artifact.reads import Chosen, Every, TableOf
-from study.figures.kit.catalogue import declaration
-from study.figures.kit.output import draw_figure, write_figure
-from study.figures.kit.results import Results
+from study.artifact.paths import MESH, RERUNS, SUBSPACES
+from study.figures.kit.declaration import declarations, write_figure
 from study.figures.requested_tolerances import dots
+from study.pipeline.study import Study
 
-from .conftest import BLOWN_UP, BLOWUP_FRAME, FRAMES, ROOT, SCENES, SETTINGS, Study, mesh_of
+from .conftest import BLOWN_UP, BLOWUP_FRAME, FRAMES, ROOT, SCENES, mesh_of
 
 PICTURES = ("snapshots_and_modes", "deim_iterations", "cloth_all_grid", "bending_runs",
             "spring_runs", "strain_runs", "bar_runs", "teaser")  # fmt: skip
-
-
-def draw(study: Study, name: str, **changes: object) -> Figure:
-    return draw_figure(
-        declaration(name), study.results, study.specs[name].model_copy(update=changes)
-    )
 
 
 def texts(figure: Figure) -> list[str]:
@@ -65,7 +56,7 @@ def whole(study) -> Callable[[str], Drawn]:
     def drawn(name: str) -> Drawn:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            figure = draw(study, name)
+            figure = study.draw(name)
         return Drawn(figure, texts(figure))
 
     return drawn
@@ -99,19 +90,18 @@ def test_units_stand_on_the_axes(whole, name, unit):
 
 
 DRAW_ALL = """
-import json
 import sys
 from pathlib import Path
-from study.figures.kit.catalogue import declaration, load_choices
-from study.figures.kit.holdings import Holdings
-from study.figures.kit.output import draw_figure, write_figure
-from study.figures.kit.results import Results
+from study.figures.kit.declaration import declarations
+from study.pipeline.resolve import Resolver
+from study.pipeline.study import Study
 
-config, holdings, settings, root, out = sys.argv[1:]
-results = Results(root, Holdings.model_validate_json(holdings), json.loads(settings))
-for name, options in load_choices(config).items():
-    write_figure(draw_figure(declaration(name), results, options), name, Path(out, name + ".pdf"), Path(out, name + ".png"))
-"""  # noqa: E501
+settings, project, root, out = sys.argv[1:]
+resolver = Resolver(Study.load(json.loads(settings), project), root)
+for name, figure in declarations().items():
+    job = resolver.job(figure, {})
+    figure.perform(job.settings, job.inputs, {kind: f"{out}/{name}.{kind}" for kind in job.outputs})
+"""
 
 
 @pytest.mark.slow
@@ -125,57 +115,26 @@ def test_bytes_are_equal_in_another_process(study, tmp_path):
         "SOURCE_DATE_EPOCH": "86400",
     }
     (tmp_path / "matplotlibrc").write_text("font.size: 31\nsavefig.bbox: tight\nfigure.dpi: 50\n")
-    holdings, settings = study.results.holdings.model_dump_json(), json.dumps(SETTINGS)
-    arguments = [holdings, settings, str(study.root), str(tmp_path)]
-    config = str(ROOT / "config" / "figures.yaml")
+    arguments = [json.dumps(study.settings), str(ROOT), str(study.root), str(tmp_path)]
     subprocess.run(
-        [sys.executable, "-c", DRAW_ALL, config, *arguments], check=True, env=environment
+        [sys.executable, "-c", DRAW_ALL, *arguments], check=True, env=environment, cwd=ROOT
     )
-    for name in study.specs:
-        files = tmp_path / "own.pdf", tmp_path / "own.png"
-        write_figure(draw(study, name), name, *files)
-        for file in files:
-            assert file.read_bytes() == (tmp_path / f"{name}{file.suffix}").read_bytes(), name
-
-
-def inputs(study: Study, name: str) -> list[Path]:
-    """Files that a figure declares."""
-    options, root, paths = study.specs[name], str(study.root), []
-    for read in declaration(name).reads.values():
-        if isinstance(read, TableOf):
-            paths.append(TABLE.at(root, name=read.name))
-        elif isinstance(read, Chosen):
-            paths += study.results.holdings.files(read.place, options, root, read.first)
-        elif isinstance(read, Every):
-            held = (study.results.path(read.place, *e) for e in study.results.experiments(options))
-            paths += [path for path in held if Path(path).is_file()]
-    return [Path(path) for path in paths]
-
-
-def test_reads_only_what_it_declares(study, whole, figure_name, tmp_path):
-    options, holdings = study.specs[figure_name], study.results.holdings
-    settings = {
-        r.key: SETTINGS[r.key] for r in declaration(figure_name).reads.values() if hasattr(r, "key")
-    }
-    for path in inputs(study, figure_name):
-        target = tmp_path / path.relative_to(study.root).parent
-        target.mkdir(parents=True, exist_ok=True)
-        for file in filter(Path.exists, (path, checksum_path(path))):
-            shutil.copy(file, target)
-    chosen = Results(str(tmp_path), holdings.chosen(options), settings)
-    figure = draw_figure(declaration(figure_name), chosen, options)
-    assert texts(figure) == whole(figure_name).texts != []
+    for name in declarations():
+        job = study.job(name)
+        files = {kind: tmp_path / f"own.{kind}" for kind in job.outputs}
+        job.artifact.perform(job.settings, job.inputs, files)
+        for kind, file in files.items():
+            assert file.read_bytes() == (tmp_path / f"{name}.{kind}").read_bytes(), name
 
 
 def test_a_missing_file_is_named(study, figure_name, tmp_path):
-    results = Results(str(tmp_path), study.results.holdings, SETTINGS)
     with pytest.raises(StorageError, match=str(tmp_path)):
-        draw_figure(declaration(figure_name), results, study.specs[figure_name])
+        declarations()[figure_name].draw(**study.read(figure_name, tmp_path))
 
 
 def test_a_failed_run_is_marked_and_never_drawn_with_nan(study):
     scene, _, _ = BLOWN_UP
-    figure = draw(study, "spring_runs", scenes=(scene,))
+    figure = study.draw("spring_runs", scenes=(scene,))
     marked = [t for t in texts(figure) if f"blew up at frame {BLOWUP_FRAME}" in t]
     assert len(marked) == 1
     hatched = [p for ax in figure.axes for p in ax.patches if p.get_hatch()]
@@ -187,7 +146,7 @@ def test_a_failed_run_is_marked_and_never_drawn_with_nan(study):
 def test_a_run_that_ended_early_lies_on_the_rim(study):
     """Error against gain: as high as the axis goes, and counted among the runs."""
     scene, method, _ = BLOWN_UP
-    figure = draw(study, "error_against_gain", scenes=(scene,), methods=(method,))
+    figure = study.draw("error_against_gain", scenes=(scene,), methods=(method,))
     left, right = figure.axes
     (dots,) = (
         line for line in left.lines if len(line.get_xdata()) > 0 and line.get_marker() == "D"
@@ -201,13 +160,13 @@ def test_a_run_that_ended_early_lies_on_the_rim(study):
 
 
 def test_a_failure_later_than_the_drawn_instant_is_no_failure(study):
-    figure = draw(study, "spring_runs", scenes=(BLOWN_UP[0],), frames=(0.1,))
+    figure = study.draw("spring_runs", scenes=(BLOWN_UP[0],), frames=(0.1,))
     assert not any("blew up" in text for text in texts(figure))
 
 
 def test_starts_that_fail_are_counted_below_runs_on_bases_of_round_off(study):
     """Kinds of starts with equal counts share a row; sizes beyond the rank are left out."""
-    shown = texts(draw(study, "bending_runs", scenes=("bend_fall",), methods=("deim-joint",)))
+    shown = texts(study.draw("bending_runs", scenes=("bend_fall",), methods=("deim-joint",)))
     assert sum("0 of 1 starts fail" in text for text in shown) == 1
     assert sum("1 of 1 starts fail" in text for text in shown) == 1
     labels = [" ".join(text.split()) for text in shown if "noise" in text]
@@ -216,26 +175,24 @@ def test_starts_that_fail_are_counted_below_runs_on_bases_of_round_off(study):
 
 
 def test_a_run_that_never_began_says_why(study):
-    assert any("round-off" in t for t in texts(draw(study, "strain_runs", scenes=("bend_fall",))))
-    figure = draw(study, "spring_runs", scenes=("spring_stretch",), ranks=(6, 20))
+    assert any("round-off" in t for t in texts(study.draw("strain_runs", scenes=("bend_fall",))))
+    figure = study.draw("spring_runs", scenes=("spring_stretch",), ranks=(6, 20))
     assert any("exceeds" in text for text in texts(figure))
 
 
 def test_a_run_out_of_view_is_drawn_to_a_stated_scale(small_study):
-    study = small_study({"spring_twist": ("spring",)}, ["deim-joint"])
-    path = study.results.path(RERUNS, "spring_twist", "spring", "deim-joint")
+    study = small_study(["spring_twist"], ["deim-joint"])
+    path = study.path(RERUNS, "spring_twist", "spring", "deim-joint")
     with h5py.File(path, "a") as file:
         file["r0006/positions"][...] *= 8.0
     write_block(Path(path))
-    figure = draw(study, "spring_runs", ranks=(6, 14))
+    figure = study.draw("spring_runs", ranks=(6, 14))
     assert sum("scale 1 :" in text for text in texts(figure)) == 1
 
 
 @pytest.mark.parametrize("rank", [6, 14, "full"])
 def test_asked_sizes_are_drawn_once(study, rank):
-    figure = draw(
-        study, "spring_runs", scenes=("spring_stretch",), methods=("deim",), ranks=(rank,)
-    )
+    figure = study.draw("spring_runs", scenes=("spring_stretch",), methods=("deim",), ranks=(rank,))
     assert len(figure.axes) == 2
 
 
@@ -260,35 +217,34 @@ def test_a_note_fits_its_figure():
 
 
 def test_missing_scenes_and_methods_leave_their_panels_out(strain_only, figure_name):
-    figure = draw(strain_only, figure_name)
+    figure = strain_only.draw(figure_name)
     for ax in figure.axes:
         assert "spring" not in ax.get_title()
-    empty = {"cloth_all_grid", "bending_runs", "spring_runs", "strain_runs", "bar_runs",
-             "reconstruction_error", "deim_entries", "error_against_gain", "teaser"}  # fmt: skip
     noted = any("no data in this configuration" in text for text in texts(figure))
-    assert noted == (figure_name in empty)
+    assert noted == (figure_name == "error_against_gain")
 
 
 def test_experiments_of_round_off_only(round_off_only, figure_name):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert texts(draw(round_off_only, figure_name, scenes=("bend_fall",)))
+        assert texts(round_off_only.draw(figure_name, scenes=("bend_fall",)))
 
 
 @pytest.mark.parametrize(("ran", "shown"), [(FRAMES, "ecsw, k = 20"), (2, "blew up")])
 def test_the_teaser_shows_a_sampled_subspace_as_far_as_it_ran(small_study, ran, shown):
-    study = small_study({"bar_release": ("deformation_gradient",)}, ["pod"])
-    assert not any("ecsw" in text for text in texts(draw(study, "teaser", methods=("pod",))))
+    study = small_study(["bar_release"], ["pod"])
+    assert not any("ecsw" in text for text in texts(study.draw("teaser", methods=("pod",))))
     points = mesh_of("bar_release").points
-    with write_hdf5(study.results.path(SUBSPACES, "bar_release")) as file:
+    study.study = Study.load(study.settings | {"subspace": {}}, ROOT)
+    with write_hdf5(study.path(SUBSPACES, "bar_release")) as file:
         file["columns/pod_k020/B"] = np.eye(len(points))
         model = file.create_group("models/pod_k020_ecsw-1e-02")
         model["train/coordinates"] = np.repeat(points[None], ran + 1, axis=0)
-    assert any(shown in text for text in texts(draw(study, "teaser", methods=("pod",))))
+    assert any(shown in text for text in texts(study.draw("teaser", methods=("pod",))))
 
 
 def test_singular_values_below_round_off_are_hollow(study):
-    figure = draw(study, "singular_values", scenes=("bend_fall", "spring_twist"))
+    figure = study.draw("singular_values", scenes=("bend_fall", "spring_twist"))
     flat, spring = figure.axes
     for ax, hollow in ((flat, 14), (spring, 4)):
         lines = [line for line in ax.lines if line.get_markerfacecolor() == "white"]
@@ -296,7 +252,7 @@ def test_singular_values_below_round_off_are_hollow(study):
 
 
 def test_errors_above_the_axis_are_marked_on_its_rim(study):
-    figure = draw(study, "reconstruction_error", scenes=("strain_twist",), methods=("deim",))
+    figure = study.draw("reconstruction_error", scenes=("strain_twist",), methods=("deim",))
     (ax,) = figure.axes
     arrows = [line for line in ax.lines if line.get_marker() == 6]
     assert [list(line.get_xdata()) for line in arrows] == [[1.0]]  # 1e5 / 10^r at r = 1
@@ -304,28 +260,26 @@ def test_errors_above_the_axis_are_marked_on_its_rim(study):
 
 
 def test_the_horizon_is_the_first_frame_above_the_threshold(study):
-    figure = draw(study, "sensitivity_floor", scenes=("spring_twist", "strain_oop"))
+    figure = study.draw("sensitivity_floor", scenes=("spring_twist", "strain_oop"))
     # 10^(-9 + f/2) exceeds 1e-3 first at f = 13
     assert "spring twist: 13" in texts(figure)
     assert "strain oop: beyond 20" in texts(figure)
 
 
-def test_published_values_are_drawn_where_they_are_given(study, tmp_path):
-    (tmp_path / "singular_values.csv").write_text(
-        "experiment,group,component,singular_value\nall_three,spring,1,5\nall_three,spring,2,1\n"
-    )
-    results = Results(str(study.root), study.results.holdings, SETTINGS, tmp_path)
-    figure = draw_figure(declaration("singular_values"), results, study.specs["singular_values"])
-    assert "published code's output" in texts(figure)
-    without = draw(study, "singular_values")
-    assert "published code's output" not in texts(without)
+@pytest.mark.parametrize("name", ["singular_values", "reconstruction_error"])
+def test_published_values_are_drawn_where_they_are_given(study, name):
+    def shown(**changes: object) -> bool:
+        return any("published code's output" in text for text in texts(study.draw(name, **changes)))
+
+    assert shown()
+    assert not shown(published={})
 
 
 def test_a_mesh_that_does_not_fit_is_refused(small_study):
-    study = small_study({"strain_oop": ("strain",)}, ["deim"])
-    save_mesh(cloth(4, 4), study.results.path(MESH, "strain_oop"))
+    study = small_study(["strain_oop"], ["deim"])
+    save_mesh(cloth(4, 4), study.path(MESH, "strain_oop"))
     with pytest.raises(StorageError, match="elements of 'strain'"):
-        draw(study, "deim_iterations")
+        study.draw("deim_iterations")
 
 
 # Cost -------------------------------------------------------------------------------------------
@@ -333,7 +287,7 @@ def test_a_mesh_that_does_not_fit_is_refused(small_study):
 
 def test_points_with_another_reference_are_no_dots(study):
     """Errors against the converged run are one line; no dot or ring lies at their times."""
-    figure = draw(study, "accuracy_cost", scenes=("strain_oop",))
+    figure = study.draw("accuracy_cost", scenes=("strain_oop",))
     (ax,) = figure.axes
     lines = [line for line in ax.lines if line.get_linestyle() == "-."]
     assert [line.get_ydata()[0] for line in lines] == [0.01]  # fom, K = 10
@@ -344,14 +298,14 @@ def test_points_with_another_reference_are_no_dots(study):
 
 
 def test_rates_out_of_reach_are_named(study):
-    figure = draw(study, "accuracy_cost", scenes=("strain_oop",))
+    figure = study.draw("accuracy_cost", scenes=("strain_oop",))
     assert "60, 30 fps \N{RIGHTWARDS ARROW}" in texts(figure)
     (ax,) = figure.axes
     assert ax.get_xlim()[1] < 1e3 / 60.0
 
 
 def test_break_even_has_a_panel_per_group(study):
-    figure = draw(study, "break_even")
+    figure = study.draw("break_even")
     assert {ax.get_title() for ax in figure.axes} == {
         "bending", "spring", "strain", "tetrahedron strain", "deformation gradient",
     }  # fmt: skip
@@ -359,7 +313,7 @@ def test_break_even_has_a_panel_per_group(study):
 
 def test_what_an_effect_moves_stands_beside_the_floor(study):
     """Below the floor the marker is open; a group that cannot be left out has none."""
-    figure = draw(study, "effects_contribution", scenes=("strain_oop", "cloth_all"))
+    figure = study.draw("effects_contribution", scenes=("strain_oop", "cloth_all"))
     *forces, moved = figure.axes
     assert [ax.get_title() for ax in forces] == ["cloth all", "strain oop"]
     assert [t.get_text() for t in moved.get_yticklabels()] == ["strain oop", "cloth all"]
@@ -370,7 +324,7 @@ def test_what_an_effect_moves_stands_beside_the_floor(study):
 
 
 def test_a_scene_without_effects_ends_at_the_tick(study):
-    figure = draw(study, "effects_cost", scenes=("strain_oop", "cloth_all"))
+    figure = study.draw("effects_cost", scenes=("strain_oop", "cloth_all"))
     shares, without = figure.axes
     assert [t.get_text() for t in shares.get_yticklabels()] == ["strain oop", "cloth all"]
     assert [t.get_text() for t in without.get_yticklabels()] == [
@@ -381,7 +335,7 @@ def test_a_scene_without_effects_ends_at_the_tick(study):
 
 
 def test_every_axis_of_the_scaling_has_two_numbers_at_least(study):
-    figure = draw(study, "scaling")
+    figure = study.draw("scaling")
     for ax in figure.axes:
         for axis in (ax.xaxis, ax.yaxis):
             low, high = axis.get_view_interval()

@@ -34,9 +34,9 @@ from pdrom.view.read import (
     rerun_positions,
 )
 from places import CONFIG
-from study.artifact.paths import FULL_ORDER, RERUNS
+from study.artifact.paths import RERUNS, TRAIN
+from study.figures.deim_iterations import iterations
 from study.figures.kit.elements import element_map, magnitudes, signed_entry
-from study.figures.kit.residual import iterations
 
 from .conftest import BLOWN_UP, BLOWUP_FRAME
 
@@ -267,7 +267,7 @@ def test_entries_outside_the_basis_are_refused():
 
 
 def test_instants_may_be_shares_of_the_first_frames(study):
-    path = study.results.path(FULL_ORDER, "spring_twist")
+    path = study.path(TRAIN, "spring_twist")
     frames, positions = positions_at(path, (0.5, 1.0), end=10)
     assert frames == [5, 10]
     whole, everything = positions_at(path, (0.25, 0.5, 1.0))
@@ -278,7 +278,7 @@ def test_instants_may_be_shares_of_the_first_frames(study):
 
 def test_runs_are_read_only_where_finite(study):
     scene, method, r = BLOWN_UP
-    path = study.results.path(RERUNS, scene, "spring", method)
+    path = study.path(RERUNS, scene, "spring", method)
     infos = {info.r: info for info in rerun_infos(path)}
     assert list(infos) == [6, 10, 14, 20]
     assert infos[14].full

@@ -7,9 +7,9 @@ from matplotlib.figure import Figure
 
 from pdrom.core.yamlfile import read_yaml
 from places import ROOT
-from study.figures.kit.catalogue import declarations
+from study.figures.kit.declaration import declarations
 from study.paper.bibliography import bibliography, cited_keys
-from study.paper.build import PAGES
+from study.paper.build import PAGES, paper
 from study.paper.known import sentences
 from study.paper.macros import AGGREGATES, keys_of
 from study.paper.source import documents
@@ -95,7 +95,7 @@ def test_only_packages_of_both_tex_systems():
 
 def test_every_key_names_a_column_of_a_table():
     study = Study.load(read_yaml(ROOT / "config" / "default.yaml"), ROOT)
-    facts = Plan(study).paper.manuscript.settings["facts"]["tables"]
+    facts = Plan(study).job(paper).settings["facts"]["tables"]
     columns = {name: set(table.column_names) for name, table in declared().items()}
     columns |= {name: set(rows[0]) for name, rows in facts.items()}
     for key in keys_of(SOURCE):

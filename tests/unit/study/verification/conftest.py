@@ -27,7 +27,7 @@ def subject():
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(ROOT)
         subject = Subject.of(["config/tiny.yaml"], [])
-        assert subject.plan.figure_jobs
+        assert subject.plan.made
     return subject
 
 
@@ -73,9 +73,9 @@ def project(tracked, subject, tmp_path_factory):
         for name, table in declared().items():
             frame = table.checked(read_table(TABLE.at(RESULTS, name=name)))
             write_reference(table, frame, folder_of(RESULTS))
-        figures = subject.plan.figure_jobs.values()
-        read = {path for job in figures for path in job.job.files if path.startswith("results/")}
-        for path in read | {p for job in figures for p in (job.pdf, job.png)}:
+        figures = subject.plan.fixed["figures"]
+        read = {path for job in figures for path in job.files if path.startswith("results/")}
+        for path in read | {path for job in figures for path in job.outputs.values()}:
             if not Path(path).exists():
                 make(path)
     return folder

@@ -13,7 +13,7 @@ from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.store import read_table, write_table, write_text
 from study.article.verified import INDEX, NAME
 from study.artifact.paths import ARTICLE, TABLE
-from study.figures.kit.catalogue import declarations
+from study.figures.kit.declaration import declarations
 from study.tables import declared
 from study.verification.again import made
 from study.verification.command import parser, verify, verify_tables

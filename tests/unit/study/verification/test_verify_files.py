@@ -12,13 +12,18 @@ from pdrom.core.errors import StorageError
 from pdrom.core.provenance import made_by
 from pdrom.core.store import atomic_path, write_hdf5, write_table, write_text
 from places import ROOT
+from study.article.build import article
 from study.artifact.artifact import Artifact
 from study.artifact.paths import TABLE, File, Place
 from study.artifact.reads import One
+from study.figures.kit.declaration import declarations
+from study.live.page import live_page
+from study.paper.build import paper_inputs
 from study.pipeline import manifest
 from study.pipeline.folders import Folders
 from study.pipeline.manifest import read_manifest, write_manifest
 from study.pipeline.resolve import Job
+from study.tables import declared
 from study.verification import again, files
 from study.verification.again import differing
 from study.verification.files import verify_files
@@ -215,7 +220,7 @@ def test_an_edited_manifest_is_damaged_and_a_lost_one_missing():
 
 def figure_job(subject):
     """The job of a figure that reads one table."""
-    return subject.plan.figure_jobs["singular_values"].job
+    return subject.plan.job(declarations()["singular_values"])
 
 
 def test_outputs_of_one_name_stay_apart():
@@ -251,12 +256,9 @@ def test_a_figure_is_drawn_again_to_the_byte(results, subject):
 def test_every_artifact_that_takes_seconds_is_made_again(subject, monkeypatch):
     monkeypatch.chdir(ROOT)
     plan, folders = subject.plan, subject.folders
-    made = [path for jobs in plan.fixed.values() for job in jobs for path in job.outputs.values()]
-    pictures = [job.png for job in plan.figure_jobs.values()]
-    wanted = [*plan.table_paths, *plan.figures, *pictures, *plan.paper.files]
-    wanted += folders.documents.values()
-    wanted += [*plan.page.outputs.values(), *plan.paper.article.outputs.values()]
-    assert sorted(made) == sorted(wanted)
+    known = [*declared().values(), *declarations().values(), paper_inputs, live_page, article]
+    wanted = [place.at(folders.results) for one in known for place in one.writes.values()]
+    assert sorted(plan.made) == sorted([*wanted, *folders.documents.values()])
 
 
 def test_a_changed_number_of_the_manuscript_is_noticed(tmp_path):

@@ -10,7 +10,7 @@ from snakemake.dag import DAG
 
 from places import ROOT
 from study.artifact.usage import Usage
-from study.figures.kit.catalogue import declarations
+from study.figures.kit.declaration import declarations
 from study.pipeline.commandline import CommandLine
 from study.pipeline.figure_command import figure_arguments
 from study.pipeline.front import completed, files_of
