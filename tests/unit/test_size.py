@@ -13,9 +13,9 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 44_039,
+    "lines of src": 44_038,
     "modules of src": 423,
-    "lines of tests": 29_978,
+    "lines of tests": 29_973,
     "words of documentation": 24_899,
     "tables": 29,
     "figures": 23,

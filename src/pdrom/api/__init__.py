@@ -25,3 +25,7 @@ __all__ = [
     "save",
     "view",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -10,7 +10,7 @@ import numpy as np
 from pdrom.api.arguments import file_path, require
 from pdrom.api.records import AskedRun, FullRun, ReducedRun, full_run
 from pdrom.api.scenes import bound
-from pdrom.core.errors import StorageError
+from pdrom.core.errors import PdromError, StorageError
 from pdrom.core.provenance import made_by
 from pdrom.core.store import (
     open_hdf5,
@@ -20,7 +20,7 @@ from pdrom.core.store import (
     write_hdf5,
 )
 from pdrom.core.yamlfile import validate
-from pdrom.model.mesh.config import MeshConfig, MeshFile
+from pdrom.model.mesh.config import MeshFile
 from pdrom.model.mesh.types import store_mesh, stored_mesh
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.requested.calibration import Request
@@ -99,12 +99,15 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> FullRun | Red
         with open_hdf5(path, unchecked) as file:
             require_self_contained(file, path)
             found = _run(file, path)
-    except (ValueError, TypeError, LookupError, RuntimeError) as error:
+        if found is not None:
+            _require_sound(found)
+    except StorageError:
+        raise
+    except (PdromError, ValueError, TypeError, LookupError, RuntimeError, AttributeError) as error:
         fault = " ".join(str(error).split())[:200]
         raise StorageError(f"{path}: holds no sound run ({fault})") from error
     if found is None:
         raise StorageError(f"{path}: holds no run that could be opened here (pdrom show says what)")
-    _require_sound(found, path)
     return found
 
 
@@ -118,10 +121,12 @@ def _run(file: h5py.File, path: Path) -> FullRun | ReducedRun | AskedRun | None:
     return None
 
 
-def _require_sound(found: FullRun | ReducedRun | AskedRun, path: Path) -> None:
-    """StorageError for arrays of other shapes than the scene's, or NaN in them."""
+def _require_sound(found: FullRun | ReducedRun | AskedRun) -> None:
+    """ValueError for arrays of other shapes than the scene's, or what is no finite number."""
     if isinstance(found, AskedRun):
         full = FullRun(found.scene, found.outcome.positions, found.ms, {})
+        if not 0 <= found.outcome.frames <= len(found.ms):
+            raise ValueError(f"tolerance met for {found.outcome.frames} of {len(found.ms)} frames")
     else:
         full = found.full if isinstance(found, ReducedRun) else found
     frames, vertices = full.scene.config.frames, full.scene.mesh.vertices
@@ -130,13 +135,16 @@ def _require_sound(found: FullRun | ReducedRun | AskedRun, path: Path) -> None:
         group, count = full.scene.group(name), len(own.roundoff)
         rows = group.elements * group.rows_per_element
         arrays[f"snapshots of {name}"] = own.p, (count, rows, 3)
+        arrays[f"round-off of {name}"] = own.roundoff, (count,)
     if isinstance(found, ReducedRun):
-        done = found.outcome.frames
-        arrays["reduced"] = found.outcome.positions, (done + 1, vertices, 3)
+        done = found.outcome
+        arrays["reduced"] = done.positions, (done.frames + 1, vertices, 3)
+        arrays["difference"] = done.difference, (done.frames,)
+        arrays["extent"] = done.extent, (done.frames,)
     for name, (array, shape) in arrays.items():
-        if array.shape != shape:
-            raise StorageError(f"{path}: {name} of shape {array.shape}, required: {shape}")
-        require_finite(f"{path}: {name}", array, StorageError)
+        if array.shape != shape or array.dtype.kind != "f":
+            raise ValueError(f"{name} of {array.dtype} {array.shape}, required: float {shape}")
+        require_finite(name, array, ValueError)
 
 
 def _store(file: h5py.File, name: str, values: np.ndarray, unit: str) -> None:
@@ -181,12 +189,7 @@ def _scene(file: h5py.File, path: Path) -> Scene:
     scene = validate(SceneConfig, settings.get("config") or settings["scene"], str(path))
     if "mesh" in file:
         return Scene.build(scene, stored_mesh(file["mesh"]))
-    return bound(scene, _project(path, scene.mesh), str(path))
-
-
-def _project(path: Path, mesh: MeshConfig) -> Path:
-    """Folder above the run's file ``path`` that the path of a ``mesh`` file starts from."""
-    if not isinstance(mesh, MeshFile):
-        return Path()
-    above = path.resolve().parents
-    return next((folder for folder in above if (folder / mesh.path).is_file()), Path())
+    # a mesh file is named from one of the folders above the run's
+    mesh, above = scene.mesh, path.resolve().parents
+    named = [f for f in above if isinstance(mesh, MeshFile) and (f / mesh.path).is_file()]
+    return bound(scene, [*named, Path()][0], str(path))

@@ -73,7 +73,12 @@ def run(
     if out is not None:
         require_place(file_path(out))
         require_own(out)
-    frames = {group: _training_frames(scene, group) for group in scene.config.groups}
+    count, plans = scene.config.frames, scene.config.reduce
+    usual = min((count + 1) // 2, SNAPSHOTS)
+    frames = {
+        group: training_frames(count, plans[group].train if group in plans else usual)
+        for group in scene.config.groups
+    }
     config = scene.config.model_dump(mode="json")
     reported = {"scene": config, "run": "train", "solver": DEFAULT_SOLVER}
     with made_by("pdrom.api.run", reported), _place(out) as path:
@@ -213,13 +218,6 @@ def _clocked(advance: Advance, seconds: list[float]) -> Advance:
         return result
 
     return step
-
-
-def _training_frames(scene: Scene, group: str) -> np.ndarray:
-    """The frames of the scene's plan, else all even ones up to `SNAPSHOTS` of them."""
-    frames, plan = scene.config.frames, scene.config.reduce.get(group)
-    count = plan.train if plan else min((frames + 1) // 2, SNAPSHOTS)
-    return training_frames(frames, count)
 
 
 @contextmanager

@@ -5,6 +5,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pdrom.model.scene import Scene
 
 
 class Status(IntEnum):
@@ -38,6 +42,14 @@ def declare_unchecked(parser: argparse.ArgumentParser) -> None:
         "--unchecked", action="store_true",
         help="read a run without a checksum inside (by an older pdrom) if it is sound",
     )  # fmt: skip
+
+
+def files_of(file: str, scene: "Scene") -> list[str]:
+    """Files that a ``scene`` consists of: its own ``file`` and that of its mesh."""
+    from pdrom.model.mesh.config import MeshFile
+
+    mesh = scene.config.mesh
+    return [file, *([str(mesh.file(Path(file).parent))] if isinstance(mesh, MeshFile) else [])]
 
 
 def require_output(path: str | Path, reads: Sequence[str]) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
 
+from pdrom import __version__
 from pdrom.command.base import Command, Status
 from pdrom.core.environment import settle
 from pdrom.core.errors import INTERRUPTED, PdromError, choices
@@ -32,6 +33,7 @@ def parser() -> argparse.ArgumentParser:
         epilog=f"{CODES}\n\nexample: pdrom new sheet.yaml && pdrom run sheet.yaml",
         formatter_class=plain,
     )
+    top.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     below = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in COMMANDS:
         command: Command = import_module(f"pdrom.command.{name}").COMMAND
@@ -75,8 +77,11 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _asked(arguments: Sequence[str]) -> argparse.Namespace:
-    """Parse the command line; a misspelt option gets a suggestion."""
-    asked, unknown = parser().parse_known_args(arguments)
+    """Parse the command line; a misspelt command or option gets a suggestion."""
+    top = parser()
+    if arguments and arguments[0][:1] != "-" and arguments[0] not in COMMANDS:
+        top.error(f"no command '{arguments[0]}'{choices(arguments[0], COMMANDS)}")
+    asked, unknown = top.parse_known_args(arguments)
     if unknown:
         known = re.findall(r"--[a-z-]+", asked.parser.format_usage())
         asked.parser.error(f"not understood: {unknown[0]}{choices(unknown[0], known)}")

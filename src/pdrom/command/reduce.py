@@ -5,10 +5,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pdrom.command.base import Command, Status, declare_unchecked, require_output
+from pdrom.command.base import Command, Status, declare_unchecked, files_of, require_output
 
 if TYPE_CHECKING:
     from pdrom.api import ReducedRun
+    from pdrom.model.scene import Scene
 
 WRONG = 0.1  # relative error above which the study calls a run wrong
 PICTURES = {"pdf": "Creator", "png": "Software", "svg": "Creator"}  # key of its maker
@@ -61,9 +62,10 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.core.store import atomic_path
     from pdrom.core.store.atomic import MARK
 
-    out = arguments.out or _file(arguments)
-    _check_outputs(arguments, out)
-    scene = load_scene(arguments.scene)
+    file = Path(arguments.scene)
+    name = f"{file.stem}_{arguments.group}_{arguments.method}_{arguments.r}.h5"
+    out, scene = arguments.out or str(file.parent / name), load_scene(file)
+    _check_outputs(arguments, out, scene)
     scene.group(arguments.group)
     if arguments.run:
         full = load(arguments.run, arguments.unchecked)
@@ -84,11 +86,11 @@ def perform(arguments: argparse.Namespace) -> Status:
     return Status.DONE if reduced.outcome.finite else Status.BLEW_UP
 
 
-def _check_outputs(arguments: argparse.Namespace, out: str) -> None:
+def _check_outputs(arguments: argparse.Namespace, out: str, scene: "Scene") -> None:
     """Refuse outputs that cannot be written, before anything runs."""
     from pdrom.core.errors import ConfigurationError, choices
 
-    read = [arguments.scene, *([arguments.run] if arguments.run else [])]
+    read = [*files_of(arguments.scene, scene), *([arguments.run] if arguments.run else [])]
     require_output(out, read)
     if arguments.plot is None:
         return
@@ -98,12 +100,6 @@ def _check_outputs(arguments: argparse.Namespace, out: str) -> None:
             f"--plot {arguments.plot}: no kind of picture '{kind}'{choices(kind, PICTURES)}"
         )
     require_output(arguments.plot, [*read, out])
-
-
-def _file(arguments: argparse.Namespace) -> str:
-    path = Path(arguments.scene)
-    name = f"{path.stem}_{arguments.group}_{arguments.method}_{arguments.r}.h5"
-    return str(path.parent / name)
 
 
 def _told(reduced: "ReducedRun") -> str:

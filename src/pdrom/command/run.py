@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from pdrom.command.base import Command, Status, require_output
+from pdrom.command.base import Command, Status, files_of, require_output
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -24,8 +24,8 @@ def perform(arguments: argparse.Namespace) -> Status:
 
     file = Path(arguments.scene)
     out = arguments.out or str(file.parent / f"{file.stem}.h5")
-    require_output(out, [arguments.scene])
     scene = load_scene(arguments.scene)
+    require_output(out, files_of(arguments.scene, scene))
     scene.log_contacts()
     full = run(scene, out, Progress(scene.config.name, scene.config.frames))
     sys.stdout.write(

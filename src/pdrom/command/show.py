@@ -22,13 +22,15 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def perform(arguments: argparse.Namespace) -> Status:
     """Say what the file of ``arguments`` holds; nothing is changed."""
-    from pdrom.core.store import check_file
+    from pdrom.core.provenance import RECORD
+    from pdrom.core.store import check_file, provenance_of
 
     path = Path(arguments.file)
-    condition = check_file(path)
+    condition, record = check_file(path), provenance_of(path)
     lines = [f"{path}: {path.stat().st_size:,} bytes, {condition.value}"]
     lines += _content(path, arguments.configuration)
-    lines += _provenance(path)
+    lines.append("provenance:" if record else "provenance: unknown (no checksum says it)")
+    lines += [f"  {name}: {record[name]}" for name in RECORD if name in record]
     sys.stdout.write("\n".join(lines) + "\n")
     return Status.DONE
 
@@ -65,16 +67,6 @@ def _hdf5(path: Path, whole: bool) -> Iterator[str]:
     yield "attributes:"
     own = {k: v for k, v in attributes.items() if k not in RECORD}
     yield from (f"  {name}: {_short(value)}" for name, value in own.items())
-
-
-def _provenance(path: Path) -> Iterator[str]:
-    """Provenance of the file by its checksum, which is compared with the file."""
-    from pdrom.core.provenance import RECORD
-    from pdrom.core.store import provenance_of
-
-    record = provenance_of(path)
-    yield "provenance:" if record else "provenance: unknown (no checksum says it)"
-    yield from (f"  {name}: {record[name]}" for name in RECORD if name in record)
 
 
 def _item(name: str, item: Any) -> Iterator[str]:

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pdrom.command.base import Status, require_output
+from pdrom.command.base import Status, files_of, require_output
 
 if TYPE_CHECKING:
     from pdrom.api import AskedRun
@@ -35,7 +35,7 @@ def perform_request(arguments: argparse.Namespace) -> Status:
         )
     stem = Path(arguments.scene).stem
     out = arguments.out or str(Path(arguments.scene).with_name(f"{stem}_asked.h5"))
-    require_output(out, [arguments.scene, arguments.run])
+    require_output(out, [*files_of(arguments.scene, scene), arguments.run])
     full = load(arguments.run, arguments.unchecked)
     if not isinstance(full, FullRun):
         raise StorageError(f"{arguments.run}: no full-order run (pdrom run makes one)")

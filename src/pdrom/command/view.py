@@ -34,6 +34,8 @@ def perform(arguments: argparse.Namespace) -> Status:
     require_output(out, arguments.results)
     if arguments.png:
         require_output(arguments.png, [*arguments.results, str(out)])
+    if arguments.vtk:
+        require_output(Path(arguments.vtk, "run.pvd"), arguments.results)
     scenes = viewed_scenes(*(load(file, arguments.unchecked) for file in arguments.results))
     if len(scenes) > 1 and (arguments.png or arguments.vtk):
         raise ConfigurationError("--png and --vtk: of one scene at a time")

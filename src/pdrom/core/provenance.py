@@ -56,7 +56,8 @@ def made_by(name: str, configuration: Any, code: str = "") -> Iterator[None]:
     configuration : settings of the job, hashed as JSON
     code : fingerprint of the code that it runs
     """
-    previous = _AT_WORK.set(Job(name, _canonical(configuration), code))
+    canonical = json.dumps(configuration, sort_keys=True, default=str)
+    previous = _AT_WORK.set(Job(name, canonical, code))
     try:
         yield
     finally:
@@ -101,7 +102,3 @@ def attributes() -> dict[str, str]:
 def as_text(record: Mapping[str, str]) -> str:
     """A record in one line, as a checksum holds it."""
     return json.dumps(dict(record), sort_keys=True)
-
-
-def _canonical(configuration: Any) -> str:
-    return json.dumps(configuration, sort_keys=True, default=str)

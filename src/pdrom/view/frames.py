@@ -27,7 +27,8 @@ SHOWN = 20  # modes
 def write_frames(scene: ViewedScene, png: Path) -> None:
     """Write the picture of ``scene`` to ``png``."""
     with style.look(), atomic_path(png, with_checksum=False) as temporary:
-        _draw(scene).savefig(temporary, dpi=150, metadata={"Software": MARK.decode()})
+        metadata = {"Software": MARK.decode()}
+        _draw(scene).savefig(temporary, format="png", dpi=150, metadata=metadata)
 
 
 def shown(sizes: Sequence[ViewedRun]) -> ViewedRun:

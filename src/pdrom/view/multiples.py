@@ -82,13 +82,6 @@ def time_axis(ax: Axes, times: np.ndarray) -> None:
     plain_ticks(ax.xaxis, high - low)
 
 
-def no_minor_labels(ax: Axes) -> None:
-    """Remove numbers between the powers of ten of a logarithmic x axis of ``ax``."""
-    from matplotlib.ticker import NullFormatter
-
-    ax.xaxis.set_minor_formatter(NullFormatter())
-
-
 def plain_ticks(axis: Axis, decades: float) -> None:
     """Plain numbers on a logarithmic axis that spans ``decades``: two at least."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator

@@ -8,7 +8,6 @@ import numpy as np
 
 from pdrom.core.packed import pack_positions, pack_text
 from pdrom.model.effects.base import EffectConfig
-from pdrom.model.mesh.types import Mesh
 from pdrom.view.runs import ViewedRun, ViewedScene
 from pdrom.view.view import view_of
 
@@ -33,7 +32,14 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
         "full": pack_positions(full),
         "view": view_of(scene.effects),
         "ranges": np.stack([low, high], axis=1).tolist(),
-        "bodies": [_pack_body(body) for body in bodies if body is not None],
+        "bodies": [
+            {
+                "points": [_numbers(axis) for axis in body.points.T],
+                "triangles": pack_text(body.triangles.astype("<u4")),
+            }
+            for body in bodies
+            if body is not None
+        ],
         "ms": scene.ms,
         "floor": _numbers(scene.floor),
         "horizon": scene.horizon,
@@ -60,13 +66,6 @@ def shown_region(
             low, high = np.minimum(low, lower), np.maximum(high, upper)
     middle, half = 0.5 * (low + high), (0.5 + ROOM) * float((high - low).max())
     return middle - half, middle + half
-
-
-def _pack_body(body: Mesh) -> dict[str, Any]:
-    return {
-        "points": [_numbers(axis) for axis in body.points.T],
-        "triangles": pack_text(body.triangles.astype("<u4")),
-    }
 
 
 def _pack_run(run: ViewedRun, stride: int, used: np.ndarray) -> dict[str, Any]:

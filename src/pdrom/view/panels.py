@@ -110,10 +110,12 @@ def draw_run(
     """
     ax.set_title(panel.title, pad=3)
     if panel.failure:
-        _mark_failure(ax)
+        look = {"facecolor": "#FBEDEB", "edgecolor": "#EBB9B4", "hatch": "////", "linewidth": 0.0}
+        _cover(ax, zorder=-5, **look)
     if panel.positions is None:
         set_window(ax, window)
-        _centre_note(ax, panel)
+        note = panel.failure or panel.remark or ""
+        centre_note(ax, note, FAILED if panel.failure else "#666666")
         return
     shown, zoom = panel.zoomed(window), panel.scale(window)
     surface = mesh_surface(mesh)
@@ -131,25 +133,12 @@ def draw_run(
     set_window(ax, shown)
     lines = [text for text in (panel.failure, panel.remark) if text]
     if zoom > SLACK:
-        lines.append(f"scale 1 : {_scale(zoom)}")
-        _frame(ax)
+        lines.append(f"scale 1 : {zoom:.{1 if zoom < 10.0 else 0}f}")
+        # a red frame: this picture has another scale than its neighbours
+        _cover(ax, zorder=8, facecolor="none", edgecolor=FAILED, linewidth=0.6)
     if lines:
         colour = FAILED if panel.failure or zoom > SLACK else "#555555"
         ax.set_xlabel("\n".join(lines), color=colour, fontsize=7.5, labelpad=2)
-
-
-def _scale(factor: float) -> str:
-    return f"{factor:.1f}" if factor < 10.0 else f"{factor:.0f}"
-
-
-def _mark_failure(ax: Axes) -> None:
-    look = {"facecolor": "#FBEDEB", "edgecolor": "#EBB9B4", "hatch": "////", "linewidth": 0.0}
-    _cover(ax, zorder=-5, **look)
-
-
-def _frame(ax: Axes) -> None:
-    """Thin red frame: this picture has another scale than its neighbours."""
-    _cover(ax, zorder=8, facecolor="none", edgecolor=FAILED, linewidth=0.6)
 
 
 def _cover(ax: Axes, **look: Any) -> None:
@@ -157,10 +146,6 @@ def _cover(ax: Axes, **look: Any) -> None:
     from matplotlib.patches import Rectangle
 
     ax.add_patch(Rectangle((0, 0), 1, 1, transform=ax.transAxes, clip_on=False, **look))
-
-
-def _centre_note(ax: Axes, panel: RunPanel) -> None:
-    centre_note(ax, panel.failure or panel.remark or "", FAILED if panel.failure else "#666666")
 
 
 def centre_note(ax: Axes, text: str, colour: str = "#666666") -> None:

@@ -88,12 +88,6 @@ def _info(label: str, group: h5py.Group) -> RerunInfo:
     )
 
 
-def rerun_errors(path: str, info: RerunInfo) -> np.ndarray:
-    """Relative error (F',) of every frame that ran, of the run ``info`` in the file ``path``."""
-    with open_hdf5(path) as file:
-        return file[info.label]["error"][...]
-
-
 def choose_ranks(infos: list[RerunInfo], asked: tuple[int | str, ...]) -> list[RerunInfo]:
     """Runs among ``infos`` of the sizes ``asked`` for, in this order, none twice, else all."""
     chosen: dict[str, RerunInfo] = {}

@@ -6,7 +6,8 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 
-from pdrom.core.store import atomic_path
+from pdrom.core.store import atomic_path, require_own
+from pdrom.core.store.atomic import MARK
 from pdrom.model.mesh.types import Mesh
 from pdrom.view.frames import shown_runs
 from pdrom.view.runs import ViewedScene
@@ -15,12 +16,21 @@ NAME = "frame_{:05d}.vtu"
 
 
 def vtk(scene: ViewedScene, collection: Path) -> None:
-    """Write the frames of ``scene`` beside the ``collection``, which is written last."""
+    """Write the frames of ``scene`` beside the ``collection``, which is written last.
+
+    Raises
+    ------
+    StorageError
+        A frame cannot be written, or a file that pdrom has not made has such a name.
+    """
     names = [NAME.format(frame) for frame in range(len(scene.positions))]
+    earlier = sorted(collection.parent.glob("frame_*.vtu"))
+    for path in (collection, *earlier):
+        require_own(path)
     for frame, name in enumerate(names):
         data = point_data(scene, frame)
         _write(scene.mesh, scene.positions[frame], data, collection.with_name(name))
-    for path in collection.parent.glob("frame_*.vtu"):  # files of an earlier, longer run
+    for path in earlier:  # of a longer run
         if path.name not in names:
             path.unlink()
     _write_collection(collection, names, scene.time_step)
@@ -48,6 +58,7 @@ def _write(mesh: Mesh, points: np.ndarray, data: dict[str, np.ndarray], path: Pa
     cells = [("tetra", mesh.tetrahedra) if volume else ("triangle", mesh.triangles)]
     with atomic_path(path, with_checksum=False) as temporary:
         meshio.Mesh(points, cells, point_data=data).write(temporary, file_format="vtu")
+        _mark(temporary)
 
 
 def _write_collection(path: Path, names: list[str], time_step: float) -> None:
@@ -59,3 +70,10 @@ def _write_collection(path: Path, names: list[str], time_step: float) -> None:
     ElementTree.indent(root)
     with atomic_path(path, with_checksum=False) as temporary:
         ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
+        _mark(temporary)
+
+
+def _mark(path: Path) -> None:
+    """Add a comment by which `require_own` knows the XML file ``path``."""
+    with open(path, "ab") as file:
+        file.write(b"\n<!-- " + MARK + b" -->\n")

@@ -14,15 +14,18 @@ from pdrom.core.errors import StorageError
 from pdrom.core.store.checksum import (
     CHECKSUM_SUFFIX,
     Checksum,
+    Condition,
+    check_file,
     checksum_path,
     digest_of,
+    is_hdf5,
     new_checksum,
     read_checksum,
     reason,
 )
 
-# Mark in the first or last bytes of every page and picture of this package.
-MARK, MARKED = b"made by pdrom", 65_536
+# Mark in the first or last bytes of every page, picture and file for ParaView.
+MARK, MARKED = b"made by pdrom, which may replace this file", 65_536
 # Part of the names of temporary files, so that no machine removes those of another one.
 _MACHINE = hashlib.blake2b(platform.node().encode(), digest_size=2).hexdigest()
 
@@ -60,7 +63,10 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
             _rename(temporary, checksum, target)
         else:
             os.replace(temporary, target)
-            _remove_checksum(checksum_path(target))  # checksum of an earlier file
+            place = checksum_path(target)
+            content = place.read_bytes() if place.is_file() else b""
+            if content and Checksum.parse(content).content == content:  # of an earlier file
+                place.unlink()
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
     finally:
@@ -91,10 +97,12 @@ def require_own(path: str | os.PathLike[str]) -> None:
     Raises
     ------
     StorageError
-        There is such a file: no result with a checksum, no page or picture with the mark of one.
+        There is such a file: no result with a checksum, nor the mark of a page or picture.
     """
     target = Path(path)
-    if not target.is_file() or read_checksum(target) is not None:
+    if not target.is_file():
+        return
+    if read_checksum(target) if is_hdf5(target) else check_file(target) is Condition.INTACT:
         return
     with open(target, "rb") as handle:
         begin = handle.read(MARKED)
@@ -116,13 +124,6 @@ def _require_file(target: Path) -> None:
         kinds = {stat.S_ISDIR: "a folder", stat.S_ISLNK: "a link; name the file itself"}
         kind = next((words for test, words in kinds.items() if test(mode)), "no regular file")
         raise StorageError(f"{target}: cannot be written ({kind})")
-
-
-def _remove_checksum(place: Path) -> None:
-    """Remove the hidden file ``place`` if it is a checksum, else leave it."""
-    content = place.read_bytes() if place.is_file() else b""
-    if content and Checksum.parse(content).content == content:
-        place.unlink()
 
 
 def _remove_leftovers(target: Path) -> None:

@@ -12,7 +12,6 @@ import pandas as pd
 from study.artifact.paths import File
 from study.tables.kit.parts import joined
 
-NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # frame_times without a scene
 PHASES = ("ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms", "global_ms")
 
 

@@ -51,6 +51,7 @@ def test_the_page_has_every_name_and_no_function_more():
     assert set(re.findall(r"`([a-z_]+)\(", PAGE.split("| name |")[1])) == functions
     assert len(functions) <= 10
     assert all(f"`{name}`" in PAGE for name in set(api.__all__) - functions)
+    assert dir(api) == sorted(api.__all__)
 
 
 def test_a_run_is_that_of_the_step_loop(full):

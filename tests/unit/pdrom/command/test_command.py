@@ -13,11 +13,13 @@ import pytest
 import yaml
 
 from builders import SMALL
+from pdrom import __version__
 from pdrom.api import load_scene
 from pdrom.command.base import Status
 from pdrom.command.main import COMMANDS, parser, run
 from pdrom.command.new import template
 from pdrom.core.store import check_file
+from pdrom.core.store.atomic import MARK
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene, SceneConfig
@@ -165,9 +167,10 @@ def spoil_configuration(file: h5py.File) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (cut_positions, "positions of shape (12, 30, 3), required: (13, 30, 3)"),
+        (cut_positions, "positions of float64 (12, 30, 3), required: float (13, 30, 3)"),
         (spoil_snapshots, "snapshots of spring: entry (0, 0, 0) is nan"),
         (spoil_configuration, "holds no sound run"),
+        (lambda file: file.attrs.modify("configuration", "[]"), "holds no sound run"),
         (lambda file: file.pop("timings"), "holds no run"),
         (lambda file: file["mesh"].pop("points"), "points"),
     ],
@@ -179,17 +182,6 @@ def test_an_unchecked_run_has_to_be_sound(folder, finished, change, words, capsy
     (told,) = capsys.readouterr().err.splitlines()
     assert told.startswith("pdrom: small.h5: ")
     assert words in told
-
-
-def test_runs_are_put_on_a_page(folder, capsys):
-    asked = ["reduce", "small.yaml", "--group", "spring", "--r"]
-    assert [run([*asked, r]) for r in ("1", "2")] == [Status.DONE] * 2
-    files = [f"small_spring_gappy_{r}.h5" for r in "12"]
-    assert run(["view", *files, "--out", "both.html"]) == Status.DONE
-    page = (folder / "both.html").read_text("utf-8")
-    assert '"r":1' in page
-    assert '"r":2' in page
-    assert run(["view", "small.yaml"]) == Status.FAULTY
 
 
 def test_the_whole_configuration_is_shown_as_yaml(folder, capsys):
@@ -360,13 +352,21 @@ UNWRITABLE = [
 
 def test_files_of_others_and_the_mesh_of_the_scene_are_not_overwritten(folder, capsys):
     Path("mine.h5").write_bytes(b"mine")
-    Path("m.obj").write_text("v 0 0 0\n")
-    for out in ("mine.h5", "m.obj"):
+    Path("m.obj").write_bytes(b"v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n# " + MARK)
+    assert run(["new", "own.yaml", "--mesh", "m.obj"]) == Status.DONE
+    for scene, out, words in (
+        ("small.yaml", "mine.h5", "cannot be written (a file that pdrom has not made"),
+        ("own.yaml", "m.obj", "would be overwritten, and is read by this command"),
+    ):
         before = Path(out).read_bytes()
-        assert run(["run", "small.yaml", "--out", out]) == Status.FAULTY
-        assert (
-            f"{out}: cannot be written (a file that pdrom has not made" in capsys.readouterr().err
-        )
+        reduce = ["reduce", scene, "--run", "none.h5"]
+        for command in (
+            ["run", scene],
+            [*reduce, "--group", "spring"],
+            [*reduce, "--error", "0.1"],
+        ):
+            assert run([*command, "--out", out]) == Status.FAULTY
+            assert f"{out}: {words}" in capsys.readouterr().err
         assert Path(out).read_bytes() == before
 
 
@@ -449,6 +449,12 @@ def test_an_output_that_cannot_be_written_is_one_line(folder):
     assert done.stderr == "pdrom: standard output: No space left on device\n"
 
 
+def test_the_version_is_said(capsys):
+    with pytest.raises(SystemExit) as caught:
+        run(["--version"])
+    assert (caught.value.code, capsys.readouterr().out) == (0, f"pdrom {__version__}\n")
+
+
 def test_a_run_of_another_scene_is_not_reduced(folder, capsys):
     run(["run", "small.yaml"])
     (folder / "small.yaml").write_text(SMALL.replace("1.0e+5", "2.0e+5"))
@@ -465,7 +471,7 @@ def test_a_blow_up_has_a_code_of_its_own(folder, monkeypatch, capsys):
 
 @pytest.mark.parametrize(
     "arguments",
-    [[], ["frobnicate"], ["run"], ["reduce", "x", "--r", "0"], ["reduce", "x", "--eror", "1e-2"]],
+    [[], ["reduec"], ["run"], ["reduce", "x", "--r", "0"], ["reduce", "x", "--eror", "1e-2"]],
 )
 def test_what_is_not_understood_has_code_2(arguments, capsys):
     with pytest.raises(SystemExit) as caught:
@@ -473,6 +479,7 @@ def test_what_is_not_understood_has_code_2(arguments, capsys):
     assert caught.value.code == 2
     said = capsys.readouterr().err
     assert "--eror" not in arguments or "did you mean '--error'?" in said
+    assert "reduec" not in arguments or "did you mean 'reduce'?" in said
 
 
 @pytest.mark.parametrize("name", COMMANDS)

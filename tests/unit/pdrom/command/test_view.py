@@ -1,8 +1,10 @@
 """pdrom view: a page, a picture and files for ParaView, of every kind of run."""
 
+import shutil
 from pathlib import Path
 from xml.etree import ElementTree
 
+import h5py
 import meshio
 import numpy as np
 import pytest
@@ -13,6 +15,8 @@ from pdrom.api import AskedRun, FullRun, load
 from pdrom.api.pictures import viewed_scenes
 from pdrom.command.base import Status
 from pdrom.command.main import run
+from pdrom.core.errors import StorageError
+from pdrom.core.store.checksum import write_block
 
 
 @pytest.fixture(scope="module")
@@ -62,9 +66,53 @@ def test_the_page_the_picture_and_the_files_for_paraview_have_all_runs(runs, tmp
     assert [path.name for path in tmp_path.rglob(".*")] == []
 
 
+def test_files_for_paraview_replace_and_remove_only_their_own(runs, tmp_path, capsys):
+    frames = tmp_path / "vtk"
+    view = ["view", files(runs)[0], "--out", str(tmp_path / "p.html"), "--vtk", str(frames)]
+    assert run(view) == run(view) == Status.DONE
+    for name in ("frame_00001.vtu", "frame_99999.vtu", "run.pvd"):
+        (frames / name).write_text("mine")
+        capsys.readouterr()
+        assert run(view) == Status.FAULTY
+        assert f"{name}: cannot be written (a file that pdrom has" in capsys.readouterr().err
+        assert (frames / name).read_text() == "mine"
+        (frames / name).unlink()
+
+
+def first_of(name, value):
+    """A change of a file: another first entry of its dataset ``name``."""
+    return lambda file: file[name].__setitem__(0, value)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("small", first_of("snapshots/spring/roundoff", np.nan), "round-off of spring"),
+        ("small_spring_gappy_2", first_of("difference", np.nan), "difference"),
+        ("small_spring_gappy_2", first_of("mesh/triangles", 999), "triangle 0 names vertex"),
+        (
+            "small_asked",
+            lambda file: file.attrs.modify("frames_met", 99),
+            "met for 99 of 12",
+        ),
+    ],
+)
+def test_a_right_checksum_does_not_make_a_run_sound(runs, tmp_path, name, change, words):
+    path = tmp_path / "run.h5"
+    shutil.copy(runs / f"{name}.h5", path)
+    with h5py.File(path, "r+") as file:
+        change(file)
+    write_block(path)
+    with pytest.raises(StorageError, match=f"run.h5: holds no sound run .*{words}"):
+        load(path)
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
-    [(["none.h5"], "none.h5: no such file"), (["RUN", "--png", "RUN"], "is read by this command")],
+    [
+        (["none.h5"], "none.h5: no such file"),
+        (["RUN", "--png", "RUN"], "is read by this command"),
+    ],
 )
 def test_what_cannot_be_viewed_is_one_line(runs, capsys, words, message):
     assert run(["view", *(files(runs)[0] if w == "RUN" else w for w in words)]) == Status.FAULTY

@@ -24,6 +24,7 @@ from pdrom.core.store import (
     write_table,
     write_text,
 )
+from pdrom.core.store.atomic import MARK
 
 
 def fail_after(function, *args, **settings):
@@ -231,8 +232,11 @@ def test_a_file_of_another_program_is_refused(tmp_path):
         require_own(path)
     write_text("ours", path)
     require_own(path)
-    path.write_text("<meta content='made by pdrom'>")
+    path.write_bytes(b"<meta content='" + MARK + b"'>")
     require_own(path)
+    path.write_text("# sheet made by pdrom's author")
+    with pytest.raises(StorageError, match="a file that pdrom has not made"):
+        require_own(path)
 
 
 def test_a_hidden_file_of_another_program_stays(tmp_path):
