@@ -3,7 +3,6 @@
 import os
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from pdrom.api.arguments import file_path, require
 from pdrom.api.records import AskedRun, FullRun, ReducedRun
@@ -12,6 +11,7 @@ from pdrom.core.store import require_own, require_place
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import mean_motion
 from pdrom.view import style
+from pdrom.view.artists import Figure
 from pdrom.view.multiples import clipped, log_axis
 from pdrom.view.page import write_page
 from pdrom.view.runs import ViewedRun, ViewedScene

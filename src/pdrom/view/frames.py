@@ -4,13 +4,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from pdrom.core.store import atomic_path
 from pdrom.core.store.atomic import MARK
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
 from pdrom.view import style
+from pdrom.view.artists import Figure
 from pdrom.view.camera import Camera
 from pdrom.view.panels import RunPanel, shared_window
 from pdrom.view.read import frame_numbers

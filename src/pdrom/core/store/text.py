@@ -4,13 +4,16 @@ import io
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from pdrom.core.errors import StorageError
 from pdrom.core.store.atomic import atomic_path
 from pdrom.core.store.checksum import reason, require_intact
+
+if TYPE_CHECKING:  # a run without tables does not load it
+    import pandas as pd
 
 
 def write_text(text: str, path: str | os.PathLike[str], with_checksum: bool = True) -> None:
@@ -29,7 +32,7 @@ FLOAT_FORMAT = "%.10g"
 
 
 def write_table(
-    table: pd.DataFrame, path: str | os.PathLike[str], with_checksum: bool = True
+    table: "pd.DataFrame", path: str | os.PathLike[str], with_checksum: bool = True
 ) -> None:
     """Write a table as CSV to ``path``: fixed float format, an empty cell for no value."""
     with atomic_path(path, with_checksum) as temporary:
@@ -38,11 +41,13 @@ def write_table(
 
 def read_table(
     path: str | os.PathLike[str], columns: Sequence[str] | None = None, result: bool = True
-) -> pd.DataFrame:
+) -> "pd.DataFrame":
     """Read the CSV table ``path``; StorageError if missing, damaged or without one of ``columns``.
 
     ``result`` marks a table that a run wrote, with a checksum; other tables have none.
     """
+    import pandas as pd
+
     if result:
         require_intact(path)
     try:

@@ -32,11 +32,23 @@ def compiled(function=None, **options):
     """Compile and keep a ``function``: without division checks, without fast-math by default.
 
     ``options`` are those of Numba's ``njit``; without a function this is a decorator with them.
+    No function is compiled a second time for callers in C, of which there are none.
     """
     if function is None:
         return lambda wrapped: compiled(wrapped, **options)
     _mark(function)
-    return njit(cache=True, error_model="numpy", **options)(function)
+    return njit(cache=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
+
+
+def inner(function=None, **options):
+    """Compile a ``function`` that only other compiled functions call: kept with each of these.
+
+    Without an entry for callers in Python, which takes longer to compile than a short function.
+    """
+    if function is None:
+        return lambda wrapped: inner(wrapped, **options)
+    own = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    return njit(error_model="numpy", **own, **options)(function)
 
 
 def template(function):

@@ -19,6 +19,7 @@ from numba.extending import intrinsic, models, register_model
 from pdrom.model.compiled.functions import compiled
 
 WIDTH = 4
+ROW_BYTES = 8 * WIDTH
 
 NUMBERS = ir.VectorType(ir.DoubleType(), WIDTH)
 INDICES = ir.VectorType(ir.IntType(32), WIDTH)
@@ -38,22 +39,27 @@ class _RowModel(models.PrimitiveModel):  # type: ignore[misc]
         super().__init__(manager, kind, NUMBERS)
 
 
-@compiled
-def empty(numbers):
-    """Array (numbers,) of doubles, to be written to."""
-    return np.empty(numbers)
+def empty(numbers: int, dtype: type = np.float64) -> np.ndarray:
+    """Array (numbers,) of doubles, or of another ``dtype``, to be written to."""
+    kind = np.dtype(dtype)
+    memory = np.empty(numbers * kind.itemsize + ROW_BYTES, np.uint8)
+    # through a memoryview: views of what is returned have that as their base, not the memory
+    start = -memory.ctypes.data % ROW_BYTES
+    return np.frombuffer(memory.data, kind, numbers, start)
 
 
-@compiled
-def zeros(numbers):
+def zeros(numbers: int) -> np.ndarray:
     """Array (numbers,) of zeros."""
-    return np.zeros(numbers)
+    made = empty(numbers)
+    made.fill(0.0)
+    return made
 
 
-@compiled
-def copied(numbers):
+def copied(numbers: np.ndarray) -> np.ndarray:
     """A copy of the flat array ``numbers``."""
-    return numbers.copy()
+    made = empty(len(numbers), numbers.dtype.type)
+    made[...] = numbers
+    return made
 
 
 @compiled(nogil=True)

@@ -10,7 +10,7 @@ branches, only selections. No fast-math: an element gives the same bits in every
 import numpy as np
 
 from pdrom.model.compiled import rows
-from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.functions import compiled, inner
 from pdrom.model.compiled.rows import at
 
 LANES = 32
@@ -21,7 +21,7 @@ SMALLEST = 1e-300
 
 def lane_function(function):
     """Compile a function of one lane: inlined, without division checks."""
-    return compiled(function, forceinline=True)
+    return inner(function, forceinline=True)
 
 
 def kernel(function):

@@ -23,6 +23,9 @@ VERTICES, FIRST, OWN = 0, 1, 4
 # Requests to a kernel: one of the two parts, or what both need beforehand.
 PARTS, PREPARE = (0, 1), 2
 
+Table = tuple[np.ndarray, np.ndarray, int]
+"""Addresses of kernels and of their records, and the part that is asked for."""
+
 _SIGNATURE = types.float64(types.intp, types.intp, types.intp, types.intp)
 
 
@@ -49,11 +52,12 @@ def call(_context, _address, _y, _rhs, _record, _part):
 
 
 @compiled(nogil=True)
-def add_part(addresses, records, part, y, rhs):
-    """Add a part of all kernels to ``rhs``; its energy.
+def add_part(table, y, rhs):
+    """Add what a ``table`` of `LocalPass` asks of its kernels to ``rhs``; the energy.
 
-    ``y``, ``rhs`` and the ``records`` of the kernels are addresses.
+    ``y`` and ``rhs`` are addresses.
     """
+    addresses, records, part = table
     energy = 0.0
     for k in range(len(addresses)):
         energy += call(addresses[k], y, rhs, records[k], part)
@@ -124,13 +128,18 @@ def projections(sampler: LocalKernel, y: np.ndarray, count: int) -> np.ndarray:
 
 
 class LocalPass:
-    """All local kernels of a step loop, one after the other."""
+    """All local kernels of a step loop, one after the other.
+
+    Attributes
+    ----------
+    first, second, preparing : first arguments of `add_part`, for the two parts and what both need
+    """
 
     def __init__(self, kernels: Sequence[LocalKernel]) -> None:
         self.kernels = tuple(kernels)
-        self.addresses, self.records = _tables(kernels)
-        self.preparing = _tables([kernel for kernel in kernels if kernel.prepares])
-        self.second = _tables([kernel for kernel in kernels if kernel.touched])
+        self.first = _table(kernels, PARTS[0])
+        self.preparing = _table([kernel for kernel in kernels if kernel.prepares], PREPARE)
+        self.second = _table([kernel for kernel in kernels if kernel.touched], PARTS[1])
         touched = [kernel.touched for kernel in kernels if kernel.touched]
         self.touched = range(0)
         self.other = rows.zeros(0)
@@ -152,16 +161,17 @@ class LocalPass:
 
     def _add(self, y: np.ndarray, rhs: np.ndarray) -> float:
         places = y.ctypes.data, rhs.ctypes.data
-        add_part(*self.preparing, PREPARE, *places)
-        energy = add_part(self.addresses, self.records, PARTS[0], *places)
+        add_part(self.preparing, *places)
+        energy = add_part(self.first, *places)
         if self.touched:
             own = slice(rows.WIDTH * self.touched.start, rows.WIDTH * self.touched.stop)
             self.other[own] = 0.0
-            energy += add_part(*self.second, PARTS[1], y.ctypes.data, self.other.ctypes.data)
+            energy += add_part(self.second, y.ctypes.data, self.other.ctypes.data)
             rhs[own] += self.other[own]
         return energy
 
 
-def _tables(kernels: Sequence[LocalKernel]) -> tuple[np.ndarray, np.ndarray]:
+def _table(kernels: Sequence[LocalKernel], part: int) -> Table:
     addresses = np.array([kernel.address for kernel in kernels], dtype=np.int64)
-    return addresses, np.array([kernel.record.ctypes.data for kernel in kernels], dtype=np.int64)
+    records = np.array([kernel.record.ctypes.data for kernel in kernels], dtype=np.int64)
+    return addresses, records, part

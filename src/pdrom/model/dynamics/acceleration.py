@@ -9,7 +9,7 @@ same.
 
 import numpy as np
 
-from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.functions import compiled, inner
 from pdrom.model.compiled.rows import flat, write
 from pdrom.model.compiled.vectors import dot
 
@@ -20,7 +20,7 @@ REGULARISATION = 1e-14
 DIFFERENCES, REFUSED = 0, 1
 
 
-@compiled
+@inner
 def _weights(gram, projection, count):
     """Solve the regularised normal equations (count, count) by Cholesky; zero weights if they
     are not positive definite, so that the plain image is taken."""
@@ -102,7 +102,11 @@ def combine(history, image):
             image[i] -= weights[j] * images[j, i]
 
 
-def _history(window: int, n: int) -> tuple[np.ndarray, ...]:
+History = tuple[np.ndarray, ...]
+"""Memory for the iterates of a frame, see `Anderson.history`."""
+
+
+def _history(window: int, n: int) -> History:
     """Memory for a frame's iterates of n numbers.
 
     The accepted iterate, and the residual and image of the one before (n,); ``window`` differences
@@ -114,8 +118,9 @@ def _history(window: int, n: int) -> tuple[np.ndarray, ...]:
     return (*vectors, *differences, np.empty((window, window)), np.zeros(2, np.int64), np.empty(1))
 
 
-# Arguments of iterations without acceleration.
-NO_HISTORY = _history(0, 0)
+# Of iterations without acceleration. Compiled loops tell it by its type, so that a process without
+# acceleration compiles nothing of it.
+NO_HISTORY = None
 
 
 class Anderson:

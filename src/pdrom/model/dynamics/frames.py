@@ -6,7 +6,7 @@ kg/s^2, ``time_step`` h, s.
 
 import numpy as np
 
-from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.functions import compiled, inner
 from pdrom.model.compiled.rows import WIDTH
 
 
@@ -48,7 +48,7 @@ def end(y, before, time_step, positions, velocities):
             velocities[i, axis] = (positions[i, axis] - before[i, axis]) / time_step
 
 
-@compiled(nogil=True)
+@inner
 def inertia_energy(y, s, inertia):
     """1/2 |(M/h^2)^1/2 (y - s)|^2 of rows of four, flat; ``inertia`` is M/h^2 (N,)."""
     energy = 0.0

@@ -7,9 +7,9 @@ import numpy as np
 
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.clock import clock, now
-from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.functions import compiled, inner
 from pdrom.model.compiled.rows import WIDTH, write
-from pdrom.model.constraints.local_kernel import PARTS, PREPARE, LocalPass, add_part
+from pdrom.model.constraints.local_kernel import LocalPass, add_part
 from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, combine, refuse
 from pdrom.model.dynamics.frames import inertia_energy
 from pdrom.model.dynamics.sweeps import sweep
@@ -37,7 +37,7 @@ class CompiledIterations:
         self._acceleration = acceleration
         # what every call hands to compiled code
         touched = local.touched
-        self._tables = (local.addresses, local.records, local.preparing, local.second)
+        self._tables = (local.first, local.preparing, local.second)
         self._second = (local.other, touched.start, touched.stop)
         self._clock = clock()
 
@@ -72,50 +72,51 @@ class CompiledIterations:
         seconds : (4,) times of the local and of the global steps are added to entries 1 and 2
         """
         history = NO_HISTORY if self._acceleration is None else self._acceleration.history
-        tracked = len(objective) > 0 or self._acceleration is not None
+        tracked = len(objective) > 0 or history is not None
         right = rows.empty(WIDTH * len(y))
         iterate, start = rows.flat(y), rows.flat(base)
         prediction = rows.flat(s) if tracked else start
         all_iterations(
-            which.start, which.stop, iterations, iterate, prediction, start, right, self._inertia,
-            self._tables, self._second, elimination.factor, history, objective, seconds,
-            self._clock,
+            (which.start, which.stop, iterations), iterate, prediction, start, right,
+            self._inertia, self._tables, self._second, elimination.factor, history, objective,
+            seconds, self._clock,
         )  # fmt: skip
 
 
-@compiled(nogil=True)
+@inner
 def _second_part(kernels, y, other, start, stop):
     """The second parts of all local steps into an array of their own; their energy."""
     other[WIDTH * start : WIDTH * stop] = 0.0
-    return add_part(kernels[0], kernels[1], PARTS[1], y.ctypes.data, other.ctypes.data)
+    return add_part(kernels, y.ctypes.data, other.ctypes.data)
 
 
 @compiled(nogil=True)
 def all_iterations(
-    first, end, iterations, y, s, base, rhs, inertia, tables, second, factor, history, objective,
+    which, y, s, base, rhs, inertia, tables, second, factor, history, objective,
     seconds, watch,
 ):  # fmt: skip
     """Do iterations of a frame in place, see `CompiledIterations.run`.
 
     Parameters
     ----------
-    first, end : those from ``first`` to before ``end`` of ``iterations``
+    which : (first, end, iterations), those from ``first`` to before ``end`` of ``iterations``
     y, s, base, rhs : rows of four, flat: iterate, prediction, (M/h^2) s, working array
     inertia : (N,) M/h^2, kg/s^2
     tables, second : of the local steps, see `CompiledIterations.compiled_arguments`
-    factor : of the system; ``history`` of the acceleration
+    factor : of the system
+    history : of the acceleration, `NO_HISTORY` without one: its code is then left out
     objective, seconds : as there
     watch : see `pdrom.model.compiled.clock`
     """
-    addresses, records, preparing, kernels = tables
+    first, end, iterations = which
+    local, preparing, kernels = tables
     other, start, stop = second
     panels, vertices, loads, work = factor
-    window = len(history[5])
     for k in range(first, end):
         before = now(watch)
         write(base, rhs)
-        add_part(preparing[0], preparing[1], PREPARE, y.ctypes.data, rhs.ctypes.data)
-        energy = add_part(addresses, records, PARTS[0], y.ctypes.data, rhs.ctypes.data)
+        add_part(preparing, y.ctypes.data, rhs.ctypes.data)
+        energy = add_part(local, y.ctypes.data, rhs.ctypes.data)
         if stop > start:
             energy += _second_part(kernels, y, other, start, stop)
             for i in range(WIDTH * start, WIDTH * stop):
@@ -123,18 +124,21 @@ def all_iterations(
         between = now(watch)
         seconds[1] += between - before
         value = np.nan
-        if len(objective) or window:
-            value = energy + inertia_energy(y, s, inertia)
+        refused = False
         if len(objective):
-            objective[k] = value
+            value = objective[k] = energy + inertia_energy(y, s, inertia)
             between = now(watch)
-        if window and refuse(history, y, value):
+        if history is not None:
+            if not len(objective):
+                value = energy + inertia_energy(y, s, inertia)
+            refused = refuse(history, y, value)
+        if refused:
             if len(objective):
                 objective[k] = objective[k - 1]
         else:
             sweep(panels, vertices, loads, work, rhs, y)
             # the last image stays as it is: its objective is known not to rise
-            if window and k < iterations - 1:
+            if history is not None and k < iterations - 1:
                 combine(history, y)
         seconds[2] += now(watch) - between
     return 0.0

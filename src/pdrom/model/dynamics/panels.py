@@ -7,12 +7,14 @@ dynamic programming over a cost in processor cycles.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
+from pdrom.model.dynamics.sweeps import SWEEP
 
 WIDTHS = np.array([1, 2, 3, 4, 6, 8])
 # Cycles of a panel (a branch that is guessed wrong, the chain of its own columns) and of each row
@@ -42,8 +44,9 @@ class Panels:
     def of(cls, lower: sparse.csc_array, diagonal: np.ndarray) -> "Panels":
         """Panels of L = ``lower`` (n, n) with ascending row indices and D = ``diagonal`` (n,)."""
         n = lower.shape[0]
-        below = _rows_below(lower.indptr, lower.indices, n, int(WIDTHS.max()))
-        ends = _partition(below, WIDTHS)
+        below = np.zeros((int(WIDTHS.max()) + 1, n), np.int64)
+        _count_rows_below(lower.indptr, lower.indices, np.full(n, -1), below)
+        ends = _partition(below)
         width = np.diff(ends, prepend=0)
         rows = below[width, ends - 1]
         first = np.concatenate([[0], ends]).astype(np.int32)
@@ -56,7 +59,7 @@ class Panels:
         )  # fmt: skip
         _fill(
             lower.indptr, lower.indices, lower.data, 1.0 / diagonal, first, row_start, value_start,
-            panels.rows, panels.values,
+            panels.rows, panels.values, np.full(n, -1),
         )  # fmt: skip
         return panels
 
@@ -70,15 +73,22 @@ class Panels:
         """Arrays in the order in which `pdrom.model.dynamics.sweeps.sweep` takes them."""
         return self.first, self.row_start, self.value_start, self.rows, self.values
 
+    @property
+    def factor(self) -> tuple[Any, ...]:
+        """First argument of `pdrom.model.dynamics.sweeps.sweep`."""
+        return *self.arrays, SWEEP.address
+
 
 @compiled
-def _rows_below(indptr, indices, n, widest):
-    """below[w, j]: rows below the panel of the w columns that end with column j."""
-    below = np.zeros((widest + 1, n), np.int64)
-    seen = np.full(n, -1, np.int64)
-    for j in range(n):
+def _count_rows_below(indptr, indices, seen, below):
+    """below[w, j]: rows below the panel of the w columns that end with column j.
+
+    ``seen`` (n,) is working memory of -1. Arrays are made by Python here: each kind of allocation
+    takes a tenth of a second to compile.
+    """
+    for j in range(len(seen)):
         count = 0
-        for width in range(1, min(widest, j + 1) + 1):
+        for width in range(1, min(len(below) - 1, j + 1) + 1):
             column = j - width + 1
             for k in range(indptr[column], indptr[column + 1]):
                 row = indices[k]
@@ -86,36 +96,40 @@ def _rows_below(indptr, indices, n, widest):
                     seen[row] = j
                     count += 1
             below[width, j] = count
-    return below
+
+
+def _partition(below: np.ndarray) -> np.ndarray:
+    """End column (exclusive) of each panel in the cheapest partition, ascending."""
+    n = below.shape[1]
+    chosen = np.zeros(n + 1, np.int64)
+    _choose(below, WIDTHS, np.full(n + 1, np.inf), chosen)
+    ends = []
+    end = n
+    while end > 0:
+        ends.append(end)
+        end -= int(chosen[end])
+    return np.array(ends[::-1], np.int64)
 
 
 @compiled
-def _partition(below, widths):
-    """End column (exclusive) of each panel in the cheapest partition, ascending."""
-    n = below.shape[1]
-    cost = np.full(n + 1, np.inf)
+def _choose(below, widths, cost, chosen):
+    """Write the width of the last panel of the cheapest partition of the columns before each one.
+
+    ``cost`` (n + 1,) is working memory of inf.
+    """
     cost[0] = 0.0
-    chosen = np.zeros(n + 1, np.int64)
-    for end in range(1, n + 1):
+    for end in range(1, len(cost)):
         for width in widths:
             if width <= end:
                 rows = below[width, end - 1]
                 own = cost[end - width] + PANEL + rows * (ROW + ENTRY * width)
                 if own < cost[end]:
                     cost[end], chosen[end] = own, width
-    ends, count = np.empty(n, np.int64), 0
-    end = n
-    while end > 0:
-        ends[count] = end
-        count += 1
-        end -= chosen[end]
-    return ends[:count][::-1].copy()
 
 
 @compiled
-def _fill(indptr, indices, data, inverse, first, row_start, value_start, rows, values):
-    """Write the rows and numbers of all panels."""
-    place = np.full(len(inverse), -1, np.int64)
+def _fill(indptr, indices, data, inverse, first, row_start, value_start, rows, values, place):
+    """Write the rows and numbers of all panels; ``place`` (n,) is working memory of -1."""
     for panel in range(len(first) - 1):
         a, b = first[panel], first[panel + 1]
         width, start = b - a, row_start[panel]
@@ -131,9 +145,8 @@ def _fill(indptr, indices, data, inverse, first, row_start, value_start, rows, v
                     new -= 1
                 rows[new] = row
                 count += 1
-        own = rows[start : start + count]
         for k in range(count):
-            place[own[k]] = k
+            place[rows[start + k]] = k
         triangle = value_start[panel] + width
         rest = triangle + width * (width - 1) // 2
         for j in range(a, b):
@@ -145,5 +158,5 @@ def _fill(indptr, indices, data, inverse, first, row_start, value_start, rows, v
                 elif row > j:
                     values[triangle + (row - a) * (row - a - 1) // 2 + j - a] = data[k]
         for k in range(count):
-            place[own[k]] = -1
-            own[k] *= WIDTH
+            place[rows[start + k]] = -1
+            rows[start + k] *= WIDTH

@@ -1,6 +1,7 @@
 """Factorisations of the global system: factor once, solve often."""
 
 from abc import ABC, abstractmethod
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -22,9 +23,9 @@ SOLVERS = Registry(
 )
 
 # First arguments of `pdrom.model.dynamics.sweeps.sweep`: panels, vertices, loads, working array.
-Factor = tuple[tuple[np.ndarray, ...], np.ndarray, np.ndarray, np.ndarray]
+Factor = tuple[tuple[Any, ...], np.ndarray, np.ndarray, np.ndarray]
 NOTHING_FREE: Factor = (
-    (np.zeros(1, np.int32), *(np.zeros(1, np.int64),) * 2, np.zeros(0, np.int32), np.zeros(0)),
+    (np.zeros(1, np.int32), *(np.zeros(1, np.int64),) * 2, np.zeros(0, np.int32), np.zeros(0), 0),
     np.zeros(0, np.int32),
     np.zeros(0),
     np.zeros(0),
@@ -117,7 +118,7 @@ class SupernodalSolver(SparseSolver):
         unknowns = np.argsort(factor.perm_c)
         order = vertices[unknowns].astype(np.int32)
         self._loads = rows.zeros(rows.WIDTH * n)
-        self._sweep = (self.panels.arrays, order, self._loads, rows.empty(rows.WIDTH * n))
+        self._sweep = (self.panels.factor, order, self._loads, rows.empty(rows.WIDTH * n))
         self.factor = self._sweep
         self.coupling = NO_COUPLING
         if coupling is not None:

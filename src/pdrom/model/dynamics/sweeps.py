@@ -11,8 +11,8 @@ from numba.core import cgutils, errors
 from numba.extending import intrinsic
 
 from pdrom.model.compiled.arithmetic import multiply_add, spread, subtract
-from pdrom.model.compiled.functions import compiled
-from pdrom.model.compiled.rows import NUMBERS, WIDTH, at, store
+from pdrom.model.compiled.functions import Callback, compiled
+from pdrom.model.compiled.rows import NUMBERS, WIDTH, at, doubles, indices, integers, store
 from pdrom.model.compiled.rows import load as load_row
 
 _INDEX = ir.IntType(64)
@@ -156,26 +156,19 @@ def load(beside, indptr, indices, data, targets, loads):
             loads[WIDTH * i + axis] = total
 
 
-@compiled(nogil=True)
-def sweep(panels, vertices, loads, x, rhs, y):
-    """Overwrite some rows of ``y`` by A^-1 (rhs - load).
-
-    Parameters
-    ----------
-    panels : arrays of `pdrom.model.dynamics.panels.Panels`
-    vertices : (n,) row of ``rhs`` and ``y`` of each unknown, in the order of the factor
-    loads : (4 n,) rows that are taken from the right-hand side, in that order
-    x : (4 n,) working array
-    rhs, y : rows of four, flat
-    """
-    first, row_start, value_start, rows, values = panels
-    for i in range(len(vertices)):
-        store(
-            x,
-            WIDTH * i,
-            subtract(load_row(rhs, WIDTH * at(vertices, i)), load_row(loads, WIDTH * i)),
-        )
-    for p in range(len(first) - 1):
+def _sweep(
+    count, first, row_start, value_start, rows, values, size, vertices, loads, x, rhs, y
+):  # fmt: skip
+    """Do `sweep` with ``count`` panels of ``size`` unknowns; the others are addresses."""
+    first, vertices = integers(first, count + 1), integers(vertices, size)
+    row_start, value_start = indices(row_start, count + 1), indices(value_start, count + 1)
+    rows, values = integers(rows, row_start[count]), doubles(values, value_start[count])
+    loads, x = doubles(loads, WIDTH * size), doubles(x, WIDTH * size)
+    rhs, y = doubles(rhs, 0), doubles(y, 0)
+    for i in range(size):
+        given = load_row(rhs, WIDTH * at(vertices, i))
+        store(x, WIDTH * i, subtract(given, load_row(loads, WIDTH * i)))
+    for p in range(count):
         a, width = WIDTH * at(first, p), at(first, p + 1) - at(first, p)
         start, stop, v = at(row_start, p), at(row_start, p + 1), at(value_start, p)
         if width == 8:
@@ -190,7 +183,7 @@ def sweep(panels, vertices, loads, x, rhs, y):
             _forward(2, x, a, rows, start, stop, values, v)
         else:
             _forward(1, x, a, rows, start, stop, values, v)
-    for p in range(len(first) - 2, -1, -1):
+    for p in range(count - 1, -1, -1):
         a, width = WIDTH * at(first, p), at(first, p + 1) - at(first, p)
         start, stop, v = at(row_start, p), at(row_start, p + 1), at(value_start, p)
         if width == 8:
@@ -205,5 +198,46 @@ def sweep(panels, vertices, loads, x, rhs, y):
             _backward(2, x, a, rows, start, stop, values, v)
         else:
             _backward(1, x, a, rows, start, stop, values, v)
-    for i in range(len(vertices)):
+    for i in range(size):
         store(y, WIDTH * at(vertices, i), load_row(x, WIDTH * i))
+
+
+_ARGUMENTS = 12
+# Called by its address: as a part of each loop it would be compiled with each of them.
+SWEEP = Callback(_sweep, types.void(*(types.intp,) * _ARGUMENTS))
+
+
+@intrinsic
+def _call(_context, address, arguments):
+    """Call `SWEEP` by its ``address`` with a tuple of ``arguments``."""
+
+    def generate(_target, builder, _signature, values):
+        kind = ir.FunctionType(ir.VoidType(), [_INDEX] * _ARGUMENTS)
+        own = [builder.extract_value(values[1], k) for k in range(_ARGUMENTS)]
+        builder.call(builder.inttoptr(values[0], kind.as_pointer()), own)
+        return _target.get_dummy_value()
+
+    return types.void(address, arguments), generate
+
+
+@compiled(nogil=True)
+def sweep(panels, vertices, loads, x, rhs, y):
+    """Overwrite some rows of ``y`` by A^-1 (rhs - load).
+
+    Parameters
+    ----------
+    panels : see `pdrom.model.dynamics.panels.Panels.factor`
+    vertices : (n,) row of ``rhs`` and ``y`` of each unknown, in the order of the factor
+    loads : (4 n,) rows that are taken from the right-hand side, in that order
+    x : (4 n,) working array
+    rhs, y : rows of four, flat
+    """
+    first, row_start, value_start, rows, values, address = panels
+    if len(vertices) == 0:
+        return
+    arguments = (
+        len(first) - 1, first.ctypes.data, row_start.ctypes.data, value_start.ctypes.data,
+        rows.ctypes.data, values.ctypes.data, len(vertices), vertices.ctypes.data,
+        loads.ctypes.data, x.ctypes.data, rhs.ctypes.data, y.ctypes.data,
+    )  # fmt: skip
+    _call(address, arguments)

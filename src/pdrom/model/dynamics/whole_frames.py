@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pdrom.model.compiled.clock import now
-from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.functions import compiled, inner
 from pdrom.model.compiled.rows import WIDTH, empty, unflat, write, zeros
 from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, forget
 from pdrom.model.dynamics.frames import end, predict, weighted
@@ -91,23 +91,24 @@ class WholeFrames:
         system = self._space.system.eliminate(fixed)
         if not self._loop.takes(system):
             return None
-        count, history = len(targets), NO_HISTORY
+        count = len(targets)
         positions, velocities = np.empty((2, count + 1, *q.shape))
         positions[0], velocities[0] = q, v
         objective = np.full((count, iterations if track else 0), np.nan)
         seconds = np.zeros((count, 4))
+        history = NO_HISTORY
         if self._anderson is not None:
             self._anderson.begin_frame(self._first)
             history = self._anderson.history
         _frames(
             positions, velocities, self._constants, self._rates, self._acceleration, h, fixed,
-            targets, system.coupling, self._floors, self._work, iterations, history, objective,
-            seconds, *self._loop.compiled_arguments, system.factor,
+            targets, system.coupling, self._floors, self._work, (0, iterations, iterations),
+            history, objective, seconds, *self._loop.compiled_arguments, system.factor,
         )  # fmt: skip
         return positions[1:], velocities[1:], objective, seconds
 
 
-@compiled(nogil=True)
+@inner
 def _accelerate(constants, rates, velocities, result):
     """Sum of all forces' accelerations, (N, 3), or (1, 3) where they are constant."""
     for i in range(len(result)):
@@ -120,7 +121,7 @@ def _accelerate(constants, rates, velocities, result):
             result[i, axis] = total
 
 
-@compiled(nogil=True)
+@inner
 def _correct(y, floors, fixed, targets):
     """Lift free vertices onto the floors."""
     for height in floors:
@@ -135,7 +136,7 @@ def _correct(y, floors, fixed, targets):
 @compiled(nogil=True)
 def _frames(
     positions, velocities, constants, rates, acceleration, h, fixed, targets, coupling, floors,
-    work, iterations, history, objective, seconds, inertia, tables, second, watch, factor,
+    work, which, history, objective, seconds, inertia, tables, second, watch, factor,
 ):  # fmt: skip
     y, rhs = work
     beside, indptr, indices, data = coupling
@@ -149,12 +150,12 @@ def _frames(
         load(beside, indptr, indices, data, targets[f], factor[2])
         base = weighted(inertia, s)
         write(s, y)
-        if len(history[5]):
+        if history is not None:
             forget(history)
         seconds[f, 0] = now(watch) - began
         all_iterations(
-            0, iterations, iterations, y, s, base, rhs, inertia, tables, second, factor, history,
-            objective[f], seconds[f], watch,
+            which, y, s, base, rhs, inertia, tables, second, factor, history, objective[f],
+            seconds[f], watch,
         )  # fmt: skip
         began = now(watch)
         if len(floors):

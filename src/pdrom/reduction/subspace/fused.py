@@ -19,7 +19,7 @@ from typing import TypeGuard
 import numpy as np
 
 from pdrom.model.compiled.clock import clock
-from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson
+from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, History
 from pdrom.model.dynamics.space import Solve
 from pdrom.model.dynamics.stepper import LocalStep, Stepper
 from pdrom.model.dynamics.whole_frames import BLOCK, Blocks
@@ -113,7 +113,7 @@ class _Fused:
         y[free] = read(own.z, len(free))
         return y
 
-    def _history(self, free: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _history(self, free: np.ndarray) -> History | None:
         """Memory of the acceleration for iterates of the ``free`` coordinates."""
         if self._acceleration is None:
             return NO_HISTORY

@@ -1,7 +1,7 @@
 """Compiled iterations and frames of `pdrom.reduction.subspace.fused`."""
 
 from pdrom.model.compiled.clock import now
-from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.functions import compiled, inner
 from pdrom.model.compiled.rows import write
 from pdrom.model.constraints.gradient_kernel import call
 from pdrom.model.dynamics.acceleration import combine, forget, refuse
@@ -21,8 +21,8 @@ def iterations(count, size, rows, operators, sampled, history):
     """
     strain, lift, offset, constant, z, weights, inertia, start = operators
     addresses, elements, starts, parameters, parameter_starts, d, p = sampled
-    y, accelerated = z[: 3 * size], len(history[5]) > 0
-    if accelerated:
+    y = z[: 3 * size]
+    if history is not None:
         write(y, start)
         forget(history)
     for k in range(count):
@@ -35,14 +35,16 @@ def iterations(count, size, rows, operators, sampled, history):
                 p[3 * starts[g] :].ctypes.data,
                 elements[g],
             )
-        if accelerated and refuse(history, y, _objective(weights, d, p, inertia, y, start)):
-            continue
-        product(lift, size, rows, constant, p, z)
-        if accelerated and k < count - 1:
-            combine(history, y)
+        refused = False
+        if history is not None:
+            refused = refuse(history, y, _objective(weights, d, p, inertia, y, start))
+        if not refused:
+            product(lift, size, rows, constant, p, z)
+            if history is not None and k < count - 1:
+                combine(history, y)
 
 
-@compiled(nogil=True)
+@inner
 def _objective(weights, d, p, inertia, y, s):
     """1/2 sum_i w_i |d_i - p_i|^2 + 1/2 (y - s)^T (M/h^2) (y - s)."""
     total = 0.0
@@ -59,7 +61,7 @@ def _objective(weights, d, p, inertia, y, s):
     return 0.5 * total
 
 
-@compiled(nogil=True)
+@inner
 def _predict(z, v, acceleration, rate, rates, h, s):
     """Write s = z + h v + h^2 (a + c v + C v)."""
     for i in range(len(z)):

@@ -13,10 +13,10 @@ from pdrom.model.compiled.arithmetic import add_scaled, constant
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH, at, load, store
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.constraints.local_kernel import PARTS, PREPARE, LocalPass, add_part
+from pdrom.model.constraints.local_kernel import LocalPass, Table, add_part
 
 # Arguments of `add_projections`, and of `multiply`.
-Tables = tuple[tuple[np.ndarray, np.ndarray], ...]
+Tables = tuple[Table, ...]
 Matrix = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
@@ -33,7 +33,7 @@ class Potential:
         kernels = [group.local_kernel for group in groups if group.local_kernel is not None]
         self._pass = LocalPass(kernels)  # owns what the tables point to
         local = self._pass
-        self.tables: Tables = ((local.addresses, local.records), local.preparing, local.second)
+        self.tables: Tables = local.first, local.preparing, local.second
         total = sparse.csr_array((vertices, vertices))
         for group in groups:
             total = total + group.system_matrix()
@@ -52,9 +52,9 @@ def add_projections(tables, y, rhs):
     """Add S^T W p(y) of all groups in ``tables`` to ``rhs``, both padded, flat; the energy W(y)."""
     kernels, preparing, second = tables
     y_place, rhs_place = y.ctypes.data, rhs.ctypes.data
-    add_part(preparing[0], preparing[1], PREPARE, y_place, rhs_place)
-    energy = add_part(kernels[0], kernels[1], PARTS[0], y_place, rhs_place)
-    return energy + add_part(second[0], second[1], PARTS[1], y_place, rhs_place)
+    add_part(preparing, y_place, rhs_place)
+    energy = add_part(kernels, y_place, rhs_place)
+    return energy + add_part(second, y_place, rhs_place)
 
 
 @compiled(nogil=True)

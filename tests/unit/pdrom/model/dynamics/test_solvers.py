@@ -143,7 +143,7 @@ def test_panels_hold_the_factor(size, rng):
         rhs, y = np.zeros((2, 4 * size))
         rhs[4 * column] = 1.0
         order, zeros = np.arange(size, dtype=np.int32), np.zeros(4 * size)
-        sweep(panels.arrays, order, zeros, np.empty(4 * size), rhs, y)
+        sweep(panels.factor, order, zeros, np.empty(4 * size), rhs, y)
         scale = np.abs(inverse).max()
         np.testing.assert_allclose(y[::4], inverse[:, column], atol=1e-12 * scale)
         assert not y.reshape(-1, 4)[:, 1:].any()
