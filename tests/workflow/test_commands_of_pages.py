@@ -32,7 +32,7 @@ LEFT_OUT = {
     r"^\.venv/bin/(ruff|snakefmt|mypy)": "executed by .ci/run",
     r"^\./reproduce --report": "executed by test_report.py",
     r"^\./reproduce (verify|bundle)": "needs a study; has tests of its own",
-    r"^\./reproduce (figure [^8]|reduced_reruns)": "planned by test_measured_claim_map.py",
+    r"^\./reproduce (figure [^8]|reduced_reruns)": "planned by test_contents.py",
     r"rest_shapes|mesh_sizes|rest_lengths|leverage": "recipes, executed by test_recipes.py",
     r"^(docker|(sh |bash )?tests/)": "makes a machine of its own",
 }

@@ -16,7 +16,6 @@ import pytest
 import yaml
 from checkout import Checkout, Made, copy_repository, only_line
 
-from pdrom.core.store import read_table
 from places import MICRO_MANUSCRIPT, MICRO_RESULTS
 from study.figures.kit.declaration import declarations
 from study.pipeline.running import hold
@@ -95,16 +94,15 @@ def finished(finished_once: Checkout, plan: dict[str, Made]) -> Iterator[Checkou
         os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
 
 
-def test_the_claim_map_names_the_rules_and_counts_the_jobs_of_a_run(
-    finished: Checkout, plan: dict[str, Made]
-) -> None:
-    written = read_table(finished.folder / MICRO_RESULTS / "claim_map.csv").set_index("kind")
-    for entry in written.drop("section").itertuples():
-        assert {plan[file].rule for file in entry.target.split()} == {entry.rule}
+def test_the_contents_count_the_jobs_of_a_run(finished: Checkout, plan: dict[str, Made]) -> None:
+    text = (finished.folder / MICRO_RESULTS / "contents.md").read_text("utf-8")
+    rows = [[cell.strip() for cell in line.split("|")] for line in text.splitlines()]
+    listed = [row for row in rows if len(row) == 9 and "./reproduce" in row[3]]
+    jobs = {(kind, name): int(count) for _, kind, name, _, count, *_ in listed}
     logs = {plan[file].log for file in needed(plan, MICRO_MANUSCRIPT)}
-    assert written.jobs["manuscript"] == len(logs)
-    assert written.jobs["figure"].nunique() > 5  # by what each one reads
-    assert written.minutes.isna().all()  # nothing has run
+    assert jobs["manuscript", "paper/main.pdf"] == len(logs)
+    assert len({count for (kind, _), count in jobs.items() if kind == "figure"}) > 5
+    assert {row[5] for row in listed} == {""}  # nothing has run
 
 
 def test_a_fresh_clone_plans_the_whole_study_beside_a_run(

@@ -9,8 +9,13 @@ INTERRUPTED = 130  # exit status of a program that ends by Ctrl-C
 def choices(value: object, allowed: Iterable[object]) -> str:
     """End of a message about ``value``: what is allowed, and the name that was probably meant."""
     names = [str(name) for name in allowed]
-    close = get_close_matches(str(value), names, n=1)
-    return f" (allowed: {', '.join(names)})" + (f", did you mean '{close[0]}'?" if close else "")
+    return f" (allowed: {', '.join(names)}){suggestion(value, names)}"
+
+
+def suggestion(value: object, allowed: Iterable[str]) -> str:
+    """End of a message about ``value``: the name among ``allowed`` that was probably meant."""
+    close = get_close_matches(str(value), list(dict.fromkeys(allowed)), n=1)
+    return f", did you mean '{close[0]}'?" if close else ""
 
 
 class PdromError(Exception):

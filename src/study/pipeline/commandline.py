@@ -8,12 +8,13 @@ file that is no text.
 import json
 import shlex
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pdrom.core.errors import ConfigurationError
+from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.yamlfile import read_yaml, shown
 
 # Options with which Snakemake prints or draws something and runs no job.
@@ -71,13 +72,14 @@ class CommandLine:
         if found["profile"]:
             found |= _of_profile(arguments, found["profile"])
         looks = [name for name in LOOKS_ONLY if found[name]]
+        reports = bool(found["report"] or found["reporter"]) and not found["report_after_run"]
         command = cls(
             arguments=tuple(arguments),
             configfiles=_texts(found["configfile"]),
             settings=_texts(found["config"]),
             targets=_texts(found["targets"]),
-            report=_report(found),
-            looks_only=bool(looks) or _reports(found),
+            report=str(found["report"]) if found["report"] and reports else None,
+            looks_only=bool(looks) or reports,
             plans=looks == ["dryrun"],
             own_output=any(found[name] is not None and found[name] for name in OWN_OUTPUT),
             cores=found["cores"] is not None or found["jobs"] is not None,
@@ -86,10 +88,11 @@ class CommandLine:
         command._check_values()
         return command
 
-    @classmethod
-    def of_process(cls) -> "CommandLine":
-        """The command line of this process."""
-        return cls.parse(sys.argv[1:])
+    @property
+    def configuration(self) -> list[str]:
+        """Options that name the configuration; none for the default one."""
+        files = ["--configfile", *self.configfiles] if self.configfiles else []
+        return [*files, *(["--config", *self.settings] if self.settings else [])]
 
     def _check_values(self) -> None:
         swallowed = {
@@ -108,43 +111,28 @@ class CommandLine:
     def rewritten(self, more: Sequence[str], made: Mapping[str, Sequence[str]]) -> list[str]:
         """The arguments with more options, and each target replaced by what is made for it."""
         targets = dict.fromkeys(file for target in self.targets for file in made[target])
-        return [*self._without_targets(), *more, *(["--", *targets] if targets else [])]
-
-    def _without_targets(self) -> list[str]:
-        """The arguments but the targets; an option may have one of their names as its value."""
-        if "--" in self.arguments:
-            return list(self.arguments[: self.arguments.index("--")])
-        options = list(self.arguments)
-        for target in self.targets:
+        options = _before_targets(self.arguments)
+        # an option may have the name of a target as its value
+        for target in () if "--" in self.arguments else self.targets:
             options.remove(target)
-        return options
-
-
-def options(configfiles: Iterable[str], settings: Iterable[str]) -> list[str]:
-    """Options that name a configuration: ``configfiles``, ``settings``; none for the default."""
-    files, pairs = list(configfiles), list(settings)
-    return [*(["--configfile", *files] if files else []), *(["--config", *pairs] if pairs else [])]
+        return [*options, *more, *(["--", *targets] if targets else [])]
 
 
 def _of_profile(arguments: Sequence[str], profiles: Sequence[str]) -> dict[str, Any]:
     """Options that a profile sets or the command line; a parser would take those as targets."""
     from snakemake.cli import get_argument_parser
 
-    options = list(arguments)[: [*arguments, "--"].index("--")]
-    found = vars(get_argument_parser(profiles).parse_args(options))
+    found = vars(get_argument_parser(profiles).parse_args(_before_targets(arguments)))
     return {name: found[name] for name in ("cores", "jobs", "executor")}
+
+
+def _before_targets(arguments: Sequence[str]) -> list[str]:
+    """The arguments before two hyphens, if there are any."""
+    return list(arguments)[: [*arguments, "--"].index("--")]
 
 
 def _texts(values: Any) -> tuple[str, ...]:
     return tuple(str(value) for value in values or ())
-
-
-def _reports(found: dict[str, Any]) -> bool:
-    return bool(found["report"] or found["reporter"]) and not found["report_after_run"]
-
-
-def _report(found: dict[str, Any]) -> str | None:
-    return str(found["report"]) if found["report"] and _reports(found) else None
 
 
 def check_files(paths: Iterable[str | Path]) -> None:
@@ -185,28 +173,27 @@ def merged(default: Path, configfiles: Iterable[str], settings: Iterable[str]) -
     return whole
 
 
-def check_or_exit(*paths: str | Path) -> None:
-    """Do `check_files` of ``paths``; a fault ends the process with one line."""
+@contextmanager
+def one_line() -> Iterator[None]:
+    """End the process with one line at an error of the user's input."""
     try:
-        check_files(paths)
-    except ConfigurationError as error:
+        yield
+    except PdromError as error:
         sys.exit(f"pdrom: {error}")
 
 
 def remember(command: CommandLine) -> None:
     """Note which configuration runs, that of ``command``."""
-    # imported late: it loads NumPy, which the environment is to be settled before
-    from pdrom.core.store import atomic_path
+    # late: it loads NumPy, which the environment is to be settled before
+    from pdrom.core.store import write_text
 
-    text = json.dumps({"configfiles": command.configfiles, "settings": command.settings})
-    with atomic_path(RECORD) as path:
-        path.write_text(text + "\n", encoding="utf-8")
+    write_text(json.dumps(command.configuration) + "\n", RECORD)
 
 
 def recall() -> list[str]:
     """Options that name the configuration of the last run; none of the default one or of no run."""
     try:
         record = json.loads(RECORD.read_text(encoding="utf-8"))
-        return options(map(str, record["configfiles"]), map(str, record["settings"]))
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError):
         return []
+    return record if isinstance(record, list) and all(isinstance(r, str) for r in record) else []

@@ -50,7 +50,8 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
     table = read_table(plan.root / COSTS, COLUMNS, result=False)
     seconds = slower_here(plan, study) * table[column]
     known = dict(zip(table.kind, seconds, strict=True))
-    return lambda log: float(known.get(kind_of(log, plan.results), seconds.median()))
+    usual = float(seconds.median())
+    return lambda log: float(known.get(kind_of(log, plan.results), usual))
 
 
 def tell_expectation(workflow: Any, plan: Plan) -> None:

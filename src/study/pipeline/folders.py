@@ -1,7 +1,6 @@
 """Folders of the results: each configuration has one of its own."""
 
 import re
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,12 +62,9 @@ def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folde
 
 
 def folders_of(workflow: Any) -> Folders:
-    """`folders` of Snakemake's workflow; a faulty name ends the process with one line."""
+    """`folders` of Snakemake's workflow."""
     settings = [f"{key}={value}" for key, value in workflow.config_settings.config.items()]
-    try:
-        return folders(workflow.overwrite_configfiles, settings)
-    except ConfigurationError as error:
-        sys.exit(f"pdrom: {error}")
+    return folders(workflow.overwrite_configfiles, settings)
 
 
 def _name(files: list[str], settings: list[str]) -> str:

@@ -15,7 +15,7 @@ from typing import NoReturn
 from pdrom.core.environment import settle
 from pdrom.core.errors import INTERRUPTED, PdromError
 from study.pipeline.commandline import CommandLine, check_files, recall
-from study.pipeline.folders import Folders, folders
+from study.pipeline.folders import folders
 from study.pipeline.running import end_at_sigterm
 
 # Snakemake's default scheduler solves an integer program for each choice among the jobs; they are
@@ -42,8 +42,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
         there is no such figure.
     """
     if arguments[:1] == ["figure"]:
-        # imported late: it loads the whole package
-        from study.pipeline.figure_command import figure_arguments
+        from study.pipeline.targets import figure_arguments  # it loads the whole package
 
         arguments = figure_arguments(arguments[1:])
     command = CommandLine.parse(arguments)
@@ -51,33 +50,28 @@ def completed(arguments: Sequence[str]) -> list[str]:
         _say(f"a report of the last run, {' '.join(recall())}")
         command = CommandLine.parse(command.rewritten(recall(), {t: [t] for t in command.targets}))
     check_files(command.configfiles)
-    own = folders(command.configfiles, command.settings)
-    made = files_of(command.targets, own) if command.targets else {}
-    for target, files in made.items():
-        if files != [target]:
-            _say(f"{_described(target)}: {', '.join(files)}")
     cores = () if command.cores else ("--cores", "all")
     replaced = command.plans or not command.looks_only
     lines = LINES if replaced and not command.own_output else ()
-    return command.rewritten([*cores, *lines, *OPTIONS], made)
+    return command.rewritten([*cores, *lines, *OPTIONS], _made(command))
 
 
-def files_of(targets: Sequence[str], own: Folders) -> dict[str, list[str]]:
-    """Files of the folders ``own`` to make for each of ``targets``, see `Names.files`."""
-    # imported late: it loads the whole package
+def _made(command: CommandLine) -> dict[str, list[str]]:
+    """Files to make for each target of ``command``, which are said where the target is a name."""
+    own = folders(command.configfiles, command.settings)
+    if not command.targets:
+        return {}
+    # late, as above
     from study.figures.kit.declaration import declarations
-    from study.pipeline.targets import Names
+    from study.pipeline.targets import Names, described
     from study.tables import declared
 
     names = Names(list(declarations()), declared())
-    return {target: names.files(target, own) for target in targets}
-
-
-def _described(target: str) -> str:
-    # imported late, as above
-    from study.pipeline.figure_command import described
-
-    return described(target)
+    made = {target: names.files(target, own) for target in command.targets}
+    for target, files in made.items():
+        if files != [target]:
+            _say(f"{described(target)}: {', '.join(files)}")
+    return made
 
 
 def _say(line: str) -> None:
@@ -96,30 +90,21 @@ def _start(command: Sequence[str]) -> NoReturn:
         sys.exit(f"pdrom: run: {command[0]}: {error.strerror}")
 
 
-def _run(arguments: Sequence[str]) -> None:
-    """Run Snakemake; a failure ends the process with its status."""
-    from snakemake.cli import main as snakemake
-
-    arguments = completed(arguments)
-    sys.argv = ["snakemake", *arguments]
-    try:
-        snakemake(arguments)
-    except SystemExit as ended:
-        if ended.code:
-            raise
-
-
 def main() -> None:
     """Run Snakemake or the tests; end the process with their status."""
     settle()
-    if sys.argv[1:2] and sys.argv[1] in HANDED_ON:
-        module = HANDED_ON[sys.argv[1]]
-        os.execv(sys.executable, [sys.executable, "-m", module, *sys.argv[2:]])
-    if sys.argv[1:2] == ["run"]:
+    word = sys.argv[1] if sys.argv[1:] else ""
+    if word in HANDED_ON:
+        _start([sys.executable, "-m", HANDED_ON[word], *sys.argv[2:]])
+    if word == "run":
         _start(sys.argv[2:])
     end_at_sigterm()
     try:
-        _run(sys.argv[1:])
+        arguments = completed(sys.argv[1:])
+        sys.argv = ["snakemake", *arguments]
+        from snakemake.cli import main as snakemake
+
+        snakemake(arguments)
     except PdromError as error:
         sys.exit(f"pdrom: {error}")
     except KeyboardInterrupt:

@@ -11,7 +11,7 @@ from study.figures.kit.declaration import Declaration, declarations
 from study.paper.build import Facts
 from study.paper.source import source_files
 from study.pipeline.figures import words
-from study.pipeline.full import FULL_STUDY, is_full
+from study.pipeline.folders import DEFAULT
 from study.pipeline.study import Study
 from study.tables.claims import load_claims
 
@@ -35,8 +35,8 @@ def facts(study: Study, labels: Labels) -> Facts:
     """Facts that the manuscript states beside results of ``study``."""
     return Facts(
         captions={name: _caption(study, figure) for name, figure in declarations().items()},
-        part=None if is_full(study) else study.configuration,
-        full_study=FULL_STUDY,
+        part=None if study.is_full else study.configuration,
+        full_study=DEFAULT,
         tables={
             "study": [_study(study)],
             "methods": [

@@ -1,7 +1,6 @@
 """The plan that the workflow rules ask: file names, parameters and code fingerprints."""
 
 import os
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -9,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from pdrom.core.errors import ConfigurationError, PdromError
+from pdrom.core.errors import ConfigurationError
 from study.article.build import article
 from study.artifact.artifact import Artifact
 from study.artifact.logs import planning_log
@@ -19,8 +18,7 @@ from study.figures.kit.declaration import declarations
 from study.live.page import live_page
 from study.paper.build import paper, paper_inputs
 from study.pipeline.contents import paths_of
-from study.pipeline.folders import Folders
-from study.pipeline.full import FULL_STUDY
+from study.pipeline.folders import DEFAULT, Folders
 from study.pipeline.paper import check_texts
 from study.pipeline.resolve import Job, Resolver
 from study.pipeline.scenes import require_scenes
@@ -40,23 +38,25 @@ def load_plan(
     folders: Folders = OF_STUDY,
     quiet: bool = False,
 ) -> "Plan":
-    """Plan of ``config``; a faulty one ends the process with one line, before any job.
+    """Plan of ``config``, checked before any job.
 
     Parameters
     ----------
     files : where the configuration came from, for the messages
     quiet : whether warnings are dropped, see `study.artifact.logs.planning_log`
+
+    Raises
+    ------
+    PdromError
+        It is faulty.
     """
-    names = [os.path.relpath(path, root) for path in files] or [FULL_STUDY]
+    names = [os.path.relpath(path, root) for path in files] or [DEFAULT]
     source = f"configuration ({', '.join(sorted(set(names)))})"
-    try:
-        others = ", ".join(sorted({*names} - {FULL_STUDY})) or "the command line"
-        with planning_log(quiet):
-            plan = Plan(Study.load(config, root, source, others), folders)
-            plan.check()
-        return plan
-    except PdromError as error:
-        sys.exit(f"pdrom: {error}")
+    others = ", ".join(sorted({*names} - {DEFAULT})) or "the command line"
+    with planning_log(quiet):
+        plan = Plan(Study.load(config, root, source, others), folders)
+        plan.check()
+    return plan
 
 
 class Plan:

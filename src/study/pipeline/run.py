@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from pdrom.core.errors import ConfigurationError, PdromError
-from study.pipeline.commandline import CommandLine, options, recall, remember
+from study.pipeline.commandline import CommandLine, one_line, recall, remember
 from study.pipeline.expectation import expected_seconds, tell_expectation
 from study.pipeline.failures import Failures, listen
 from study.pipeline.folders import Folders
 from study.pipeline.fork_server import hold_pipe, start_server
-from study.pipeline.full import apart
 from study.pipeline.manifest import write_manifest
 from study.pipeline.plan import Plan
 from study.pipeline.running import (
@@ -25,7 +24,7 @@ from study.pipeline.running import (
     stop_at_sigterm,
 )
 from study.pipeline.summary import configuration, preview, summary
-from study.pipeline.targets import Rule, known
+from study.pipeline.targets import known
 
 # What Snakemake compares by date.
 DATED = ("results", "paper", "config", "workflow")
@@ -47,44 +46,40 @@ class Run:
         A command that only looks needs no lock, so that it works beside a run.
         """
         end_at_sigterm()
-        try:
-            command = CommandLine.of_process()
+        with one_line():
+            command = CommandLine.parse(sys.argv[1:])
             if command.looks_only:
                 remove_stale_locks()
             else:
                 hold()
                 settle_dates(DATED)
                 remember(command)
-        except PdromError as error:
-            sys.exit(f"pdrom: {error}")
         return cls(command, listen())
 
-    def check(self, plan: Plan, folders: Folders, rules: Iterable[Rule], cores: int) -> None:
-        """End the process with one line if a target or a report cannot be made.
+    def check(self, plan: Plan, folders: Folders, rules: Iterable[Any], cores: int) -> None:
+        """Check targets and report; a dry run says at its end what it would take on ``cores``.
 
-        A dry run says at its end what it would take on so many ``cores``. ``plan``, ``folders`` and
-        ``rules`` are those of the workflow.
+        ``plan``, ``folders`` and Snakemake's ``rules`` are those of the workflow.
+
+        Raises
+        ------
+        ConfigurationError
+            A target or the report cannot be made.
         """
-        try:
-            known(plan).check(self.command.targets, list(rules))
-            self._check_report(folders)
-        except PdromError as error:
-            sys.exit(f"pdrom: {error}")
-        if self.command.plans:
-            preview(expected_seconds(plan), cores)
-
-    def _check_report(self, folders: Folders) -> None:
-        asked = self.command.report and not self.command.targets
-        if asked and not Path(folders.manuscript).is_file():
+        known(plan).check(self.command.targets, list(rules))
+        reports = self.command.report and not self.command.targets
+        if reports and not Path(folders.manuscript).is_file():
             last = " ".join(recall())
             hint = f"the last run was of another one: add {last}" if last else "run it first"
             raise ConfigurationError(
                 f"report: this configuration has no {folders.manuscript}; {hint}"
             )
+        if self.command.plans:
+            preview(expected_seconds(plan), cores)
 
     def title(self, plan: Plan) -> str:
         """Configuration of this run, and what tells results of ``plan`` from the full study's."""
-        named, words = configuration(self.command), apart(plan.study)
+        named, words = configuration(self.command), plan.study.apart
         return f"{named} ({words})" if words else named
 
     def start(self, workflow: Any, plan: Plan) -> None:
@@ -103,19 +98,18 @@ class Run:
                 sys.exit(f"pdrom: {FOLDER}/run.pipe: cannot be made ({error.strerror})")
             start_server()
 
-    def succeed(self, plan: Plan, folders: Folders) -> None:
+    def succeed(self, workflow: Any, plan: Plan, folders: Folders) -> None:
         """End a run whose jobs all succeeded: it says what came of ``plan`` in ``folders``."""
+        # late: a plan needs nothing of it
+        from study.verification.contents import write_contents
+
         try:
-            self._record(plan, folders)
+            if not self.command.targets:
+                write_contents(configuration(self.command), workflow.dag, plan, folders)
+            write_manifest(plan, folders, self.command.configuration)
         except PdromError as error:
             say_last(f"pdrom: {error}\n")
-        words = apart(plan.study)
-        say_last(summary(self.command, folders, plan.figures, plan.table_paths, words))
-
-    def _record(self, plan: Plan, folders: Folders) -> None:
-        """Write what there is now; a run that changed nothing leaves the account of an older."""
-        named = options(self.command.configfiles, self.command.settings)
-        write_manifest(plan, folders, named)
+        say_last(summary(self.command, folders, plan.figures, plan.table_paths, plan.study.apart))
 
     def fail(self) -> None:
         """End a run that failed or was interrupted: it says why."""

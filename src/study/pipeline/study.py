@@ -192,6 +192,22 @@ class Study:
         single.scenes = {scene: self.scene(scene)}
         return single
 
+    @cached_property
+    def is_full(self) -> bool:
+        """Whether it has the settings of config/default.yaml."""
+        path = self.root / DEFAULT
+        return self.settings == validate(StudySettings, read_yaml(path), str(path))
+
+    @property
+    def apart(self) -> str:
+        """Words that tell its results from those of the full study; empty for that."""
+        if self.is_full:
+            return ""
+        coarsen = self.settings.coarsen
+        factors = {"coarse meshes": coarsen.resolution, "short runs": coarsen.frames}
+        kinds = [words for words, factor in factors.items() if factor < 1.0]
+        return f"of {' and '.join(kinds) or 'this configuration'}, not those of the study"
+
     @property
     def experiments(self) -> list[tuple[str, str]]:
         """(scene, group) pairs whose group is reduced, in configuration order."""

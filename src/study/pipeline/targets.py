@@ -1,36 +1,60 @@
-"""Targets on the command line: figures, tables and files, with help for misspelt ones."""
+"""Targets on the command line: figures by number or name, tables and files; help if misspelt."""
 
-import re
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
-from typing import Protocol
+from itertools import takewhile
+from pathlib import Path
+from typing import Any
 
-from pdrom.core.errors import ConfigurationError, StorageError
+from pdrom.core.errors import ConfigurationError, StorageError, choices, suggestion
 from study.artifact import paths
 from study.artifact.paths import RESULTS, Place
 from study.figures.kit.declaration import declarations
-from study.pipeline.figure_command import WORD
+from study.paper.figure_numbers import SUPPLEMENT, figure_numbers
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.scenes import read_scene, scene_names
-from study.tables import declared
 
-FIGURE = re.compile(rf"{WORD} (\w+)")
+WORD = "figure"
+PREPRINT = "preprint:"
 
 
-class Rule(Protocol):
-    """Interface of a rule of Snakemake."""
+def figure_arguments(arguments: Sequence[str]) -> list[str]:
+    """Options and targets for Snakemake, from the ``arguments`` that follow the word ``figure``.
 
-    name: str
+    A number counts in the paper, one with an S before it in the supplement, ``preprint:NUMBER`` in
+    the preprint; every figure has its name, too. A target reads ``figure NAME`` (one word), which
+    `Names` turns into its file.
 
-    def has_wildcards(self) -> bool:
-        """Whether it makes many files by one pattern."""
-        ...
+    Raises
+    ------
+    ConfigurationError
+        No figure was named, or there is no such one.
+    """
+    named = list(takewhile(lambda word: not word.startswith("-"), arguments))
+    options = [word for word in arguments[len(named) :] if word != "--"]
+    numbers = figure_numbers(Path())
+    by_place = {n.manuscript: name for name, n in numbers.items() if n.manuscript}
+    known = {number: by_place[number] for number in sorted(by_place, key=_order)}
+    known |= {f"{PREPRINT}{n.preprint}": name for name, n in numbers.items() if n.preprint}
+    known |= {name: name for name in numbers}
+    if not named:
+        raise ConfigurationError(f"{WORD}: its number or name is missing{choices('', known)}")
+    for word in named:
+        if word not in known:
+            raise ConfigurationError(f"{WORD} {word}: there is none{choices(word, known)}")
+    return [*options, "--", *(f"{WORD} {known[word]}" for word in named)]
 
-    def is_producer(self, requested_output: str) -> bool:
-        """Whether it makes a file of the name ``requested_output``."""
-        ...
+
+def _order(number: str) -> tuple[bool, int]:
+    """Key of a number for sorting: the paper's, then the supplement's."""
+    return number.startswith(SUPPLEMENT), int(number.removeprefix(SUPPLEMENT))
+
+
+def described(target: str) -> str:
+    """A target with both numbers, if it is a figure that has one; else the target itself."""
+    word, _, name = target.partition(" ")
+    return f"{WORD} {figure_numbers(Path())[name].label(name)}" if word == WORD else target
 
 
 @dataclass(frozen=True)
@@ -46,12 +70,12 @@ class Names:
         A file below ``results`` is the study's own, wherever that has its results; ``figure NAME``
         stands for that figure alone.
         """
-        figure = FIGURE.fullmatch(target)
-        if figure and figure[1] in self.figures:
-            return [paths.FIGURE.at(folders.results, name=figure[1])]
-        found = [paths.FIGURE.at(folders.results, name=target)] if target in self.figures else []
-        if target in self.tables:
-            found.append(paths.TABLE.at(folders.results, name=target))
+        word, _, name = target.partition(" ")
+        alone = word == WORD and name in self.figures
+        name = name if alone else target
+        found = [paths.FIGURE.at(folders.results, name=name)] if name in self.figures else []
+        if name in self.tables and not alone:
+            found.append(paths.TABLE.at(folders.results, name=name))
         return found or [_own(target, folders)]
 
 
@@ -76,60 +100,49 @@ class Known:
     names: Names
     labels: dict[str, Callable[[dict[str, str]], Iterable[str]]]
 
-    def check(self, targets: Iterable[str], rules: Sequence[Rule]) -> None:
-        """ConfigurationError for the first of ``targets`` that no one of ``rules`` makes.
+    def check(self, targets: Iterable[str], rules: Sequence[Any]) -> None:
+        """ConfigurationError with a suggestion for a target that none of Snakemake's rules makes.
 
-        It comes with a suggestion.
+        ``targets`` are those of the command line.
         """
+        own = {rule.name for rule in rules if not rule.has_wildcards()}
         for target in targets:
-            named = [rule for rule in rules if rule.name == target]
-            if named and not named[0].has_wildcards():
+            if target in own:
                 continue
-            producers = [] if named else [r for r in rules if r.is_producer(target)]
-            if not producers:
-                raise ConfigurationError(self._unknown(target, rules))
-            self._check_labels(target)
+            named = any(rule.name == target for rule in rules)
+            if named or not any(rule.is_producer(target) for rule in rules):
+                raise ConfigurationError(f"target '{target}': {self._unknown(target, own)}")
+            for place in paths.PLACES:
+                self._check_labels(place, target)
 
-    def _check_labels(self, target: str) -> None:
-        for place in paths.PLACES:
-            labels = self._labels(place, target)
-            for label, value in labels.items():
-                allowed = list(self.labels[label](labels)) if label in self.labels else [value]
-                if value not in allowed:
-                    raise ConfigurationError(
-                        f"target '{target}': unknown {label} '{value}'{_suggestion(value, allowed)}"
-                    )
-
-    def _labels(self, place: Place, target: str) -> dict[str, str]:
-        """Labels of a target, none if it is no file of that kind."""
+    def _check_labels(self, place: Place, target: str) -> None:
         try:
             labels = place.file(target).labels
         except StorageError:
-            return {}
-        return labels if place.at(self.results, **labels) == target else {}
+            return  # no file of that kind
+        if place.at(self.results, **labels) != target:
+            return
+        for label, value in labels.items():
+            allowed = list(self.labels[label](labels)) if label in self.labels else [value]
+            if value not in allowed:
+                hint = suggestion(value, allowed)
+                raise ConfigurationError(f"target '{target}': unknown {label} '{value}'{hint}")
 
-    def _unknown(self, target: str, rules: Sequence[Rule]) -> str:
-        own = {rule.name for rule in rules if not rule.has_wildcards()}
-        names = [*self.names.figures, *self.names.tables, *own]
+    def _unknown(self, target: str, own: set[str]) -> str:
         scenes = self.labels["scene"]({})
         if target in scenes:
             example = paths.FULL_ORDER.at(self.results, scene=target, run="train")
-            return f"target '{target}': a scene; name one of its files, as {example}"
-        allowed = self.files if "/" in target else [*names, *scenes]
+            return f"a scene; name one of its files, as {example}"
+        names = [*self.names.figures, *self.names.tables, *own, *scenes]
         return (
-            f"target '{target}': nothing makes it{_suggestion(target, allowed)}; targets are names "
-            f"of figures and tables, and files below {self.results}"
+            f"nothing makes it{suggestion(target, self.files if '/' in target else names)}; "
+            f"targets are names of figures and tables, and files below {self.results}"
         )
-
-
-def _suggestion(value: str, allowed: Iterable[str]) -> str:
-    close = get_close_matches(value, sorted(set(allowed)), n=1)
-    return f", did you mean '{close[0]}'?" if close else ""
 
 
 def known(plan: Plan) -> Known:
     """Collect the names and files of a plan's study."""
-    study, names = plan.study, Names(declarations(), declared())
+    study = plan.study
 
     def mesh(scene: str) -> str:
         return read_scene(study.root, scene, study.settings.changes).mesh.identifier
@@ -137,7 +150,7 @@ def known(plan: Plan) -> Known:
     return Known(
         results=plan.results,
         files=[*plan.table_paths, *plan.figures, *plan.measured],
-        names=names,
+        names=Names(declarations(), plan.tables),
         labels={
             "scene": lambda labels: {*scene_names(study.root), *study.scenes},
             "group": lambda labels: study.scene(labels["scene"]).reduce,

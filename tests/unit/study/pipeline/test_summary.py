@@ -14,7 +14,6 @@ from pdrom.core.yamlfile import read_yaml
 from places import ROOT
 from study.pipeline.commandline import CommandLine
 from study.pipeline.folders import Folders
-from study.pipeline.full import apart
 from study.pipeline.study import Study
 from study.pipeline.summary import Preview, minutes, processor_seconds, shortened, summary
 
@@ -68,7 +67,7 @@ def test_verdicts_of_another_study_are_told_from_those_of_the_full_one():
     ],
 )
 def test_a_study_says_how_it_differs_from_the_full_one(config, words):
-    found = apart(Study.load({**read_yaml(ROOT / "config" / "default.yaml"), **config}, ROOT))
+    found = Study.load({**read_yaml(ROOT / "config" / "default.yaml"), **config}, ROOT).apart
     assert found.startswith(words)
     assert bool(found) == bool(words)
 

@@ -4,7 +4,6 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-import pytest
 import snakemake.cli  # noqa: F401 : before the graph, which cannot be imported first
 from snakemake.dag import DAG
 
@@ -12,12 +11,9 @@ from places import ROOT
 from study.artifact.usage import Usage
 from study.figures.kit.declaration import declarations
 from study.pipeline.commandline import CommandLine
-from study.pipeline.figure_command import figure_arguments
-from study.pipeline.front import completed, files_of
+from study.pipeline.front import completed
 from study.tables import declared
-from study.verification.claim_map.entries import entries
-from study.verification.claim_map.measured import claim_map
-from study.verification.claim_map.pages import contents
+from study.verification.contents import contents, costs, entries, files_of
 from study.verification.subject import Subject
 
 TINY = ["--configfile", "config/tiny.yaml"]
@@ -48,59 +44,40 @@ class Dag:
     bfs = DAG.bfs
 
 
-def test_every_command_asks_for_what_the_entry_names(subject, monkeypatch):
+def test_every_command_makes_what_its_entry_names(subject, monkeypatch):
     monkeypatch.chdir(ROOT)
-    listed = entries(ROOT)
-    made = claim_map(Dag(subject), subject.plan, subject.folders, TINY, "tiny")
-    table = made.to_dict("records")
-    for entry, row in zip(listed, table, strict=True):
-        words = list(entry.words)
-        assert shlex.split(row["command"]) == ["./reproduce", *words, *TINY]
-        targets = figure_arguments(words[1:])[1:] if words[:1] == ["figure"] else words
-        made = [file for files in files_of(targets, subject.folders).values() for file in files]
-        assert made == ([] if entry.kind == "manuscript" else row["target"].split()), entry
-
-
-@pytest.mark.parametrize("kind", ["claim", "figure", "table", "section", "manuscript"])
-def test_a_command_is_understood_as_a_whole(kind, subject, monkeypatch):
-    monkeypatch.chdir(ROOT)
-    words = next(entry.words for entry in entries(ROOT) if entry.kind == kind)
-    command = CommandLine.parse(completed([*words, *TINY]))
-    assert command.configfiles == ("config/tiny.yaml",)
-    assert all(target.startswith(subject.results) for target in command.targets)
+    listed = list(entries(ROOT))
+    assert {entry.kind for entry in listed} == {
+        "claim", "figure", "table", "section", "manuscript",
+    }  # fmt: skip
+    for entry in listed:
+        command = CommandLine.parse(completed([*entry.words, *TINY]))
+        assert command.configfiles == ("config/tiny.yaml",)
+        wanted = [] if entry.kind == "manuscript" else files_of(entry, subject.folders)
+        assert list(command.targets) == wanted, entry
 
 
 def test_costs_are_those_of_all_jobs_that_are_needed(subject, tmp_path, monkeypatch):
-    dag, plan = Dag(subject), subject.plan
+    dag = Dag(subject)
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "config").symlink_to(ROOT / "config")
-    (tmp_path / "paper").symlink_to(ROOT / "paper")
     for job in dag.jobs:
         for file in (*job.log, *job.output):
             Path(file).parent.mkdir(parents=True, exist_ok=True)
         Path(job.log[0]).write_text(f"pdrom: {Usage(1.0, 60.0, 100.0)}\n")
-        Path(job.output[0]).write_bytes(bytes(1000))
-
-    def figures():
-        table = claim_map(dag, plan, subject.folders, TINY, "tiny")
-        return table[table.kind == "figure"].set_index("name")
-
-    decay = figures().loc["singular_values"]
-    assert decay.jobs == decay.minutes == 3
-    assert (decay.minutes_alone, decay.memory) == (1.0, 100.0)
-    assert decay.disk == pytest.approx(0.003)
+    listed = [entry for entry in entries(ROOT) if entry.name == "singular_values"]
+    assert [*costs(listed, dag, subject.folders)] == [(3, 3.0)] * 2
     # one job that was not measured: nothing is claimed about what needs it
     Path("logs/run.log").write_text("interrupted\n")
-    assert figures().loc["singular_values"][["minutes", "memory"]].isna().all()
+    assert [*costs(listed, dag, subject.folders)] == [(3, None)] * 2
 
 
 def test_the_contents_name_every_entry_and_describe_every_figure_and_column(subject, monkeypatch):
     monkeypatch.chdir(ROOT)
-    made = claim_map(Dag(subject), subject.plan, subject.folders, TINY, "config/tiny.yaml")
-    page = contents(made)
+    page = contents("config/tiny.yaml", Dag(subject), subject.folders, TINY)
     assert "run of config/tiny.yaml" in page
     for entry in entries(ROOT):
-        assert f"| {entry.kind} | {entry.name} | `./reproduce " in page
+        command = shlex.join(["./reproduce", *entry.words, *TINY])
+        assert f"| {entry.kind} | {entry.name} | `{command}` | " in page
     assert [name for name in declarations() if f"## `{name}`" not in page] == []
     for table in declared().values():
         assert [c.name for c in table.columns if f"| {c.name} | {c.kind} |" not in page] == []
