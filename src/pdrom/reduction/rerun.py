@@ -1,6 +1,7 @@
 """A run of a reduced model, compared with the full-order run frame by frame."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -42,6 +43,16 @@ class Rerun:
     def max_extent(self) -> float:
         """Largest extent of the run."""
         return float(self.extent.max(initial=0.0))
+
+    def row(self, displacement: np.ndarray) -> dict[str, Any]:
+        """How far the run got, and its error; ``displacement`` see `error`."""
+        return {
+            "frames": self.frames,
+            "finite": self.finite,
+            "blowup_frame": self.blowup_frame,
+            "max_extent": self.max_extent,
+            "relative_error": self.error(displacement),
+        }
 
     def error(self, displacement: np.ndarray) -> float | None:
         """Relative error over the whole run; None if it ended early.

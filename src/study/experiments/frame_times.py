@@ -16,7 +16,7 @@ from pdrom.core.names import SceneName
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.scene import SceneConfig
-from pdrom.reduction.basis import compute_basis
+from pdrom.reduction.basis import basis_of
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import select
 from pdrom.reduction.snapshots import load_snapshots
@@ -224,8 +224,5 @@ def _seconds(case: ProjectionCase, snapshots: File, settings: Options) -> float:
     """Processor time of basis and sampling, s."""
     data, spec = load_snapshots(snapshots.path), settings.projection_methods[case.method]
     before = process_time()
-    basis = compute_basis(
-        data.train, data.row_mass, data.roundoff, rows_per_element=data.rows_per_element, spec=spec
-    )
-    select(basis, spec, case.r)
+    select(basis_of(data, spec), spec, case.r)
     return process_time() - before

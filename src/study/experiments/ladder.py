@@ -10,18 +10,13 @@ from pydantic import Field
 from pdrom.core.store import write_table
 from pdrom.model.metrics import relative_errors
 from pdrom.model.scene import SceneConfig
-from pdrom.reduction.basis import Basis, compute_basis
-from pdrom.reduction.deviations import error_within
-from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.rerun import replace_group, rerun
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.rerun import Rerun, displacement_norms
-from pdrom.reduction.sampling import Reduction, select
+from pdrom.reduction.sampling import Reduction, reductions
 from pdrom.reduction.snapshots import SPLITS, SnapshotSet, load_snapshots
 from study.artifact.paths import LADDER, MESH, SENSITIVITY, SNAPSHOTS, TRAIN, File
 from study.artifact.reads import Setting
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.repetition import Repeater, Repetitions
+from study.experiments.kit.repetition import ReducedRuns, Repetition, Repetitions
 from study.experiments.kit.scenes import positions_of, scene_of
 from study.experiments.kit.settings import BlowupExtent, Horizon, Modes
 
@@ -97,41 +92,31 @@ def ladder(
     out: File,
 ) -> None:
     """Reduce and rerun the scene with every rung."""
-    labels = out.labels
-    scene, data = scene_of(config, mesh), load_snapshots(snapshots.path)
-    reference = positions_of(fom)
-    end = horizon.frames(sensitivity)
-    displacement = displacement_norms(reference)
-    group, system = scene.group(labels["group"]), scene.system
-    repeater = None
-    if labels["scene"] in ladder.repeated:
-        repeater = Repeater(
-            scene,
-            group.name,
-            data,
-            reference=reference,
-            end=end,
-            asked=ladder,
-            blowup_extent=blowup_extent,
-        )
-    bases: dict[tuple[str, int | None], Basis] = {}
+    labels, data = out.labels, load_snapshots(snapshots.path)
+    runs = ReducedRuns(
+        scene_of(config, mesh),
+        labels["group"],
+        data,
+        reference=positions_of(fom),
+        end=horizon.frames(sensitivity),
+        blowup_extent=blowup_extent,
+    )
+    judged = runs.until_the_end() if labels["scene"] in ladder.repeated else None
     rows = []
-    for direction, method, seed, r in ladder.rungs(group.rows_per_element):
+    for direction, method, seed, r in ladder.rungs(data.rows_per_element):
         row = {**labels, "direction": direction, "rung": _name(method, seed), "r": r}
-        row["rows_per_element"] = group.rows_per_element
-        key = (method.basis_id, seed)
-        if key not in bases:
-            bases[key] = _basis(data, method, seed)
-        if direction == "square" and r > bases[key].rank:
+        row["rows_per_element"] = data.rows_per_element
+        basis = runs.basis(method, signs=seed)
+        if direction == "square" and r > basis.rank:
             continue
-        reduction = _reduce(bases[key], method, r)
-        if reduction is not None:
-            steps = replace_group(scene, group.name, ReducedLocalStep(group, reduction))
-            outcome = rerun(scene, system, steps, reference=reference, blowup_extent=blowup_extent)
-            row |= {"r": reduction.r, **_measures(reduction, data)}
-            row |= _ran(outcome, displacement, end)
-            if repeater is not None and seed is None and direction != "square":
-                row |= _repeated(repeater, method, reduction.r)
+        size = min(r, basis.rank)
+        # a group that is round-off has no reduction
+        for reduction in reductions(basis, method, [size] if size else []).values():
+            outcome = runs.run(reduction)
+            row |= {**outcome.row(runs.displacement), "r": size, **_measures(reduction, data)}
+            row["relative_error_within_horizon"] = runs.error(outcome)
+            if judged is not None and seed is None and direction != "square":
+                row |= _ranges(list(judged.repeat(method, [size], "training", ladder)))
         rows.append(row)
         log.info("%s, %s", direction, row["rung"])
     table = pd.DataFrame(rows, columns=COLUMNS)
@@ -149,24 +134,6 @@ def _name(method: MethodSpec, seed: int | None) -> str:
     return method.title if seed is None else f"signs {seed}"
 
 
-def _basis(data: SnapshotSet, method: MethodSpec, seed: int | None) -> Basis:
-    signs = None if seed is None else np.random.default_rng(seed)
-    return compute_basis(
-        data.train,
-        data.row_mass,
-        data.roundoff,
-        rows_per_element=data.rows_per_element,
-        spec=method,
-        signs=signs,
-    )
-
-
-def _reduce(basis: Basis, method: MethodSpec, r: int) -> Reduction | None:
-    """Reduction of a rung; None if the projections of the group are only round-off."""
-    size = min(r, basis.rank)
-    return Reduction(basis, select(basis, method, size), method, r=size) if size else None
-
-
 def _measures(reduction: Reduction, data: SnapshotSet) -> dict[str, Any]:
     errors = {}
     for split in SPLITS:
@@ -176,17 +143,8 @@ def _measures(reduction: Reduction, data: SnapshotSet) -> dict[str, Any]:
     return {"entries": entries, "condition": reduction.condition, "gain": reduction.gain, **errors}
 
 
-def _ran(outcome: Rerun, displacement: np.ndarray, end: int) -> dict[str, Any]:
-    return {
-        "finite": outcome.finite,
-        "blowup_frame": outcome.blowup_frame,
-        "relative_error_within_horizon": error_within(outcome.difference, displacement, end),
-    }
-
-
-def _repeated(repeater: Repeater, method: MethodSpec, r: int) -> dict[str, Any]:
+def _ranges(runs: list[Repetition]) -> dict[str, Any]:
     """Ranges over the repetitions; a run that ended before the horizon has an infinite error."""
-    runs = list(repeater.repeat(method, [r], "training"))
     if not runs:
         return {}
     errors, gains = [run.error for run in runs], [run.gain for run in runs]

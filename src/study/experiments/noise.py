@@ -14,11 +14,10 @@ from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, compute_basis
-from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.rerun import replace_group, rerun
+from pdrom.reduction.local.rerun import rerun_reduced
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun, displacement_norms
-from pdrom.reduction.sampling import Reduction, select_path
+from pdrom.reduction.sampling import reductions
 from pdrom.reduction.snapshots import row_masses, training_frames
 from study.artifact.paths import MESH, NOISE, NOISE_RUNS, SENSITIVITY, File
 from study.artifact.reads import Settings
@@ -174,28 +173,15 @@ def _runs(
     displacement = displacement_norms(reference)
     for method, spec in settings.noise_methods.items():
         basis = noise_basis(projections[even], masses, group.rows_per_element, method=spec)
-        sizes = [r for r in settings.noise.sizes if r <= basis.rank]
-        path = select_path(basis, spec, sizes) if sizes else {}
+        made = reductions(basis, spec, settings.noise.sizes)
         for r in settings.noise.sizes:
             row = {"method": method, "r": r, "rank": basis.rank, "frames": 0}
             outcome = None
-            if r in path:
-                reduction = Reduction(basis, path[r], spec, r=r)
-                steps = replace_group(scene, name, ReducedLocalStep(group, reduction))
-                outcome = rerun(
-                    scene,
-                    scene.system,
-                    steps,
-                    reference=reference,
-                    blowup_extent=settings.blowup_extent,
+            if r in made:
+                outcome = rerun_reduced(
+                    scene, name, made[r], reference, blowup_extent=settings.blowup_extent
                 )
-                row |= {
-                    "gain": reduction.gain,
-                    "frames": outcome.frames,
-                    "finite": outcome.finite,
-                    "blowup_frame": outcome.blowup_frame,
-                    "relative_error": outcome.error(displacement),
-                }
+                row |= {"gain": made[r].gain, **outcome.row(displacement)}
             yield row, outcome
 
 

@@ -2,7 +2,7 @@
 
 import logging
 
-from pdrom.reduction.basis import compute_basis, save_basis
+from pdrom.reduction.basis import basis_of, save_basis
 from pdrom.reduction.method import BasisSpec
 from pdrom.reduction.snapshots import load_snapshots
 from study.artifact.paths import BASIS, SNAPSHOTS, File
@@ -20,8 +20,6 @@ log = logging.getLogger(__name__)
 def pod(snapshots: File, spec: BasisSpec, out: File) -> None:
     """Compute a basis ``spec`` of the training ``snapshots`` and save it to ``out``."""
     data = load_snapshots(snapshots.path)
-    basis = compute_basis(
-        data.train, data.row_mass, data.roundoff, rows_per_element=data.rows_per_element, spec=spec
-    )
+    basis = basis_of(data, spec)
     log.info("numerical rank %d of %d snapshots", basis.rank, len(data.train))
     save_basis(basis, out.path)

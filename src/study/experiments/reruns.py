@@ -15,8 +15,7 @@ from pdrom.model.held_out import FIRST
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, load_basis
 from pdrom.reduction.deviations import Yardstick
-from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.rerun import replace_group, rerun
+from pdrom.reduction.local.rerun import rerun_reduced
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.snapshots import load_snapshots
@@ -160,9 +159,9 @@ class _Case:
                 rows.append({**self.labels, "r": r, "frames": 0})
                 continue
             reduction = load_reduction(self.basis, self.sampling, settings.method, r=r)
-            step = ReducedLocalStep(self.scene.group(group), reduction)
-            steps = replace_group(self.scene, group, step)
-            outcome = rerun(self.scene, system, steps, reference, settings.blowup_extent)
+            outcome = rerun_reduced(
+                self.scene, group, reduction, reference, settings.blowup_extent, system
+            )
             apart = yardstick.deviations(outcome)
             for name, values in apart.items():
                 store[name] = values
@@ -170,9 +169,8 @@ class _Case:
             if self.motion == TRAINING:  # of which figures are drawn
                 store["positions"] = outcome.positions.astype(np.float32)
             measured = {"energy_ratio": largest(apart["energy"]), "gain": reduction.gain}
-            rows.append(
-                {**self.labels, "r": r, **_row(outcome, yardstick.displacement), **measured}
-            )
+            row = outcome.row(yardstick.displacement)
+            rows.append({**self.labels, "r": r, **row, **measured})
             log.info("r = %d: %d frames, blow-up %s", r, outcome.frames, outcome.blowup_frame)
         return rows
 
@@ -182,13 +180,3 @@ def _store(store: h5py.Group, outcome: Rerun, displacement: np.ndarray) -> None:
     store["extent"] = outcome.extent
     blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
     store.attrs.update(finite=outcome.finite, blowup_frame=blowup, max_extent=outcome.max_extent)
-
-
-def _row(outcome: Rerun, displacement: np.ndarray) -> dict[str, Any]:
-    return {
-        "frames": outcome.frames,
-        "finite": outcome.finite,
-        "blowup_frame": outcome.blowup_frame,
-        "max_extent": outcome.max_extent,
-        "relative_error": outcome.error(displacement),
-    }

@@ -15,8 +15,7 @@ from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.energy import EnergyScale
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import load_basis
-from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.rerun import replace_group, rerun
+from pdrom.reduction.local.rerun import rerun, rerun_reduced
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling import Reduction
@@ -203,10 +202,8 @@ class _Case:
             if local.reduction is None:
                 rows.append({**self.labels, **labels, "frames": 0})
                 continue
-            step = ReducedLocalStep(self.scene.group(local.group), local.reduction)
-            steps = replace_group(self.scene, local.group, step)
-            outcome = rerun(
-                self.scene, self.system, steps, reference=self.reference, blowup_extent=self.limit
+            outcome = rerun_reduced(
+                self.scene, local.group, local.reduction, self.reference, self.limit, self.system
             )
             rows.append(self._row({**labels, "gain": local.reduction.gain}, outcome))
         for labels, model in models:
@@ -218,10 +215,6 @@ class _Case:
         return {
             **self.labels,
             **labels,
-            "frames": outcome.frames,
-            "finite": outcome.finite,
-            "blowup_frame": outcome.blowup_frame,
-            "max_extent": outcome.max_extent,
+            **outcome.row(self.displacement),
             "energy_ratio": self.scale.ratio(outcome.positions),
-            "relative_error": outcome.error(self.displacement),
         }

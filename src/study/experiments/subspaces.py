@@ -228,13 +228,15 @@ class _Runs:
                 family = ECSW if method.startswith(ECSW) else method
                 spent[family] += of_model
                 model = SubspaceModel(kind, columns, samples)
-                labels = {"method": method, "position_basis": kind, "k": k}
+                labels: dict[str, Any] = {"method": method, "position_basis": kind, "k": k}
                 store = self._file.create_group(f"models/{base}_{method}")
                 store_model(store, {**labels, "base": base}, samples)
-                labels["reduction_s"] = of_columns + spent[family]
+                labels |= {"group": "all", "reduction_s": of_columns + spent[family]}
                 for name, motion in motions.items():
                     outcome = motion.run(model, self._limit)
-                    row = _row(motion, model, outcome) | labels | {"motion": name}
+                    row = outcome.row(motion.displacement) | labels | {"motion": name}
+                    row["scene"] = motion.scene.config.name
+                    row["r"] = model.elements_evaluated(motion.scene)
                     if self._compared:
                         row["energy_ratio"] = _store_run(store, name, motion, outcome)
                     rows[name].append(row)
@@ -285,17 +287,3 @@ def _samplings(
             yield ecsw_name(tolerance), samples
     if HRPD in methods:
         yield HRPD, {g.name: hrpd(g, columns, spaces[g.name]) for g in scene.groups}
-
-
-def _row(motion: Motion, model: SubspaceModel, outcome: Rerun) -> dict[str, Any]:
-    scene = motion.scene
-    return {
-        "scene": scene.config.name,
-        "group": "all",
-        "r": model.elements_evaluated(scene),
-        "frames": outcome.frames,
-        "finite": outcome.finite,
-        "blowup_frame": outcome.blowup_frame,
-        "max_extent": outcome.max_extent,
-        "relative_error": outcome.error(motion.displacement),
-    }

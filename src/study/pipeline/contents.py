@@ -128,7 +128,7 @@ SOME: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     **dict.fromkeys(_in_subspaces, _subspaces),
     **dict.fromkeys([paths.SCALING, paths.BREAK_EVEN_SIZED, paths.EFFECTS_SIZED], _sizes),
     **dict.fromkeys(_online, lambda study: ({"scene": scene} for scene in study.online)),
-    **dict.fromkeys([paths.REPETITIONS, paths.REPEATED_FRAMES], _groups(_repeated)),
+    paths.REPETITIONS: _groups(_repeated),
     **dict.fromkeys([paths.NOISE, paths.NOISE_RUNS], _groups(_noisy)),
     paths.LADDER: _groups(lambda study, scene, group: scene in study.settings.ladder.scenes),
     paths.LIVE_MODEL: _live,

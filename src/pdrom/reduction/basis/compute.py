@@ -8,6 +8,7 @@ from pdrom.core.store import require_finite
 from pdrom.reduction.basis.pod import fix_signs, numerical_rank, pod
 from pdrom.reduction.basis.types import Basis
 from pdrom.reduction.method import BasisSpec
+from pdrom.reduction.snapshots import SnapshotSet
 
 
 def compute_basis(
@@ -73,6 +74,26 @@ def compute_basis(
         separate_axes=separate,
         active_axes=active,
         trained=_trained(v, offsets, separate),
+    )
+
+
+def basis_of(
+    data: SnapshotSet,
+    spec: BasisSpec,
+    train: np.ndarray | None = None,
+    signs: np.random.Generator | None = None,
+) -> Basis:
+    """Basis ``spec`` of the training snapshots of ``data``; ``signs`` and errors: `compute_basis`.
+
+    ``train`` (n, e p, 3) takes their place.
+    """
+    return compute_basis(
+        data.train if train is None else train,
+        data.row_mass,
+        data.roundoff,
+        rows_per_element=data.rows_per_element,
+        spec=spec,
+        signs=signs,
     )
 
 

@@ -8,7 +8,9 @@ from pdrom.model.dynamics.stepper import LocalStep
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.runs.bounded import BoundedRun
 from pdrom.model.scene import Scene
+from pdrom.reduction.local.local_step import ReducedLocalStep
 from pdrom.reduction.rerun import Rerun, compare
+from pdrom.reduction.sampling.reduction import Reduction
 
 
 def replace_group(scene: Scene, group: str, replacement: LocalStep) -> list[LocalStep]:
@@ -38,3 +40,20 @@ def rerun(
     loop = scene.stepper(system, local_steps, track_objective=False)
     start, frames, unit = scene.initial_state(offset), scene.config.frames, scene.mesh.extent
     return compare(BoundedRun(loop.run, start, frames, blowup_extent, unit), reference)
+
+
+def rerun_reduced(
+    scene: Scene,
+    group: str,
+    reduction: Reduction,
+    reference: np.ndarray,
+    blowup_extent: float,
+    system: GlobalSystem | None = None,
+    offset: np.ndarray | None = None,
+) -> Rerun:
+    """Run a scene with the projections of a ``group`` by ``reduction``, see `rerun`.
+
+    ``system`` is the scene's own unless another is given.
+    """
+    steps = replace_group(scene, group, ReducedLocalStep(scene.group(group), reduction))
+    return rerun(scene, system or scene.system, steps, reference, blowup_extent, offset)

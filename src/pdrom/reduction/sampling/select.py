@@ -8,7 +8,7 @@ from pdrom.reduction.basis.types import Basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling.deim import joint_rows
 from pdrom.reduction.sampling.gappy_pod_e import bound_gain
-from pdrom.reduction.sampling.reduction import Sampling
+from pdrom.reduction.sampling.reduction import Reduction, Sampling
 from pdrom.reduction.sampling.selection import Selection
 from pdrom.reduction.selections import SELECTIONS
 
@@ -45,6 +45,13 @@ def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[in
         return {r: Sampling.of_elements(elements, *counts) for r, elements in chosen.items()}
     chosen = _sampled_blocks(v, 1, spec, ranks)
     return {r: _of_entries(entries, basis, spec) for r, entries in chosen.items()}
+
+
+def reductions(basis: Basis, spec: MethodSpec, sizes: Sequence[int]) -> dict[int, Reduction]:
+    """Reductions of those of ``sizes`` that ``basis`` has, by ``spec``; see `select_path`."""
+    known = [r for r in sizes if r <= basis.rank]
+    path = select_path(basis, spec, known)
+    return {r: Reduction(basis, path[r], spec, r=r) for r in known}
 
 
 def _sampled_blocks(

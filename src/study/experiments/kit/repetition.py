@@ -1,4 +1,4 @@
-"""A reduced run repeated: trained on other frames, or from a slightly moved start.
+"""Runs of a scene with one group reduced: from moved starts, on other training frames or signs.
 
 A run is one draw of what nobody means to choose: which frames train, and the last digits of the
 start. Where an error of the run decides something, its repetitions say how much of it is that.
@@ -13,13 +13,12 @@ from pydantic import Field
 
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.scene import Scene
-from pdrom.reduction.basis import Basis, compute_basis
+from pdrom.reduction.basis import Basis, basis_of
 from pdrom.reduction.deviations import error_within
-from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.rerun import replace_group, rerun
+from pdrom.reduction.local.rerun import rerun_reduced
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.rerun import displacement_norms
-from pdrom.reduction.sampling import Reduction, select_path
+from pdrom.reduction.rerun import Rerun, displacement_norms
+from pdrom.reduction.sampling import Reduction, reductions
 from pdrom.reduction.snapshots import SnapshotSet
 from study.experiments.kit.sensitivity import perturbation_field
 from study.experiments.kit.settings import Tolerance
@@ -40,28 +39,24 @@ class Repetitions(ConfigModel):
 
 @dataclass(frozen=True)
 class Repetition:
-    """One repetition.
-
-    error : before the horizon; inf for a run that ended earlier
-    errors : (F,) of each frame before the horizon, relative to the motion of the whole run (root
-        mean square over its frames); inf from the frame on at which the run ended
-    """
+    """One repetition; ``error`` before the horizon, inf for a run that ended earlier."""
 
     r: int
     seed: int
     gain: float
     error: float
     finite: bool
-    errors: np.ndarray
 
 
-class Repeater:
-    """Repeats runs of a scene with one group reduced, up to the horizon.
+class ReducedRuns:
+    """Runs of a scene with one group reduced, compared with its full-order run.
 
     Parameters
     ----------
-    reference : (F + 1, N, 3) positions of the full-order run, which errors are taken against
+    data : snapshots of the group
+    reference : (F + 1, N, 3) m, positions of the full-order run
     end : first frame that is not judged
+    blowup_extent : see `pdrom.reduction.local.rerun.rerun`
     """
 
     def __init__(
@@ -71,81 +66,64 @@ class Repeater:
         data: SnapshotSet,
         reference: np.ndarray,
         end: int,
-        asked: Repetitions,
         blowup_extent: float,
     ) -> None:
-        frames = min(scene.config.frames, max(2, end))
-        self.scene = Scene.build(scene.config.model_copy(update={"frames": frames}), scene.mesh)
-        self.group = self.scene.group(group)
-        self.data, self.asked, self.end = data, asked, end
-        self.reference = reference[: frames + 1]
-        self.blowup_extent = blowup_extent
-        displacement = displacement_norms(reference)
-        self._displacement = displacement[:frames]
-        self._motion = float(np.sqrt(np.mean(displacement**2)))
-        self._bases: dict[tuple[str, int | None], Basis] = {}
-        self._reductions: dict[tuple[MethodSpec, int | None], dict[int, Reduction]] = {}
+        self.scene, self.group, self.data = scene, group, data
+        self.reference, self.end, self.blowup_extent = reference, end, blowup_extent
+        self.displacement = displacement_norms(reference)
+        self._bases: dict[tuple[str, int | None, int | None], Basis] = {}
+
+    def until_the_end(self) -> "ReducedRuns":
+        """The same runs up to the first frame that is not judged, but of two frames at least."""
+        frames = min(self.scene.config.frames, max(2, self.end))
+        scene = Scene.build(
+            self.scene.config.model_copy(update={"frames": frames}), self.scene.mesh
+        )
+        reference = self.reference[: frames + 1]
+        return ReducedRuns(scene, self.group, self.data, reference, self.end, self.blowup_extent)
+
+    def basis(
+        self, method: MethodSpec, frames: int | None = None, signs: int | None = None
+    ) -> Basis:
+        """Basis for ``method``; seeds may draw training ``frames``, and ``signs`` of the modes."""
+        key = (method.basis_id, frames, signs)
+        if key not in self._bases:
+            train = None if frames is None else drawn(self.data, frames)
+            flips = None if signs is None else np.random.default_rng(signs)
+            self._bases[key] = basis_of(self.data, method, train, flips)
+        return self._bases[key]
+
+    def run(self, reduction: Reduction, offset: np.ndarray | None = None) -> Rerun:
+        """Run with ``reduction`` from the scene's start, moved by ``offset`` (N, 3) m."""
+        return rerun_reduced(
+            self.scene, self.group, reduction, self.reference, self.blowup_extent, offset=offset
+        )
+
+    def error(self, outcome: Rerun) -> float | None:
+        """Relative error before the end; None for a run that did not get there."""
+        return error_within(outcome.difference, self.displacement, self.end)
 
     def repeat(
-        self, method: MethodSpec, sizes: Sequence[int], varied: Varied
+        self, method: MethodSpec, sizes: Sequence[int], varied: Varied, asked: Repetitions
     ) -> Iterator[Repetition]:
         """Every repetition of ``method`` at each of ``sizes`` that its basis has.
 
         ``varied`` says what the seed draws: the start, or the training snapshots.
         """
-        for seed in range(1, self.asked.repetitions + 1):
-            subset = None if varied == "start" else seed
-            for r, reduction in self._reduced(method, sizes, subset).items():
-                yield self._run(reduction, r, seed, moved=varied != "training")
-
-    def _run(self, reduction: Reduction, r: int, seed: int, moved: bool) -> Repetition:
-        field = perturbation_field(self.scene, self.asked.perturbation, seed) if moved else None
-        steps = replace_group(self.scene, self.group.name, ReducedLocalStep(self.group, reduction))
-        outcome = rerun(
-            self.scene,
-            self.scene.system,
-            steps,
-            reference=self.reference,
-            blowup_extent=self.blowup_extent,
-            offset=field,
-        )
-        error = error_within(outcome.difference, self._displacement, self.end)
-        errors = np.full(len(self._displacement), np.inf)
-        errors[: outcome.frames] = outcome.difference / self._motion
-        return Repetition(
-            r=r,
-            seed=seed,
-            gain=reduction.gain,
-            error=float("inf") if error is None else error,
-            finite=outcome.finite,
-            errors=errors,
-        )
-
-    def _reduced(
-        self, method: MethodSpec, sizes: Sequence[int], subset: int | None
-    ) -> dict[int, Reduction]:
-        if (method, subset) not in self._reductions:
-            self._reductions = {(method, subset): self._reduce(method, sizes, subset)}
-        return self._reductions[method, subset]
-
-    def _reduce(
-        self, method: MethodSpec, sizes: Sequence[int], subset: int | None
-    ) -> dict[int, Reduction]:
-        key = (method.basis_id, subset)
-        if key not in self._bases:
-            data = self.data
-            train = data.train if subset is None else drawn(data, subset)
-            self._bases[key] = compute_basis(
-                train,
-                data.row_mass,
-                data.roundoff,
-                rows_per_element=data.rows_per_element,
-                spec=method,
-            )
-        basis = self._bases[key]
-        held = [r for r in sizes if r <= basis.rank]
-        path = select_path(basis, method, held) if held else {}
-        return {r: Reduction(basis, path[r], method, r=r) for r in held}
+        own = reductions(self.basis(method), method, sizes) if varied == "start" else None
+        for seed in range(1, asked.repetitions + 1):
+            made = own
+            if made is None:
+                made = reductions(self.basis(method, frames=seed), method, sizes)
+            offset = None
+            if varied != "training":
+                offset = perturbation_field(self.scene, asked.perturbation, seed)
+            for r, reduction in made.items():
+                outcome = self.run(reduction, offset)
+                error = self.error(outcome)
+                yield Repetition(
+                    r, seed, reduction.gain, np.inf if error is None else error, outcome.finite
+                )
 
 
 def drawn(data: SnapshotSet, seed: int) -> np.ndarray:

@@ -3,7 +3,6 @@
 import logging
 from typing import Any
 
-import h5py
 import numpy as np
 import pandas as pd
 
@@ -12,7 +11,7 @@ from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.metrics import relative_errors
 from pdrom.reduction.basis import Basis
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.sampling import Reduction, Sampling, select_path
+from pdrom.reduction.sampling import Reduction, reductions
 from pdrom.reduction.snapshots import SPLITS, SnapshotSet
 from study.artifact.paths import File
 from study.experiments.kit.settings import Count, Rank, resolve_ranks
@@ -59,12 +58,12 @@ def sample(
     """
     labels = sampling.labels
     wanted = _sizes(sweep, ranks, basis.rank)
-    path = select_path(basis, method, wanted) if wanted else {}
     rows = []
     with write_hdf5(sampling.path) as file:
-        for r in wanted:
-            reduction = Reduction(basis, path[r], method, r=r)
-            _store(file, r, path[r], reduction)
+        for r, reduction in reductions(basis, method, wanted).items():
+            store, sampled = file.create_group(f"r{r:04d}"), reduction.sampling
+            store["entries"], store["elements"] = sampled.entries, sampled.elements
+            store.attrs["gain"], store.attrs["condition"] = reduction.gain, reduction.condition
             rows += [{**labels, "r": r, **row} for row in _errors(reduction, data)]
     beyond = [r for r in resolve_ranks(ranks, basis.rank) if r > basis.rank]
     rows += [{**labels, "r": r, "split": split} for r in beyond for split in SPLITS]
@@ -79,12 +78,6 @@ def _sizes(sweep: Sweep, ranks: tuple[Rank, ...], rank: int) -> list[int]:
         return []
     asked = [r for r in resolve_ranks(ranks, rank) if r <= rank]
     return sorted({*sweep.ranks(rank), *asked})
-
-
-def _store(file: h5py.File, r: int, sampling: Sampling, reduction: Reduction) -> None:
-    store = file.create_group(f"r{r:04d}")
-    store["entries"], store["elements"] = sampling.entries, sampling.elements
-    store.attrs["gain"], store.attrs["condition"] = reduction.gain, reduction.condition
 
 
 def _errors(reduction: Reduction, data: SnapshotSet) -> list[dict[str, Any]]:

@@ -7,12 +7,14 @@ from builders import make_scene
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.sampling import reductions
 from pdrom.reduction.snapshots import SnapshotSet
-from study.experiments.kit.repetition import Repeater, Repetitions, drawn
+from study.experiments.kit.repetition import ReducedRuns, Repetitions, drawn
 
 FULL = MethodSpec(title="all", centring="affine", rows="all")
 BLOCK = MethodSpec(title="elements", centring="affine", rows="element", solve="qr")
 END = 9
+TWICE = Repetitions(repetitions=2)
 
 
 @pytest.fixture(scope="module")
@@ -36,14 +38,14 @@ def sheet() -> tuple[Scene, np.ndarray, SnapshotSet]:
 
 
 @pytest.fixture(scope="module")
-def repeater(sheet) -> Repeater:
-    """Two draws, judged up to frame `END`."""
+def short(sheet) -> ReducedRuns:
+    """Runs up to frame `END`."""
     scene, reference, data = sheet
-    return Repeater(scene, "spring", data, reference, END, Repetitions(repetitions=2), 100.0)
+    return ReducedRuns(scene, "spring", data, reference, END, 100.0).until_the_end()
 
 
-def test_drawn_frames_are_stored_ones_in_order(repeater):
-    data = repeater.data
+def test_drawn_frames_are_stored_ones_in_order(sheet):
+    data = sheet[2]
     both = np.concatenate([data.train, data.test])
     frames = np.concatenate([data.frames["train"], data.frames["test"]])
     for seed in range(5):
@@ -54,43 +56,55 @@ def test_drawn_frames_are_stored_ones_in_order(repeater):
     assert not np.array_equal(drawn(data, 1), drawn(data, 2))
 
 
-def test_a_moved_start_keeps_the_reduction_and_hardly_moves_a_tame_run(repeater):
-    runs = list(repeater.repeat(BLOCK, [3], "start"))
+def test_a_moved_start_keeps_the_reduction_and_hardly_moves_a_tame_run(short):
+    runs = list(short.repeat(BLOCK, [3], "start", TWICE))
     assert [run.seed for run in runs] == [1, 2]
     assert runs[0].gain == runs[1].gain
     assert runs[0].error != runs[1].error
     assert runs[0].error == pytest.approx(runs[1].error, rel=1e-4)
 
 
-def test_other_training_frames_are_another_basis(repeater):
-    one, other = repeater.repeat(BLOCK, [3], "training")
+def test_other_training_frames_are_another_basis(short):
+    one, other = short.repeat(BLOCK, [3], "training", TWICE)
     assert one.gain != other.gain
     assert abs(one.error - other.error) > 1e-3 * one.error
-    again = [run.error for run in repeater.repeat(BLOCK, [3], "training")]
+    again = [run.error for run in short.repeat(BLOCK, [3], "training", TWICE)]
     assert again == [one.error, other.error]
 
 
-def test_errors_of_the_frames_make_up_the_error_before_the_horizon(sheet, repeater):
-    """Theirs is in units of the motion of the whole run, that of the motion before the horizon."""
-    moved = np.sum(np.square(sheet[1][1:] - sheet[1][0]), axis=(1, 2))
-    run = next(repeater.repeat(BLOCK, [3], "start"))
-    assert run.errors.shape == (END,)
-    unit = moved.mean() / moved[:END].mean()
-    assert np.sqrt(unit * np.mean(run.errors**2)) == pytest.approx(run.error, rel=1e-9)
+def test_the_error_is_that_of_the_frames_before_the_end(sheet, short):
+    scene, reference, data = sheet
+    whole = ReducedRuns(scene, "spring", data, reference, END, 100.0)
+    (reduction,) = reductions(whole.basis(BLOCK), BLOCK, [3]).values()
+    one, other = whole.run(reduction), short.run(reduction)
+    assert (one.frames, other.frames) == (12, END)
+    assert whole.error(one) == short.error(other)
+    moved = np.linalg.norm(reference[1 : END + 1] - reference[0])
+    expected = np.linalg.norm(one.positions[1 : END + 1] - reference[1 : END + 1]) / moved
+    assert whole.error(one) == pytest.approx(expected, rel=1e-9)
+
+
+def test_signs_are_drawn_by_a_seed(short):
+    """They change a basis whose modes the mean is added to, and no other."""
+    published = MethodSpec(
+        title="p", centring="mean-in-modes", rows="joint", solve="tikhonov", repeat_rows=True
+    )
+    one, two = (short.basis(published, signs=seed).V for seed in (1, 2))
+    assert not np.array_equal(one, two)
+    assert short.basis(published, signs=1).V is one
+    np.testing.assert_array_equal(short.basis(BLOCK, signs=1).V, short.basis(BLOCK).V)
 
 
 def test_a_run_that_ends_early_is_wrong_without_bound(sheet):
     """Here one that may extend over half of the sheet only, and ends after a frame."""
     scene, reference, data = sheet
-    short = Repeater(scene, "spring", data, reference, END, Repetitions(repetitions=1), 0.5)
-    (run,) = short.repeat(BLOCK, [3], "start")
+    narrow = ReducedRuns(scene, "spring", data, reference, END, 0.5).until_the_end()
+    (run,) = narrow.repeat(BLOCK, [3], "start", Repetitions(repetitions=1))
     assert np.isinf(run.error)
-    assert np.isfinite(run.errors[0])
-    assert np.isinf(run.errors[1:]).all()
     assert not run.finite
 
 
-def test_sizes_beyond_the_rank_are_left_out(repeater):
-    sizes = {run.r for run in repeater.repeat(FULL, [2, 999], "training")}
+def test_sizes_beyond_the_rank_are_left_out(short):
+    sizes = {run.r for run in short.repeat(FULL, [2, 999], "training", TWICE)}
     assert sizes == {2}
-    assert repeater.scene.config.frames == END
+    assert short.scene.config.frames == END
