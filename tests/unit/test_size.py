@@ -13,7 +13,7 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 43_907,
+    "lines of src": 43_810,
     "modules of src": 418,
     "lines of tests": 29_947,
     "words of documentation": 24_899,
