@@ -27,7 +27,7 @@ from same_results import differences, run_digests, table_digests
 from sandbox import Sandbox
 
 RESULTS = "results/studies/tiny"
-TABLES = ("singular_values", "reconstruction_error", "sensitivity", "heldout_reruns")
+TABLES = ("singular_values", "reconstruction_error", "sensitivity", "reduced_reruns")
 TARGETS = [f"{RESULTS}/tables/{name}.csv" for name in TABLES]
 COMMAND = ["./reproduce", "--configfile", "config/tiny.yaml", "--cores", "2", "--keep-going", "--"]
 KINDS = ("server", "client", "job", "front")

@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 43_810,
-    "modules of src": 418,
+    "lines of src": 43_748,
+    "modules of src": 416,
     "lines of tests": 29_947,
     "words of documentation": 24_899,
-    "tables": 29,
+    "tables": 28,
     "figures": 23,
     "experiments": 21,
-    "percent of src in decorators, signatures and imports": 22.62,
+    "percent of src in decorators, signatures and imports": 22.61,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

@@ -16,6 +16,7 @@ from study.experiments.kit.settings import Horizon
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Drawn, Experiment, NothingToDraw, ReducedRuns
 from study.figures.runs import RUNS, Runs, experiment_rows
+from study.tables.kit.held_out import trained
 
 TOLERANCE = "ecsw-1e-02"
 
@@ -58,7 +59,7 @@ def teaser(
     for each in drawn.experiments:
         found = experiment_rows(options, drawn, runs, each)
         subspace = _subspace(options, runs, each, each.find(subspaces))
-        rows.append(_merged(drawn, each, found, errors, subspace))
+        rows.append(_merged(drawn, each, found, trained(errors), subspace))
     return draw_rows(rows, options.camera)
 
 

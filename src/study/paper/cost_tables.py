@@ -7,7 +7,7 @@ import pandas as pd
 from pdrom.view.text import escape
 from study.paper.macros import format_number
 from study.paper.tabular import name, tabular
-from study.tables.kit.held_out import MEDIAN, over_motions
+from study.tables.kit.held_out import MEDIAN, over_motions, trained
 
 Tables = Mapping[str, pd.DataFrame]
 NONE = "--"
@@ -40,11 +40,11 @@ def positions(tables: Tables) -> str:
     table = tables["reduced_reruns"]
     rows = []
     for scene in table.scene.unique():
-        runs = _rows(table, scene=scene, group="all")
+        runs = trained(_rows(table, scene=scene, group="all"))
         if runs.empty:
             continue
         largest = runs[runs.k == runs.k.max()]
-        rows.append([name(scene), *_of_subspaces(largest, tables["heldout_reruns"])])
+        rows.append([name(scene), *_of_subspaces(largest, table)])
     header = [
         "scene", "all", "all, held out", "sampled", "sampled, held out", "elements", "speed-up",
         "hrpd", "skinning, all",
@@ -52,13 +52,13 @@ def positions(tables: Tables) -> str:
     return tabular(header, rows, "l" + "r" * 8)
 
 
-def _of_subspaces(runs: pd.DataFrame, heldout: pd.DataFrame) -> list[str]:
+def _of_subspaces(runs: pd.DataFrame, reruns: pd.DataFrame) -> list[str]:
     def error(run: pd.Series) -> str:
         return format_number(run.relative_error_within_horizon)
 
     def unseen(run: pd.Series) -> str:
         same = _rows(
-            heldout, scene=run.scene, group="all", method=run.method, k=run.k,
+            reruns, scene=run.scene, group="all", method=run.method, k=run.k,
             position_basis=run.position_basis,
         )  # fmt: skip
         return _cell(over_motions(same), lambda found: format_number(found[MEDIAN]))

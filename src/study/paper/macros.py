@@ -2,7 +2,7 @@ r"""Numbers of the manuscript.
 
 The source names a number by where it stands in a table::
 
-    \val{reduced_reruns|scene=bar_release|method=block-deim|r=20|relative_error_within_horizon}
+    \val{reduced_reruns|scene=bar_release|method=block-deim|r=20|motion=train|speedup}
 
 (table, any number of filters, the column; optionally ``max``, ``min``, ``median``, ``count`` or
 ``distinct``, the number of different values, of the rows that match). A filter is column=value

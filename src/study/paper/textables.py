@@ -13,13 +13,14 @@ from study.paper.hard_tables import hard_cases, hard_reductions
 from study.paper.macros import format_number
 from study.paper.speedup_tables import payoff, pays, speedups
 from study.paper.tabular import longtable, name, tabular
+from study.tables.kit.held_out import trained
 
 Tables = Mapping[str, pd.DataFrame]
 
 
 def scenes(tables: Tables) -> str:
     """Scenes with their groups, sizes and horizons."""
-    horizon = tables["reduced_reruns"].groupby("scene").horizon_frame.first()
+    horizon = trained(tables["reduced_reruns"]).groupby("scene").horizon_frame.first()
     rows = []
     for row in tables["scenes"].itertuples():
         end = horizon.get(row.scene)
@@ -83,7 +84,7 @@ def _relative(rows: pd.DataFrame, component: int) -> str:
 
 def reruns(tables: Tables) -> str:
     """Error within the horizon of every method at r = 20 and at full rank."""
-    table = tables["reduced_reruns"]
+    table = trained(tables["reduced_reruns"])
     table = table[table.position_basis == "full"]
     order = list(tables["methods"].method)
     rows = []

@@ -24,10 +24,9 @@ from study.artifact.paths import File
 from study.artifact.reads import Every, PerScene, TableOf
 from study.experiments.kit.names import ANDERSON, FOM
 from study.tables.kit.declaration import compared, flag, integer, number, table, timed
-from study.tables.kit.held_out import COLUMNS, MEDIAN, with_held_out
+from study.tables.kit.held_out import COLUMNS, MEDIAN, trained, with_held_out
 from study.tables.kit.one_time import timings_in_one_time
 from study.tables.kit.parts import joined
-from study.tables.kit.reruns import USERS
 from study.tables.kit.vocabulary import (
     ERROR_WITHIN,
     GROUP,
@@ -35,6 +34,7 @@ from study.tables.kit.vocabulary import (
     MS_PER_FRAME,
     POSITION_BASIS,
     SCENE,
+    USERS,
     K,
     R,
 )
@@ -73,7 +73,6 @@ CONVERGED, OWN = "converged", "own iterations"
     ),
     reads={
         "reruns": TableOf("reduced_reruns"),
-        "heldout": TableOf("heldout_reruns"),
         "timings": Every(paths.TIMINGS),
         "frame_times": TableOf("frame_times"),
         "sweeps": Every(paths.ITERATIONS),
@@ -83,7 +82,6 @@ CONVERGED, OWN = "converged", "own iterations"
 )
 def accuracy_cost(
     reruns: pd.DataFrame,
-    heldout: pd.DataFrame,
     timings: list[File],
     frame_times: pd.DataFrame,
     sweeps: list[File],
@@ -103,8 +101,8 @@ def accuracy_cost(
     full = times[times.method.isna()].copy()
     full = full.assign(method="full", position_basis="full", relative_error_within_horizon=0.0)
     sweep = _sweep(joined(sweeps), times)
-    points = reruns.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
-    points = with_held_out(points.assign(iterations=points.scene.map(iterations)), heldout)
+    points = trained(reruns).dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
+    points = with_held_out(points.assign(iterations=points.scene.map(iterations)), reruns)
     known = joined(models).reindex(columns=[*_MODEL, "error_converged"]).astype({"k": "Int64"})
     points = points.merge(known, on=_MODEL, how="left")
     own = sweep[sweep.method == FOM].set_index(["scene", "iterations"]).error_converged

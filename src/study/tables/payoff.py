@@ -6,7 +6,7 @@ import pandas as pd
 from study.artifact.reads import TableOf
 from study.tables.kit.declaration import compared, integer, number, table, timed
 from study.tables.kit.gains import FAILED
-from study.tables.kit.held_out import with_held_out
+from study.tables.kit.held_out import trained, with_held_out
 from study.tables.kit.vocabulary import METHOD, POSITION_BASIS
 
 _ERROR = "relative_error_within_horizon"
@@ -49,15 +49,16 @@ _ERROR = "relative_error_within_horizon"
         ),
         timed(integer("pays_heldout", "those that pay whose run has at most a tenth held out")),
     ),
-    reads={"reruns": TableOf("reduced_reruns"), "heldout": TableOf("heldout_reruns")},
+    reads={"reruns": TableOf("reduced_reruns")},
 )
-def payoff(reruns: pd.DataFrame, heldout: pd.DataFrame) -> pd.DataFrame:
+def payoff(reruns: pd.DataFrame) -> pd.DataFrame:
     """One row per method, over all scenes and sizes; only what ran and was timed counts.
 
-    Sizes are chosen on the training motion, ``reruns``, and scored on others, ``heldout``; see
+    Sizes are chosen on the training motion of ``reruns`` and scored on the others, see
     `with_held_out`.
     """
-    runs = with_held_out(reruns[reruns.speedup.notna() & reruns.max_extent.notna()], heldout)
+    runs = trained(reruns)
+    runs = with_held_out(runs[runs.speedup.notna() & runs.max_extent.notna()], reruns)
     rows = []
     for (basis, method), own in runs.groupby(["position_basis", "method"], sort=False):
         accurate = own[own[_ERROR] <= FAILED]

@@ -1,54 +1,156 @@
-"""Table reduced_reruns: errors of the reruns, over the run and within the horizon, with times."""
+"""Table reduced_reruns: errors of the reruns of all motions, times of those in training."""
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import h5py
 import pandas as pd
 
+from pdrom.core.store import open_hdf5, read_table
+from pdrom.model.held_out import MOTIONS
+from pdrom.reduction.deviations import DEVIATIONS, ERRORS, REFERENCE, Series, errors_within
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
-from study.tables.kit.declaration import table
+from study.experiments.kit.horizon import floor_of, horizons
+from study.tables.kit.declaration import table, text
+from study.tables.kit.held_out import KEYS, TRAIN
 from study.tables.kit.one_time import timings_in_one_time
-from study.tables.kit.reruns import COLUMNS, KEYS, MEASURES, TRAIN, judged_reruns
-from study.tables.kit.vocabulary import GLOBAL_MS, LOCAL_MS, MS_PER_FRAME, SPEEDUP
+from study.tables.kit.vocabulary import (
+    BLOWUP_FRAME,
+    ERROR_OVER_EXTENT,
+    ERROR_WITHIN,
+    FINITE,
+    FLOOR,
+    FRAMES,
+    GLOBAL_MS,
+    GROUP,
+    HORIZON_FRAME,
+    LOCAL_MS,
+    MAX_EXTENT,
+    METHOD,
+    MS_PER_FRAME,
+    POSITION_BASIS,
+    RELATIVE_ERROR,
+    SCENE,
+    SHAPE_ERROR,
+    SPEEDUP,
+    USERS,
+    K,
+    R,
+)
 
 
 @table(
-    title="Reduced runs of the training motions",
-    columns=(*COLUMNS, MS_PER_FRAME, LOCAL_MS, GLOBAL_MS, SPEEDUP, *MEASURES),
+    title="Reduced runs of the training and the held-out motions",
+    columns=(
+        SCENE, GROUP, METHOD, POSITION_BASIS, K, R, FRAMES, FINITE, BLOWUP_FRAME, MAX_EXTENT,
+        RELATIVE_ERROR, ERROR_WITHIN, HORIZON_FRAME, FLOOR, MS_PER_FRAME, LOCAL_MS, GLOBAL_MS,
+        SPEEDUP, ERROR_OVER_EXTENT, SHAPE_ERROR, *USERS,
+        text(
+            "motion",
+            f"{TRAIN}, or how the motion differs from the training one: {', '.join(MOTIONS)}",
+        ),
+    ),
     reads={
         "runs": Every(paths.RERUNS),
         "rows": Every(paths.RERUNS_TRAIN),
+        "rows_heldout": Every(paths.RERUNS_HELDOUT),
         "subspaces": Every(paths.SUBSPACES),
         "subspace_rows": Every(paths.SUBSPACES_TRAIN),
+        "subspace_rows_heldout": Every(paths.SUBSPACES_HELDOUT),
         "timings": Every(paths.TIMINGS),
         "frame_times": TableOf("frame_times"),
         "sensitivity": TableOf("sensitivity"),
         "perturbation": Setting("sensitivity.reference"),
         "threshold": Setting("sensitivity.threshold"),
     },
-)
+)  # fmt: skip
 def reduced_reruns(
     runs: list[File],
     rows: list[File],
+    rows_heldout: list[File],
     subspaces: list[File],
     subspace_rows: list[File],
+    subspace_rows_heldout: list[File],
     timings: list[File],
     frame_times: pd.DataFrame,
     sensitivity: pd.DataFrame,
     perturbation: float,
     threshold: float,
 ) -> pd.DataFrame:
-    """Runs of the training motion with their times; see `judged_reruns` for the rest."""
-    judged = judged_reruns(
-        runs,
-        rows,
-        subspaces,
-        subspace_rows=subspace_rows,
-        sensitivity=sensitivity,
-        perturbation=perturbation,
-        threshold=threshold,
-        motion=TRAIN,
-    )
-    return _with_times(judged, timings_in_one_time(timings, frame_times))
+    """Runs of the training motion with their times, then those of each held-out motion.
+
+    One row per motion, scene, group, method and r, then the runs in position subspaces, in which
+    all groups are reduced and r counts the evaluated elements. Every run is judged by the horizon
+    of its own motion: the error within it uses the frames before it only, and a run that blew up
+    before has none.
+
+    Parameters
+    ----------
+    runs, rows, rows_heldout : HDF5 files of the runs, and their tables in the same order
+    subspaces, subspace_rows, subspace_rows_heldout : the same in position subspaces
+    sensitivity, perturbation, threshold : see `horizons`; held-out motions have labels of their own
+    """
+    judged: list[pd.DataFrame] = []
+    for motion in (TRAIN, *MOTIONS):
+        own = motion == TRAIN
+        label = perturbation if own else motion
+        ends = horizons(sensitivity, label, threshold)
+        local = zip(runs, rows if own else rows_heldout, strict=True)
+        inside = zip(subspaces, subspace_rows if own else subspace_rows_heldout, strict=True)
+        parts = [_local_only(run, row, ends, motion) for run, row in local]
+        parts += [_subspace(run, row, ends, motion) for run, row in inside]
+        found = pd.concat(parts, ignore_index=True).assign(motion=motion)
+        floors = {s: floor_of(sensitivity, s, label)[:end] for s, end in ends.items()}
+        floor = {scene: float(drift.max(initial=0.0)) for scene, drift in floors.items()}
+        found["horizon_frame"] = found.scene.map(ends)
+        found["sensitivity_floor"] = found.scene.map(floor)
+        judged.append(found)
+    judged[0] = _with_times(judged[0], timings_in_one_time(timings, frame_times))
+    return pd.concat(judged, ignore_index=True)
+
+
+def _local_only(run: File, row: File, ends: dict[str, int], motion: str) -> pd.DataFrame:
+    """Rows of runs whose positions are not reduced."""
+    table, end = _of_motion(row, motion), ends[run["scene"]]
+    with open_hdf5(run.path) as file:
+        store = file if motion == TRAIN else file[motion]
+        runs = [store[f"r{r:04d}"] for r in table.r]
+        reference = {series: store[series][...] for series in REFERENCE}
+        table = table.assign(**_errors(runs, reference, end, file.attrs))
+    return table.assign(position_basis="full", k=None)
+
+
+def _of_motion(row: File, motion: str) -> pd.DataFrame:
+    """Rows of a motion; a table of training runs has no column that names one."""
+    table = read_table(row.path)
+    return table if motion == TRAIN else table[table.motion == motion]
+
+
+def _subspace(run: File, row: File, ends: dict[str, int], motion: str) -> pd.DataFrame:
+    """Rows of runs in position subspaces."""
+    table, end = _of_motion(row, motion), ends[run["scene"]]
+    with open_hdf5(run.path) as file:
+        models = [f"{t.position_basis}_k{t.k:03d}_{t.method}" for t in table.itertuples()]
+        runs = [file[f"models/{model}/{motion}"] for model in models]
+        reference = {series: file[f"{series}/{motion}"][...] for series in REFERENCE}
+        table = table.assign(**_errors(runs, reference, end, file.attrs))
+    return table
+
+
+def _errors(
+    runs: Sequence[h5py.Group], reference: Series, end: int, units: Mapping[str, Any]
+) -> dict[str, list[float | None]]:
+    """Errors before the horizon; a run of a size beyond the rank has no frames and no errors."""
+    known = {unit: float(units[unit]) for unit in ("extent_norm", "time_step")}
+    found = [
+        errors_within({series: run[series][...] for series in DEVIATIONS}, reference, end, **known)
+        if "difference" in run
+        else dict.fromkeys(ERRORS)
+        for run in runs
+    ]
+    return {name: [errors[name] for errors in found] for name in ERRORS}
 
 
 def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:

@@ -9,10 +9,9 @@ from study.artifact.paths import File
 from study.artifact.reads import Every, TableOf
 from study.experiments.kit.fresh_process import FULL, REDUCED
 from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
-from study.tables.kit.held_out import COLUMNS, HIGH, LOW, MEDIAN, over_motions
+from study.tables.kit.held_out import COLUMNS, HIGH, LOW, MEDIAN, TRAIN, over_motions, trained
 from study.tables.kit.intervals import in_words, median_interval
 from study.tables.kit.parts import joined
-from study.tables.kit.reruns import TRAIN
 from study.tables.kit.vocabulary import (
     GROUP,
     METHOD,
@@ -74,7 +73,6 @@ UNCONFIRMED = "not confirmed by its control"
         "subspaces": Every(paths.SUBSPACES_SECONDS),
         "large": Every(paths.ONLINE),
         "reruns": TableOf("reduced_reruns"),
-        "heldout": TableOf("heldout_reruns"),
     },
 )
 def speedups(
@@ -84,7 +82,6 @@ def speedups(
     subspaces: list[File],
     large: list[File],
     reruns: pd.DataFrame,
-    heldout: pd.DataFrame,
 ) -> pd.DataFrame:
     """One row per quoted reduction; a speed-up is a ratio of two times of one process."""
     rows = joined(parts)
@@ -95,7 +92,7 @@ def speedups(
         _costs(joined(projections), _REDUCTION),
         _costs(joined(subspaces), _MODEL),
     ]
-    errors = [_errors(reruns, heldout, keys) for keys in (_REDUCTION, _MODEL)]
+    errors = [_errors(reruns, keys) for keys in (_REDUCTION, _MODEL)]
     own = joined(large)
     if len(own):
         extra.append(_costs(own[own.motion == TRAIN], _MODEL))
@@ -144,19 +141,17 @@ def _costs(costs: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
     return costs.reindex(columns=[*keys, "reduction_s"])
 
 
-def _errors(reruns: pd.DataFrame, heldout: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
-    inside = keys == _MODEL
-    own, unseen = (runs[(runs.position_basis != "full") == inside] for runs in (reruns, heldout))
-    train = own[[*keys, _ERROR]].rename(columns={_ERROR: "error_train"})
+def _errors(reruns: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
+    runs = reruns[(reruns.position_basis != "full") == (keys == _MODEL)]
+    train = trained(runs)[[*keys, _ERROR]].rename(columns={_ERROR: "error_train"})
     sizes = {key: "Int64" for key in keys if key in ("k", "r")}
-    return train.astype(sizes).merge(over_motions(unseen, keys), on=keys, how="outer")
+    return train.astype(sizes).merge(over_motions(runs, keys), on=keys, how="outer")
 
 
 def large_errors(large: pd.DataFrame) -> pd.DataFrame:
     """Errors of each model of large scenes over whole runs, from the rows of all motions."""
     whole = large.rename(columns={"relative_error": _ERROR}).assign(horizon_frame=1)
-    own, unseen = whole[whole.motion == TRAIN], whole[whole.motion != TRAIN]
-    return _errors(own, unseen, _MODEL)
+    return _errors(whole, _MODEL)
 
 
 def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -> pd.DataFrame:

@@ -11,8 +11,8 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, PerScene, Setting, TableOf
 from study.tables.kit.declaration import compared, number, table, text
+from study.tables.kit.held_out import KEYS, trained
 from study.tables.kit.parts import joined
-from study.tables.kit.reruns import KEYS
 from study.tables.kit.vocabulary import (
     BLOWUP_FRAME,
     ENERGY_RATIO,
@@ -141,6 +141,6 @@ def _rerun_rows(
     local = joined(reruns).assign(position_basis="full", k=np.nan)
     runs = pd.concat([local, joined(subspaces)], ignore_index=True)
     runs = runs.drop(columns="relative_error")
-    errors = reduced_reruns[[*KEYS, "relative_error_within_horizon"]]
+    errors = trained(reduced_reruns)[[*KEYS, "relative_error_within_horizon"]]
     errors = errors.rename(columns={"relative_error_within_horizon": "relative_error"})
     return runs.merge(errors, on=KEYS, how="left", validate="one_to_one")

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from study.tables.kit.declaration import Column, Table
+from study.tables.kit.held_out import trained
 from study.verification.pairing import names_row
 
 # Errors of runs on samples with a larger amplification, and errors of approximations and the
@@ -119,7 +120,9 @@ def _chaotic(tables: Mapping[str, pd.DataFrame]) -> frozenset[str]:
     if RUNS not in tables:
         return frozenset()
     runs = (
-        tables[RUNS].groupby("scene").agg(end=("frames", "max"), horizon=("horizon_frame", "max"))
+        trained(tables[RUNS])
+        .groupby("scene")
+        .agg(end=("frames", "max"), horizon=("horizon_frame", "max"))
     )
     return frozenset(runs.index[runs.horizon < runs.end])
 
@@ -143,4 +146,5 @@ def _gains(tables: Mapping[str, pd.DataFrame]) -> dict[tuple, float]:
 def _ended(runs: pd.DataFrame | None) -> frozenset[tuple]:
     if runs is None:
         return frozenset()
-    return frozenset(names(runs[runs[OF_RUN[0]].isna()], RUN))
+    own = trained(runs)
+    return frozenset(names(own[own[OF_RUN[0]].isna()], RUN))

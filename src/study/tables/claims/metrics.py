@@ -20,7 +20,7 @@ from study.tables.claims.run_metrics import (
     trend_p_value,
     useful_speedup,
 )
-from study.tables.kit.reruns import KEYS
+from study.tables.kit.held_out import KEYS
 
 _PLACE = ("scene", "group", "method", "position_basis")
 
@@ -85,7 +85,6 @@ class Metric:
     values : from tables, ``where`` and ``accuracy`` to a row of labels and a `VALUE` for each
     labels : columns that rows may be chosen by, in addition to those of the table
     ratio : a value as the ratio of two times, where it is made of times in another way
-    beside : further tables that it reads
     """
 
     values: Callable[[Tables, dict, float], pd.DataFrame]
@@ -93,7 +92,6 @@ class Metric:
     columns: tuple[str, ...]
     labels: tuple[str, ...] = ()
     ratio: Callable[[np.ndarray], np.ndarray] = np.asarray
-    beside: tuple[str, ...] = ()
 
 
 def _over_the_rest(share: np.ndarray) -> np.ndarray:
@@ -102,7 +100,7 @@ def _over_the_rest(share: np.ndarray) -> np.ndarray:
         return np.divide(share, np.subtract(1.0, share))
 
 
-_RERUN = ("frames", "blowup_frame", "relative_error_within_horizon", *_PLACE, "r")
+_RERUN = ("motion", "frames", "blowup_frame", "relative_error_within_horizon", *_PLACE, "r")
 METRICS = {
     "local_share": Metric(_local_share, "local_share", ("local_share",), ratio=_over_the_rest),
     "rerun_error": Metric(rerun_error, "reduced_reruns", _RERUN),
@@ -142,7 +140,7 @@ METRICS = {
     "position_basis_ratio": Metric(
         position_basis_ratio,
         "reduced_reruns",
-        ("scene", "k", "position_basis", "relative_error_within_horizon"),
+        ("motion", "scene", "k", "position_basis", "relative_error_within_horizon"),
     ),
 }
 _HELD_OUT = (
@@ -152,9 +150,8 @@ METRICS |= {
     f"heldout_{name}": replace(
         METRICS[name],
         values=held_out(METRICS[name].values),
-        columns=tuple(dict.fromkeys((*METRICS[name].columns, *KEYS))),
-        beside=("heldout_reruns",),
+        columns=tuple(dict.fromkeys((*METRICS[name].columns, *_RERUN, "horizon_frame", *KEYS))),
     )
     for name in _HELD_OUT
 }
-READ = sorted({table for m in METRICS.values() for table in (m.table, *m.beside)})
+READ = sorted({metric.table for metric in METRICS.values()})

@@ -11,7 +11,7 @@ import pandas as pd
 
 from study.tables.claims.rows import VALUE, Tables, filtered, labelled
 from study.tables.kit.families import families
-from study.tables.kit.held_out import MEDIAN, with_held_out
+from study.tables.kit.held_out import MEDIAN, trained, with_held_out
 
 Values = Callable[[Tables, dict, float], pd.DataFrame]
 
@@ -30,11 +30,11 @@ def _full_rank_only(table: pd.DataFrame, where: dict) -> tuple[pd.DataFrame, dic
 
 
 def _reruns(tables: Tables, where: dict) -> pd.DataFrame:
-    """Reruns; only those whose positions are not reduced, unless ``where`` selects others.
+    """Reruns of the training motion; with reduced positions only if ``where`` selects them.
 
     A method may have the same name with full and with reduced positions.
     """
-    table = tables["reduced_reruns"]
+    table = trained(tables["reduced_reruns"])
     return table if "position_basis" in where else table[table.position_basis == "full"]
 
 
@@ -50,7 +50,8 @@ def held_out(values: Values) -> Values:
     """
 
     def of_held_out(tables: Tables, where: dict, accuracy: float) -> pd.DataFrame:
-        runs = with_held_out(tables["reduced_reruns"], tables["heldout_reruns"])
+        reruns = tables["reduced_reruns"]
+        runs = with_held_out(trained(reruns), reruns)
         runs = runs[runs[MEDIAN].notna()].assign(relative_error_within_horizon=runs[MEDIAN])
         return values({**tables, "reduced_reruns": runs}, where, accuracy)
 
@@ -144,7 +145,7 @@ def position_basis_ratio(tables: Tables, where: dict, accuracy: float) -> pd.Dat
 
     Only where at least one of the two is accurate: the better of two failures says nothing.
     """
-    rows = filtered(tables["reduced_reruns"], where)
+    rows = filtered(trained(tables["reduced_reruns"]), where)
     keys = ["scene", "k"]
     errors = {
         kind: rows[rows.position_basis == kind].set_index(keys).relative_error_within_horizon

@@ -3,6 +3,8 @@
 import numpy as np
 import pandas as pd
 
+from study.tables.kit.held_out import trained
+
 EXPERIMENT = ["scene", "group"]
 ORTHOGONAL = "pod"  # the method that evaluates and projects everything
 FAILED = 0.1  # error within the horizon above which a run counts as failed
@@ -10,7 +12,7 @@ _TRAINING = ["gain", "elements_sampled", "relative_error"]
 
 
 def reruns_with_gain(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFrame:
-    """Runs of ``reruns`` in which only projections are reduced, with three sorts of columns.
+    """Training runs of ``reruns`` that reduce projections only, with three sorts of columns.
 
     gain, elements_sampled, reconstruction_error : of the reduction, on the training snapshots
     elements : all elements of the group
@@ -18,7 +20,8 @@ def reruns_with_gain(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.D
     orthogonal_error, orthogonal_reconstruction : the same of the orthogonal projection at the
         largest size up to r (bases without centring have one mode more); nan if it was not run
     """
-    runs = reruns[(reruns.position_basis == "full") & (reruns.max_extent.notna())].copy()
+    runs = trained(reruns)
+    runs = runs[(runs.position_basis == "full") & runs.max_extent.notna()].copy()
     ended = runs.relative_error_within_horizon.isna() & runs.blowup_frame.notna()
     runs["error"] = runs.relative_error_within_horizon.where(~ended, np.inf)
     train = reconstruction[reconstruction.split == "train"]

@@ -75,6 +75,8 @@ CONTACT_DELAY = compared(
     ),
     tolerance=0.02,
 )
+# what users look at, of the same frames
+USERS = (VELOCITY_ERROR, RELATIVE_SHAPE_ERROR, ENERGY_DRIFT, CONTACT_DELAY)
 HORIZON_FRAME = integer("horizon_frame", "first frame that cannot be judged: the scene's horizon")
 FLOOR = compared(
     "error", number("sensitivity_floor", "largest drift of perturbed runs before the horizon")

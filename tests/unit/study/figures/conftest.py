@@ -288,7 +288,7 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for h, ratio in ((0.016, 1.0), (0.2, 1.0), (0.016, 100.0))
     ]  # fmt: skip
     reruns = [
-        (scene, group, method, r, "full", 1.0, *_outcome(scene, method, r), 0.2 * r, None)
+        (scene, group, method, r, "full", 1.0, *_outcome(scene, method, r), 0.2 * r, None, "train")
         for scene, group in pairs
         if scene not in FLAT
         for method in methods
@@ -340,7 +340,7 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "effects_cost": (shares, "scene effect ms_per_frame share"),
         "effects_left_out": (removed, "scene left_out groups ms_per_frame own_ms"),
         "reduced_reruns": (reruns, "scene group method r position_basis max_extent blowup_frame"
-         " relative_error relative_error_within_horizon ms_per_frame k"),
+         " relative_error relative_error_within_horizon ms_per_frame k motion"),
         "noise": (noise, "scene group noisy_axes method r rank relative_error"),
         "alternatives": (others, "scene vertices stiffness motion method substeps"
          " ms_per_frame"

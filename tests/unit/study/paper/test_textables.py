@@ -53,13 +53,10 @@ TABLES = {
             ("b", "bending", "pod", "full", 6, 0, None, 7, None, None, None),
             ("b", "all", "full", "pod", 6, 10, None, 7, 0.125, 6, 2.5),
             ("b", "all", "ecsw-1e-02", "pod", 90, 10, None, 7, 0.375, 6, 4.0),
+            *(("b", "all", "full", "pod", 7, 9, None, 9, e, 6, None) for e in (0.25, 0.5, 9.0)),
         ],
         columns=COLUMNS,
-    ),
-    "heldout_reruns": pd.DataFrame(
-        [("b", "all", "full", "pod", 6, 7, 9, None, 9, error) for error in (0.25, 0.5, 9.0)],
-        columns=[*COLUMNS[:4], "k", "r", *COLUMNS[5:9]],
-    ),
+    ).assign(motion=["train"] * 8 + ["heldout", "kick", "stiffness"]),
     "accuracy_cost": pd.DataFrame(
         [
             ("bar_a", "fom", 1, 0.5, 0.25),

@@ -92,10 +92,12 @@ def test_a_speedup_stands_beside_its_costs_and_errors(measured, tmp_path):
         pd.DataFrame(models).assign(group="all", r=7, relative_error_within_horizon=0.01),
         pd.DataFrame(steps).assign(position_basis="full", relative_error_within_horizon=0.2),
     ])  # fmt: skip
-    unseen = runs[runs.method == "ecsw"].assign(frames=9, blowup_frame=None, horizon_frame=9)
+    unseen = runs[runs.method == "ecsw"].assign(motion="kick")
+    runs = pd.concat([runs.assign(motion="train"), unseen])
+    runs = runs.assign(frames=9, blowup_frame=None, horizon_frame=9)
     table = speedups(
         measured, frame_times(measured), [File(str(tmp_path / "projections.csv"), {})],
-        [File(str(tmp_path / "seconds.csv"), {})], [], runs, unseen,
+        [File(str(tmp_path / "seconds.csv"), {})], [], runs,
     ).set_index("method")  # fmt: skip
     assert table.speedup.to_dict() == {"ecsw": pytest.approx(4.0), "deim": pytest.approx(0.5)}
     assert table.shown.to_dict() == {"ecsw": "4.0 (4.0 to 4.0)", "deim": "0.50 (0.50 to 0.50)"}
@@ -111,7 +113,7 @@ def test_a_speedup_stands_beside_its_costs_and_errors(measured, tmp_path):
 
 def test_no_process_leaves_empty_tables():
     assert len(frame_times([])) == 0
-    empty = speedups([], frame_times([]), [], [], [], pd.DataFrame(), pd.DataFrame())
+    empty = speedups([], frame_times([]), [], [], [], pd.DataFrame())
     assert tuple(empty.columns) == speedups.column_names
 
 

@@ -31,7 +31,8 @@ def tables() -> tuple[pd.DataFrame, pd.DataFrame]:
         key = {"scene": scene, "group": "spring", "method": method, "r": r}
         reruns.append(
             key | {
-                "position_basis": "full", "frames": frames, "finite": error is not None,
+                "position_basis": "full", "motion": "train", "frames": frames,
+                "finite": error is not None,
                 "blowup_frame": None if error is not None else frames, "max_extent": 1.0,
                 "relative_error": error, "relative_error_within_horizon": error,
                 "horizon_frame": HORIZONS[scene], "sensitivity_floor": FLOORS[scene],
@@ -46,7 +47,8 @@ def tables() -> tuple[pd.DataFrame, pd.DataFrame]:
     marked = reruns[0] | {"r": 99, "frames": 0, "max_extent": None, "finite": None,
                           "relative_error_within_horizon": None}  # fmt: skip
     subspace = reruns[1] | {"position_basis": "pod"}
-    return pd.DataFrame([*reruns, marked, subspace]), pd.DataFrame(reconstruction)
+    unseen = reruns[1] | {"motion": "kick"}
+    return pd.DataFrame([*reruns, marked, subspace, unseen]), pd.DataFrame(reconstruction)
 
 
 def test_only_runs_whose_basis_suffices_count():

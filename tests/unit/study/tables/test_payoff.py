@@ -21,7 +21,7 @@ RUN = st.tuples(
 )
 
 
-def tables(runs) -> tuple[pd.DataFrame, pd.DataFrame]:
+def tables(runs) -> pd.DataFrame:
     """Reruns of both motions; the number of the run is its size r."""
     rows = [
         (scene, "spring", method, "full", None, r, error, speedup, 1.0, held)
@@ -30,14 +30,14 @@ def tables(runs) -> tuple[pd.DataFrame, pd.DataFrame]:
     both = pd.DataFrame(rows, columns=[*LABELS, ERROR, "speedup", "max_extent", "held"])
     both = both.astype({"speedup": float, "held": float, "k": "Int64"})
     held = both[both.held.notna()].drop(columns=ERROR).rename(columns={"held": ERROR})
-    held = held.assign(frames=9, blowup_frame=None, horizon_frame=9)
-    return both.drop(columns="held"), held
+    held = held.assign(motion="kick", frames=9, blowup_frame=None, horizon_frame=9, speedup=None)
+    return pd.concat([both.drop(columns="held").assign(motion="train"), held])
 
 
 @given(st.lists(RUN, min_size=1, max_size=12))
 def test_the_fastest_accurate_run_of_each_scene_decides(runs):
     timed = [run for run in runs if run[3] is not None]
-    made = payoff.checked(payoff(*tables(runs)))
+    made = payoff.checked(payoff(tables(runs)))
     assert made.method.tolist() == list(dict.fromkeys(run[1] for run in timed))
     for row in made.itertuples():
         own = [run for run in timed if run[1] == row.method]
@@ -58,16 +58,17 @@ def test_the_fastest_accurate_run_of_each_scene_decides(runs):
 def test_the_held_out_error_is_that_of_the_fastest_run():
     runs = [("a", "deim", 0.01, 2.0, 0.2), ("a", "deim", 0.02, 8.0, 0.3)]
     runs += [("b", "deim", 0.03, 8.0, None), ("b", "deim", 1.0, 9.0, 0.2)]
-    (row,) = payoff(*tables(runs)).itertuples()
+    (row,) = payoff(tables(runs)).itertuples()
     assert (row.error_train, row.error_heldout, row.heldout) == (0.025, 0.3, 1)
 
 
 def test_who_pays_is_scored_on_the_held_out_motions():
     """Accurate and fast, accurate and slow, and fast but off by more than a tenth held out."""
     runs = [("a", "deim", 0.01, 2.0, 0.05), ("b", "deim", 0.02, 0.5, 0.05)]
-    reruns, held = tables([*runs, ("c", "deim", 0.05, 4.0, 0.2)])
-    motions = [held.assign(**{ERROR: factor * held[ERROR]}) for factor in (0.5, 1.0, 1.5)]
-    (row,) = payoff(reruns, pd.concat(motions)).itertuples()
+    reruns = tables([*runs, ("c", "deim", 0.05, 4.0, 0.2)])
+    held = reruns[reruns.motion != "train"]
+    motions = [held.assign(**{ERROR: factor * held[ERROR]}) for factor in (0.5, 1.5)]
+    (row,) = payoff(pd.concat([reruns, *motions])).itertuples()
     assert (row.accurate, row.pays, row.loses) == (3, 2, 1)
     assert (row.accurate_heldout, row.pays_heldout, row.heldout) == (2, 1, 3)
     found = (row.error_heldout_low, row.error_heldout, row.error_heldout_high)
@@ -75,6 +76,6 @@ def test_who_pays_is_scored_on_the_held_out_motions():
 
 
 def test_what_did_not_run_does_not_count():
-    reruns, held = tables([("a", "deim", 0.01, 2.0, None), ("b", "deim", 0.01, 2.0, None)])
-    (row,) = payoff(reruns.assign(max_extent=[1.0, None]), held).itertuples()
+    reruns = tables([("a", "deim", 0.01, 2.0, None), ("b", "deim", 0.01, 2.0, None)])
+    (row,) = payoff(reruns.assign(max_extent=[1.0, None])).itertuples()
     assert (row.scenes, row.accurate, row.heldout) == (1, 1, 0)

@@ -48,7 +48,7 @@ def files(tmp_path):
         write_table(table, written[name][0].path)
     judged = pd.concat([local.assign(position_basis="full", k=np.nan), inside])
     errors = [0.05, None, None, 0.01, 0.5]
-    judged = judged.assign(relative_error_within_horizon=errors)
+    judged = judged.assign(relative_error_within_horizon=errors, motion="train")
     runs = paths.TRAIN.files([str(fom)])
     return runs, written["reruns"], written["subspaces"], written["sweep"], judged
 

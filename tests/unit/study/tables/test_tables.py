@@ -16,7 +16,7 @@ from study.artifact import paths
 from study.artifact.paths import File, Place
 from study.experiments.kit.horizon import floor_of
 from study.tables.accuracy_cost import accuracy_cost, pareto, reference_of
-from study.tables.heldout_reruns import heldout_reruns
+from study.tables.kit.held_out import TRAIN, trained
 from study.tables.local_share import local_share
 from study.tables.reconstruction_error import reconstruction_error
 from study.tables.reduced_reruns import reduced_reruns
@@ -146,7 +146,12 @@ class Files:
     def reduced(self) -> pd.DataFrame:
         """The table reduced_reruns of these files."""
         return reduced_reruns(
-            **self._beside(paths.RERUNS_TRAIN, paths.SUBSPACES_TRAIN, ""),
+            runs=paths.RERUNS.files(self.reruns),
+            rows=_tables(paths.RERUNS_TRAIN, self.reruns, ""),
+            rows_heldout=_tables(paths.RERUNS_HELDOUT, self.reruns, "_heldout"),
+            subspaces=paths.SUBSPACES.files(self.subspaces),
+            subspace_rows=_tables(paths.SUBSPACES_TRAIN, self.subspaces, ""),
+            subspace_rows_heldout=_tables(paths.SUBSPACES_HELDOUT, self.subspaces, "_heldout"),
             timings=self.timings,
             frame_times=NOT_TIMED,
             sensitivity=self.sensitivity,
@@ -154,24 +159,14 @@ class Files:
             threshold=1e-3,
         )
 
-    def heldout(self) -> pd.DataFrame:
-        """The table heldout_reruns of these files."""
-        return heldout_reruns(
-            **self._beside(paths.RERUNS_HELDOUT, paths.SUBSPACES_HELDOUT, "_heldout"),
-            sensitivity=self.sensitivity,
-            threshold=1e-3,
-        )
+    def trained(self) -> pd.DataFrame:
+        """Its rows of the training motion."""
+        return trained(self.reduced())
 
-    def _beside(self, rows: Place, subspace_rows: Place, suffix: str) -> dict[str, list[File]]:
-        """Runs with the tables of one motion."""
-        return {
-            "runs": paths.RERUNS.files(self.reruns),
-            "rows": rows.files(p.replace(".h5", f"{suffix}.csv") for p in self.reruns),
-            "subspaces": paths.SUBSPACES.files(self.subspaces),
-            "subspace_rows": subspace_rows.files(
-                p.replace(".h5", f"{suffix}.csv") for p in self.subspaces
-            ),
-        }
+
+def _tables(place: Place, runs: list[str], suffix: str) -> list[File]:
+    """Tables of some motions, beside the files of their ``runs``."""
+    return place.files(run.replace(".h5", f"{suffix}.csv") for run in runs)
 
 
 def store_series(run, difference):
@@ -265,7 +260,7 @@ def files(tmp_path) -> Files:
 
 def test_errors_in_units_of_the_extent(files):
     """Root mean squares before the horizon, which is 2 for scene a, over the norm of the extent."""
-    table = files.reduced()
+    table = files.trained()
     assert table.error_over_extent[0] == pytest.approx(np.sqrt(0.025) / 2.0)
     assert table.error_over_extent[[3, 5]].tolist() == pytest.approx([0.05, 0.1])
     assert table.error_over_extent[[1, 2, 4]].isna().all()
@@ -278,7 +273,7 @@ def test_errors_in_units_of_the_extent(files):
 
 def test_energy_and_first_contact_before_the_horizon(files):
     """Scene a ends before the second sample of the energy and before its first contact."""
-    table = files.reduced()
+    table = files.trained()
     assert table.energy_drift.isna().tolist() == [True, True, True, False, True, False, False]
     assert table.energy_drift[[3, 5, 6]].tolist() == pytest.approx([0.2] * 3)
     assert table.contact_delay[0] == -np.inf
@@ -291,7 +286,7 @@ def error(difference, end) -> float:
 
 
 def test_errors_within_the_horizon(files):
-    table = files.reduced()
+    table = files.trained()
     within = table.relative_error_within_horizon
     assert table.scene.tolist() == ["a", "a", "a", "b", "b", "b", "b"]
     assert within[0] == pytest.approx(error([0.1, 0.2], 2))
@@ -309,7 +304,7 @@ def test_errors_within_the_horizon(files):
 
 
 def test_times_go_to_their_runs(files):
-    table = files.reduced()
+    table = files.trained()
     expected = [4.0, 5.0, np.nan, 2.0, np.nan, 1.0, 0.5]
     np.testing.assert_array_equal(table.ms_per_frame, expected)
     np.testing.assert_allclose(table.speedup, [2.0, 1.6, np.nan, 5.0, np.nan, 10.0, 20.0])
@@ -318,17 +313,19 @@ def test_times_go_to_their_runs(files):
 
 
 def test_there_need_be_no_subspace(files):
-    table = replace(files, subspaces=[]).reduced()
+    table = replace(files, subspaces=[]).trained()
     assert len(table) == 5
     assert table.k.isna().all()
     assert table.ms_per_frame.notna().sum() == 3
 
 
 def test_held_out_runs_are_judged_by_their_own_horizon(files):
-    table = files.heldout()
+    table = files.reduced()
+    table = table[table.motion != TRAIN].reset_index(drop=True)
     assert table.horizon_frame.tolist() == [1, 1, 1, 4, 4, 4, 4]
     assert set(table.motion) == {"heldout"}
     assert table.relative_error_within_horizon[0] == pytest.approx(0.1)
+    assert table[["ms_per_frame", "speedup"]].isna().all(axis=None)
     # it blew up in frame 1, which is behind the horizon
     assert table.relative_error_within_horizon[1] == pytest.approx(0.5)
 
@@ -369,10 +366,8 @@ def no_sweep(folder) -> File:
 
 
 def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
-    runs, unseen, timings = files.reduced(), files.heldout(), files.timings
-    table = accuracy_cost(
-        runs, unseen, timings, NOT_TIMED, [no_sweep(tmp_path)], [], {"a": 10, "b": 20}
-    )
+    runs, timings = files.reduced(), files.timings
+    table = accuracy_cost(runs, timings, NOT_TIMED, [no_sweep(tmp_path)], [], {"a": 10, "b": 20})
     points = list(zip(table.scene, table.method, table.ms_per_frame, strict=True))
     assert points == [
         ("a", "full", 8.0), ("a", "deim", 4.0),
@@ -383,12 +378,10 @@ def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
     assert table.relative_error_within_horizon[[0, 2]].tolist() == [0.0, 0.0]
     assert table.pareto.tolist() == [True] * 6
     slow = runs.assign(ms_per_frame=100.0)
-    table = accuracy_cost(
-        slow, unseen, timings, NOT_TIMED, [no_sweep(tmp_path)], [], {"a": 1, "b": 1}
-    )
+    table = accuracy_cost(slow, timings, NOT_TIMED, [no_sweep(tmp_path)], [], {"a": 1, "b": 1})
     assert table.pareto.tolist() == [True, False, True, False, False, False]
     table = accuracy_cost(
-        runs, unseen.iloc[:0], timings, NOT_TIMED, [no_sweep(tmp_path)], [], {"a": 1, "b": 1}
+        trained(runs), timings, NOT_TIMED, [no_sweep(tmp_path)], [], {"a": 1, "b": 1}
     )
     # nothing is said of a reduction that no held-out motion judged
     assert table.pareto_heldout.tolist() == [True, False, True, False, False, False]
@@ -408,12 +401,12 @@ def sweep(folder, **changes) -> File:
 
 
 def test_runs_with_other_iterations_have_their_own_reference(files, tmp_path):
-    runs, unseen, timings = files.reduced(), files.heldout(), files.timings
+    runs, timings = files.reduced(), files.timings
     model = {"scene": "b", "position_basis": "pod", "k": 8, "method": "ecsw-1e-02"}
     model["error_converged"] = 0.3
     inside = written(tmp_path / "models.csv", list(model), model)
     own = {"a": 10, "b": 20}
-    table = accuracy_cost(runs, unseen, timings, NOT_TIMED, [sweep(tmp_path)], [inside], own)
+    table = accuracy_cost(runs, timings, NOT_TIMED, [sweep(tmp_path)], [inside], own)
     assert table[table.position_basis == "pod"].error_converged.tolist()[1:] == [0.3]
     assert table[table.method == "full"].error_converged.tolist()[:1] == [0.1]
     fom = table[table.method == "fom"]
@@ -440,9 +433,9 @@ def test_runs_with_other_iterations_have_their_own_reference(files, tmp_path):
 
 
 def test_without_a_converged_run_there_is_no_point_against_it(files, tmp_path):
-    runs, unseen, timings = files.reduced(), files.heldout(), files.timings
+    runs, timings = files.reduced(), files.timings
     sweeps = [sweep(tmp_path, error_converged=None)]
-    table = accuracy_cost(runs, unseen, timings, NOT_TIMED, sweeps, [], {"a": 10, "b": 20})
+    table = accuracy_cost(runs, timings, NOT_TIMED, sweeps, [], {"a": 10, "b": 20})
     assert "fom" not in set(table.method)
     assert (table.method == "fewer-iterations").sum() == 1
 
