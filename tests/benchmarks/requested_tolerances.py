@@ -18,7 +18,7 @@ import numpy as np
 from pdrom.api import FullRun, build_scene, reduce
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
-from pdrom.reduction.requested.calibration import relative_errors
+from pdrom.reduction.requested.levels import relative_errors
 
 TOLERANCES = (0.1, 0.03, 0.01)
 MATERIALS = ("spring", "strain", "deformation_gradient", "tetrahedron_strain")

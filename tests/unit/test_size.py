@@ -13,10 +13,10 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 43_748,
-    "modules of src": 416,
-    "lines of tests": 29_947,
-    "words of documentation": 24_899,
+    "lines of src": 43_628,
+    "modules of src": 413,
+    "lines of tests": 29_946,
+    "words of documentation": 24_890,
     "tables": 28,
     "figures": 23,
     "experiments": 21,

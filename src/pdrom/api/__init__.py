@@ -6,14 +6,14 @@ docs/library.md has a worked example.
 from pdrom.api.arguments import methods
 from pdrom.api.files import load, save
 from pdrom.api.pictures import plot, view
-from pdrom.api.records import AskedRun, FullRun, ReducedRun
+from pdrom.api.records import FullRun, ReducedRun, RequestedRun
 from pdrom.api.runs import basis, reduce, run
 from pdrom.api.scenes import build_scene, load_scene
 
 __all__ = [
-    "AskedRun",
     "FullRun",
     "ReducedRun",
+    "RequestedRun",
     "basis",
     "build_scene",
     "load",

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 
 from pdrom.api.arguments import file_path, require
-from pdrom.api.records import AskedRun, FullRun, ReducedRun, full_run
+from pdrom.api.records import AnyRun, FullRun, ReducedRun, RequestedRun, full_run
 from pdrom.api.scenes import bound
 from pdrom.core.errors import PdromError, StorageError
 from pdrom.core.provenance import made_by
@@ -23,12 +23,11 @@ from pdrom.core.yamlfile import validate
 from pdrom.model.mesh.config import MeshFile
 from pdrom.model.mesh.types import store_mesh, stored_mesh
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.requested.calibration import Request
-from pdrom.reduction.requested.run import Outcome
+from pdrom.reduction.requested.run import Outcome, Request
 from pdrom.reduction.rerun import Rerun, displacement_norms
 
 
-def save(reduced: ReducedRun | AskedRun, path: str | os.PathLike[str]) -> None:
+def save(reduced: ReducedRun | RequestedRun, path: str | os.PathLike[str]) -> None:
     """Write a reduced run with its full-order run, as positions in single precision.
 
     A run within a requested tolerance is written alone, in double precision.
@@ -43,11 +42,11 @@ def save(reduced: ReducedRun | AskedRun, path: str | os.PathLike[str]) -> None:
     ConfigurationError, StorageError
         No reduced run; the file cannot be written.
     """
-    require((ReducedRun, AskedRun), reduced, "reduced", source="pdrom.api.reduce makes one")
+    require((ReducedRun, RequestedRun), reduced, "reduced", source="pdrom.api.reduce makes one")
     path = file_path(path)
     require_own(path)
-    if isinstance(reduced, AskedRun):
-        _save_asked(reduced, path)
+    if isinstance(reduced, RequestedRun):
+        _save_requested(reduced, path)
         return
     config = reduced.full.scene.config.model_dump(mode="json")
     labels = {"group": reduced.group, "method": reduced.method, "r": reduced.r}
@@ -65,21 +64,21 @@ def save(reduced: ReducedRun | AskedRun, path: str | os.PathLike[str]) -> None:
         _store(file, "displacement", displacement_norms(reduced.full.positions), "m")
 
 
-def _save_asked(asked: AskedRun, path: Path) -> None:
-    config, done = asked.scene.config.model_dump(mode="json"), asked.outcome
-    wish = {"quantity": asked.request.quantity, "requested_error": asked.request.error}
+def _save_requested(run: RequestedRun, path: Path) -> None:
+    config, done = run.scene.config.model_dump(mode="json"), run.outcome
+    wish = {"quantity": run.request.quantity, "requested_error": run.request.error}
     with made_by("pdrom.api.save", {"scene": config, **wish}), write_hdf5(path) as file:
         file.attrs.update({**wish, "frames_met": done.frames, "limit": done.limit})
         file.attrs.update({"level": done.level, "failed": done.failed, "expected": done.expected})
-        file.attrs.update({"reduced": done.reduced, "checks": done.checks})
+        file.attrs.update({"reduced": done.reduced, "checks": done.checks, "full_ms": done.full_ms})
         if done.estimate is not None:
             file.attrs["estimate"] = done.estimate
-        store_mesh(asked.scene.mesh, file.create_group("mesh"))
+        store_mesh(run.scene.mesh, file.create_group("mesh"))
         _store(file, "positions", done.positions, "m")
-        _store(file, "timings", asked.ms[:, None], "ms")
+        _store(file, "timings", run.ms[:, None], "ms")
 
 
-def load(path: str | os.PathLike[str], unchecked: bool = False) -> FullRun | ReducedRun | AskedRun:
+def load(path: str | os.PathLike[str], unchecked: bool = False) -> AnyRun:
     """A run that `save`, `pdrom.api.run` or the pipeline wrote.
 
     Parameters
@@ -111,7 +110,7 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> FullRun | Red
     return found
 
 
-def _run(file: h5py.File, path: Path) -> FullRun | ReducedRun | AskedRun | None:
+def _run(file: h5py.File, path: Path) -> AnyRun | None:
     if "requested_error" in file.attrs:
         return _requested(_scene(file, path), file)
     if "positions" in file and "timings" in file:
@@ -121,9 +120,9 @@ def _run(file: h5py.File, path: Path) -> FullRun | ReducedRun | AskedRun | None:
     return None
 
 
-def _require_sound(found: FullRun | ReducedRun | AskedRun) -> None:
+def _require_sound(found: AnyRun) -> None:
     """ValueError for arrays of other shapes than the scene's, or what is no finite number."""
-    if isinstance(found, AskedRun):
+    if isinstance(found, RequestedRun):
         full = FullRun(found.scene, found.outcome.positions, found.ms, {})
         if not 0 <= found.outcome.frames <= len(found.ms):
             raise ValueError(f"tolerance met for {found.outcome.frames} of {len(found.ms)} frames")
@@ -152,7 +151,7 @@ def _store(file: h5py.File, name: str, values: np.ndarray, unit: str) -> None:
     file[name].attrs["unit"] = unit
 
 
-def _requested(scene: Scene, file: h5py.File) -> AskedRun:
+def _requested(scene: Scene, file: h5py.File) -> RequestedRun:
     """Load a run within a requested tolerance; the cost of its calibration is not stored."""
     kept, timings = file.attrs, file["timings"][...].sum(axis=1)
     request = Request(error=float(kept["requested_error"]), quantity=str(kept["quantity"]))
@@ -162,9 +161,9 @@ def _requested(scene: Scene, file: h5py.File) -> AskedRun:
         expected=float(kept["expected"]), estimate=None if estimate is None else float(estimate),
         level=str(kept["level"]), reduced=bool(kept["reduced"]),
         failed=[str(each) for each in kept["failed"]], checks=[int(f) for f in kept["checks"]],
-        work=np.nan, full_work=np.nan, seconds=1e-3 * float(timings.sum()),
+        seconds=1e-3 * float(timings.sum()), full_ms=float(kept["full_ms"]),
     )  # fmt: skip
-    return AskedRun(scene, request, outcome, timings, np.nan, None)
+    return RequestedRun(scene, request, outcome, timings, np.nan, None)
 
 
 def _reduced(scene: Scene, file: h5py.File) -> ReducedRun:

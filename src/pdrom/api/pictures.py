@@ -1,11 +1,12 @@
 """Pictures of runs, and a page to look at them."""
 
 import os
+from typing import get_args
 
 import numpy as np
 
 from pdrom.api.arguments import file_path, require
-from pdrom.api.records import AskedRun, FullRun, ReducedRun
+from pdrom.api.records import AnyRun, FullRun, ReducedRun, RequestedRun
 from pdrom.core.errors import SceneError
 from pdrom.core.store import require_own, require_place
 from pdrom.model.scene import Scene, SceneConfig
@@ -16,7 +17,6 @@ from pdrom.view.multiples import clipped, log_axis
 from pdrom.view.page import write_page
 from pdrom.view.runs import ViewedRun, ViewedScene
 
-AnyRun = FullRun | ReducedRun | AskedRun
 LOW, HIGH = 1e-7, 1e3  # errors outside are drawn on the limit
 
 
@@ -92,9 +92,7 @@ def viewed_scenes(*runs: AnyRun) -> list[ViewedScene]:
         raise SceneError("view: at least one run is required")
     scenes: dict[str, list[AnyRun]] = {}
     for run in runs:
-        require(
-            (FullRun, ReducedRun, AskedRun), run, "view", source="pdrom.api.run and reduce make one"
-        )
+        require(get_args(AnyRun), run, "view", source="pdrom.api.run and reduce make one")
         known = scenes.setdefault(_scene(run).config.name, [])
         if known and _alike(_scene(known[0])) != _alike(_scene(run)):
             raise SceneError(f"view: two different scenes are called '{_scene(run).config.name}'")
@@ -108,18 +106,18 @@ def _scene(run: AnyRun) -> Scene:
 
 def _alike(scene: Scene) -> SceneConfig:
     """Configuration without the tolerance that its file may request: runs do not depend on it."""
-    return scene.config.model_copy(update={"asked": None})
+    return scene.config.model_copy(update={"requested_error": None})
 
 
 def _viewed(runs: list[AnyRun]) -> ViewedScene:
     """Runs of one scene, the full-order run first if there is one."""
     full = [run.full if isinstance(run, ReducedRun) else run for run in runs]
-    known: list[FullRun | AskedRun] = [run for run in full if isinstance(run, FullRun)]
-    first = [*known, *(run for run in runs if isinstance(run, AskedRun))][0]
+    known: list[FullRun | RequestedRun] = [run for run in full if isinstance(run, FullRun)]
+    first = [*known, *(run for run in runs if isinstance(run, RequestedRun))][0]
     others = [run for run in runs if run is not first and not isinstance(run, FullRun)]
     others.sort(key=lambda run: run.r if isinstance(run, ReducedRun) else 0)
     scene = _scene(first)
-    positions = first.outcome.positions if isinstance(first, AskedRun) else first.positions
+    positions = first.outcome.positions if isinstance(first, RequestedRun) else first.positions
     return ViewedScene(
         name=scene.config.name,
         title=scene.config.title,
@@ -129,7 +127,7 @@ def _viewed(runs: list[AnyRun]) -> ViewedScene:
         ms=float(np.median(first.ms)),
         runs=tuple(_shown(run, positions) for run in others),
         effects=scene.config.effects,
-        first=first.title if isinstance(first, AskedRun) else "full order",
+        first=first.title if isinstance(first, RequestedRun) else "full order",
     )
 
 
@@ -146,7 +144,7 @@ def _shown(run: AnyRun, positions: np.ndarray) -> ViewedRun:
             blowup_frame=run.outcome.blowup_frame,
             ms=run.ms if np.isfinite(run.ms) else None,
         )
-    assert isinstance(run, AskedRun)
+    assert isinstance(run, RequestedRun)
     apart = np.linalg.norm(run.outcome.positions[1:] - positions[1:], axis=(1, 2))
     return ViewedRun(
         group="all groups",

@@ -8,8 +8,7 @@ import numpy as np
 from pdrom.core.brief import brief
 from pdrom.model.scene import Scene
 from pdrom.reduction.deviations import Yardstick
-from pdrom.reduction.requested.calibration import Request
-from pdrom.reduction.requested.run import Outcome
+from pdrom.reduction.requested.run import Outcome, Request
 from pdrom.reduction.rerun import Rerun, mean_motion
 
 
@@ -86,7 +85,7 @@ class ReducedRun:
 
 
 @dataclass(frozen=True, eq=False)
-class AskedRun:
+class RequestedRun:
     """A run within a requested tolerance.
 
     scene : its motion
@@ -117,7 +116,10 @@ class AskedRun:
     def __repr__(self) -> str:
         done = self.outcome
         met = f"met for {done.frames} of {len(self.ms)} frames" if done.met else "not met"
-        return f"AskedRun('{self.scene.config.name}': {self.request} {met}; {done.level})"
+        return f"RequestedRun('{self.scene.config.name}': {self.request} {met}; {done.level})"
+
+
+AnyRun = FullRun | ReducedRun | RequestedRun
 
 
 def full_run(scene: Scene, file: h5py.File) -> FullRun:

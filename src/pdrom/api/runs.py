@@ -18,8 +18,7 @@ from pdrom.api.arguments import (
     require,
     require_positions,
 )
-from pdrom.api.records import AskedRun, FullRun, ReducedRun, full_run
-from pdrom.api.tolerance import requested_run
+from pdrom.api.records import FullRun, ReducedRun, RequestedRun, full_run
 from pdrom.core.errors import ConfigurationError, SnapshotError
 from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5, require_own, require_place
@@ -32,8 +31,8 @@ from pdrom.reduction.basis import Basis, compute_basis
 from pdrom.reduction.local.local_step import ReducedLocalStep
 from pdrom.reduction.local.rerun import replace_group
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.requested.calibration import Request, read_request
-from pdrom.reduction.requested.levels import OnWork, silent
+from pdrom.reduction.requested import run as requested
+from pdrom.reduction.requested.levels import OnFrame, silent
 from pdrom.reduction.rerun import compare
 from pdrom.reduction.sampling import Reduction
 from pdrom.reduction.sampling.select import select
@@ -120,13 +119,13 @@ def basis(full: FullRun, group: str, method: str | MethodSpec = "pod") -> Basis:
     )
 
 
-Wish = float | str | Request
+Wish = float | str | requested.Request
 
 
 @overload
 def reduce(
-    full: FullRun, *, error: Wish, scene: Scene | None = None, on_work: OnWork = silent
-) -> AskedRun: ...
+    full: FullRun, *, error: Wish, scene: Scene | None = None, on_frame: OnFrame = silent
+) -> RequestedRun: ...
 
 
 @overload
@@ -147,8 +146,8 @@ def reduce(
     basis_of_group: Basis | None = None,
     error: Wish | None = None,
     scene: Scene | None = None,
-    on_work: OnWork = silent,
-) -> ReducedRun | AskedRun:
+    on_frame: OnFrame = silent,
+) -> ReducedRun | RequestedRun:
     """The scene again, with the projections of one group reduced to r modes.
 
     A run that blows up ends there and is a result like any other.
@@ -164,11 +163,11 @@ def reduce(
         against the implicit step solved to convergence. The whole scene is reduced as far as that
         allows, or not at all.
     scene : with ``error``, another motion of the same mesh that is run; ``full`` has trained it
-    on_work : with ``error``, told what is computed and the counted work (ns) just done
+    on_frame : with ``error``, told what level of accuracy has just done a frame
 
     Returns
     -------
-    ReducedRun, or AskedRun with an ``error``
+    ReducedRun, or RequestedRun with an ``error``
         ``outcome`` (positions, differences, the frame of a blow-up), ``error`` of each frame,
         ``gain``, ``ms`` a frame.
 
@@ -184,7 +183,7 @@ def reduce(
     if error is not None:
         if group is not None:
             raise ConfigurationError("error: of the whole scene, without a group")
-        return requested_run(full, read_request(error), scene, on_work)
+        return _within(full, error, scene or full.scene, on_frame)
     if scene is not None:
         raise ConfigurationError("scene: only together with an error")
     group = require(str, group, "group", source=GROUP)
@@ -206,6 +205,29 @@ def reduce(
     ms = 1e3 * float(np.median(seconds))
     name = method if isinstance(method, str) else method.title
     return ReducedRun(full, group, name, r, float(reduction.gain), outcome, ms)
+
+
+def _within(
+    full: FullRun, request: requested.Request, scene: Scene, on_frame: OnFrame
+) -> RequestedRun:
+    """Calibrate on the motion of ``full``, then run ``scene``, which has the same mesh.
+
+    The calibration has the material, the masses, the step and the frames of ``scene``.
+    """
+    request = requested.read_request(error)
+    require(Scene, scene, "scene", source="load_scene makes one")
+    training = requested.transferred(full.scene, scene)
+    started = perf_counter()
+    calibration = requested.calibrate(training, requested.ToleranceSettings(), request, on_frame)
+    offline = perf_counter() - started
+    outcome = requested.CheckedRun(calibration, scene, request.error, on_frame).outcome()
+    frames = len(outcome.positions) - 1
+    ms = np.full(frames, 1e3 * outcome.seconds / frames)
+    reached = None
+    if scene.config.effects == training.config.effects and outcome.frames:
+        errors = calibration.motions[0].errors(outcome.positions)
+        reached = float(errors[outcome.frames - 1])
+    return RequestedRun(scene, request, outcome, ms, offline, reached)
 
 
 def _clocked(advance: Advance, seconds: list[float]) -> Advance:

@@ -57,8 +57,8 @@ def run(arguments: Sequence[str]) -> int:
         return _fail("the working folder is not there any more; change to another one")
     try:
         try:
-            asked = _asked(arguments)
-            return int(asked.perform(asked))
+            found = _parsed(arguments)
+            return int(found.perform(found))
         finally:
             sys.stdout.flush()  # fails here, not at exit
     except PdromError as error:
@@ -76,16 +76,16 @@ def run(arguments: Sequence[str]) -> int:
         return INTERRUPTED
 
 
-def _asked(arguments: Sequence[str]) -> argparse.Namespace:
+def _parsed(arguments: Sequence[str]) -> argparse.Namespace:
     """Parse the command line; a misspelt command or option gets a suggestion."""
     top = parser()
     if arguments and arguments[0][:1] != "-" and arguments[0] not in COMMANDS:
         top.error(f"no command '{arguments[0]}'{choices(arguments[0], COMMANDS)}")
-    asked, unknown = top.parse_known_args(arguments)
+    found, unknown = top.parse_known_args(arguments)
     if unknown:
-        known = re.findall(r"--[a-z-]+", asked.parser.format_usage())
-        asked.parser.error(f"not understood: {unknown[0]}{choices(unknown[0], known)}")
-    return asked
+        known = re.findall(r"--[a-z-]+", found.parser.format_usage())
+        found.parser.error(f"not understood: {unknown[0]}{choices(unknown[0], known)}")
+    return found
 
 
 def _drop_output() -> None:

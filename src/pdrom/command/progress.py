@@ -64,11 +64,8 @@ def kernels_are_kept() -> bool:
     return folder is None or any(Path(folder).glob("dynamics*/*.nbi"))
 
 
-class WorkProgress:
-    """Write the current step and the time so far, every few seconds.
-
-    Called with the title and the counted work of what was just done.
-    """
+class LevelProgress:
+    """Write the level of accuracy that runs and the time so far, every few seconds."""
 
     def __init__(self, name: str, stream: TextIO | None = None, every: float = 2.0) -> None:
         self._name, self._every, self._stream = name, every, stream or sys.stderr
@@ -84,8 +81,8 @@ class WorkProgress:
         if self._terminal:
             self._stream.write("\n")
 
-    def __call__(self, title: str, work: float) -> None:
-        """Count ``work`` (estimated, ns) done in the step called ``title``."""
+    def __call__(self, title: str) -> None:
+        """Note a frame done by the level called ``title``."""
         now = monotonic()
         if now - self._shown < (EVERY if self._terminal else self._every):
             return

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from pdrom.command.base import Command, Status, declare_unchecked, files_of, require_output
 
 if TYPE_CHECKING:
-    from pdrom.api import ReducedRun
+    from pdrom.api import ReducedRun, RequestedRun
     from pdrom.model.scene import Scene
 
 WRONG = 0.1  # relative error above which the study calls a run wrong
@@ -53,9 +53,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 def perform(arguments: argparse.Namespace) -> Status:
     """Run in full order unless that is done, reduce, run again, and say how it went."""
     if arguments.group is None:
-        from pdrom.command.tolerance import perform_request
-
-        return perform_request(arguments)
+        return _perform_request(arguments)
     from pdrom.api import FullRun, load, load_scene, plot, reduce, run, save
     from pdrom.command.progress import Progress
     from pdrom.core.errors import StorageError
@@ -129,6 +127,78 @@ def _error(reduced: "ReducedRun") -> str:
         f"relative error {error:.2g} of the full order's motion, over all frames (largest of one "
         f"frame {largest:.2g}; {'accurate' if error <= WRONG else 'wrong'}: {WRONG:g} is the limit)"
     )
+
+
+def _perform_request(arguments: argparse.Namespace) -> Status:
+    """Calibrate on the training run, run, and say what was done and what it cost."""
+    from pdrom.api import FullRun, load, load_scene, reduce, save
+    from pdrom.command.progress import LevelProgress
+    from pdrom.core.errors import ConfigurationError, StorageError
+    from pdrom.reduction.requested.run import read_request
+
+    scene = load_scene(arguments.scene)
+    wish, source = arguments.error, "--error"
+    if wish is None:
+        wish, source = scene.config.requested_error, f"{arguments.scene}: reduce.error"
+    if wish is None:
+        raise ConfigurationError(
+            "--group or --error: one is required (or reduce.error in the scene)"
+        )
+    request = read_request(wish, source)
+    if arguments.plot is not None:
+        raise ConfigurationError("--plot: only together with --group")
+    if not arguments.run:
+        raise ConfigurationError(
+            f"{source}: --run is required with it: a training run, which pdrom run makes"
+        )
+    stem = Path(arguments.scene).stem
+    out = arguments.out or str(Path(arguments.scene).with_name(f"{stem}_requested.h5"))
+    require_output(out, [*files_of(arguments.scene, scene), arguments.run])
+    full = load(arguments.run, arguments.unchecked)
+    if not isinstance(full, FullRun):
+        raise StorageError(f"{arguments.run}: no full-order run (pdrom run makes one)")
+    with LevelProgress(scene.config.name) as progress:
+        made = reduce(full, error=request, scene=scene, on_frame=progress)
+    save(made, out)
+    sys.stdout.write("\n".join([f"{out}: {_answer(made)}", *_done(made)]) + "\n")
+    return _status_of(made)
+
+
+def _status_of(made: "RequestedRun") -> Status:
+    """Exit code: the tolerance has to be met for half of the frames at least."""
+    return Status.DONE if 2 * made.outcome.frames >= len(made.ms) else Status.NOTHING_FITS
+
+
+def _answer(made: "RequestedRun") -> str:
+    import numpy as np
+
+    outcome, frames = made.outcome, len(made.ms)
+    wish = f"{made.request} against the converged implicit step"
+    if not np.isfinite(outcome.positions).all():
+        return f"{wish}: blew up, with the full order, too"
+    if not outcome.met:
+        why = outcome.limit or "nothing meets it for sure"
+        return f"{wish}: refused ({why}); run in full order with the most iterations"
+    maker = "by a reduction" if outcome.reduced else "by the full order only"
+    part = "" if outcome.frames == frames else f" up to frame {outcome.frames} of {frames}"
+    return f"{wish}: met{part}, {maker}" + (f" ({outcome.limit})" if part else "")
+
+
+def _done(made: "RequestedRun") -> list[str]:
+    """Level, estimate and cost, a line each."""
+    outcome, ms = made.outcome, made.ms[0]
+    tried = f", after {', '.join(outcome.failed)}" if outcome.failed else ""
+    known = [f"expected at most {outcome.expected:.2g}"]
+    if outcome.estimate is not None:
+        known.append(f"estimated {outcome.estimate:.2g}")
+    if made.error is not None:
+        known.append(f"reached {made.error:.2g}")
+    return [
+        f"  by {outcome.level}{tried}; {len(outcome.checks)} frames checked",
+        f"  error: {', '.join(known)}",
+        f"  {ms:.2f} ms a frame, {outcome.full_ms:.2f} in the cheapest full order that meets it; "
+        f"choosing took {made.offline_s:.1f} s, as long as {1e3 * made.offline_s / ms:.0f} frames",
+    ]
 
 
 COMMAND = Command(

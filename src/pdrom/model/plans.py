@@ -13,13 +13,13 @@ class ReductionPlan(ConfigModel):
     train: Annotated[int, Field(ge=2, le=100_000)]
 
 
-def with_asked(keys: Any) -> Any:
+def with_requested_error(keys: Any) -> Any:
     """Separate ``reduce.error``, the requested tolerance of the scene, from the groups' plans.
 
-    ``keys`` are those of a scene file as read, and come back unchanged where no error is asked for.
+    ``keys`` are those of a scene file as read, and come back unchanged where none is requested.
     """
     plans = keys.get("reduce") if isinstance(keys, dict) else None
     if not isinstance(plans, dict) or "error" not in plans:
         return keys
     groups = {name: plan for name, plan in plans.items() if name != "error"}
-    return {**keys, "reduce": groups, "asked": plans["error"]}
+    return {**keys, "reduce": groups, "requested_error": plans["error"]}

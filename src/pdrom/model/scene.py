@@ -25,7 +25,7 @@ from pdrom.model.masses import Mass, MassConfig, vertex_masses
 from pdrom.model.mesh.checks import check_mesh
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.mesh.types import Mesh
-from pdrom.model.plans import ReductionPlan, with_asked
+from pdrom.model.plans import ReductionPlan, with_requested_error
 
 # Positions and velocities of a longer run fill disk and memory: 1600 vertices for 100,000 frames.
 MAX_VERTEX_FRAMES = 160_000_000
@@ -38,7 +38,7 @@ class _Model(ConfigModel):
 class SceneConfig(_Model):
     """Configuration of a scene (config/scenes/*.yaml). Units: seconds, metres, kilograms.
 
-    ``asked`` is the error that ``pdrom reduce`` keeps to, also written ``reduce.error``.
+    ``requested_error`` is the error that ``pdrom reduce`` keeps to, also written ``reduce.error``.
     """
 
     name: SceneName
@@ -52,10 +52,10 @@ class SceneConfig(_Model):
     masses: tuple[MassConfig, ...] = ()
     effects: EffectConfigs
     reduce: dict[str, ReductionPlan] = Field(default_factory=dict)
-    asked: float | str | None = None
+    requested_error: float | str | None = None
     held_out: HeldOut = HeldOut()
 
-    _asked = model_validator(mode="before")(with_asked)
+    _requested = model_validator(mode="before")(with_requested_error)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -156,6 +156,10 @@ class Scene:
         _check_size(config, mesh)
         if masses is None:
             masses = vertex_masses(mesh, config.name, config.vertex_mass, entries=config.masses)
+        return cls._bound(config, mesh, masses)
+
+    @classmethod
+    def _bound(cls, config: SceneConfig, mesh: Mesh, masses: np.ndarray) -> "Scene":
         effects = [bind(entry, config.name, mesh, masses) for entry in config.effects]
         scene = cls(
             config,
@@ -171,6 +175,17 @@ class Scene:
         for force in scene.forces:
             force.time_step = config.time_step
         return scene
+
+    def changed(self, **keys: Any) -> "Scene":
+        """The scene with other ``keys`` of its configuration, on the same mesh of the same masses.
+
+        Raises
+        ------
+        MeshError, SceneError
+            As `build`, of effects.
+        """
+        config = self.config.model_copy(update=keys)
+        return self._bound(config, self.mesh, self.masses)
 
     def log_holds(self) -> None:
         """Log how many vertices each effect holds, and which an obstacle wants elsewhere."""

@@ -76,7 +76,7 @@ def noise(mesh: File, sensitivity: File, settings: Options, out: File, runs: Fil
     labels, asked = out.labels, settings.noise
     whole = scene_of(settings.scene, mesh)
     frames = min(whole.config.frames, max(2, settings.horizon.frames(sensitivity)))
-    scene = Scene.build(whole.config.model_copy(update={"frames": frames}), whole.mesh)
+    scene = whole.changed(frames=frames)
     rows = []
     with write_hdf5(runs.path) as file:
         for axes in kinds(scene):

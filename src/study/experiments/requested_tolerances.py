@@ -12,17 +12,22 @@ from pydantic import Field
 from pdrom.core.store import write_table
 from pdrom.model.held_out import MOTIONS, HeldOutMotion
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.requested.calibration import (
-    Calibration,
+from pdrom.reduction.requested.levels import (
+    Level,
     Motion,
     Quantity,
+    Trajectory,
+    last_within,
+    relative_errors,
+)
+from pdrom.reduction.requested.run import (
+    Calibration,
+    CheckedRun,
     Request,
     ToleranceSettings,
     calibrate,
     transferred,
-)  # fmt: skip
-from pdrom.reduction.requested.levels import Level, Trajectory
-from pdrom.reduction.requested.run import RequestedRun
+)
 from study.artifact.paths import REQUESTED_TOLERANCES, File
 from study.artifact.reads import Setting, SourcesOf
 from study.experiments.kit.declaration import experiment
@@ -79,24 +84,25 @@ def requested_tolerances(
         variant = Scene.build(config.heldout_variant(name), training.mesh, masses=training.masses)
         own = transferred(training, variant)
         if not made or made[-1].motions[0].scene.config.effects != own.config.effects:
-            made.append(calibrate(own, section, min(section.errors)))
+            made.append(calibrate(own, section, Request(error=min(section.errors))))
         rows += ({"motion": name, **row} for row in _rows(variant, made[-1], section))
         log.info("%s: %s done", config.name, name)
     write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
 
 
 def _rows(scene: Scene, own: Calibration, section: RequestedRuns) -> Iterator[dict[str, Any]]:
-    motion, frames = Motion(scene, min(section.errors) / section.factor), scene.config.frames
+    frames = scene.config.frames
+    motion = Motion(scene, min(section.errors) / section.factor, "position")
+    judged = motion.unconverged, motion.sensitivity
     own_run = Trajectory(Level(scene.config.iterations), scene).to(frames)
     known: dict[str, Trajectory] = {}
     for error in section.errors:
-        run = RequestedRun(scene, own, Request(error=error))
-        outcomes = [run.outcome() for _ in range(REPEATS)]
-        done, full = outcomes[0], run.full_order.level
+        outcomes = [CheckedRun(own, scene, error).outcome() for _ in range(REPEATS)]
+        done, full = outcomes[0], own.full_order(error).level
         if full.title not in known:
             known[full.title] = Trajectory(full, scene).to(frames)
         alone = known[full.title]
-        end = done.frames or min(motion.ends(error, "position"))
+        end = done.frames or min(last_within(errors, error) for errors in judged)
         yield {
             "scene": scene.config.name,
             "tolerance": error,
@@ -120,4 +126,5 @@ def _rows(scene: Scene, own: Calibration, section: RequestedRuns) -> Iterator[di
 
 def _error(motion: Motion, run: np.ndarray, end: int, quantity: Quantity) -> float | None:
     """Error of ``run`` (F + 1, N, 3) over the first frames, up to ``end``; None without any."""
-    return float(motion.errors(run, quantity)[end - 1]) if end else None
+    differences = run[1:] - motion.reference[1:]
+    return float(relative_errors(differences, motion.reference, quantity)[end - 1]) if end else None

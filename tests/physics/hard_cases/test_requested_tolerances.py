@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from hard_cases import training
-from pdrom.reduction.requested.calibration import Request, ToleranceSettings, calibrate
-from pdrom.reduction.requested.run import RequestedRun
+from pdrom.reduction.requested.run import CheckedRun, Request, ToleranceSettings, calibrate
 from study.experiments.hard_cases.catalogue import reducible_cases
 
 SETTINGS = ToleranceSettings(
@@ -21,11 +20,11 @@ CASES = [
 @pytest.mark.parametrize("name", CASES)
 def test_a_tolerance_holds_within_a_factor_of_two(name):
     scene = training(name).scene
-    own = calibrate(scene, SETTINGS, 0.01)
+    own = calibrate(scene, SETTINGS, Request(error=0.01))
     for error in (0.1, 0.01):
-        done = RequestedRun(scene, own, Request(error=error)).outcome()
+        done = CheckedRun(own, scene, error).outcome()
         assert len(done.positions) == scene.config.frames + 1
         if done.met:
             assert np.isfinite(done.positions).all()
-            errors = own.motions[0].errors(done.positions, "position")
+            errors = own.motions[0].errors(done.positions)
             assert errors[done.frames - 1] <= 2.0 * error

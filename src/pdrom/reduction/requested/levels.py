@@ -1,4 +1,8 @@
-"""Levels of accuracy: the full order with few or many iterations, and reductions; and their runs.
+"""Levels of accuracy: full orders with few or many iterations, reductions; their runs and errors.
+
+The reference of a motion is its implicit step, solved with so many accelerated iterations that half
+of them make no difference to the tolerance. Its error is not zero: it counts as that of half the
+iterations.
 
 What a frame costs is counted, not timed, so that a choice is the same in every run. The constants
 are those of one thread of a processor of 2024; only their ratios matter.
@@ -7,11 +11,12 @@ are those of one thread of a processor of 2024; only their ratios matter.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from time import thread_time
+from typing import Literal, get_args
 
 import numpy as np
 
 from pdrom.model.dynamics.stepper import State, Stepper
-from pdrom.model.dynamics.whole_frames import BLOCK, WholeFrames
+from pdrom.model.dynamics.whole_frames import WholeFrames
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import projector
@@ -28,14 +33,16 @@ REDUCED_FRAME, REDUCED_IN_PYTHON = 4e4, 2.3e5
 FILL = 0.35
 # Shift of the second start in every coordinate, over the extent of the mesh.
 MOVED, SEED = 1e-10, 0
+CONVERGED, MOST = 80, 320  # iterations of a reference; twice as many until half agree, up to MOST
+Quantity = Literal["position", "velocity"]
+QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 
-FULL_ORDER = "full order"
-OnWork = Callable[[str, float], None]
-"""Told, while something is computed, its title and the counted work (ns) just done."""
+OnFrame = Callable[[str], None]
+"""Told the title of a level after each frame that it has done."""
 
 
-def silent(title: str, work: float) -> None:
-    """Report no progress of ``work``."""
+def silent(title: str) -> None:
+    """Report no progress of ``title``."""
 
 
 @dataclass(frozen=True)
@@ -57,19 +64,21 @@ class Level:
         """Name for messages and tables."""
         count = f"K = {self.iterations}"
         if self.model is None:
-            return f"{FULL_ORDER}, {'Anderson, ' if self.window else ''}{count}"
+            return f"full order, {'Anderson, ' if self.window else ''}{count}"
         return f"ecsw, k = {self.model.columns.modes}, tau = {self.tau:g}, {count}"
+
+    @property
+    def exact(self) -> "Level":
+        """A full order that sees what a frame of this level misses: with twice its iterations."""
+        return Level(CONVERGED if self.model is not None else 2 * self.iterations, WINDOW)
 
     def scene(self, scene: Scene) -> Scene:
         """The scene with the level's iterations."""
         changes = {"iterations": self.iterations, "anderson_window": self.window}
         return replace(scene, config=scene.config.model_copy(update=changes))
 
-    def work(self, scene: Scene, touching: float = 0.0) -> float:
-        """Estimated nanoseconds of a frame of ``scene``.
-
-        ``touching`` is the share of frames with a contact, which a reduction resolves in Python.
-        """
+    def work(self, scene: Scene) -> float:
+        """Counted nanoseconds of a frame of ``scene``; a reduction resolves contacts in Python."""
         effects = scene.groups, scene.forces, scene.boundaries, scene.contacts
         slow = not WholeFrames.suits(*effects)
         if self.model is None:
@@ -82,7 +91,7 @@ class Level:
         for group in scene.groups:
             count, rows = self.model.evaluated(group), group.rows_per_element
             iteration += count * rows * (SAMPLED * rows + DENSE * size)
-        in_python = REDUCED_IN_PYTHON * max(touching, slow)
+        in_python = REDUCED_IN_PYTHON * (slow or len(scene.contacts) > 0)
         return REDUCED_FRAME + in_python + self.iterations * iteration
 
 
@@ -94,18 +103,18 @@ class Trajectory:
     Parameters
     ----------
     moved : whether it starts a distance of round-off away from the scene's own start
-    on_work : told of the frames that are done
+    on_frame : told of the frames that are done
 
     Attributes
     ----------
     defects : of checked frames, m, see `check`
-    seconds : processor time of the frames, checks included
+    seconds : processor time of the frames
     """
 
     def __init__(
-        self, level: Level, scene: Scene, moved: bool = False, on_work: OnWork = silent
+        self, level: Level, scene: Scene, moved: bool = False, on_frame: OnFrame = silent
     ) -> None:
-        self.level, self._model, self._on_work = level, level.model, on_work
+        self.level, self._model, self._on_frame = level, level.model, on_frame
         hair = np.random.default_rng(SEED).standard_normal(scene.mesh.points.shape)
         state = scene.initial_state(MOVED * scene.mesh.extent * hair if moved else None)
         self._loop: Stepper
@@ -115,7 +124,6 @@ class Trajectory:
             self._loop = self._model.loop(level.scene(scene))[0]
             projection = projector(self._model.columns, scene.masses)
             state = State(projection @ state.positions, projection @ state.velocities)
-        self._work = level.work(scene)
         self._state, self._ends = state, [state.positions]
         self.defects: dict[int, float] = {}
         self.seconds = 0.0
@@ -140,16 +148,7 @@ class Trajectory:
         for after in self._run(self._state, range(self.frames, frame)):
             self._state = after
             self._ends.append(after.positions)
-            self._on_work(self.level.title, self._work)
         return self
-
-    def _run(self, state: State, frames: range) -> Iterator[State]:
-        with np.errstate(over="ignore", invalid="ignore"):
-            started = thread_time()
-            for after, _ in self._loop.run(state, frames):
-                self.seconds += thread_time() - started
-                yield after
-                started = thread_time()
 
     def check(self, exact: "Trajectory") -> float:
         """Do the next frame, and do it by another run's loop ``exact``, too.
@@ -162,17 +161,92 @@ class Trajectory:
         before = State(self._positions(first.positions), self._positions(first.velocities))
         self.to(frame + 1)
         (end,) = exact._run(before, range(frame, frame + 1))
-        self._on_work(exact.level.title, exact._work)
         self.defects[frame] = float(np.linalg.norm(self.end - end.positions))
         return self.defects[frame]
 
-    def differences(self, reference: np.ndarray) -> Iterator[np.ndarray]:
-        """Differences (N, 3) m to the positions of a ``reference`` at the ends of its frames."""
-        last = len(reference) - 1
-        for frame in range(1, last + 1):
-            if frame > self.frames:
-                self.to(min(self.frames + BLOCK, last))
-            yield self._positions(self._ends[frame]) - reference[frame]
+    def _run(self, state: State, frames: range) -> Iterator[State]:
+        with np.errstate(over="ignore", invalid="ignore"):
+            started = thread_time()
+            for after, _ in self._loop.run(state, frames):
+                self.seconds += thread_time() - started
+                yield after
+                self._on_frame(self.level.title)
+                started = thread_time()
 
     def _positions(self, y: np.ndarray) -> np.ndarray:
         return y if self._model is None else self._model.columns.B @ y
+
+
+def relative_errors(
+    differences: np.ndarray, reference: np.ndarray, quantity: Quantity
+) -> np.ndarray:
+    """Errors (F',) over the first 1, 2, ... F' frames, relative to the motion in these frames.
+
+    Velocities are finite differences of positions between frames. An error is infinite where the
+    run is not finite, or where nothing moves and something is wrong.
+
+    Parameters
+    ----------
+    differences : (F', N, 3) m, ends of frames minus those of the ``reference`` (F + 1, N, 3) m
+    """
+    moved = reference[1 : len(differences) + 1] - reference[0]
+    with np.errstate(over="ignore", invalid="ignore"):
+        if quantity == "velocity":
+            zero = np.zeros_like(reference[:1])
+            moved, differences = (np.diff(q, axis=0, prepend=zero) for q in (moved, differences))
+        errors = np.cumsum(np.sum(differences**2, axis=(1, 2)))
+        sizes = np.cumsum(np.sum(moved**2, axis=(1, 2)))
+        relative = np.sqrt(errors / np.where(sizes > 0.0, sizes, np.nan))
+    relative[(sizes == 0.0) & (errors == 0.0)] = 0.0
+    return np.nan_to_num(relative, nan=np.inf, posinf=np.inf)
+
+
+def last_within(errors: np.ndarray, tolerance: float) -> int:
+    """Most frames over which the ``errors``, see `relative_errors`, are within ``tolerance``."""
+    within = np.flatnonzero(errors <= tolerance)
+    return int(within[-1]) + 1 if len(within) else 0
+
+
+class Motion:
+    """The motion of ``scene`` with its reference, solved to an error of ``tolerance``.
+
+    Parameters
+    ----------
+    quantity : whose errors are meant
+
+    Attributes
+    ----------
+    reference : (F + 1, N, 3) m
+    iterations : of the reference
+    unconverged : errors (F,) of half the iterations
+    sensitivity : differences (F,), relative as errors, that a start moved by round-off makes
+    """
+
+    def __init__(
+        self, scene: Scene, tolerance: float, quantity: Quantity, on_frame: OnFrame = silent
+    ) -> None:
+        self.scene, self.quantity = scene, quantity
+        count = CONVERGED
+
+        def run(iterations: int, moved: bool = False) -> np.ndarray:
+            level = Level(iterations, WINDOW)
+            return Trajectory(level, scene, moved, on_frame).to(scene.config.frames).positions
+
+        half, self.reference = run(count // 2), run(count)
+        apart = run(count // 2, moved=True)[1:] - half[1:]
+        self.sensitivity = relative_errors(apart, half, self.quantity)
+        known = last_within(self.sensitivity, tolerance)
+        self.unconverged = self.errors(half)
+        while last_within(self.unconverged, tolerance) < known and count < MOST:
+            count, half = 2 * count, self.reference
+            self.reference = run(count)
+            self.unconverged = self.errors(half)
+        self.iterations = count
+        moved = np.linalg.norm(self.reference[1:] - self.reference[0], axis=(1, 2))
+        self.unit = float(np.sqrt(np.mean(moved**2)))
+        """Root mean square displacement of a frame, m."""
+
+    def errors(self, positions: np.ndarray) -> np.ndarray:
+        """Errors (F',) of a run with ``positions`` (F' + 1, N, 3) m, see `relative_errors`."""
+        differences = positions[1:] - self.reference[1 : len(positions)]
+        return relative_errors(differences, self.reference, self.quantity)

@@ -1,39 +1,149 @@
-"""A run within a requested tolerance: a level is chosen, checked, and replaced if need be.
+"""Runs within a requested tolerance: a level of accuracy is chosen, run, checked, and replaced.
 
-Some frames are done by a more accurate level, too, from the same state, which gives their defects.
-Then a second level runs the same motion from a start moved by round-off: how far both are apart
-shows how the motion amplifies errors. The tolerance counts as met for the frames over which the
-estimated error, by both, is within it. A reduction that fails is replaced by the full order, a full
-order by a more accurate one; at last the most accurate one runs. Nothing depends on the clock.
+Every level runs two motions whose converged frames are known: that of the training run, and one
+that is made from it. The cheapest level whose error there, times a factor, is within the tolerance
+runs the scene.
+
+A run adds up the defects of its frames, the distances to what a more accurate level makes of the
+same state, and the motion amplifies them. A run of another motion therefore has the error of the
+calibration, enlarged by as much as the defects of its checked frames are larger, or as it is
+further than in the calibration from a second level's run, whose start is moved by round-off. The
+tolerance counts as met for the frames over which this estimate is within it. A reduction that fails
+is replaced by the full order, and that by the most accurate one. Nothing depends on the clock.
 """
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
+from pdrom.core.errors import ConfigurationError, PdromError, choices
+from pdrom.core.yamlfile import ConfigModel, shown
+from pdrom.model.constraints.base import GroupConfig
+from pdrom.model.effects.entries import effect_config
+from pdrom.model.held_out import KICK
 from pdrom.model.scene import Scene
-from pdrom.reduction.requested.calibration import (
-    JUDGED,
-    Calibrated,
-    Calibration,
-    Request,
-    exact_level,
+from pdrom.reduction.requested.levels import (
+    CONVERGED,
+    QUANTITIES,
+    WINDOW,
+    Level,
+    Motion,
+    OnFrame,
+    Quantity,
+    Trajectory,
     last_within,
     relative_errors,
-)  # fmt: skip
-from pdrom.reduction.requested.levels import IN_PYTHON, Level, OnWork, Trajectory, silent
+    silent,
+)
+from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
 
 log = logging.getLogger(__name__)
 
+Count = Annotated[int, Field(ge=1, le=10_000)]
+
+# The motion that is made from the training motion: slower handles, a kick, stiffer constraints.
+SLOWER, KICKED, KICK_SEED, STIFFER = 0.9, 0.8, 101, 1.6
+# No error is known where less than this part of a motion's frames can be judged.
+JUDGED = 0.1
+PROBED = 6  # frames of a run in calibration whose defects are taken
 CHECKS = 2  # frames of a run that are checked, at least
 # A reduction is taken where it needs less than this part of the full order's work, with all that
 # checks it: counted work is no closer to the time.
 WORTH = 2.0 / 3.0
 # A run that has grown to this multiple of the mesh has blown up, whatever a check says.
 BLOWUP_EXTENT = 100.0
+SLOW = "the iterations converge too slowly after it"
+ROUNDOFF = "round-off decides after it"
 AMPLIFIED = "a second run, of another accuracy and moved by round-off, departs after it"
+
+
+class Request(ConfigModel):
+    """Largest relative error of a run against its implicit step, solved to convergence.
+
+    error : 0.01 is one per cent
+    quantity : whose error it is, over all frames
+    """
+
+    error: Annotated[float, Field(gt=0.0, lt=1.0)]
+    quantity: Quantity = "position"
+
+    def __str__(self) -> str:
+        plural = {"position": "positions", "velocity": "velocities"}
+        return f"{100 * self.error:g} % of the {plural[self.quantity]}"
+
+
+def read_request(wish: object, source: str = "error") -> Request:
+    """Read a requested tolerance: a `Request`, a number, or text such as "velocity=0.05".
+
+    Raises
+    ------
+    ConfigurationError
+        Naming ``source``: no number above 0 and below 1, or an unknown quantity.
+    """
+    if isinstance(wish, Request):
+        return wish
+    quantity, given, number = str(wish).rpartition("=")
+    if given and quantity not in QUANTITIES:
+        raise ConfigurationError(
+            f"{source}: unknown quantity {shown(quantity, 60)}{choices(quantity, QUANTITIES)}"
+        )
+    try:
+        error = float(number)
+    except ValueError:
+        error = float("nan")
+    if isinstance(wish, bool) or not 0.0 < error < 1.0:
+        raise ConfigurationError(
+            f"{source} = {shown(wish, 60)}: a number above 0 and below 1 is required, such as 0.01 "
+            "or velocity=0.05"
+        )
+    return Request.model_validate({"error": error, **({"quantity": quantity} if given else {})})
+
+
+class ToleranceSettings(ConfigModel):
+    """Levels that are calibrated, and the factor of the estimates.
+
+    modes, tolerances : of the reductions: k, tau
+    frames : of the training motion that the elements are sampled for, at most
+    plain, accelerated : iterations of the full order, without and with acceleration
+    iterations : of the reductions, accelerated
+    factor : by which estimated errors are multiplied
+    every : one of so many frames of a reduction is checked
+    """
+
+    modes: tuple[Count, ...] = (20, 40)
+    tolerances: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (5e-2, 1e-2)
+    frames: Count = 25
+    iterations: tuple[Count, ...] = (5, 10, 20)
+    plain: tuple[Count, ...] = (1, 2, 3, 5)
+    accelerated: tuple[Count, ...] = (5, 10, 20, 40)
+    factor: Annotated[float, Field(ge=1.0, le=1e3)] = 4.0
+    every: Count = 20
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """A level with its outcome on the motions.
+
+    work : counted nanoseconds of a frame
+    errors : of each motion, (F,) over the first frames
+    defect : largest defect of a frame, in units of the motion
+    ms : processor time of a frame of the first motion
+    """
+
+    level: Level
+    work: float
+    errors: list[np.ndarray]
+    defect: float
+    ms: float
+
+    @property
+    def reduced(self) -> bool:
+        """Whether it is a reduction."""
+        return self.level.model is not None
 
 
 @dataclass(frozen=True)
@@ -50,9 +160,9 @@ class Outcome:
     reduced : whether that is a reduction
     failed : titles of the levels that were tried before
     checks : numbers of the frames that were checked
-    work : estimated nanoseconds, of all that was run
-    full_work : those of the cheapest full order that meets the tolerance in the calibration, alone
-    seconds : processor time of all frames, without what is made before the first of them
+    seconds : processor time of all frames that were done, without what precedes the first of them
+    full_ms : processor time of a frame of the cheapest full order that meets the tolerance in the
+        calibration, without checks
     """
 
     positions: np.ndarray
@@ -64,9 +174,8 @@ class Outcome:
     reduced: bool
     failed: list[str]
     checks: list[int]
-    work: float
-    full_work: float
     seconds: float
+    full_ms: float
 
     @property
     def met(self) -> bool:
@@ -74,145 +183,266 @@ class Outcome:
         return self.frames > 0
 
 
-class RequestedRun:
-    """A run of ``scene`` within the tolerance of ``request``, by levels of a ``calibration``.
+@dataclass(frozen=True)
+class Calibration:
+    """Calibrated ``levels``, in the order of their work, and the ``motions`` with references.
 
-    Attributes
-    ----------
-    full_order : the cheapest full order that meets it in the calibration, else the most accurate
+    Its errors are of one quantity; it serves all tolerances down to the one that it was made for.
     """
 
+    levels: list[Calibrated]
+    motions: list[Motion]
+    settings: ToleranceSettings
+
+    @property
+    def most_accurate(self) -> Calibrated:
+        """The full order with the most iterations."""
+        full = (each for each in self.levels if not each.reduced)
+        return max(full, key=lambda each: (each.level.iterations, each.level.window))
+
+    def horizon(self, error: float) -> tuple[int, str]:
+        """Frames whose errors are known well enough for a tolerance, and what ends them."""
+        least = error / self.settings.factor
+        converged = min(last_within(motion.unconverged, least) for motion in self.motions)
+        sharp = min(last_within(motion.sensitivity, least) for motion in self.motions)
+        return min(converged, sharp), ROUNDOFF if sharp < converged else SLOW
+
+    def expected(self, level: Calibrated, error: float) -> float:
+        """Largest error of ``level`` on the motions before the horizon, times the factor.
+
+        None is smaller than that of the references. Infinite where too few frames are known.
+        """
+        end, _ = self.horizon(error)
+        if end < max(JUDGED * self.motions[0].scene.config.frames, 1):
+            return np.inf
+        known = [*level.errors, *(motion.unconverged for motion in self.motions)]
+        return self.settings.factor * float(max(errors[end - 1] for errors in known))
+
+    def admissible(self, error: float) -> list[Calibrated]:
+        """Levels whose expected error is within the tolerance; none if no full order is one."""
+        good = [each for each in self.levels if self.expected(each, error) <= error]
+        return good if any(not each.reduced for each in good) else []
+
+    def full_order(self, error: float) -> Calibrated:
+        """The cheapest full order that is admissible, else the most accurate one."""
+        full = (each for each in self.admissible(error) if not each.reduced)
+        return next(full, self.most_accurate)
+
+    def second(self, level: Calibrated, error: float) -> Calibrated:
+        """The cheapest other level of the same kind with an error about as large as requested.
+
+        ``level`` itself if there is none.
+        """
+        most = error * self.settings.factor
+        alike = [each for each in self.levels if each.reduced == level.reduced]
+        others = (e for e in alike if e is not level and self.expected(e, error) <= most)
+        return next(others, level)
+
+    def attempts(self, error: float) -> list[Calibrated]:
+        """Levels to run until one is within the tolerance; only the last where none is admissible.
+
+        The cheapest reduction, where it pays with its second run and its checks; the cheapest full
+        order; the most accurate one.
+        """
+        full = self.full_order(error)
+        most = WORTH * (full.work + self.second(full, error).work)
+        checks = full.work / self.settings.every
+        reduced = (each for each in self.admissible(error) if each.reduced)
+        pays = [e for e in reduced if e.work + self.second(e, error).work + checks < most]
+        others = [full] if full is self.most_accurate else [full, self.most_accurate]
+        return [*pays[:1], *others]
+
+
+class CheckedRun:
+    """A run of ``scene`` within the tolerance ``error``, by levels of a ``calibration``."""
+
     def __init__(
-        self, scene: Scene, calibration: Calibration, request: Request, on_work: OnWork = silent
+        self, calibration: Calibration, scene: Scene, error: float, on_frame: OnFrame = silent
     ) -> None:
-        self.scene, self._own, self._request = scene, calibration, request
-        self._frames, self._on_work = scene.config.frames, on_work
-        self._good = calibration.admissible(request)
-        full = (each for each in self._good if not each.reduced)
-        self.full_order = next(full, calibration.most_accurate)
+        self._own, self._scene, self._error = calibration, scene, error
+        self._frames, self._on_frame = scene.config.frames, on_frame
+        self._started: list[Trajectory] = []
 
     def outcome(self) -> Outcome:
         """Do all frames; each call is a run of its own."""
-        self._work, self._seconds, checks, failed = 0.0, 0.0, list[int](), list[str]()
-        known, limit = self._own.horizon(self._request)
-        known = min(known, self._frames)
-        for level in self._attempts():
-            run, estimate = self._checked(level)
-            checks, estimates = list(run.defects), np.full(self._frames, estimate)
-            if estimate <= self._request.error:
-                estimates = np.maximum(estimates, self._amplified(level, run))
-            end = last_within(estimates[:known], self._request.error)
-            if end == known > 0 or level is self._own.most_accurate:
+        self._started.clear()
+        own, error, frames, failed = self._own, self._error, self._frames, list[str]()
+        known, limit = own.horizon(error)
+        known = min(known, frames)
+        for level in own.attempts(error):
+            run, estimates = self._estimated(level)
+            end = last_within(estimates[:known], error)
+            if end == known > 0 or level is own.most_accurate:
                 break
             failed.append(level.level.title)
             log.info("%s: replaced", level.level.title)
-        end *= end >= JUDGED * self._frames
-        self._spend(level.work * (self._frames - run.frames), run.to(self._frames))
+        end *= end >= JUDGED * frames
         limit = AMPLIFIED if end < known else limit
         return Outcome(
-            run.positions,
-            end,
-            limit if end < self._frames else "",
-            self._own.expected(level, self._request),
-            float(estimates[end - 1]) if end else None,
-            level.level.title,
-            level.reduced,
-            failed,
-            checks,
-            self._work,
-            self._frames * self.full_order.work,
-            self._seconds,
+            positions=run.to(frames).positions,
+            frames=end,
+            limit=limit if end < frames else "",
+            expected=own.expected(level, error),
+            estimate=float(estimates[end - 1]) if end else None,
+            level=level.level.title,
+            reduced=level.reduced,
+            failed=failed,
+            checks=list(run.defects),
+            seconds=sum(each.seconds for each in self._started),
+            full_ms=own.full_order(error).ms,
         )
 
-    def _attempts(self) -> Iterator[Calibrated]:
-        """Levels to run until one is within the tolerance, the most accurate full order last.
+    def _start(self, level: Level, moved: bool = False) -> Trajectory:
+        self._started.append(Trajectory(level, self._scene, moved, self._on_frame))
+        return self._started[-1]
 
-        At first a reduction, if there is one that pays; full orders each have at most half the
-        expected error of the one before. A request that no full order meets is left to the last.
+    def _estimated(self, level: Calibrated) -> tuple[Trajectory, np.ndarray]:
+        """Run of ``level`` up to its end or the first check that fails; its estimated errors (F,).
+
+        The error expected is enlarged as the root mean square of the defects is. All are infinite
+        where nothing was expected, a check failed, or the run blew up.
         """
-        best, error = self._own.most_accurate, np.inf
-        most = WORTH * self._cost(self.full_order)
-        reductions = (each for each in self._good if each.reduced and self._cost(each) < most)
-        yield from (each for each in (next(reductions, None),) if each)
-        for each in self._good:
-            expected = self._own.expected(each, self._request)
-            if not each.reduced and each is not best and expected <= error / 2.0:
-                error = expected
-                yield each
-        yield best
-
-    def _cost(self, level: Calibrated) -> float:
-        """Estimated nanoseconds of a run with its checks and the second run."""
-        second, (exact, frames) = self._own.second(level, self._request), self._checks(level)
-        checks = len(frames) * (exact.work(self.scene) + IN_PYTHON)
-        return checks + self._frames * (level.work + second.work)
-
-    def _checks(self, level: Calibrated) -> tuple[Level, list[int]]:
-        """Level that checks frames of ``level``, and which."""
-        if not level.reduced:
-            return exact_level(level.level), check_frames(self._frames, np.inf, 1.0)
-        exact, share = self.full_order.level, self._own.settings.share
-        cost = (exact.work(self.scene) + IN_PYTHON) / self.full_order.work
-        share *= min(1.0, 0.01 / self._request.error)
-        return exact, check_frames(self._frames, cost, share)
-
-    def _checked(self, level: Calibrated) -> tuple[Trajectory, float]:
-        """Run ``level`` up to its end or the first check that fails; and its estimated error.
-
-        The error expected is enlarged as the root mean square of the defects is; it is infinite
-        where nothing was expected, or the run blew up.
-        """
-        expected = self._own.expected(level, self._request)
-        run = Trajectory(level.level, self.scene, on_work=self._on_work)
-        exact_of, frames = self._checks(level)
-        exact = Trajectory(exact_of, self.scene)
-        estimate = expected
-        for frame in frames if np.isfinite(expected) else []:
+        own, frames, full = self._own, self._frames, self._own.full_order(self._error).level
+        run = self._start(level.level)
+        exact = self._start(full if level.reduced else level.level.exact)
+        hopeless = np.full(frames, np.inf)
+        expected = estimate = own.expected(level, self._error)
+        if not np.isfinite(expected):
+            return run, hopeless
+        for frame in check_frames(frames, frames // own.settings.every if level.reduced else 0):
             run.to(frame).check(exact)
-            self._work += exact_of.work(self.scene) + IN_PYTHON
-            size = np.sqrt(np.mean(np.square(list(run.defects.values()))))
-            estimate = expected * _ratio(size / self._own.motions[0].unit, level.defect)
-            if not (estimate <= self._request.error and self._bounded(run)):
-                self._spend(level.work * run.frames, run, exact)
-                return run, np.inf
-        run.to(self._frames)
-        self._spend(level.work * run.frames, run, exact)
-        return run, estimate if self._bounded(run) else np.inf
+            size = np.sqrt(np.mean(np.square(list(run.defects.values())))) / own.motions[0].unit
+            with np.errstate(divide="ignore", invalid="ignore"):  # nothing may move
+                estimate = expected * float(np.fmax(1.0, np.divide(size, level.defect)))
+            if not (estimate <= self._error and self._bounded(run)):
+                return run, hopeless
+        if not self._bounded(run.to(frames)):
+            return run, hopeless
+        return run, np.maximum(estimate, self._amplified(level, run))
 
     def _bounded(self, run: Trajectory) -> bool:
-        return bool(np.ptp(run.end, axis=0).max() <= BLOWUP_EXTENT * self.scene.mesh.extent)
+        return bool(np.ptp(run.end, axis=0).max() <= BLOWUP_EXTENT * self._scene.mesh.extent)
 
     def _amplified(self, level: Calibrated, run: Trajectory) -> np.ndarray:
         """Estimated errors (F,) over the first frames of a ``run`` from that of a second level.
 
         The error expected is enlarged as the distance of both is over the one expected.
         """
-        own, request = self._own, self._request
-        second = own.second(level, request)
-        other = Trajectory(second.level, self.scene, moved=True, on_work=self._on_work)
+        own, second = self._own, self._own.second(level, self._error)
+        other = self._start(second.level, moved=True).to(self._frames)
         positions = run.positions
-        apart = relative_errors(other.differences(positions), positions, request.quantity)
-        self._spend(second.work * self._frames, other)
-        errors = own.expected(level, request), own.expected(second, request)
+        differences = positions[1:] - other.positions[1:]
+        apart = relative_errors(differences, positions, own.motions[0].quantity)
+        errors = own.expected(level, self._error), own.expected(second, self._error)
         usual = sum(errors) / own.settings.factor
         return errors[0] * np.maximum(1.0, apart / usual)
 
-    def _spend(self, work: float, *runs: Trajectory) -> None:
-        """Count the ``work`` of ``runs`` and their time since it was last counted."""
-        self._work += work
-        for run in runs:
-            self._seconds, run.seconds = self._seconds + run.seconds, 0.0
 
-
-def _ratio(size: float, usual: float) -> float:
-    """Ratio to the usual size, at least one; infinite where that is zero and this is not."""
-    return max(1.0, size / usual) if usual > 0.0 else (1.0 if size == 0.0 else np.inf)
-
-
-def check_frames(frames: int, cost: float, share: float) -> list[int]:
-    """Frames at which a run is checked: as many as cost the share of it, at least `CHECKS`.
-
-    cost : of a check, in frames
-    """
-    count = min(max(CHECKS, int(share * frames / cost)), frames)
+def check_frames(frames: int, count: int) -> list[int]:
+    """Numbers of ``count`` frames of a run, spread over all ``frames``; `CHECKS` at least."""
+    count = min(max(CHECKS, count), frames)
     return sorted({int(f) for f in (np.arange(count) + 0.5) * frames / count})
+
+
+def calibrate(
+    training: Scene, settings: ToleranceSettings, request: Request, on_frame: OnFrame = silent
+) -> Calibration:
+    """Run every level of ``settings`` on the ``training`` motion and the one made from it.
+
+    Parameters
+    ----------
+    request : smallest error that will be requested
+    on_frame : told of all frames that are done
+    """
+    scenes, least = (training, varied(training)), request.error / settings.factor
+    motions = [Motion(scene, least, request.quantity, on_frame) for scene in scenes]
+    most = max(motion.iterations for motion in motions)
+    # the iterations of a reference too, and half of many
+    many = [Level(count, WINDOW) for count in {most, max(most // 2, CONVERGED)}]
+    plain = [Level(count) for count in settings.plain]
+    full = [*many, *plain, *(Level(count, WINDOW) for count in settings.accelerated)]
+    levels: list[Calibrated] = []
+    for level in (*full, *_reduced(training, motions[0], settings)):
+        try:
+            levels.append(_calibrated(level, motions, on_frame))
+        except PdromError as error:
+            if level.model is None:
+                raise
+            log.warning("%s: left out (%s)", level.title, error)
+    return Calibration(sorted(levels, key=lambda each: each.work), motions, settings)
+
+
+def _reduced(training: Scene, motion: Motion, settings: ToleranceSettings) -> Iterator[Level]:
+    """Reductions trained on converged frames; none where the scene does not take a subspace."""
+    frames = np.arange(0, training.config.frames, 2)
+    few = frames[:: -(-len(frames) // settings.frames)]
+    # iterates of the samples' training run, in the subspace
+    scene = Level(20).scene(training)
+    try:
+        for k in settings.modes:
+            columns = make_columns(scene, motion.reference[1:][frames], "pod", k=k)
+            found = sample_elements(scene, columns, few, tolerances=settings.tolerances)
+            for tau, samples in zip(settings.tolerances, found, strict=True):
+                model = SubspaceModel("pod", columns, samples)
+                yield from (Level(count, WINDOW, model, tau) for count in settings.iterations)
+    except PdromError as error:
+        log.warning("%s: no reduction (%s)", training.config.name, error)
+
+
+def _calibrated(level: Level, motions: Sequence[Motion], on_frame: OnFrame) -> Calibrated:
+    errors, defects, ms = [], [0.0], []
+    for motion in motions:
+        frames = motion.scene.config.frames
+        run = Trajectory(level, motion.scene, on_frame=on_frame)
+        exact = Trajectory(level.exact, motion.scene)
+        for frame in np.unique(np.linspace(0, frames - 1, PROBED + 1).round().astype(int)[1:]):
+            defects.append(run.to(int(frame)).check(exact) / motion.unit)
+        errors.append(motion.errors(run.to(frames).positions))
+        ms.append(1e3 * run.seconds / frames)
+    defect = float(np.nan_to_num(max(defects), nan=np.inf))
+    log.info("%s: errors %s", level.title, ", ".join(f"{own[-1]:.2e}" for own in errors))
+    return Calibrated(level, level.work(motions[0].scene), errors, defect, ms[0])
+
+
+def varied(scene: Scene) -> Scene:
+    """The motion that is made from that of ``scene``; none of the study's held-out ones."""
+    own = scene.config.held_out
+    speed, axes = KICKED * (own.kick or KICK), own.kick_axes
+    kick = {"effect": "kick", "speed": speed, "seed": KICK_SEED, "axes": axes}
+    effects = [effect.with_frames_scaled(SLOWER) for effect in scene.config.effects]
+    effects = [
+        e.model_copy(update={"weight": STIFFER * e.weight}) if isinstance(e, GroupConfig) else e
+        for e in effects
+    ]
+    effects.append(effect_config(kick, len(effects)))
+    return scene.changed(effects=tuple(effects))
+
+
+def transferred(trained: Scene, scene: Scene) -> Scene:
+    """The training motion with the material, masses, step, frames and obstacles of ``scene``.
+
+    A calibration rests on all of these. Held vertices, their paths and the start are those of
+    the ``trained`` scene.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the scene: it has another mesh or other constraint groups.
+    """
+    mesh, own = trained.mesh, scene.mesh
+    alike = [
+        np.array_equal(getattr(mesh, name), getattr(own, name))
+        for name in ("points", "triangles", "tetrahedra")
+    ]
+    groups = [[(g.name, g.elements) for g in s.groups] for s in (trained, scene)]
+    if not all(alike) or groups[0] != groups[1]:
+        raise ConfigurationError(
+            f"scene '{scene.config.name}': the training run is of another mesh or other constraint "
+            f"groups (scene '{trained.config.name}')"
+        )
+    effects = scene.config.effects
+    motions = [[each.config for each in (*s.boundaries, *s.starts)] for s in (trained, scene)]
+    if motions[0] != motions[1]:
+        material = (*scene.groups, *scene.forces, *scene.contacts)
+        effects = (*(each.config for each in material), *motions[0])
+    return scene.changed(effects=effects)

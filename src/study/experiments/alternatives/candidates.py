@@ -173,4 +173,4 @@ def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) ->
     }
     if substeps == 1:
         return replace(scene, config=config.model_copy(update=changes))
-    return Scene.build(config.model_copy(update=changes), scene.mesh, masses=scene.masses)
+    return scene.changed(**changes)

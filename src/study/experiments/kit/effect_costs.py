@@ -178,8 +178,7 @@ def left_out(
 
 
 def _without(scene: Scene, names: tuple[str, ...], frames: int, solver: str) -> Variant:
-    kept = {"effects": scene.config.effects_without(*names)}
-    part = Scene.build(scene.config.model_copy(update=kept), scene.mesh)
+    part = scene.changed(effects=scene.config.effects_without(*names))
     loop = part.stepper(part.system_with(solver), track_objective=False)
     return Variant({"groups": len(part.groups)}, loop, part.initial_state(), frames)
 

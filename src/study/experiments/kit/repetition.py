@@ -76,9 +76,7 @@ class ReducedRuns:
     def until_the_end(self) -> "ReducedRuns":
         """The same runs up to the first frame that is not judged, but of two frames at least."""
         frames = min(self.scene.config.frames, max(2, self.end))
-        scene = Scene.build(
-            self.scene.config.model_copy(update={"frames": frames}), self.scene.mesh
-        )
+        scene = self.scene.changed(frames=frames)
         reference = self.reference[: frames + 1]
         return ReducedRuns(scene, self.group, self.data, reference, self.end, self.blowup_extent)
 

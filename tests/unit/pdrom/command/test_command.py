@@ -69,7 +69,7 @@ def test_a_requested_error_is_met_said_and_viewed(folder, capsys):
     for words in ("met, by", "frames checked", "reached", "choosing took"):
         assert words in said
     assert run(asked) == Status.DONE
-    assert capsys.readouterr().out.startswith("small_asked.h5: 20 % of the velocities")
+    assert capsys.readouterr().out.startswith("small_requested.h5: 20 % of the velocities")
     assert run(["view", "one.h5"]) == Status.DONE
     assert run(["show", "one.h5"]) == Status.DONE
     assert "requested_error: 0.05" in capsys.readouterr().out

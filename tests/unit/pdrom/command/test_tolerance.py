@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from builders import SMALL
-from pdrom.api import AskedRun, FullRun, load_scene
+from pdrom.api import FullRun, RequestedRun, load_scene
 from pdrom.command.base import Status
 from pdrom.command.main import run
-from pdrom.reduction.requested.calibration import Request
-from pdrom.reduction.requested.run import Outcome
+from pdrom.reduction.requested.run import Outcome, Request
 
 COMMAND = ["reduce", "small.yaml", "--run", "small.h5", "--error", "0.05"]
 
@@ -25,15 +24,15 @@ def full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FullRun:
     return found
 
 
-def done(full: FullRun, error: float | None = None, **changes) -> AskedRun:
+def done(full: FullRun, error: float | None = None, **changes) -> RequestedRun:
     """A run of four frames within its tolerance, but for the ``changes`` of its outcome."""
     outcome = {
         "positions": full.positions, "frames": 4, "limit": "", "expected": 0.031, "estimate": None,
         "level": "ecsw, k = 20, tau = 0.01, K = 10", "reduced": True, "failed": [],
-        "checks": [0, 2], "work": 1.0, "full_work": 4.0, "seconds": 0.1,
+        "checks": [0, 2], "seconds": 0.1, "full_ms": 8.0,
     }  # fmt: skip
     made = Outcome(**(outcome | changes))
-    return AskedRun(full.scene, Request(error=0.05), made, np.full(4, 2.0), 1.5, error)
+    return RequestedRun(full.scene, Request(error=0.05), made, np.full(4, 2.0), 1.5, error)
 
 
 SLOW = "the iterations converge too slowly after it"
@@ -61,8 +60,8 @@ SLOW = "the iterations converge too slowly after it"
         ({"failed": ["a"]}, "K = 10, after a; 2 frames checked\n", Status.DONE),
         (
             {},
-            "2.00 ms a frame, about 0.25 of the full order that meets it; choosing took 1.5 s, as "
-            "long as 750 frames",
+            "2.00 ms a frame, 8.00 in the cheapest full order that meets it; choosing took 1.5 s, "
+            "as long as 750 frames",
             Status.DONE,
         ),
     ],
@@ -72,7 +71,9 @@ def test_what_became_of_a_run(full, monkeypatch, capsys, changes, words, status)
     monkeypatch.setattr("pdrom.api.save", lambda *_: None)
     assert run(COMMAND) == status
     said = capsys.readouterr().out
-    assert said.startswith("small_asked.h5: 5 % of the positions against the converged implicit")
+    assert said.startswith(
+        "small_requested.h5: 5 % of the positions against the converged implicit"
+    )
     assert words in said
 
 

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from builders import SMALL
-from pdrom.api import AskedRun, FullRun, load
+from pdrom.api import FullRun, RequestedRun, load
 from pdrom.api.pictures import viewed_scenes
 from pdrom.command.base import Status
 from pdrom.command.main import run
@@ -32,22 +32,24 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def files(runs: Path) -> list[str]:
-    return [str(runs / f"{name}.h5") for name in ("small", "small_spring_gappy_2", "small_asked")]
+    return [
+        str(runs / f"{name}.h5") for name in ("small", "small_spring_gappy_2", "small_requested")
+    ]
 
 
 def test_a_run_within_a_tolerance_is_a_kind_of_its_own(runs):
-    full, _, asked = map(load, files(runs))
+    full, _, requested = map(load, files(runs))
     assert isinstance(full, FullRun)
-    assert isinstance(asked, AskedRun)
-    assert asked.request.error == 0.05
-    assert asked.title == "within 5 % of the positions"
-    (scene,) = viewed_scenes(asked)
-    assert scene.first == asked.title
+    assert isinstance(requested, RequestedRun)
+    assert requested.request.error == 0.05
+    assert requested.title == "within 5 % of the positions"
+    (scene,) = viewed_scenes(requested)
+    assert scene.first == requested.title
     (scene,) = viewed_scenes(*map(load, files(runs)))
     assert scene.first == "full order"
-    assert [each.method for each in scene.runs] == [asked.title, "gappy"]
+    assert [each.method for each in scene.runs] == [requested.title, "gappy"]
     assert scene.ms == np.median(full.ms)
-    assert scene.runs[0].ms == np.median(asked.ms)
+    assert scene.runs[0].ms == np.median(requested.ms)
 
 
 def test_the_page_the_picture_and_the_files_for_paraview_have_all_runs(runs, tmp_path, capsys):
@@ -90,11 +92,7 @@ def first_of(name, value):
         ("small", first_of("snapshots/spring/roundoff", np.nan), "round-off of spring"),
         ("small_spring_gappy_2", first_of("difference", np.nan), "difference"),
         ("small_spring_gappy_2", first_of("mesh/triangles", 999), "triangle 0 names vertex"),
-        (
-            "small_asked",
-            lambda file: file.attrs.modify("frames_met", 99),
-            "met for 99 of 12",
-        ),
+        ("small_requested", lambda f: f.attrs.modify("frames_met", 99), "met for 99 of 12"),
     ],
 )
 def test_a_right_checksum_does_not_make_a_run_sound(runs, tmp_path, name, change, words):

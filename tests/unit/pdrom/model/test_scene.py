@@ -200,3 +200,11 @@ def test_explicit_drag_beyond_its_stability_limit_is_refused(rate, stable):
         return
     with pytest.raises(ValueError, match="allowed are rates below 125"):
         make_scene(*effects)
+
+
+def test_a_changed_scene_has_the_mesh_and_masses_of_the_first():
+    scene = make_scene(SPRING, frames=8)
+    heavy = scene.build(scene.config, scene.mesh, masses=2.0 * scene.masses).changed(frames=3)
+    assert (heavy.config.frames, scene.config.frames) == (3, 8)
+    assert np.array_equal(heavy.masses, 2.0 * scene.masses)
+    assert heavy.mesh is scene.mesh

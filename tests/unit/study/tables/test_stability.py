@@ -64,17 +64,7 @@ def test_every_run_has_its_row_and_outcome(files):
     full = table[(table.method == "full") & (table.position_basis == "full")]
     assert full.max_extent.tolist() == [1.2, 1.2]
     assert (full.energy_ratio == 1.0).all()
-    keys = [
-        "experiment",
-        "scene",
-        "h",
-        "stiffness_ratio",
-        "group",
-        "method",
-        "position_basis",
-        "k",
-        "r",
-    ]
+    keys = ["experiment", "scene", "h", "stiffness_ratio", "method", "position_basis", "k", "r"]
     assert not table.duplicated(keys).any()
 
 

@@ -7,19 +7,18 @@ from builders import make_scene
 from pdrom.core.errors import ConfigurationError
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
-from pdrom.reduction.requested import run as checked
-from pdrom.reduction.requested.calibration import (
+from pdrom.reduction.requested import run as requested
+from pdrom.reduction.requested.levels import Level, Trajectory, last_within, relative_errors
+from pdrom.reduction.requested.run import (
     Calibration,
+    CheckedRun,
     Request,
     ToleranceSettings,
     calibrate,
-    last_within,
+    check_frames,
     read_request,
-    relative_errors,
     transferred,
-)  # fmt: skip
-from pdrom.reduction.requested.levels import Level, Trajectory
-from pdrom.reduction.requested.run import RequestedRun, check_frames
+)
 
 EFFECTS = (
     {"effect": "gravity"},
@@ -28,7 +27,7 @@ EFFECTS = (
 )
 SHEET = {"kind": "cloth", "rows": 7, "columns": 7, "plane": "xz"}
 SETTINGS = ToleranceSettings(modes=(8,), tolerances=(1e-2,), iterations=(10,), factor=2.0)
-FRAMES = 24
+FRAMES, KICK = 24, {"effect": "kick", "speed": 0.4, "seed": 7}
 
 
 def sheet(*more, weight: float = 1e5, **keys) -> Scene:
@@ -36,13 +35,9 @@ def sheet(*more, weight: float = 1e5, **keys) -> Scene:
     return make_scene(*effects, mesh=SHEET, **{"frames": FRAMES, **keys})
 
 
-def kicked(speed: float) -> Scene:
-    return sheet({"effect": "kick", "speed": speed, "seed": 7})
-
-
 @pytest.fixture(scope="module")
 def own() -> Calibration:
-    return calibrate(sheet(), SETTINGS, 0.005)
+    return calibrate(sheet(), SETTINGS, Request(error=0.005))
 
 
 def error_of(scene: Scene, positions: np.ndarray, frames: int) -> float:
@@ -55,8 +50,8 @@ def error_of(scene: Scene, positions: np.ndarray, frames: int) -> float:
 
 @pytest.mark.parametrize("error", [0.1, 0.03, 0.01])
 def test_a_tolerance_is_met_on_another_motion(own, error):
-    scene = kicked(0.4)
-    done = RequestedRun(scene, own, Request(error=error)).outcome()
+    scene = sheet(KICK)
+    done = CheckedRun(own, scene, error).outcome()
     assert done.met
     assert error_of(scene, done.positions, done.frames) <= error
     assert done.estimate <= error
@@ -68,8 +63,8 @@ def test_a_tolerance_is_met_on_another_motion(own, error):
 @pytest.mark.parametrize("error", [0.05, 0.01])
 def test_what_a_calibration_rests_on_may_differ_when_it_is_made_again(changes, error):
     scene = sheet(**changes)
-    calibration = calibrate(transferred(sheet(), scene), SETTINGS, error)
-    done = RequestedRun(scene, calibration, Request(error=error)).outcome()
+    calibration = calibrate(transferred(sheet(), scene), SETTINGS, Request(error=error))
+    done = CheckedRun(calibration, scene, error).outcome()
     assert not done.met or error_of(scene, done.positions, done.frames) <= error
 
 
@@ -82,17 +77,16 @@ def test_other_cells_or_groups_are_refused():
 
 
 def test_a_tolerance_below_the_reference_s_own_error_is_refused(own):
-    tiny = Request(error=1e-14)
-    assert own.admissible(tiny) == []
-    done = RequestedRun(sheet(), own, tiny).outcome()
+    assert own.admissible(1e-14) == []
+    done = CheckedRun(own, sheet(), 1e-14).outcome()
     assert not done.met
     assert done.limit
     assert done.level == own.most_accurate.level.title
 
 
 def test_a_refused_request_runs_with_the_most_accurate_full_order(own):
-    done = RequestedRun(kicked(0.4), own, Request(error=1e-14)).outcome()
-    expected = Trajectory(own.most_accurate.level, kicked(0.4)).to(FRAMES).positions
+    done = CheckedRun(own, sheet(KICK), 1e-14).outcome()
+    expected = Trajectory(own.most_accurate.level, sheet(KICK)).to(FRAMES).positions
     assert np.array_equal(done.positions, expected)
     assert not done.reduced
 
@@ -108,34 +102,35 @@ def test_a_full_order_is_checked_too_and_replaced_by_a_better_one(own, monkeypat
         run.defects[frame] = 1e3 if run.level.title == levels[0] else 0.0
         return run.defects[frame]
 
-    monkeypatch.setattr(checked.Trajectory, "check", poor)
-    done = RequestedRun(sheet(), own, Request(error=0.05)).outcome()
+    monkeypatch.setattr(Trajectory, "check", poor)
+    done = CheckedRun(own, sheet(), 0.05).outcome()
     assert done.failed[0] == levels[0] != done.level
 
 
 def test_a_run_that_departs_from_its_second_run_is_met_for_fewer_frames(own, monkeypatch):
     late = np.where(np.arange(FRAMES) < 10, 0.0, np.inf)
-    monkeypatch.setattr(RequestedRun, "_amplified", lambda *_: late)
-    done = RequestedRun(sheet(), own, Request(error=0.05)).outcome()
-    assert (done.frames, done.limit) == (10, checked.AMPLIFIED)
+    monkeypatch.setattr(CheckedRun, "_amplified", lambda *_: late)
+    done = CheckedRun(own, sheet(), 0.05).outcome()
+    assert (done.frames, done.limit) == (10, requested.AMPLIFIED)
 
 
 def test_two_runs_are_the_same_to_the_last_bit(own):
-    run = RequestedRun(kicked(1.0), own, Request(error=0.03))
+    run = CheckedRun(own, sheet(KICK), 0.03)
     first, again = run.outcome(), run.outcome()
     assert np.array_equal(first.positions, again.positions)
-    assert (first.level, first.work, first.estimate) == (again.level, again.work, again.estimate)
+    for name in ("level", "checks", "estimate"):
+        assert getattr(first, name) == getattr(again, name)
 
 
 def test_the_cheapest_level_that_meets_it_is_tried_first(own):
-    levels = own.admissible(Request(error=0.1))
+    levels = own.admissible(0.1)
     assert [each.work for each in levels] == sorted(each.work for each in levels)
-    assert all(own.expected(each, Request(error=0.1)) <= 0.1 for each in levels)
+    assert all(own.expected(each, 0.1) <= 0.1 for each in levels)
 
 
 def test_velocities_are_differences_of_positions():
     reference = np.cumsum(np.ones((4, 2, 3)), axis=0)
-    wrong = [np.full((2, 3), 0.1)] * 3
+    wrong = np.full((3, 2, 3), 0.1)
     assert relative_errors(wrong, reference, "position")[0] == pytest.approx(0.1)
     np.testing.assert_allclose(
         relative_errors(wrong, reference, "velocity"), 0.1 / np.sqrt([1.0, 2.0, 3.0])
@@ -166,10 +161,10 @@ def test_a_tolerance_may_be_of_the_velocities():
     assert str(read_request(0.01)) == "1 % of the positions"
 
 
-@pytest.mark.parametrize(("frames", "cost", "share"), [(100, 1.0, 0.05), (3, 1e9, 0.1), (1, 1, 1)])
-def test_checks_are_spread_and_two_at_least(frames, cost, share):
-    found = check_frames(frames, cost, share)
-    assert min(2, frames) <= len(found) <= frames
+@pytest.mark.parametrize(("frames", "count"), [(100, 5), (100, 0), (3, 9), (1, 1)])
+def test_checks_are_spread_and_two_at_least(frames, count):
+    found = check_frames(frames, count)
+    assert len(found) == min(max(2, count), frames)
     assert all(0 <= frame < frames for frame in found)
 
 
