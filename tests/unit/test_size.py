@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 43_628,
+    "lines of src": 43_627,
     "modules of src": 413,
     "lines of tests": 29_946,
     "words of documentation": 24_890,
     "tables": 28,
     "figures": 23,
     "experiments": 21,
-    "percent of src in decorators, signatures and imports": 22.61,
+    "percent of src in decorators, signatures and imports": 22.6,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

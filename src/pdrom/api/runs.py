@@ -207,9 +207,7 @@ def reduce(
     return ReducedRun(full, group, name, r, float(reduction.gain), outcome, ms)
 
 
-def _within(
-    full: FullRun, request: requested.Request, scene: Scene, on_frame: OnFrame
-) -> RequestedRun:
+def _within(full: FullRun, error: Wish, scene: Scene, on_frame: OnFrame) -> RequestedRun:
     """Calibrate on the motion of ``full``, then run ``scene``, which has the same mesh.
 
     The calibration has the material, the masses, the step and the frames of ``scene``.
