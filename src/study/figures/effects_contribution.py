@@ -32,7 +32,7 @@ Looks = dict[str, tuple[str, str]]
     ),
     reads={
         "drawn": Settings(Drawn),
-        "table": TableOf("effects_contribution"),
+        "table": TableOf("effects_cost"),
         "contributions": EachOf(CONTRIBUTIONS, "experiments"),
     },
     options=Scenes,
@@ -41,6 +41,7 @@ def effects_contribution(
     options: Scenes, drawn: Drawn, table: pd.DataFrame, contributions: list[File]
 ) -> Figure:
     """Draw the forces of the first scenes over time, and beside them every scene and effect."""
+    table = table.dropna(subset=["force"])
     scenes = drawn.scenes_of(table, "no contributions of effects")
     rows = table[table.scene.isin(scenes)]
     forces = {file["scene"]: read_table(file.path, FRAMES) for file in contributions}

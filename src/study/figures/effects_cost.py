@@ -8,6 +8,7 @@ from study.artifact.reads import Settings, TableOf
 from study.experiments.kit.names import GLOBAL, REST, RIGHT
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Drawn, Scenes
+from study.tables.effects_cost import NOTHING
 
 OTHERS = "forces, holds, contacts"
 COLOURS = {OTHERS: style.VERMILLION, RIGHT: style.SKY, GLOBAL: "#3A5A78", REST: "#C9C4BA"}
@@ -21,21 +22,17 @@ COLOURS = {OTHERS: style.VERMILLION, RIGHT: style.SKY, GLOBAL: "#3A5A78", REST: 
         "the whole less what these effects cost in it. A bar that ends at the tick pays nothing "
         "for what the scene does not list."
     ),
-    reads={
-        "drawn": Settings(Drawn),
-        "costs": TableOf("effects_cost"),
-        "removed": TableOf("effects_left_out"),
-    },
+    reads={"drawn": Settings(Drawn), "table": TableOf("effects_cost")},
     options=Scenes,
 )
-def effects_cost(
-    options: Scenes, drawn: Drawn, costs: pd.DataFrame, removed: pd.DataFrame
-) -> Figure:
+def effects_cost(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a bar per scene, divided by effect; on the right one scene without some of its effects.
 
     On the right a tick marks the time of the whole scene less what the missing effects cost in it.
     A bar that ends there pays nothing for what it does not list.
     """
+    costs, removed = table.dropna(subset=["share"]), table.dropna(subset=["without_ms"])
+    removed = removed.sort_values("effect", key=lambda name: name != NOTHING, kind="stable")
     scenes = drawn.scenes_of(costs, "no timings of effects")
     several = [scene for scene in scenes if (removed.scene == scene).any()]
     rows = removed[removed.scene == several[0]] if several else removed[:0]
@@ -78,21 +75,21 @@ def _draw_scenes(
 
 
 def _draw_left_out(ax: Axes, rows: pd.DataFrame, scene: str) -> None:
-    whole = float(rows.ms_per_frame.iloc[0])
+    whole = float(rows.without_ms.iloc[0])
     shades = {1: "#BFD3E0", 2: "#8FB2C9", 3: "#5F90B2"}
     for y, row in enumerate(rows.itertuples()):
-        ax.barh(y, row.ms_per_frame, color=shades.get(row.groups, "#5F90B2"), height=0.72)
-        if row.own_ms > 0.0:
+        ax.barh(y, row.without_ms, color=shades.get(row.groups, "#5F90B2"), height=0.72)
+        if row.ms_per_frame > 0.0:
             ax.plot(
-                [whole - row.own_ms], [y], marker="|", color=style.BLACK, markersize=9,
+                [whole - row.ms_per_frame], [y], marker="|", color=style.BLACK, markersize=9,
                 markeredgewidth=1.4,
             )  # fmt: skip
-    style.label_rows(ax, [_words(row.left_out) for row in rows.itertuples()])
-    ax.set_xlim(0.0, 1.15 * float(rows.ms_per_frame.max()))
+    style.label_rows(ax, [_words(row.effect) for row in rows.itertuples()])
+    ax.set_xlim(0.0, 1.15 * float(rows.without_ms.max()))
     ax.tick_params(axis="y", length=0)
     ax.set_xlabel("time per frame (ms)")
     ax.set_title(style.words(scene))
 
 
 def _words(left_out: str) -> str:
-    return "whole" if left_out == "nothing" else f"without {style.words(left_out)}"
+    return "whole" if left_out == NOTHING else f"without {style.words(left_out)}"

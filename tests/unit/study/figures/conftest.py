@@ -232,19 +232,19 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for factor in (1, 2, 5)
         for r in (6, 14, 40)
     ]
-    shares = [
-        (scene, effect, time, time / 4.0)
+    effects = [
+        (scene, effect, "", time, time / 4.0, *6 * [None])
         for scene, groups in scenes.items()
         for effect, time in (
             *((group, 2.0 / len(groups)) for group in groups), ("gravity", 0.5), ("pins", 0.5),
             ("global solve", 0.7), ("rest of the frame", 0.3),
         )
     ]  # fmt: skip
-    removed = [
-        (scene, name, number, time, 4.0 - time)
+    effects += [
+        (scene, name, "several", 4.0 - time, None, number, time, *4 * [None])
         for scene, groups in scenes.items()
         if len(groups) > 1
-        for name, number, time in (("nothing", 3, 4.0), ("gravity", 3, 3.5), ("a + b", 1, 2.0))
+        for name, number, time in (("gravity", 3, 3.5), ("a + b", 1, 2.0), ("nothing", 3, 4.0))
     ]
     rungs = [("up", "published code"), ("up", "+ affine"), ("down", "- QR"), ("signs", "signs 1")]
     others = [
@@ -305,8 +305,8 @@ def _write_tables(results, scenes, methods, rng) -> None:
         for method in ("deim-joint", "published")
         for r in (6, 10)
     ]
-    moved = [
-        (scene, effect, role, drift, 1e-6, None if drift is None else drift > 1e-6)
+    effects += [
+        (scene, effect, role, *4 * [None], 1.0, drift, 1e-6, drift and drift > 1e-6)
         for scene, groups in scenes.items()
         for effect, role, drift in (
             *((group, "constraint group", None) for group in groups[:1]),
@@ -314,7 +314,7 @@ def _write_tables(results, scenes, methods, rng) -> None:
             ("gravity", "force", 0.5),
             ("kick", "start", 1e-15),
         )
-    ]
+    ]  # fmt: skip
     requests = [
         (scene, tolerance, met, reduced, 0.5 * tolerance if met else 2.0, time)
         for scene in scenes
@@ -337,15 +337,14 @@ def _write_tables(results, scenes, methods, rng) -> None:
         "stability": (runs, "scene group method position_basis k r experiment outcome"
          " blowup_frame h stiffness_ratio"),
         "breakeven": (ratios, "scene group method factor vertices r ratio breakeven_r"),
-        "effects_cost": (shares, "scene effect ms_per_frame share"),
-        "effects_left_out": (removed, "scene left_out groups ms_per_frame own_ms"),
+        "effects_cost": (effects, "scene effect role ms_per_frame share groups without_ms force"
+         " moved sensitivity_floor above_floor"),
         "reduced_reruns": (reruns, "scene group method r position_basis max_extent blowup_frame"
          " relative_error relative_error_within_horizon ms_per_frame k motion"),
         "noise": (noise, "scene group noisy_axes method r rank relative_error"),
         "alternatives": (others, "scene vertices stiffness motion method substeps"
          " ms_per_frame"
          " error_implicit error_continuous"),
-        "effects_contribution": (moved, "scene effect role moved sensitivity_floor above_floor"),
     }  # fmt: skip
     for name, (rows, header) in made.items():
         _write(results.table(name), header, rows)

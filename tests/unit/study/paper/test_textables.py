@@ -21,6 +21,13 @@ COLUMNS = [
     "scene", "group", "method", "position_basis", "r", "frames", "blowup_frame", "horizon_frame",
     ERROR, "k", "speedup",
 ]  # fmt: skip
+
+
+def frame(header: str, *rows: tuple) -> pd.DataFrame:
+    """Rows under the columns that a header names."""
+    return pd.DataFrame(list(rows), columns=header.split())
+
+
 TABLES = {
     "methods": pd.DataFrame(
         {
@@ -66,38 +73,18 @@ TABLES = {
         ],
         columns=["scene", "method", "iterations", ERROR, "ms_per_frame"],
     ),
-    "breakeven": pd.DataFrame(
-        [
-            ("bar_a", "edge_spring", "deim-joint", 1, 400, 6, 20.0),
-            ("bar_a", "edge_spring", "deim-joint", 1, 400, 20, 20.0),
-            ("bar_a", "edge_spring", "block-deim", 1, 400, 6, None),
-        ],
-        columns=[
-            "scene",
-            "group",
-            "method",
-            "factor",
-            "vertices",
-            "r",
-            "breakeven_r",
-        ],
+    "breakeven": frame(
+        "scene group method factor vertices r breakeven_r",
+        ("bar_a", "edge_spring", "deim-joint", 1, 400, 6, 20.0),
+        ("bar_a", "edge_spring", "deim-joint", 1, 400, 20, 20.0),
+        ("bar_a", "edge_spring", "block-deim", 1, 400, 6, None),
     ),
-    "scaling": pd.DataFrame(
-        [
-            ("bar_a", "fom", 400, 3, 1.25, 1.5, None),
-            ("bar_a", "fom", 800, 3, 1.25, 1.5, None),
-            ("bar_a", "ecsw", 400, 3, 0.125, None, None),
-            ("bar_b", "fom", 400, 1, None, None, None),
-        ],
-        columns=[
-            "scene",
-            "method",
-            "vertices",
-            "meshes",
-            "exponent",
-            "local_exponent",
-            "global_exponent",
-        ],
+    "scaling": frame(
+        "scene method vertices meshes exponent local_exponent global_exponent",
+        ("bar_a", "fom", 400, 3, 1.25, 1.5, None),
+        ("bar_a", "fom", 800, 3, 1.25, 1.5, None),
+        ("bar_a", "ecsw", 400, 3, 0.125, None, None),
+        ("bar_b", "fom", 400, 1, None, None, None),
     ),
     "singular_values": pd.DataFrame(
         {
@@ -108,17 +95,15 @@ TABLES = {
             "above_roundoff": [True, True, True, False],
         }
     ),
-    "stability": pd.DataFrame(
-        [
-            ("full", "full", "rerun", "accurate", 1.0),
-            ("pod", "full", "rerun", "accurate", 1.0),
-            ("pod", "full", "rerun", "blow-up", float("inf")),
-            ("pod", "full", "rerun", "not run", None),
-            ("pod", "full", "rerun", "wrong", 3.0),
-            ("pod", "full", "sweep", "wrong", 2.0),
-            ("ecsw", "pod", "rerun", "accurate", 0.5),
-        ],
-        columns=["method", "position_basis", "experiment", "outcome", "energy_ratio"],
+    "stability": frame(
+        "method position_basis experiment outcome energy_ratio",
+        ("full", "full", "rerun", "accurate", 1.0),
+        ("pod", "full", "rerun", "accurate", 1.0),
+        ("pod", "full", "rerun", "blow-up", float("inf")),
+        ("pod", "full", "rerun", "not run", None),
+        ("pod", "full", "rerun", "wrong", 3.0),
+        ("pod", "full", "sweep", "wrong", 2.0),
+        ("ecsw", "pod", "rerun", "accurate", 0.5),
     ),
     "local_share": pd.DataFrame(
         {
@@ -144,100 +129,39 @@ TABLES = {
             "history": ["2026-01-31: first.", "h", "h"],
         }
     ),
-    "claims_tests": pd.DataFrame(
-        [
-            ("C1", "published", "some_one", True, ">=", 0.1, 1, 2, 0.05, 0.1, float("inf")),
-            ("C1", "published", "others", True, ">=", 0.1, 3, 4, 0.0, 0.5, 1.0),
-            ("C1", "published", "aside", False, "<=", 0.1, 5, 6, 0.0, 0.5, 1.0),
-            ("C1", "beyond", "all", True, "<=", 0.05, 0, 0, None, None, None),
-        ],
-        columns=[
-            "claim",
-            "part",
-            "what",
-            "decides",
-            "compare",
-            "threshold",
-            "satisfied",
-            "of",
-            "least",
-            "median",
-            "most",
-        ],
+    "claims_tests": frame(
+        "claim part what decides compare threshold satisfied of least median most",
+        ("C1", "published", "some_one", True, ">=", 0.1, 1, 2, 0.05, 0.1, float("inf")),
+        ("C1", "published", "others", True, ">=", 0.1, 3, 4, 0.0, 0.5, 1.0),
+        ("C1", "published", "aside", False, "<=", 0.1, 5, 6, 0.0, 0.5, 1.0),
+        ("C1", "beyond", "all", True, "<=", 0.05, 0, 0, None, None, None),
     ),
-    "speedups": pd.DataFrame(
-        [
-            ("bar_a", "deim_x", "full", None, 6, 1.2, "0.50", True, 0.1, None, 2.0, 0.5, None),
-            ("b", "ecsw", "pod", 20, 97, 8.0, "66 to 73", False, 0.01, 0.02, 1.0, 3.0, 1234.5),
-        ],
-        columns=[
-            "scene",
-            "method",
-            "position_basis",
-            "k",
-            "r",
-            "full_ms",
-            "shown",
-            "loses",
-            "error_train",
-            "error_heldout",
-            "training_s",
-            "reduction_s",
-            "frames_to_break_even",
-        ],
+    "speedups": frame(
+        "scene method position_basis k r full_ms shown loses error_train "
+        "error_heldout training_s reduction_s frames_to_break_even",
+        ("bar_a", "deim_x", "full", None, 6, 1.2, "0.50", True, 0.1, None, 2.0, 0.5, None),
+        ("b", "ecsw", "pod", 20, 97, 8.0, "66 to 73", False, 0.01, 0.02, 1.0, 3.0, 1234.5),
     ),
-    "winners": pd.DataFrame(
-        [
-            ("s_one", 1.0, "implicit", 0.1, 400, 400, 1600, 17.0, 15.0, 20.0, 3, 2),
-            ("s_one", 1.0, "implicit", 0.1, 10_000, 400, 1600, 17.0, 15.0, 20.0, 3, 2),
-            ("s_two", 100.0, "continuous", 0.01, 400, *5 * [None], 3, 0),
-        ],
-        columns=[
-            "scene",
-            "stiffness",
-            "reference",
-            "limit",
-            "vertices",
-            "from_plain",
-            "from_best",
-            "speedup",
-            "speedup_low",
-            "speedup_high",
-            "motions",
-            "reached",
-        ],
+    "winners": frame(
+        "scene stiffness reference limit vertices from_plain from_best speedup "
+        "speedup_low speedup_high motions reached",
+        ("s_one", 1.0, "implicit", 0.1, 400, 400, 1600, 17.0, 15.0, 20.0, 3, 2),
+        ("s_one", 1.0, "implicit", 0.1, 10_000, 400, 1600, 17.0, 15.0, 20.0, 3, 2),
+        ("s_two", 100.0, "continuous", 0.01, 400, *5 * [None], 3, 0),
     ),
-    "payoff": pd.DataFrame(
-        [
-            ("full", "deim_x", 3, 0, 0, 0, *5 * [None], 0, 0, 0),
-            ("pod", "ecsw", 3, 2, 1, 1, *5 * [0.5], 2, 2, 1),
-        ],
-        columns=[
-            "position_basis",
-            "method",
-            "scenes",
-            "accurate",
-            "pays",
-            "loses",
-            "least_speedup",
-            "best_speedup",
-            "most_speedup",
-            "error_train",
-            "error_heldout",
-            "heldout",
-            "accurate_heldout",
-            "pays_heldout",
-        ],
+    "payoff": frame(
+        "position_basis method scenes accurate pays loses least_speedup best_speedup "
+        "most_speedup error_train error_heldout heldout accurate_heldout pays_heldout",
+        ("full", "deim_x", 3, 0, 0, 0, *5 * [None], 0, 0, 0),
+        ("pod", "ecsw", 3, 2, 1, 1, *5 * [0.5], 2, 2, 1),
     ),
-    "hard_cases": pd.DataFrame(
-        [
-            ("torn", "pod", 1.0, None, 1.0, "holds", None),
-            ("torn", "deim_x", float("inf"), 0, 1.0, "singular", "a % reason"),
-            ("kicked", "pod", None, None, None, "nothing to reduce", None),
-            ("kicked", "deim_x", 25.0, 7, 300.0, "blow-up", "a % reason"),
-            ("folded", "deim_x", 25.0, None, 4.0, "distorted", "a % reason"),
-        ],
-        columns=["case", "method", "gain", "blowup_frame", "max_extent", "outcome", "why"],
+    "hard_cases": frame(
+        "case method gain blowup_frame max_extent outcome why",
+        ("torn", "pod", 1.0, None, 1.0, "holds", None),
+        ("torn", "deim_x", float("inf"), 0, 1.0, "singular", "a % reason"),
+        ("kicked", "pod", None, None, None, "nothing to reduce", None),
+        ("kicked", "deim_x", 25.0, 7, 300.0, "blow-up", "a % reason"),
+        ("folded", "deim_x", 25.0, None, 4.0, "distorted", "a % reason"),
     ),
 }
 

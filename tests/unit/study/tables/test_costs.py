@@ -10,9 +10,8 @@ from pdrom.core.store import write_table
 from study.artifact.paths import File
 from study.tables.break_even import breakeven
 from study.tables.budget import budget
-from study.tables.effects_contribution import effects_contribution
 from study.tables.effects_cost import effects_cost
-from study.tables.effects_left_out import effects_left_out
+from study.tables.kit.one_time import NOT_TIMED
 
 METHODS = ("fom", "fewer-iterations", "full", "block-deim")
 
@@ -110,21 +109,20 @@ def test_every_curve_has_its_own_break_even(tmp_path):
 # Effects ------------------------------------------------------------------------------------------
 
 
-def test_effects_are_joined_and_scenes_without_rows_left_out(tmp_path):
+NO_RUNS = pd.DataFrame(columns=["scene", "perturbation", "frame", "relative_difference"])
+
+
+def test_effects_are_joined_in_one_time(tmp_path):
     cost = {"scene": "a", "effect": "spring", "elements": 3, "ms_per_frame": 1.0, "share": 1.0}
     write_table(pd.DataFrame([cost]), tmp_path / "a.csv")
     write_table(pd.DataFrame([cost | {"scene": "b"}]), tmp_path / "b.csv")
     files = [File(str(tmp_path / f"{name}.csv"), {}) for name in "ab"]
     times = pd.DataFrame({"scene": ["b"], "ms_per_frame": [3.0]})
-    table = effects_cost(files, times)
+    table = effects_cost(files, [], [], times, NO_RUNS, 1e-10, 1e-3)
     assert table.scene.tolist() == ["a", "b"]
     # the one time of scene b; a was not timed in several processes
     assert table.ms_per_frame.tolist() == [1.0, 3.0]
-    empty = pd.DataFrame(columns=effects_left_out.column_names)
-    write_table(empty, tmp_path / "none.csv")
-    table = effects_left_out([File(str(tmp_path / "none.csv"), {})], times)
-    assert tuple(table.columns) == effects_left_out.column_names
-    assert len(table) == 0
+    assert effects_cost([], [], [], times, NO_RUNS, 1e-10, 1e-3).empty
 
 
 def test_contributions_are_judged_before_the_horizon_and_bring_their_times(tmp_path):
@@ -154,19 +152,37 @@ def test_contributions_are_judged_before_the_horizon_and_bring_their_times(tmp_p
         ],
         columns=["scene", "perturbation", "frame", "relative_difference"],
     )
-    costs = pd.DataFrame({"scene": ["a"], "effect": ["bending"], "ms_per_frame": [0.25]})
-    removed = pd.DataFrame({"scene": ["a"], "left_out": ["bending"], "saved_ms": [0.2]})
-    file = File(str(tmp_path / "all.csv"), {})
-    made = effects_contribution([file], sensitivity, 1e-10, 1e-3, costs, removed)
+    costs = pd.DataFrame(
+        [("a", "bending", 3, 0.25, 0.5), ("a", "global solve", 9, 0.25, 0.5)],
+        columns=["scene", "effect", "elements", "ms_per_frame", "share"],
+    )
+    removed = pd.DataFrame(
+        [
+            ("a", "nothing", 2, 0, 0.5, 0.0, 0.0),
+            ("a", "bending", 1, 3, 0.3, 0.2, 0.25),
+            ("a", "bending + spring", 0, 6, 0.1, 0.4, 0.35),
+        ],
+        columns=["scene", "left_out", "groups", "elements", "ms_per_frame", "saved_ms", "own_ms"],
+    )
+    write_table(costs, tmp_path / "costs.csv")
+    write_table(removed, tmp_path / "removed.csv")
+    files = [[File(str(tmp_path / f"{n}.csv"), {})] for n in ("costs", "removed", "all")]
+    made = effects_cost(*files, NOT_TIMED, sensitivity, 1e-10, 1e-3)
+    assert made.effect.tolist() == [
+        "bending", "global solve", "nothing", "bending + spring", "spring", "strain", "kick",
+    ]  # fmt: skip
+    assert made.role.tolist()[1:4] == ["phase", "several", "several"]
     by = made.set_index(["scene", "effect"])
+    assert by.loc[("a", "bending + spring"), ["ms_per_frame", "without_ms"]].tolist() == [0.35, 0.1]
+    by = by[by.force.notna()]
     assert by.moved[("a", "bending")] == 1e-7
     assert by.moved[("a", "spring")] == 1e-1
     assert by.moved[("b", "kick")] == 0.7
     assert pd.isna(by.moved[("b", "strain")])
-    assert by.above_floor.tolist() == [True, False, pd.NA, True]
+    assert by.above_floor.tolist() == [False, True, pd.NA, True]
     assert by.sensitivity_floor[("a", "bending")] == 1e-5
-    assert by.force_share.to_numpy() == pytest.approx([0.75, 0.25, 0.5, 0.5])
+    assert by.force_share.to_numpy() == pytest.approx([0.25, 0.75, 0.5, 0.5])
     assert by.energy.tolist() == [4.0, 4.0, 4.0, 7.0]
     assert by.acting_frames.tolist() == [3, 3, 3, 1]
-    assert by.loc[("a", "bending"), ["own_ms", "saved_ms"]].tolist() == [0.25, 0.2]
-    assert pd.isna(by.own_ms[("b", "kick")])
+    assert by.loc[("a", "bending"), ["ms_per_frame", "saved_ms"]].tolist() == [0.25, 0.2]
+    assert pd.isna(by.ms_per_frame[("b", "kick")])
