@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 43_599,
-    "modules of src": 411,
-    "lines of tests": 29_886,
+    "lines of src": 43_511,
+    "modules of src": 407,
+    "lines of tests": 29_881,
     "words of documentation": 24_861,
     "tables": 26,
     "figures": 23,
     "experiments": 21,
-    "percent of src in decorators, signatures and imports": 22.6,
+    "percent of src in decorators, signatures and imports": 22.49,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

@@ -13,7 +13,7 @@ from study.paper.source import source_files
 from study.pipeline.figures import words
 from study.pipeline.folders import DEFAULT
 from study.pipeline.study import Study
-from study.tables.claims import load_claims
+from study.tables.claims.rules import load_claims
 
 Labels = Mapping[str, str]
 Row = dict[str, Any]

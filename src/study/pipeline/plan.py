@@ -26,7 +26,7 @@ from study.pipeline.study import Study, StudySettings
 from study.pipeline.subspace_scenes import check_live, check_subspaces
 from study.pipeline.values import scaled_methods
 from study.tables import declared
-from study.tables.claims import load_claims
+from study.tables.claims.rules import load_claims
 
 OF_STUDY = Folders()
 

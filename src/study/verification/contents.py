@@ -21,7 +21,7 @@ from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.targets import PREPRINT
 from study.tables import declared
-from study.tables.claims import load_claims
+from study.tables.claims.rules import load_claims
 from study.tables.kit.document import document
 
 CONTENTS = Place("contents.md")

@@ -13,7 +13,7 @@ from pdrom.core.store import Condition, check_file, read_table
 from study.artifact.paths import TABLE
 from study.pipeline.resolve import Job
 from study.tables import declared
-from study.tables.claims import is_timed, load_claims
+from study.tables.claims.rules import load_claims
 from study.verification.again import is_derived, made
 from study.verification.compare import Comparison
 from study.verification.judge import Judgement, in_words, judge
@@ -224,7 +224,7 @@ def claim_line(
 def _rests_on_times(claim: str, part: str) -> bool:
     """Whether a test decides that compares times, of the ``published`` or ``beyond`` ones."""
     rule = load_claims(RULES).get(claim)
-    return any(test.decides and is_timed(test) for test in getattr(rule, part, ()))
+    return any(test.decides and test.timed for test in getattr(rule, part, ()))
 
 
 def _results(paths: Sequence[str]) -> list[str]:

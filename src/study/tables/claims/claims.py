@@ -1,15 +1,38 @@
 """Table claims: the verdicts on the preprint's claims, with the rules of config/claims.yaml."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
-from study.artifact.reads import ProjectFile, Setting, TableOf
-from study.tables.claims import VERDICTS, claims_rows, load_claims, timed_columns
-from study.tables.claims.metrics import READ
-from study.tables.claims.rules import NONE_ADDED, Added
+from study.tables.claims.metrics import Tables
+from study.tables.claims.rules import (
+    NONE_ADDED,
+    PARTS,
+    READS,
+    Added,
+    Change,
+    ClaimRule,
+    TestRule,
+    load_claims,
+)
+from study.tables.claims.verdicts import VERDICTS, combined, evaluate
 from study.tables.kit.declaration import compared, text, timed
 from study.tables.kit.declaration import table as declare
+
+
+def timed_columns(rule: ClaimRule) -> set[str]:
+    """Columns of the row of a ``rule`` that depend on timing: two runs may differ there."""
+    found: set[str] = set()
+    for part, suffix in PARTS.items():
+        timed = [test for test in getattr(rule, part) if test.timed]
+        if timed:
+            found.add(f"why{suffix}")
+        if any(test.decides for test in timed):
+            found |= {f"{name}{suffix}" for name in ("measured", "verdict", "condition")}
+            found.add("answer")
+    return found
 
 
 def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
@@ -45,13 +68,48 @@ def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         compared("skipped", timed(text("answer", "both verdicts in words"))),
         text("history", "when and why the rules became what they are"),
     ),
-    reads={
-        "rules": ProjectFile("config/claims.yaml"),
-        "added": Setting("claim_sets"),
-        **{name: TableOf(name) for name in READ},
-    },
+    reads=READS,
     timed_cells=_timed_cells,
 )
 def claims(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame) -> pd.DataFrame:
     """One row per claim, in the order of the file ``rules``; see `claims_rows`."""
     return claims_rows(load_claims(rules, added), tables)
+
+
+def claims_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
+    """Rows of the table claims from ``rules`` and ``tables``, in the order of the file."""
+    return pd.DataFrame([_row(name, rule, tables) for name, rule in rules.items()])
+
+
+def _row(name: str, rule: ClaimRule, tables: Tables) -> dict[str, Any]:
+    published, beyond = _decided(rule.published, tables), _decided(rule.beyond, tables)
+    return {
+        "claim": name,
+        "source": rule.source,
+        "paper": rule.paper,
+        **published,
+        "figure_or_table": rule.figure_or_table,
+        "section": rule.section,
+        "shown": rule.shown,
+        "text": rule.text,
+        "qualifiers": rule.qualifiers,
+        **{f"{key}_beyond": value for key, value in beyond.items()},
+        "answer": f"as published it {published['verdict']}, beyond it {beyond['verdict']}",
+        "history": " ".join(_told(change) for change in rule.changes),
+    }
+
+
+def _decided(tests: Sequence[TestRule], tables: Tables) -> dict[str, str]:
+    outcomes = [(test, evaluate(test, tables)) for test in tests]
+    deciding = [o for test, o in outcomes if test.decides]
+    return {
+        "measured": "; ".join(o.measured for o in deciding),
+        "verdict": combined([o.verdict for o in deciding]),
+        "condition": "; ".join(o.condition for o in deciding if o.condition),
+        "why": "; ".join(o.sentence for _, o in outcomes) + ".",
+    }
+
+
+def _told(change: Change) -> str:
+    known = " (results were known)" if change.after_data else ""
+    return f"{change.date.isoformat()}{known}: {change.reason}"

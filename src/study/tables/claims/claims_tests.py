@@ -1,15 +1,27 @@
 """Table claims_tests: every test of config/claims.yaml and what it found."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pandas as pd
 
-from study.artifact.reads import ProjectFile, Setting, TableOf
-from study.tables.claims import FOUND, VERDICTS, is_timed, load_claims, outcome_rows
-from study.tables.claims.metrics import READ
-from study.tables.claims.rules import NONE_ADDED, Added
-from study.tables.claims.sensitivity import PARTS
+from study.tables.claims.metrics import VALUE, Tables
+from study.tables.claims.rules import (
+    NONE_ADDED,
+    PARTS,
+    READS,
+    Added,
+    ClaimRule,
+    TestRule,
+    load_claims,
+)
+from study.tables.claims.verdicts import VERDICTS, answer_of, close, satisfied, values_of
 from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
+
+SAID = {"what", "metric", "decides", "compare", "threshold", "share"}
+FOUND = ("satisfied", "of", "close", "least", "median", "most", "verdict")
 
 
 def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
@@ -21,7 +33,7 @@ def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         for test in getattr(rule, part)
     }
     keys = zip(table.claim, table.part, table.what, strict=True)
-    return [set(FOUND) if is_timed(tests[key]) else set() for key in keys]
+    return [set(FOUND) if tests[key].timed else set() for key in keys]
 
 
 @table(
@@ -46,13 +58,33 @@ def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         compared("skipped", timed(number("most", "largest value"))),
         compared("exact", timed(text("verdict", f"of this test, one of: {', '.join(VERDICTS)}"))),
     ),
-    reads={
-        "rules": ProjectFile("config/claims.yaml"),
-        "added": Setting("claim_sets"),
-        **{name: TableOf(name) for name in READ},
-    },
+    reads=READS,
     timed_cells=_timed_cells,
 )
 def claims_tests(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame) -> pd.DataFrame:
     """One row per claim, part and test, in the order of the file ``rules``; see `claims`."""
     return outcome_rows(load_claims(rules, added), tables)
+
+
+def outcome_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
+    """Rows of the table claims_tests from ``rules`` and ``tables``, in the order of the file."""
+    rows = [
+        {"claim": name, "part": part, **_said(test), **_found(test, tables)}
+        for name, rule in rules.items()
+        for part in PARTS
+        for test in getattr(rule, part)
+    ]
+    return pd.DataFrame(rows)
+
+
+def _said(test: TestRule) -> dict[str, Any]:
+    return test.model_dump(include=SAID) | {"margin": test.factor if test.timed else None}
+
+
+def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
+    """Counts and the range of the values, which is empty where there are none."""
+    values = values_of(test, tables)[VALUE].to_numpy(float)
+    good, total = int(satisfied(test, values).sum()), len(values)
+    spread = (values.min(), np.median(values), values.max()) if total else (None, None, None)
+    found = (good, total, int(close(test, values).sum()), *spread, answer_of(test, values))
+    return dict(zip(FOUND, found, strict=True))

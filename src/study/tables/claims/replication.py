@@ -5,12 +5,12 @@ from pathlib import Path
 import pandas as pd
 
 from study.artifact.reads import ProjectFile, TableOf
-from study.tables.claims import VERDICTS, load_claims
+from study.tables.claims.rules import PARTS, load_claims
+from study.tables.claims.verdicts import VERDICTS
 from study.tables.kit.declaration import compared, flag, table, text, timed
 
 RULES = "config/claims.yaml"
 RECORDED = "config/reference/replication/claims.csv"
-PARTS = {"published": "", "beyond": "_beyond"}
 MEASURED = [f"{name}{suffix}" for suffix in PARTS.values() for name in ("verdict", "measured")]
 
 

@@ -12,22 +12,25 @@ from pydantic import Field, FiniteFloat, model_validator
 
 from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
+from study.artifact.reads import ProjectFile, Read, Setting, TableOf
 from study.tables import declared
-from study.tables.claims.metrics import METRICS
-from study.tables.claims.rows import Value
+from study.tables.claims.metrics import METRICS, Value
 
 SETS = "sets"
 _NAMED = "@"  # opens the name of a set in ``where``
 Added = Mapping[str, Sequence[Value]]
 NONE_ADDED: Added = MappingProxyType({})
 MARGIN = 1.5  # of tests that compare times and name no other
+PARTS = {"published": "", "beyond": "_beyond"}  # both verdicts, and what ends their columns
+# What the tables of the claims read.
+READS: dict[str, Read] = {
+    "rules": ProjectFile("config/claims.yaml"),
+    "added": Setting("claim_sets"),
+    **{name: TableOf(name) for name in sorted({metric.table for metric in METRICS.values()})},
+}
 
 
-class _Model(ConfigModel):
-    """Base of the rules."""
-
-
-class TestRule(_Model):
+class TestRule(ConfigModel):
     """One comparison.
 
     what : words for the rows that are compared, used in the reason
@@ -84,7 +87,7 @@ class TestRule(_Model):
         return self
 
 
-class Change(_Model):
+class Change(ConfigModel):
     """Date and reason of a change in the rules of a claim.
 
     after_data : whether results that the rules decide on were known by then
@@ -97,7 +100,7 @@ class Change(_Model):
     rules: str | None = None
 
 
-class ClaimRule(_Model):
+class ClaimRule(ConfigModel):
     """A claim of the preprint, where it stands, and the tests that decide it.
 
     text : the claim in our words
@@ -122,7 +125,7 @@ class ClaimRule(_Model):
 
     @model_validator(mode="after")
     def _something_decides(self) -> Self:
-        for part in ("published", "beyond"):
+        for part in PARTS:
             if not any(test.decides for test in getattr(self, part)):
                 raise ValueError(f"{part}: none of them decides")
         return self

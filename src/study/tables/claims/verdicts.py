@@ -1,15 +1,13 @@
 """Verdicts: the tests of a claim, evaluated."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from study.tables.claims.metrics import METRICS
-from study.tables.claims.rows import VALUE, Tables, filtered
-from study.tables.claims.rules import Change, ClaimRule, TestRule
+from study.tables.claims.metrics import METRICS, VALUE, Tables, filtered
+from study.tables.claims.rules import TestRule
 
 VERDICTS = HOLDS, FAILS, DEPENDS, MACHINE, UNDECIDED = (
     "holds", "does not hold", "depends", "depends on the machine", "cannot be decided",
@@ -31,25 +29,6 @@ class Outcome:
     measured: str
     sentence: str
     condition: str = ""
-
-
-def timed_columns(rule: ClaimRule) -> set[str]:
-    """Columns of the row of a ``rule`` that depend on timing: two runs may differ there."""
-    found: set[str] = set()
-    for part, suffix in (("published", ""), ("beyond", "_beyond")):
-        tests: Sequence[TestRule] = getattr(rule, part)
-        timed = [test for test in tests if is_timed(test)]
-        if timed:
-            found.add(f"why{suffix}")
-        if any(test.decides for test in timed):
-            found |= {f"{name}{suffix}" for name in ("measured", "verdict", "condition")}
-            found.add("answer")
-    return found
-
-
-def is_timed(test: TestRule) -> bool:
-    """Whether what a test compares depends on timing."""
-    return test.timed
 
 
 def values_of(test: TestRule, tables: Tables) -> pd.DataFrame:
@@ -150,42 +129,3 @@ def combined(verdicts: Sequence[str]) -> str:
         if verdict in verdicts:
             return verdict
     return HOLDS
-
-
-def claims_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
-    """Rows of the table claims from ``rules`` and ``tables``, in the order of the file."""
-    return pd.DataFrame([_row(name, rule, tables) for name, rule in rules.items()])
-
-
-def _row(name: str, rule: ClaimRule, tables: Tables) -> dict[str, Any]:
-    published, beyond = _decided(rule.published, tables), _decided(rule.beyond, tables)
-    return {
-        "claim": name,
-        "source": rule.source,
-        "paper": rule.paper,
-        **published,
-        "figure_or_table": rule.figure_or_table,
-        "section": rule.section,
-        "shown": rule.shown,
-        "text": rule.text,
-        "qualifiers": rule.qualifiers,
-        **{f"{key}_beyond": value for key, value in beyond.items()},
-        "answer": f"as published it {published['verdict']}, beyond it {beyond['verdict']}",
-        "history": " ".join(_told(change) for change in rule.changes),
-    }
-
-
-def _decided(tests: Sequence[TestRule], tables: Tables) -> dict[str, str]:
-    outcomes = [(test, evaluate(test, tables)) for test in tests]
-    deciding = [o for test, o in outcomes if test.decides]
-    return {
-        "measured": "; ".join(o.measured for o in deciding),
-        "verdict": combined([o.verdict for o in deciding]),
-        "condition": "; ".join(o.condition for o in deciding if o.condition),
-        "why": "; ".join(o.sentence for _, o in outcomes) + ".",
-    }
-
-
-def _told(change: Change) -> str:
-    known = " (results were known)" if change.after_data else ""
-    return f"{change.date.isoformat()}{known}: {change.reason}"

@@ -7,9 +7,9 @@ import pandas as pd
 from pdrom.core.store import write_table
 from places import ROOT
 from study.pipeline.tracked import recorded_verdicts
-from study.tables.claims import load_claims
 from study.tables.claims.claims import claims
 from study.tables.claims.replication import MEASURED, RECORDED, RULES, replication
+from study.tables.claims.rules import load_claims
 
 
 def verdicts(**columns: str) -> pd.DataFrame:

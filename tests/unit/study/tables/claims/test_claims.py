@@ -12,25 +12,20 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import validate
 from places import ROOT
 from study.tables import declared
-from study.tables.claims import (
+from study.tables.claims.claims import claims, claims_rows, timed_columns
+from study.tables.claims.metrics import METRICS
+from study.tables.claims.rules import MARGIN, ClaimRule, TestRule, load_claims
+from study.tables.claims.verdicts import (
     DEPENDS,
     FAILS,
     HOLDS,
     MACHINE,
-    METRICS,
     UNDECIDED,
-    ClaimRule,
-    TestRule,
+    answer,
     answer_of,
-    claims_rows,
-    load_claims,
-    timed_columns,
     values_of,
 )
-from study.tables.claims import evaluate as evaluated
-from study.tables.claims.claims import claims
-from study.tables.claims.rules import MARGIN
-from study.tables.claims.verdicts import answer
+from study.tables.claims.verdicts import evaluate as evaluated
 
 RERUNS = [
     # scene, group, method, position_basis, k, r, frames, blowup, error within, local_ms

@@ -5,9 +5,10 @@ import pytest
 
 from places import ROOT
 from study.tables import declared
-from study.tables.claims import MACHINE, UNDECIDED, load_claims, outcome_rows
-from study.tables.claims.claims_tests import claims_tests
-from study.tables.claims.verdicts import claims_rows, combined
+from study.tables.claims.claims import claims_rows
+from study.tables.claims.claims_tests import claims_tests, outcome_rows
+from study.tables.claims.rules import load_claims
+from study.tables.claims.verdicts import MACHINE, UNDECIDED, combined
 
 RULES = load_claims(ROOT / "config" / "claims.yaml")
 SHARES = pd.DataFrame(
