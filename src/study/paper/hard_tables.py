@@ -7,7 +7,7 @@ import pandas as pd
 
 from pdrom.view.text import escape
 from study.experiments.hard_cases.catalogue import CASES
-from study.experiments.hard_cases.expectations import FAILURES, HOLDS, NOT_TAKEN, NOTHING
+from study.experiments.hard_cases.outcomes import FAILURES, HOLDS, NOT_TAKEN, NOTHING
 from study.paper.macros import format_number
 from study.paper.tabular import longtable, name
 

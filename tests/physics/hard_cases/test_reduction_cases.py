@@ -9,9 +9,14 @@ from hard_cases import EXPECTED, METHODS, training
 from pdrom.model.effects import EFFECTS
 from study.experiments.hard_cases.catalogue import CASES as CATALOGUE
 from study.experiments.hard_cases.catalogue import reducible_cases
-from study.experiments.hard_cases.expectations import FAILURES, NOT_TAKEN, surprise
-from study.experiments.hard_cases.outcomes import row
-from study.experiments.hard_cases.reductions import names, reduced_run
+from study.experiments.hard_cases.outcomes import (
+    FAILURES,
+    NOT_TAKEN,
+    names,
+    reduced_run,
+    row,
+    surprise,
+)
 
 CASES = [*reducible_cases(), *reducible_cases(slow=True)]
 REDUCTIONS = names(METHODS)

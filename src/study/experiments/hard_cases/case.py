@@ -1,14 +1,15 @@
-"""A hard case: a scene, what must hold in it, and its bounds."""
+"""A hard case: a scene, what must hold in it, its bounds, and small meshes and starts for it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from pdrom.core.yamlfile import validate
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.effects import EFFECTS
+from pdrom.model.mesh.generators import bar, boundary, cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene, SceneConfig
 
@@ -83,3 +84,136 @@ def build(
         "hard case",
     )
     return Scene.build(config, mesh, masses=masses)
+
+
+Start = Callable[[Scene], State]
+SEED = 7
+
+
+def sheet(
+    plane: Literal["xy", "xz"] = "xz", wave: float = 0.0, rows: int = 6, columns: int = 6
+) -> Mesh:
+    """A sheet of ``rows`` times ``columns`` vertices in ``plane``, with ``wave`` as in `cloth`."""
+    return cloth(rows, columns, plane, wave=wave)
+
+
+def small_bar() -> Mesh:
+    """A bar of 45 vertices, 80 tetrahedra."""
+    return bar(5, 3, 3)
+
+
+def one_triangle() -> Mesh:
+    """A single triangle."""
+    return Mesh(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]], np.int32))
+
+
+def one_tetrahedron() -> Mesh:
+    """A single tetrahedron."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    tetrahedra = np.array([[0, 1, 2, 3]], np.int32)
+    return Mesh(points, boundary(tetrahedra), tetrahedra)
+
+
+def scaled(mesh: Mesh, *factors: float) -> Mesh:
+    """``mesh`` with its axes scaled by ``factors`` (one, or three)."""
+    return Mesh(mesh.points * np.array(factors), mesh.triangles, mesh.tetrahedra)
+
+
+def shifted(mesh: Mesh, *offset: float) -> Mesh:
+    """``mesh`` moved by ``offset``."""
+    return Mesh(mesh.points + np.array(offset), mesh.triangles, mesh.tetrahedra)
+
+
+def both(first: Mesh, second: Mesh) -> Mesh:
+    """The meshes ``first`` and ``second`` in one, not connected."""
+    n = first.vertices
+    return Mesh(
+        np.concatenate([first.points, second.points]),
+        np.concatenate([first.triangles, second.triangles + n]).astype(np.int32),
+        np.concatenate([first.tetrahedra, second.tetrahedra + n]).astype(np.int32),
+    )
+
+
+def mapped(*rows: tuple[float, float, float]) -> Start:
+    """Rest shape under the linear map with these three ``rows`` about its centre, at rest."""
+    matrix = np.array(rows)
+
+    def start(scene: Scene) -> State:
+        points = scene.mesh.points
+        centre = points.mean(axis=0)
+        return still(centre + (points - centre) @ matrix.T)
+
+    return start
+
+
+def scales(x: float, y: float, z: float) -> Start:
+    """The rest shape scaled by ``x``, ``y``, ``z`` about its centre (negative: mirrored)."""
+    return mapped((x, 0, 0), (0, y, 0), (0, 0, z))
+
+
+def still(positions: np.ndarray) -> State:
+    """A state at ``positions`` (N, 3) without velocity."""
+    return State(positions, np.zeros_like(positions))
+
+
+def scrambled(size: float = 1.0) -> Start:
+    """Vertices at random in a box of ``size`` rest extents."""
+
+    def start(scene: Scene) -> State:
+        points = scene.mesh.points
+        box = np.random.default_rng(SEED).uniform(-0.5, 0.5, points.shape)
+        return still(points.mean(axis=0) + size * scene.mesh.extent * box)
+
+    return start
+
+
+def noisy(start: Start, size: float) -> Start:
+    """``start`` with normal noise of ``size`` rest extents."""
+
+    def moved(scene: Scene) -> State:
+        noise = np.random.default_rng(SEED).standard_normal(scene.mesh.points.shape)
+        return still(start(scene).positions + size * scene.mesh.extent * noise)
+
+    return moved
+
+
+def pairs_merged(scene: Scene) -> State:
+    """Every odd vertex of ``scene`` lies on the vertex before it: edges of length zero."""
+    points = scene.mesh.points.copy()
+    points[1::2] = points[: len(points) - len(points) % 2 : 2]
+    return still(points)
+
+
+def folded(scene: Scene) -> State:
+    """The half x > 0 of ``scene`` lies on the half x < 0: vertices of its elements coincide."""
+    points = scene.mesh.points.copy()
+    centre = 0.5 * (points[:, 0].min() + points[:, 0].max())
+    points[:, 0] = centre - np.abs(points[:, 0] - centre)
+    return still(points)
+
+
+def moving(velocity: tuple[float, float, float]) -> Start:
+    """The rest shape with one velocity for all vertices, m/s."""
+
+    def start(scene: Scene) -> State:
+        points = scene.mesh.points.copy()
+        return State(points, np.tile(np.array(velocity), (len(points), 1)))
+
+    return start
+
+
+def meeting(speed: float) -> Start:
+    """The upper half of the vertices moves down and the lower half up at ``speed``, m/s."""
+
+    def start(scene: Scene) -> State:
+        points = scene.mesh.points.copy()
+        velocities = np.zeros_like(points)
+        velocities[:, 1] = np.where(points[:, 1] > points[:, 1].mean(), -speed, speed)
+        return State(points, velocities)
+
+    return start
+
+
+def lowered(offset: float) -> Start:
+    """The rest shape moved by ``offset`` along y."""
+    return lambda scene: still(scene.mesh.points + np.array([0.0, offset, 0.0]))

@@ -9,8 +9,9 @@ import numpy as np
 from pdrom.core.project import config_file
 from pdrom.model.mesh.files import read_mesh_file
 from pdrom.model.mesh.types import Mesh
-from study.experiments.hard_cases.case import HardCase, Recipe
-from study.experiments.hard_cases.shapes import (
+from study.experiments.hard_cases.case import (
+    HardCase,
+    Recipe,
     both,
     folded,
     lowered,

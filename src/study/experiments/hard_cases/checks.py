@@ -11,9 +11,7 @@ from pdrom.core.errors import PdromError
 from pdrom.model.metrics import shape_residuals
 from pdrom.model.scene import Scene
 from study.experiments.hard_cases.case import HardCase
-from study.experiments.hard_cases.record import Record
-from study.experiments.hard_cases.roundoff import EPS, OPERATIONS
-from study.experiments.hard_cases.runs import full_order
+from study.experiments.hard_cases.record import EPS, OPERATIONS, Record, full_order
 
 Check = Callable[[HardCase, Scene, Record], str]
 

@@ -14,8 +14,7 @@ from pdrom.reduction.method import MethodSpec
 from study.artifact.paths import HARD_CASES, File
 from study.artifact.reads import ProjectFiles, Setting
 from study.experiments.hard_cases.catalogue import CASES, MESHES, modules_of, reducible_cases
-from study.experiments.hard_cases.expectations import Expectation, surprise
-from study.experiments.hard_cases.outcomes import rows
+from study.experiments.hard_cases.outcomes import Expectation, rows, surprise
 from study.experiments.kit.declaration import experiment
 
 log = logging.getLogger(__name__)

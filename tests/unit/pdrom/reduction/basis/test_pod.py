@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from pymor.algorithms.pod import pod as pymor_pod
 from pymor.vectorarrays.numpy import NumpyVectorSpace
 
-from pdrom.reduction.basis.pod import fix_signs, pod
+from pdrom.reduction.basis.pod import fix_signs, numerical_rank, pod
 
 SHAPES = st.tuples(st.integers(1, 60), st.integers(1, 12), st.integers(0, 2**32 - 1))
 
@@ -87,3 +87,32 @@ def test_signs_do_not_depend_on_those_of_the_input(shape, seed):
 @pytest.mark.parametrize("shape", [(7, 0), (0, 0)])
 def test_no_column_has_no_sign(shape):
     assert fix_signs(np.empty(shape)).shape == shape
+
+
+EPS = np.finfo(float).eps
+
+
+@pytest.mark.parametrize(
+    ("sigma", "shape", "roundoff", "rank"),
+    [
+        ([], (10, 0), 0.0, 0),
+        ([0.0, 0.0], (10, 2), 0.0, 0),
+        ([3.0, 2.0, 1.0], (10, 3), 0.0, 3),
+        ([3.0, 2.0, 1.0], (10, 3), 1.5, 2),
+        ([3.0, 2.0, 1.0], (10, 3), 5.0, 0),
+        # on a level is not above it
+        ([3.0, 2.0, 1.0], (10, 3), 2.0, 1),
+        ([1.0, 11 * EPS, 9 * EPS], (10, 3), 0.0, 2),
+        ([1.0, 11 * EPS, 9 * EPS], (3, 10), 0.0, 2),
+        ([1.0, 11 * EPS, 9 * EPS], (8, 8), 0.0, 3),
+    ],
+)
+def test_counts_what_is_above_both_levels(sigma, shape, roundoff, rank):
+    assert numerical_rank(np.array(sigma), shape, roundoff) == rank
+
+
+def test_noise_that_decays_nicely_has_no_rank(rng):
+    """A flat sheet's bending: singular values near 1e-12 and nothing but cancellation."""
+    sigma = np.linalg.svd(1e-13 * rng.standard_normal((300, 20)), compute_uv=False)
+    assert numerical_rank(sigma, (300, 20), 1e-10) == 0
+    assert numerical_rank(sigma, (300, 20), 0.0) == 20

@@ -4,16 +4,34 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from meshless import assert_reads_nothing_of_the_mesh
+from test_subspace_run import GRAVITY, PINS, SCENES, SPRING, run_model, whole_space
 
-from builders import GROUPS, make_scene
+from builders import GROUPS, make_scene, random_rotation
 from pdrom.core.errors import SamplingError
+from pdrom.core.store import open_hdf5, write_hdf5
+from pdrom.model.constraints.lanes import LANES
+from pdrom.model.runs.full_order import trajectory
+from pdrom.reduction.basis import compute_basis
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.sampling.reduction import Reduction
+from pdrom.reduction.sampling.select import select
 from pdrom.reduction.subspace.columns import skinning_weights
 from pdrom.reduction.subspace.hrpd import (
     HrpdSpec,
     SampledSpace,
     element_centres,
+    hrpd,
     sampled_space,
 )
+from pdrom.reduction.subspace.interpolation import (
+    InterpolatedLocalStep,
+    Interpolation,
+    interpolation_of,
+)
+from pdrom.reduction.subspace.local_step import SubspaceLocalStep
+from pdrom.reduction.subspace.model import SubspaceModel, make_columns
+from pdrom.reduction.subspace.space import coordinates
 
 
 def test_centres_are_the_mean_of_the_elements_vertices(group_scene):
@@ -101,3 +119,160 @@ def test_a_singular_sample_is_a_named_error(group_scene):
 def test_a_group_without_rest_vectors_has_no_space():
     scene = make_scene({"effect": "bending", "weight": 1.0})
     assert sampled_space(scene.groups[0], scene.mesh.points, HrpdSpec()) is None
+
+
+R = 4
+HRPD = HrpdSpec(dimension=8, samples=20)
+
+
+def right_hand_sides(scene, columns, interpolation, q, y):
+    """Of the interpolated and of the full projections, both (K, 3), at coordinates of q and y."""
+    group = scene.groups[0]
+    found = []
+    for step in (
+        InterpolatedLocalStep(group, columns, interpolation),
+        SubspaceLocalStep(group, columns),
+    ):
+        rhs = np.zeros((columns.B.shape[1], 3))
+        step.begin_frame(coordinates(columns, scene.masses, q))
+        step.accumulate(coordinates(columns, scene.masses, y), rhs)
+        found.append(rhs)
+    return found
+
+
+def hrpd_of(scene, columns):
+    return {
+        g.name: hrpd(g, columns, sampled_space(g, scene.mesh.points, HRPD)) for g in scene.groups
+    }
+
+
+def test_hrpd_with_all_elements_and_dimensions_is_the_full_projection(group_scene, rng):
+    scene, group = group_scene, group_scene.groups[0]
+    spec = HrpdSpec(dimension=group.elements * group.rows_per_element, samples=group.elements)
+    space = sampled_space(group, scene.mesh.points, spec)
+    assert space.V.shape[1] == spec.dimension
+    columns = whole_space(scene)
+    y = scene.mesh.points + 0.1 * rng.standard_normal(scene.mesh.points.shape)
+    found = hrpd(group, columns, space)
+    one, two = right_hand_sides(scene, columns, found, scene.mesh.points, y)
+    np.testing.assert_allclose(one, two, atol=1e-8 * np.abs(two).max())
+
+
+def test_hrpd_is_exact_for_the_rest_shape_in_every_orientation(group_scene, rng):
+    """One linear map for all elements is in the space, whatever its dimension and samples."""
+    scene, group = group_scene, group_scene.groups[0]
+    columns = make_columns(scene, scene.mesh.points[None], "skinning", 3)
+    found = hrpd(group, columns, sampled_space(group, scene.mesh.points, HRPD))
+    assert len(found.elements) == min(HRPD.samples, group.elements)
+    y = scene.mesh.points @ random_rotation(rng).T + rng.standard_normal(3)
+    one, two = right_hand_sides(scene, columns, found, y, y)
+    assert np.abs(two).max() > 0.0
+    np.testing.assert_allclose(one, two, atol=1e-9 * np.abs(two).max())
+
+
+@pytest.mark.parametrize("kind", ["pod", "skinning"])
+@pytest.mark.parametrize("name", ["pins", "handles", "bar"])
+def test_pins_and_handles_are_met_exactly(name, kind):
+    scene = SCENES[name]()
+    reference = trajectory(scene)
+    columns = make_columns(scene, reference[1:], kind, 3)
+    found = hrpd_of(scene, columns)
+    result = run_model(scene, SubspaceModel(kind, columns, found))
+    assert np.isfinite(result).all()
+    for boundary in scene.boundaries:
+        held = boundary.held(0)
+        np.testing.assert_allclose(result[1:, held], reference[1:, held], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["handles", "bending", "bar", "poke", "damped"])
+def test_a_step_reads_nothing_of_the_mesh(name):
+    """With everything of the length of the mesh overwritten the second run is the same."""
+    config = SCENES[name]().config
+    effects = [e.model_dump() for e in config.effects]
+    scene = make_scene(*effects, mesh=config.mesh.model_dump(), frames=config.frames)
+    reference = trajectory(scene)
+    columns = make_columns(scene, reference[1:], "pod", 3)
+    found = hrpd_of(scene, columns)
+    loop, start = SubspaceModel("pod", columns, found).loop(scene)
+    assert_reads_nothing_of_the_mesh(scene, columns, loop, start)
+
+
+def test_arrays_of_a_step_have_the_size_of_the_sample():
+    """Meshes of two sizes: nothing that the step holds grows."""
+    sizes = []
+    for rows in (10, 20):
+        scene = make_scene(SPRING, PINS, mesh={"kind": "cloth", "rows": rows, "columns": 10})
+        run = trajectory(scene)
+        columns = make_columns(scene, run[1:], "skinning", 4)
+        found = hrpd(
+            scene.groups[0],
+            columns,
+            sampled_space(scene.groups[0], scene.mesh.points, HrpdSpec(dimension=6, samples=8)),
+        )
+        step = InterpolatedLocalStep(scene.groups[0], columns, found)
+        held = [v for v in vars(step).values() if isinstance(v, np.ndarray)]
+        held += [v for v in vars(step.group).values() if isinstance(v, np.ndarray)]
+        held += [v for v in vars(found).values() if isinstance(v, np.ndarray)]
+        assert len(held) >= 9
+        sizes.append(sum(a.size for a in held))
+        # blocks are filled up
+        numbers = 5
+        assert max(a.shape[0] for a in held) <= max(2 * 8 * group_vertices(scene), numbers * LANES)
+    # the sampled edges share another number of vertices, nothing else differs
+    assert abs(sizes[1] - sizes[0]) <= 8 * columns.B.shape[1]
+
+
+def group_vertices(scene) -> int:
+    """Vertices of one element."""
+    return int(np.diff(scene.groups[0].S.indptr).max())
+
+
+def test_projections_that_are_round_off_need_no_element():
+    """A flat sheet has nothing to bend: no mode, no sample, and the same run as with all."""
+    scene = make_scene({"effect": "bending", "weight": 10.0}, SPRING, GRAVITY, PINS, frames=5)
+    reference = trajectory(scene)
+    columns = make_columns(scene, reference[1:], "pod", 3)
+    found = hrpd_of(scene, columns)
+    assert len(found["bending"].elements) == 0
+    kept = {"bending": found["bending"]}
+    one = run_model(scene, SubspaceModel("pod", columns, kept))
+    np.testing.assert_allclose(one, run_model(scene, SubspaceModel("pod", columns)), atol=1e-9)
+
+
+def test_interpolations_survive_a_file(tmp_path):
+    scene = SCENES["pins"]()
+    found = hrpd_of(scene, make_columns(scene, trajectory(scene)[1:], "pod", 3))["spring"]
+    with write_hdf5(tmp_path / "it.h5") as file:
+        found.save(file.create_group("it"))
+    with open_hdf5(tmp_path / "it.h5") as file:
+        loaded = Interpolation.load(file["it"])
+    assert loaded.gain == found.gain
+    for name, value in vars(found).items():
+        np.testing.assert_array_equal(getattr(loaded, name), value)
+
+
+@pytest.mark.parametrize(
+    "choices",
+    [
+        {"rows": "joint", "centring": "none", "solve": "square"},
+        {"rows": "element", "centring": "affine"},
+    ],
+    ids=["joint rows", "whole elements"],
+)
+def test_the_right_hand_side_by_a_reduction_is_that_of_its_reconstruction(choices):
+    pull, pins = {"effect": "gravity"}, {"effect": "pins", "select": "left"}
+    scene = make_scene(pull, pins, {"effect": "strain", "weight": 1e4}, mesh=GROUPS["strain"])
+    (group,) = scene.groups
+    run = trajectory(scene, track_objective=False)
+    snapshots = np.stack([group.project(q) for q in run])
+    spec = MethodSpec(title="x", **choices)
+    basis = compute_basis(snapshots, np.ones(len(group.row_weights)), 1e-12, 2, spec)
+    reduction = Reduction(basis, select(basis, spec, R), spec, R)
+    columns = make_columns(scene, run, "pod", 3)
+    step = InterpolatedLocalStep(group, columns, interpolation_of(group, columns, reduction))
+    z = np.random.default_rng(0).standard_normal((columns.B.shape[1], 3))
+    rhs = np.zeros_like(z)
+    step.accumulate(z, rhs)
+    p = reduction.reconstruct(group.project(columns.B @ z)[None])[0]
+    strain = group.S @ columns.B
+    assert rhs == pytest.approx(strain.T @ (group.row_weights[:, None] * p), rel=1e-9, abs=1e-9)

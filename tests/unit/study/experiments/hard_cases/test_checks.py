@@ -7,9 +7,7 @@ import pytest
 
 from study.experiments.hard_cases.catalogue import CASES
 from study.experiments.hard_cases.checks import CHECKS, faults
-from study.experiments.hard_cases.record import record
-from study.experiments.hard_cases.roundoff import Roundoff
-from study.experiments.hard_cases.runs import full_order
+from study.experiments.hard_cases.record import Roundoff, full_order, record
 
 CASE = CASES["inverted_uneven"]
 
