@@ -13,9 +13,9 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 43_511,
-    "modules of src": 407,
-    "lines of tests": 29_881,
+    "lines of src": 43_463,
+    "modules of src": 402,
+    "lines of tests": 29_837,
     "words of documentation": 24_861,
     "tables": 26,
     "figures": 23,
