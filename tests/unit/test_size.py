@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 43_463,
-    "modules of src": 402,
-    "lines of tests": 29_837,
+    "lines of src": 43_297,
+    "modules of src": 394,
+    "lines of tests": 29_802,
     "words of documentation": 24_861,
     "tables": 26,
     "figures": 23,
     "experiments": 21,
-    "percent of src in decorators, signatures and imports": 22.49,
+    "percent of src in decorators, signatures and imports": 22.4,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

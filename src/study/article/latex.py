@@ -13,8 +13,7 @@ import pandas as pd
 
 from pdrom.view.text import escape
 from study.paper.build import Facts
-from study.paper.known import NOTED, SHOWN, closing, note, sentences
-from study.paper.macros import matching
+from study.paper.macros import NOTED, SHOWN, closing, matching, note, sentences
 
 ORIGIN = "origin:"
 _COMMENT = re.compile(r"(?m)^[ \t]*%.*\n|(?<!\\)%.*$")

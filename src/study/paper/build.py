@@ -18,14 +18,12 @@ from study.artifact.files import Files
 from study.artifact.paths import FIGURE, MACHINE, PAPER_INPUT, TABLE, File
 from study.artifact.reads import Every, One, ProjectFile, Setting, SourcesOf
 from study.paper.bibliography import bibliography
-from study.paper.figuretex import captions
-from study.paper.known import decisions, provenance
-from study.paper.macros import keys_of, macros, number_of
+from study.paper.macros import captions, decisions, keys_of, macros, number_of, provenance
 from study.paper.source import DOCUMENTS, documents
 from study.paper.tex import build_pdfs
 from study.paper.textables import TEX_TABLES
 
-PAGES = {"main": 16}  # at most: all else belongs in the supplement
+PAGES = {"main": 16, "supplement": 30}  # at most
 
 
 class Facts(BaseModel):

@@ -1,21 +1,298 @@
 """Tables of the manuscript as TeX, generated from ``tables`` of the study by name."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import pandas as pd
 
 from pdrom.view.text import escape
-from study.paper.claim_tables import claims, claims_in_full
-from study.paper.cost_tables import break_even, exponents, iterations, positions
-from study.paper.hard_tables import hard_cases, hard_reductions
+from study.figures.kit.declaration import declarations
 from study.paper.macros import format_number
-from study.paper.speedup_tables import payoff, pays, speedups
-from study.paper.tabular import longtable, name, tabular
-from study.tables.kit.held_out import trained
+from study.tables.kit.held_out import MEDIAN, over_motions, trained
+from study.tables.kit.intervals import in_words
+from study.tables.winners import CURVE
 
 Tables = Mapping[str, pd.DataFrame]
+
+
+def tabular(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
+    """A tabular of ``rows`` with a ruled ``header``; cells are TeX already, as is ``columns``."""
+    lines = [rf"\begin{{tabular}}{{{columns}}}", *_head(header), *map(_line, rows)]
+    return "\n".join([*lines, r"\hline", r"\end{tabular}"]) + "\n"
+
+
+def longtable(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
+    r"""Table that may break across pages, below ``\captionrow``, which the text defines."""
+    head = _head(header)
+    lines = [rf"\begin{{longtable}}{{{columns}}}", r"\captionrow", *head, r"\endfirsthead"]
+    lines += [*head, r"\endhead", *map(_line, rows)]
+    return "\n".join([*lines, r"\hline", r"\end{longtable}"]) + "\n"
+
+
+def _head(header: Sequence[str]) -> list[str]:
+    return [r"\hline", _line(header), r"\hline"]
+
+
+def _line(cells: Sequence[str]) -> str:
+    return " & ".join(cells) + r" \\"
+
+
+def name(text: str) -> str:
+    """Name ``text`` of a scene, group or method, in typewriter."""
+    return rf"\texttt{{{escape(text)}}}"
+
+
+_VERDICT_COLOUR = {"holds": "okgreen", "does not hold": "okred"}
+_PARTS = {"published": "as published", "beyond": "beyond"}
+# Where the manuscript shows what a claim without a figure rests on.
+_SHOWN = {"C11": "reruns", "C12": "positions"}
+_SIGNS = {">=": r"$\ge$", "<=": r"$\le$"}
+
+
+def claims(tables: Tables) -> str:
+    """Both verdicts on each claim, with how many rows agree in the tests that decide it."""
+    tests = tables["claims_tests"]
+    tests = tests[tests.decides.astype(bool)]
+    rows = []
+    for row in tables["claims"].itertuples():
+        mine = tests[tests.claim == row.claim]
+        cells = [
+            _verdict(verdict, mine[mine.part == part])
+            for part, verdict in zip(_PARTS, (row.verdict, row.verdict_beyond), strict=True)
+        ]
+        rows.append([row.claim, escape(row.paper), *cells, _place(row.claim, row.figure_or_table)])
+    header = ["claim", "the preprint says", "as published", "beyond", "shown in"]
+    left = r">{\raggedright\arraybackslash}"
+    return tabular(header, rows, rf"l{left}p{{4.7cm}}{left}p{{3.2cm}}{left}p{{4.1cm}}l")
+
+
+def _verdict(verdict: str, tests: pd.DataFrame) -> str:
+    colour = _VERDICT_COLOUR.get(verdict, "okgrey")
+    counted = ", ".join(f"{test.satisfied}/{test.of}" for test in tests.itertuples())
+    return rf"\textcolor{{{colour}}}{{{escape(verdict)}}} ({counted})"
+
+
+def _place(claim: str, shown: str) -> str:
+    """A figure or a table of the manuscript by its number, a table of results by its name."""
+    if claim in _SHOWN:
+        return rf"table~\ref{{tab:{_SHOWN[claim]}}}"
+    return rf"figure~\ref{{fig:{shown}}}" if shown in declarations() else name(shown)
+
+
+def claims_in_full(tables: Tables) -> str:
+    """Every test that decides a verdict, with what was found."""
+    tests = tables["claims_tests"]
+    tests = tests[tests.decides.astype(bool)]
+    rows = []
+    for (claim, part), found in tests.groupby(["claim", "part"], sort=False):
+        for place, test in enumerate(found.itertuples()):
+            rows.append(["" if place else f"{claim} {_PARTS[part]}", *_test(test)])
+    header = ["", "test", "limit", "rows", "least", "median", "most"]
+    return tabular(header, rows, "llrrrrr")
+
+
+def _test(row: Any) -> list[str]:
+    """Describe a test: its limit, how many rows satisfy it, and the range of the values."""
+    spread = (row.least, row.median, row.most)
+    values = ["--" if pd.isna(value) else format_number(value) for value in spread]
+    limit = f"{_SIGNS[row.compare]} {format_number(row.threshold)}"
+    return [escape(row.what), limit, f"{row.satisfied} of {row.of}", *values]
+
+
+NONE = "--"
+# Runs of the table of iterations: method and iterations K.
+_RUNS = (("fom", 1), ("fom", 5), ("fom", 10), ("fom", 40), ("fom-anderson", 10))
+_TOLERANCE = "ecsw-1e-02"
+
+
+def iterations(tables: Tables) -> str:
+    """Error against the converged run and time per frame of full-order runs."""
+    table = tables["accuracy_cost"]
+    rows = []
+    for scene in table.scene.unique():
+        cells = [
+            _cell(
+                _rows(table, scene=scene, method=method, iterations=count),
+                lambda run: _with_time(run.relative_error_within_horizon, run.ms_per_frame),
+            )
+            for method, count in _RUNS
+        ]
+        rows.append([name(scene), *cells])
+    titles = [
+        f"$K = {count}$" + (", accelerated" if method != "fom" else "") for method, count in _RUNS
+    ]
+    return tabular(["scene", *titles], rows, "l" + "r" * len(_RUNS))
+
+
+def positions(tables: Tables) -> str:
+    """Errors and speed-ups in position subspaces of the largest dimension k."""
+    table = tables["reduced_reruns"]
+    rows = []
+    for scene in table.scene.unique():
+        runs = trained(_rows(table, scene=scene, group="all"))
+        if runs.empty:
+            continue
+        largest = runs[runs.k == runs.k.max()]
+        rows.append([name(scene), *_of_subspaces(largest, table)])
+    header = [
+        "scene", "all", "all, held out", "sampled", "sampled, held out", "elements", "speed-up",
+        "hrpd", "skinning, all",
+    ]  # fmt: skip
+    return tabular(header, rows, "l" + "r" * 8)
+
+
+def _of_subspaces(runs: pd.DataFrame, reruns: pd.DataFrame) -> list[str]:
+    def error(run: pd.Series) -> str:
+        return format_number(run.relative_error_within_horizon)
+
+    def unseen(run: pd.Series) -> str:
+        same = _rows(
+            reruns, scene=run.scene, group="all", method=run.method, k=run.k,
+            position_basis=run.position_basis,
+        )  # fmt: skip
+        return _cell(over_motions(same), lambda found: format_number(found[MEDIAN]))
+
+    full = _rows(runs, position_basis="pod", method="full")
+    sampled = _rows(runs, position_basis="pod", method=_TOLERANCE)
+    return [
+        _cell(full, error),
+        _cell(full, unseen),
+        _cell(sampled, error),
+        _cell(sampled, unseen),
+        _cell(sampled, lambda run: str(int(run.r))),
+        _cell(sampled, lambda run: format_number(run.speedup)),
+        _cell(_rows(runs, position_basis="pod", method="hrpd"), error),
+        _cell(_rows(runs, position_basis="skinning", method="full"), error),
+    ]
+
+
+_METHODS = ("deim-joint", "block-deim", "gappy")
+
+
+def break_even(tables: Tables) -> str:
+    """Size r from which a reduced local step takes longer than the full one."""
+    table = tables["breakeven"]
+    rows = []
+    keys = ["scene", "group", "vertices"]
+    for (scene, group, vertices), part in table.groupby(keys, sort=False):
+        cells = [_break_even(_rows(part, method=method)) for method in _METHODS]
+        rows.append([name(scene), escape(group.replace("_", " ")), str(int(vertices)), *cells])
+    titles = [escape(method) for method in _METHODS]
+    return tabular(["scene", "group", "vertices", *titles], rows, "llr" + "r" * len(titles))
+
+
+def _break_even(part: pd.DataFrame) -> str:
+    if part.empty:
+        return NONE
+    crossed = part.breakeven_r.dropna()
+    return "pays" if crossed.empty else str(int(crossed.max()))
+
+
+def _rows(table: pd.DataFrame, **wanted: object) -> pd.DataFrame:
+    for column, value in wanted.items():
+        table = table[table[column] == value]
+    return table
+
+
+def _cell(rows: pd.DataFrame, text: Callable[[pd.Series], str]) -> str:
+    """Text of the only row; nothing where there is none."""
+    return text(rows.iloc[0]) if len(rows) else NONE
+
+
+def _with_time(error: float, ms: float) -> str:
+    return f"{format_number(error)} ({format_number(ms)})"
+
+
+FULL = "full"  # position basis of unreduced positions
+
+
+def speedups(tables: Tables) -> str:
+    """Each quoted speed-up with its interval, its errors and what it costs."""
+    rows = [
+        [
+            name(row.scene),
+            name(_reduction(row)),
+            _number(row.full_ms),
+            escape(row.shown) + (" (loses)" if row.loses else ""),
+            _number(row.error_train),
+            _number(row.error_heldout),
+            _number(row.training_s),
+            _number(row.reduction_s),
+            "never" if pd.isna(row.frames_to_break_even) else _whole(row.frames_to_break_even),
+        ]
+        for row in tables["speedups"].itertuples()
+    ]
+    header = ["scene", "reduction", "full ms", "speed-up", "training", "held out", "run (s)",
+              "reduction (s)", "frames"]  # fmt: skip
+    return tabular(header, rows, "llrlrrrrr")
+
+
+def payoff(tables: Tables) -> str:
+    """Numbers of scenes in which each reduction is accurate, pays, and loses."""
+    rows = [
+        [
+            name(_model(row)),
+            str(row.scenes),
+            str(row.accurate),
+            str(row.pays),
+            str(row.loses),
+            *(_number(v) for v in (row.least_speedup, row.best_speedup, row.most_speedup)),
+            _number(row.error_train),
+            f"{_number(row.error_heldout)} ({row.heldout})",
+            str(row.accurate_heldout),
+            str(row.pays_heldout),
+        ]
+        for row in tables["payoff"].itertuples()
+    ]
+    header = ["reduction", "runs in", "accurate in", "pays in", "loses in", "least", "median",
+              "most", "training", "held out (of)", "accurate", "pays"]  # fmt: skip
+    return tabular(header, rows, "lrrrrrrrrrrr")
+
+
+def pays(tables: Tables) -> str:
+    """Mesh sizes from which a reduction is faster than others, for each error that it reaches."""
+    rows = []
+    for _, curve in tables["winners"].groupby(CURVE, sort=False):
+        row, smallest, largest = curve.iloc[0], curve.vertices.min(), curve.vertices.max()
+        if not pd.isna(row.speedup):
+            stiffness = "" if row.stiffness == 1.0 else rf" $\times {row.stiffness:g}$"
+            rows.append(
+                [
+                    name(row.scene) + stiffness,
+                    row.reference,
+                    format_number(row.limit),
+                    str(smallest) if smallest == largest else f"{smallest} to {largest}",
+                    _size(row.from_plain),
+                    _size(row.from_best),
+                    in_words(row.speedup, row.speedup_low, row.speedup_high),
+                    f"{row.reached} of {row.motions}",
+                ]
+            )
+    header = ["scene", "against", "error", "vertices", "plain", "all", "speed-up", "motions"]
+    return tabular(header, rows, "lllrrrrr")
+
+
+def _size(vertices: Any) -> str:
+    return "--" if pd.isna(vertices) else str(int(vertices))
+
+
+def _model(row: Any) -> str:
+    return row.method if row.position_basis == FULL else f"{row.method}, {row.position_basis}"
+
+
+def _reduction(row: Any) -> str:
+    size = f"r = {int(row.r)}" if row.position_basis == FULL else f"k = {int(row.k)}"
+    return f"{row.method}, {size}"
+
+
+def _number(value: float) -> str:
+    return "--" if pd.isna(value) else format_number(value)
+
+
+def _whole(value: float) -> str:
+    """Two digits of a count, written out."""
+    return str(int(float(f"{value:.1e}")))
 
 
 def scenes(tables: Tables) -> str:
@@ -164,10 +441,7 @@ TEX_TABLES = {
     "tab_iterations": iterations,
     "tab_positions": positions,
     "tab_break_even": break_even,
-    "tab_exponents": exponents,
     "tab_speedups": speedups,
     "tab_payoff": payoff,
     "tab_pays": pays,
-    "tab_hard_cases": hard_cases,
-    "tab_hard_reductions": hard_reductions,
 }

@@ -39,9 +39,12 @@ def experiments(study: Study, labels: Labels) -> tuple[Experiment, ...]:
     chosen = options(study, labels)
     found = []
     for scene in chosen.names("scenes") or tuple(study.scenes):
-        reduced = tuple(study.scenes[scene].reduce)
+        config = study.scenes[scene]
+        reduced = tuple(config.reduce)
         found += [
-            Experiment(scene=scene, group=group, mesh=study.mesh_of(scene), only=len(reduced) == 1)
+            Experiment(
+                scene=scene, group=group, mesh=config.mesh.identifier, only=len(reduced) == 1
+            )
             for group in chosen.names("groups") or reduced
             if group in reduced
         ]

@@ -13,7 +13,7 @@ from pdrom.core.store import Condition, check_file, read_table, write_text
 from study.artifact.paths import FIGURE, RESULTS, TABLE, Place
 from study.artifact.usage import usage_of
 from study.figures.kit.declaration import declarations
-from study.paper.document import figures_page
+from study.paper.figure_numbers import figures_page
 from study.paper.macros import keys_of
 from study.paper.source import source_files
 from study.pipeline.commandline import recall

@@ -30,16 +30,16 @@ from study.article.tables import FACTS
 from study.article.verified import write_verified
 from study.artifact.paths import File
 from study.paper.build import Facts
-from study.paper.figuretex import captions
-from study.paper.known import provenance
 from study.paper.macros import (
     AGGREGATES,
     MISSING,
+    captions,
     format_number,
     keys_of,
     macros,
     matching,
     number_of,
+    provenance,
 )
 from study.paper.source import documents
 from study.paper.tex import find_pdflatex, packages_of

@@ -7,8 +7,7 @@ import pytest
 from pdrom.core.errors import PaperError
 from places import ROOT
 from study.paper.figure_numbers import Numbers, figure_numbers
-from study.paper.figuretex import captions
-from study.paper.known import sentences
+from study.paper.macros import captions, sentences
 from study.paper.source import documents
 from study.paper.tex import build_pdfs
 

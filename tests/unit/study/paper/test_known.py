@@ -4,8 +4,7 @@ import pandas as pd
 import pytest
 
 from pdrom.core.errors import PaperError
-from study.paper.known import decisions, provenance, sentences
-from study.paper.macros import is_held, macros
+from study.paper.macros import decisions, is_held, macros, provenance, sentences
 from study.paper.tex import build_pdfs
 
 TABLES = {

@@ -2,8 +2,8 @@
 
 import pytest
 
-from study.paper.tabular import longtable, tabular
 from study.paper.tex import build_pdfs
+from study.paper.textables import longtable, tabular
 
 PAGE = r"""\documentclass{article}\usepackage[T1]{fontenc}\usepackage{lmodern}\usepackage{longtable}
 \newcommand{\captionrow}{\caption{Table}\\}\begin{document}%s\end{document}"""
