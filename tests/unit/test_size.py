@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 43_297,
-    "modules of src": 394,
-    "lines of tests": 29_802,
-    "words of documentation": 24_861,
-    "tables": 26,
+    "lines of src": 43_213,
+    "modules of src": 389,
+    "lines of tests": 29_754,
+    "words of documentation": 24_832,
+    "tables": 25,
     "figures": 23,
     "experiments": 21,
-    "percent of src in decorators, signatures and imports": 22.4,
+    "percent of src in decorators, signatures and imports": 22.33,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

@@ -12,7 +12,7 @@ from pdrom.view.page import filled
 from study.artifact.paths import RESULTS, TABLE
 from study.figures.kit.declaration import declarations
 from study.tables import declared
-from study.tables.kit.quantities import QUANTITIES
+from study.tables.kit.declaration import QUANTITIES
 
 NOT_JUDGED = ("timed", "skipped")
 FACTS = {

@@ -10,7 +10,7 @@ from study.artifact.reads import Settings, TableOf
 from study.figures.kit.declaration import figure
 from study.figures.kit.legends import method_handles
 from study.figures.kit.options import Drawn, Experiments, Methods, NothingToDraw
-from study.tables.kit.gains import FAILED, judged_runs
+from study.tables.kit.reruns import FAILED, judged_runs
 
 ERRORS, GAINS = (1e-5, 1e2), (1.0, 1e5)  # limits of the axes; points outside are drawn on the rim
 ENDS = ("low", "median", "high")

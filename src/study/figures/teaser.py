@@ -16,7 +16,7 @@ from study.experiments.kit.settings import Horizon
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Drawn, Experiment, NothingToDraw, ReducedRuns
 from study.figures.runs import RUNS, Runs, experiment_rows
-from study.tables.kit.held_out import trained
+from study.tables.kit.reruns import trained
 
 TOLERANCE = "ecsw-1e-02"
 

@@ -69,7 +69,6 @@ class StudySettings(ConfigModel):
     iterations: IterationSweep = IterationSweep()
     timing: Timing = Timing()
     frame_times: FrameTimes = FrameTimes()
-    budgets: tuple[Annotated[float, Field(gt=0.0)], ...] = (0.1, 1.0, 10.0)
     subspace: Subspace = Subspace()
     scaling: Scaling = Scaling()
     stability: Stability = Stability()

@@ -24,9 +24,8 @@ from study.artifact.paths import File
 from study.artifact.reads import Every, PerScene, TableOf
 from study.experiments.kit.names import ANDERSON, FOM
 from study.tables.kit.declaration import compared, flag, integer, number, table, timed
-from study.tables.kit.held_out import COLUMNS, MEDIAN, trained, with_held_out
-from study.tables.kit.one_time import timings_in_one_time
-from study.tables.kit.parts import joined
+from study.tables.kit.parts import joined, timings_in_one_time
+from study.tables.kit.reruns import COLUMNS, MEDIAN, trained, with_held_out
 from study.tables.kit.vocabulary import (
     ERROR_WITHIN,
     GROUP,

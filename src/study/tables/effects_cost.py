@@ -10,8 +10,7 @@ from study.experiments.kit.horizon import floor_of, horizons
 from study.experiments.kit.names import GLOBAL, REST, RIGHT
 from study.experiments.kit.sensitivity import without
 from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
-from study.tables.kit.one_time import in_one_time
-from study.tables.kit.parts import joined
+from study.tables.kit.parts import in_one_time, joined
 from study.tables.kit.vocabulary import FLOOR, MS_PER_FRAME, SCENE
 
 KEYS = ["scene", "effect"]

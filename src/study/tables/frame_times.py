@@ -7,9 +7,9 @@ from study.artifact.paths import File
 from study.artifact.reads import Every
 from study.experiments.kit.fresh_process import CONTROL, FULL
 from study.tables.kit.declaration import flag, integer, number, table, timed
-from study.tables.kit.families import TWIN
 from study.tables.kit.intervals import confirmed, median_interval
 from study.tables.kit.parts import joined
+from study.tables.kit.reruns import TWIN
 from study.tables.kit.vocabulary import MS_PER_FRAME, SCENE, VERTICES
 
 

@@ -15,8 +15,7 @@ import pandas as pd
 
 from study.artifact.reads import TableOf
 from study.tables.kit.declaration import compared, integer, number, table, text
-from study.tables.kit.families import families
-from study.tables.kit.gains import judged_runs
+from study.tables.kit.reruns import families, judged_runs
 
 RESAMPLES, SEED = 2000, 1
 STEPS = {

@@ -6,7 +6,7 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, TableOf
 from study.tables.kit.declaration import number, table, text, timed
-from study.tables.kit.one_time import timings_in_one_time
+from study.tables.kit.parts import timings_in_one_time
 from study.tables.kit.vocabulary import GLOBAL_MS, LOCAL_MS, LOCAL_SHARE, SCENE, VERTICES
 
 IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")

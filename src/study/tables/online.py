@@ -6,8 +6,8 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, TableOf
 from study.tables.kit.declaration import compared, integer, number, table, timed
-from study.tables.kit.held_out import HIGH, LOW, MEDIAN, TRAIN
 from study.tables.kit.parts import joined
+from study.tables.kit.reruns import HIGH, LOW, MEDIAN, TRAIN
 from study.tables.kit.vocabulary import (
     ELEMENTS_SAMPLED,
     MS_PER_FRAME,

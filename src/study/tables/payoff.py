@@ -5,8 +5,7 @@ import pandas as pd
 
 from study.artifact.reads import TableOf
 from study.tables.kit.declaration import compared, integer, number, table, timed
-from study.tables.kit.gains import FAILED
-from study.tables.kit.held_out import trained, with_held_out
+from study.tables.kit.reruns import FAILED, trained, with_held_out
 from study.tables.kit.vocabulary import METHOD, POSITION_BASIS
 
 _ERROR = "relative_error_within_horizon"

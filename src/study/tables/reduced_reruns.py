@@ -14,8 +14,8 @@ from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.horizon import floor_of, horizons
 from study.tables.kit.declaration import table, text
-from study.tables.kit.held_out import KEYS, TRAIN
-from study.tables.kit.one_time import timings_in_one_time
+from study.tables.kit.parts import timings_in_one_time
+from study.tables.kit.reruns import KEYS, TRAIN
 from study.tables.kit.vocabulary import (
     BLOWUP_FRAME,
     ERROR_OVER_EXTENT,

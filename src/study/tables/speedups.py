@@ -9,9 +9,9 @@ from study.artifact.paths import File
 from study.artifact.reads import Every, TableOf
 from study.experiments.kit.fresh_process import FULL, REDUCED
 from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
-from study.tables.kit.held_out import COLUMNS, HIGH, LOW, MEDIAN, TRAIN, over_motions, trained
 from study.tables.kit.intervals import in_words, median_interval
 from study.tables.kit.parts import joined
+from study.tables.kit.reruns import COLUMNS, HIGH, LOW, MEDIAN, TRAIN, over_motions, trained
 from study.tables.kit.vocabulary import (
     GROUP,
     METHOD,

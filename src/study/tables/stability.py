@@ -11,8 +11,8 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, PerScene, Setting, TableOf
 from study.tables.kit.declaration import compared, number, table, text
-from study.tables.kit.held_out import KEYS, trained
 from study.tables.kit.parts import joined
+from study.tables.kit.reruns import KEYS, trained
 from study.tables.kit.vocabulary import (
     BLOWUP_FRAME,
     ENERGY_RATIO,

@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from study.artifact.reads import ProjectFile
-from study.tables.kit.declaration import Column, Table
-from study.tables.kit.quantities import Quantity
+from study.tables.kit.declaration import Column, Quantity, Table
 from study.verification.distance import distance
 from study.verification.pairing import pairs
 from study.verification.rows import RUN, Context, names, of_fitted_samples, of_wrong_runs

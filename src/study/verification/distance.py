@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from study.tables.kit.quantities import Quantity
+from study.tables.kit.declaration import Quantity
 
 # Differences below it count for nothing: rounding errors of sums.
 FLOOR = 1e-12

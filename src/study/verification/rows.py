@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from study.tables.kit.declaration import Column, Table
-from study.tables.kit.held_out import trained
+from study.tables.kit.reruns import trained
 from study.verification.pairing import names_row
 
 # Errors of runs on samples with a larger amplification, and errors of approximations and the

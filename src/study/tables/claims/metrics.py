@@ -13,8 +13,7 @@ import pandas as pd
 
 from pdrom.core.errors import ConfigurationError
 from study.tables.break_even import CURVE
-from study.tables.kit.families import families
-from study.tables.kit.held_out import KEYS, MEDIAN, trained, with_held_out
+from study.tables.kit.reruns import KEYS, MEDIAN, families, trained, with_held_out
 
 Tables = Mapping[str, pd.DataFrame]
 Value = str | int | float

@@ -1,14 +1,49 @@
-"""Tables whose rows experiments have written, file by file."""
+"""Rows that experiments have written, file by file, with the times of jobs in the one time.
 
-from collections.abc import Iterable
+A job times its own full-order run beside its variants, but the machine runs at another speed in
+another job, and so one run would have several times. Ratios within a job do not mind: the job's
+times are multiplied by the one time of the scene (table frame_times) over the job's own time of its
+full-order run.
+"""
+
+from collections.abc import Collection, Iterable, Sequence
 
 import pandas as pd
 
 from pdrom.core.store import read_table
 from study.artifact.paths import File
 
+PHASES = ("ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms", "global_ms")
+
 
 def joined(files: Iterable[File]) -> pd.DataFrame:
     """Rows of all files, in order; without columns if there are no rows."""
     parts = [part for part in (read_table(file.path) for file in files) if len(part)]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
+
+
+def in_one_time(
+    table: pd.DataFrame, own: pd.Series, times: pd.DataFrame, columns: Collection[str]
+) -> pd.DataFrame:
+    """``table`` with its ``columns`` of times brought to the scenes' one time.
+
+    Scenes that were not timed in several processes keep the times of their job.
+
+    Parameters
+    ----------
+    own : scene -> time of a full-order frame in the job, ms
+    times : table frame_times
+    """
+    one = times.set_index("scene").ms_per_frame.reindex(own.index)
+    factor = table.scene.map((one / own).fillna(1.0)).fillna(1.0)
+    return table.assign(**{name: table[name] * factor for name in columns})
+
+
+def timings_in_one_time(timings: Sequence[File], times: pd.DataFrame) -> pd.DataFrame:
+    """Rows of the ``timings`` of all scenes in ``times``, see `in_one_time`."""
+    rows = joined(timings)
+    if rows.empty:
+        return rows
+    own = rows[rows.method.isna() & (rows.implementation == "compiled")]
+    own = own.set_index("scene").ms_per_frame
+    return in_one_time(rows, own, times, columns=[name for name in PHASES if name in rows])

@@ -125,7 +125,7 @@ def test_faulty_settings_are_refused(settings, tmp_path):
         (GROUP, "r/b/s/g.csv"),
         (Every(SCENE), ["r/a/s.csv", "r/a/t.csv"]),
         (Preferred(GROUP, "group", "h"), ["r/b/s/h.csv"]),
-        (TableOf("budget"), "r/tables/budget.csv"),
+        (TableOf("payoff"), "r/tables/payoff.csv"),
         (ProjectFile("config/claims.yaml"), "config/claims.yaml"),
         (SourcesOf("section"), ["mesh.obj"]),
     ],

@@ -41,7 +41,7 @@ def test_inputs_are_files_of_the_study_in_its_order():
     assert made("sensitivity").inputs == {
         "parts": ["out/sensitivity/spring_oop.csv", "out/sensitivity/strain_oop.csv"]
     }
-    assert made("budget").inputs == {"points": "out/tables/accuracy_cost.csv"}
+    assert made("payoff").inputs == {"reruns": "out/tables/reduced_reruns.csv"}
     assert made("online").inputs["parts"] == []
     assert made("claims").inputs["rules"] == "config/claims.yaml"
 
@@ -76,14 +76,14 @@ def test_a_setting_is_a_parameter_of_those_who_read_it_only():
 @pytest.mark.parametrize(
     ("read", "message"),
     [
-        (Setting("stability.wrogn"), "table budget reads the key 'stability.wrogn'.*wrong"),
-        (Setting("budgets.more"), "reads the key 'budgets.more'"),
+        (Setting("stability.wrogn"), "table payoff reads the key 'stability.wrogn'.*wrong"),
+        (Setting("ranks.more"), "reads the key 'ranks.more'"),
         (PerScene("time_stap"), "reads the key 'time_stap' of scenes.*time_step"),
         (TableOf("sensitivty"), "reads 'sensitivty'.*sensitivity"),
     ],
 )
 def test_what_does_not_exist_is_named(read, message):
     asked = plan()
-    asked.tables = {"budget": replace(declared()["budget"], reads={"points": read})}
+    asked.tables = {"payoff": replace(declared()["payoff"], reads={"reruns": read})}
     with pytest.raises(ConfigurationError, match=message):
         asked.check()

@@ -1,63 +1,15 @@
-"""Tables of budgets, break-even sizes and effects, against brute force and synthetic data."""
+"""Tables of break-even sizes and effects, against brute force and synthetic data."""
 
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from pdrom.core.store import write_table
 from study.artifact.paths import File
 from study.tables.break_even import breakeven
-from study.tables.budget import budget
 from study.tables.effects_cost import effects_cost
-from study.tables.kit.one_time import NOT_TIMED
 
-METHODS = ("fom", "fewer-iterations", "full", "block-deim")
-
-
-def points(rows) -> pd.DataFrame:
-    """Table accuracy_cost of (scene, method, error, time)."""
-    table = pd.DataFrame(
-        rows, columns=["scene", "method", "relative_error_within_horizon", "ms_per_frame"]
-    )
-    return table.assign(position_basis="full", k=None, r=range(len(table)), iterations=10)
-
-
-ROWS = st.lists(
-    st.tuples(
-        st.sampled_from("ab"), st.sampled_from(METHODS), st.integers(0, 4), st.integers(1, 5)
-    ),
-    min_size=1,
-    max_size=15,
-)
-
-
-@given(ROWS)
-def test_a_budget_buys_the_smallest_error_that_fits(rows):
-    limits = (0.5, 2.0, 9.0)
-    table = budget(points(rows), limits)
-    for row in table.itertuples():
-        rivals = [
-            (error, cost)
-            for scene, method, error, cost in rows
-            if scene == row.scene
-            and (method == "fom") == (row.reference == "converged")
-            and cost <= row.budget_ms
-        ]
-        if not rivals:
-            assert pd.isna(row.method)
-            continue
-        assert (row.relative_error_within_horizon, row.ms_per_frame) == min(rivals)
-    pairs = {(scene, method == "fom") for scene, method, _, _ in rows}
-    assert len(table) == len(limits) * len(pairs)
-
-
-def test_a_budget_that_buys_nothing_is_a_row():
-    table = budget(points([("a", "block-deim", 0.1, 5.0)]), [1.0, 10.0])
-    assert table.budget_ms.tolist() == [1.0, 10.0]
-    assert table.method.isna().tolist() == [True, False]
-    assert table.reference.tolist() == ["own iterations"] * 2
+NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # table frame_times without rows
 
 
 # Break-even ---------------------------------------------------------------------------------------

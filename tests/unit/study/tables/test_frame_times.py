@@ -12,7 +12,7 @@ from study.artifact.paths import File
 from study.experiments.kit.fresh_process import COLUMNS
 from study.tables.frame_times import frame_times
 from study.tables.kit.intervals import confirmed, in_words, median_interval
-from study.tables.kit.one_time import in_one_time
+from study.tables.kit.parts import in_one_time
 from study.tables.repetitions import repetitions
 from study.tables.speedups import speedups
 

@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from study.tables.gain_interventions import gain_interventions
-from study.tables.kit.gains import judged_runs
+from study.tables.kit.reruns import judged_runs
 
 # scene, method, r, error within the horizon (None: ended before), gain, elements, frames
 RUNS = [

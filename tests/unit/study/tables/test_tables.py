@@ -16,7 +16,7 @@ from study.artifact import paths
 from study.artifact.paths import File, Place
 from study.experiments.kit.horizon import floor_of
 from study.tables.accuracy_cost import accuracy_cost, pareto, reference_of
-from study.tables.kit.held_out import TRAIN, trained
+from study.tables.kit.reruns import TRAIN, trained
 from study.tables.local_share import local_share
 from study.tables.reconstruction_error import reconstruction_error
 from study.tables.reduced_reruns import reduced_reruns

@@ -9,7 +9,7 @@ import pytest
 
 from places import ROOT
 from study.tables import declared
-from study.tables.kit.quantities import QUANTITIES, TALLY, TOLERANCES
+from study.tables.kit.declaration import QUANTITIES, TALLY, TOLERANCES
 from study.verification.compare import FITTED, NOT_COMPARED, Comparison
 from study.verification.judge import LEAST, judge
 from study.verification.pairing import names_row

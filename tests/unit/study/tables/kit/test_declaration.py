@@ -153,7 +153,7 @@ def test_every_table_is_declared_in_a_module_that_has_no_other():
 
 
 def test_a_time_in_seconds_or_milliseconds_is_timed_unless_it_is_no_clocks():
-    no_clocks = {"budget_ms", "h", "contact_delay"}  # set, or seconds of the simulation
+    no_clocks = {"h", "contact_delay"}  # set, or seconds of the simulation
     for name, made in declared().items():
         for column in made.columns:
             if column.unit in ("s", "ms") and column.name not in no_clocks:

@@ -2,7 +2,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.tables.kit.held_out import KEYS, TRAIN, over_motions, trained, with_held_out
+from study.tables.kit.reruns import KEYS, TRAIN, over_motions, trained, with_held_out
 
 RUN = {"scene": "a", "group": "g", "method": "pod", "position_basis": "full", "k": None}
 
