@@ -179,11 +179,6 @@ def test_energy_does_not_grow_without_forcing(group_scene, rng):
     assert max(energies) <= start * (1 + 1e-9)
 
 
-def test_two_runs_give_the_same_bits():
-    scene = make_scene(GRAVITY, {"effect": "spring", "weight": 1e6}, frames=10)
-    assert np.array_equal(trajectory(scene), trajectory(scene))
-
-
 def test_one_factorisation_per_pin_set():
     scene = make_scene(
         {"effect": "pins", "select": "top", "until": 4},

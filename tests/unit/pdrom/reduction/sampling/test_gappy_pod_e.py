@@ -156,17 +156,6 @@ def test_bounded_gain_is_near_the_smallest_set_that_meets_it():
         assert fewest <= len(chosen) - len(start) <= fewest + 1
 
 
-def test_an_even_share_of_the_elements_is_the_least_that_a_bound_needs(rng):
-    """trace(G) = r m / e for modes of equal size everywhere: gain >= sqrt(e / m)."""
-    hadamard = np.array([[1.0]])
-    for _ in range(6):
-        hadamard = np.kron(hadamard, [[1.0, 1.0], [1.0, -1.0]])
-    v = hadamard[:, rng.permutation(64)[:5]] / 8.0
-    for bound in (2.0, 3.0):
-        chosen = bound_gain(v, 1, block_elements(v, 1), bound)
-        assert len(chosen) >= 64 / bound**2
-
-
 def test_modes_that_depend_on_each_other_end_with_all_elements(rng):
     v = rng.standard_normal((30, 4))
     v[:, 3] = v[:, 0]

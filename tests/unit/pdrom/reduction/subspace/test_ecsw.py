@@ -240,15 +240,6 @@ def hanging():
     return scene, columns, space, fixed
 
 
-def test_the_energy_norm_is_that_of_the_inverse_matrix(hanging, rng):
-    scene, columns, space, fixed = hanging
-    (frame,) = training_run(scene, columns, [FRAME])
-    free = np.setdiff1d(np.arange(len(space.matrix)), fixed)
-    r = rng.standard_normal(len(free))
-    expected = r @ np.linalg.solve(space.matrix[np.ix_(free, free)], r)
-    assert np.sum((frame.measure[:, free] @ r) ** 2) == pytest.approx(expected)
-
-
 def test_the_response_norm_is_the_root_mean_square_of_the_recursion(hanging):
     """Reference: the squares of the recursion's answer to one impulse, added up, mode by mode."""
     scene, columns, space, fixed = hanging

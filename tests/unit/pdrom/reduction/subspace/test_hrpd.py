@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from meshless import assert_reads_nothing_of_the_mesh
-from test_subspace_run import GRAVITY, PINS, SCENES, SPRING, run_model, whole_space
+from test_subspace_run import GRAVITY, PINS, SCENES, SPRING, hrpd_of, run_model, whole_space
 
 from builders import GROUPS, make_scene, random_rotation
 from pdrom.core.errors import SamplingError
@@ -140,12 +139,6 @@ def right_hand_sides(scene, columns, interpolation, q, y):
     return found
 
 
-def hrpd_of(scene, columns):
-    return {
-        g.name: hrpd(g, columns, sampled_space(g, scene.mesh.points, HRPD)) for g in scene.groups
-    }
-
-
 def test_hrpd_with_all_elements_and_dimensions_is_the_full_projection(group_scene, rng):
     scene, group = group_scene, group_scene.groups[0]
     spec = HrpdSpec(dimension=group.elements * group.rows_per_element, samples=group.elements)
@@ -182,19 +175,6 @@ def test_pins_and_handles_are_met_exactly(name, kind):
     for boundary in scene.boundaries:
         held = boundary.held(0)
         np.testing.assert_allclose(result[1:, held], reference[1:, held], atol=1e-12)
-
-
-@pytest.mark.parametrize("name", ["handles", "bending", "bar", "poke", "damped"])
-def test_a_step_reads_nothing_of_the_mesh(name):
-    """With everything of the length of the mesh overwritten the second run is the same."""
-    config = SCENES[name]().config
-    effects = [e.model_dump() for e in config.effects]
-    scene = make_scene(*effects, mesh=config.mesh.model_dump(), frames=config.frames)
-    reference = trajectory(scene)
-    columns = make_columns(scene, reference[1:], "pod", 3)
-    found = hrpd_of(scene, columns)
-    loop, start = SubspaceModel("pod", columns, found).loop(scene)
-    assert_reads_nothing_of_the_mesh(scene, columns, loop, start)
 
 
 def test_arrays_of_a_step_have_the_size_of_the_sample():
