@@ -119,7 +119,7 @@ def errors_within(
 ) -> dict[str, float | None]:
     """Errors over the frames before ``end`` by the names of their columns.
 
-    None of a run that did not get there, and of a quantity that the full order does not have.
+    None for a run that ended before, and for a quantity that the full order does not have.
 
     Parameters
     ----------

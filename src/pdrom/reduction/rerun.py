@@ -100,8 +100,8 @@ def displacement_norms(reference: np.ndarray) -> np.ndarray:
 def step_norms(positions: np.ndarray) -> np.ndarray:
     """|| Q^(n + 1) - Q^n ||_F of each frame of ``positions`` (F + 1, N, 3) m, (F,) m.
 
-    The step loop has no other velocities. Of the difference of two runs (F + 1, N, 3) it is that of
-    their velocities.
+    These are the velocities of the step loop times h; for the difference of two runs
+    (F + 1, N, 3), the differences of their velocities.
     """
     return np.linalg.norm(np.diff(positions, axis=0), axis=(1, 2))
 

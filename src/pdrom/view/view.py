@@ -8,7 +8,7 @@ from pdrom.model.effects.base import EffectConfig
 from pdrom.model.effects.gravity import Gravity
 
 Y = np.array([0.0, 1.0, 0.0])
-EYE = np.array([0.85, 0.55, 1.45])  # where y points up
+EYE = np.array([0.85, 0.55, 1.45])  # direction to the viewer where y points up
 
 
 def up_of(effects: Sequence[EffectConfig]) -> np.ndarray:

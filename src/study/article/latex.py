@@ -162,7 +162,7 @@ def _linked_cell(cell: str, key: str) -> str:
 
 
 def _plain(cell: str) -> str:
-    """A cell without TeX; of one that begins with a name, the name."""
+    """Text of a cell without TeX; only the name where the cell begins with one."""
     name = re.match(r"\\texttt\{([^{}]*)\}", cell)
     return (name[1] if name else cell).replace("\\", "")
 

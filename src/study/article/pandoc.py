@@ -1,4 +1,4 @@
-"""Pandoc, run as a program: the one that comes with a wheel, without a network."""
+"""Runs of pandoc, the program that a wheel brings along, without a network."""
 
 import json
 import subprocess

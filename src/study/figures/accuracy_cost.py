@@ -251,7 +251,7 @@ def handles(found: TradeOffs) -> list[tuple[str, list[Line2D]]]:
 
 
 class Options(Scenes, Methods):
-    """Choices; the first scene is drawn large."""
+    """Options of the figure; the first scene is drawn large."""
 
 
 @figure(

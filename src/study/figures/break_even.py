@@ -12,7 +12,7 @@ from study.figures.kit.options import Columns, Drawn, Experiments, Methods, Noth
 
 
 class Options(Experiments, Methods, Columns):
-    """Choices."""
+    """Options of the figure."""
 
 
 @figure(

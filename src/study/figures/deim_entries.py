@@ -21,7 +21,7 @@ ROW_HEIGHT = 1.85  # inches
 
 
 class Options(Experiments, Methods, Ranks, View):
-    """Choices."""
+    """Options of the figure."""
 
 
 @figure(

@@ -56,7 +56,7 @@ class Iteration:
 
 
 class Options(Experiments, Methods, Count, Columns, View):
-    """Choices."""
+    """Options of the figure."""
 
 
 @figure(

@@ -16,7 +16,7 @@ SHOWN = 3  # scenes whose forces are drawn
 LOW, HIGH = 1e-12, 1e2
 ROUNDOFF = 1e-14  # of the largest force of a scene: what is smaller is not drawn
 OTHERS = ("#8C6D31", "#5A5A5A", "#B03A6B", "#2B2B80", "#3E8E7E", "#A0522D", "#7F7F00")
-MARKERS = "*dph8H|"  # none of a group, so that looks differ without colours, too
+MARKERS = "*dph8H|"  # no group has one of these: effects differ without colours, too
 Looks = dict[str, tuple[str, str]]
 
 

@@ -19,7 +19,7 @@ _KEYS = ["scene", "group", "method", "r"]
 
 
 class Options(Experiments, Methods):
-    """Choices."""
+    """Options of the figure."""
 
 
 @figure(

@@ -18,7 +18,7 @@ TWIN = "_twin"
 
 
 class Options(Scenes, Columns):
-    """Choices."""
+    """Options of the figure."""
 
 
 @figure(

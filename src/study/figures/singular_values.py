@@ -21,7 +21,7 @@ PUBLISHED_COLUMNS = ["experiment", "group", "component", "singular_value"]
 
 
 class Options(Experiments, Columns, Beside):
-    """Choices."""
+    """Options of the figure."""
 
 
 @figure(

@@ -32,7 +32,7 @@ LEFT, TALLEST = 0.75, 1.45  # where pictures begin, and how high they may be
 
 
 class Options(Experiments, Methods, Instants, Count, View):
-    """Choices."""
+    """Options of the figure."""
 
 
 @figure(

@@ -117,7 +117,7 @@ def _label(look: Look) -> str:
 
 
 class Options(Experiments, Methods, Ranks):
-    """Choices."""
+    """Options of the figure."""
 
 
 @figure(

@@ -22,7 +22,7 @@ TOLERANCE = "ecsw-1e-02"
 
 
 class Options(ReducedRuns):
-    """Choices."""
+    """Options of the figure."""
 
     modes: int = 20
 

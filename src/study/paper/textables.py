@@ -74,7 +74,7 @@ def _verdict(verdict: str, tests: pd.DataFrame) -> str:
 
 
 def _place(claim: str, shown: str) -> str:
-    """A figure or a table of the manuscript by its number, a table of results by its name."""
+    """Reference to a figure or table of the manuscript, or the name of a table of results."""
     if claim in _SHOWN:
         return rf"table~\ref{{tab:{_SHOWN[claim]}}}"
     return rf"figure~\ref{{fig:{shown}}}" if shown in declarations() else name(shown)

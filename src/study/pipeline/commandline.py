@@ -119,7 +119,7 @@ class CommandLine:
 
 
 def _of_profile(arguments: Sequence[str], profiles: Sequence[str]) -> dict[str, Any]:
-    """Options that a profile sets or the command line; a parser would take those as targets."""
+    """Cores, jobs and executor, as the command line or a profile sets them."""
     from snakemake.cli import get_argument_parser
 
     found = vars(get_argument_parser(profiles).parse_args(_before_targets(arguments)))
@@ -183,7 +183,7 @@ def one_line() -> Iterator[None]:
 
 
 def remember(command: CommandLine) -> None:
-    """Note which configuration runs, that of ``command``."""
+    """Write down the configuration of ``command``, which runs."""
     # late: it loads NumPy, which the environment is to be settled before
     from pdrom.core.store import write_text
 

@@ -146,7 +146,7 @@ def digest_of_source(source: str, module: str = "") -> str:
 
 
 def _text(code: CodeType) -> str:
-    """Everything of compiled code but where its lines stand."""
+    """Content of compiled code without its line numbers."""
     return repr(
         (
             code.co_name,
@@ -191,7 +191,7 @@ def _is_registry(call: ast.Call) -> bool:
 
 
 def _drop_others(entries: ast.Dict, module: str) -> None:
-    """Keep the entries that are code of the module itself, and those that are no plain text."""
+    """Keep the entries that name code of ``module`` or are no plain text."""
     kept = [
         (key, value)
         for key, value in zip(entries.keys, entries.values, strict=True)

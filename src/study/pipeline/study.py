@@ -114,7 +114,7 @@ class Study:
         self.settings = settings
         self.root = root
         self.configuration = configuration
-        self.titles: dict[str, str] = {}  # for what prints them
+        self.titles: dict[str, str] = {}  # for tables and figures
         self.vertices: dict[str, int] = {}
         self.bound: dict[str, Scene] = {
             name: load_bound_scene(root, name, settings.changes) for name in settings.scenes

@@ -135,7 +135,7 @@ class Preview(logging.Handler):
             return
         self._jobs[record.rule_name] += 1
         self._reasons[record.rule_name] |= shortened(record.reason)
-        if record.log:  # what only names targets has none
+        if record.log:  # a rule that only names targets has none
             seconds = self._of_job(str(record.log[0]))
             self._processor += seconds
             self._wall += seconds * min(record.threads, self._cores) / self._cores
@@ -165,7 +165,7 @@ def shortened(reason: str) -> set[str]:
 
 
 def preview(seconds: Callable[[str], float], cores: int) -> None:
-    """Have this process say at its end what its dry run has planned."""
+    """Report at the end of this process what its dry run has planned."""
     planned = Preview(seconds, cores)
     logging.getLogger("snakemake.logging").addHandler(planned)
     atexit.register(lambda: sys.stdout.write(planned.text()))

@@ -1,4 +1,4 @@
-"""Table winners: the cheapest way to an error, and from what size on a reduction is cheaper."""
+"""Table winners: the cheapest method for an error, and from what size on a reduction is cheaper."""
 
 from collections.abc import Sequence
 

@@ -92,5 +92,5 @@ def _other(made: Iterable[Job], faulty: set[str]) -> list[str]:
 
 
 def command_for(subject: Subject, path: str) -> str:
-    """Command that makes the file ``path`` of ``subject`` again, whatever is in its place."""
+    """Command that makes the file ``path`` of ``subject`` again, even if there is one."""
     return shlex.join(["./reproduce", *subject.options, "--force", "--", path])

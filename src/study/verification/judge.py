@@ -102,7 +102,7 @@ def _cells(comparison: Comparison, column: Column) -> Iterator[Difference]:
 
 
 def _fragile(comparison: Comparison, column: Column, other: np.ndarray) -> Iterator[Difference]:
-    """A few cells may be others; the row that is named is the first of them."""
+    """A difference if too many cells are ``other`` ones; it names the row of the first."""
     allowed = max(FEW, column.within * len(other))
     if other.sum() > allowed:
         place = row_in_words(comparison.table, comparison.e, int(np.argmax(other)))

@@ -18,10 +18,10 @@ RUNS, SPECTRA, RECONSTRUCTION = "reduced_reruns", "singular_values", "reconstruc
 WRONG = 0.1
 # The error that says so, the first that a table has.
 OF_RUN = ("relative_error_within_horizon", "relative_error")
-# What names the samples of a reduction.
+# Columns that identify the samples of a reduction.
 SAMPLES = ("scene", "group", "method", "r")
 RUN = (*SAMPLES, "position_basis", "k")
-# Part of the names of methods whose number of elements a fit with non-negative weights leaves.
+# In the names of methods whose number of elements follows from a fit with non-negative weights.
 FITTED = "ecsw"
 
 

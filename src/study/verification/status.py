@@ -1,4 +1,4 @@
-"""Ends of the commands of this package."""
+"""Exit codes of the commands of this package."""
 
 import sys
 from collections.abc import Callable

@@ -63,7 +63,7 @@ class Checksum:
 
     @classmethod
     def parse(cls, content: bytes) -> "Checksum":
-        """Checksum read from these bytes; of damaged bytes, one whose content is another."""
+        """Checksum read from these bytes; damaged ones give a checksum that fits no file."""
         first, _, rest = content.partition(b"\n")
         commented = first.startswith(b"# ")
         words = (rest if commented else content).decode(errors="replace").split()

@@ -112,7 +112,7 @@ def _reopen(work):
 
 @lane_function
 def _distance(t, values, target, solid):
-    """Square of the distance to the values that belong to t; infinite if t solves nothing."""
+    """Squared distance to the values that belong to t; infinite where t is no solution."""
     product, _, first, second = _product(t, values, solid)
     m = t * (t - values[2])
     a, b = m / (first + SMALLEST), m / (second + SMALLEST) if solid else 0.0

@@ -89,7 +89,7 @@ def _sweep(work):
 
 @lane_function
 def _larger_first(a, v, b, w):
-    """Swap two columns and their right vectors if the second is longer; one turns its sign.
+    """Swap two columns and their right vectors if the second is longer; one changes sign.
 
     The sign keeps V a rotation.
     """

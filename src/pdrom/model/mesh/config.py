@@ -120,7 +120,7 @@ class BarMesh(MeshModel):
 class MeshFile(MeshModel):
     """A mesh file, of a format that keeps it in one file, in the folder of its scene or below.
 
-    path : from that folder on; `below` names it from another one on
+    path : relative to that folder; `below` makes it relative to another one
     """
 
     kind: Literal["file"]

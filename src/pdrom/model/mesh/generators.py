@@ -109,7 +109,7 @@ def boundary(tetrahedra: np.ndarray) -> np.ndarray:
     faces = tetrahedra[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
     ordered = np.sort(faces, axis=1).astype(np.int64)
     size = int(faces.max()) + 1
-    # one number a face, which a million vertices leave in 64 bits: rows are sorted much slower
+    # one number a face, of 64 bits for up to a million vertices: sorting rows is much slower
     keys = (ordered[:, 0] * size + ordered[:, 1]) * size + ordered[:, 2]
     _, first, count = np.unique(keys, return_index=True, return_counts=True)
     return faces[np.sort(first[count == 1])].astype(np.int32)

@@ -27,7 +27,7 @@ from pdrom.reduction.subspace.space import (
     reduced_state,
 )
 
-# Numbers of a basis above which only the rows that an iteration needs are doubles.
+# Size of a basis above which only the rows that an iteration needs are stored as doubles.
 DOUBLES = 60_000
 MANIFOLDS = ("clamped", "length")
 

@@ -79,7 +79,7 @@ class InterpolatedLocalStep:
         self._rows = np.ascontiguousarray(columns.B[vertices])
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Freeze frame-lagged data of the sampled elements at the coordinates q (K, 3)."""
+        """Fix frame-lagged data of the sampled elements at the coordinates q (K, 3)."""
         if len(self._elements):
             self.group.begin_frame(self._rows @ q)
 

@@ -171,7 +171,7 @@ class _ActiveSet:
         return linalg.solve_triangular(self._factor[:n, :n], rhs, lower=True, check_finite=False)
 
     def _keep(self, keep: np.ndarray, x: np.ndarray) -> None:
-        """Leave the columns of ``keep`` only, with values ``x``."""
+        """Keep only the columns of ``keep``, with values ``x``."""
         kept = np.flatnonzero(keep)
         size, n = len(self.active), len(kept)
         first = int(np.flatnonzero(~keep)[0])

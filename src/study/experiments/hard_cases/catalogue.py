@@ -124,7 +124,7 @@ def _squashed() -> list[HardCase]:
 
 
 def _states() -> list[HardCase]:
-    """Regular scenes in irregular states."""
+    """Cases: regular scenes that start in irregular states."""
     three = (BENDING, SPRING, STRAIN)
     turn = mapped((-1, 0, 0), (0, -1, 0), (0, 0, 1))
     cases = [
@@ -339,7 +339,7 @@ def _air() -> list[HardCase]:
 
 
 def _obstacles() -> list[HardCase]:
-    """Edges, tunnelling, starts inside, friction of nothing and without end."""
+    """Cases: edges, tunnelling, starts inside an obstacle, zero and infinite friction."""
     ball = {"effect": "sphere", "centre": [0, 1, 0], "radius": 0.4}
     edge = {"effect": "box", "lower": [-0.02, 1.0, -2], "upper": [0.03, 1.9, 2], "friction": 0.5}
     plate = {"effect": "box", "lower": [-9, 1, -9], "upper": [9, 1, 9]}
@@ -418,7 +418,7 @@ def _unstructured() -> list[HardCase]:
 
 
 def _collisions() -> list[HardCase]:
-    """Bodies that meet themselves."""
+    """Cases: bodies that collide with themselves."""
     apart = {"effect": "self_collision", "thickness": 0.18}
     return [
         HardCase("collision_folded", _scene(sheet, SPRING, GRAVITY, FLOOR, apart),

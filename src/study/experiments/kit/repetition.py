@@ -39,7 +39,7 @@ class Repetitions(ConfigModel):
 
 @dataclass(frozen=True)
 class Repetition:
-    """One repetition; ``error`` before the horizon, inf for a run that ended earlier."""
+    """One repeated run; ``error`` up to the horizon, inf for a run that ended earlier."""
 
     r: int
     seed: int

@@ -1,7 +1,7 @@
-"""Rows that experiments have written, file by file, with the times of jobs in the one time.
+"""Rows that experiments have written, file by file, with times that jobs of a scene can share.
 
 A job times its own full-order run beside its variants, but the machine runs at another speed in
-another job, and so one run would have several times. Ratios within a job do not mind: the job's
+another job, and so one run would have several times. Ratios within a job stay: the job's
 times are multiplied by the one time of the scene (table frame_times) over the job's own time of its
 full-order run.
 """

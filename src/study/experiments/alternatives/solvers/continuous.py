@@ -7,7 +7,7 @@ import numpy as np
 from pdrom.model.scene import Scene
 from study.experiments.alternatives.solvers.explicit import Explicit
 
-UNSTABLE = 1e100  # m; a larger run, or one that is not finite, has no change to speak of
+UNSTABLE = 1e100  # m; of a larger run, or one that is not finite, no change is estimated
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ class Elements:
         """The elements in an order in which neighbours in the list share no vertex.
 
         Elements of one colour share none; the first colour that is free at all corners is taken.
-        The processor then works on several of them at a time.
+        The processor then overlaps the work on several of them.
         """
         colours = _colours(self.rows, self.corners, int(self.corners.max(initial=0)) + 1)
         order = np.argsort(colours, kind="stable")

@@ -31,7 +31,7 @@ class Potential:
 
     def __init__(self, groups: Sequence[ConstraintGroup], vertices: int) -> None:
         kernels = [group.local_kernel for group in groups if group.local_kernel is not None]
-        self._pass = LocalPass(kernels)  # owns what the tables point to
+        self._pass = LocalPass(kernels)  # keeps the arrays that the tables point to
         local = self._pass
         self.tables: Tables = local.first, local.preparing, local.second
         total = sparse.csr_array((vertices, vertices))
