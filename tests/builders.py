@@ -1,6 +1,7 @@
 """Builders of small scenes."""
 
 import numpy as np
+from numba import njit
 
 from pdrom.model.scene import Scene, SceneConfig
 from places import ROOT
@@ -54,3 +55,13 @@ def random_rotation(rng: np.random.Generator) -> np.ndarray:
     q, r = np.linalg.qr(rng.standard_normal((3, 3)))
     q *= np.sign(np.diag(r))
     return q * np.sign(np.linalg.det(q))
+
+
+def from_python(function):
+    """Let Python call a ``function`` that only compiled code calls."""
+
+    @njit
+    def call(*arguments):
+        return function(*arguments)
+
+    return call

@@ -13,10 +13,10 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 43_213,
-    "modules of src": 389,
-    "lines of tests": 29_754,
-    "words of documentation": 24_832,
+    "lines of src": 43_179,
+    "modules of src": 379,
+    "lines of tests": 29_633,
+    "words of documentation": 24_813,
     "tables": 25,
     "figures": 23,
     "experiments": 21,

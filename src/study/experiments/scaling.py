@@ -5,6 +5,7 @@ import gc
 import logging
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -34,7 +35,6 @@ from study.experiments.kit.local_costs import local_costs
 from study.experiments.kit.measurement import Measurement, Protocol, Variant, measure
 from study.experiments.kit.names import FOM
 from study.experiments.kit.settings import Modes, Repeats, Solver, Tolerance
-from study.experiments.kit.training import Training, train
 
 log = logging.getLogger(__name__)
 
@@ -44,6 +44,22 @@ ITERATIONS = [
 ]  # fmt: skip
 STATES = 4  # states of the training run at which local steps are timed alone
 TrainingFrames = Annotated[int, Field(ge=3, le=1000)]
+
+
+@dataclass(frozen=True)
+class Training:
+    """Positions (n, N, 3) m after the training frames, and projections (n, e p, 3) within them.
+
+    ``roundoff`` (n,) is that of the projections.
+    """
+
+    positions: np.ndarray
+    projections: np.ndarray
+    roundoff: np.ndarray
+
+    def first(self, frames: int) -> "Training":
+        """Keep the first frames only."""
+        return Training(self.positions[:frames], self.projections[:frames], self.roundoff[:frames])
 
 
 class SizedBreakEven(ConfigModel):
@@ -224,3 +240,22 @@ def _memory() -> float:
     if trim is not None:  # glibc; elsewhere small sizes may fit into free memory
         trim(0)
     return psutil.Process().memory_info().rss / 1e6
+
+
+def train(scene: Scene, system: GlobalSystem, frames: int) -> Training:
+    """First ``frames`` of the full-order run of ``scene`` with the matrix of ``system``.
+
+    The projections are those at the last local iterates.
+    """
+    group = scene.groups[0]
+    loop, state = scene.stepper(system, track_objective=False), scene.initial_state()
+    positions, projections, roundoff = [], [], []
+
+    def watch(y: np.ndarray) -> None:
+        projections.append(group.project(y))
+        roundoff.append(group.roundoff(y))
+
+    for frame in range(frames):
+        state, _ = loop.step(state, frame, watch)
+        positions.append(state.positions)
+    return Training(np.stack(positions), np.stack(projections), np.array(roundoff))

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 import pandas as pd
 
 from pdrom.core.names import SceneName
@@ -20,7 +21,9 @@ from pdrom.model.energy import largest
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.rerun import Rerun
+from pdrom.reduction.snapshots import training_frames
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.ecsw import Norm
 from pdrom.reduction.subspace.hrpd import HrpdSpec, SampledSpace, hrpd, sampled_space
@@ -31,6 +34,7 @@ from pdrom.reduction.subspace.model import (
     SubspaceModel,
     ecsw_name,
     make_columns,
+    rerun_model,
     sample_elements,
 )
 from pdrom.reduction.subspace.store import store_columns, store_model
@@ -48,7 +52,6 @@ from study.artifact.paths import (
 from study.artifact.reads import Every, Settings, SourcesOf
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.measurement import clocked
-from study.experiments.kit.motion import Motion, training_indices, training_positions
 from study.experiments.kit.scenes import TRAIN, positions_of, scene_of
 from study.experiments.kit.settings import BlowupExtent, Modes, PositionBasis, Tolerance
 
@@ -65,6 +68,14 @@ LARGE_COLUMNS = [*_RUN, "motion", "tau", "vertices", "elements", "iterations", "
 FULL, HRPD = "full", "hrpd"
 
 Sampled = Mapping[str, Samples | Interpolation]
+
+
+class Motion(Yardstick):
+    """A motion of a scene with its full-order run."""
+
+    def run(self, model: SubspaceModel, limit: float) -> Rerun:
+        """Run a model; a blow-up, an extent above ``limit`` m, ends the run and is recorded."""
+        return rerun_model(self.scene, model, self.reference, blowup_extent=limit)
 
 
 class Hrpd(HrpdSpec):
@@ -287,3 +298,14 @@ def _samplings(
             yield ecsw_name(tolerance), samples
     if HRPD in methods:
         yield HRPD, {g.name: hrpd(g, columns, spaces[g.name]) for g in scene.groups}
+
+
+def training_indices(scene: Scene) -> np.ndarray:
+    """Training frames (n,) of ``scene``: the even ones that train the projections, too."""
+    count = max(plan.train for plan in scene.config.reduce.values())
+    return training_frames(scene.config.frames, count)
+
+
+def training_positions(motion: Motion) -> np.ndarray:
+    """Positions (n, N, 3) m of ``motion`` after the training frames."""
+    return motion.reference[1:][training_indices(motion.scene)]

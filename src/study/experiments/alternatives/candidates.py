@@ -21,8 +21,8 @@ from study.experiments.alternatives.settings import (
     TWO_LEVEL,
     Comparison,
 )
-from study.experiments.alternatives.solvers.anderson import WINDOW
-from study.experiments.alternatives.solvers.methods import alternative
+from study.experiments.alternatives.solvers.projective import WINDOW
+from study.experiments.alternatives.solvers.substeps import alternative
 from study.experiments.alternatives.solvers.two_level import TwoLevel
 from study.experiments.kit.converged import converged_run
 

@@ -26,7 +26,7 @@ from study.artifact.reads import Settings, SourcesOf
 from study.experiments.alternatives.candidates import Trained, candidates, trained
 from study.experiments.alternatives.processes import Case, in_processes
 from study.experiments.alternatives.settings import CONVERGED, Comparison
-from study.experiments.alternatives.solvers.continuous import continuous
+from study.experiments.alternatives.solvers.explicit import continuous
 from study.experiments.kit.converged import converged_run
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.settings import BlowupExtent

@@ -7,7 +7,7 @@ from pydantic import AfterValidator, Field
 from pdrom.core.errors import choices
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.held_out import FIRST, MOTIONS, HeldOutMotion
-from study.experiments.alternatives.solvers.methods import METHODS
+from study.experiments.alternatives.solvers.substeps import METHODS
 from study.experiments.kit.measurement import Protocol
 from study.experiments.kit.settings import Count, Modes, Repeats, Tolerance
 

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pdrom.model.compiled import rows
+from pdrom.model.compiled.clock import clock, now
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.constraints.local_kernel import LocalKernel
+from pdrom.model.constraints.local_kernel import OWN, PREPARE, LocalKernel, call, local_kernel
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.dynamics.system import GlobalSystem
@@ -20,7 +22,6 @@ from pdrom.model.effects.base import Boundary, Contact, Effect, Force
 from pdrom.model.scene import Scene
 from study.experiments.kit.measurement import Measurement, Variant, measure, median_frames
 from study.experiments.kit.names import GLOBAL, REST, RIGHT
-from study.experiments.kit.timed_kernel import timed
 
 COSTS = ["scene", "effect", "elements", "ms_per_frame", "share", "us_per_iteration"]
 LEFT_OUT = ["scene", "left_out", "groups", "elements", "ms_per_frame", "saved_ms", "own_ms"]
@@ -32,6 +33,9 @@ _QUESTIONS: dict[type[Effect], tuple[str, ...]] = {
     Boundary: ("active", "held", "takes_hold", "path"),
     Contact: ("apply",),
 }
+# Entries of the record: address and record of the kernel, the places of the seconds and clocks of
+# its two parts and of its preparation.
+KERNEL, RECORD, SECONDS, CLOCKS, SIZE = range(OWN, OWN + 5)
 
 
 class Timed:
@@ -195,3 +199,23 @@ def _saving(
         whole - result.frame,
         float(chosen.ms_per_frame.sum()),
     )
+
+
+@local_kernel
+def _timed(y, rhs, record, part):
+    entries = rows.indices(record, SIZE)
+    watch = rows.indices(entries[CLOCKS] + 16 * part, 2)
+    before = now(watch)
+    energy = call(entries[KERNEL], y, rhs, entries[RECORD], part)
+    rows.doubles(entries[SECONDS], PREPARE + 1)[part] += now(watch) - before
+    return energy
+
+
+def timed(kernel: LocalKernel) -> tuple[LocalKernel, np.ndarray]:
+    """A kernel that does the same, and the seconds (3,) that its parts and preparation took."""
+    seconds, clocks = np.zeros(PREPARE + 1), np.stack([clock() for _ in range(PREPARE + 1)])
+    arrays = (seconds, clocks)
+    places = [kernel.address, kernel.record.ctypes.data, *(array.ctypes.data for array in arrays)]
+    record = np.concatenate([kernel.record[:OWN], np.array(places, dtype=np.int64)])
+    kept = (*arrays, kernel.record, *kernel.arrays)
+    return LocalKernel(_timed, record, kept, kernel.prepares, kernel.touched), seconds

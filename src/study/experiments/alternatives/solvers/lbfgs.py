@@ -13,8 +13,15 @@ from pdrom.model.compiled.vectors import add_multiple, dot
 from pdrom.model.dynamics.frames import inertia_energy, weighted
 from pdrom.model.dynamics.sweeps import sweep
 from pdrom.model.scene import Scene
-from study.experiments.alternatives.solvers.potential import add_projections, multiply, rows_of
-from study.experiments.alternatives.solvers.substeps import Alternative, Substeps, begin, end
+from study.experiments.alternatives.solvers.substeps import (
+    Alternative,
+    Substeps,
+    add_projections,
+    begin,
+    end,
+    multiply,
+    rows_of,
+)
 
 MEMORY = 5  # steps remembered, as in the paper
 SUFFICIENT = 1e-4  # Armijo's constant

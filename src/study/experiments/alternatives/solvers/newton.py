@@ -18,10 +18,21 @@ from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.constraints.lanes import lane_function
 from pdrom.model.dynamics.frames import inertia_energy
 from pdrom.model.scene import Scene
-from study.experiments.alternatives.solvers.clamping import MODES, hessian
-from study.experiments.alternatives.solvers.elements import Elements, decompose_element, workspace
-from study.experiments.alternatives.solvers.potential import add_projections, multiply
-from study.experiments.alternatives.solvers.substeps import Alternative, Substeps, begin, end
+from study.experiments.alternatives.solvers.elements import (
+    MODES,
+    Elements,
+    decompose_element,
+    hessian,
+    workspace,
+)
+from study.experiments.alternatives.solvers.substeps import (
+    Alternative,
+    Substeps,
+    add_projections,
+    begin,
+    end,
+    multiply,
+)
 
 SUFFICIENT = 1e-4  # Armijo's constant
 HALVINGS = 3  # of a step, before the floor is raised

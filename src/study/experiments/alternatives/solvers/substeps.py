@@ -1,22 +1,48 @@
-"""A frame in equal substeps, between the same held vertices and contacts as in the step loop."""
+"""A frame in equal substeps, between the same held vertices and contacts as in the step loop.
+
+The potential energy of all groups, W(y) = sum_j 1/2 sum_e w_e |S_e y - p_e(y)|^2, has the gradient
+S^T W S y - S^T W p(y), because p is the nearest point: what moves p moves along the manifold
+(Bouaziz et al. 2014, sect. 3).
+"""
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from time import perf_counter
 from typing import ClassVar, NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 from pdrom.core.errors import SceneError
+from pdrom.core.registry import Registry
+from pdrom.model.compiled.arithmetic import add_scaled, constant
 from pdrom.model.compiled.functions import compiled
-from pdrom.model.compiled.rows import WIDTH, as_vertices, flat
+from pdrom.model.compiled.rows import WIDTH, as_vertices, at, flat, load, store
+from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.constraints.local_kernel import LocalPass, Table, add_part
 from pdrom.model.dynamics.solvers import Factor
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import PHASES, FrameReport, State, Stepper
 from pdrom.model.dynamics.system import Elimination, GlobalSystem
 from pdrom.model.effects.gravity import Gravity
 from pdrom.model.scene import Scene
-from study.experiments.alternatives.solvers.potential import Potential
+
+# Arguments of `add_projections`, and of `multiply`.
+Tables = tuple[Table, ...]
+Matrix = tuple[np.ndarray, np.ndarray, np.ndarray]
+METHODS = Registry(
+    "method",
+    {
+        "projective": "study.experiments.alternatives.solvers.projective:SmallSteps",
+        "anderson": "study.experiments.alternatives.solvers.projective:Accelerated",
+        "chebyshev": "study.experiments.alternatives.solvers.projective:Chebyshev",
+        "l-bfgs": "study.experiments.alternatives.solvers.lbfgs:QuasiNewton",
+        "newton": "study.experiments.alternatives.solvers.newton:Newton",
+        "xpbd": "study.experiments.alternatives.solvers.xpbd:CompliantConstraints",
+        "vertex-descent": "study.experiments.alternatives.solvers.vertex_descent:VertexDescent",
+        "explicit": "study.experiments.alternatives.solvers.explicit:Explicit",
+    },
+)
 
 
 class Substeps(NamedTuple):
@@ -183,3 +209,71 @@ def end(y, before, step, v):
     """Velocities ``v`` from the positions ``y`` and ``before`` at both ends of a ``step``, s."""
     for k in range(len(y)):
         v[k] = (y[k] - before[k]) / step
+
+
+class Potential:
+    """Compiled local steps of groups, and the matrix S^T W S of all of them.
+
+    Attributes
+    ----------
+    tables : first argument of `add_projections`
+    stiffness : S^T W S, first argument of `multiply`
+    """
+
+    def __init__(self, groups: Sequence[ConstraintGroup], vertices: int) -> None:
+        kernels = [group.local_kernel for group in groups if group.local_kernel is not None]
+        self._pass = LocalPass(kernels)  # keeps the arrays that the tables point to
+        local = self._pass
+        self.tables: Tables = local.first, local.preparing, local.second
+        total = sparse.csr_array((vertices, vertices))
+        for group in groups:
+            total = total + group.system_matrix()
+        self.stiffness = rows_of(total)
+
+
+def rows_of(matrix: sparse.csr_array) -> Matrix:
+    """A matrix (N, N) as `multiply` takes it."""
+    ordered = sparse.csr_array(matrix)
+    ordered.sort_indices()
+    return ordered.indptr.astype(np.int32), ordered.indices.astype(np.int32), ordered.data
+
+
+@compiled(nogil=True)
+def add_projections(tables, y, rhs):
+    """Add S^T W p(y) of all groups in ``tables`` to ``rhs``, both padded, flat; the energy W(y)."""
+    kernels, preparing, second = tables
+    y_place, rhs_place = y.ctypes.data, rhs.ctypes.data
+    add_part(preparing, y_place, rhs_place)
+    energy = add_part(kernels, y_place, rhs_place)
+    return energy + add_part(second, y_place, rhs_place)
+
+
+@compiled(nogil=True)
+def multiply(matrix, y, out):
+    """Overwrite ``out`` by the matrix times ``y``, both padded vectors, flat."""
+    indptr, indices, data = matrix
+    for i in range(len(indptr) - 1):
+        total = constant(0.0)
+        for k in range(at(indptr, i), at(indptr, i + 1)):
+            total = add_scaled(total, at(data, k), load(y, WIDTH * at(indices, k)))
+        store(out, WIDTH * i, total)
+
+
+def alternative(
+    name: str,
+    scene: Scene,
+    substeps: int,
+    iterations: int = 1,
+    system: GlobalSystem | None = None,
+) -> Alternative:
+    """Step loop of a scene by the method ``name``: so many ``substeps`` a frame, see `Alternative`.
+
+    Each of them does ``iterations``; ``system`` is a factored one of equal substeps, to be shared.
+
+    Raises
+    ------
+    ConfigurationError, SceneError
+        Unknown name, a group or a force that the method does not take.
+    """
+    made: Alternative = METHODS.load(name)(scene, substeps, iterations, system)
+    return made

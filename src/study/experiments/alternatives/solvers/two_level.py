@@ -21,9 +21,15 @@ from pdrom.model.dynamics.frames import inertia_energy, weighted
 from pdrom.model.dynamics.sweeps import sweep
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.model import Samples, SubspaceModel
-from study.experiments.alternatives.solvers.anderson import WINDOW
-from study.experiments.alternatives.solvers.potential import Potential, add_projections
-from study.experiments.alternatives.solvers.substeps import Alternative, Substeps, begin, end
+from study.experiments.alternatives.solvers.projective import WINDOW
+from study.experiments.alternatives.solvers.substeps import (
+    Alternative,
+    Potential,
+    Substeps,
+    add_projections,
+    begin,
+    end,
+)
 
 INNER = 10  # iterations in the span, accelerated as well
 

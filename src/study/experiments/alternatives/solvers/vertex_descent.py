@@ -10,8 +10,14 @@ from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.constraints.lanes import lane_function
 from pdrom.model.scene import Scene
-from study.experiments.alternatives.solvers.clamping import MODES, hessian, residual
-from study.experiments.alternatives.solvers.elements import Elements, decompose_element, workspace
+from study.experiments.alternatives.solvers.elements import (
+    MODES,
+    Elements,
+    decompose_element,
+    hessian,
+    residual,
+    workspace,
+)
 from study.experiments.alternatives.solvers.substeps import Alternative, Substeps, begin, end
 
 

@@ -15,8 +15,12 @@ from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH, at, load, store
 from pdrom.model.constraints.lanes import lane_function
 from pdrom.model.scene import Scene
-from study.experiments.alternatives.solvers.clamping import residual
-from study.experiments.alternatives.solvers.elements import Elements, decompose_element, workspace
+from study.experiments.alternatives.solvers.elements import (
+    Elements,
+    decompose_element,
+    residual,
+    workspace,
+)
 from study.experiments.alternatives.solvers.substeps import (
     Alternative,
     Substeps,

@@ -6,10 +6,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from study.experiments.alternatives.solvers.clamping import MODES, decompose, hessian, residual
+from builders import from_python
+from study.experiments.alternatives.solvers import elements
+from study.experiments.alternatives.solvers.elements import MODES
 
 SIDES = st.floats(-3.0, 3.0, width=32)
 X = (1.0, 0.0, 0.0)
+decompose, residual, hessian = map(
+    from_python, (elements.decompose, elements.residual, elements.hessian)
+)
 
 
 def parts(d):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from builders import make_scene
-from study.experiments.alternatives.solvers.continuous import continuous
+from study.experiments.alternatives.solvers.explicit import continuous
 
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
 EFFECTS = ({"effect": "gravity"}, {"effect": "pins", "select": "left"})

@@ -6,7 +6,7 @@ import pytest
 from builders import GROUPS, make_scene
 from pdrom.core.errors import SceneError
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
-from study.experiments.alternatives.solvers.methods import alternative
+from study.experiments.alternatives.solvers.substeps import alternative
 from study.experiments.alternatives.solvers.two_level import TwoLevel
 from study.experiments.kit.converged import ConvergedStepper, converged_run
 

@@ -5,8 +5,8 @@ import pytest
 
 from builders import make_scene
 from pdrom.model.runs.full_order import trajectory
-from study.experiments.kit.contributions import COLUMNS, contributions
 from study.experiments.kit.sensitivity import removable, sensitivities, without
+from study.experiments.sensitivity import COLUMNS, contributions
 
 SPRING = {"effect": "spring", "weight": 1e3}
 GRAVITY = {"effect": "gravity"}
