@@ -11,9 +11,6 @@ from study.pipeline.resolve import Resolver
 from study.pipeline.study import Study
 
 SCENE = "own"
-NEEDED = (
-    "mesh", "fom", "sensitivity", "subspaces", "iterations", "snapshots", "pod", "reruns", "timing",
-)  # fmt: skip
 CHANGES = {
     "ranks": [2, "full"],
     "sensitivity": {"perturbations": [1e-10], "seeds": [1]},

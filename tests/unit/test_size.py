@@ -13,7 +13,7 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 43_179,
+    "lines of src": 43_176,
     "modules of src": 379,
     "lines of tests": 29_633,
     "words of documentation": 24_813,

@@ -24,11 +24,11 @@ title: {title}
 frames: 100 # to simulate
 time_step: 0.016 # s
 iterations: 10 # local and global steps of a frame
-vertex_mass: 10.0 # kg of each vertex
+{mass}
 
 # Only what is listed is loaded and computed.
 effects:
-  - {{effect: gravity}} # along -y
+  - {{effect: gravity{pull}}} # along -{up}
   - {floor}
   - {{effect: pins, select: {side}}} # held: a side (left, right, top ...) or a list of vertices
   # a handle: held vertices, moved by `offset` (m) over 50 frames; any `select` may be a place
@@ -58,6 +58,7 @@ VOLUME = """\
   - {effect: tetrahedron_strain, weight: 1.0e+6}
   # - {effect: volume, weight: 1.0e+6}
 """
+KILOGRAMS = 10.0  # of a vertex of the study's scenes, for which the weights are meant
 ENOUGH = 3  # fewest held vertices with which a body cannot turn about a line
 
 
@@ -65,6 +66,9 @@ def declare(parser: argparse.ArgumentParser) -> None:
     """Add to ``parser`` the file to write, and the mesh in it."""
     parser.add_argument("scene", metavar="SCENE", help="file to write; .yaml is added to a name")
     parser.add_argument("--mesh", metavar="FILE", help="mesh file (.obj, .vtu, .msh ...)")
+    parser.add_argument(
+        "--up", choices=("x", "y", "z"), default="y", help="axis of the mesh that points up (y)"
+    )
 
 
 def perform(arguments: argparse.Namespace) -> Status:
@@ -74,10 +78,11 @@ def perform(arguments: argparse.Namespace) -> Status:
 
     path = Path(arguments.scene)
     path = path if path.suffix in (".yaml", ".yml") else path.with_name(f"{path.name}.yaml")
-    text = template(path.stem, *(_read(arguments.mesh, path) if arguments.mesh else ()))
+    file, mesh = _read(arguments.mesh, path) if arguments.mesh else (None, None)
+    text = template(path.stem, file, mesh, arguments.up)
     try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
+        with path.open("x", encoding="utf-8") as made:
+            made.write(text)
     except FileExistsError:
         raise ConfigurationError(f"{path}: there is such a file already; name another") from None
     except OSError as error:
@@ -86,22 +91,35 @@ def perform(arguments: argparse.Namespace) -> Status:
     return Status.DONE
 
 
-def template(stem: str, file: str | None = None, mesh: "Mesh | None" = None) -> str:
-    """Text of a scene called as ``stem`` allows, on a generated sheet or the ``mesh`` of a file."""
+def template(stem: str, file: str | None = None, mesh: "Mesh | None" = None, up: str = "y") -> str:
+    """Text of a scene called as ``stem`` allows, on a generated sheet or the ``mesh`` of a file.
+
+    ``up`` is the axis that points up there.
+    """
     from pdrom.core.names import named
+    from pdrom.model.mesh.measures import vertex_measures
 
     names = {key: json.dumps(value, ensure_ascii=False) for key, value in named({}, stem).items()}
     if mesh is None:
         groups = SURFACE + VOLUME.replace("  - {", "  # - {")
         floor, side, about, made = "{effect: floor} # at y = 0", "left", "", GENERATED
+        mass, up = "vertex_mass: 10.0 # kg of each vertex", "y"
     else:
         groups = VOLUME if len(mesh.tetrahedra) else SURFACE
-        floor, side, about = _floor(mesh), _side(mesh), _about(mesh)
+        axis = "xyz".index(up)
+        floor, side, about = _floor(mesh, axis), _side(mesh, axis), _about(mesh)
+        density = float(f"{KILOGRAMS * mesh.vertices / vertex_measures(mesh).sum():.2g}")
+        unit = "kg/m^3" if len(mesh.tetrahedra) else "kg/m^2"
+        mass = f"masses: [{{density: {density:.12g}}}] # {unit}: about {KILOGRAMS:g} kg a vertex"
         made = f"{{kind: file, path: {json.dumps(file, ensure_ascii=False)}}}"
     group = "tetrahedron_strain" if groups == VOLUME else "spring"
-    return TEMPLATE.format(
-        **names, mesh=made, about=about, floor=floor, side=side, groups=groups, group=group
+    pull = (
+        "" if up == "y" else f", acceleration: {[-9.81 if axis == up else 0.0 for axis in 'xyz']}"
     )
+    return TEMPLATE.format(
+        **names, **{"mesh": made, "about": about, "mass": mass, "pull": pull, "up": up},
+        floor=floor, side=side, groups=groups, group=group,
+    )  # fmt: skip
 
 
 def _read(file: str, scene: Path) -> "tuple[str, Mesh]":
@@ -151,22 +169,25 @@ def _sides(mesh: "Mesh") -> dict[str, int]:
     return found
 
 
-def _side(mesh: "Mesh") -> str:
+def _side(mesh: "Mesh", axis: int) -> str:
     """A selection of enough vertices to hold the mesh by: its first such side, or a few on top."""
     for side, count in _sides(mesh).items():
         if count >= ENOUGH:
             return side
-    top = mesh.points[mesh.points[:, 1].argmax()].tolist()
+    top = mesh.points[mesh.points[:, axis].argmax()].tolist()
     return f"{{kind: nearest, point: {top}, count: {ENOUGH}}}"
 
 
-def _floor(mesh: "Mesh") -> str:
-    """A floor half an extent below the mesh, at a height of few digits."""
-    lowest = float(mesh.points[:, 1].min())
+def _floor(mesh: "Mesh", axis: int) -> str:
+    """A floor half an extent below the mesh along ``axis``, at a height of few digits."""
+    lowest = float(mesh.points[:, axis].min())
     step = 10.0 ** math.floor(math.log10(mesh.extent))
     height = math.floor((lowest - mesh.extent / 2.0) / step) * step
-    below = f"below the mesh, which begins at y = {lowest:.3g}"
-    return f"{{effect: floor, height: {height:.12g}}} # {below}"
+    below = f"below the mesh, which begins at {'xyz'[axis]} = {lowest:.3g}"
+    if axis == 1:
+        return f"{{effect: floor, height: {height:.12g}}} # {below}"
+    point, normal = ([x if i == axis else 0.0 for i in range(3)] for x in (height, 1.0))
+    return f"{{effect: plane, point: {point}, normal: {normal}}} # {below}"
 
 
 COMMAND = Command(

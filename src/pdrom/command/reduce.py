@@ -161,12 +161,8 @@ def _perform_request(arguments: argparse.Namespace) -> Status:
         made = reduce(full, error=request, scene=scene, on_frame=progress)
     save(made, out)
     sys.stdout.write("\n".join([f"{out}: {_answer(made)}", *_done(made)]) + "\n")
-    return _status_of(made)
-
-
-def _status_of(made: "RequestedRun") -> Status:
-    """Exit code: the tolerance has to be met for half of the frames at least."""
-    return Status.DONE if 2 * made.outcome.frames >= len(made.ms) else Status.NOTHING_FITS
+    enough = 2 * made.outcome.frames >= len(made.ms)
+    return Status.DONE if enough else Status.NOTHING_FITS
 
 
 def _answer(made: "RequestedRun") -> str:

@@ -49,8 +49,9 @@ class EnergyScale:
         """Scale of a full-order run of ``scene`` with positions ``reference`` (F + 1, N, 3) m."""
         zero = min(_force_potential(scene, q) for q in reference)
         own = energies(scene, reference) - zero
-        peak = float(own.max())
-        return cls(scene, zero, peak, own / peak if peak > _roundoff(scene) else np.empty(0))
+        peak, rest = float(own.max()), scene.mesh.points
+        roundoff = sum(0.5 * float(g.weights.max()) * g.roundoff(rest) ** 2 for g in scene.groups)
+        return cls(scene, zero, peak, own / peak if peak > roundoff else np.empty(0))
 
     def relative(self, positions: np.ndarray) -> np.ndarray:
         """Total energies at ``positions`` (F' + 1, N, 3) of a run, over the full order's largest.
@@ -96,12 +97,6 @@ def _group_potential(scene: Scene, q: np.ndarray) -> float:
         group.begin_frame(q)
         total += group.accumulate(q, unused)
     return total
-
-
-def _roundoff(scene: Scene) -> float:
-    """Energy of the rounding errors in S q of the rest shape, J."""
-    rest = scene.mesh.points
-    return sum(0.5 * float(g.weights.max()) * g.roundoff(rest) ** 2 for g in scene.groups)
 
 
 def _force_potential(scene: Scene, q: np.ndarray) -> float:

@@ -4,18 +4,23 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from pdrom.core.store import atomic_path
 from pdrom.core.store.atomic import MARK
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
+from pdrom.model.mesh.types import Mesh
 from pdrom.view import style
 from pdrom.view.artists import Figure
 from pdrom.view.camera import Camera
+from pdrom.view.pack import shown_region
 from pdrom.view.panels import RunPanel, shared_window
 from pdrom.view.read import frame_numbers
 from pdrom.view.run_rows import Row, draw_rows
 from pdrom.view.runs import ViewedRun, ViewedScene
 from pdrom.view.text import plain_words
+from pdrom.view.view import rotation_to, up_of
 
 INSTANTS = (0.25, 0.5, 0.75, 1.0)  # fractions of the run
 CAMERA = Camera(30.0, 20.0)
@@ -41,8 +46,20 @@ def shown_runs(scene: ViewedScene) -> list[ViewedRun]:
     return [shown(scene.sizes(*pair)) for pair in pairs]
 
 
+def _upright(scene: ViewedScene) -> tuple[ViewedScene, list[Mesh]]:
+    """Turn ``scene`` so that y is up; also its obstacles, the largest, which are behind, first."""
+    turn = rotation_to(up_of(scene.effects))
+    region = shown_region(scene.positions, scene.effects)
+    bodies = [effect.body(*region) for effect in scene.effects]
+    runs = tuple(replace(run, positions=run.positions @ turn) for run in scene.runs)
+    turned = replace(scene, positions=scene.positions @ turn, runs=runs)
+    surfaces = [replace(body, points=body.points @ turn) for body in bodies if body]
+    return turned, sorted(surfaces, key=lambda body: -float(np.ptp(body.points, axis=0).max()))
+
+
 def _draw(scene: ViewedScene) -> Figure:
     """One row per run; the grey outline in the rows below is the first run."""
+    scene, bodies = _upright(scene)
     numbers = frame_numbers(INSTANTS, len(scene.positions) - 1)
     full = scene.positions[numbers].astype(float)
     reference = [
@@ -50,22 +67,18 @@ def _draw(scene: ViewedScene) -> Figure:
         for frame, q in zip(numbers, full, strict=True)
     ]
     labels = [f"{style.words(scene.name)}\n{scene.first}"]
-    labels += [_title(scene, run) for run in shown_runs(scene)]
+    for run in shown_runs(scene):
+        group = f"{style.words(run.group)}\n" if len(scene.groups) > 1 else ""
+        labels.append(group + plain_words(run.title) + (f"\nr = {run.r}" if run.r else ""))
     every = [reference, *([_panel(run, f) for f in numbers] for run in shown_runs(scene))]
     windows = [
         shared_window(CAMERA, q, [panels[i] for panels in every]) for i, q in enumerate(full)
     ]
     rows = [
-        Row(label, scene.mesh, panels, windows, full)
+        Row(label, scene.mesh, [replace(p, obstacles=bodies) for p in panels], windows, full)
         for label, panels in zip(labels, every, strict=True)
     ]
     return draw_rows(rows, CAMERA, NO_LIMIT)
-
-
-def _title(scene: ViewedScene, run: ViewedRun) -> str:
-    """Method and size of ``run``, below the group where ``scene`` reduces several."""
-    group = f"{style.words(run.group)}\n" if len(scene.groups) > 1 else ""
-    return f"{group}{plain_words(run.title)}" + (f"\nr = {run.r}" if run.r else "")
 
 
 def panel_of(run: ViewedRun, frame: int) -> RunPanel:

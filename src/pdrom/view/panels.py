@@ -1,5 +1,6 @@
 """Panels with a run in them: the mesh at one instant, or why there is none."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,6 +10,7 @@ from pdrom.model.mesh.types import Mesh
 from pdrom.view.artists import Axes
 from pdrom.view.camera import Camera, Window, bounds, window_of
 from pdrom.view.mesh_render import (
+    FLOOR,
     Colour,
     Surface,
     draw_floor,
@@ -35,6 +37,7 @@ class RunPanel:
     remark : one line below the picture
     reference : whether this is the run that others are compared with
     flat : (N, 2) m, the positions in the picture plane (see `seen_by`)
+    obstacles : their surfaces; None draws the floor y = 0
     """
 
     title: str
@@ -44,6 +47,7 @@ class RunPanel:
     remark: str | None = None
     reference: bool = False
     flat: np.ndarray | None = None
+    obstacles: Sequence[Mesh] | None = None
 
     def seen_by(self, camera: Camera) -> "RunPanel":
         """The panel with its positions in the picture plane of ``camera``."""
@@ -119,7 +123,10 @@ def draw_run(
         return
     shown, zoom = panel.zoomed(window), panel.scale(window)
     surface = mesh_surface(mesh)
-    if not panel.failure:
+    for body in panel.obstacles or ():
+        faces = Surface(body.triangles)
+        draw_surface(ax, body.points, faces, camera, FLOOR, wire=0.05).set_zorder(0.1)
+    if panel.obstacles is None and not panel.failure:
         draw_floor(ax, panel.positions, surface, camera=camera, window=shown)
     if ghost is not None:
         edges = outline_edges(mesh.points, mesh.triangles)

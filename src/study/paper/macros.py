@@ -141,15 +141,13 @@ def _parse(key: str, tables: Mapping[str, pd.DataFrame]) -> _Key:
     if not parts or "=" in parts[-1]:
         raise PaperError(f"\\val{{{key}}}: names no column of table '{name}'")
     *filters, column = parts
-    found = [_filter(entry) for entry in filters]
+    found: list[Filter] = []
+    for entry in filters:
+        parsed = _FILTER.fullmatch(entry)
+        found.append((parsed[1], parsed[2], parsed[3]) if parsed else (entry, "=", ""))
     for field in (*(field for field, _, _ in found), column):
         _require(field, tables[name], key)
     return _Key(name, found, column, aggregate)
-
-
-def _filter(entry: str) -> Filter:
-    parts = _FILTER.fullmatch(entry)
-    return (parts[1], parts[2], parts[3]) if parts else (entry, "=", "")
 
 
 def matching(rows: pd.DataFrame, filters: Sequence[Filter]) -> pd.DataFrame:

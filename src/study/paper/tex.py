@@ -108,7 +108,10 @@ def build_pdfs(
         for _ in range(MAX_RUNS):
             for source in sources:
                 _run(pdflatex, source, job, environment)
-            current = [_auxiliary(job / f"{source.stem}.aux") for source in sources]
+            current = [
+                (job / f"{source.stem}.aux").read_text(encoding="utf-8", errors="replace")
+                for source in sources
+            ]
             if current == previous:
                 break
             previous = current
@@ -117,10 +120,6 @@ def build_pdfs(
         for source, output in documents.items():
             with atomic_path(output) as temporary:
                 shutil.copyfile(job / f"{source.stem}.pdf", temporary)
-
-
-def _auxiliary(path: Path) -> str:
-    return path.read_text(encoding="utf-8", errors="replace")
 
 
 def _environment(search: list[Path]) -> dict[str, str]:

@@ -114,7 +114,10 @@ def iterations(tables: Tables) -> str:
         cells = [
             _cell(
                 _rows(table, scene=scene, method=method, iterations=count),
-                lambda run: _with_time(run.relative_error_within_horizon, run.ms_per_frame),
+                lambda run: (
+                    f"{format_number(run.relative_error_within_horizon)} "
+                    f"({format_number(run.ms_per_frame)})"
+                ),
             )
             for method, count in _RUNS
         ]
@@ -200,10 +203,6 @@ def _cell(rows: pd.DataFrame, text: Callable[[pd.Series], str]) -> str:
     return text(rows.iloc[0]) if len(rows) else NONE
 
 
-def _with_time(error: float, ms: float) -> str:
-    return f"{format_number(error)} ({format_number(ms)})"
-
-
 FULL = "full"  # position basis of unreduced positions
 
 
@@ -212,7 +211,11 @@ def speedups(tables: Tables) -> str:
     rows = [
         [
             name(row.scene),
-            name(_reduction(row)),
+            name(
+                f"{row.method}, r = {int(row.r)}"
+                if row.position_basis == FULL
+                else f"{row.method}, k = {int(row.k)}"
+            ),
             _number(row.full_ms),
             escape(row.shown) + (" (loses)" if row.loses else ""),
             _number(row.error_train),
@@ -232,7 +235,9 @@ def payoff(tables: Tables) -> str:
     """Numbers of scenes in which each reduction is accurate, pays, and loses."""
     rows = [
         [
-            name(_model(row)),
+            name(
+                row.method if row.position_basis == FULL else f"{row.method}, {row.position_basis}"
+            ),
             str(row.scenes),
             str(row.accurate),
             str(row.pays),
@@ -277,15 +282,6 @@ def _size(vertices: Any) -> str:
     return "--" if pd.isna(vertices) else str(int(vertices))
 
 
-def _model(row: Any) -> str:
-    return row.method if row.position_basis == FULL else f"{row.method}, {row.position_basis}"
-
-
-def _reduction(row: Any) -> str:
-    size = f"r = {int(row.r)}" if row.position_basis == FULL else f"k = {int(row.k)}"
-    return f"{row.method}, {size}"
-
-
 def _number(value: float) -> str:
     return "--" if pd.isna(value) else format_number(value)
 
@@ -302,18 +298,15 @@ def scenes(tables: Tables) -> str:
     for row in tables["scenes"].itertuples():
         end = horizon.get(row.scene)
         shown = "--" if pd.isna(end) else "run" if end == row.frames else str(int(end))
-        groups = _powers(escape(row.groups.replace("_", " ")))
+        groups = escape(row.groups.replace("_", " "))
+        # numbers such as 1e+06 as powers of ten
+        powers = re.sub(r"([\d.]+)e\+?(-?)0*(\d+)", r"$\1\\cdot 10^{\2\3}$", groups)
+        groups = powers.replace(r"$1\cdot 10", "$10")
         rows.append(
             [name(row.scene), groups, str(row.vertices), str(row.elements), str(row.frames), shown]
         )
     header = ["scene", "groups (weight)", "vertices", "elements", "frames", "horizon"]
     return longtable(header, rows, r"l>{\raggedright\arraybackslash}p{5.2cm}rrrr")
-
-
-def _powers(text: str) -> str:
-    """Numbers such as 1e+06 in ``text`` as powers of ten."""
-    plain = re.sub(r"([\d.]+)e\+?(-?)0*(\d+)", r"$\1\\cdot 10^{\2\3}$", text)
-    return plain.replace(r"$1\cdot 10", "$10")
 
 
 def methods(tables: Tables) -> str:
@@ -347,16 +340,12 @@ def ranks(tables: Tables) -> str:
     rows = []
     for (scene, group), part in tables["singular_values"].groupby(["scene", "group"], sort=False):
         real = part[part.above_roundoff]
-        decay = [_relative(real, component) for component in (6, 10, 20)]
+        cells = [real[real.component == component].relative for component in (6, 10, 20)]
+        decay = [format_number(cell.iloc[0]) if len(cell) else "--" for cell in cells]
         rows.append([name(scene), escape(group.replace("_", " ")), str(len(real)), *decay])
     header = ["scene", "group", "rank", r"$\sigma_6/\sigma_1$", r"$\sigma_{10}/\sigma_1$",
               r"$\sigma_{20}/\sigma_1$"]  # fmt: skip
     return longtable(header, rows, "llrrrr")
-
-
-def _relative(rows: pd.DataFrame, component: int) -> str:
-    cell = rows[rows.component == component].relative
-    return format_number(cell.iloc[0]) if len(cell) else "--"
 
 
 def reruns(tables: Tables) -> str:

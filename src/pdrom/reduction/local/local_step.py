@@ -8,7 +8,7 @@ from pdrom.model.compiled.rows import as_vertices, flat, shares, unflat
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.constraints.local_kernel import LocalKernel, LocalPass
 from pdrom.reduction.local.lift import Lift, coefficients, lift
-from pdrom.reduction.sampling.reduction import Block, Reduction
+from pdrom.reduction.sampling.reduction import Reduction
 
 
 class ReducedLocalStep:
@@ -100,7 +100,8 @@ def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
     limits = np.full((2, r), np.inf) * [[-1.0], [1.0]]
     if reduction.limits is not None:
         limits = reduction.limits
-    columns = [(axis, k) for k, block in enumerate(blocks) for axis in _axes(block)]
+    every = [range(3) if block.axis is None else (block.axis,) for block in blocks]
+    columns = [(axis, k) for k, axes in enumerate(every) for axis in axes]
     lifted = np.zeros((len(columns), vertices, r))
     for own, (axis, _) in zip(lifted, columns, strict=True):
         own[...] = operator @ reduction.v[axis::3]
@@ -118,10 +119,6 @@ def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
         offset=flat(as_vertices(operator @ mean.reshape(-1, 3))),
         seconds=np.zeros(2),
     )
-
-
-def _axes(block: Block) -> tuple[int, ...]:
-    return (0, 1, 2) if block.axis is None else (block.axis,)
 
 
 def _joined(parts: list[np.ndarray], kind: type) -> np.ndarray:

@@ -133,8 +133,11 @@ class _Measures:
                 m[np.ix_(free, free)] for m in (self._space.matrix, self._space.inertia_matrix)
             )
             measure = np.zeros((len(free), size))
-            energy = self._norm == "energy"
-            measure[:, free] = _inverse_root(block) if energy else self._response(block, inertia)
+            if self._norm == "energy":  # a triangular R with R^T R = A^-1
+                root = linalg.cholesky(block, lower=True)
+                measure[:, free] = linalg.solve_triangular(root, np.eye(len(block)), lower=True)
+            else:
+                measure[:, free] = self._response(block, inertia)
             self._cache[key] = measure
         return self._cache[key]
 
@@ -144,12 +147,6 @@ class _Measures:
         c2 = 1.0 / np.maximum(values, 1.0)
         beside = np.maximum(1.0 - c2, 1.0 / self._frames)
         return (c2 * np.sqrt((1.0 + c2) / (1.0 + 3.0 * c2)) / beside)[:, None] * modes.T
-
-
-def _inverse_root(matrix: np.ndarray) -> np.ndarray:
-    """A triangular R with R^T R = A^-1."""
-    root = linalg.cholesky(matrix, lower=True)
-    return linalg.solve_triangular(root, np.eye(len(matrix)), lower=True)
 
 
 # Rows that the training equations are hashed to, per coordinate of the subspace: several times the

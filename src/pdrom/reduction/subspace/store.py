@@ -42,7 +42,13 @@ def load_models(path: str | os.PathLike[str]) -> list[tuple[dict[str, object], S
             base = str(store.attrs["base"])
             labels = {key: store.attrs[key] for key in ("method", "position_basis", "k")}
             labels["k"] = int(labels["k"])
-            model = SubspaceModel(str(labels["position_basis"]), columns[base], _samples(store))
+            samples = {
+                name: Interpolation.load(chosen)
+                if "operator" in chosen
+                else Samples(chosen["elements"][...], chosen["factors"][...])
+                for name, chosen in store.get("samples", {}).items()
+            }
+            model = SubspaceModel(str(labels["position_basis"]), columns[base], samples)
             models.append((labels, model))
     return models
 
@@ -56,15 +62,3 @@ def _columns(store: h5py.Group) -> Columns:
         atom_columns=[a["columns"][...] for a in atoms],
         modes=int(store.attrs["modes"]),
     )
-
-
-def _samples(store: h5py.Group) -> dict[str, Samples | Interpolation]:
-    if "samples" not in store:
-        return {}
-    return {name: _sampled(chosen) for name, chosen in store["samples"].items()}
-
-
-def _sampled(chosen: h5py.Group) -> Samples | Interpolation:
-    if "operator" in chosen:
-        return Interpolation.load(chosen)
-    return Samples(chosen["elements"][...], chosen["factors"][...])

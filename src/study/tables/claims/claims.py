@@ -12,7 +12,6 @@ from study.tables.claims.rules import (
     PARTS,
     READS,
     Added,
-    Change,
     ClaimRule,
     TestRule,
     load_claims,
@@ -95,7 +94,11 @@ def _row(name: str, rule: ClaimRule, tables: Tables) -> dict[str, Any]:
         "qualifiers": rule.qualifiers,
         **{f"{key}_beyond": value for key, value in beyond.items()},
         "answer": f"as published it {published['verdict']}, beyond it {beyond['verdict']}",
-        "history": " ".join(_told(change) for change in rule.changes),
+        "history": " ".join(
+            f"{change.date.isoformat()}{' (results were known)' * change.after_data}: "
+            f"{change.reason}"
+            for change in rule.changes
+        ),
     }
 
 
@@ -108,8 +111,3 @@ def _decided(tests: Sequence[TestRule], tables: Tables) -> dict[str, str]:
         "condition": "; ".join(o.condition for o in deciding if o.condition),
         "why": "; ".join(o.sentence for _, o in outcomes) + ".",
     }
-
-
-def _told(change: Change) -> str:
-    known = " (results were known)" if change.after_data else ""
-    return f"{change.date.isoformat()}{known}: {change.reason}"

@@ -100,7 +100,8 @@ def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Itera
     for margin in MARGINS if any(test.timed for test in tests) else ():
         changed = [_changed(test, margin=margin) if test.timed else test for test in tests]
         yield "margin", f"{margin:g}", changed, rows
-    yield from _kept(tests, rows, "sizes", "r", _sizes())
+    sizes = {f"r up to {SMALL}": lambda r: ~(r > SMALL), f"r above {SMALL}": lambda r: r > SMALL}
+    yield from _kept(tests, rows, "sizes", "r", sizes)
     for split in SPLITS:
         changed = [_of_split(test, split) for test in tests]
         if changed != list(tests):
@@ -118,10 +119,6 @@ def _kept(
         kept = [values[keep(values[column])] if column in values else values for values in rows]
         if sum(map(len, kept)) < sum(map(len, rows)):
             yield varied, name, tests, kept
-
-
-def _sizes() -> dict[str, _Keep]:
-    return {f"r up to {SMALL}": lambda r: ~(r > SMALL), f"r above {SMALL}": lambda r: r > SMALL}
 
 
 def _other_than(scene: str) -> _Keep:

@@ -87,6 +87,9 @@ def test_files_are_read_back(full, tmp_path):
     assert errors.pop("contact_delay") is found.pop("contact_delay") is None  # there is no floor
     assert found == pytest.approx(errors, rel=1e-3)
     assert read.full.scene.config == full.scene.config
+    api.save(read, tmp_path / "again.h5")  # positions in single precision stay what they are
+    again = api.load(tmp_path / "again.h5")
+    assert np.array_equal(again.outcome.positions, read.outcome.positions)
     stored = api.run(full.scene, tmp_path / "full.h5")
     again = api.load(tmp_path / "full.h5")
     assert np.array_equal(stored.positions, again.positions)

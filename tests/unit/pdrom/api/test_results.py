@@ -1,6 +1,5 @@
 """What runs are saved, read, drawn and shown as: nothing is lost, and faults are named."""
 
-import shutil
 from dataclasses import replace
 
 import h5py
@@ -55,33 +54,11 @@ def test_every_method_runs_to_its_end_or_says_where_it_blew_up(full, method):
     assert made.ms > 0.0
 
 
-def test_what_was_saved_is_saved_alike_again(reduced, tmp_path):
-    """Positions are kept in single precision: a second time nothing changes."""
-    api.save(reduced, tmp_path / "one.h5")
-    one = api.load(tmp_path / "one.h5")
-    api.save(one, tmp_path / "two.h5")
-    two = api.load(tmp_path / "two.h5")
-    assert np.array_equal(one.outcome.positions, two.outcome.positions)
-    assert np.array_equal(one.full.positions, two.full.positions)
-    assert (one.title, one.gain, one.ms) == (two.title, two.gain, two.ms)
-    assert [path.name for path in sorted(tmp_path.iterdir())] == ["one.h5", "two.h5"]
-
-
 def test_a_saved_run_has_no_snapshots_and_says_so(reduced, tmp_path):
     api.save(reduced, tmp_path / "one.h5")
     read = api.load(tmp_path / "one.h5")
     with pytest.raises(PdromError, match="stored no snapshots"):
         api.basis(read.full, "spring")
-
-
-def test_a_file_of_something_else_is_no_run(tmp_path):
-    with h5py.File(tmp_path / "other.h5", "w") as file:
-        file["numbers"] = [1.0]
-    before = shutil.copy(tmp_path / "other.h5", tmp_path / "copy.h5")
-    for unchecked in (False, True):
-        with pytest.raises(StorageError, match=r"other\.h5"):
-            api.load(tmp_path / "other.h5", unchecked)
-    assert before.read_bytes() == (tmp_path / "other.h5").read_bytes()
 
 
 def test_a_picture_has_a_line_for_each_run_and_a_cross_for_a_blow_up(reduced):

@@ -1,6 +1,7 @@
 """The command line: each command does its work, says it in a line, and ends with its code."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -23,6 +24,7 @@ from pdrom.core.store.atomic import MARK
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene, SceneConfig
+from pdrom.view.view import up_of
 
 
 @pytest.fixture
@@ -100,9 +102,11 @@ def test_a_run_is_read_wherever_it_was_copied(folder, finished, capsys):
     assert set(content(folder)) == {"copy.h5", "no suffix", *made}
 
 
-@pytest.mark.parametrize("name", ["x.h5", "x.txt", "x", "x.csv"])
+@pytest.mark.parametrize("name", ["x.h5", "x.txt", "x", "x.csv", "own.h5"])
 def test_a_file_of_others_is_never_moved_changed_or_removed(folder, name, capsys):
     Path(name).write_bytes(b"somebody's own\n")
+    if name == "own.h5":
+        h5py.File(name, "w").create_dataset("numbers", data=[1.0]).file.close()
     before = content(folder)
     for arguments in reads_of(name)[:3]:
         assert run(arguments) == Status.FAULTY
@@ -204,8 +208,10 @@ def test_a_table_is_shown_with_what_its_columns_hold(folder, capsys):
 def test_a_new_scene_is_valid_and_replaces_nothing(folder, capsys):
     assert run(["new", "My Sheet-1"]) == Status.DONE
     text = (folder / "My Sheet-1.yaml").read_text("utf-8")
-    scene = SceneConfig.model_validate(yaml.safe_load(text))
-    assert scene.name == "my_sheet_1"
+    assert SceneConfig.model_validate(yaml.safe_load(text)).name == "my_sheet_1"
+    (folder / "Two Words.yaml").write_text(re.sub("(?m)^(name|title): .*", "", text))
+    config = load_scene("Two Words.yaml").config
+    assert (config.name, config.title) == ("two_words", "Two words")
     assert run(["new", "My Sheet-1.yaml"]) == Status.FAULTY
     assert "there is such a file already" in capsys.readouterr().err
     assert (folder / "My Sheet-1.yaml").read_text("utf-8") == text
@@ -270,13 +276,16 @@ def test_a_mesh_without_a_whole_side_is_held_at_its_top(folder):
     assert built.boundaries[0].vertices.tolist() == [2, 3, 4]
 
 
-def test_names_and_titles_follow_from_the_file(folder):
-    short = SMALL.partition("\n")[2].replace("title: Small\n", "")
-    (folder / "Two Words.yaml").write_text(short, encoding="utf-8")
-    config = load_scene("Two Words.yaml").config
-    assert (config.name, config.title) == ("two_words", "Two words")
-    (folder / "on.yaml").write_text(short, encoding="utf-8")
-    assert load_scene("on.yaml").config.name == "on"
+@pytest.mark.parametrize("up", [0, 1, 2])
+def test_a_new_scene_has_a_density_and_its_floor_below_along_what_is_up(up):
+    mesh = cloth(4, 3, "xz")
+    text = template("a", "a.obj", mesh, up="xyz"[up])
+    scene = Scene.build(SceneConfig.model_validate(yaml.safe_load(text)), mesh)
+    assert up_of(scene.config.effects).tolist() == np.eye(3)[up].tolist()
+    (floor,) = scene.contacts
+    assert floor.gaps(mesh.points).min() >= mesh.extent / 2.0
+    assert floor.gaps(mesh.points + np.eye(3)[up]) == pytest.approx(floor.gaps(mesh.points) + 1.0)
+    assert scene.masses.mean() == pytest.approx(10.0, rel=0.05)
 
 
 def test_what_an_obstacle_moves_at_rest_is_said_once(folder, caplog):
@@ -449,12 +458,6 @@ def test_an_output_that_cannot_be_written_is_one_line(folder):
     assert done.stderr == "pdrom: standard output: No space left on device\n"
 
 
-def test_the_version_is_said(capsys):
-    with pytest.raises(SystemExit) as caught:
-        run(["--version"])
-    assert (caught.value.code, capsys.readouterr().out) == (0, f"pdrom {__version__}\n")
-
-
 def test_a_run_of_another_scene_is_not_reduced(folder, capsys):
     run(["run", "small.yaml"])
     (folder / "small.yaml").write_text(SMALL.replace("1.0e+5", "2.0e+5"))
@@ -512,4 +515,5 @@ def test_a_page_without_a_browser_is_opened_by_hand(folder, finished, monkeypatc
 def test_the_module_is_the_program(tmp_path):
     done = shell("pdrom new x", tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
+    assert shell("pdrom --version", tmp_path).stdout == f"pdrom {__version__}\n"
     assert (tmp_path / "x.yaml").is_file()

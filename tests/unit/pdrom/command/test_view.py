@@ -1,7 +1,9 @@
 """pdrom view: a page, a picture and files for ParaView, of every kind of run."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 from xml.etree import ElementTree
 
 import h5py
@@ -17,6 +19,10 @@ from pdrom.command.base import Status
 from pdrom.command.main import run
 from pdrom.core.errors import StorageError
 from pdrom.core.store.checksum import write_block
+from pdrom.model.effects.gravity import Gravity
+from pdrom.model.effects.sphere import Sphere
+from pdrom.view.frames import write_frames
+from pdrom.view.view import rotation_to
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +72,19 @@ def test_the_page_the_picture_and_the_files_for_paraview_have_all_runs(runs, tmp
     assert np.array_equal(last.points, full.positions[-1])
     assert {name.split(" ")[0] for name in last.point_data} >= {"displacement", "spring", "all"}
     assert [path.name for path in tmp_path.rglob(".*")] == []
+
+
+def test_a_picture_is_upright_and_has_the_obstacles(runs, tmp_path, monkeypatch):
+    turn, drawn = rotation_to(np.array([0.0, 0.0, 1.0])), []
+    monkeypatch.setattr("pdrom.view.panels.draw_surface", lambda *a, **k: drawn.append(a) or Mock())
+    (scene,) = viewed_scenes(load(files(runs)[0]))
+    gravity = Gravity.Config(acceleration=(0.0, 0.0, -9.81))
+    effects = (gravity, Sphere.Config(centre=(0.0, 0.0, 1.6), radius=0.4))
+    turned = replace(scene, effects=effects, positions=scene.positions @ turn.T)
+    write_frames(turned, tmp_path / "p.png")
+    (_, sphere, *_), *_, (_, last, *_) = drawn
+    assert sphere.mean(axis=0) == pytest.approx([0.0, 1.6, 0.0], abs=1e-6)
+    assert last == pytest.approx(scene.positions[-1], abs=1e-6)
 
 
 def test_files_for_paraview_replace_and_remove_only_their_own(runs, tmp_path, capsys):
