@@ -2,19 +2,21 @@
 
 import json
 import re
-from collections.abc import Mapping
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
 from html import escape
+from importlib.util import find_spec
 from pathlib import Path
 
 import pandas as pd
 
+from pdrom.core.errors import PaperError
 from pdrom.core.store import read_table, read_text, write_text
-from study.article.claims import claims_page
 from study.article.latex import Origins, linked_table, prepared
-from study.article.pandoc import Tree, page, parsed
 from study.article.pictures import copy_pdf, shown_figure, write_picture
-from study.article.tables import FACTS, contents, list_page, table_page
-from study.article.tree import Labels, numbered, resolved
+from study.article.tables import FACTS, claims_page, contents, list_page, table_page
+from study.article.tree import Labels, Tree, numbered, resolved
 from study.article.verified import INDEX, write_verified
 from study.artifact.files import Files
 from study.artifact.paths import ARTICLE, FIGURE_PICTURE, File, Place
@@ -142,6 +144,60 @@ def _writes() -> dict[str, Place]:
     names |= {f"table_{name}": f"tables/{name}.html" for name in (*declared(), *FACTS)}
     names |= {f"picture_{name}": f"figures/{name}.webp" for name in declarations()}
     return {key: ARTICLE.where(name=name) for key, name in names.items()}
+
+
+LIMIT = 300.0  # seconds; a definition that expands to itself never ends
+
+
+def parsed(text: str, files: Mapping[str, str], references: Path) -> Tree:
+    r"""Pandoc's syntax tree of a LaTeX source ``text``, with its bibliography.
+
+    Parameters
+    ----------
+    files : what the source reads by ``\input``, by name
+    references : BibTeX
+
+    Raises
+    ------
+    PaperError
+        Pandoc is not installed, or refuses the source.
+    """
+    with tempfile.TemporaryDirectory(prefix="pdrom-pandoc-") as folder:
+        for name, content in {**files, "article.tex": text}.items():
+            Path(folder, name).write_text(content, encoding="utf-8")
+        words = ["-f", "latex", "-t", "json", "--citeproc", "-M", "link-citations=true"]
+        words += ["--bibliography", str(references.resolve()), "article.tex"]
+        tree: Tree = json.loads(_run(words, folder, ""))
+        return tree
+
+
+def page(tree: Tree, template: Path, variables: Mapping[str, str]) -> str:
+    """HTML of ``tree`` by a ``template`` with ``variables``; PaperError as in `parsed`.
+
+    Formulas are MathML, a table of contents comes first.
+    """
+    words = ["-f", "json", "-t", "html5", "--mathml", "--wrap=none", "--toc", "--toc-depth=2"]
+    words += ["--standalone", "--shift-heading-level-by=1", f"--template={template.resolve()}"]
+    words += [word for name, value in variables.items() for word in ("-V", f"{name}={value}")]
+    return _run(words, None, json.dumps(tree))
+
+
+def _run(words: Sequence[str], folder: str | None, given: str) -> str:
+    spec = find_spec("pypandoc")
+    program = Path(spec.origin or "").parent / "files" / "pandoc" if spec else None
+    if program is None or not program.is_file():
+        raise PaperError("no pandoc: the package pypandoc-binary of requirements.lock is missing")
+    command = [str(program), "--quiet", *words]
+    try:
+        done = subprocess.run(
+            command, input=given, cwd=folder, capture_output=True, encoding="utf-8",
+            timeout=LIMIT, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired as error:
+        raise PaperError(f"pandoc does not end within {LIMIT:g} s") from error
+    if done.returncode != 0:
+        raise PaperError(f"pandoc: {' '.join(done.stderr.split())[:300]}")
+    return done.stdout
 
 
 article = Files(

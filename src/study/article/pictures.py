@@ -8,7 +8,7 @@ from pathlib import Path
 from PIL import Image
 
 from pdrom.core.store import atomic_path, require_intact
-from study.article.nodes import Node, attributes, link, plain, words
+from study.article.tree import Node, attributes, link, plain, words
 from study.artifact.reads import TableOf
 from study.figures.kit.declaration import declarations
 

@@ -1,4 +1,4 @@
-"""Pages of the tables: each holds its table as packed CSV, which a script shows and sorts."""
+"""Pages of tables and of the claims: rule, tests with what they found, history."""
 
 import base64
 import gzip
@@ -12,6 +12,8 @@ from pdrom.view.page import filled
 from study.artifact.paths import RESULTS, TABLE
 from study.figures.kit.declaration import declarations
 from study.tables import declared
+from study.tables.claims.metrics import METRICS
+from study.tables.claims.rules import ClaimRule, TestRule
 from study.tables.kit.declaration import QUANTITIES
 
 NOT_JUDGED = ("timed", "skipped")
@@ -68,3 +70,95 @@ def list_page(names: list[str], template: str) -> str:
         for name in names
     )
     return filled(template, {"TITLE": "Tables", "BODY": f"<ul>{items}</ul>"})
+
+
+PARTS = {"published": "As published", "beyond": "Beyond"}
+
+
+def claims_page(
+    claims: Mapping[str, ClaimRule],
+    tests: pd.DataFrame,
+    verdicts: pd.DataFrame,
+    pages: Mapping[str, str],
+    template: str,
+) -> str:
+    """HTML of all ``claims``, rules by name, in ``template``.
+
+    Parameters
+    ----------
+    pages : of the figures by their names
+    """
+    found = verdicts.set_index("claim")
+    body = "".join(
+        _claim(name, rule, tests[tests.claim == name], found.loc[name], pages)
+        for name, rule in claims.items()
+    )
+    return filled(template, {"TITLE": "Claims", "BODY": body})
+
+
+def _claim(
+    name: str, rule: ClaimRule, tests: pd.DataFrame, verdict: pd.Series, pages: Mapping[str, str]
+) -> str:
+    shown = rule.figure_or_table
+    place = f"{pages[shown]}#fig:{shown}" if shown in pages else f"tables/{shown}.html"
+    history = "".join(
+        f"<li>{c.date} ({'results were known' if c.after_data else 'before any result'}): "
+        f"{escape(c.reason)}</li>"
+        for c in rule.changes
+    )
+    return (
+        f"<section aria-labelledby='{name}'><h2 id='{name}'>{name}: {escape(rule.paper)}</h2>"
+        f"<p>{escape(rule.text)} <small>{escape(rule.source)}, section {escape(rule.section)}, "
+        f"figures: {escape(rule.shown)}. Qualifiers: {escape(rule.qualifiers)}.</small></p>"
+        f"<p><strong>As published: {escape(verdict.verdict)}. "
+        f"Beyond: {escape(verdict.verdict_beyond)}.</strong> "
+        f"Last <code>./reproduce verify</code>: <span data-verified='claim {name}'>not yet</span>. "
+        f"Command: <code>./reproduce claims</code>. Shown in <a href='{place}'>{shown}</a>.</p>"
+        f"{''.join(_tests(name, part, getattr(rule, part), tests) for part in PARTS)}"
+        f"<h3>History of the rules</h3><ul>{history}</ul>"
+        f"<p><small>Rules: <code>config/claims.yaml</code>, "
+        f"fingerprint {rule.fingerprint}.</small></p></section>"
+    )
+
+
+def _tests(name: str, part: str, rules: tuple[TestRule, ...], tests: pd.DataFrame) -> str:
+    head = "<tr><th>test</th><th>rule</th><th>rows that satisfy it</th><th>found</th></tr>"
+    rows = "".join(
+        f"<tr><td>{escape(rule.what)}{'' if rule.decides else ' (beside the verdict)'}</td>"
+        f"<td>{_rule(rule)}</td><td>{_found(name, part, row)}</td>"
+        f"<td>{_range(row)}{escape(row.verdict)}</td></tr>"
+        for rule, (_, row) in zip(rules, tests[tests.part == part].iterrows(), strict=True)
+    )
+    label = f"Tests of {name}, {part}"
+    return (
+        f"<h3>{PARTS[part]}</h3><div class=scroll tabindex=0 role=region aria-label='{label}'>"
+        f"<table>{head}{rows}</table></div>"
+    )
+
+
+def _range(row: pd.Series) -> str:
+    """Range of the values of a test; nothing where it has no rows."""
+    if not row.of:
+        return ""
+    return f"{row.least:.2g} to {row.most:.2g}, median {row['median']:.2g}: "
+
+
+def _found(name: str, part: str, row: pd.Series) -> str:
+    return (
+        f"<a class=val href='tables/claims_tests.html#claim={name}|part={part}|satisfied'>"
+        f"{row.satisfied} of {row.of}</a>"
+    )
+
+
+def _rule(rule: TestRule) -> str:
+    table = METRICS[rule.metric].table
+    where = "; ".join(
+        f"{column}: {', '.join(map(str, values))}" for column, values in rule.where.items()
+    )
+    sign = {">=": "at least", "<=": "at most"}[rule.compare]
+    margin = f"; ratios within a factor {rule.factor:g} decide nothing" if rule.timed else ""
+    return (
+        f"<code>{rule.metric}</code> of <a href='tables/{table}.html'>{table}</a>"
+        f"{f' ({escape(where)})' if where else ''} {sign} {rule.threshold:g}, "
+        f"in {rule.share:.0%} of the rows{margin}; <code>./reproduce {argument(table)}</code>"
+    )

@@ -8,15 +8,18 @@ import numpy as np
 import pandas as pd
 
 from pdrom.view import style
-from pdrom.view.artists import Axes, Figure, Line2D
+from pdrom.view.artists import Artist, Axes, Figure, Line2D, SubFigure
 from pdrom.view.multiples import clipped, label_counts, log_axis, time_axis
 from study.artifact.reads import Settings, TableOf
 from study.experiments.kit.names import ANDERSON, FOM
 from study.figures.kit.declaration import figure
-from study.figures.kit.legends import draw_legend, legend_height
 from study.figures.kit.options import Drawn, Methods, Scenes
 from study.tables.accuracy_cost import FEWER, pareto
 
+LINE = 0.145  # inches, of a line of text
+GAP = 0.06  # inches, between rows of blocks
+
+Block = tuple[str, Sequence[Artist]]
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
 LOW, HIGH = 1e-4, 1e2  # errors outside are arrows on the rim
@@ -322,3 +325,27 @@ def _label(ax: Axes, x: float, text: str) -> None:
         x, 0.99, text, transform=ax.get_xaxis_transform(), fontsize=6.5, va="top", ha="right",
         color="#6B675F",
     )  # fmt: skip
+
+
+def _rows(blocks: Sequence[Block], columns: int) -> list[Sequence[Block]]:
+    return [blocks[i : i + columns] for i in range(0, len(blocks), columns)]
+
+
+def legend_height(blocks: Sequence[Block], columns: int) -> float:
+    """Height, inches, of the legend of ``blocks`` in ``columns``."""
+    rows = _rows(blocks, columns)
+    return sum(LINE * (1.3 + max(len(entries) for _, entries in row)) + GAP for row in rows)
+
+
+def draw_legend(figure: SubFigure, blocks: Sequence[Block], columns: int) -> None:
+    """Draw titled ``blocks`` of entries on ``figure`` in ``columns``, row by row from the top."""
+    height = legend_height(blocks, columns)
+    top = 1.0
+    for row in _rows(blocks, columns):
+        for place, (title, entries) in enumerate(row):
+            figure.legend(
+                handles=list(entries), title=title, loc="upper left", alignment="left",
+                bbox_to_anchor=(0.01 + place / columns, top), fontsize=7, title_fontsize=7.5,
+                borderpad=0.0, borderaxespad=0.1, labelspacing=0.3, handlelength=1.8,
+            )  # fmt: skip
+        top -= (LINE * (1.3 + max(len(entries) for _, entries in row)) + GAP) / height

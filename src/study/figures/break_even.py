@@ -7,7 +7,6 @@ from pdrom.view.artists import Axes, Figure
 from pdrom.view.multiples import label_outer, small_multiples
 from study.artifact.reads import Settings, TableOf
 from study.figures.kit.declaration import figure
-from study.figures.kit.legends import method_handles
 from study.figures.kit.options import Columns, Drawn, Experiments, Methods, NothingToDraw
 
 
@@ -40,7 +39,7 @@ def break_even(options: Options, drawn: Drawn, table: pd.DataFrame) -> Figure:
         ax.set_title(style.words(group))
     label_outer(axes, options.columns, "basis vectors r", "reduced over full local step")
     one = style.handle("break-even", color=style.BLACK, linestyle="--")
-    style.legend(figure, [*method_handles(drawn, styles), one], 3)
+    style.legend(figure, [*drawn.handles(styles), one], 3)
     return figure
 
 

@@ -13,7 +13,6 @@ from study.artifact.paths import MESH, SAMPLING, SNAPSHOTS, File
 from study.artifact.reads import EachOf, Settings
 from study.figures.kit.declaration import figure
 from study.figures.kit.elements import NEUTRAL, ElementMap, element_map
-from study.figures.kit.legends import method_handles
 from study.figures.kit.options import Drawn, Experiments, Methods, NothingToDraw, Ranks, View
 
 SEVERAL = "#333333"
@@ -150,6 +149,6 @@ def _legend(figure: Figure, drawn: Drawn, methods: list[str]) -> None:
     dots = {"linestyle": "none", "marker": "o", "markersize": 4.5}
     named = {**{f"{a} entry": c for a, c in style.AXES.items()}, "several axes": SEVERAL}
     handles = [style.handle(label, color=c, **dots) for label, c in named.items()]
-    handles += method_handles(drawn, style.method_styles(methods))
+    handles += drawn.handles(style.method_styles(methods))
     handles.append(style.handle("numbers that DEIM uses (r)", color=style.GREY, linestyle="--"))
     style.legend(figure, handles, 4)

@@ -8,7 +8,6 @@ from pdrom.view.artists import Axes, Figure
 from pdrom.view.multiples import clipped, log_axes, rim_arrows
 from study.artifact.reads import Settings, TableOf
 from study.figures.kit.declaration import figure
-from study.figures.kit.legends import method_handles
 from study.figures.kit.options import Drawn, Experiments, Methods, NothingToDraw
 from study.tables.kit.reruns import FAILED, judged_runs
 
@@ -64,7 +63,7 @@ def error_against_gain(
         _draw_ranges(left, ranges[ranges.method == method], styles[method][0])
     _draw_limits(left)
     _draw_decades(right, runs)
-    style.legend(figure, method_handles(drawn, styles, linestyle="none"), 4)
+    style.legend(figure, drawn.handles(styles, linestyle="none"), 4)
     return figure
 
 

@@ -11,7 +11,6 @@ from pdrom.view.artists import Axes, Figure
 from pdrom.view.multiples import clipped, label_outer, log_axis, small_multiples
 from study.artifact.reads import ProjectFile, Settings, TableOf
 from study.figures.kit.declaration import figure
-from study.figures.kit.legends import method_handles
 from study.figures.kit.options import Drawn, NothingToDraw, Reconstruction
 
 LOW, HIGH = 1e-7, 1e3  # errors outside are drawn on the limit
@@ -120,7 +119,7 @@ def _draw_published(ax: Axes, table: pd.DataFrame, experiment: str, group: str) 
 def _legend(
     figure: Figure, drawn: Drawn, methods: list[str], splits: tuple[str, ...], published: bool
 ) -> None:
-    handles = method_handles(drawn, style.method_styles(methods))
+    handles = drawn.handles(style.method_styles(methods))
     handles += style.split_handles(splits)
     if published:
         label = "published code's output (x, y)"

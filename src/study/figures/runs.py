@@ -17,8 +17,8 @@ from study.artifact.paths import MESH, NOISE_RUNS, RERUNS, TRAIN, File
 from study.artifact.reads import EachOf, Every, Read, Settings, TableOf
 from study.experiments.kit.settings import Horizon
 from study.figures.kit.declaration import figure
-from study.figures.kit.floor import FLOORS, Floors
 from study.figures.kit.options import Drawn, Experiment, NothingToDraw, ReducedRuns
+from study.figures.sensitivity_floor import FLOORS, Floors
 
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}
 WRONG = 0.1  # of the motion: a run whose error is larger has failed, as one that does not start

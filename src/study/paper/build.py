@@ -1,15 +1,21 @@
 """Rules of the manuscript: tables -> macros, TeX tables, bibliography -> PDF."""
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from pybtex.backends.latex import Backend
+from pybtex.database import parse_file
+from pybtex.errors import set_strict_mode
+from pybtex.exceptions import PybtexError
+from pybtex.style.formatting.unsrt import Style
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from pdrom.core.errors import StorageError
+from pdrom.core.errors import PaperError, StorageError
 from pdrom.core.machine import Machine
 from pdrom.core.store import read_table, read_text, require_intact, write_text
 from pdrom.core.yamlfile import describe
@@ -17,7 +23,6 @@ from pdrom.view.text import replaced
 from study.artifact.files import Files
 from study.artifact.paths import FIGURE, MACHINE, PAPER_INPUT, TABLE, File
 from study.artifact.reads import Every, One, ProjectFile, Setting, SourcesOf
-from study.paper.bibliography import bibliography
 from study.paper.macros import captions, decisions, keys_of, macros, number_of, provenance
 from study.paper.source import DOCUMENTS, documents
 from study.paper.tex import build_pdfs
@@ -133,6 +138,44 @@ def build(
     folder = source[0].parent
     made = {folder / f"{name}.tex": Path(outputs[name]) for name in DOCUMENTS}
     build_pdfs(made, sorted({path.parent for path in results}), PAGES)
+
+
+_CITE = re.compile(r"\\cite\{([^}]*)\}")
+
+
+def cited_keys(source: str) -> list[str]:
+    """Keys of a TeX source in order of first citation."""
+    keys = [key.strip() for group in _CITE.findall(source) for key in group.split(",")]
+    return list(dict.fromkeys(keys))
+
+
+def bibliography(source: str, references: Path) -> str:
+    """The thebibliography environment (TeX) of the entries that ``source`` cites, in that order.
+
+    Raises
+    ------
+    PaperError
+        A cited key is not in ``references`` or lacks a field, or the file is not BibTeX.
+    """
+    keys = cited_keys(source)
+    set_strict_mode(False)
+    try:
+        database = parse_file(str(references))
+    except PybtexError as error:
+        raise PaperError(f"{references}: {error}") from error
+    missing = [key for key in keys if key not in database.entries]
+    if missing:
+        raise PaperError(f"{references}: no entry for {', '.join(missing)}")
+    try:
+        formatted = list(Style().format_entries([database.entries[key] for key in keys]))
+    except PybtexError as error:
+        raise PaperError(f"{references}: {error}") from error
+    backend = Backend(encoding="utf-8")
+    lines = [r"\begin{thebibliography}{99}"]
+    for entry in formatted:
+        lines += [rf"\bibitem{{{entry.key}}}", entry.text.render(backend), ""]
+    lines.append(r"\end{thebibliography}")
+    return "\n".join(lines) + "\n"
 
 
 REFERENCES = "paper/references.bib"

@@ -1,7 +1,7 @@
 """Options of a figure, and the part of the study that it draws."""
 
-from collections.abc import Sequence
-from typing import Annotated, Literal
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal
 
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field
@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.effects import EFFECTS
 from pdrom.view import style
+from pdrom.view.artists import Line2D
 from pdrom.view.camera import Camera
 from pdrom.view.text import plain_words
 from study.artifact.paths import File
@@ -210,6 +211,13 @@ class Drawn(_Plain):
         """Title of a method, ready to be drawn; its name where it is not held."""
         held = self.reductions.get(method)
         return plain_words(held.title if held else method)
+
+    def handles(self, looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
+        """Entries of a legend: methods by their titles, with ``looks`` and ``common`` ones."""
+        return [
+            style.handle(self.title(method), color=colour, marker=marker, **common)
+            for method, (colour, marker) in looks.items()
+        ]
 
     def scenes_of(self, table: pd.DataFrame, nothing: str) -> list[str]:
         """Scenes that have a row in ``table``; without any, `NothingToDraw`.

@@ -3,7 +3,7 @@
 import pytest
 
 from pdrom.core.errors import PaperError
-from study.paper.bibliography import bibliography, cited_keys
+from study.paper.build import bibliography, cited_keys
 
 BIB = """
 @article{beta, author = {Bea B{\\'e}ta}, title = {The {DEIM} of beta}, journal = {J. Beta},

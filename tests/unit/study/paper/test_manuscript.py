@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 from pdrom.core.yamlfile import read_yaml
 from places import ROOT
 from study.figures.kit.declaration import declarations
-from study.paper.bibliography import bibliography, cited_keys
-from study.paper.build import PAGES, paper
+from study.paper.build import PAGES, bibliography, cited_keys, paper
 from study.paper.macros import AGGREGATES, keys_of, sentences
 from study.paper.source import documents
 from study.paper.tex import build_pdfs, packages_of
