@@ -20,17 +20,8 @@ from pdrom.reduction.basis import basis_of
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import select
 from pdrom.reduction.snapshots import load_snapshots
-from study.artifact.paths import (
-    BASIS,
-    FRAME_TIMES,
-    MESH,
-    ONLINE_MODELS,
-    PROJECTION_SECONDS,
-    SAMPLING,
-    SNAPSHOTS,
-    SUBSPACES,
-    File,
-)
+from study.artifact import paths
+from study.artifact.paths import File
 from study.artifact.reads import EachOf, Settings
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.fresh_process import (
@@ -120,15 +111,15 @@ class Options(ConfigModel):
 @experiment(
     "Times of frames in several processes",
     reads={
-        "meshes": EachOf(MESH, "timed_scenes"),
-        "subspaces": EachOf(SUBSPACES, "subspace_cases"),
-        "bases": EachOf(BASIS, "projection_cases"),
-        "samplings": EachOf(SAMPLING, "projection_cases"),
-        "snapshots": EachOf(SNAPSHOTS, "projection_cases"),
-        "large": EachOf(ONLINE_MODELS, "large_scenes"),
+        "meshes": EachOf(paths.MESH, "timed_scenes"),
+        "subspaces": EachOf(paths.SUBSPACES, "subspace_cases"),
+        "bases": EachOf(paths.BASIS, "projection_cases"),
+        "samplings": EachOf(paths.SAMPLING, "projection_cases"),
+        "snapshots": EachOf(paths.SNAPSHOTS, "projection_cases"),
+        "large": EachOf(paths.ONLINE_MODELS, "large_scenes"),
         "settings": Settings(Options),
     },
-    writes={"times": FRAME_TIMES, "seconds": PROJECTION_SECONDS},
+    writes={"times": paths.FRAME_TIMES, "seconds": paths.PROJECTION_SECONDS},
     alone=True,
 )
 def frame_times(

@@ -17,15 +17,8 @@ from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.deviations import error_within
 from pdrom.reduction.rerun import displacement_norms
 from pdrom.reduction.subspace.store import load_models
-from study.artifact.paths import (
-    ITERATIONS,
-    MESH,
-    SENSITIVITY,
-    SUBSPACES,
-    SUBSPACES_CONVERGED,
-    TRAIN,
-    File,
-)
+from study.artifact import paths
+from study.artifact.paths import File
 from study.artifact.reads import Every, Setting
 from study.experiments.kit.converged import ConvergedStepper
 from study.experiments.kit.declaration import experiment
@@ -64,16 +57,16 @@ class IterationSweep(IterationCounts):
 @experiment(
     "Accuracy of {scene} against the number of iterations",
     reads={
-        "mesh": MESH,
-        "fom": TRAIN,
-        "sensitivity": SENSITIVITY,
-        "subspaces": Every(SUBSPACES),
+        "mesh": paths.MESH,
+        "fom": paths.TRAIN,
+        "sensitivity": paths.SENSITIVITY,
+        "subspaces": Every(paths.SUBSPACES),
         "config": Setting("scene"),
         "sweep": Setting("iterations"),
         "horizon": Setting("horizon"),
         "solver": Setting("solver"),
     },
-    writes={"out": ITERATIONS, "models": SUBSPACES_CONVERGED},
+    writes={"out": paths.ITERATIONS, "models": paths.SUBSPACES_CONVERGED},
 )
 def iterations(
     mesh: File,

@@ -27,16 +27,8 @@ from pdrom.reduction.subspace.exported import (
 from pdrom.reduction.subspace.interpolation import interpolation_of
 from pdrom.reduction.subspace.model import SubspaceModel, ecsw_name
 from pdrom.reduction.subspace.store import load_models
-from study.artifact.paths import (
-    BASIS,
-    LIVE_MODEL,
-    MESH,
-    ONLINE_MODELS,
-    SAMPLING,
-    SUBSPACES,
-    TRAIN,
-    File,
-)
+from study.artifact import paths
+from study.artifact.paths import File
 from study.artifact.reads import EachOf, Settings
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.load_reduction import load_reduction
@@ -105,15 +97,15 @@ class Options(ConfigModel):
 @experiment(
     "Models of {scene} for the page",
     reads={
-        "mesh": MESH,
-        "train": TRAIN,
-        "subspaces": EachOf(SUBSPACES, "with_subspaces"),
-        "online": EachOf(ONLINE_MODELS, "with_online_models"),
-        "bases": EachOf(BASIS, "joint_rows"),
-        "samplings": EachOf(SAMPLING, "joint_rows"),
+        "mesh": paths.MESH,
+        "train": paths.TRAIN,
+        "subspaces": EachOf(paths.SUBSPACES, "with_subspaces"),
+        "online": EachOf(paths.ONLINE_MODELS, "with_online_models"),
+        "bases": EachOf(paths.BASIS, "joint_rows"),
+        "samplings": EachOf(paths.SAMPLING, "joint_rows"),
         "settings": Settings(Options),
     },
-    writes={"out": LIVE_MODEL},
+    writes={"out": paths.LIVE_MODEL},
 )
 def live(
     mesh: File,

@@ -12,14 +12,8 @@ from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.snapshots import load_snapshots
-from study.artifact.paths import (
-    MESH,
-    REPETITIONS,
-    SENSITIVITY,
-    SNAPSHOTS,
-    TRAIN,
-    File,
-)
+from study.artifact import paths
+from study.artifact.paths import File
 from study.artifact.reads import Settings
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.repetition import ReducedRuns, Repetitions, Varied
@@ -71,13 +65,13 @@ class Options(ConfigModel):
 @experiment(
     "Repeated runs of {scene}, {group} reduced",
     reads={
-        "mesh": MESH,
-        "fom": TRAIN,
-        "snapshots": SNAPSHOTS,
-        "sensitivity": SENSITIVITY,
+        "mesh": paths.MESH,
+        "fom": paths.TRAIN,
+        "snapshots": paths.SNAPSHOTS,
+        "sensitivity": paths.SENSITIVITY,
         "settings": Settings(Options),
     },
-    writes={"out": REPETITIONS},
+    writes={"out": paths.REPETITIONS},
 )
 def repetitions(
     mesh: File, fom: File, snapshots: File, sensitivity: File, settings: Options, out: File

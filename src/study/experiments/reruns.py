@@ -19,19 +19,8 @@ from pdrom.reduction.local.rerun import rerun_reduced
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.snapshots import load_snapshots
-from study.artifact.paths import (
-    BASIS,
-    FULL_ORDER,
-    MESH,
-    RECONSTRUCTION,
-    RERUNS,
-    RERUNS_HELDOUT,
-    RERUNS_TRAIN,
-    SAMPLING,
-    SNAPSHOTS,
-    TRAIN,
-    File,
-)
+from study.artifact import paths
+from study.artifact.paths import File
 from study.artifact.reads import Every, Settings
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.load_reduction import load_reduction
@@ -64,19 +53,19 @@ class Options(ConfigModel):
 @experiment(
     "Sampling and reruns of {scene}, {group} by {method}",
     reads={
-        "mesh": MESH,
-        "fom": TRAIN,
-        "motions": Every(FULL_ORDER),
-        "snapshots": SNAPSHOTS,
-        "basis": BASIS,
+        "mesh": paths.MESH,
+        "fom": paths.TRAIN,
+        "motions": Every(paths.FULL_ORDER),
+        "snapshots": paths.SNAPSHOTS,
+        "basis": paths.BASIS,
         "settings": Settings(Options),
     },
     writes={
-        "sampling": SAMPLING,
-        "errors": RECONSTRUCTION,
-        "runs": RERUNS,
-        "out": RERUNS_TRAIN,
-        "heldout_table": RERUNS_HELDOUT,
+        "sampling": paths.SAMPLING,
+        "errors": paths.RECONSTRUCTION,
+        "runs": paths.RERUNS,
+        "out": paths.RERUNS_TRAIN,
+        "heldout_table": paths.RERUNS_HELDOUT,
     },
 )
 def reruns(

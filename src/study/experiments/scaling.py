@@ -4,7 +4,6 @@ import ctypes
 import gc
 import logging
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -17,7 +16,6 @@ from pydantic import Field
 
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.model.dynamics.stepper import LocalStep
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, compute_basis
@@ -31,7 +29,7 @@ from study.artifact.paths import BREAK_EVEN_SIZED, EFFECTS_SIZED, SCALING, File
 from study.artifact.reads import Settings, SourcesOf
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.effect_costs import effect_costs
-from study.experiments.kit.local_costs import local_costs
+from study.experiments.kit.local_costs import local_costs, variant
 from study.experiments.kit.measurement import Measurement, Protocol, Variant, measure
 from study.experiments.kit.names import FOM
 from study.experiments.kit.settings import Modes, Repeats, Solver, Tolerance
@@ -131,7 +129,7 @@ def scaling(
     first = training.first(sized.training_frames)
     basis = _basis(scene, first, specs[sized.method])
     variants = [
-        _full_order(scene, system, sized, measured),
+        variant(scene, system, scene.groups, sized.frames, {"method": FOM, **measured}),
         _reduced(scene, system, basis, specs[sized.method], sized),
         _subspace(scene, first, sized),
     ]
@@ -178,12 +176,6 @@ def _steps_alone(
     return steps
 
 
-def _full_order(
-    scene: Scene, system: GlobalSystem, settings: Sized, labels: dict[str, Any]
-) -> Variant:
-    return _variant(scene, system, scene.groups, settings, {"method": FOM, **labels})
-
-
 def _reduced(
     scene: Scene, system: GlobalSystem, basis: Basis, spec: MethodSpec, settings: Sized
 ) -> Variant:
@@ -192,7 +184,7 @@ def _reduced(
     reduction = Reduction(basis, select(basis, spec, size), spec, r=size)
     steps = replace_group(scene, group.name, ReducedLocalStep(group, reduction))
     labels = {"r": reduction.r, "elements_sampled": len(reduction.elements)}
-    return _variant(scene, system, steps, settings, {"method": method, **labels})
+    return variant(scene, system, steps, settings.frames, {"method": method, **labels})
 
 
 def _subspace(scene: Scene, training: Training, settings: Sized) -> Variant:
@@ -206,17 +198,6 @@ def _subspace(scene: Scene, training: Training, settings: Sized) -> Variant:
         "elements_sampled": model.elements_evaluated(scene),
     }
     return Variant(labels, *model.loop(scene), settings.frames)
-
-
-def _variant(
-    scene: Scene,
-    system: GlobalSystem,
-    steps: Sequence[LocalStep],
-    settings: Sized,
-    labels: dict[str, Any],
-) -> Variant:
-    loop = scene.stepper(system, steps, track_objective=False)
-    return Variant(labels, loop, scene.initial_state(), settings.frames)
 
 
 def _times(scene: Scene, measured: Measurement) -> dict[str, Any]:

@@ -38,17 +38,8 @@ from pdrom.reduction.subspace.model import (
     sample_elements,
 )
 from pdrom.reduction.subspace.store import store_columns, store_model
-from study.artifact.paths import (
-    FULL_ORDER,
-    MESH,
-    ONLINE,
-    ONLINE_MODELS,
-    SUBSPACES,
-    SUBSPACES_HELDOUT,
-    SUBSPACES_SECONDS,
-    SUBSPACES_TRAIN,
-    File,
-)
+from study.artifact import paths
+from study.artifact.paths import File
 from study.artifact.reads import Every, Settings, SourcesOf
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.measurement import clocked
@@ -147,12 +138,16 @@ class LargeOptions(ConfigModel):
 
 @experiment(
     "Position subspaces of {scene}, with full and with sampled projections",
-    reads={"mesh": MESH, "full_order": Every(FULL_ORDER), "settings": Settings(Options)},
+    reads={
+        "mesh": paths.MESH,
+        "full_order": Every(paths.FULL_ORDER),
+        "settings": Settings(Options),
+    },
     writes={
-        "out": SUBSPACES,
-        "train_table": SUBSPACES_TRAIN,
-        "heldout_table": SUBSPACES_HELDOUT,
-        "seconds_table": SUBSPACES_SECONDS,
+        "out": paths.SUBSPACES,
+        "train_table": paths.SUBSPACES_TRAIN,
+        "heldout_table": paths.SUBSPACES_HELDOUT,
+        "seconds_table": paths.SUBSPACES_SECONDS,
     },
 )
 def subspaces(
@@ -186,7 +181,7 @@ def subspaces(
 @experiment(
     "Reduction of {scene}",
     reads={"sources": SourcesOf("scene.mesh"), "settings": Settings(LargeOptions)},
-    writes={"out": ONLINE, "models": ONLINE_MODELS},
+    writes={"out": paths.ONLINE, "models": paths.ONLINE_MODELS},
 )
 def online(sources: list[Path], settings: LargeOptions, out: File, models: File) -> None:
     """Reduce a large scene by every model and run all motions with each.

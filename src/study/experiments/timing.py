@@ -22,24 +22,14 @@ from pdrom.reduction.local.local_step import ReducedLocalStep
 from pdrom.reduction.local.rerun import replace_group
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.subspace.store import load_models
-from study.artifact.paths import (
-    BASIS,
-    BREAK_EVEN,
-    EFFECTS,
-    LEFT_OUT,
-    MESH,
-    SAMPLING,
-    SUBSPACES,
-    TIMINGS,
-    TRAIN,
-    File,
-)
+from study.artifact import paths
+from study.artifact.paths import File
 from study.artifact.reads import Every, Settings
 from study.experiments.iterations import IterationCounts, accelerated, stepper_of
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.effect_costs import effect_costs, left_out
 from study.experiments.kit.load_reduction import basis_of, load_reduction
-from study.experiments.kit.local_costs import local_costs
+from study.experiments.kit.local_costs import local_costs, variant
 from study.experiments.kit.measurement import Measurement, Protocol, Variant, measure
 from study.experiments.kit.names import ANDERSON, FOM
 from study.experiments.kit.scenes import scene_of
@@ -87,14 +77,19 @@ class Options(ConfigModel):
 @experiment(
     "Timings of {scene}",
     reads={
-        "mesh": MESH,
-        "fom": TRAIN,
-        "bases": Every(BASIS),
-        "samplings": Every(SAMPLING),
-        "subspaces": Every(SUBSPACES),
+        "mesh": paths.MESH,
+        "fom": paths.TRAIN,
+        "bases": Every(paths.BASIS),
+        "samplings": Every(paths.SAMPLING),
+        "subspaces": Every(paths.SUBSPACES),
         "settings": Settings(Options),
     },
-    writes={"out": TIMINGS, "breakeven": BREAK_EVEN, "effects": EFFECTS, "without": LEFT_OUT},
+    writes={
+        "out": paths.TIMINGS,
+        "breakeven": paths.BREAK_EVEN,
+        "effects": paths.EFFECTS,
+        "without": paths.LEFT_OUT,
+    },
     alone=True,
 )
 def timing(
@@ -140,7 +135,11 @@ def _variants(
     subspaces: list[File],
 ) -> tuple[list[Variant], Alone]:
     """Everything whose frames are timed, and the reduced local steps that are timed alone."""
-    make = partial(_variant, scene, system, frames)
+
+    def make(labels: dict[str, Any], steps: Sequence[LocalStep]) -> Variant:
+        labels = {"iterations": scene.config.iterations, **labels}
+        return variant(scene, system, steps, frames, labels)
+
     variants = _full_order(scene, make, settings.timing)
     variants += _other_counts(scene, system, frames, settings.iterations)
     alone: Alone = {}
@@ -183,25 +182,13 @@ class _Source:
         return ReducedLocalStep(self._group, reduction)
 
 
-def _variant(
-    scene: Scene,
-    system: GlobalSystem,
-    frames: int,
-    labels: dict[str, Any],
-    local_steps: Sequence[LocalStep],
-) -> Variant:
-    loop = scene.stepper(system, local_steps, track_objective=False)
-    labels = {"iterations": scene.config.iterations, **labels}
-    return Variant(labels, loop, scene.initial_state(), frames)
-
-
 def _full_order(scene: Scene, make: Make, timing: Timing) -> list[Variant]:
     """The full-order run in every implementation; the slowest does only some iterations."""
     variants = [make({"implementation": "compiled"}, scene.groups)]
     for name, step in IMPLEMENTATIONS.items():
-        variant = make({"implementation": name}, [step(g) for g in scene.groups])
-        frames = min(variant.frames, getattr(timing, f"{name}_frames"))
-        variants.append(replace(variant, frames=frames))
+        made = make({"implementation": name}, [step(g) for g in scene.groups])
+        frames = min(made.frames, getattr(timing, f"{name}_frames"))
+        variants.append(replace(made, frames=frames))
     slow = variants[-1]
     whole = scene.config.iterations
     slow.loop.iterations = min(whole, timing.interpreted_iterations)

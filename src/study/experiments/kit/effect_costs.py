@@ -20,6 +20,7 @@ from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.effects.base import Boundary, Contact, Effect, Force
 from pdrom.model.scene import Scene
+from study.experiments.kit.local_costs import variant
 from study.experiments.kit.measurement import Measurement, Variant, measure, median_frames
 from study.experiments.kit.names import GLOBAL, REST, RIGHT
 
@@ -183,8 +184,8 @@ def left_out(
 
 def _without(scene: Scene, names: tuple[str, ...], frames: int, solver: str) -> Variant:
     part = scene.changed(effects=scene.config.effects_without(*names))
-    loop = part.stepper(part.system_with(solver), track_objective=False)
-    return Variant({"groups": len(part.groups)}, loop, part.initial_state(), frames)
+    labels: dict[str, object] = {"groups": len(part.groups)}
+    return variant(part, part.system_with(solver), part.groups, frames, labels)
 
 
 def _saving(

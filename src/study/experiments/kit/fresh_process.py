@@ -6,7 +6,7 @@ scatter. Only new processes show that; a fork would inherit the places.
 
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from pdrom.core.aside import damaged_set_aside
 from pdrom.core.errors import PdromError
 from pdrom.core.store import read_table, write_table
 from pdrom.core.yamlfile import ConfigModel
+from pdrom.model.dynamics.stepper import LocalStep
 from pdrom.model.mesh.types import load_mesh
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import load_basis
@@ -25,6 +26,7 @@ from pdrom.reduction.local.rerun import replace_group
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.subspace.store import load_models
 from study.experiments.kit.load_reduction import load_reduction
+from study.experiments.kit.local_costs import variant
 from study.experiments.kit.measurement import Protocol, Variant, measure
 from study.experiments.kit.settings import Solver
 
@@ -123,18 +125,17 @@ def _variants(asked: TimedScene, request: Request) -> Iterator[Variant]:
     frames = min(request.timing.frames, config.frames)
     common = {"scene": config.name, "vertices": mesh.vertices, "frames": config.frames}
 
-    def variant(labels: dict[str, Any], steps: list[Any]) -> Variant:
-        loop = scene.stepper(system, steps, track_objective=False)
-        return Variant({**common, **labels}, loop, scene.initial_state(), frames)
+    def made(labels: dict[str, Any], steps: Sequence[LocalStep]) -> Variant:
+        return variant(scene, system, steps, frames, {**common, **labels})
 
     for role in (FULL, CONTROL):
-        yield variant({"role": role}, list(scene.groups))
+        yield made({"role": role}, scene.groups)
     for own in asked.projections:
         reduction = load_reduction(load_basis(own.basis), own.sampling, own.spec, r=own.r)
         step = ReducedLocalStep(scene.group(own.group), reduction)
         labels: dict[str, Any] = {"role": REDUCED, "position_basis": "full"}
         labels |= own.model_dump(include={"group", "method", "r"})
-        yield variant(labels, replace_group(scene, own.group, step))
+        yield made(labels, replace_group(scene, own.group, step))
     if asked.subspaces is None:
         return
     for found, model in load_models(asked.subspaces.path):

@@ -1,20 +1,33 @@
 """Time of local steps alone: the reduced ones and the full one of their group (claim C9)."""
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
 from pdrom.model.compiled.rows import as_vertices, vertices
 from pdrom.model.dynamics.stepper import LocalStep
+from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene
 from pdrom.reduction.local.local_step import ReducedLocalStep
-from study.experiments.kit.measurement import measure_calls
+from study.experiments.kit.measurement import Variant, measure_calls
 
 COLUMNS = [
     "scene", "group", "method", "vertices", "elements", "r", "local_ms", "full_ms", "solve_ms",
     "lift_ms",
 ]  # fmt: skip
+
+
+def variant(
+    scene: Scene,
+    system: GlobalSystem,
+    steps: Sequence[LocalStep],
+    frames: int,
+    labels: dict[str, object],
+) -> Variant:
+    """Loop of a ``scene`` with these local ``steps`` and no objective, from its own start."""
+    loop = scene.stepper(system, steps, track_objective=False)
+    return Variant(labels, loop, scene.initial_state(), frames)
 
 
 def local_costs(
