@@ -45,7 +45,7 @@ class Rerun:
         return float(self.extent.max(initial=0.0))
 
     def row(self, displacement: np.ndarray) -> dict[str, Any]:
-        """How far the run got, and its error; ``displacement`` see `error`."""
+        """Outcome of the run and its error; ``displacement`` see `error`."""
         return {
             "frames": self.frames,
             "finite": self.finite,

@@ -101,7 +101,7 @@ class Run:
     def succeed(self, workflow: Any, plan: Plan, folders: Folders) -> None:
         """End a run whose jobs all succeeded: it says what came of ``plan`` in ``folders``."""
         # late: a plan needs nothing of it
-        from study.verification.contents import write_contents
+        from study.pipeline.inventory import write_contents
 
         try:
             if not self.command.targets:

@@ -23,10 +23,20 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, PerScene, TableOf
 from study.experiments.kit.names import ANDERSON, FOM
-from study.tables.kit import vocabulary
 from study.tables.kit.declaration import compared, flag, integer, number, table, timed
 from study.tables.kit.parts import joined, timings_in_one_time
 from study.tables.kit.reruns import COLUMNS, MEDIAN, trained, with_held_out
+from study.tables.kit.vocabulary import (
+    ERROR_WITHIN,
+    GROUP,
+    METHOD,
+    MS_PER_FRAME,
+    POSITION_BASIS,
+    SCENE,
+    USERS,
+    K,
+    R,
+)
 
 FEWER = "fewer-iterations"
 _MODEL = ["scene", "position_basis", "k", "method"]
@@ -37,15 +47,15 @@ CONVERGED, OWN = "converged", "own iterations"
     title="Every method and size as a point of accuracy and cost",
     only_with_error=True,
     columns=(
-        vocabulary.SCENE,
-        vocabulary.GROUP,
-        vocabulary.METHOD,
-        vocabulary.POSITION_BASIS,
-        vocabulary.K,
-        vocabulary.R,
+        SCENE,
+        GROUP,
+        METHOD,
+        POSITION_BASIS,
+        K,
+        R,
         integer("iterations", "local/global iterations of a frame"),
-        vocabulary.ERROR_WITHIN,
-        vocabulary.MS_PER_FRAME,
+        ERROR_WITHIN,
+        MS_PER_FRAME,
         timed(flag("pareto", "no point of the same reference is as good in both, better in one")),
         compared(
             "error",
@@ -58,7 +68,7 @@ CONVERGED, OWN = "converged", "own iterations"
         ),
         *COLUMNS,
         timed(flag("pareto_heldout", "the same by the error held out; full order as it is")),
-        *vocabulary.USERS,
+        *USERS,
     ),
     reads={
         "reruns": TableOf("reduced_reruns"),

@@ -105,7 +105,7 @@ def effects_cost(
 
 
 def _absent(rows: pd.DataFrame, others: pd.DataFrame) -> np.ndarray:
-    """Which of ``rows`` have scenes and effects that ``others`` have not."""
+    """Whether each of ``rows`` has a scene and effect that ``others`` have not."""
     keys, known = (pd.MultiIndex.from_frame(each[KEYS]) for each in (rows, others))
     return ~keys.isin(known)
 
@@ -113,7 +113,7 @@ def _absent(rows: pd.DataFrame, others: pd.DataFrame) -> np.ndarray:
 def _acting(
     frames: pd.DataFrame, sensitivity: pd.DataFrame, perturbation: float, threshold: float
 ) -> pd.DataFrame:
-    """What each effect does in the ``frames`` of its scene, and how far the run moves without."""
+    """Force and energy of each effect in ``frames``, and how far the run moves without it."""
     made = frames.groupby([*KEYS, "role"], sort=False, as_index=False).agg(
         force=("force", _root_mean_square),
         acting_frames=("force", lambda force: int((force > 0.0).sum())),

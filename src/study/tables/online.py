@@ -5,10 +5,20 @@ import pandas as pd
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, TableOf
-from study.tables.kit import vocabulary
 from study.tables.kit.declaration import compared, integer, number, table, timed
 from study.tables.kit.parts import joined
 from study.tables.kit.reruns import HIGH, LOW, MEDIAN, TRAIN
+from study.tables.kit.vocabulary import (
+    ELEMENTS_SAMPLED,
+    MS_PER_FRAME,
+    POSITION_BASIS,
+    SCENE,
+    SPEEDUP,
+    SPEEDUP_HIGH,
+    SPEEDUP_LOW,
+    VERTICES,
+    K,
+)
 from study.tables.speedups import large_errors, timed_reductions
 
 _KEYS = ["scene", "position_basis", "k", "method"]
@@ -22,23 +32,23 @@ _TIMES = ["ms_per_frame", "fom_ms_per_frame", "speedup", "speedup_low", "speedup
 @table(
     title="Large scenes in position subspaces with sampled elements",
     columns=(
-        vocabulary.SCENE,
-        vocabulary.VERTICES,
+        SCENE,
+        VERTICES,
         integer("elements", "elements of all groups"),
-        vocabulary.POSITION_BASIS,
-        vocabulary.K,
+        POSITION_BASIS,
+        K,
         compared("exact", number("tau", "tolerance of the element sampling")),
-        vocabulary.ELEMENTS_SAMPLED,
+        ELEMENTS_SAMPLED,
         number("relative_error_train", "error of the positions in the training motion"),
         number("relative_error_heldout", "the same in held-out motions: their median"),
         number("relative_error_heldout_low", "the least of them"),
         number("relative_error_heldout_high", "the largest"),
-        vocabulary.MS_PER_FRAME,
+        MS_PER_FRAME,
         timed(number("ms_per_iteration", "time of an iteration", "ms")),
         timed(number("fom_ms_per_frame", "time of a frame of the full-order run", "ms")),
-        vocabulary.SPEEDUP,
-        vocabulary.SPEEDUP_LOW,
-        vocabulary.SPEEDUP_HIGH,
+        SPEEDUP,
+        SPEEDUP_LOW,
+        SPEEDUP_HIGH,
     ),
     reads={
         "parts": Every(paths.ONLINE),

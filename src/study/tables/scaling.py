@@ -7,9 +7,17 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every
 from study.experiments.kit.names import FOM
-from study.tables.kit import vocabulary
 from study.tables.kit.declaration import integer, number, table, text, timed
 from study.tables.kit.parts import joined
+from study.tables.kit.vocabulary import (
+    ELEMENTS_SAMPLED,
+    LOCAL_SHARE,
+    SCENE,
+    SPEEDUP,
+    VERTICES,
+    K,
+    R,
+)
 
 EXPONENTS = {"ms_per_iteration": "exponent", "local_ms": "local_exponent",
              "global_ms": "global_exponent"}  # fmt: skip
@@ -19,20 +27,20 @@ FEWEST = 3  # meshes, for an exponent
 @table(
     title="Cost of an iteration against the size of the mesh",
     columns=(
-        vocabulary.SCENE,
+        SCENE,
         text("method", f"{FOM} (full order), a reduced local step, or ecsw"),
-        vocabulary.VERTICES,
+        VERTICES,
         integer("elements", "elements of all groups"),
-        vocabulary.R,
-        vocabulary.K,
-        vocabulary.ELEMENTS_SAMPLED,
+        R,
+        K,
+        ELEMENTS_SAMPLED,
         timed(number("factorisation_ms", "assembly and factorisation of the system", "ms")),
         timed(number("memory_mb", "memory that both took", "MB")),
         timed(number("ms_per_iteration", "time of an iteration", "ms")),
         timed(number("local_ms", "time of the local step in an iteration", "ms")),
         timed(number("global_ms", "time of the global solve in an iteration", "ms")),
-        vocabulary.LOCAL_SHARE,
-        vocabulary.SPEEDUP,
+        LOCAL_SHARE,
+        SPEEDUP,
         timed(number("local_speedup", "the same of the local step alone")),
         integer("meshes", "sizes of the mesh of the curve"),
         timed(number("exponent", "of the time of an iteration in the number of vertices")),

@@ -8,11 +8,23 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, TableOf
 from study.experiments.kit.fresh_process import FULL, REDUCED
-from study.tables.kit import vocabulary
 from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
 from study.tables.kit.intervals import in_words, median_interval
 from study.tables.kit.parts import joined
 from study.tables.kit.reruns import COLUMNS, HIGH, LOW, MEDIAN, TRAIN, over_motions, trained
+from study.tables.kit.vocabulary import (
+    GROUP,
+    METHOD,
+    MS_PER_FRAME,
+    POSITION_BASIS,
+    SCENE,
+    SPEEDUP,
+    SPEEDUP_HIGH,
+    SPEEDUP_LOW,
+    VERTICES,
+    K,
+    R,
+)
 
 _MODEL = ["scene", "position_basis", "k", "method"]
 _REDUCTION = ["scene", "group", "method", "r"]
@@ -24,19 +36,19 @@ UNCONFIRMED = "not confirmed by its control"
 @table(
     title="Speed-ups over several processes, with what they cost",
     columns=(
-        vocabulary.SCENE,
-        vocabulary.VERTICES,
-        vocabulary.GROUP,
-        vocabulary.METHOD,
-        vocabulary.POSITION_BASIS,
-        vocabulary.K,
-        vocabulary.R,
+        SCENE,
+        VERTICES,
+        GROUP,
+        METHOD,
+        POSITION_BASIS,
+        K,
+        R,
         integer("processes", "processes that timed it"),
         timed(number("full_ms", "time of a frame of the full-order run", "ms")),
-        vocabulary.MS_PER_FRAME,
-        vocabulary.SPEEDUP,
-        vocabulary.SPEEDUP_LOW,
-        vocabulary.SPEEDUP_HIGH,
+        MS_PER_FRAME,
+        SPEEDUP,
+        SPEEDUP_LOW,
+        SPEEDUP_HIGH,
         timed(text("shown", "the median and its quantiles, where the control confirms the times")),
         timed(flag("loses", "dearer than the full order: the upper quantile is below one")),
         timed(number("training_s", "time of the training run", "s")),

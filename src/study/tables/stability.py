@@ -10,10 +10,23 @@ from pdrom.core.store import open_hdf5
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, PerScene, Setting, TableOf
-from study.tables.kit import vocabulary
 from study.tables.kit.declaration import compared, number, table, text
 from study.tables.kit.parts import joined
 from study.tables.kit.reruns import KEYS, trained
+from study.tables.kit.vocabulary import (
+    BLOWUP_FRAME,
+    ENERGY_RATIO,
+    FINITE,
+    GAIN,
+    GROUP,
+    MAX_EXTENT,
+    METHOD,
+    POSITION_BASIS,
+    RELATIVE_ERROR,
+    SCENE,
+    K,
+    R,
+)
 
 # the first is the only one after which numbers of the run count
 OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
@@ -23,21 +36,21 @@ SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # what has one full-o
 @table(
     title="Where each method can be trusted",
     columns=(
-        vocabulary.SCENE,
-        vocabulary.METHOD,
-        vocabulary.R,
+        SCENE,
+        METHOD,
+        R,
         compared("exact", number("h", "time step", "s")),
         compared("exact", number("stiffness_ratio", "factor on the weights of the reduced groups")),
-        vocabulary.FINITE,
-        vocabulary.BLOWUP_FRAME,
-        vocabulary.MAX_EXTENT,
-        vocabulary.ENERGY_RATIO,
-        vocabulary.GAIN,
-        vocabulary.GROUP,
-        vocabulary.POSITION_BASIS,
-        vocabulary.K,
+        FINITE,
+        BLOWUP_FRAME,
+        MAX_EXTENT,
+        ENERGY_RATIO,
+        GAIN,
+        GROUP,
+        POSITION_BASIS,
+        K,
         text("experiment", "rerun (of the study) or sweep (a short run)"),
-        vocabulary.RELATIVE_ERROR,
+        RELATIVE_ERROR,
         compared("error", text("outcome", f"one of: {', '.join(OUTCOMES)}")),
     ),
     reads={

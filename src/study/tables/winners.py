@@ -132,7 +132,7 @@ def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, o
 
 
 def _pays(curve: pd.DataFrame) -> dict[str, object]:
-    """From what mesh on a reduction pays: where it does in every motion; empty if it never does."""
+    """Columns `PAYS`: smallest mesh from which on a reduction pays in every motion, or none."""
     # NaN where one motion is not reached
     every = curve.assign(plain=curve.plain_ms / curve.reduced_ms)
     worst = every.groupby("vertices")[["plain", "reduced_speedup"]].agg(

@@ -74,7 +74,7 @@ class ReducedRuns:
         self._bases: dict[tuple[str, int | None, int | None], Basis] = {}
 
     def until_the_end(self) -> "ReducedRuns":
-        """The same runs up to the first frame that is not judged, but of two frames at least."""
+        """Copy of the runs up to the first frame that is not judged, but of two frames at least."""
         frames = min(self.scene.config.frames, max(2, self.end))
         scene = self.scene.changed(frames=frames)
         reference = self.reference[: frames + 1]

@@ -40,7 +40,7 @@ def test_names_become_files_and_it_is_said(capsys):
 
 @pytest.mark.parametrize(
     ("name", "document", "preprint"),
-    [("reconstruction_error", "main.pdf", 8), ("singular_values", "supplement.pdf", 9)],
+    [("reconstruction_error", "main.pdf", 8), ("deim_entries", "supplement.pdf", 3)],
 )
 @pytest.mark.parametrize("asked", ["own", "preprint", "name"])
 def test_a_figure_has_two_numbers_and_a_name(name, document, preprint, asked, capsys):

@@ -12,8 +12,8 @@ from study.artifact.usage import Usage
 from study.figures.kit.declaration import declarations
 from study.pipeline.commandline import CommandLine
 from study.pipeline.front import completed
+from study.pipeline.inventory import contents, costs, entries, files_of
 from study.tables import declared
-from study.verification.contents import contents, costs, entries, files_of
 from study.verification.subject import Subject
 
 TINY = ["--configfile", "config/tiny.yaml"]
