@@ -13,7 +13,7 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 43_051,
+    "lines of src": 43_050,
     "modules of src": 372,
     "lines of tests": 29_632,
     "words of documentation": 24_812,

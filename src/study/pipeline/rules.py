@@ -1,6 +1,6 @@
 """Rules of the workflow, one for each artifact."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -42,7 +42,7 @@ def rules(plan: Plan, cores: int) -> Iterator[Rule]:
     numbers = figure_numbers(plan.root)
     for folder, jobs in plan.fixed.items():
         for job in jobs:
-            yield _fixed(plan, job, folder, numbers.get(job.artifact.name))
+            yield _fixed(plan, job, folder, numbers)
 
 
 def _experiment(plan: Plan, experiment: Experiment, cores: int) -> Rule:
@@ -75,8 +75,8 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> Rule:
     )
 
 
-def _fixed(plan: Plan, job: Job, folder: str, numbers: Numbers | None) -> Rule:
-    """Rule of a single job, without labels; ``numbers`` of a figure of its name."""
+def _fixed(plan: Plan, job: Job, folder: str, numbers: Mapping[str, Numbers]) -> Rule:
+    """Rule of a single job, without labels; ``numbers`` of the figures."""
     artifact = job.artifact
     params = {
         "artifact": artifact.address,
@@ -84,12 +84,10 @@ def _fixed(plan: Plan, job: Job, folder: str, numbers: Numbers | None) -> Rule:
         "content": job.content,
         "code": job.code,
     }
-    message, shown = _presented(job)
-    if isinstance(artifact, Declaration) and numbers is not None:
+    if isinstance(artifact, Declaration):
         title, caption = words(plan.study, artifact)
         params["rst"] = f"**{to_rst(title)}.** {to_rst(caption)}"
-        # a PNG is what every browser shows
-        shown = {"png": {"caption": "../report/figure.rst", **_figure(artifact, numbers)}}
+    message, shown = _presented(job, numbers)
     return Rule(
         name=artifact.rule,
         input=job.inputs,
@@ -104,31 +102,32 @@ def _fixed(plan: Plan, job: Job, folder: str, numbers: Numbers | None) -> Rule:
     )
 
 
-def _presented(job: Job) -> tuple[str, dict[str, dict[str, Any]]]:
+def _presented(job: Job, numbers: Mapping[str, Numbers]) -> tuple[str, dict[str, dict[str, Any]]]:
     """Message of a job, and what Snakemake's report shows of its outputs."""
     artifact, paths = job.artifact, job.outputs
-    match artifact.name:
-        case _ if isinstance(artifact, Table):
-            labels = {"table": artifact.name, "title": artifact.title}
-            return f"Table {artifact.name}", {"table": {"category": "Tables", "labels": labels}}
-        case _ if isinstance(artifact, Declaration):
-            return f"Figure {artifact.name}", {}
-        case "live_page":
-            return f"Page {paths['out']}", {"out": {"category": "Page"}}
-        case "article":
-            return artifact.title, {"main": {"category": "Page"}}
-        case "paper":
-            shown = {document: {"category": "Manuscript"} for document in paths}
-            return f"Manuscript {', '.join(paths.values())}", shown
-    return artifact.title, {}
+    if isinstance(artifact, Table):
+        labels = {"table": artifact.name, "title": artifact.title}
+        return f"Table {artifact.name}", {"table": {"category": "Tables", "labels": labels}}
+    if isinstance(artifact, Declaration):
+        # a PNG is what every browser shows
+        return f"Figure {artifact.name}", {"png": _figure(artifact, numbers[artifact.name])}
+    shown = {
+        "live_page": {"out": {"category": "Page"}},
+        "article": {"main": {"category": "Page"}},
+        "paper": {document: {"category": "Manuscript"} for document in paths},
+    }
+    where = {"live_page": "Page", "paper": "Manuscript"}.get(artifact.name)
+    message = f"{where} {', '.join(paths.values())}" if where else artifact.title
+    return message, shown.get(artifact.name, {})
 
 
 def _figure(figure: Declaration, numbers: Numbers) -> dict[str, Any]:
-    """Category and labels of a figure in the report, which is sorted by the first label."""
-    own = {"paper": numbers.manuscript or UNNUMBERED, "name": figure.name}
-    title = {"title": to_plain(figure.title)}
+    """Entry of a figure in the report, which is sorted by the first label."""
+    own = {"paper": numbers.manuscript or UNNUMBERED}
     if numbers.preprint is None:
-        labels = {"name": figure.name, "paper": own["paper"], **title}
-        return {"category": "Figures of this study", "labels": labels}
-    labels = {"preprint": str(numbers.preprint), **own, **title}
-    return {"category": "Figures of the preprint", "labels": labels}
+        category, labels = "Figures of this study", {"name": figure.name, **own}
+    else:
+        category = "Figures of the preprint"
+        labels = {"preprint": str(numbers.preprint), **own, "name": figure.name}
+    labels["title"] = to_plain(figure.title)
+    return {"caption": "../report/figure.rst", "category": category, "labels": labels}

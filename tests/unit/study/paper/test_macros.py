@@ -7,7 +7,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pdrom.core.errors import PaperError
-from study.paper.macros import MISSING, format_number, keys_of, macros, number_of
+from study.paper.macros import (
+    MISSING,
+    decisions,
+    format_number,
+    is_held,
+    keys_of,
+    macros,
+    number_of,
+    provenance,
+    sentences,
+)
+from study.paper.tex import build_pdfs
 
 TABLES = {
     "runs": pd.DataFrame(
@@ -129,3 +140,90 @@ def test_text_of_a_number_is_close_to_it(value):
     assert float(text) == pytest.approx(value, rel=0.051)
     assert format_number(-value) in (f"-{format_number(value)}",
                                      format_number(value).replace("{", "{-", 1))  # fmt: skip
+
+
+HELD = {
+    "runs": pd.DataFrame(
+        {"scene": ["bar"], "method": ["pod"], "outcome": ["wrong"], "error": [0.5], "end": [None]}
+    )
+}
+BAR, CLOTH = r"\val{runs|scene=bar|error}", r"\val{runs|scene=cloth|error}"
+BLOCKS = rf"""\known{{The bar has {BAR} \emph{{so}}.}} Always. \known{{The cloth has {CLOTH}.}}
+\known{{And {CLOTH} again.}}
+
+Next. \known{{Both: {BAR}, {CLOTH}.}}
+
+\begin{{tabular}}{{lr}}
+\hline
+\row{{bar & {BAR} \\}}
+\row{{cloth & {CLOTH} \\}}
+\hline
+\end{{tabular}}
+"""
+
+
+def test_blocks_are_found_with_their_paragraphs():
+    found = sentences(BLOCKS)
+    assert [sentence.paragraph for sentence in found] == [0, 0, 0, 1, 2, 2]
+    assert [sentence.is_row for sentence in found] == [False] * 4 + [True] * 2
+    assert found[0].text == rf"The bar has {BAR} \emph{{so}}."
+
+
+@pytest.mark.parametrize(
+    "source", [r"\known{open {x}", r"\known{a \known{b} c}", r"\known{\row{b} c}"]
+)
+def test_faulty_blocks_are_named(source):
+    with pytest.raises(PaperError, match=r"another one|not closed"):
+        sentences(source)
+
+
+def test_a_sentence_needs_all_of_its_numbers():
+    assert decisions(BLOCKS, HELD)[:4] == ["shown", "noted", "dropped", "noted"]
+
+
+def test_a_row_goes_without_a_note():
+    assert decisions(BLOCKS, HELD)[4:] == ["shown", "dropped"]
+    assert decisions(rf"\row{{{CLOTH} \\}} \known{{{CLOTH}}}", HELD) == ["dropped", "noted"]
+
+
+@pytest.mark.parametrize(
+    ("key", "held"),
+    [
+        ("runs|scene=bar|error", True),
+        ("runs|scene=bar|end", True),  # an empty cell of a run is held: it says that none was found
+        ("runs|scene=cloth|error", False),
+        ("runs|scene=cloth|error|max", False),
+        ("runs|scene=bar|outcome=accurate|error|count", True),  # none of the runs: a number
+        ("runs|scene=cloth|outcome=accurate|error|count", False),
+    ],
+)
+def test_what_a_configuration_holds(key, held):
+    assert is_held(key, HELD) is held
+
+
+def pages(tmp_path, part):
+    """Length of the document that TeX makes of the source."""
+    known = provenance({"main": decisions(BLOCKS, HELD)}, part, "config/default.yaml")
+    document = "\n".join(
+        [r"\documentclass{article}", r"\usepackage[T1]{fontenc}\usepackage{lmodern,xcolor}",
+         r"\definecolor{okgrey}{gray}{0.4}",
+         macros(BLOCKS, HELD) + known, r"\begin{document}",
+         r"\ifpart PART \configuration\ of \fullstudy\fi", BLOCKS, r"\typeout{end}",
+         r"\end{document}"]
+    )  # fmt: skip
+    (tmp_path / "main.tex").write_text(document, encoding="utf-8")
+    build_pdfs({tmp_path / "main.tex": tmp_path / "main.pdf"}, [])
+    return (tmp_path / "main.pdf").stat().st_size
+
+
+def test_tex_accepts_what_is_left(tmp_path):
+    whole, part = pages(tmp_path, None), pages(tmp_path, "config/my_study.yaml")
+    assert 0 < whole < part
+
+
+def test_the_note_names_the_configuration_that_holds_the_numbers():
+    text = provenance({"main": ["noted"]}, "config/tiny.yaml", "config/default.yaml")
+    assert r"\parttrue" in text
+    assert r"\newcommand{\configuration}{\texttt{config/tiny.yaml}}" in text
+    assert r"[The full study (\texttt{config/default.yaml}) holds" in text
+    assert r"\partfalse" in provenance({}, None, "config/default.yaml")

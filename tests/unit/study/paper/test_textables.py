@@ -3,6 +3,7 @@
 import pandas as pd
 import pytest
 
+from study.paper.tex import build_pdfs
 from study.paper.textables import (
     TEX_TABLES,
     break_even,
@@ -293,3 +294,16 @@ def test_stability_counts_what_ran():
     assert cells[1:5] == ["1", "1", "0", "1"]
     assert cells[5:] == ["3", r"\ensuremath{\infty}", "0 of 1", "2"]
     assert second.startswith(r"\texttt{ecsw, pod subspace} & 1 & 0 & 0 & 0 & 0.50 & 0.50 & 0 of 0")
+
+
+PAGE = r"""\documentclass{article}\usepackage[T1]{fontenc}\usepackage{lmodern}\usepackage{longtable}
+\newcommand{\captionrow}{\caption{Table}\\}\begin{document}%s\end{document}"""
+
+
+@pytest.mark.parametrize("form", [tabular, longtable])
+@pytest.mark.parametrize("rows", [[], [["a", "1"]], [["a", "1"], ["b", "2"]]])
+def test_a_table_is_set(form, rows, tmp_path):
+    """A table without rows is that of a configuration which holds nothing of what it shows."""
+    (tmp_path / "main.tex").write_text(PAGE % form(["name", "number"], rows, "lr"))
+    build_pdfs({tmp_path / "main.tex": tmp_path / "main.pdf"}, [])
+    assert (tmp_path / "main.pdf").read_bytes().startswith(b"%PDF")
