@@ -6,13 +6,7 @@ from pdrom.model.held_out import MOTIONS
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every
-from study.experiments.alternatives.settings import (
-    ACCELERATED,
-    CONVERGED,
-    OWN,
-    REDUCED,
-    SETTING,
-)
+from study.experiments.alternatives import settings
 from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
 from study.tables.kit.parts import joined
 from study.tables.kit.vocabulary import ELEMENTS_SAMPLED, MS_PER_FRAME, SCENE, VERTICES, K
@@ -23,8 +17,10 @@ ITERATIONS = integer("iterations", "iterations of each substep")
 
 MOTION = text("motion", f"held-out motion, one of: {', '.join(MOTIONS)}")
 # What tells candidates apart, whatever the motion.
-CANDIDATE = ["scene", "factor", "stiffness", *SETTING]
-TRAINED_ON = text("trained_on", f"frames that a reduction is trained on: {OWN}, {CONVERGED}")
+CANDIDATE = ["scene", "factor", "stiffness", *settings.SETTING]
+TRAINED_ON = text(
+    "trained_on", f"frames that a reduction is trained on: {settings.OWN}, {settings.CONVERGED}"
+)
 
 # Rounding decides which iterate of a two-level iteration is refused: its errors have few digits.
 LOOSE = 0.3
@@ -39,8 +35,8 @@ LOOSE = 0.3
         STIFFNESS,
         text(
             "method",
-            f"how a frame is solved; {CONVERGED}: to the end; {REDUCED}: reduced, {ACCELERATED}: "
-            "and accelerated in the subspace",
+            f"how a frame is solved; {settings.CONVERGED}: to the end; {settings.REDUCED}: "
+            f"reduced, {settings.ACCELERATED}: and accelerated in the subspace",
         ),
         SUBSTEPS,
         ITERATIONS,

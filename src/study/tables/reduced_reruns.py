@@ -13,40 +13,21 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.horizon import floor_of, horizons
+from study.tables.kit import vocabulary
 from study.tables.kit.declaration import table, text
 from study.tables.kit.parts import timings_in_one_time
 from study.tables.kit.reruns import KEYS, TRAIN
-from study.tables.kit.vocabulary import (
-    BLOWUP_FRAME,
-    ERROR_OVER_EXTENT,
-    ERROR_WITHIN,
-    FINITE,
-    FLOOR,
-    FRAMES,
-    GLOBAL_MS,
-    GROUP,
-    HORIZON_FRAME,
-    LOCAL_MS,
-    MAX_EXTENT,
-    METHOD,
-    MS_PER_FRAME,
-    POSITION_BASIS,
-    RELATIVE_ERROR,
-    SCENE,
-    SHAPE_ERROR,
-    SPEEDUP,
-    USERS,
-    K,
-    R,
-)
 
 
 @table(
     title="Reduced runs of the training and the held-out motions",
     columns=(
-        SCENE, GROUP, METHOD, POSITION_BASIS, K, R, FRAMES, FINITE, BLOWUP_FRAME, MAX_EXTENT,
-        RELATIVE_ERROR, ERROR_WITHIN, HORIZON_FRAME, FLOOR, MS_PER_FRAME, LOCAL_MS, GLOBAL_MS,
-        SPEEDUP, ERROR_OVER_EXTENT, SHAPE_ERROR, *USERS,
+        vocabulary.SCENE, vocabulary.GROUP, vocabulary.METHOD, vocabulary.POSITION_BASIS,
+        vocabulary.K, vocabulary.R, vocabulary.FRAMES, vocabulary.FINITE, vocabulary.BLOWUP_FRAME,
+        vocabulary.MAX_EXTENT, vocabulary.RELATIVE_ERROR, vocabulary.ERROR_WITHIN,
+        vocabulary.HORIZON_FRAME, vocabulary.FLOOR, vocabulary.MS_PER_FRAME, vocabulary.LOCAL_MS,
+        vocabulary.GLOBAL_MS, vocabulary.SPEEDUP, vocabulary.ERROR_OVER_EXTENT,
+        vocabulary.SHAPE_ERROR, *vocabulary.USERS,
         text(
             "motion",
             f"{TRAIN}, or how the motion differs from the training one: {', '.join(MOTIONS)}",
