@@ -20,13 +20,13 @@ from study.experiments.alternatives.settings import Alternatives
 from study.experiments.frame_times import FrameTimes
 from study.experiments.hard_cases.experiment import HardCases
 from study.experiments.iterations import IterationSweep
-from study.experiments.kit.sampling import Sweep
 from study.experiments.kit.settings import BlowupExtent, Rank, Solver
 from study.experiments.ladder import LadderSection
 from study.experiments.live import Live
 from study.experiments.noise import Noise
 from study.experiments.repetitions import RepetitionSection
 from study.experiments.requested_tolerances import RequestedTolerances
+from study.experiments.reruns import Sweep
 from study.experiments.scaling import Scaling
 from study.experiments.sensitivity import Sensitivity
 from study.experiments.stability import Stability

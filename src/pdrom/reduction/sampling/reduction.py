@@ -23,20 +23,16 @@ def solution_operator(a: np.ndarray, solve: Solve, tikhonov: float) -> np.ndarra
         gram = a.T @ a + tikhonov * np.eye(a.shape[1])
         return linalg.solve(gram, a.T, assume_a="pos", check_finite=False)
     if solve == "square":
-        return _inverse(a)
+        if a.shape[0] != a.shape[1]:
+            return np.full(a.shape[::-1], np.nan)
+        lu, pivots, info = linalg.lapack.dgetrf(a)
+        if info > 0 or _singular(np.abs(np.diag(lu))):
+            return np.full(a.shape, np.nan)
+        return linalg.lu_solve((lu, pivots), np.eye(len(a)), check_finite=False)
     q, r = linalg.qr(a, mode="economic", check_finite=False)
     if a.shape[0] < a.shape[1] or _singular(np.abs(np.diag(r))):
         return np.full((a.shape[1], a.shape[0]), np.nan)
     return linalg.solve_triangular(r, q.T, check_finite=False)
-
-
-def _inverse(a: np.ndarray) -> np.ndarray:
-    if a.shape[0] != a.shape[1]:
-        return np.full(a.shape[::-1], np.nan)
-    lu, pivots, info = linalg.lapack.dgetrf(a)
-    if info > 0 or _singular(np.abs(np.diag(lu))):
-        return np.full(a.shape, np.nan)
-    return linalg.lu_solve((lu, pivots), np.eye(len(a)), check_finite=False)
 
 
 def _singular(diagonal: np.ndarray) -> bool:

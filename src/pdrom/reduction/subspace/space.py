@@ -16,7 +16,7 @@ from pdrom.core.errors import NotReducibleError, SolverError
 from pdrom.model.dynamics.space import Solve, Space
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.dynamics.system import require_accurate
-from pdrom.model.effects.base import Boundary, Contact, Effect
+from pdrom.model.effects.base import Boundary, Contact
 from pdrom.model.effects.held import held_path, held_targets, held_vertices
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.columns import Columns
@@ -95,7 +95,9 @@ class ReducedSpace(Space):
     """
 
     def __init__(self, scene: Scene, columns: Columns, matrices: Sequence[np.ndarray]) -> None:
-        _require_reducible([*scene.forces, *scene.boundaries, *scene.contacts])
+        for effect in (*scene.forces, *scene.boundaries, *scene.contacts):
+            if not effect.in_subspace:
+                raise NotReducibleError(f"effect '{effect.name}' needs all vertices in every frame")
         h = scene.config.time_step
         self.columns = columns
         mass = columns.B.T @ (scene.masses[:, None] * columns.B)
@@ -169,13 +171,6 @@ class ReducedSpace(Space):
         held = held_vertices([b.boundary for b in self._boundaries], frame)
         for contact in self._contacts:
             contact.correct(y, before, held)
-
-
-def _require_reducible(effects: Sequence[Effect]) -> None:
-    """NotReducibleError for the first effect that a position subspace cannot represent."""
-    for effect in effects:
-        if not effect.in_subspace:
-            raise NotReducibleError(f"effect '{effect.name}' needs all vertices in every frame")
 
 
 def coordinates(columns: Columns, masses: np.ndarray, field: np.ndarray) -> np.ndarray:

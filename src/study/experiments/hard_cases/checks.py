@@ -55,14 +55,10 @@ def energy(case: HardCase, scene: Scene, run: Record) -> str:
     frames by the damping of the implicit step.
     """
     start, largest = run.energy[0], run.energy.max()
-    noise = EPS * OPERATIONS * _elastic_scale(scene, run)
+    elastic = float(np.abs(run.positions).max()) ** 2 * float(abs(scene.system.matrix).sum())
+    noise = EPS * OPERATIONS * elastic
     ok = largest <= start * (1.0 + 1e-9) + noise
     return "" if ok else f"energy grows from {start:.3g} J to {largest:.3g} J"
-
-
-def _elastic_scale(scene: Scene, run: Record) -> float:
-    size = float(np.abs(run.positions).max()) ** 2
-    return size * float(abs(scene.system.matrix).sum())
 
 
 def momentum(case: HardCase, scene: Scene, run: Record) -> str:

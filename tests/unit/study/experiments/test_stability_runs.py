@@ -14,7 +14,7 @@ from pdrom.reduction.method import load_methods
 from places import ROOT
 from study.artifact.paths import File
 from study.experiments import fom, mesh, pod, reruns, snapshots, stability, subspaces
-from study.experiments.kit.sampling import Sweep
+from study.experiments.reruns import Sweep
 from study.experiments.stability import ShortRuns
 from study.experiments.subspaces import SubspaceModels
 
