@@ -14,9 +14,10 @@ from pdrom.core.packed import pack_array, pack_positions
 from pdrom.core.store import write_text
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.basis import Basis, load_basis
+from pdrom.reduction.basis import load_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import mean_motion
+from pdrom.reduction.sampling import Reduction
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.exported import (
     export_basis,
@@ -132,10 +133,12 @@ def live(
     reference = positions_of(train)
     own = [found for file in (*subspaces, *online) for found in load_models(file.path)]
     chosen = list(_chosen(own, settings.live))
-    size = settings.live.joint_rows
-    for case, basis, sampling in zip(settings.joint_rows, bases, samplings, strict=True):
-        joint = _Joint(case, load_basis(basis.path), sampling.path, size)
-        chosen += list(joint.models(scene, [model for _, model in chosen]))
+    for case, file, sampling in zip(settings.joint_rows, bases, samplings, strict=True):
+        basis = load_basis(file.path)
+        # of the size asked for, or of the largest that exists
+        size = min(settings.live.joint_rows, basis.rank)
+        reduction = load_reduction(basis, sampling.path, case.method, size)
+        chosen += list(_joint(scene, case.group, reduction, chosen))
     content = {
         "format": FORMAT,
         "scene": settings.scene.name,
@@ -158,9 +161,7 @@ def live(
 Labelled = tuple[dict[str, Any], SubspaceModel]
 
 
-def _chosen(
-    models: list[tuple[dict[str, Any], SubspaceModel]], asked: LiveModels
-) -> Iterator[Labelled]:
+def _chosen(models: list[Labelled], asked: LiveModels) -> Iterator[Labelled]:
     """Models with sampled elements on snapshot bases, of the sizes and tolerances asked for."""
     tolerances = {ecsw_name(tolerance): tolerance for tolerance in asked.tolerances}
     for labels, model in models:
@@ -169,21 +170,15 @@ def _chosen(
             yield {"family": "elements", "k": k, "tau": tolerances[method]}, model
 
 
-class _Joint:
-    """Joint rows of one group, of the size asked for or of the largest that exists."""
-
-    def __init__(self, case: JointRows, basis: Basis, sampling: str, size: int) -> None:
-        self._group = case.group
-        self._reduction = load_reduction(basis, sampling, case.method, min(size, basis.rank))
-
-    def models(self, scene: Scene, beside: list[SubspaceModel]) -> Iterator[Labelled]:
-        """One for each subspace of the models ``beside``; other groups are sampled as there."""
-        group = scene.group(self._group)
-        for model in {id(model.columns): model for model in beside}.values():
-            joint = interpolation_of(group, model.columns, self._reduction)
-            labels = {"family": "joint", "k": model.columns.modes, "r": self._reduction.r}
-            samples = {**model.samples, self._group: joint}
-            yield labels, SubspaceModel(model.position_basis, model.columns, samples)
+def _joint(
+    scene: Scene, group: str, reduction: Reduction, beside: list[Labelled]
+) -> Iterator[Labelled]:
+    """Joint rows of a group for each subspace of the models ``beside``; others as sampled there."""
+    for model in {id(model.columns): model for _, model in beside}.values():
+        joint = interpolation_of(scene.group(group), model.columns, reduction)
+        labels = {"family": "joint", "k": model.columns.modes, "r": reduction.r}
+        samples = {**model.samples, group: joint}
+        yield labels, SubspaceModel(model.position_basis, model.columns, samples)
 
 
 def _models(scene: Scene, chosen: list[Labelled]) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -11,7 +10,6 @@ from pydantic import Field, model_validator
 
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.energy import EnergyScale
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import load_basis
@@ -115,14 +113,19 @@ def stability(
     Bases and samplings are those of the scene's own setting: how far do they carry?
     """
     scene = scene_of(config, mesh)
-    reductions = list(_reductions(methods, short.ranks, bases, samplings))
-    models = [model for file in subspaces for model in _largest(load_models(file.path))]
+    local = list(_reductions(methods, short.ranks, bases, samplings))
+    models = []
+    for file in subspaces:
+        found: list[tuple[dict[str, Any], SubspaceModel]] = load_models(file.path)
+        largest = max(labels["k"] for labels, _ in found)
+        models += [(labels, model) for labels, model in found if labels["k"] == largest]
     rows = []
     for h, ratio in _grid(scene.config.time_step, short):
         limits = (short.min_frames, short.max_frames)
         other = varied(scene.config, h, ratio, duration=short.duration, frames=limits)
-        case = _Case(Scene.build(other, scene.mesh), ratio, solver, blowup_extent)
-        rows += case.rows(reductions, models)
+        case = Scene.build(other, scene.mesh)
+        own = {"scene": config.name, "h": h, "stiffness_ratio": ratio}
+        rows += [own | row for row in _rows(case, local, models, solver, blowup_extent)]
         log.info("h = %g s, stiffness times %g: %d frames", h, ratio, other.frames)
     table = pd.DataFrame(rows, columns=COLUMNS)
     whole = ["r", "blowup_frame", "k", "frames"]
@@ -136,85 +139,56 @@ def _grid(own: float, chosen: ShortRuns) -> list[tuple[float, float]]:
     return [(h, 1.0) for h in steps] + [(own, ratio) for ratio in ratios if ratio != 1.0]
 
 
-@dataclass(frozen=True)
-class _Local:
-    """A reduction of one group; None where the basis has fewer modes."""
-
-    group: str
-    method: str
-    r: int
-    reduction: Reduction | None
-
-
 def _reductions(
     methods: dict[str, MethodSpec],
     ranks: tuple[Rank, ...],
     bases: list[File],
     samplings: list[File],
-) -> Iterator[_Local]:
+) -> Iterator[tuple[dict[str, Any], Reduction | None]]:
+    """Labels and reductions of single groups; None where the basis has fewer modes."""
     for file in samplings:
-        group, method = file["group"], file["method"]
-        spec = methods[method]
+        spec = methods[file["method"]]
         basis = load_basis(basis_of(file, spec, bases).path)
         for r in resolve_ranks(ranks, basis.rank):
+            labels = {"group": file["group"], "method": file["method"], "r": r}
             known = r <= basis.rank
             reduction = load_reduction(basis, file.path, spec, r=r) if known else None
-            yield _Local(group, method, r, reduction)
+            yield labels | {"position_basis": "full"}, reduction
 
 
-def _largest(
+def _rows(
+    scene: Scene,
+    local: list[tuple[dict[str, Any], Reduction | None]],
     models: list[tuple[dict[str, Any], SubspaceModel]],
-) -> list[tuple[dict[str, Any], SubspaceModel]]:
-    size = max(labels["k"] for labels, _ in models)
-    return [(labels, model) for labels, model in models if labels["k"] == size]
+    solver: str,
+    limit: float,
+) -> list[dict[str, Any]]:
+    """Rows of the full order of ``scene`` and, if that is finite, of everything else.
 
+    ``limit`` is the extent of a blow-up over that of the rest shape.
+    """
+    system = scene.system_with(solver)
+    nothing = np.zeros((scene.config.frames + 1, *scene.mesh.points.shape))
+    full = rerun(scene, system, scene.groups, reference=nothing, blowup_extent=limit)
+    reference, displacement = full.positions, displacement_norms(full.positions)
+    scale = EnergyScale.of(scene, reference)
 
-class _Case:
-    """The scene at one setting, with its full-order run."""
+    def row(labels: dict[str, Any], outcome: Rerun) -> dict[str, Any]:
+        energy = {"energy_ratio": scale.ratio(outcome.positions)}
+        return {**labels, **outcome.row(displacement), **energy}
 
-    def __init__(self, scene: Scene, ratio: float, solver: str, limit: float) -> None:
-        self.scene, self.limit = scene, limit
-        self.system: GlobalSystem = scene.system_with(solver)
-        self.labels = {
-            "scene": scene.config.name, "h": scene.config.time_step, "stiffness_ratio": ratio,
-        }  # fmt: skip
-        nothing = np.zeros((scene.config.frames + 1, *scene.mesh.points.shape))
-        self.full_order = rerun(
-            scene, self.system, scene.groups, reference=nothing, blowup_extent=limit
-        )
-        self.reference = self.full_order.positions
-        self.displacement = displacement_norms(self.reference)
-        self.scale = EnergyScale.of(scene, self.reference)
-
-    def rows(
-        self, reductions: list[_Local], models: list[tuple[dict[str, Any], SubspaceModel]]
-    ) -> list[dict[str, Any]]:
-        """Rows of the full order and, if that is finite, of everything else."""
-        full = {"method": "full", "position_basis": "full"}
-        rows = [self._row(full, self.full_order)]
-        if not self.full_order.finite:
-            log.warning("the full-order run blew up: nothing to compare with")
-            return rows
-        rows[0]["relative_error"] = 0.0
-        for local in reductions:
-            labels = {"group": local.group, "method": local.method, "r": local.r}
-            labels["position_basis"] = "full"
-            if local.reduction is None:
-                rows.append({**self.labels, **labels, "frames": 0})
-                continue
-            outcome = rerun_reduced(
-                self.scene, local.group, local.reduction, self.reference, self.limit, self.system
-            )
-            rows.append(self._row({**labels, "gain": local.reduction.gain}, outcome))
-        for labels, model in models:
-            outcome = rerun_model(self.scene, model, self.reference, blowup_extent=self.limit)
-            rows.append(self._row({"group": "all", **labels}, outcome))
+    rows = [row({"method": "full", "position_basis": "full"}, full)]
+    if not full.finite:
+        log.warning("the full-order run blew up: nothing to compare with")
         return rows
-
-    def _row(self, labels: dict[str, Any], outcome: Rerun) -> dict[str, Any]:
-        return {
-            **self.labels,
-            **labels,
-            **outcome.row(self.displacement),
-            "energy_ratio": self.scale.ratio(outcome.positions),
-        }
+    rows[0]["relative_error"] = 0.0
+    for labels, reduction in local:
+        if reduction is None:
+            rows.append({**labels, "frames": 0})
+            continue
+        outcome = rerun_reduced(scene, labels["group"], reduction, reference, limit, system)
+        rows.append(row({**labels, "gain": reduction.gain}, outcome))
+    for labels, model in models:
+        outcome = rerun_model(scene, model, reference, blowup_extent=limit)
+        rows.append(row({"group": "all", **labels}, outcome))
+    return rows
