@@ -1,6 +1,7 @@
 """Rule online: the rows of one scene."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from builders import make_scene
@@ -16,14 +17,26 @@ from study.artifact.paths import File
 from study.experiments import subspaces as experiment
 from study.experiments.kit.fresh_process import Request, Subspaces, TimedScene, in_fresh_process
 from study.experiments.kit.measurement import Protocol
-from study.experiments.subspaces import LARGE_COLUMNS, Hrpd, LargeModels, LargeOptions, Online
+from study.experiments.subspaces import (
+    COLUMNS,
+    LARGE_COLUMNS,
+    Hrpd,
+    LargeModels,
+    LargeOptions,
+    Online,
+)
 from study.tables.frame_times import frame_times
 from study.tables.online import online
+from study.tables.speedups import speedups
 
 EFFECTS = (
     {"effect": "spring", "weight": 1e5},
     {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]},
     {"effect": "pins", "select": "top"},
+)
+JUDGED = ("motion", "relative_error_within_horizon", "horizon_frame")
+NO_RERUNS = pd.DataFrame(columns=[*COLUMNS, *JUDGED])
+    columns=[*COLUMNS, "motion", "relative_error_within_horizon", "horizon_frame"]
 )
 CHANGES = {"reduce": {"spring": {"train": 5}}, "held_out": {"kick": 0.5}}
 
@@ -85,6 +98,10 @@ def test_a_fresh_process_times_every_model(written):
     assert table.fom_ms_per_frame.nunique() == 1
     # the files hold the same models
     assert table.ms_per_frame.tolist() == rows.ms_per_frame[2:].tolist()
+    quoted = speedups([times], frame_times([times]), [], [], [File(str(path), {})], NO_RERUNS)
+    for column, own in (("error_train", "train"), ("error_heldout_high", "heldout_high")):
+        assert quoted[column].tolist() == table[f"relative_error_{own}"].tolist()
+    assert (quoted.reduction_s > 0.0).all()
 
 
 def test_a_process_that_fails_is_told(written, tmp_path):
