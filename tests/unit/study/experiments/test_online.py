@@ -36,8 +36,6 @@ EFFECTS = (
 )
 JUDGED = ("motion", "relative_error_within_horizon", "horizon_frame")
 NO_RERUNS = pd.DataFrame(columns=[*COLUMNS, *JUDGED])
-    columns=[*COLUMNS, "motion", "relative_error_within_horizon", "horizon_frame"]
-)
 CHANGES = {"reduce": {"spring": {"train": 5}}, "held_out": {"kick": 0.5}}
 
 
