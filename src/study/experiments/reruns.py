@@ -209,27 +209,20 @@ def sample(
     sampling, errors : files to write; their labels are the first columns of the table
     """
     labels = sampling.labels
-    wanted = _sizes(sweep, ranks, basis.rank)
+    asked = resolve_ranks(ranks, basis.rank)
+    wanted = {*sweep.ranks(basis.rank), *asked} if basis.rank else set()
     rows = []
     with write_hdf5(sampling.path) as file:
-        for r, reduction in reductions(basis, method, wanted).items():
+        for r, reduction in reductions(basis, method, sorted(wanted)).items():
             store, sampled = file.create_group(f"r{r:04d}"), reduction.sampling
             store["entries"], store["elements"] = sampled.entries, sampled.elements
             store.attrs["gain"], store.attrs["condition"] = reduction.gain, reduction.condition
             rows += [{**labels, "r": r, **row} for row in _errors(reduction, data)]
-    beyond = [r for r in resolve_ranks(ranks, basis.rank) if r > basis.rank]
+    beyond = [r for r in asked if r > basis.rank]
     rows += [{**labels, "r": r, "split": split} for r in beyond for split in SPLITS]
     if beyond:
         log.warning("r = %s exceeds the numerical rank %d: marked rows", beyond, basis.rank)
     write_table(pd.DataFrame(rows, columns=ERROR_COLUMNS), errors.path)
-
-
-def _sizes(sweep: Sweep, ranks: tuple[Rank, ...], rank: int) -> list[int]:
-    """Sizes of sweep and reruns that the basis can have, ascending."""
-    if rank == 0:
-        return []
-    asked = [r for r in resolve_ranks(ranks, rank) if r <= rank]
-    return sorted({*sweep.ranks(rank), *asked})
 
 
 def _errors(reduction: Reduction, data: SnapshotSet) -> list[dict[str, Any]]:

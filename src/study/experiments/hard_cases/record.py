@@ -57,7 +57,9 @@ class Roundoff:
         noise = self._noise(size)
         evaluation = 2.0 * np.sqrt(abs(first) * noise) + noise
         if self.columns is None:
-            return evaluation + self._sparse(size)
+            residual = self._residual(size)
+            smallest = float(self.scene.system.inertia.min())
+            return evaluation + 1.5 * float(residual @ residual) / smallest
         return evaluation + self._dense(self.columns, size, largest)
 
     def _noise(self, size: float) -> float:
@@ -74,11 +76,6 @@ class Roundoff:
         """c u |A| |y| of the vertices, (N,)."""
         rows = np.asarray(abs(self.scene.system.matrix).sum(axis=1)).ravel()
         return OPERATIONS * EPS * size * rows
-
-    def _sparse(self, size: float) -> float:
-        residual = self._residual(size)
-        smallest = float(self.scene.system.inertia.min())
-        return 1.5 * float(residual @ residual) / smallest
 
     def _dense(self, columns: Columns, size: float, largest: np.ndarray) -> float:
         b = columns.B
