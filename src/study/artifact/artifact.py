@@ -176,14 +176,14 @@ def load(address: str) -> Artifact:
 
 
 @cache
-def declared_in(package: str, kind: type[A], decorator: str) -> dict[str, A]:
+def declared_in(package: str, kind: type[A]) -> dict[str, A]:
     """Return the artifacts of a kind that modules of a package declare, by name, sorted.
 
-    Only modules in whose source a line begins with the ``decorator`` of the kind are imported.
+    Only modules that import something from that of the kind can declare one: no other is imported.
     """
     root, found = Path(import_module(package).__path__[0]), {}
     for path in root.rglob("*.py"):
-        if f"\n@{decorator}(" not in path.read_text(encoding="utf-8"):
+        if f"\nfrom {kind.__module__} import " not in path.read_text(encoding="utf-8"):
             continue
         name = ".".join((package, *path.relative_to(root).with_suffix("").parts))
         module = import_module(name.removesuffix(".__init__"))

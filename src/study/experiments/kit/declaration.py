@@ -38,4 +38,4 @@ def experiment(
 
 def experiments(package: str = "study.experiments") -> dict[str, Experiment]:
     """Return every experiment of a package by name."""
-    return declared_in(package, Experiment, "experiment")
+    return declared_in(package, Experiment)

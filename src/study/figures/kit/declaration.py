@@ -152,7 +152,7 @@ def declarations() -> dict[str, Declaration]:
     ConfigurationError
         Two figures have the same number.
     """
-    found = declared_in(PACKAGE, Declaration, "figure")
+    found = declared_in(PACKAGE, Declaration)
     numbers = [made.number for made in found.values() if made.number is not None]
     for number in numbers:
         if numbers.count(number) > 1:

@@ -254,7 +254,7 @@ def table(
 
 def declared(package: str = "study.tables") -> dict[str, Table]:
     """Return every table of a package by name."""
-    return declared_in(package, Table, "table")
+    return declared_in(package, Table)
 
 
 def _require_distinct(made: Table) -> None:

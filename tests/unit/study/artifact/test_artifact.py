@@ -165,4 +165,4 @@ def test_artifacts_are_found_and_loaded_by_their_address():
     for made in found.values():
         assert load(made.address) is made
         assert set(made.types) | set(made.files) == set(made.reads)
-    assert declared_in("pdrom.core", Experiment, "experiment") == {}
+    assert declared_in("pdrom.core", Experiment) == {}
