@@ -1,6 +1,7 @@
-"""Command line of ``./reproduce verify``."""
+"""``./reproduce verify``: whether the results of the last run are the expected ones."""
 
 import argparse
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,10 +12,9 @@ from study.artifact.paths import ARTICLE
 from study.verification.examine import Examination
 from study.verification.files import verify_files
 from study.verification.lines import Line, counted, page, status_of
-from study.verification.references import LOG, folder_of
-from study.verification.status import Status, say
+from study.verification.references import LOG, folder_of, update
+from study.verification.status import Status, ended, say
 from study.verification.subject import Subject
-from study.verification.update import update
 
 CODES = "exit codes: 0 all holds; 1 faulty input; 2 not understood; 3 differs; 4 not there"
 PAGE = "verification.md"
@@ -94,3 +94,7 @@ def _about(subject: Subject, folder: Path) -> list[str]:
         f"Results in `{subject.results}`, expected ones in `{folder}` (`{LOG}` says why).",
         "What is compared, and what the outcomes mean, is in `docs/verification.md`.",
     ]
+
+
+if __name__ == "__main__":
+    sys.exit(ended(lambda: verify(sys.argv[1:])))
