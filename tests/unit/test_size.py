@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 42_926,
-    "modules of src": 367,
-    "lines of tests": 29_626,
+    "lines of src": 42_954,
+    "modules of src": 371,
+    "lines of tests": 29_628,
     "words of documentation": 24_812,
     "tables": 25,
     "figures": 23,
     "experiments": 21,
-    "percent of src in decorators, signatures and imports": 22.09,
+    "percent of src in decorators, signatures and imports": 22.11,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

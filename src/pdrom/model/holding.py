@@ -3,13 +3,13 @@
 import logging
 from collections.abc import Sequence
 from copy import deepcopy
-from itertools import combinations, product
+from itertools import combinations
 
 import numpy as np
 
 from pdrom.core.errors import SceneError
 from pdrom.model.effects.base import Boundary, Contact
-from pdrom.model.effects.held import held_path
+from pdrom.model.effects.held import held_targets
 
 log = logging.getLogger(__name__)
 
@@ -72,12 +72,10 @@ def log_obstructed(
     # boundaries remember where they took hold
     boundaries, positions = deepcopy(boundaries), points.copy()
     slack = SLACK * float(np.ptp(points, axis=0).max())
-    coming = range(frames if obstacles and boundaries else 0)
-    while coming:
-        held, path = held_path(boundaries, coming, positions)
-        coming = coming[len(path) :]
-        for targets, obstacle in product(path, obstacles):
-            positions[held] = targets
+    for frame in range(frames if obstacles and boundaries else 0):
+        held, targets = held_targets(boundaries, frame, positions)
+        positions[held] = targets
+        for obstacle in obstacles:
             before = positions.copy()
             obstacle.correct(positions, before)
             pushed = held[np.linalg.norm(positions[held] - targets, axis=1) > slack]

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from pdrom.model import constraints
+from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
 from study.artifact.markup import filled, keys
 from study.artifact.paths import SUBSPACES
@@ -76,7 +76,7 @@ def drawn_subspaces(study: Study, labels: Labels) -> tuple[Experiment, ...]:
 
 def groups(study: Study, labels: Labels) -> tuple[str, ...]:
     """Names of all constraint groups."""
-    return tuple(name for name in EFFECTS if EFFECTS[name].startswith(constraints.__name__))
+    return tuple(name for name in EFFECTS if issubclass(EFFECTS.load(name), ConstraintGroup))
 
 
 def words(study: Study, figure: Declaration) -> tuple[str, str]:

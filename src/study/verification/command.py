@@ -1,7 +1,6 @@
-"""``./reproduce verify``: whether the results of the last run are the expected ones."""
+"""Command line of ``./reproduce verify``."""
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,9 +11,10 @@ from study.artifact.paths import ARTICLE
 from study.verification.examine import Examination
 from study.verification.files import verify_files
 from study.verification.lines import Line, counted, page, status_of
-from study.verification.references import LOG, folder_of, update
-from study.verification.status import Status, ended, say
+from study.verification.references import LOG, folder_of
+from study.verification.status import Status, say
 from study.verification.subject import Subject
+from study.verification.update import update
 
 CODES = "exit codes: 0 all holds; 1 faulty input; 2 not understood; 3 differs; 4 not there"
 PAGE = "verification.md"
@@ -94,7 +94,3 @@ def _about(subject: Subject, folder: Path) -> list[str]:
         f"Results in `{subject.results}`, expected ones in `{folder}` (`{LOG}` says why).",
         "What is compared, and what the outcomes mean, is in `docs/verification.md`.",
     ]
-
-
-if __name__ == "__main__":
-    sys.exit(ended(lambda: verify(sys.argv[1:])))

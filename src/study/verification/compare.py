@@ -1,6 +1,6 @@
 """A table against the expected one: which rows belong together, how far each cell is off."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -10,18 +10,10 @@ import pandas as pd
 
 from study.artifact.reads import ProjectFile
 from study.tables.kit.declaration import Column, Quantity, Table
-from study.verification.rows import (
-    RUN,
-    Context,
-    names,
-    names_row,
-    of_fitted_samples,
-    of_wrong_runs,
-)
+from study.verification.distance import distance
+from study.verification.pairing import pairs
+from study.verification.rows import RUN, Context, names, of_fitted_samples, of_wrong_runs
 
-Pairs = list[tuple[int, int]]
-# Differences below it count for nothing: rounding errors of sums.
-FLOOR = 1e-12
 # Not compared with a reference.
 NOT_COMPARED: tuple[Quantity, ...] = ("timed", "skipped")
 # How far a number of samples from a fit, and the numbers of a wrong run, may be off, relative.
@@ -108,62 +100,3 @@ class Comparison:
 
 def _without(rows: pd.DataFrame, runs: frozenset[tuple]) -> pd.DataFrame:
     return rows[[name not in runs for name in names(rows, RUN)]]
-
-
-def pairs(table: Table, expected: pd.DataFrame, found: pd.DataFrame) -> Pairs:
-    """(row of ``expected``, row of ``found``) of all rows of ``table`` that belong together.
-
-    Rows with the same names and numbers of samples belong together; of those that are left, rows
-    with the same names, in their order: a number of samples may differ where a fit leaves it.
-    """
-    made: dict[int, int] = {}
-    named = [c.name for c in table.columns if names_row(c)]
-    counts = [c.name for c in table.columns if c.quantity == "value" and c.kind == "integer"]
-    for columns in ([*named, *counts], named):
-        waiting: dict[tuple, list[int]] = {}
-        taken = set(made.values())
-        for j, key in enumerate(_keys(found, columns)):
-            if j not in taken:
-                waiting.setdefault(key, []).append(j)
-        for i, key in enumerate(_keys(expected, columns)):
-            if i not in made and waiting.get(key):
-                made[i] = waiting[key].pop(0)
-    return sorted(made.items())
-
-
-def _keys(frame: pd.DataFrame, columns: Sequence[str]) -> list[tuple]:
-    return list(zip(*([_key(cell) for cell in frame[name]] for name in columns), strict=True))
-
-
-def _key(cell: object) -> object:
-    """A cell without the digits that references do not have; one word for what is missing."""
-    if cell is None or cell is pd.NA or cell != cell:
-        return ""
-    return f"{cell:.6g}" if isinstance(cell, float) else cell
-
-
-def distance(quantity: Quantity, expected: pd.Series, found: pd.Series) -> np.ndarray:
-    """Distance of each pair of cells of ``expected`` and ``found``.
-
-    The difference where ``quantity`` is a share, of other numbers that over the larger of the two;
-    0 if the cells are equal, inf if only one has a value.
-    """
-    same = _same(expected, found)
-    numbers = pd.api.types.is_numeric_dtype(expected) and pd.api.types.is_numeric_dtype(found)
-    if not numbers or pd.api.types.is_bool_dtype(expected):
-        return np.where(same, 0.0, np.inf)
-    a, b = (column.to_numpy(dtype=float, na_value=np.nan) for column in (expected, found))
-    with np.errstate(all="ignore"):
-        apart = np.abs(a - b)
-        if quantity != "share":
-            apart = np.where(apart <= FLOOR, 0.0, apart / np.maximum(np.abs(a), np.abs(b)))
-    return np.where(same, 0.0, np.where(np.isnan(apart), np.inf, apart))
-
-
-def _same(a: pd.Series, b: pd.Series) -> np.ndarray:
-    if a.dtype == b.dtype == np.dtype(float):
-        x, y = a.to_numpy(), b.to_numpy()
-        return (x == y) | (np.isnan(x) & np.isnan(y))
-    left, right = a.astype(object), b.astype(object)
-    equal = (left == right).fillna(False).to_numpy(dtype=bool)
-    return equal | (a.isna().to_numpy() & b.isna().to_numpy())

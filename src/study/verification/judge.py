@@ -9,7 +9,8 @@ import pandas as pd
 
 from study.tables.kit.declaration import Column, Table
 from study.verification.compare import Comparison
-from study.verification.rows import SAMPLES, names, names_row
+from study.verification.pairing import names_row
+from study.verification.rows import SAMPLES, names
 
 # Columns of a row that say which one it is.
 NAMED = 6

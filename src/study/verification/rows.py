@@ -8,6 +8,7 @@ import pandas as pd
 
 from study.tables.kit.declaration import Column, Table
 from study.tables.kit.reruns import trained
+from study.verification.pairing import names_row
 
 # Errors of runs on samples with a larger amplification, and errors of approximations and the
 # amplification itself above the second one, have few digits or none on other kernels.
@@ -22,11 +23,6 @@ SAMPLES = ("scene", "group", "method", "r")
 RUN = (*SAMPLES, "position_basis", "k")
 # In the names of methods whose number of elements follows from a fit with non-negative weights.
 FITTED = "ecsw"
-
-
-def names_row(column: Column) -> bool:
-    """Whether a column says which row it is: a name, a parameter, a size."""
-    return column.quantity == "exact" and not column.timed
 
 
 @dataclass(frozen=True)

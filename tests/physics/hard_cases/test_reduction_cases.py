@@ -57,15 +57,29 @@ def test_two_runs_give_the_same_bits(name, reduction):
     assert np.array_equal(first.positions, again.positions)
 
 
-@pytest.mark.parametrize("name", reducible_cases())
+def taken(name: str) -> bool:
+    """Whether a position subspace takes all effects of a case."""
+    listed = [EFFECTS.load(effect["effect"]) for effect in CATALOGUE[name].scene.effects]
+    return all(effect.in_subspace for effect in listed)
+
+
+# By default every third of the cases whose effects are all taken: `pairs` runs them, too.
+TAKEN = [name for name in reducible_cases() if taken(name)]
+SELDOM = {name for i, name in enumerate(TAKEN) if i % 3}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] if name in SELDOM else [])
+        for name in reducible_cases()
+    ],
+)
 def test_a_subspace_takes_what_the_effects_say(name):
     """One that does not take an effect says so by name; vertex positions take every effect."""
-    case = CATALOGUE[name]
-    listed = [EFFECTS.load(effect["effect"]) for effect in case.scene.effects]
-    taken = all(effect.in_subspace for effect in listed)
     for reduction in ("pod-full", "pod"):
         found = row(training(name), reduction, METHODS, EXPECTED)
-        assert (found["outcome"] == NOT_TAKEN) == (reduction == "pod-full" and not taken)
+        assert (found["outcome"] == NOT_TAKEN) == (reduction == "pod-full" and not taken(name))
         if found["outcome"] == NOT_TAKEN:
             assert "effect '" in found["why"]
 

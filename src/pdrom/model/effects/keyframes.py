@@ -4,6 +4,8 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
+from scipy.interpolate import PchipInterpolator
+from scipy.spatial.transform import Rotation
 
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.effects.base import Vector
@@ -79,16 +81,12 @@ class Keyframes(Hold):
         """Offset (3,) m and rotation vector (3,) degrees at a ``time`` in frames."""
         time = min(time, self._times[-1])
         if self._smooth:
-            from scipy.interpolate import PchipInterpolator
-
             pose = PchipInterpolator(self._times, self._poses)(time)
         else:
             pose = np.array([np.interp(time, self._times, line) for line in self._poses.T])
         return pose[:3], pose[3:]
 
     def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
-        from scipy.spatial.transform import Rotation
-
         offset, turn = self._pose(frame + 1 - self.config.start)
         middle = 0.5 * (anchor.min(axis=0) + anchor.max(axis=0))
         rotation = Rotation.from_rotvec(turn, degrees=True)

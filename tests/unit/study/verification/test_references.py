@@ -15,10 +15,10 @@ from study.verification.references import (
     folder_of,
     note,
     read_reference,
-    update,
     write_reference,
 )
 from study.verification.subject import Subject
+from study.verification.update import update
 
 TABLE = declared()["reduced_reruns"]
 LIMIT = 1_250_000  # bytes

@@ -19,8 +19,9 @@ from study.tables import declared
 from study.verification.again import made
 from study.verification.command import parser, verify, verify_tables
 from study.verification.lines import Line, Outcome, status_of
-from study.verification.references import LOG, NOTHING, folder_of, update
+from study.verification.references import LOG, folder_of
 from study.verification.status import Status
+from study.verification.update import NOTHING, update
 
 RESULTS = "results/studies/tiny"
 CLAIMS = ("claims", "claims_tests", "claims_sensitivity")
@@ -135,7 +136,7 @@ def plan_says(monkeypatch, code: int, words: str) -> None:
     """In place of Snakemake, which would plan the tables: its exit code and ``words``."""
     done = CompletedProcess([], code, words, "")
     run = SimpleNamespace(run=lambda *_, **__: done)
-    monkeypatch.setattr("study.verification.references.subprocess", run)
+    monkeypatch.setattr("study.verification.update.subprocess", run)
 
 
 def test_an_update_writes_every_table_and_notes_the_reason(results, subject, monkeypatch):
