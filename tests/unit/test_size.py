@@ -13,7 +13,7 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 42_954,
+    "lines of src": 42_942,
     "modules of src": 371,
     "lines of tests": 29_628,
     "words of documentation": 24_812,

@@ -108,7 +108,9 @@ def accuracy_cost(
     full["error_converged"] = [own.get((scene, iterations[scene]), np.nan) for scene in full.scene]
     parts = [full.assign(iterations=full.scene.map(iterations)), points, sweep]
     points = pd.concat([part for part in parts if len(part)], ignore_index=True)
-    reduced = points.method.isin(reruns.method) & ~_unreduced(points)
+    # full is also the name of a model whose positions alone are reduced
+    unreduced = (points.method == "full") & (points.position_basis == "full")
+    reduced = points.method.isin(reruns.method) & ~unreduced
     unseen = points[MEDIAN].where(reduced, points.relative_error_within_horizon)
     errors = {"pareto": points.relative_error_within_horizon, "pareto_heldout": unseen}
     for name, error in errors.items():
@@ -139,11 +141,6 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     ]
     points = pd.concat(named, ignore_index=True).assign(position_basis="full", k=None, r=None)
     return points.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
-
-
-def _unreduced(points: pd.DataFrame) -> pd.Series:
-    """Whether each point is the full order: ``full`` is also a model with reduced positions."""
-    return (points.method == "full") & (points.position_basis == "full")
 
 
 def reference_of(points: pd.DataFrame) -> pd.Series:

@@ -20,6 +20,9 @@ from study.tables.claims.verdicts import VERDICTS, combined, evaluate
 from study.tables.kit.declaration import compared, text, timed
 from study.tables.kit.declaration import table as declare
 
+# What the rule of a claim says of it.
+WORDS = {"source", "paper", "figure_or_table", "section", "shown", "text", "qualifiers"}
+
 
 def timed_columns(rule: ClaimRule) -> set[str]:
     """Columns of the row of a ``rule`` that depend on timing: two runs may differ there."""
@@ -84,14 +87,8 @@ def _row(name: str, rule: ClaimRule, tables: Tables) -> dict[str, Any]:
     published, beyond = _decided(rule.published, tables), _decided(rule.beyond, tables)
     return {
         "claim": name,
-        "source": rule.source,
-        "paper": rule.paper,
+        **rule.model_dump(include=WORDS),
         **published,
-        "figure_or_table": rule.figure_or_table,
-        "section": rule.section,
-        "shown": rule.shown,
-        "text": rule.text,
-        "qualifiers": rule.qualifiers,
         **{f"{key}_beyond": value for key, value in beyond.items()},
         "answer": f"as published it {published['verdict']}, beyond it {beyond['verdict']}",
         "history": " ".join(

@@ -69,7 +69,7 @@ def claims_tests(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame)
 def outcome_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
     """Rows of the table claims_tests from ``rules`` and ``tables``, in the order of the file."""
     rows = [
-        {"claim": name, "part": part, **_said(test), **_found(test, tables)}
+        {"claim": name, "part": part, **test.model_dump(include=SAID), **_found(test, tables)}
         for name, rule in rules.items()
         for part in PARTS
         for test in getattr(rule, part)
@@ -77,14 +77,11 @@ def outcome_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame
     return pd.DataFrame(rows)
 
 
-def _said(test: TestRule) -> dict[str, Any]:
-    return test.model_dump(include=SAID) | {"margin": test.factor if test.timed else None}
-
-
 def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
-    """Counts and the range of the values, which is empty where there are none."""
+    """Margin, counts and the range of the values, which is empty where there are none."""
     values = values_of(test, tables)[VALUE].to_numpy(float)
     good, total = int(satisfied(test, values).sum()), len(values)
     spread = (values.min(), np.median(values), values.max()) if total else (None, None, None)
     found = (good, total, int(close(test, values).sum()), *spread, answer_of(test, values))
-    return dict(zip(FOUND, found, strict=True))
+    margin = test.factor if test.timed else None
+    return {"margin": margin, **dict(zip(FOUND, found, strict=True))}

@@ -25,10 +25,11 @@ def document(tables: Iterable[Table]) -> str:
 
 
 def _section(table: Table) -> str:
+    sources = dict.fromkeys(_source(read) for read in table.reads.values())
     lines = [
         f"## {table.name}",
         "",
-        f"{table.title}.\nMade by `{table.module}` from {', '.join(_sources(table))}.",
+        f"{table.title}.\nMade by `{table.module}` from {', '.join(sources)}.",
         "",
         "| column | type | unit | timed | compared as | meaning |",
         "|---|---|---|---|---|---|",
@@ -43,10 +44,6 @@ def _row(column: Column) -> str:
     kind = f"{column.quantity}{own}"
     cells = (column.name, column.kind, column.unit, timed, kind, column.meaning)
     return f"| {' | '.join(cells)} |"
-
-
-def _sources(table: Table) -> list[str]:
-    return list(dict.fromkeys(_source(read) for read in table.reads.values()))
 
 
 def _source(read: Read) -> str:
