@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 42_942,
-    "modules of src": 371,
+    "lines of src": 42_858,
+    "modules of src": 362,
     "lines of tests": 29_628,
     "words of documentation": 24_812,
     "tables": 25,
     "figures": 23,
     "experiments": 21,
-    "percent of src in decorators, signatures and imports": 22.11,
+    "percent of src in decorators, signatures and imports": 22.02,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

@@ -25,7 +25,25 @@ from pdrom.model.masses import Mass, MassConfig, vertex_masses
 from pdrom.model.mesh.checks import check_mesh
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.mesh.types import Mesh
-from pdrom.model.plans import ReductionPlan, with_requested_error
+
+
+class ReductionPlan(ConfigModel):
+    """Experiments on one group: how many training snapshots its basis gets."""
+
+    train: Annotated[int, Field(ge=2, le=100_000)]
+
+
+def with_requested_error(keys: Any) -> Any:
+    """Separate ``reduce.error``, the requested tolerance of the scene, from the groups' plans.
+
+    ``keys`` are those of a scene file as read, and come back unchanged where none is requested.
+    """
+    plans = keys.get("reduce") if isinstance(keys, dict) else None
+    if not isinstance(plans, dict) or "error" not in plans:
+        return keys
+    groups = {name: plan for name, plan in plans.items() if name != "error"}
+    return {**keys, "reduce": groups, "requested_error": plans["error"]}
+
 
 # Positions and velocities of a longer run fill disk and memory: 1600 vertices for 100,000 frames.
 MAX_VERTEX_FRAMES = 160_000_000

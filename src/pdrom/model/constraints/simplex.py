@@ -3,17 +3,24 @@
 An element with p rows has p + 1 vertices, S q = D^-T [q_1 - q_0, ..., q_p - q_0]^T with the edge
 matrix D of the rest shape (1 for springs). What differs from group to group is the projection of a
 block; gather and scatter are here, for blocks of elements (see `pdrom.model.constraints.lanes`).
+
+A block takes the expensive path as soon as one of its elements needs it. Neighbours are in like
+states, so that blocks of neighbours are cheap where little happens; their vertices are also in the
+cache still. Meshers list elements in the order in which they were made, neighbours far apart. What
+a group shows to others (S, weights, projections) keeps the order of the mesh; only the arrays of
+its kernels do not.
 """
 
 from typing import Any, ClassVar
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
 
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.arithmetic import add, constant, subtract, transposed
 from pdrom.model.compiled.rows import WIDTH, at
 from pdrom.model.constraints.base import StencilGroup
-from pdrom.model.constraints.element_order import visiting_order
 from pdrom.model.constraints.lanes import LANES, blocks, lane_function, load, pack, save, workspaces
 from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, LocalKernel
 
@@ -248,3 +255,42 @@ def store_projections(work, count, start, p):
         for i in range(count):
             at_p = 3 * (count * (start + lane) + i)
             p[at_p], p[at_p + 1], p[at_p + 2] = load(work, P + 3 * i, lane)
+
+
+# The order of the mesh is kept if its blocks have at most so many times the vertices that others
+# would have. Grids keep theirs.
+KEPT = 1.5
+
+
+def visiting_order(stencil: np.ndarray, vertices: int) -> np.ndarray | None:
+    """Elements (e,) in the order to visit them; None for the order that they have.
+
+    They are sorted by their vertices, numbered by the reverse Cuthill-McKee algorithm (Cuthill and
+    McKee 1969), which gives neighbours numbers close to each other.
+
+    Parameters
+    ----------
+    stencil : (e, m) vertices of each element
+    vertices : number of all vertices
+    """
+    if len(stencil) == 0:
+        return None
+    rank = np.empty(vertices, dtype=np.int64)
+    rank[csgraph.reverse_cuthill_mckee(_neighbours(stencil, vertices), True)] = np.arange(vertices)
+    order = np.lexsort(np.sort(rank[stencil], axis=1).T[::-1])
+    return order if _corners(stencil) > KEPT * _corners(stencil[order]) else None
+
+
+def _neighbours(stencil: np.ndarray, vertices: int) -> sparse.csr_array:
+    """Graph (N, N) of the vertices that have an element in common."""
+    e, m = stencil.shape
+    rows = np.repeat(np.arange(e), m)
+    incidence = sparse.csr_array((np.ones(e * m), (rows, stencil.ravel())), shape=(e, vertices))
+    return sparse.csr_array(incidence.T @ incidence)
+
+
+def _corners(stencil: np.ndarray) -> int:
+    """Number of vertices of the blocks, added up."""
+    blocks = np.arange(len(stencil)) // LANES
+    pairs = blocks[:, None] * (int(stencil.max()) + 1) + stencil
+    return len(np.unique(pairs))

@@ -21,7 +21,7 @@ _INDEX = ir.IntType(64)
 class _Panel:
     """Writes the instructions of a panel of ``width`` columns.
 
-    values : of the panel, see `pdrom.model.dynamics.panels.Panels`
+    values : of the panel, see `pdrom.model.dynamics.solvers.Panels`
     """
 
     def __init__(self, context, builder, signature, arguments, width):
@@ -226,7 +226,7 @@ def sweep(panels, vertices, loads, x, rhs, y):
 
     Parameters
     ----------
-    panels : see `pdrom.model.dynamics.panels.Panels.factor`
+    panels : see `pdrom.model.dynamics.solvers.Panels.factor`
     vertices : (n,) row of ``rhs`` and ``y`` of each unknown, in the order of the factor
     loads : (4 n,) rows that are taken from the right-hand side, in that order
     x : (4 n,) working array

@@ -1,12 +1,15 @@
-"""Base of plane, sphere and box: vertices stop at a convex body, with Coulomb friction."""
+"""Plane, sphere and box: vertices stop at a convex body, with Coulomb friction."""
 
 from abc import abstractmethod
-from typing import Annotated
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from pdrom.model.effects.base import Contact, EffectConfig
+from pdrom.model.effects.base import Contact, EffectConfig, Vector
+from pdrom.model.effects.bodies import ball, cuboid, square
+from pdrom.model.mesh.lengths import PositiveLength
+from pdrom.model.mesh.selection import require_direction, require_ordered
 from pdrom.model.mesh.types import Mesh
 
 # A vertex that began a frame no deeper than this part of the extent began it outside.
@@ -84,3 +87,150 @@ class Obstacle(Contact):
         hits (n,) bool, points (n, 3) m, outward unit normals (n, 3); the latter two mean nothing
         for a path that does not enter.
         """
+
+
+class Plane(Obstacle):
+    """Vertices stay on the side of a plane that its normal points to; see `Obstacle`."""
+
+    class Config(ObstacleConfig):
+        """``point`` on the plane in metres, ``normal`` of any length."""
+
+        effect: Literal["plane"] = "plane"
+        point: Vector = (0.0, 0.0, 0.0)
+        normal: Vector = (0.0, 1.0, 0.0)
+
+        @model_validator(mode="after")
+        def _directed(self) -> Self:
+            return require_direction(self)
+
+        def body(self, low: np.ndarray, high: np.ndarray) -> Mesh:
+            return square(np.array(self.point), np.array(self.normal), low, high=high)
+
+    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
+        super().__init__(config, mesh, masses)
+        self._point = np.array(config.point)
+        self._normal = np.array(config.normal) / np.linalg.norm(config.normal)
+
+    def depths(self, points: np.ndarray) -> np.ndarray:
+        return -((points - self._point) @ self._normal)
+
+    def normals(self, points: np.ndarray) -> np.ndarray:
+        return np.tile(self._normal, (len(points), 1))
+
+    def entries(
+        self, start: np.ndarray, end: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        above, below = np.maximum(-self.depths(start), 0.0), self.depths(end)
+        hits = below > 0.0
+        fraction = np.where(hits, above / np.where(hits, above + below, 1.0), 0.0)
+        return hits, start + fraction[:, None] * (end - start), self.normals(start)
+
+
+UP = np.array([0.0, 1.0, 0.0])
+
+
+class Sphere(Obstacle):
+    """Vertices stay out of a ball; see `Obstacle`."""
+
+    class Config(ObstacleConfig):
+        """``centre`` and ``radius`` in metres."""
+
+        effect: Literal["sphere"] = "sphere"
+        centre: Vector
+        radius: PositiveLength
+
+        def body(self, low: np.ndarray, high: np.ndarray) -> Mesh:
+            return ball(np.array(self.centre), self.radius)
+
+    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
+        super().__init__(config, mesh, masses)
+        self._centre = np.array(config.centre)
+
+    def depths(self, points: np.ndarray) -> np.ndarray:
+        return self.config.radius - np.linalg.norm(points - self._centre, axis=1)
+
+    def normals(self, points: np.ndarray) -> np.ndarray:
+        """Normals (n, 3) at ``points`` (n, 3) m, at the centre itself upwards."""
+        arm = points - self._centre
+        length = np.linalg.norm(arm, axis=1)[:, None]
+        return np.where(length > 0.0, arm / np.where(length > 0.0, length, 1.0), UP)
+
+    def entries(
+        self, start: np.ndarray, end: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Smaller root t of |start + t (end - start) - centre| = radius, if in [0, 1]."""
+        arm, path = start - self._centre, end - start
+        square = np.einsum("ij,ij->i", path, path)
+        inwards = -np.einsum("ij,ij->i", arm, path)
+        outside = np.einsum("ij,ij->i", arm, arm) - self.config.radius**2
+        root = inwards**2 - square * outside
+        meets = (inwards > 0.0) & (root >= 0.0)
+        # not the difference of inwards and the root, which cancel near the surface
+        divisor = np.where(meets, inwards + np.sqrt(np.where(meets, root, 0.0)), 1.0)
+        fraction = np.clip(np.where(meets, outside / divisor, 0.0), 0.0, None)
+        points = start + fraction[:, None] * path
+        return meets & (fraction <= 1.0), points, self.normals(points)
+
+
+class Box(Obstacle):
+    """Vertices stay out of a box; see `Obstacle`. It may be as thin as a plate."""
+
+    class Config(ObstacleConfig):
+        """Corners ``lower`` and ``upper`` in metres."""
+
+        effect: Literal["box"] = "box"
+        lower: Vector
+        upper: Vector
+
+        @model_validator(mode="after")
+        def _ordered(self) -> Self:
+            return require_ordered(self)
+
+        def body(self, low: np.ndarray, high: np.ndarray) -> Mesh:
+            return cuboid(np.array(self.lower), np.array(self.upper))
+
+    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
+        super().__init__(config, mesh, masses)
+        self._lower, self._upper = np.array(config.lower), np.array(config.upper)
+
+    def depths(self, points: np.ndarray) -> np.ndarray:
+        return self._to_faces(points).min(axis=1)
+
+    def _to_faces(self, points: np.ndarray) -> np.ndarray:
+        """Distance (n, 6) to the lower and the upper faces, x, y, z; negative beyond them."""
+        return np.hstack([points - self._lower, self._upper - points])
+
+    def normals(self, points: np.ndarray) -> np.ndarray:
+        """Normals (n, 3) of the faces nearest to ``points`` (n, 3) m; of equals the first."""
+        face = self._to_faces(points).argmin(axis=1)
+        return _axis_vectors(face % 3, np.where(face < 3, -1.0, 1.0))
+
+    def entries(
+        self, start: np.ndarray, end: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Entries of straight paths from ``start`` to ``end`` (n, 3), see `Obstacle.entries`.
+
+        A path enters where it has crossed the nearer faces of all three axes.
+        """
+        path, rows = end - start, np.arange(len(start))
+        near_face = np.where(path > 0.0, self._lower, self._upper)
+        far_face = np.where(path > 0.0, self._upper, self._lower)
+        # a path that hardly moves along an axis, or not at all: between the faces from -inf to inf
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            near, far = (near_face - start) / path, (far_face - start) / path
+            within = (start >= self._lower) & (start <= self._upper)
+            near = np.where(path != 0.0, near, np.where(within, -np.inf, np.inf))
+            far = np.where(path != 0.0, far, np.inf)
+            axis = near.argmax(axis=1)
+            fraction, moved = near[rows, axis], path[rows, axis]
+            # a little inside the face still is on it
+            on_face = fraction * np.abs(moved) >= -self._slack
+        hits = (moved != 0.0) & on_face & (fraction <= 1.0) & (far.min(axis=1) >= fraction)
+        points = start + np.clip(np.where(hits, fraction, 0.0), 0.0, None)[:, None] * path
+        points[rows, axis] = near_face[rows, axis]
+        return hits, points, _axis_vectors(axis, -np.sign(moved))
+
+
+def _axis_vectors(axes: np.ndarray, signs: np.ndarray) -> np.ndarray:
+    """Vectors (n, 3) along the axes (n,) 0, 1 or 2."""
+    return np.eye(3)[axes] * signs[:, None]

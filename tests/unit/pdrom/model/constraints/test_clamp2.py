@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pdrom.model.constraints.clamp2 import FLAT, HIGH, LOW, clamp_block
+from builders import from_python
 from pdrom.model.constraints.lanes import LANES, workspace
+from pdrom.model.constraints.triangle_strain import FLAT, HIGH, LOW, clamp_block
 
 RANGE = (0.9, 1.1)
 F, P, FOUND, SIZE = 0, 6, 12, 13
@@ -19,7 +20,7 @@ def projected(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     by_lane = work.reshape(SIZE, LANES)
     padded = np.concatenate([matrices, np.repeat(matrices[-1:], LANES - len(matrices), axis=0)])
     by_lane[F : F + 6] = padded.reshape(LANES, 6).T
-    clamp_block(work, F, P, FOUND, *RANGE)
+    from_python(clamp_block)(work, F, P, FOUND, *RANGE)
     found = by_lane[P : P + 6].T.reshape(LANES, 2, 3)[: len(matrices)]
     return found, by_lane[FOUND, : len(matrices)] != 0.0
 

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from builders import make_scene
-from pdrom.model.constraints.element_order import visiting_order
 from pdrom.model.constraints.local_kernel import projections
+from pdrom.model.constraints.simplex import visiting_order
 from pdrom.model.mesh.generators import bar, cloth
 
 SHAPES = {

@@ -8,8 +8,7 @@ from scipy import sparse
 
 from builders import make_scene
 from pdrom.core.errors import ConfigurationError, SolverError
-from pdrom.model.dynamics.panels import WIDTHS, Panels
-from pdrom.model.dynamics.solvers import SOLVERS
+from pdrom.model.dynamics.solvers import SOLVERS, WIDTHS, Panels
 from pdrom.model.dynamics.sweeps import sweep
 from pdrom.model.dynamics.system import GlobalSystem
 
