@@ -70,10 +70,7 @@ SELDOM = {name for i, name in enumerate(TAKEN) if i % 3}
 
 @pytest.mark.parametrize(
     "name",
-    [
-        pytest.param(name, marks=[pytest.mark.slow] if name in SELDOM else [])
-        for name in reducible_cases()
-    ],
+    [pytest.param(n, marks=[pytest.mark.slow] if n in SELDOM else []) for n in reducible_cases()],
 )
 def test_a_subspace_takes_what_the_effects_say(name):
     """One that does not take an effect says so by name; vertex positions take every effect."""
