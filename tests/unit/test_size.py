@@ -13,9 +13,9 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 42_858,
+    "lines of src": 42_852,
     "modules of src": 362,
-    "lines of tests": 29_628,
+    "lines of tests": 29_615,
     "words of documentation": 24_812,
     "tables": 25,
     "figures": 23,

@@ -1,13 +1,10 @@
-"""Parts of a study that figures draw, chosen by their options, and their captions."""
+"""Parts of a study that figures draw, chosen by their options."""
 
 from collections.abc import Mapping
-from typing import Any
 
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
-from study.artifact.markup import filled, keys
 from study.artifact.paths import SUBSPACES
-from study.figures.kit.declaration import Declaration
 from study.figures.kit.options import Experiment, Options, Reduction
 from study.pipeline.contents import labels_of
 from study.pipeline.study import Study
@@ -77,18 +74,6 @@ def drawn_subspaces(study: Study, labels: Labels) -> tuple[Experiment, ...]:
 def groups(study: Study, labels: Labels) -> tuple[str, ...]:
     """Names of all constraint groups."""
     return tuple(name for name in EFFECTS if issubclass(EFFECTS.load(name), ConstraintGroup))
-
-
-def words(study: Study, figure: Declaration) -> tuple[str, str]:
-    """Title and caption of ``figure`` in mark-up, with settings of ``study`` filled in.
-
-    Raises
-    ------
-    ConfigurationError
-        The caption names a setting that does not exist.
-    """
-    settings: dict[str, Any] = {key: study.value(key) for key in keys(figure.caption)}
-    return figure.title, filled(figure.caption, settings)
 
 
 DERIVED = {

@@ -7,10 +7,9 @@ from typing import Any
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.view.text import require_typeset
 from study.artifact.markup import to_tex
-from study.figures.kit.declaration import Declaration, declarations
+from study.figures.kit.declaration import declarations
 from study.paper.build import Facts
 from study.paper.source import source_files
-from study.pipeline.figures import words
 from study.pipeline.folders import DEFAULT
 from study.pipeline.study import Study
 from study.tables.claims.rules import load_claims
@@ -34,7 +33,9 @@ def manuscript(study: Study, labels: Labels) -> Manuscript:
 def facts(study: Study, labels: Labels) -> Facts:
     """Facts that the manuscript states beside results of ``study``."""
     return Facts(
-        captions={name: _caption(study, figure) for name, figure in declarations().items()},
+        captions={
+            name: _caption(*each.words(study.value)) for name, each in declarations().items()
+        },
         part=None if study.is_full else study.configuration,
         full_study=DEFAULT,
         tables={
@@ -48,8 +49,7 @@ def facts(study: Study, labels: Labels) -> Facts:
     )
 
 
-def _caption(study: Study, figure: Declaration) -> str:
-    title, caption = words(study, figure)
+def _caption(title: str, caption: str) -> str:
     return f"{to_tex(title)}. {to_tex(caption)}"
 
 

@@ -8,7 +8,6 @@ from study.artifact.markup import to_plain, to_rst
 from study.experiments.kit.declaration import Experiment
 from study.figures.kit.declaration import Declaration
 from study.paper.figure_numbers import Numbers, figure_numbers
-from study.pipeline.figures import words
 from study.pipeline.plan import Plan
 from study.pipeline.resolve import Job
 from study.tables.kit.declaration import Table
@@ -85,7 +84,7 @@ def _fixed(plan: Plan, job: Job, folder: str, numbers: Mapping[str, Numbers]) ->
         "code": job.code,
     }
     if isinstance(artifact, Declaration):
-        title, caption = words(plan.study, artifact)
+        title, caption = artifact.words(plan.study.value)
         params["rst"] = f"**{to_rst(title)}.** {to_rst(caption)}"
     message, shown = _presented(job, numbers)
     return Rule(

@@ -25,7 +25,7 @@ from pdrom.core.yamlfile import read_yaml, validate
 from pdrom.view import style
 from pdrom.view.artists import Figure
 from study.artifact.artifact import Artifact, declare, declared_in
-from study.artifact.markup import to_plain
+from study.artifact.markup import filled, keys, to_plain
 from study.artifact.paths import FIGURE, FIGURE_PICTURE
 from study.artifact.reads import Labels, Paths, Read, Setting, Sources
 from study.figures.kit.options import NothingToDraw, Options
@@ -59,6 +59,16 @@ class Declaration(Artifact):
     def rule(self) -> str:
         """Name of the rule that makes it."""
         return f"figure_{self.name}"
+
+    def words(self, value: Callable[[str], Any]) -> tuple[str, str]:
+        """Title and caption in mark-up; ``value`` returns the settings that the caption names.
+
+        Raises
+        ------
+        ConfigurationError
+            A setting does not exist.
+        """
+        return self.title, filled(self.caption, {key: value(key) for key in keys(self.caption)})
 
     def inputs(self, sources: Sources, labels: Labels) -> dict[str, Paths]:
         """Paths by name; the figure's own name is a label, by which its options are found."""
