@@ -2,7 +2,6 @@
 
 import os
 import signal
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -26,12 +25,6 @@ def pytest_configure() -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Files that start Snakemake take minutes: first, so that no process ends alone with them."""
     items.sort(key=lambda item: "workflow" not in item.path.parts)
-
-
-@pytest.fixture
-def scene_of() -> Callable[..., Scene]:
-    """Builder of scenes, see `make_scene`."""
-    return make_scene
 
 
 @pytest.fixture(params=sorted(GROUPS))

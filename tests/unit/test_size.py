@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 42_852,
+    "lines of src": 42_847,
     "modules of src": 362,
-    "lines of tests": 29_615,
+    "lines of tests": 29_610,
     "words of documentation": 24_812,
     "tables": 25,
     "figures": 23,
     "experiments": 21,
-    "percent of src in decorators, signatures and imports": 22.02,
+    "percent of src in decorators, signatures and imports": 22.0,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

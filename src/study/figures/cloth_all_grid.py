@@ -63,7 +63,8 @@ def cloth_all_grid(
             for m in methods
         ]
         label, ran = f"{style.words(each.group)} reduced", any(reduced)
-        panels = [panel for run in reduced for panel in run or _blank(len(frames))]
+        blank = [RunPanel("", style.GREY, None, remark="not run")] * len(frames)
+        panels = [panel for run in reduced for panel in run or blank]
         rows.append((label, panels, None if ran else NOTHING_RAN))
     windows = [shared_window(camera, q, [], margin=0.04) for q in full]
     size = (max(w.width for w in windows), max(w.height for w in windows))
@@ -76,10 +77,6 @@ def cloth_all_grid(
     figure = draw_rows(made, camera, footer=FOOTER)
     _draw_scale(figure)
     return figure
-
-
-def _blank(count: int) -> list[RunPanel]:
-    return [RunPanel("", style.GREY, None, remark="not run")] * count
 
 
 def _run(

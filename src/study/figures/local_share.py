@@ -66,13 +66,9 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
             start += share
         printed = f"{100.0 * rows.local_share[scene]:.0f} %"
         ax.text(2.0, y, printed, va="center", ha="left", fontsize=7.5, fontweight="bold")
-        ax.text(102.0, y, _milliseconds(total), va="center", ha="left", fontsize=7)
+        words = f"{total:.2g} ms" if total < 99.5 else f"{total:.0f} ms"
+        ax.text(102.0, y, words, va="center", ha="left", fontsize=7)
     ax.axvline(CLAIM, color=style.BLACK, linewidth=1.0, linestyle="--")
     ax.set_xlim(0, 100)
     ax.set_xticks([0, 25, 50, 75, 100])
     ax.tick_params(axis="y", length=0)
-
-
-def _milliseconds(value: float) -> str:
-    """Time of a frame with two significant digits."""
-    return f"{value:.2g} ms" if value < 99.5 else f"{value:.0f} ms"

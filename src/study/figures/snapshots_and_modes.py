@@ -3,7 +3,7 @@
 import numpy as np
 
 from pdrom.model.mesh.types import load_mesh
-from pdrom.reduction.snapshots import SnapshotSet, load_snapshots
+from pdrom.reduction.snapshots import load_snapshots
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from pdrom.view.camera import Camera, Window, window_of
@@ -90,7 +90,7 @@ def snapshots_and_modes(
     for ax, k, q, window in zip(axes, taken, positions, moving, strict=True):
         slot = _draw_column(ax, elements, q, centred[:, k], basis.rows_per_element, camera)
         set_window(ax, window)
-        ax.set_title(f"frame {_frame(snapshots, k)}: {slot}", pad=2)
+        ax.set_title(f"frame {int(snapshots.frames['train'][k])}: {slot}", pad=2)
     axes = _row(figure, count, bottom - TITLE - heights[1], heights[1], "modes")
     for k, ax in enumerate(axes):
         column, rows = basis.V[:, k], basis.rows_per_element
@@ -104,10 +104,6 @@ def snapshots_and_modes(
 
 def _height(window: Window, count: int) -> float:
     return min(TALLEST, (style.WIDTH - LEFT) / count * window.height / window.width)
-
-
-def _frame(snapshots: SnapshotSet, k: int) -> int:
-    return int(snapshots.frames["train"][k])
 
 
 def _draw_product(figure: Figure, basis: BasisView, centred: np.ndarray, title: str) -> None:

@@ -20,7 +20,7 @@
   let run = null, handles = [], times = [], dragging = false;
   let playing = true, told = 0, due = 0, drawing = null, layers = {};
 
-  window.pdromLive = (content) => waiting.get(content.scene)(content);
+  window.pdromLive = (content) => waiting.get(content.scene)?.(content);
 
   function load(index) {
     if (!loaded.has(index)) loaded.set(index, new Promise((resolve, reject) => {
@@ -28,6 +28,8 @@
       const script = document.createElement("script");
       script.src = scenes[index].file;
       script.onerror = () => reject(new Error(`${scenes[index].file}: missing; it lies beside this page`));
+      // a whole file has made its call before
+      script.onload = () => reject(new Error(`${scenes[index].file}: cut, or not of this scene`));
       document.head.append(script);
     }).then(async (content) => {
       const { shown: { full, ...rest }, ...others } = content;
@@ -65,19 +67,26 @@
     return ofSize.find((model) => !model.tau || String(model.tau) === at("tau").value);
   }
 
+  // Nothing of a scene is shown while another one is read.
+  function leave() {
+    [run, handles] = [null, []];
+    buttons();
+    say("", false);
+    for (const id of ["about", "elements", "frame", "ms", "distance"]) at(id).textContent = "";
+    drawing.clear();
+    drawing.redraw();
+  }
+
   async function scene() {
     document.body.dataset.ready = "no";
+    leave();
     const index = Number(at("scene").value);
     const found = await load(index).catch((error) => {
       loaded.delete(index); // it may be there the next time
       return error;
     });
     if (index !== Number(at("scene").value)) return; // another one was chosen in the meantime
-    if (found instanceof Error) {
-      [run, handles] = [null, []];
-      buttons();
-      return say(found.message, true);
-    }
+    if (found instanceof Error) return say(found.message, true);
     shown = found;
     const { iterations: own } = shown.data;
     Object.assign(at("iterations"), { max: Math.max(MOST_ITERATIONS, own), value: own });

@@ -27,12 +27,16 @@ def _write(models: list[File], html: Path, outputs: Mapping[str, str], **parts: 
         A file of models is damaged, or none.
     """
     texts = {name.upper(): path.read_text("utf-8") for name, path in parts.items()}
-    texts["SCENES"] = safe_json([_listed(file) for file in models])
+    texts["SCENES"] = safe_json([scene for file in models if (scene := _listed(file))])
     write_text(filled(html.read_text("utf-8"), texts), outputs["out"])
 
 
-def _listed(file: File) -> dict[str, str]:
-    head = HEAD.match(read_text(file.path))
+def _listed(file: File) -> dict[str, str] | None:
+    """A scene of the list, None for one of which the study has no models."""
+    text = read_text(file.path)
+    if '"models":[]' in text:
+        return None
+    head = HEAD.match(text)
     if head is None:
         raise StorageError(f"{file.path}: no models for the page, or of another version")
     scene, title = map(json.loads, head.groups())

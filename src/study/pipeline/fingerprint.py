@@ -216,7 +216,8 @@ def track_scripts(workflow: Any) -> None:
     """Give the rules of Snakemake's workflow their scripts as parameters, in place of dates."""
     for rule in workflow.rules:
         if rule.script:
-            rule.set_params(script=_script(SCRIPTS / Path(rule.script).name))
+            text = (SCRIPTS / Path(rule.script).name).read_text(encoding="utf-8")
+            rule.set_params(script=digest_of_source(text)[:16])
     # the settings that it is computed from come after the rules were read
     type(workflow).rerun_triggers = property(_triggers)
 
@@ -226,7 +227,3 @@ def _triggers(workflow: Any) -> frozenset[Any]:
     from snakemake.settings.types import RerunTrigger
 
     return frozenset(workflow.dag_settings.rerun_triggers) - {RerunTrigger.CODE}
-
-
-def _script(path: Path) -> str:
-    return digest_of_source(path.read_text(encoding="utf-8"))[:16]

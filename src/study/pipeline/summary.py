@@ -35,6 +35,8 @@ REASONS = {
 }
 END = "This was a dry-run"
 
+# A run alone keeps about as many processes busy as there are cores, on the mean of five minutes.
+BUSY = 1.7
 LISTED = 8  # targets, by their names
 
 
@@ -76,6 +78,7 @@ def summary(
     else:
         lines += _verdicts(folders, apart)
         lines.append(f"manuscript: {', '.join(folders.documents.values())}")
+        lines.append(f"as pages: {paths.ARTICLE.at(folders.results, name='index.html')}")
         for kind, files in (("figures", figures), ("tables", tables)):
             found = sum(Path(file).is_file() for file in files)
             lines.append(f"{kind}: {found} in {folders.results}/{kind}")
@@ -84,6 +87,8 @@ def summary(
     lines.append(
         f"time: {minutes(wall)} on {cores} cores, {minutes(processor_seconds())} of processor time"
     )
+    if os.getloadavg()[1] > BUSY * (cores or 1):
+        lines.append("times: worthless, other programs have used the processor, too")
     return "\n".join(f"pdrom: {line}" for line in lines) + "\n"
 
 

@@ -87,10 +87,14 @@ def test_files_are_read_back(full, tmp_path):
     assert errors.pop("contact_delay") is found.pop("contact_delay") is None  # there is no floor
     assert found == pytest.approx(errors, rel=1e-3)
     assert read.full.scene.config == full.scene.config
+    with pytest.raises(PdromError, match="stored no snapshots"):
+        api.basis(read.full, "spring")
     api.save(read, tmp_path / "again.h5")  # positions in single precision stay what they are
     again = api.load(tmp_path / "again.h5")
     assert np.array_equal(again.outcome.positions, read.outcome.positions)
-    stored = api.run(full.scene, tmp_path / "full.h5")
+    seen: list[int] = []
+    stored = api.run(full.scene, tmp_path / "full.h5", lambda frame, report: seen.append(frame))
+    assert seen == list(range(12))
     again = api.load(tmp_path / "full.h5")
     assert np.array_equal(stored.positions, again.positions)
     assert np.array_equal(again.scene.mesh.triangles, full.scene.mesh.triangles)

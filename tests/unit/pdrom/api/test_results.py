@@ -35,13 +35,6 @@ def reduced(full: api.FullRun) -> api.ReducedRun:
     return api.reduce(full, "spring", "block-deim", 2)
 
 
-def test_each_frame_is_told_once_and_in_order():
-    seen = []
-    made = api.run(scene(), on_frame=lambda frame, report: seen.append(frame))
-    assert seen == list(range(8))
-    assert len(made.positions) == 9
-
-
 @pytest.mark.parametrize("method", list(api.methods()))
 def test_every_method_runs_to_its_end_or_says_where_it_blew_up(full, method):
     made = api.reduce(full, "spring", method, 2)
@@ -52,13 +45,6 @@ def test_every_method_runs_to_its_end_or_says_where_it_blew_up(full, method):
     assert outcome.frames == 8 or not outcome.finite
     assert made.gain >= 1.0 - 1e-9
     assert made.ms > 0.0
-
-
-def test_a_saved_run_has_no_snapshots_and_says_so(reduced, tmp_path):
-    api.save(reduced, tmp_path / "one.h5")
-    read = api.load(tmp_path / "one.h5")
-    with pytest.raises(PdromError, match="stored no snapshots"):
-        api.basis(read.full, "spring")
 
 
 def test_a_picture_has_a_line_for_each_run_and_a_cross_for_a_blow_up(reduced):

@@ -48,6 +48,9 @@ def test_a_scene_is_run_reduced_and_shown(folder, capsys):
     shown = capsys.readouterr().out
     for words in ("intact", "reduced: 13 x 30 x 3 float32, in m", "method: gappy", "scene: small"):
         assert words in shown
+    assert run(["show", "small.h5", "--configuration"]) == Status.DONE
+    text = capsys.readouterr().out.split("configuration:\n")[1].split("attributes")[0]
+    assert yaml.safe_load(text)["scene"]["name"] == "small"
 
 
 @pytest.fixture(scope="module")
@@ -186,14 +189,6 @@ def test_an_unchecked_run_has_to_be_sound(folder, finished, change, words, capsy
     (told,) = capsys.readouterr().err.splitlines()
     assert told.startswith("pdrom: small.h5: ")
     assert words in told
-
-
-def test_the_whole_configuration_is_shown_as_yaml(folder, capsys):
-    run(["run", "small.yaml", "--out", "x.h5"])
-    capsys.readouterr()
-    assert run(["show", "x.h5", "--configuration"]) == Status.DONE
-    text = capsys.readouterr().out.split("configuration:\n")[1].split("attributes")[0]
-    assert yaml.safe_load(text)["scene"]["name"] == "small"
 
 
 def test_a_table_is_shown_with_what_its_columns_hold(folder, capsys):

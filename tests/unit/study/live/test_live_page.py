@@ -1,6 +1,7 @@
 """The page on which models run: one file, scenes beside it, and it works in a real browser."""
 
 import io
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -26,7 +27,9 @@ def test_no_title_ends_the_script_and_scenes_are_named_in_order(tmp_path):
     write_text(
         'pdromLive({"format":1,"scene":"one","title":"A </script> \\"b\\"","more":0});\n', file
     )
-    text = write_page(tmp_path, [file]).read_text("utf-8")
+    without = file.with_name("two.js")  # a scene of which the study has no models
+    write_text('pdromLive({"format":1,"scene":"two","title":"B","models":[]});\n', without)
+    text = write_page(tmp_path, [file, without]).read_text("utf-8")
     assert '[{"scene":"one","title":"A \\u003c/script> \\"b\\"","file":"live/one.js"}]' in text
     assert text.count("</script>") == 5
 
@@ -66,8 +69,10 @@ def test_of_scenes_chosen_in_haste_the_last_is_shown_and_a_lost_one_is_named(tmp
     files = [one.with_name(f"{name}.js") for name in "abcd"]
     for file in files:
         named = f'"scene":"{file.stem}","title":"{file.stem.upper()}"'
-        write_text(one.read_text("utf-8").replace('"scene":"test","title":"test"', named), file)
+        text = re.sub(r'"scene":"\w+","title":"[^"]*"', named, one.read_text("utf-8"), count=1)
+        write_text(text, file)
     path = write_page(tmp_path, files)
+    whole = files[3].read_text()
     files[3].unlink()
     choose = """scenes => scenes.forEach((scene) => {
       document.getElementById("scene").value = scene;
@@ -83,10 +88,19 @@ def test_of_scenes_chosen_in_haste_the_last_is_shown_and_a_lost_one_is_named(tmp
         for button in ("#play", "#again"):
             page.click(button)
         assert "live/d.js: missing" in page.inner_text("#verdict")
+        for content in ("", whole[: len(whole) // 2], "document.title = 1", files[0].read_text()):
+            files[3].write_text(content)  # cut, empty, foreign, of another scene
+            page.evaluate(choose, [1])
+            page.wait_for_selector('body[data-ready="yes"]')
+            page.evaluate(choose, [3])
+            page.wait_for_selector("#verdict.bad")
+            assert "live/d.js: cut, or not of this scene" in page.inner_text("#verdict")
+            assert page.inner_text("#about") == ""
         page.evaluate(choose, [1])
         page.wait_for_selector('body[data-ready="yes"]')
         assert page.inner_text("#about").startswith("B.")
-        assert [said for said in page.said if "ERR_FILE_NOT_FOUND" not in said] == []
+        expected = ("ERR_FILE_NOT_FOUND", "SyntaxError", "Unexpected", "Invalid")
+        assert [said for said in page.said if not any(e in said for e in expected)] == []
 
 
 @pytest.fixture(scope="module", params=["", "#plain"], ids=["WebGL2", "canvas"])

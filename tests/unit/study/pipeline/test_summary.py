@@ -1,6 +1,7 @@
 """The last lines of a dry run and of a finished one."""
 
 import logging
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -25,6 +26,7 @@ TABLES = ("results/tables/claims.csv",)
 def project(tmp_path, monkeypatch):
     """A folder with some results."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(os, "getloadavg", lambda: (0.0, 0.0, 0.0))
     Path("results/figures").mkdir(parents=True)
     Path(FIGURES[0]).touch()
     claims = pd.DataFrame(
@@ -40,15 +42,20 @@ def lines(*arguments: str, words: str = "") -> dict[str, str]:
     return dict(line.split(": ", 1) for line in said)
 
 
-def test_a_whole_study():
+def test_a_whole_study(monkeypatch):
+    assert "times" not in lines()
+    monkeypatch.setattr(os, "getloadavg", lambda: (0.0, 2.0 * os.cpu_count(), 0.0))
     said = lines("--config", "ranks=[3]")
+    assert said["times"].startswith("worthless")  # the processor is shared
     assert said["configuration"] == "config/default.yaml, ranks=[3]"
     assert said["verdicts (as published / beyond)"] == "C1 holds / depends, C2 fails / x"
     assert said["manuscript"] == "paper/main.pdf, paper/supplement.pdf"
+    assert said["as pages"] == "results/article/index.html"
     assert said["figures"] == "1 in results/figures"
     assert said["tables"] == "1 in results/tables"
     assert said["report"] == "./reproduce --report report.html"
     assert "of processor time" in said["time"]
+    assert (minutes(59.4), minutes(60), minutes(125)) == ("59 s", "1 min 0 s", "2 min 5 s")
 
 
 def test_verdicts_of_another_study_are_told_from_those_of_the_full_one():
@@ -89,10 +96,6 @@ def test_processor_time_counts_what_this_process_waited_for():
     before = processor_seconds()
     subprocess.run([sys.executable, "-c", work], check=True)
     assert processor_seconds() - before >= 0.2
-
-
-def test_minutes():
-    assert (minutes(59.4), minutes(60), minutes(125)) == ("59 s", "1 min 0 s", "2 min 5 s")
 
 
 @pytest.mark.parametrize(
