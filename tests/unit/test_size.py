@@ -13,7 +13,7 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 42_847,
+    "lines of src": 42_842,
     "modules of src": 362,
     "lines of tests": 29_610,
     "words of documentation": 24_812,

@@ -86,11 +86,6 @@ class ReducedLocalStep:
     def lift_seconds(self, seconds: float) -> None:
         self._lift.seconds[:] = seconds
 
-    @property
-    def coefficients(self) -> np.ndarray:
-        """Coefficients (sets, r) of the last evaluation, a set for each block of the reduction."""
-        return self._lift.coefficients
-
 
 def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
     mean, blocks, r = reduction.basis.mean, reduction.blocks, reduction.r
