@@ -102,13 +102,13 @@ class Every(FileRead):
 
 @dataclass(frozen=True)
 class EachOf(Every):
-    """The file of a kind of each entry of a setting, in order; an entry knows its ``labels``."""
+    """A file for each entry of a setting, which knows its ``labels``, also where some share it."""
 
     key: str
 
     def paths(self, sources: Sources, labels: Labels) -> Paths:
         entries = sources.value(self.key, labels)
-        return list(dict.fromkeys(sources.file(self.place, entry.labels) for entry in entries))
+        return [sources.file(self.place, entry.labels) for entry in entries]
 
 
 @dataclass(frozen=True)

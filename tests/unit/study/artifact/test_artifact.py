@@ -136,9 +136,9 @@ def test_files_are_asked_of_the_study(read, paths):
 
 
 def test_one_file_for_each_entry_of_a_setting():
-    entries = [File("", {"scene": "t"}), File("", {"scene": "s"})]
+    entries = [File("", {"scene": scene}) for scene in "tst"]
     read = EachOf(SCENE, "cases")
-    assert read.paths(Sources({"cases": entries}), {}) == ["r/a/t.csv", "r/a/s.csv"]
+    assert read.paths(Sources({"cases": entries}), {}) == ["r/a/t.csv", "r/a/s.csv", "r/a/t.csv"]
 
 
 def test_settings_that_go_together_are_one_model():
