@@ -9,9 +9,9 @@ import pandas as pd
 from pdrom.view.text import escape
 from study.figures.kit.declaration import declarations
 from study.paper.macros import format_number
-from study.tables.kit.intervals import in_words
+from study.tables.alternatives import CURVE
+from study.tables.kit.parts import in_words
 from study.tables.kit.reruns import MEDIAN, over_motions, trained
-from study.tables.winners import CURVE
 
 Tables = Mapping[str, pd.DataFrame]
 

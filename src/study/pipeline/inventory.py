@@ -5,12 +5,13 @@ that this took, then the captions of the figures and the columns of the tables.
 """
 
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from pdrom.core.store import Condition, check_file, read_table, write_text
 from study.artifact.paths import FIGURE, RESULTS, TABLE, Place
+from study.artifact.reads import Every, PerScene, Preferred, ProjectFile, Read, Setting, TableOf
 from study.artifact.usage import usage_of
 from study.figures.kit.declaration import declarations
 from study.paper.figure_numbers import figures_page
@@ -22,8 +23,17 @@ from study.pipeline.plan import Plan
 from study.pipeline.targets import PREPRINT
 from study.tables import declared
 from study.tables.claims.rules import load_claims
-from study.tables.kit.document import document
+from study.tables.kit.declaration import Column, Table
 
+TABLES_HEAD = """# Tables
+
+Tables are CSV with one row per observation, SI units unless a unit says otherwise, and an empty
+cell where there is no value.
+A column marked "timed" depends on timing or on the memory in use: only there may two runs on one
+machine differ (in `claims`, only in claims about times).
+"Compared as" is the kind for which `./reproduce verify` has a tolerance, followed by the column's
+own tolerance if it has one (docs/verification.md).
+"""
 CONTENTS = Place("contents.md")
 CLAIMS = "claims"
 HEAD = """\
@@ -36,6 +46,51 @@ measured by this run.
 | kind | name | command | jobs | minutes | as published | beyond |
 |---|---|---|---|---|---|---|
 """
+
+
+def document(tables: Iterable[Table]) -> str:
+    """Markdown of all tables."""
+    tables = list(tables)
+    names = [f"- [{table.name}](#{table.name}): {table.title}" for table in tables]
+    parts = [TABLES_HEAD, "\n".join(names) + "\n", *map(_section, tables)]
+    return "\n".join(parts)
+
+
+def _section(table: Table) -> str:
+    sources = dict.fromkeys(_source(read) for read in table.reads.values())
+    lines = [
+        f"## {table.name}",
+        "",
+        f"{table.title}.\nMade by `{table.module}` from {', '.join(sources)}.",
+        "",
+        "| column | type | unit | timed | compared as | meaning |",
+        "|---|---|---|---|---|---|",
+        *map(_row, table.columns),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _row(column: Column) -> str:
+    timed = "timed" if column.timed else ""
+    own = "" if column.tolerance is None else f", {column.tolerance:g}"
+    kind = f"{column.quantity}{own}"
+    cells = (column.name, column.kind, column.unit, timed, kind, column.meaning)
+    return f"| {' | '.join(cells)} |"
+
+
+def _source(read: Read) -> str:
+    match read:
+        case Every(place) | Preferred(place):
+            return f"`{place.pattern}`"
+        case TableOf(name):
+            return f"table [{name}](#{name})"
+        case Setting(key):
+            return f"setting `{key}`"
+        case PerScene(key):
+            return f"`{key}` of every scene"
+        case ProjectFile(path):
+            return f"`{path}`"
+    raise TypeError(f"{read} has no words")
 
 
 class Entry(NamedTuple):

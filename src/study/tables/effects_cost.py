@@ -1,4 +1,4 @@
-"""Table effects_cost: what each effect of a scene costs, and what it contributes."""
+"""Cost of the parts of a full-order run: its effects, its local step, and a larger mesh."""
 
 import numpy as np
 import pandas as pd
@@ -7,15 +7,31 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.horizon import floor_of, horizons
-from study.experiments.kit.names import GLOBAL, REST, RIGHT
+from study.experiments.kit.names import FOM, GLOBAL, REST, RIGHT
 from study.experiments.kit.sensitivity import without
 from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
-from study.tables.kit.parts import in_one_time, joined
-from study.tables.kit.vocabulary import FLOOR, MS_PER_FRAME, SCENE
+from study.tables.kit.parts import in_one_time, joined, timings_in_one_time
+from study.tables.kit.vocabulary import (
+    ELEMENTS_SAMPLED,
+    FLOOR,
+    GLOBAL_MS,
+    LOCAL_MS,
+    LOCAL_SHARE,
+    MS_PER_FRAME,
+    SCENE,
+    SPEEDUP,
+    VERTICES,
+    K,
+    R,
+)
 
 KEYS = ["scene", "effect"]
 NOTHING = "nothing"  # left out: the whole scene
 PHASE, SEVERAL = "phase", "several"
+IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")
+EXPONENTS = {"ms_per_iteration": "exponent", "local_ms": "local_exponent",
+             "global_ms": "global_exponent"}  # fmt: skip
+FEWEST = 3  # meshes, for an exponent
 
 
 @table(
@@ -115,7 +131,7 @@ def _acting(
 ) -> pd.DataFrame:
     """Force and energy of each effect in ``frames``, and how far the run moves without it."""
     made = frames.groupby([*KEYS, "role"], sort=False, as_index=False).agg(
-        force=("force", _root_mean_square),
+        force=("force", lambda force: float(np.sqrt(np.mean(np.square(force))))),
         acting_frames=("force", lambda force: int((force > 0.0).sum())),
         energy=("energy", _range),
     )
@@ -136,10 +152,6 @@ def _acting(
     return made
 
 
-def _root_mean_square(values: pd.Series) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
-
-
 def _range(values: pd.Series) -> float:
     return float(values.max() - values.min()) if len(values) > 1 else float(values.iloc[0])
 
@@ -150,3 +162,90 @@ def _largest(
     """Largest drift before the horizon; None where there was no such run, or no such frame."""
     drift = floor_of(sensitivity, scene, label)[: ends[scene]]
     return float(drift.max()) if len(drift) else None
+
+
+@table(
+    title="Share of the local step in a full-order frame",
+    columns=(
+        SCENE,
+        text("implementation", f"of the local step: {', '.join(IMPLEMENTATIONS)}"),
+        VERTICES,
+        LOCAL_MS,
+        timed(number("assembly_ms", "time of the right-hand side in a frame", "ms")),
+        GLOBAL_MS,
+        LOCAL_SHARE,
+    ),
+    reads={"timings": Every(paths.TIMINGS), "frame_times": TableOf("frame_times")},
+)
+def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
+    """One row per scene and implementation of ``timings``, in the time of ``frame_times``.
+
+    Assembly counts as a part of the local step: compiled kernels project and scatter in one pass.
+    """
+    times = timings_in_one_time(timings, frame_times)
+    full = times[times.method.isna()].copy()
+    full["local_share"] = (full.local_ms + full.assembly_ms) / (
+        full.local_ms + full.assembly_ms + full.global_ms
+    )
+    order = {name: place for place, name in enumerate(IMPLEMENTATIONS)}
+    scenes = {scene: place for place, scene in enumerate(times.scene.unique())}
+    keys = full.scene.map(scenes) * len(order) + full.implementation.map(order)
+    return full.iloc[keys.argsort(kind="stable")]
+
+
+@table(
+    title="Cost of an iteration against the size of the mesh",
+    columns=(
+        SCENE,
+        text("method", f"{FOM} (full order), a reduced local step, or ecsw"),
+        VERTICES,
+        integer("elements", "elements of all groups"),
+        R,
+        K,
+        ELEMENTS_SAMPLED,
+        timed(number("factorisation_ms", "assembly and factorisation of the system", "ms")),
+        timed(number("memory_mb", "memory that both took", "MB")),
+        timed(number("ms_per_iteration", "time of an iteration", "ms")),
+        timed(number("local_ms", "time of the local step in an iteration", "ms")),
+        timed(number("global_ms", "time of the global solve in an iteration", "ms")),
+        LOCAL_SHARE,
+        SPEEDUP,
+        timed(number("local_speedup", "the same of the local step alone")),
+        integer("meshes", "sizes of the mesh of the curve"),
+        timed(number("exponent", "of the time of an iteration in the number of vertices")),
+        timed(number("local_exponent", "of the time of the local step")),
+        timed(number("global_exponent", "of the time of the global solve")),
+    ),
+    reads={"parts": Every(paths.SCALING)},
+)
+def scaling(parts: list[File]) -> pd.DataFrame:
+    """All scenes of ``parts``, one row per mesh size and method.
+
+    The speed-ups, of an iteration and of its local step, are over the full-order run. Exponents are
+    those of power laws fitted to the logarithms of a curve, all meshes of a scene and method, which
+    has them in all its rows. Any two points lie on a power law: a curve of fewer than three meshes
+    has no exponent, and no quantity that was too small to be measured on so many.
+    """
+    rows = joined(parts)
+    if rows.empty:
+        return rows
+    own = rows[rows.method == FOM].set_index(["scene", "vertices"])
+    mesh = pd.MultiIndex.from_frame(rows[["scene", "vertices"]])
+    for name, column in (("speedup", "ms_per_iteration"), ("local_speedup", "local_ms")):
+        rows[name] = own[column].loc[mesh].to_numpy() / rows[column]
+    curves = rows.groupby(["scene", "method"], sort=False)
+    rows["meshes"] = curves.vertices.transform("nunique")
+    for quantity, name in EXPONENTS.items():
+        rows[name] = np.nan
+        for _, curve in curves:
+            rows.loc[curve.index, name] = _exponent(curve.vertices, curve[quantity])
+    return rows
+
+
+def _exponent(vertices: pd.Series, values: pd.Series) -> float:
+    """Slope of the logarithms of what was measured; nan of fewer than three meshes."""
+    measured = values > 0.0
+    if vertices[measured].nunique() < FEWEST:
+        return np.nan
+    x, y = (np.log(series[measured].to_numpy(float)) for series in (vertices, values))
+    return float(np.polyfit(x, y, 1)[0])

@@ -1,15 +1,50 @@
-"""Table reconstruction_error: all methods, sizes and splits."""
+"""Singular values of the snapshots, and the reconstruction error of every method and size."""
 
 import pandas as pd
 
+from pdrom.reduction.basis import load_basis
 from study.artifact import paths
 from study.artifact.paths import File
-from study.artifact.reads import Every
-from study.tables.kit.declaration import compared, integer, number, table, text
+from study.artifact.reads import Every, Preferred
+from study.tables.kit.declaration import compared, flag, integer, number, table, text
 from study.tables.kit.parts import joined
 from study.tables.kit.vocabulary import ELEMENTS_SAMPLED, GAIN, GROUP, METHOD, SCENE, R
 
 _SMALL = "empty at round-off level"
+
+
+@table(
+    title="Singular values of the training snapshots",
+    columns=(
+        SCENE,
+        GROUP,
+        integer("component", "number of the mode, from 1"),
+        number("singular_value", "of the snapshot matrix", "that of the group's projections"),
+        number("relative", "over the first one"),
+        flag("above_roundoff", "larger than the rounding errors of the projections"),
+    ),
+    # of an experiment's bases the one without weights and centring: every study may hold others
+    reads={"bases": Preferred(paths.BASIS, "basis", "none-none-vectorised")},
+)
+def singular_values(bases: list[File]) -> pd.DataFrame:
+    """Rows of all bases, in order."""
+    parts = []
+    for file in bases:
+        basis = load_basis(file.path)
+        sigma = basis.singular_values
+        parts.append(
+            pd.DataFrame(
+                {
+                    "scene": file["scene"],
+                    "group": file["group"],
+                    "component": range(1, len(sigma) + 1),
+                    "singular_value": sigma,
+                    "relative": sigma / sigma[0] if sigma[0] > 0.0 else float("nan"),
+                    "above_roundoff": [i < basis.rank for i in range(len(sigma))],
+                }
+            )
+        )
+    return pd.concat(parts, ignore_index=True)
 
 
 @table(

@@ -1,4 +1,4 @@
-"""Table sensitivity: how far runs drift apart that should be the same."""
+"""Changes of results by what should not matter, and by one choice of the method at a time."""
 
 import pandas as pd
 
@@ -7,7 +7,19 @@ from study.artifact.paths import File
 from study.artifact.reads import Every
 from study.tables.kit.declaration import compared, integer, number, table, text
 from study.tables.kit.parts import joined
-from study.tables.kit.vocabulary import SCENE
+from study.tables.kit.vocabulary import (
+    BLOWUP_FRAME,
+    ERROR_WITHIN,
+    FINITE,
+    FRAMES,
+    GAIN,
+    GROUP,
+    METHOD,
+    SCENE,
+    R,
+)
+
+_CELL = ["scene", "group", "method", "r", "varied"]
 
 
 @table(
@@ -25,3 +37,114 @@ def sensitivity(parts: list[File]) -> pd.DataFrame:
     keys = ["scene", "perturbation", "frame"]
     rows = joined(parts).groupby(keys, sort=False, as_index=False)
     return rows["relative_difference"].max()
+
+
+@table(
+    title="Runs on bases of round-off",
+    columns=(
+        SCENE,
+        GROUP,
+        text(
+            "noisy_axes",
+            "what the start's round-off reaches: all axes; of a flat mesh its plane, or this and "
+            "the axis across it at one vertex",
+        ),
+        integer("seed", "of the start's round-off"),
+        METHOD,
+        R,
+        compared("value", integer("rank", "modes that the snapshots have without a cutoff")),
+        # the modes are made of round-off
+        compared("skipped", GAIN),
+        FRAMES,
+        FINITE,
+        BLOWUP_FRAME,
+        number(
+            "relative_error", "error of the positions over all frames, which end at the horizon"
+        ),
+    ),
+    reads={"parts": Every(paths.NOISE)},
+)
+def noise(parts: list[File]) -> pd.DataFrame:
+    """Rows of all scenes, in the order of their ``parts``."""
+    return joined(parts)
+
+
+@table(
+    title="Repeated runs: other training frames, moved starts",
+    columns=(
+        SCENE,
+        GROUP,
+        METHOD,
+        R,
+        text("varied", "what differs: training (frames), start"),
+        integer("repetitions", "runs; their range encloses the median of all but by 2^(1 - n)"),
+        compared(
+            "error", integer("ended", "runs that ended before the horizon, with an infinite error")
+        ),
+        number("error_median", "median of the errors of the positions before the horizon"),
+        number("error_low", "the least of them"),
+        number("error_high", "the largest"),
+        number("gain_median", "median of the gains"),
+        number("gain_low", "the least of them"),
+        number("gain_high", "the largest"),
+        compared("error", number("spread", "largest error over least")),
+    ),
+    reads={"parts": Every(paths.REPETITIONS)},
+)
+def repetitions(parts: list[File]) -> pd.DataFrame:
+    """One row per repeated run of ``parts``, over its repetitions.
+
+    The range of n independent draws lies on one side of their distribution's median with the
+    probability 2^(1 - n): five draws enclose it with 15/16, whatever the distribution is.
+    """
+    rows = joined(parts)
+    if rows.empty:
+        return rows
+    cells = rows.groupby(_CELL, sort=False)
+    made = cells.agg(
+        repetitions=("error", "size"),
+        error_median=("error", "median"),
+        error_low=("error", "min"),
+        error_high=("error", "max"),
+        gain_median=("gain", "median"),
+        gain_low=("gain", "min"),
+        gain_high=("gain", "max"),
+    )
+    made["ended"] = rows.error.isin([float("inf")]).groupby([rows[c] for c in _CELL]).sum()
+    return made.assign(spread=made.error_high / made.error_low).reset_index()
+
+
+@table(
+    title="From the published choices to sound ones, one at a time",
+    columns=(
+        SCENE,
+        GROUP,
+        text(
+            "direction",
+            "up from published choices, down from sound ones, signs of the modes, square: "
+            "coefficients by samples",
+        ),
+        text("rung", "choice that changes on this rung"),
+        integer("rows_per_element", "rows of an element"),
+        compared("value", integer("entries", "sampled entries that determine the coefficients")),
+        R,
+        compared("value", number("condition", "condition number of the sampled modes")),
+        GAIN,
+        number("error_train", "reconstruction error of the training snapshots"),
+        number("error_test", "the same of the snapshots between them"),
+        number("error_heldout", "the same of the held-out motion"),
+        FINITE,
+        BLOWUP_FRAME,
+        ERROR_WITHIN,
+        integer("repetitions", "runs trained on other frames, where they were repeated"),
+        number("error_median", "median of their errors before the horizon"),
+        number("error_low", "the least of them"),
+        number("error_high", "the largest; inf for a run that ended earlier"),
+        number("gain_low", "the least of their gains"),
+        number("gain_high", "the largest"),
+    ),
+    reads={"parts": Every(paths.LADDER)},
+)
+def ladder(parts: list[File]) -> pd.DataFrame:
+    """Rows of all scenes, in the order of their ``parts``."""
+    return joined(parts)

@@ -1,4 +1,4 @@
-"""Table speedups: the speed-ups that the text quotes, with all that belongs to them."""
+"""Times over several processes: full-order frames, quoted speed-ups, and large scenes."""
 
 from collections.abc import Iterator
 
@@ -7,12 +7,12 @@ import pandas as pd
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, TableOf
-from study.experiments.kit.fresh_process import FULL, REDUCED
+from study.experiments.kit.fresh_process import CONTROL, FULL, REDUCED
 from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
-from study.tables.kit.intervals import in_words, median_interval
-from study.tables.kit.parts import joined
-from study.tables.kit.reruns import COLUMNS, HIGH, LOW, MEDIAN, TRAIN, over_motions, trained
+from study.tables.kit.parts import confirmed, in_words, joined, median_interval
+from study.tables.kit.reruns import COLUMNS, HIGH, LOW, MEDIAN, TRAIN, TWIN, over_motions, trained
 from study.tables.kit.vocabulary import (
+    ELEMENTS_SAMPLED,
     GROUP,
     METHOD,
     MS_PER_FRAME,
@@ -31,6 +31,61 @@ _REDUCTION = ["scene", "group", "method", "r"]
 _LABELS = ["scene", "group", "method", "position_basis", "k", "r"]
 _ERROR = "relative_error_within_horizon"
 UNCONFIRMED = "not confirmed by its control"
+_ERRORS = {
+    "error_train": "relative_error_train", MEDIAN: "relative_error_heldout",
+    LOW: "relative_error_heldout_low", HIGH: "relative_error_heldout_high",
+}  # fmt: skip
+_TIMES = ["ms_per_frame", "fom_ms_per_frame", "speedup", "speedup_low", "speedup_high"]
+
+
+@table(
+    title="Times of full-order frames, with their controls",
+    columns=(
+        SCENE,
+        VERTICES,
+        integer("processes", "processes that timed it"),
+        MS_PER_FRAME,
+        timed(number("low_ms", "2.5 % quantile of this median (bootstrap)", "ms")),
+        timed(number("high_ms", "97.5 % quantile", "ms")),
+        timed(number("control_ratio", "time of the same run, timed once more, over this one")),
+        timed(number("control_low", "2.5 % quantile of this median")),
+        timed(number("control_high", "97.5 % quantile")),
+        timed(flag("control_agrees", "the quantiles enclose one")),
+        timed(number("twin_ratio", "time of the scene's twin, the same frames, over this one")),
+        timed(number("twin_low", "2.5 % quantile of this median")),
+        timed(number("twin_high", "97.5 % quantile")),
+        timed(flag("confirmed", "the quantiles lie within a half of one: speed-ups are given")),
+    ),
+    reads={"parts": Every(paths.FRAME_TIMES)},
+)
+def frame_times(parts: list[File]) -> pd.DataFrame:
+    """One row per scene of ``parts``: medians over processes, ratios within a process."""
+    rows = joined(parts)
+    if rows.empty:
+        return rows
+    full, control = (
+        rows[rows.role == role].pivot(index="process", columns="scene", values="ms_per_frame")
+        for role in (FULL, CONTROL)
+    )
+    vertices = rows.groupby("scene").vertices.first()
+    made = []
+    for scene in rows.scene.unique():
+        row = {"scene": scene, "vertices": vertices[scene], "processes": len(full)}
+        row |= _named(("ms_per_frame", "low_ms", "high_ms"), full[scene])
+        row |= _named(
+            ("control_ratio", "control_low", "control_high"), control[scene] / full[scene]
+        )
+        row["confirmed"] = confirmed(row["control_low"], row["control_high"])
+        row["control_agrees"] = row["control_low"] <= 1.0 <= row["control_high"]
+        if f"{scene}{TWIN}" in full:
+            twin = full[f"{scene}{TWIN}"] / full[scene]
+            row |= _named(("twin_ratio", "twin_low", "twin_high"), twin)
+        made.append(row)
+    return pd.DataFrame(made).reindex(columns=[c.name for c in frame_times.columns])
+
+
+def _named(names: tuple[str, str, str], values: pd.Series) -> dict:
+    return dict(zip(names, median_interval(values.to_numpy(float)), strict=True))
 
 
 @table(
@@ -89,13 +144,13 @@ def speedups(
         return pd.DataFrame()
     made = pd.DataFrame(list(timed_reductions(rows, times)))
     extra = [
-        _costs(joined(projections), _REDUCTION),
-        _costs(joined(subspaces), _MODEL),
+        joined(projections).reindex(columns=[*_REDUCTION, "reduction_s"]),
+        joined(subspaces).reindex(columns=[*_MODEL, "reduction_s"]),
     ]
     errors = [_errors(reruns, keys) for keys in (_REDUCTION, _MODEL)]
     own = joined(large)
     if len(own):
-        extra.append(_costs(own[own.motion == TRAIN], _MODEL))
+        extra.append(own[own.motion == TRAIN].reindex(columns=[*_MODEL, "reduction_s"]))
         errors.append(large_errors(own))
     made = _first_known(made, extra, "reduction_s")
     for column in ("error_train", MEDIAN, LOW, HIGH):
@@ -137,10 +192,6 @@ def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
         }
 
 
-def _costs(costs: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
-    return costs.reindex(columns=[*keys, "reduction_s"])
-
-
 def _errors(reruns: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
     runs = reruns[(reruns.position_basis != "full") == (keys == _MODEL)]
     train = trained(runs)[[*keys, _ERROR]].rename(columns={_ERROR: "error_train"})
@@ -164,3 +215,43 @@ def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -
         own = made[keys].astype(sizes).merge(known, on=keys, how="left")[column]
         found = found.fillna(own.astype(float).set_axis(made.index))
     return made.assign(**{column: found})
+
+
+@table(
+    title="Large scenes in position subspaces with sampled elements",
+    columns=(
+        SCENE,
+        VERTICES,
+        integer("elements", "elements of all groups"),
+        POSITION_BASIS,
+        K,
+        compared("exact", number("tau", "tolerance of the element sampling")),
+        ELEMENTS_SAMPLED,
+        number("relative_error_train", "error of the positions in the training motion"),
+        number("relative_error_heldout", "the same in held-out motions: their median"),
+        number("relative_error_heldout_low", "the least of them"),
+        number("relative_error_heldout_high", "the largest"),
+        MS_PER_FRAME,
+        timed(number("ms_per_iteration", "time of an iteration", "ms")),
+        timed(number("fom_ms_per_frame", "time of a frame of the full-order run", "ms")),
+        SPEEDUP,
+        SPEEDUP_LOW,
+        SPEEDUP_HIGH,
+    ),
+    reads={
+        "parts": Every(paths.ONLINE),
+        "measured": Every(paths.FRAME_TIMES),
+        "times": TableOf("frame_times"),
+    },
+)
+def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.DataFrame:
+    """Rows of all scenes, ``parts``, in order, with ``measured`` times, in the one of ``times``."""
+    rows = joined(parts)
+    if rows.empty:
+        return rows
+    found = pd.DataFrame(list(timed_reductions(joined(measured), times)))
+    found = found.rename(columns={"full_ms": "fom_ms_per_frame"})
+    made = rows[rows.motion == TRAIN].rename(columns={"r": "elements_sampled"})
+    made = made.merge(large_errors(rows).rename(columns=_ERRORS), on=_MODEL, how="left")
+    made = made.merge(found[[*_MODEL, *_TIMES]], on=_MODEL, how="left")
+    return made.assign(ms_per_iteration=made.ms_per_frame / made.iterations)

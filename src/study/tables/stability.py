@@ -1,4 +1,4 @@
-"""Table stability: where each method can be trusted, over scenes, sizes, time step, stiffness."""
+"""Limits of trust in each method: over scenes, sizes, time step, stiffness, and in hard cases."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,13 +10,14 @@ from pdrom.core.store import open_hdf5
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, PerScene, Setting, TableOf
-from study.tables.kit.declaration import compared, number, table, text
+from study.tables.kit.declaration import compared, flag, number, table, text
 from study.tables.kit.parts import joined
 from study.tables.kit.reruns import KEYS, trained
 from study.tables.kit.vocabulary import (
     BLOWUP_FRAME,
     ENERGY_RATIO,
     FINITE,
+    FRAMES,
     GAIN,
     GROUP,
     MAX_EXTENT,
@@ -31,6 +32,8 @@ from study.tables.kit.vocabulary import (
 # the first is the only one after which numbers of the run count
 OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
 SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # what has one full-order run
+# Share of the runs on degenerate meshes whose outcome rounding decides.
+FRAGILE = 0.005
 
 
 @table(
@@ -144,3 +147,32 @@ def _rerun_rows(
     errors = trained(reduced_reruns)[[*KEYS, "relative_error_within_horizon"]]
     errors = errors.rename(columns={"relative_error_within_horizon": "relative_error"})
     return runs.merge(errors, on=KEYS, how="left", validate="one_to_one")
+
+
+@table(
+    title="Every reduction in every hard case",
+    columns=(
+        text("case", "name of the hard case"),
+        METHOD,
+        flag("bounded_projections", "no state makes projections of the reduced group large"),
+        K,
+        R,
+        GAIN,
+        FRAMES,
+        compared("error", FINITE, FRAGILE),
+        BLOWUP_FRAME,
+        compared(
+            "error", number("max_extent", "largest extent over the scale of the full-order run")
+        ),
+        compared(
+            "skipped",
+            number("objective_rise", "largest in one iteration, over the first value of its frame"),
+        ),
+        compared("error", text("outcome", "how the reduction fared"), FRAGILE),
+        compared("error", text("why", "reason of a refusal or of an expected failure")),
+    ),
+    reads={"parts": Every(paths.HARD_CASES)},
+)
+def hard_cases(parts: list[File]) -> pd.DataFrame:
+    """Rows of ``parts`` in the order of the cases and methods."""
+    return joined(parts)

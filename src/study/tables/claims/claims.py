@@ -1,12 +1,17 @@
-"""Table claims: the verdicts on the preprint's claims, with the rules of config/claims.yaml."""
+"""Tables of the claims, by the rules of config/claims.yaml.
 
-from collections.abc import Mapping, Sequence
+claims holds the verdicts, claims_tests every test and what it found, claims_sensitivity which
+verdicts stand when a rule changes.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
-from study.tables.claims.metrics import Tables
+from study.tables.claims.metrics import VALUE, Tables
 from study.tables.claims.rules import (
     NONE_ADDED,
     PARTS,
@@ -16,12 +21,33 @@ from study.tables.claims.rules import (
     TestRule,
     load_claims,
 )
-from study.tables.claims.verdicts import VERDICTS, combined, evaluate
-from study.tables.kit.declaration import compared, text, timed
+from study.tables.claims.verdicts import (
+    VERDICTS,
+    answer_of,
+    close,
+    combined,
+    evaluate,
+    satisfied,
+    values_of,
+)
+from study.tables.kit.declaration import compared, flag, integer, number, text, timed
 from study.tables.kit.declaration import table as declare
 
 # What the rule of a claim says of it.
 WORDS = {"source", "paper", "figure_or_table", "section", "shown", "text", "qualifiers"}
+SAID = {"what", "metric", "decides", "compare", "threshold", "share"}
+FOUND = ("satisfied", "of", "close", "least", "median", "most", "verdict")
+FACTORS = (0.5, 0.8, 1.25, 2.0)  # on thresholds
+SHARES = (0.5, 0.6, 0.75, 0.9, 1.0)
+MARGINS = (1.0, 1.25, 1.5, 2.0, 3.0, 5.0)  # of ratios of times; 1: each of them decides
+SMALL = 10  # largest of the small sizes
+SPLITS = ("train", "test", "heldout")
+VARIED = ("threshold", "share", "margin", "sizes", "splits", "scenes")
+# Share of the variations whose verdict a few runs decide.
+FRAGILE = 0.01
+_Rows = list[pd.DataFrame]
+_Keep = Callable[[pd.Series], pd.Series]
+_Variation = tuple[str, str, Sequence[TestRule], _Rows]  # what, how, the tests and their rows
 
 
 def timed_columns(rule: ClaimRule) -> set[str]:
@@ -37,7 +63,7 @@ def timed_columns(rule: ClaimRule) -> set[str]:
     return found
 
 
-def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
+def _timed_of_claims(table: pd.DataFrame, **files: Path) -> list[set[str]]:
     loaded = load_claims(files["rules"])
     return [timed_columns(loaded[claim]) for claim in table.claim]
 
@@ -71,7 +97,7 @@ def _timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         text("history", "when and why the rules became what they are"),
     ),
     reads=READS,
-    timed_cells=_timed_cells,
+    timed_cells=_timed_of_claims,
 )
 def claims(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame) -> pd.DataFrame:
     """One row per claim, in the order of the file ``rules``; see `claims_rows`."""
@@ -108,3 +134,165 @@ def _decided(tests: Sequence[TestRule], tables: Tables) -> dict[str, str]:
         "condition": "; ".join(o.condition for o in deciding if o.condition),
         "why": "; ".join(o.sentence for _, o in outcomes) + ".",
     }
+
+
+def _timed_of_tests(table: pd.DataFrame, **files: Path) -> list[set[str]]:
+    rules = load_claims(files["rules"])
+    tests = {
+        (claim, part, test.what): test
+        for claim, rule in rules.items()
+        for part in PARTS
+        for test in getattr(rule, part)
+    }
+    keys = zip(table.claim, table.part, table.what, strict=True)
+    return [set(FOUND) if tests[key].timed else set() for key in keys]
+
+
+@declare(
+    title="Tests of the claims",
+    columns=(
+        text("claim", "its identifier in config/claims.yaml"),
+        text("part", f"which verdict: {', '.join(PARTS)}"),
+        text("what", "words for the rows that are compared"),
+        text("metric", "what is compared"),
+        flag("decides", "the verdict rests on it; the others are for information"),
+        text("compare", "comparison with the threshold"),
+        number("threshold", "what a value is compared with"),
+        number("share", "of the rows that must agree for a clear answer"),
+        number("margin", "factor of the threshold within which a ratio of times decides nothing"),
+        compared("skipped", timed(integer("satisfied", "rows that satisfy the comparison"))),
+        compared("skipped", timed(integer("of", "rows that are compared"))),
+        compared("skipped", timed(integer("close", "of them, ratios of times within the margin"))),
+        compared(
+            "skipped", timed(number("least", "smallest value; infinite for a run that failed"))
+        ),
+        compared("skipped", timed(number("median", "their median"))),
+        compared("skipped", timed(number("most", "largest value"))),
+        compared("exact", timed(text("verdict", f"of this test, one of: {', '.join(VERDICTS)}"))),
+    ),
+    reads=READS,
+    timed_cells=_timed_of_tests,
+)
+def claims_tests(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame) -> pd.DataFrame:
+    """One row per claim, part and test, in the order of the file ``rules``; see `claims`."""
+    return outcome_rows(load_claims(rules, added), tables)
+
+
+def outcome_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
+    """Rows of the table claims_tests from ``rules`` and ``tables``, in the order of the file."""
+    rows = [
+        {"claim": name, "part": part, **test.model_dump(include=SAID), **_found(test, tables)}
+        for name, rule in rules.items()
+        for part in PARTS
+        for test in getattr(rule, part)
+    ]
+    return pd.DataFrame(rows)
+
+
+def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
+    """Margin, counts and the range of the values, which is empty where there are none."""
+    values = values_of(test, tables)[VALUE].to_numpy(float)
+    good, total = int(satisfied(test, values).sum()), len(values)
+    spread = (values.min(), np.median(values), values.max()) if total else (None, None, None)
+    found = (good, total, int(close(test, values).sum()), *spread, answer_of(test, values))
+    margin = test.factor if test.timed else None
+    return {"margin": margin, **dict(zip(FOUND, found, strict=True))}
+
+
+def _timed_of_variations(table: pd.DataFrame, **files: Path) -> list[set[str]]:
+    loaded = load_claims(files["rules"])
+    cells = {"verdict", "verdict_of_rules", "same"}
+    return [
+        cells if f"verdict{PARTS[part]}" in timed_columns(loaded[claim]) else set()
+        for claim, part in zip(table.claim, table.part, strict=True)
+    ]
+
+
+@declare(
+    title="Verdicts under other rules",
+    columns=(
+        text("claim", "its identifier in config/claims.yaml"),
+        text("part", f"tests that decide: {', '.join(PARTS)}"),
+        text("varied", f"what is changed in all of them: {', '.join(VARIED)}"),
+        text("variation", "how: factor, share, sizes, split, scene left out"),
+        compared("exact", timed(text("verdict", f"one of: {', '.join(VERDICTS)}")), FRAGILE),
+        compared(
+            "exact",
+            timed(text("verdict_of_rules", "the verdict of the rules as they are")),
+        ),
+        compared("exact", timed(flag("same", "the two agree")), FRAGILE),
+    ),
+    reads=READS,
+    timed_cells=_timed_of_variations,
+)
+def claims_sensitivity(
+    rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame
+) -> pd.DataFrame:
+    """One row per claim of the file ``rules``, part and variation; see `claims`."""
+    return sensitivity_rows(load_claims(rules, added), tables)
+
+
+def sensitivity_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
+    """A row for every claim, part and variation of its deciding tests that can be made.
+
+    A variation that leaves a test without rows, or no test another, is none.
+    """
+    made = []
+    for claim, rule in rules.items():
+        for part in PARTS:
+            tests = [test for test in getattr(rule, part) if test.decides]
+            rows = [values_of(test, tables) for test in tests]
+            base = _verdict(tests, rows)
+            for varied, variation, changed, kept in _variations(tests, rows, tables):
+                if all(len(values) for values in (*rows, *kept)):
+                    verdict = _verdict(changed, kept)
+                    made.append((claim, part, varied, variation, verdict, base, verdict == base))
+    names = ["claim", "part", "varied", "variation", "verdict", "verdict_of_rules", "same"]
+    return pd.DataFrame(made, columns=names)
+
+
+def _verdict(tests: Sequence[TestRule], rows: _Rows) -> str:
+    found = zip(tests, rows, strict=True)
+    return combined([answer_of(test, values[VALUE].to_numpy(float)) for test, values in found])
+
+
+def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Iterator[_Variation]:
+    """The tests with other numbers, then on a part of their rows, or on those of another split."""
+    for factor in FACTORS:
+        changed = [_changed(t, threshold=factor * t.threshold) for t in tests]
+        yield "threshold", f"x {factor:g}", changed, rows
+    for share in SHARES:
+        yield "share", f"{share:g}", [_changed(test, share=share) for test in tests], rows
+    for margin in MARGINS if any(test.timed for test in tests) else ():
+        changed = [_changed(test, margin=margin) if test.timed else test for test in tests]
+        yield "margin", f"{margin:g}", changed, rows
+    sizes = {f"r up to {SMALL}": lambda r: ~(r > SMALL), f"r above {SMALL}": lambda r: r > SMALL}
+    yield from _kept(tests, rows, "sizes", "r", sizes)
+    for split in SPLITS:
+        changed = [_of_split(test, split) for test in tests]
+        if changed != list(tests):
+            yield "splits", split, changed, [values_of(test, tables) for test in changed]
+    scenes = dict.fromkeys(s for values in rows if "scene" in values for s in values.scene)
+    others = {f"without {s}": lambda values, s=s: values != s for s in scenes}
+    yield from _kept(tests, rows, "scenes", "scene", others)
+
+
+def _kept(
+    tests: Sequence[TestRule], rows: _Rows, varied: str, column: str, keeps: Mapping[str, _Keep]
+) -> Iterator[_Variation]:
+    """The tests on the ``rows`` whose ``column`` a filter keeps, where it drops some."""
+    for name, keep in keeps.items():
+        kept = [values[keep(values[column])] if column in values else values for values in rows]
+        if sum(map(len, kept)) < sum(map(len, rows)):
+            yield varied, name, tests, kept
+
+
+def _changed(test: TestRule, **changes: float) -> TestRule:
+    return test.model_copy(update=changes)
+
+
+def _of_split(test: TestRule, split: str) -> TestRule:
+    """Repeat the test over another split of the snapshots, where it is about one."""
+    if "split" not in test.where:
+        return test
+    return test.model_copy(update={"where": {**test.where, "split": (split,)}})

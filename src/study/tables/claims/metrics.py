@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.errors import ConfigurationError
-from study.tables.break_even import CURVE
 from study.tables.kit.reruns import KEYS, MEDIAN, families, trained, with_held_out
+from study.tables.payoff import CURVE
 
 Tables = Mapping[str, pd.DataFrame]
 Value = str | int | float
@@ -24,6 +24,11 @@ LABELS = (
 )  # fmt: skip
 AXES = ("x", "y", "z")
 Values = Callable[[Tables, dict, float], pd.DataFrame]
+_PLACE = ("scene", "group", "method", "position_basis")
+_RERUN = ("motion", "frames", "blowup_frame", "relative_error_within_horizon", *_PLACE, "r")
+_HELD_OUT = (
+    "rerun_error", "useful_speedup", "best_useful_speedup", "error_trend", "position_basis_ratio",
+)  # fmt: skip
 
 
 def filtered(table: pd.DataFrame, where: Mapping[str, tuple[Value, ...]]) -> pd.DataFrame:
@@ -263,8 +268,6 @@ def _over_the_rest(share: np.ndarray) -> np.ndarray:
         return np.divide(share, np.subtract(1.0, share))
 
 
-_PLACE = ("scene", "group", "method", "position_basis")
-_RERUN = ("motion", "frames", "blowup_frame", "relative_error_within_horizon", *_PLACE, "r")
 METRICS = {
     "local_share": Metric(_local_share, "local_share", ("local_share",), ratio=_over_the_rest),
     "rerun_error": Metric(rerun_error, "reduced_reruns", _RERUN),
@@ -307,9 +310,6 @@ METRICS = {
         ("motion", "scene", "k", "position_basis", "relative_error_within_horizon"),
     ),
 }
-_HELD_OUT = (
-    "rerun_error", "useful_speedup", "best_useful_speedup", "error_trend", "position_basis_ratio",
-)  # fmt: skip
 METRICS |= {
     f"heldout_{name}": replace(
         METRICS[name],

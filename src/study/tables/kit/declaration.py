@@ -1,6 +1,6 @@
 """Declaration of a table: title, columns, reads, and the function that makes it.
 
-A module of this package holds one table, a function under its declaration::
+A table is a function under its declaration::
 
     @table(
         title="What part of a frame the local step takes",

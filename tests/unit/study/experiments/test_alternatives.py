@@ -11,8 +11,7 @@ from pdrom.core.yamlfile import validate
 from study.artifact.paths import File
 from study.experiments.alternatives import experiment, processes
 from study.experiments.alternatives.settings import Alternatives, Comparison
-from study.tables.alternatives import alternatives
-from study.tables.winners import _pays, winners
+from study.tables.alternatives import _pays, alternatives, winners
 
 EFFECTS = (
     {"effect": "gravity"},

@@ -25,9 +25,7 @@ from study.experiments.subspaces import (
     LargeOptions,
     Online,
 )
-from study.tables.frame_times import frame_times
-from study.tables.online import online
-from study.tables.speedups import speedups
+from study.tables.speedups import frame_times, online, speedups
 
 EFFECTS = (
     {"effect": "spring", "weight": 1e5},

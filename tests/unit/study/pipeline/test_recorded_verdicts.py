@@ -8,8 +8,8 @@ from pdrom.core.store import write_table
 from places import ROOT
 from study.pipeline.tracked import recorded_verdicts
 from study.tables.claims.claims import claims
-from study.tables.claims.replication import MEASURED, RECORDED, RULES, replication
 from study.tables.claims.rules import load_claims
+from study.tables.claims.verdicts import MEASURED, RECORDED, RULES, replication
 
 
 def verdicts(**columns: str) -> pd.DataFrame:

@@ -6,8 +6,8 @@ import pytest
 
 from pdrom.core.store import write_table
 from study.artifact.paths import File
-from study.tables.break_even import breakeven
 from study.tables.effects_cost import effects_cost
+from study.tables.payoff import breakeven
 
 NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # table frame_times without rows
 

@@ -10,11 +10,9 @@ from scipy.stats import binom
 from pdrom.core.store import write_table
 from study.artifact.paths import File
 from study.experiments.kit.fresh_process import COLUMNS
-from study.tables.frame_times import frame_times
-from study.tables.kit.intervals import confirmed, in_words, median_interval
-from study.tables.kit.parts import in_one_time
-from study.tables.repetitions import repetitions
-from study.tables.speedups import speedups
+from study.tables.kit.parts import confirmed, in_one_time, in_words, median_interval
+from study.tables.sensitivity import repetitions
+from study.tables.speedups import frame_times, speedups
 
 VALUES = st.lists(st.floats(0.1, 10.0), min_size=1, max_size=12)
 

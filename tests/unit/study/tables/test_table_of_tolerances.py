@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.core.store import write_table
 from study.artifact.paths import REQUESTED_TOLERANCES
 from study.experiments.requested_tolerances import COLUMNS
-from study.tables.requested_tolerances import requested_tolerances
+from study.tables.accuracy_cost import requested_tolerances
 
 ROW = {
     "scene": "s", "motion": "heldout", "tolerance": 0.05, "vertices": 9, "frames": 8,

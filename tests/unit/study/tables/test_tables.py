@@ -16,12 +16,11 @@ from study.artifact import paths
 from study.artifact.paths import File, Place
 from study.experiments.kit.horizon import floor_of
 from study.tables.accuracy_cost import accuracy_cost, pareto, reference_of
+from study.tables.effects_cost import local_share
 from study.tables.kit.reruns import TRAIN, trained
-from study.tables.local_share import local_share
-from study.tables.reconstruction_error import reconstruction_error
+from study.tables.reconstruction_error import reconstruction_error, singular_values
 from study.tables.reduced_reruns import reduced_reruns
 from study.tables.sensitivity import sensitivity
-from study.tables.singular_values import singular_values
 
 TIMING = [
     "scene", "group", "method", "position_basis", "k", "r", "iterations", "vertices",

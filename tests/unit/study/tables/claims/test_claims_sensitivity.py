@@ -6,7 +6,7 @@ import pytest
 from pdrom.core.yamlfile import validate
 from places import ROOT
 from study.tables import declared
-from study.tables.claims.claims_sensitivity import VARIED, claims_sensitivity, sensitivity_rows
+from study.tables.claims.claims import VARIED, claims_sensitivity, sensitivity_rows
 from study.tables.claims.rules import PARTS, ClaimRule, load_claims
 
 ERRORS = pd.DataFrame(

@@ -5,8 +5,7 @@ import pytest
 
 from places import ROOT
 from study.tables import declared
-from study.tables.claims.claims import claims_rows
-from study.tables.claims.claims_tests import claims_tests, outcome_rows
+from study.tables.claims.claims import claims_rows, claims_tests, outcome_rows
 from study.tables.claims.rules import load_claims
 from study.tables.claims.verdicts import MACHINE, UNDECIDED, combined
 

@@ -1,6 +1,6 @@
 """Declarations: what they refuse, what they make of a frame, and that the study's are sound."""
 
-from collections import Counter
+import re
 
 import pandas as pd
 import pytest
@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from pdrom.core.errors import StorageError
 from pdrom.core.store import read_table, write_table
+from places import ROOT
 from study.artifact.artifact import load
 from study.artifact.reads import Setting
 from study.tables import declared
@@ -144,9 +145,9 @@ def test_timing_columns_are_those_declared():
 # The study's tables -------------------------------------------------------------------------------
 
 
-def test_every_table_is_declared_in_a_module_that_has_no_other():
-    modules = Counter(made.module for made in declared().values())
-    assert set(modules.values()) == {1}
+def test_every_table_is_declared_once_and_found_at_its_address():
+    texts = [path.read_text() for path in (ROOT / "src/study/tables").rglob("*.py")]
+    assert len(declared()) == sum(len(re.findall(r"^@(?:table|declare)\(", t, re.M)) for t in texts)
     for name, made in declared().items():
         assert load(made.address) is made
         assert made.name == name
