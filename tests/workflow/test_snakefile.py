@@ -298,7 +298,7 @@ def test_registering_a_selection_reruns_the_methods_that_use_it(finished: Checko
 
 def test_a_selection_reruns_the_methods_that_use_it(finished: Checkout) -> None:
     """The full order and other methods do not depend on it."""
-    greedy = "src/pdrom/reduction/sampling/pivoted_qr.py"
+    greedy = "src/pdrom/reduction/sampling/qdeim.py"
     finished.edit(greedy, "for r in ranks}", "for r in sorted(ranks)}")
     planned = finished.planned(*MICRO_ARGUMENTS)
     assert not {p for p in planned if _stage(p) in ("sampling", "reruns", "fom", "pod")}
