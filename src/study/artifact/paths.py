@@ -18,7 +18,7 @@ RESULTS = "results"
 LABELS = {
     "mesh": r"[A-Za-z0-9_.-]+",
     "scene": r"[a-z][a-z0-9_]*",
-    "run": r"train|heldout|kick|stiffness|speed|gravity|kick_stiffness",
+    "run": r"train|heldout|kick|stiffness",
     "group": r"[a-z_]+",
     "basis": r"[a-z0-9-]+",
     "method": r"[a-z0-9-]+",
@@ -93,6 +93,8 @@ MESH = Place("meshes/{mesh}.h5")
 FULL_ORDER = Place("fom/{scene}/{run}.h5")
 TRAIN = FULL_ORDER.where(run="train")
 HELDOUT = FULL_ORDER.where(run="heldout")
+KICK = FULL_ORDER.where(run="kick")
+STIFFNESS = FULL_ORDER.where(run="stiffness")
 SENSITIVITY = Place("sensitivity/{scene}.csv")
 CONTRIBUTIONS = Place("contributions/{scene}.csv")
 ITERATIONS = Place("iterations/{scene}.csv")

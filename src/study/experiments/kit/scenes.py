@@ -5,13 +5,12 @@ from typing import cast
 import numpy as np
 
 from pdrom.core.store import open_hdf5
-from pdrom.model.held_out import FIRST, HeldOutMotion
+from pdrom.model.held_out import HeldOutMotion
 from pdrom.model.mesh.types import load_mesh
 from pdrom.model.scene import Scene, SceneConfig
 from study.artifact.paths import File
 
 TRAIN = "train"
-SPLITS = (TRAIN, FIRST)  # what experiments on a single held-out motion run
 
 
 def scene_of(config: SceneConfig, mesh: File, run: str = TRAIN) -> Scene:

@@ -62,8 +62,7 @@ def study(tmp_path_factory) -> Made:
     grid = file("mesh.h5")
     mesh.mesh(sources=[], config=scene.mesh, out=grid)
     runs = {run: file(f"{run}.h5", run=run) for run in ("train", *MOTIONS)}
-    for run in runs.values():
-        fom.fom(mesh=grid, config=scene, solver="supernodal", out=run)
+    fom.fom(mesh=grid, config=scene, solver="supernodal", **runs)
     stored = file("snapshots.h5", group="strain")
     two = {run: runs[run] for run in ("train", "heldout")}
     snapshots.snapshots(mesh=grid, **two, config=scene, out=stored)

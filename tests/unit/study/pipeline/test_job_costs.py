@@ -45,7 +45,7 @@ def say(results: Path, log: str, processor: float, wall: float = 0.0, memory: fl
 @pytest.mark.parametrize(
     ("log", "kind"),
     [
-        ("fom/sheet_train.log", "fom"),
+        ("fom/sheet.log", "fom"),
         ("hard_cases.log", "hard_cases"),
         ("tables/payoff.log", "tables"),
     ],

@@ -37,7 +37,7 @@ def test_files_of_the_study_and_what_was_asked_for_beside_them(plan, tmp_path, m
         paths.TRAIN.at("results", scene="no_such_scene"),
         paths.RERUNS.at("results", scene="bend_fall", group="bending", method="no-such-method"),
         paths.TRAIN.at("results/studies/tiny", scene="bend_fall"),
-        "results/logs/fom/spring_oop_train.log",
+        "results/logs/fom/spring_oop.log",
         "results/tables/old.csv",
         "results/notes.txt",
     ]
