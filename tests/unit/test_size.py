@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 42_654,
+    "lines of src": 42_650,
     "modules of src": 345,
-    "lines of tests": 29_604,
-    "words of documentation": 24_804,
+    "lines of tests": 29_603,
+    "words of documentation": 24_789,
     "tables": 23,
     "figures": 23,
     "experiments": 21,
-    "percent of src in decorators, signatures and imports": 21.82,
+    "percent of src in decorators, signatures and imports": 21.81,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 
