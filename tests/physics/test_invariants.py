@@ -146,17 +146,6 @@ def test_handles_reach_their_target():
     assert final[bottom] == pytest.approx(turned, abs=1e-12)
 
 
-def test_floor_stops_the_fall():
-    scene = make_scene(
-        GRAVITY,
-        {"effect": "floor", "height": 1.0},
-        {"effect": "strain", "weight": 1e5},
-        frames=60,
-    )
-    positions = trajectory(scene)
-    assert positions[..., 1].min() >= 1.0
-
-
 def test_energy_does_not_grow_without_forcing(group_scene, rng):
     """Implicit Euler is dissipative: kinetic plus constraint energy never exceeds its start.
 

@@ -122,15 +122,3 @@ def test_a_right_checksum_does_not_make_a_run_sound(runs, tmp_path, name, change
     write_block(path)
     with pytest.raises(StorageError, match=f"run.h5: holds no sound run .*{words}"):
         load(path)
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["none.h5"], "none.h5: no such file"),
-        (["RUN", "--png", "RUN"], "is read by this command"),
-    ],
-)
-def test_what_cannot_be_viewed_is_one_line(runs, capsys, words, message):
-    assert run(["view", *(files(runs)[0] if w == "RUN" else w for w in words)]) == Status.FAULTY
-    assert message in capsys.readouterr().err.splitlines()[-1]

@@ -1,14 +1,9 @@
 """Scenes: what is listed is built, what is not is not; faults have one clear message."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from builders import make_scene
-from pdrom.core.errors import ConfigurationError, SceneError
 from pdrom.core.store import open_hdf5
 from pdrom.model.compiled import rows
 from pdrom.model.constraints.local_kernel import OWN, LocalKernel, call, local_kernel
@@ -16,28 +11,8 @@ from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs.full_order import run, trajectory
 from places import ROOT
 from study.pipeline.scenes import Coarsen, load_bound_scene, read_scene
-from study.pipeline.study import Study
 
 SPRING = {"effect": "spring", "weight": 1e5}
-
-
-def test_unlisted_effects_are_not_imported():
-    """A spring scene loads no other constraint, no gravity, no floor, no poke."""
-    code = (
-        "import sys; from builders import make_scene;"
-        "from pdrom.model.runs.full_order import trajectory;"
-        "trajectory(make_scene({'effect': 'spring', 'weight': 1.0}, frames=1));"
-        "print('\\n'.join(m for m in sys.modules if m.startswith('pdrom.')))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT / "tests", capture_output=True, text=True, check=True
-    )
-    loaded = set(done.stdout.split())
-    assert "pdrom.model.constraints.spring" in loaded
-    for absent in ("bending", "triangle_strain", "tetrahedron", "svd3", "deformation_gradient"):
-        assert f"pdrom.model.constraints.{absent}" not in loaded
-    for absent in ("gravity", "floor", "hold", "poke", "kick", "damping"):
-        assert f"pdrom.model.effects.{absent}" not in loaded
 
 
 def test_unlisted_groups_leave_no_matrix_entry():
@@ -96,48 +71,6 @@ def test_stored_snapshot_is_the_projection_of_the_last_iterate(tmp_path):
         assert np.array_equal(file["snapshots/spring/p"][0], seen[3])
 
 
-@pytest.mark.parametrize(
-    ("effects", "message"),
-    [
-        ([{"effect": "gravity"}], "no constraint group"),
-        ([SPRING, {"effect": "sprnig", "weight": 1.0}], "allowed: area, bending"),
-        ([{"effect": "spring", "weight": -1.0}], "weight = -1.0"),
-        ([{"effect": "spring", "weight": float("nan")}], "weight"),
-        ([{"effect": "spring", "weigth": 1.0}], "weigth"),
-        ([{"effect": "spring"}], "'weight' is missing"),
-        ([SPRING, SPRING], "twice"),
-        ([SPRING, {"effect": "gravity", "acceleration": "down"}], "acceleration"),
-        ([SPRING, {"effect": "pins", "select": "top", "start": 5, "until": 3}], "until = 3"),
-        ([{"effect": "strain", "weight": 1.0, "minimum": 1.2}], "minimum"),
-        (["spring"], "a mapping with a key 'effect'"),
-    ],
-)
-def test_faulty_effects_name_key_and_value(effects, message):
-    with pytest.raises(ValidationError, match=message):
-        make_scene(*effects)
-
-
-@pytest.mark.parametrize(
-    ("effects", "message"),
-    [
-        ([SPRING, {"effect": "pins", "select": "front"}], "selects nothing"),
-        ([{"effect": "tetrahedron_strain", "weight": 1.0}], "needs tetrahedra"),
-        (
-            [
-                SPRING,
-                {"effect": "pins", "select": "top"},
-                {"effect": "translate", "select": "top", "offset": [0, 1, 0], "over": 3},
-            ],
-            "held by 'pins' and by 'translate' in frame 0",
-        ),
-        ([SPRING, {"effect": "poke", "count": 500}], "count = 500"),
-    ],
-)
-def test_contradictions_with_the_mesh_are_named(effects, message):
-    with pytest.raises(SceneError, match=message):
-        make_scene(*effects)
-
-
 def test_coarsening_scales_every_frame_number():
     scene = read_scene(ROOT, "cloth_all", Coarsen(resolution=0.5, frames=0.25))
     assert (scene.mesh.rows, scene.frames) == (10, 60)
@@ -169,23 +102,6 @@ def test_one_rule_gives_every_scene_a_kick_of_its_own_and_twice_the_stiffness(na
 def test_every_scene_file_is_valid():
     for path in sorted((ROOT / "config" / "scenes").glob("*.yaml")):
         assert load_bound_scene(ROOT, path.stem).config.name == path.stem
-
-
-@pytest.mark.parametrize(
-    ("config", "message"),
-    [
-        ({"scenes": ["nope"], "methods": ["pod"]}, "unknown scene 'nope'"),
-        ({"scenes": ["bend_fall"], "methods": ["podd"]}, "unknown method 'podd'"),
-        ({"scenes": ["bend_fall"], "methods": ["pod"], "ranks": [0]}, "ranks.0"),
-        ({"scenes": ["bend_fall"], "methods": ["pod"], "rank": [1]}, "unknown key 'rank'"),
-        ({"scenes": [], "methods": ["pod"]}, "scenes"),
-        ({"scenes": ["bend_fall"], "methods": ["pod"], "solver": "lu"}, "splu, splu-columns"),
-        ({"scenes": ["bend_fall", "bend_fall"], "methods": ["pod"]}, "twice"),
-    ],
-)
-def test_faulty_studies_name_key_and_value(config, message):
-    with pytest.raises(ConfigurationError, match=message):
-        Study.load(config, ROOT)
 
 
 @pytest.mark.parametrize(("rate", "stable"), [(124.9, True), (125.0, False)])

@@ -98,26 +98,6 @@ def test_the_projection_is_the_nearest_member(kind, data):
         assert np.abs(p - reference).max() <= 1e-10 * np.abs(reference).max()
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_named_degenerate_elements(kind, rng):
-    """Points, lines, flat, mirrored and repeated ones; F of known projection where it is unique."""
-    group_type, rows, settings = KINDS[kind]
-    turn = random_rotation(rng)
-    half_turn = np.diag([1.0, -1.0, -1.0])
-    eye = np.eye(3)
-    members = [eye, turn, half_turn, half_turn @ turn]
-    others = [0.0 * eye, np.diag([1.0, 0.0, 0.0]), -eye, -turn, np.full((3, 3), 1.0)]
-    f = np.stack(members + others)[:, :rows]
-    group = bound(group_type, rows, len(f), **settings)
-    p = projected(group, f)
-    assert np.abs(p[:4] - f[:4]).max() < 1e-14
-    assert np.isfinite(p).all()
-    assert np.array_equal(p, projected(group, f))
-    reference = group.reference_project(f, np.arange(len(f)))
-    distance, nearest = (np.linalg.norm(f - q, axis=(1, 2)) for q in (p, reference))
-    assert distance == pytest.approx(nearest, rel=1e-12, abs=1e-14)
-
-
 @pytest.mark.parametrize("exponent", range(0, -15, -2))
 @pytest.mark.parametrize("kind", KINDS)
 def test_small_singular_values_keep_their_direction(kind, exponent, rng):

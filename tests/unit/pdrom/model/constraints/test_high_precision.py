@@ -94,6 +94,7 @@ def mirror(rng: np.random.Generator, rows: int) -> np.ndarray:
 
 MATRICES = {
     "random": lambda rng, rows: rng.standard_normal((rows, 3)),
+    "member": with_singular_values(1.0, 1.0, 1.0),
     "in range": with_singular_values(1.005, 1.0, 0.995),
     "nearly singular (1e-8)": with_singular_values(1.0, 0.7, 1e-8),
     "nearly singular (1e-16)": with_singular_values(1.0, 0.7, 1e-16),

@@ -1,12 +1,23 @@
-"""Generators, checks and selections."""
+"""Meshes: generators, checks of cells and their orientation, the farthest points, files."""
 
+from pathlib import Path
+
+import meshio
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from pdrom.core.errors import SceneError
+from pdrom.core.errors import DegenerateElementError, MeshError
+from pdrom.model.mesh.checks import check_mesh, turned_alike
+from pdrom.model.mesh.config import MeshFile
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.select import farthest_points, select_vertices
-from pdrom.model.mesh.types import load_mesh, save_mesh
+from pdrom.model.mesh.types import Mesh, load_mesh, save_mesh
+from pdrom.model.runs.full_order import trajectory
+from pdrom.model.scene import Scene, SceneConfig
+from strategies import cells, wild_meshes
+from study.experiments.hard_cases.case import build
 
 
 def test_cloth_has_the_counts_of_the_study():
@@ -60,17 +71,137 @@ def test_sides_of_a_sheet():
     assert select_vertices(mesh, [5, 1, 5]).tolist() == [1, 5]
 
 
-@pytest.mark.parametrize(
-    ("selection", "message"),
-    [("front", "flat along"), ("up", "allowed are"), ([], "no vertex"), ([99], "0 to 11")],
-)
-def test_empty_selections_are_refused(selection, message):
-    with pytest.raises(SceneError, match=message):
-        select_vertices(cloth(4, 3), selection)
-
-
 def test_farthest_points_start_at_the_centre_and_spread():
     mesh = cloth(5, 5)
     chosen = farthest_points(mesh.points, np.arange(25), 5)
     assert chosen[0] == 12
     assert set(chosen[1:].tolist()) == {0, 4, 20, 24}
+
+
+OPEN = cloth(4, 5).triangles
+CLOSED = bar(3, 3, 4).triangles
+BOTH = np.concatenate([OPEN, CLOSED + OPEN.max() + 1])
+
+
+@given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 0.4))
+@pytest.mark.parametrize("triangles", [OPEN, CLOSED, BOTH], ids=["sheet", "closed", "two parts"])
+def test_the_fewer_ones_are_turned(triangles, seed, share):
+    rng = np.random.default_rng(seed)
+    count = int(share * min(len(OPEN), len(CLOSED)))
+    flipped = np.zeros(len(triangles), dtype=bool)
+    flipped[rng.permutation(len(triangles))[:count]] = True
+    given_so = np.where(flipped[:, None], triangles[:, ::-1], triangles)
+    order = rng.permutation(len(triangles))
+    assert np.array_equal(turned_alike(given_so[order], "mesh"), flipped[order])
+
+
+def test_a_strip_with_one_side_is_refused():
+    """Möbius' strip of six triangles: the ends of a strip are joined with half a turn."""
+    strip = np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4], [4, 5, 1], [5, 0, 1]])
+    with pytest.raises(MeshError, match=r"strip: the surface about triangle 0 .* one side only"):
+        turned_alike(strip, "strip")
+    assert not turned_alike(strip[:-1], "open strip")[0]
+
+
+def test_a_mesh_file_with_a_triangle_the_other_way_round(tmp_path, caplog):
+    mesh = cloth(3, 3)
+    cells = mesh.triangles.copy()
+    cells[2] = cells[2, ::-1]
+    lines = [f"v {x} {y} {z}" for x, y, z in mesh.points]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in cells]
+    (tmp_path / "sheet.obj").write_text("\n".join(lines))
+    read = MeshFile(kind="file", path="sheet.obj").build(tmp_path)
+    assert "1 of 8 triangles are listed the other way round" in caplog.text
+    sides = np.cross(*(read.points[read.triangles[:, k]] - read.points[read.triangles[:, 0]]
+                       for k in (1, 2)))  # fmt: skip
+    assert (sides[:, 2] > 0.0).all()
+
+
+EMPTY = np.empty((0, 4), dtype=np.int32)
+
+
+def one_cell(corners: np.ndarray) -> Mesh:
+    indices = np.arange(len(corners), dtype=np.int32)[None]
+    if len(corners) == 3:
+        return Mesh(corners, indices)
+    return Mesh(corners, EMPTY[:, :3], indices)
+
+
+@given(corners=cells(3, 0.0) | cells(4, 0.0))
+def test_degenerate_cells_are_refused(corners):
+    """Collinear and coplanar up to rounding of the corners."""
+    with pytest.raises(DegenerateElementError, match="has zero"):
+        check_mesh(one_cell(corners), "mesh")
+
+
+@given(corners=cells(3, 1e-9) | cells(4, 1e-9))
+def test_slivers_are_not_refused(corners):
+    check_mesh(one_cell(corners), "mesh")
+
+
+@given(corners=cells(4, 0.5))
+def test_size_has_no_say(corners):
+    for size in (1e-100, 1e100):
+        check_mesh(one_cell(size * corners), "mesh")
+
+
+@given(mesh=wild_meshes("sheet"))
+@pytest.mark.parametrize("effect", ["spring", "strain", "bending"])
+def test_wild_sheets_rest_in_themselves(effect, mesh):
+    """S at rest projects on itself: the elastic force vanishes for any mesh."""
+    _rests(build(mesh, {"effect": effect, "weight": 1.0}, frames=1))
+
+
+@given(mesh=wild_meshes("bar"))
+@pytest.mark.parametrize("effect", ["spring", "tetrahedron_strain", "deformation_gradient"])
+def test_wild_bars_rest_in_themselves(effect, mesh):
+    _rests(build(mesh, {"effect": effect, "weight": 1.0}, frames=1))
+
+
+def _rests(scene) -> None:
+    group, points = scene.groups[0], scene.mesh.points
+    group.begin_frame(points)
+    d = group.S @ points
+    scale = np.abs(abs(group.S) @ np.abs(points)).max()
+    assert np.abs(d - group.project(points)).max() <= 1e-12 * scale
+
+
+SHEET, BAR = cloth(3, 3, "xz"), bar(3, 2, 2)
+
+
+def read(folder: Path, points: np.ndarray, **cells: np.ndarray) -> Mesh:
+    """The mesh of a file with these points and cells."""
+    meshio.Mesh(points, list(cells.items())).write(folder / "mesh.vtu")
+    return MeshFile(kind="file", path="mesh.vtu").build(folder)
+
+
+def test_a_tetrahedron_of_negative_volume_is_turned(tmp_path):
+    cells = BAR.tetrahedra.copy()
+    cells[1] = cells[1][[1, 0, 2, 3]]
+    corner = (mesh := read(tmp_path, BAR.points, tetra=cells)).points[mesh.tetrahedra]
+    assert (np.linalg.det(corner[:, 1:] - corner[:, :1]) > 0.0).all()
+    assert np.array_equal(np.sort(mesh.tetrahedra, axis=1), np.sort(BAR.tetrahedra, axis=1))
+
+
+def two_sheets(joined: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Points and triangles of two sheets: apart, or with one corner in common."""
+    other = SHEET.points + (1.0 if joined else 1.5) * np.array([1.0, 0.0, 1.0])
+    number = np.arange(9, 18)
+    if joined:  # the last vertex of the first sheet is the first of the second
+        other, number = other[1:], np.arange(8, 17)
+    return np.vstack([SHEET.points, other]), np.vstack([SHEET.triangles, number[SHEET.triangles]])
+
+
+@pytest.mark.parametrize("joined", [False, True], ids=["two components", "joined in one vertex"])
+@pytest.mark.parametrize("effect", ["spring", "strain", "bending"])
+def test_parts_without_a_common_edge_are_taken(tmp_path, joined, effect):
+    """They rest where nothing pulls, and move where something does."""
+    points, triangles = two_sheets(joined)
+    mesh = read(tmp_path, points, triangle=triangles)
+    entry = {"effect": effect, "weight": 10.0}
+    settings = {"name": "parts", "title": "Parts", "mesh": {"kind": "file", "path": "mesh.vtu"}}
+    for effects, still in (([entry], True), ([entry, {"effect": "gravity"}], False)):
+        config = SceneConfig.model_validate({**settings, "frames": 4, "effects": effects})
+        moved = trajectory(Scene.build(config, mesh))[-1] - mesh.points
+        assert np.isfinite(moved).all()
+        assert (np.abs(moved).max() < 1e-12) == still

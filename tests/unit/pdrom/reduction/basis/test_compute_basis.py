@@ -208,18 +208,6 @@ def test_round_off_has_no_basis(spec, rng):
     assert basis_of(p, spec, roundoff=1e-12).rank == 0
 
 
-def test_small_data_above_round_off_keep_their_rank(rng):
-    p = 1e-14 * rng.standard_normal((7, ROWS, 3))
-    assert basis_of(p, BasisSpec(), roundoff=1e-20).rank == 7
-
-
-@pytest.mark.parametrize("centring", ["none", "affine"])
-def test_repeated_snapshots_add_no_rank(centring):
-    p, _ = snapshots(23, 5)
-    spec = BasisSpec(centring=centring)
-    assert basis_of(np.concatenate([p, p, p]), spec).rank == basis_of(p, spec).rank
-
-
 def test_a_flat_axis_gets_no_modes_and_is_flagged(spec, rng):
     p = rng.standard_normal((7, ROWS, 3))
     p[:, :, 2] = 1e-17 * rng.standard_normal((7, ROWS))

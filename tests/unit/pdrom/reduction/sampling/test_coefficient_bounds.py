@@ -42,15 +42,6 @@ def test_range_is_that_of_the_training_coefficients_with_its_margin(seed, margin
     np.testing.assert_allclose(bounded.limited(own), own, atol=1e-9)
 
 
-def test_mass_weighted_coefficients_are_those_of_the_mass_inner_product(rng):
-    p, mass = rng.standard_normal((9, 20, 3)), rng.uniform(0.5, 2.0, 20)
-    spec = FREE.model_copy(update={"weighting": "mass"})
-    basis = compute_basis(p, mass, 0.0, P, spec)
-    own = (p.reshape(9, -1) - basis.mean) * np.repeat(mass, 3) @ basis.V
-    expected = [own.min(axis=0), own.max(axis=0)]
-    np.testing.assert_allclose(basis.trained[0], expected, atol=1e-9)
-
-
 @settings(max_examples=5)
 @given(SEEDS)
 def test_clipping_is_the_projection_on_the_box(seed):
