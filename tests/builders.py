@@ -3,6 +3,7 @@
 import numpy as np
 from numba import njit
 
+from pdrom.model.constraints.gradient_kernel import call
 from pdrom.model.scene import Scene, SceneConfig
 from places import ROOT
 
@@ -55,6 +56,12 @@ def random_rotation(rng: np.random.Generator) -> np.ndarray:
     q, r = np.linalg.qr(rng.standard_normal((3, 3)))
     q *= np.sign(np.diag(r))
     return q * np.sign(np.linalg.det(q))
+
+
+@njit
+def call_kernel(address, d, parameters, p, m):
+    """Call the compiled kernel at ``address`` for ``m`` elements; p is written."""
+    call(address, d.ctypes.data, parameters.ctypes.data, p.ctypes.data, m)
 
 
 def from_python(function):

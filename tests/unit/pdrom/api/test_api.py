@@ -1,4 +1,4 @@
-"""The package from Python: the page's example, what runs hold, and files that are read back."""
+"""The package from Python: the page's example, runs, their files and pictures, and faults."""
 
 import copy
 import inspect
@@ -7,11 +7,14 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
 from pdrom import api
-from pdrom.core.errors import ConfigurationError, PdromError, RankError
+from pdrom.api.pictures import viewed_scenes
+from pdrom.core.errors import ConfigurationError, PdromError, RankError, StorageError
+from pdrom.core.store import write_hdf5
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.snapshots import training_frames
@@ -33,6 +36,12 @@ KEYS = {"mesh": {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}, "fram
 def full() -> api.FullRun:
     """A short run of a small sheet."""
     return api.run(api.build_scene(effects=EFFECTS, **KEYS))
+
+
+@pytest.fixture(scope="module")
+def reduced(full: api.FullRun) -> api.ReducedRun:
+    """A reduced run of it."""
+    return api.reduce(full, "spring", "block-deim", 2)
 
 
 def test_the_pages_example_runs_and_is_short(tmp_path, monkeypatch, capsys):
@@ -73,8 +82,7 @@ def test_the_full_rank_reproduces_the_run_and_few_modes_do_not(full):
         api.reduce(full, "spring", "pod", rank + 1)
 
 
-def test_files_are_read_back(full, tmp_path):
-    reduced = api.reduce(full, "spring", "block-deim", 2)
+def test_files_are_read_back(full, reduced, tmp_path):
     api.save(reduced, tmp_path / "reduced.h5")
     read = api.load(tmp_path / "reduced.h5")
     assert isinstance(read, api.ReducedRun)
@@ -177,6 +185,9 @@ FAULTY = {
     ),
     "plot of a run": (lambda full, _: api.plot(full), "plot = FullRun.*a ReducedRun"),
     "plot of nothing": (lambda *_: api.plot(), "at least one run"),
+    "view of nothing": (lambda _, p: api.view(p / "v"), "view"),
+    "view of a text": (lambda _, p: api.view(p / "v", "text"), "view"),
+    "view of None": (lambda _, p: api.view(p / "v", None), "view"),
     "view of a scene": (lambda full, p: api.view(p / "v", full.scene), "view = Scene"),
     "view into a folder": (lambda full, p: api.view(p, full), "cannot be written .a folder"),
     "save of a run": (lambda full, p: api.save(full, p / "s"), "reduced = FullRun"),
@@ -272,13 +283,12 @@ def copies(value):
     return copy.deepcopy(value), pickle.loads(pickle.dumps(value))
 
 
-def test_scenes_and_runs_are_copied_and_pickled(full):
+def test_scenes_and_runs_are_copied_and_pickled(full, reduced):
     assert full.scene.system is not None  # what a run leaves behind does not hinder
     for scene in copies(full.scene):
         assert scene is not full.scene
         assert scene.config == full.scene.config
         assert np.array_equal(trajectory(scene), full.positions)
-    reduced = api.reduce(full, "spring", "block-deim", 2)
     for again in copies(reduced):
         assert repr(again) == repr(reduced)
         assert np.array_equal(again.error, reduced.error)
@@ -309,3 +319,83 @@ def test_docstrings_tell_every_argument(name):
     told = function.__doc__.split("Parameters\n")[-1]
     for argument in inspect.signature(function).parameters:
         assert f"    {argument} : " in told
+
+
+@pytest.mark.parametrize("method", list(api.methods()))
+def test_every_method_runs_to_its_end_or_says_where_it_blew_up(full, method):
+    made = api.reduce(full, "spring", method, 2)
+    outcome = made.outcome
+    assert np.isfinite(outcome.positions).all()
+    assert len(made.error) == outcome.frames
+    assert outcome.finite == (outcome.blowup_frame is None)
+    assert outcome.frames == 12 or not outcome.finite
+    assert made.gain >= 1.0 - 1e-9
+    assert made.ms > 0.0
+
+
+def test_a_picture_has_a_line_for_each_run_and_a_cross_for_a_blow_up(reduced):
+    blown = replace(reduced, outcome=replace(reduced.outcome, blowup_frame=7))
+    (axes,) = api.plot(reduced, blown).axes
+    named = [line for line in axes.lines if not line.get_label().startswith("_")]
+    assert [line.get_label() for line in named] == [reduced.title] * 2
+    assert len(axes.lines) == 3
+    time, error = named[0].get_data()
+    assert time == pytest.approx(0.016 * np.arange(1, 13))
+    assert error == pytest.approx(np.clip(reduced.error, 1e-7, 1e3))
+
+
+def test_runs_of_one_scene_are_shown_together_by_size(full, reduced):
+    smaller = api.reduce(full, "spring", "block-deim", 1)
+    (shown,) = viewed_scenes(reduced, smaller, full)
+    assert [run.r for run in shown.sizes("spring", "block-deim")] == [1, 2]
+    assert shown.groups == ["spring"]
+    assert np.array_equal(shown.positions, full.positions)
+    other = api.run(api.build_scene(effects=EFFECTS, **KEYS, name="other"))
+    assert [one.name for one in viewed_scenes(full, other)] == ["scene", "other"]
+
+
+@pytest.mark.parametrize("name", ["reduced", "full"])
+def test_records_are_compared_and_hashed_by_identity(reduced, name):
+    record = reduced if name == "reduced" else reduced.full
+    assert record == record
+    assert record != replace(record)
+    assert len({record, reduced.full.scene}) == 2
+
+
+@pytest.mark.parametrize("fault", ["cut", "nan", "times", "reduced"])
+def test_a_sealed_run_is_looked_at_like_any_other(reduced, tmp_path, fault):
+    """With a right checksum, by whoever wrote it."""
+    full = reduced.full
+    positions = np.array(full.positions)
+    if fault == "cut":
+        full = replace(full, positions=positions[:-1])
+    elif fault == "nan":
+        positions[3, 2, 1] = np.nan
+        full = replace(full, positions=positions)
+    elif fault == "times":
+        full = replace(full, ms=full.ms[:-1])
+    outcome = reduced.outcome
+    if fault == "reduced":
+        outcome = replace(outcome, positions=outcome.positions[:, :-1])
+    path = tmp_path / "sealed.h5"
+    api.save(replace(reduced, full=full, outcome=outcome), path)
+    with pytest.raises(StorageError, match=r"sealed\.h5"):
+        api.load(path)
+
+
+def test_a_run_from_elsewhere_reads_no_other_file(reduced, tmp_path):
+    api.save(reduced, tmp_path / "one.h5")
+    path = tmp_path / "two.h5"
+    with write_hdf5(path) as file:
+        file["positions"] = h5py.ExternalLink(str(tmp_path / "one.h5"), "/full")
+    with pytest.raises(StorageError, match="leads elsewhere"):
+        api.load(path)
+
+
+@pytest.mark.parametrize("fault", ["cut", "nan"])
+def test_positions_that_are_not_whole_are_not_reduced(reduced, fault):
+    positions = np.array(reduced.full.positions)
+    positions[2, 1, 0] = np.nan
+    full = replace(reduced.full, positions=positions[:-1] if fault == "cut" else positions)
+    with pytest.raises(PdromError, match="full: positions"):
+        api.reduce(full, "spring", r=1)

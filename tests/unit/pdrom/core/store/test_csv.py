@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pdrom.core.errors import StorageError
-from pdrom.core.store import read_table, write_table
+from pdrom.core.errors import SceneError, StorageError
+from pdrom.core.store import read_table, require_finite, write_table
 
 TABLE = pd.DataFrame(
     {
@@ -68,3 +68,12 @@ def test_a_table_of_the_results_needs_its_checksum(tmp_path):
     (tmp_path / "t.csv").write_text("a,b\n1,2\n")
     with pytest.raises(StorageError, match=r"t\.csv: its checksum .* is missing"):
         read_table(tmp_path / "t.csv")
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_first_number_that_is_none_is_named(bad):
+    array = np.zeros((3, 4))
+    assert require_finite("x", array, SceneError) is array
+    array[1, 2] = array[2, 0] = bad
+    with pytest.raises(SceneError, match=rf"x: entry \(1, 2\) is {bad}"):
+        require_finite("x", array, SceneError)

@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numba import njit
 
-from builders import random_rotation
+from builders import call_kernel, random_rotation
 from pdrom.model.constraints.bending import VertexBending
 from pdrom.model.constraints.deformation_gradient import DeformationGradient
-from pdrom.model.constraints.gradient_kernel import call
 from pdrom.model.constraints.lanes import LANES, pack
 from pdrom.model.constraints.spring import EdgeSpring
 from pdrom.model.constraints.tetrahedron_strain import TetrahedronStrain
@@ -189,18 +187,13 @@ def _curved() -> VertexBending:
 _CURVED = _curved()
 
 
-@njit
-def _call_kernel(address, d, parameters, p, m):
-    call(address, d.ctypes.data, parameters.ctypes.data, p.ctypes.data, m)
-
-
 def half_spheres(h: np.ndarray, n: np.ndarray, magnitude: float, compiled: bool) -> np.ndarray:
     """Projections (m, 3) of the vectors h on the half spheres about the poles n."""
     if compiled:
         p, rest = np.full_like(h, np.nan), np.zeros_like(h)
         columns = (np.ones(len(h)), np.full(len(h), magnitude), rest, n)
         parameters = pack(np.column_stack(columns))
-        _call_kernel(_CURVED.gradient_kernel.address, h, parameters, p, len(h))
+        call_kernel(_CURVED.gradient_kernel.address, h, parameters, p, len(h))
         return p
     group = copy(_CURVED)
     group.side, group.normals = np.ones(len(h)), n

@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
-from numba import njit
 
-from builders import GROUPS, make_scene
+from builders import GROUPS, call_kernel, make_scene
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.constraints.gradient_kernel import call
 from pdrom.model.constraints.implementations import IMPLEMENTATIONS
 
 STATES = {
@@ -32,11 +30,6 @@ def test_projection_is_finite_and_deterministic(group_scene, rng, state):
     assert np.array_equal(first, group.project(y))
 
 
-@njit
-def _call_kernel(address, d, parameters, p, m):
-    call(address, d.ctypes.data, parameters.ctypes.data, p.ctypes.data, m)
-
-
 @pytest.mark.parametrize("state", ["rest", "near rest", "scrambled", "mirrored"])
 def test_kernels_equal_the_numpy_reference(group_scene, rng, state):
     """At regular states p is unique: compiled and NumPy agree to round-off.
@@ -58,7 +51,7 @@ def test_kernels_equal_the_numpy_reference(group_scene, rng, state):
     part, vertices = group.restricted(elements, np.ones(len(elements)))
     part.begin_frame(y[vertices])
     parameters = np.ascontiguousarray(part.kernel_parameters(), dtype=float)
-    _call_kernel(group.gradient_kernel.address, some, parameters, p, len(elements))
+    call_kernel(group.gradient_kernel.address, some, parameters, p, len(elements))
     expected = group.project_elements(y, elements).reshape(p.shape)
     np.testing.assert_allclose(p, expected, rtol=1e-10, atol=1e-12)
     assert group.frame_lagged == (type(group).begin_frame is not ConstraintGroup.begin_frame)

@@ -163,20 +163,6 @@ def test_hrpd_is_exact_for_the_rest_shape_in_every_orientation(group_scene, rng)
     np.testing.assert_allclose(one, two, atol=1e-9 * np.abs(two).max())
 
 
-@pytest.mark.parametrize("kind", ["pod", "skinning"])
-@pytest.mark.parametrize("name", ["pins", "handles", "bar"])
-def test_pins_and_handles_are_met_exactly(name, kind):
-    scene = SCENES[name]()
-    reference = trajectory(scene)
-    columns = make_columns(scene, reference[1:], kind, 3)
-    found = hrpd_of(scene, columns)
-    result = run_model(scene, SubspaceModel(kind, columns, found))
-    assert np.isfinite(result).all()
-    for boundary in scene.boundaries:
-        held = boundary.held(0)
-        np.testing.assert_allclose(result[1:, held], reference[1:, held], atol=1e-12)
-
-
 def test_arrays_of_a_step_have_the_size_of_the_sample():
     """Meshes of two sizes: nothing that the step holds grows."""
     sizes = []
