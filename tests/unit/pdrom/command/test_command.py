@@ -154,29 +154,22 @@ def test_a_run_without_a_checksum_is_read_if_that_is_asked_for(folder, finished,
     assert run(["view", "small.h5", "--unchecked"]) == Status.DONE
 
 
-def cut_positions(file: h5py.File) -> None:
+def first_of(name: str, value: float) -> Callable[[h5py.File], None]:
+    """A change of a file: another first number of its dataset ``name``."""
+    return lambda file: file[name].__setitem__((0,) * file[name].ndim, value)
+
+
+def shortened(file: h5py.File) -> None:
     """A run that ends early."""
-    short = file["positions"][:-1]
-    del file["positions"]
-    file["positions"] = short
-
-
-def spoil_snapshots(file: h5py.File) -> None:
-    """A number that is none."""
-    file["snapshots/spring/p"][0, 0, 0] = np.nan
-
-
-def spoil_configuration(file: h5py.File) -> None:
-    """A configuration that is none."""
-    file.attrs["configuration"] = "{"
+    file["positions"] = file.pop("positions")[:-1]
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (cut_positions, "positions of float64 (12, 30, 3), required: float (13, 30, 3)"),
-        (spoil_snapshots, "snapshots of spring: entry (0, 0, 0) is nan"),
-        (spoil_configuration, "holds no sound run"),
+        (shortened, "positions of float64 (12, 30, 3), required: float (13, 30, 3)"),
+        (first_of("snapshots/spring/p", np.nan), "snapshots of spring: entry (0, 0, 0) is nan"),
+        (lambda file: file.attrs.modify("configuration", "{"), "holds no sound run"),
         (lambda file: file.attrs.modify("configuration", "[]"), "holds no sound run"),
         (lambda file: file.pop("timings"), "holds no run"),
         (lambda file: file["mesh"].pop("points"), "points"),

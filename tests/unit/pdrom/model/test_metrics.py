@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pdrom.model.metrics import relative_errors, shape_differences, squared_norms, trajectory_error
-
-SEEDS = st.integers(0, 2**32 - 1)
+from strategies import SEEDS
 
 
 def test_known_errors():

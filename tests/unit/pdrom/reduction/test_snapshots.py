@@ -20,6 +20,7 @@ from pdrom.reduction.snapshots import (
 )
 
 FRAMES = st.integers(4, 500)
+TRAIN = training_frames(12, 3)
 
 
 @given(frames=FRAMES, data=st.data())
@@ -78,12 +79,17 @@ def runs(tmp_path_factory):
     return scene, folder
 
 
+def collected(runs, frames=TRAIN, **paths):
+    """Snapshots of the runs, or of other files in their place."""
+    scene, folder = runs
+    files = {name: folder / f"{name}.h5" for name in ("train", "held")} | paths
+    return collect(files["train"], files["held"], scene.groups[0], scene.masses, frames)
+
+
 def test_splits_hold_their_frames(runs):
     scene, folder = runs
-    group = scene.groups[0]
-    train = training_frames(12, 3)
-    got = collect(folder / "train.h5", folder / "held.h5", group, scene.masses, train)
-    np.testing.assert_array_equal(got.frames["train"], train)
+    group, got = scene.groups[0], collected(runs)
+    np.testing.assert_array_equal(got.frames["train"], TRAIN)
     np.testing.assert_array_equal(got.frames["test"], snapshots.test_frames(12))
     np.testing.assert_array_equal(got.frames["heldout"], [1, 6])
     with open_hdf5(folder / "train.h5") as file:
@@ -92,24 +98,19 @@ def test_splits_hold_their_frames(runs):
     for split in ("train", "test"):
         at = np.searchsorted(frames, got.frames[split])
         np.testing.assert_array_equal(getattr(got, split), p[at])
-    at = np.searchsorted(frames, train)
+    at = np.searchsorted(frames, TRAIN)
     assert got.roundoff == pytest.approx(np.sqrt((roundoff[at] ** 2).sum()))
     assert got.train.shape == (3, group.elements, 3)
     assert (got.elements, got.rows_per_element) == (group.elements, 1)
 
 
 def test_round_off_of_a_projection_is_small_but_not_zero(runs):
-    scene, folder = runs
-    got = collect(
-        folder / "train.h5", folder / "held.h5", scene.groups[0], scene.masses, np.array([0])
-    )
-    assert 0.0 < got.roundoff < 1e-13 * np.linalg.norm(scene.mesh.points) * 100
+    size = np.linalg.norm(runs[0].mesh.points)
+    assert 0.0 < collected(runs, np.array([0])).roundoff < 1e-13 * size * 100
 
 
 def test_file_round_trip(runs, tmp_path):
-    scene, folder = runs
-    group, train = scene.groups[0], training_frames(12, 3)
-    got = collect(folder / "train.h5", folder / "held.h5", group, scene.masses, train)
+    got = collected(runs)
     save_snapshots(got, tmp_path / "s.h5")
     back = load_snapshots(tmp_path / "s.h5")
     for name, value in vars(got).items():
@@ -134,34 +135,28 @@ def test_file_round_trip(runs, tmp_path):
 )
 @pytest.mark.parametrize("which", ["train", "held"])
 def test_faulty_snapshots_name_file_and_group(runs, tmp_path, spoil, message, which):
-    scene, folder = runs
-    paths = {name: folder / f"{name}.h5" for name in ("train", "held")}
-    with open_hdf5(paths[which]) as file:
+    spoilt = tmp_path / "spoilt.h5"
+    with open_hdf5(runs[1] / f"{which}.h5") as file:
         store = {name: file[f"snapshots/spring/{name}"][...] for name in ("p", "frames")}
         roundoff = file["snapshots/spring/roundoff"][...]
-    paths[which] = tmp_path / "spoilt.h5"
     p = spoil(store["p"])
-    with write_hdf5(paths[which]) as file:
+    with write_hdf5(spoilt) as file:
         file["snapshots/spring/p"] = p
         file["snapshots/spring/frames"] = store["frames"][: len(p)]
         file["snapshots/spring/roundoff"] = roundoff[: len(p)]
     with pytest.raises(SnapshotError, match=rf"spoilt\.h5: .*'spring'.*{message}"):
-        collect(paths["train"], paths["held"], scene.groups[0], scene.masses, np.array([0]))
+        collected(runs, np.array([0]), **{which: spoilt})
 
 
 def test_missing_group_is_named(runs, tmp_path):
-    scene, folder = runs
     with write_hdf5(tmp_path / "empty.h5") as file:
         file.attrs["x"] = 1
     with pytest.raises(StorageError, match=r"empty\.h5"):
-        collect(
-            tmp_path / "empty.h5", folder / "held.h5", scene.groups[0], scene.masses, np.array([0])
-        )
+        collected(runs, np.array([0]), train=tmp_path / "empty.h5")
 
 
 @pytest.mark.parametrize("train", [np.array([], dtype=int), np.array([0, 2])])
 def test_training_frames_that_were_not_stored_are_an_error(runs, train):
     """The docstring promises a SnapshotError for an empty split."""
-    scene, folder = runs
     with pytest.raises(SnapshotError, match=r"train\.h5: snapshots of 'spring'.* train frames"):
-        collect(folder / "train.h5", folder / "held.h5", scene.groups[0], scene.masses, train)
+        collected(runs, train)

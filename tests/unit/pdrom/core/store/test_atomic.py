@@ -27,21 +27,6 @@ from pdrom.core.store import (
 from pdrom.core.store.atomic import MARK
 
 
-def fail_after(function, *args, **settings):
-    """A job that dies when it has written something."""
-    function(*args, **settings)
-    raise ZeroDivisionError
-
-
-def test_failure_leaves_the_old_file_and_no_other(tmp_path):
-    path = tmp_path / "result.txt"
-    path.write_text("old")
-    with pytest.raises(ZeroDivisionError), atomic_path(path) as temporary:
-        fail_after(temporary.write_text, "half")
-    assert path.read_text() == "old"
-    assert list(tmp_path.iterdir()) == [path]
-
-
 def test_name_appears_only_when_complete(tmp_path):
     path = tmp_path / "new" / "folder" / "result.txt"
     with atomic_path(path) as temporary:

@@ -12,6 +12,7 @@ from scipy import linalg
 from pdrom.core.errors import RankError, SnapshotError
 from pdrom.reduction.basis import Basis, compute_basis, load_basis, save_basis
 from pdrom.reduction.method import BasisSpec
+from strategies import SEEDS
 
 WEIGHTINGS, LAYOUTS = ("none", "mass"), ("vectorised", "per-axis")
 CENTRINGS = ("none", "affine", "mean-in-modes")
@@ -19,7 +20,6 @@ SPECS = [
     BasisSpec(weighting=w, centring=c, layout=layout)
     for w, c, layout in itertools.product(WEIGHTINGS, CENTRINGS, LAYOUTS)
 ]
-SEEDS = st.integers(0, 2**32 - 1)
 ROWS = 12
 
 

@@ -8,10 +8,10 @@ from scipy.optimize import lsq_linear
 from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, select
+from strategies import SEEDS
 
 ELEMENTS, P, R = 14, 2, 4
 FREE = MethodSpec(title="t", centring="affine", rows="element")
-SEEDS = st.integers(0, 2**32 - 1)
 
 
 def reductions(seed: int, **changes) -> tuple[np.ndarray, Reduction, Reduction]:

@@ -15,11 +15,11 @@ from pdrom.reduction.method import MethodSpec, load_methods
 from pdrom.reduction.sampling import Reduction, Sampling, select, select_path
 from pdrom.reduction.sampling.reduction import norm_and_condition, solution_operator
 from places import CONFIG
+from strategies import SEEDS
 from study.experiments.kit.load_reduction import load_reduction
 
 ELEMENTS, P = 14, 2
 ROWS = ELEMENTS * P
-SEEDS = st.integers(0, 2**32 - 1)
 PRESETS = load_methods(CONFIG / "methods.yaml")
 INGREDIENTS = {
     "weighting": ("none", "mass"),
@@ -60,6 +60,12 @@ def reduction_of(p: np.ndarray, mass: np.ndarray, spec: MethodSpec, r: int) -> R
     return Reduction(basis, select(basis, spec, r), spec, r)
 
 
+def made(spec: MethodSpec, seed: int, r: int = 5) -> tuple[np.ndarray, Reduction]:
+    """Snapshots, and their reduction."""
+    p, mass = data(seed)
+    return p, reduction_of(p, mass, spec, r)
+
+
 def span_part(basis: Basis, v: np.ndarray, p: np.ndarray, per_axis: bool) -> np.ndarray:
     """Best approximation of p in mean + span (of each axis by itself if ``per_axis``)."""
     columns = p.reshape(len(p), -1).T - basis.mean[:, None]
@@ -80,9 +86,7 @@ def test_the_presets_are_those_of_the_study():
 
 @given(seed=SEEDS, name=st.sampled_from(list(PROJECTIONS)))
 def test_what_is_in_the_span_is_reproduced(name, seed):
-    spec = PROJECTIONS[name]
-    p, mass = data(seed)
-    reduction = reduction_of(p, mass, spec, 5)
+    p, reduction = made(PROJECTIONS[name], seed)
     inside = span_part(reduction.basis, reduction.v, p, reduction.blocks[0].axis is not None)
     tolerance = 1e-11 * max(reduction.gain, 1.0)
     np.testing.assert_allclose(reduction.reconstruct(inside), inside, atol=tolerance)
@@ -90,10 +94,8 @@ def test_what_is_in_the_span_is_reproduced(name, seed):
 
 @given(seed=SEEDS, name=st.sampled_from(list(EVERY)))
 def test_reconstruction_stays_in_the_space_and_keeps_its_input(name, seed):
-    spec = EVERY[name]
-    p, mass = data(seed)
+    p, reduction = made(EVERY[name], seed)
     before = p.copy()
-    reduction = reduction_of(p, mass, spec, 5)
     result = reduction.reconstruct(p)
     np.testing.assert_array_equal(p, before)
     assert result.shape == p.shape
@@ -105,9 +107,7 @@ def test_reconstruction_stays_in_the_space_and_keeps_its_input(name, seed):
 @given(seed=SEEDS, name=st.sampled_from(list(UNWEIGHTED)))
 def test_error_is_at_most_gain_times_that_of_the_best_approximation(name, seed):
     """|| p - p^ || <= gain || (I - V V^T)(p - mean) || for data outside the training set."""
-    spec = PROJECTIONS[name]
-    p, mass = data(seed)
-    reduction = reduction_of(p, mass, spec, 5)
+    p, reduction = made(PROJECTIONS[name], seed)
     unseen = np.random.default_rng(seed + 1).standard_normal(p.shape)
     per_axis = reduction.blocks[0].axis is not None
     best = unseen - span_part(reduction.basis, reduction.v, unseen, per_axis)
@@ -119,9 +119,7 @@ def test_error_is_at_most_gain_times_that_of_the_best_approximation(name, seed):
 @given(seed=SEEDS, name=st.sampled_from([n for n in UNWEIGHTED if UNWEIGHTED[n].rows != "all"]))
 def test_gain_is_the_norm_of_the_pseudo_inverse_and_attained(name, seed):
     """Some sampled values are amplified by the gain: it is no mere bound."""
-    spec = PROJECTIONS[name]
-    p, mass = data(seed)
-    reduction = reduction_of(p, mass, spec, 5)
+    _, reduction = made(PROJECTIONS[name], seed)
     norms = [np.linalg.norm(np.linalg.pinv(b.matrix), 2) for b in reduction.blocks]
     assert reduction.gain == pytest.approx(max(norms), rel=1e-6)
     assert reduction.condition == pytest.approx(
@@ -150,8 +148,7 @@ def test_error_with_mass_weighting_has_its_factor_in_the_mass_norm(rows, seed):
 @pytest.mark.parametrize("preset", ["deim", "qdeim", "deim-joint"])
 def test_square_methods_interpolate_the_sampled_entries(preset):
     spec = PRESETS[preset]
-    p, mass = data(5)
-    reduction = reduction_of(p, mass, spec, 6)
+    p, reduction = made(spec, 5, 6)
     unseen = np.random.default_rng(6).standard_normal(p.shape)
     flat, result = unseen.reshape(8, -1), reduction.reconstruct(unseen).reshape(8, -1)
     sampled = np.concatenate([b.entries for b in reduction.blocks])
@@ -164,8 +161,7 @@ def test_pod_is_the_best_approximation_of_all_shared_methods():
     errors = {}
     for name, spec in PRESETS.items():
         if spec.centring == "affine":
-            reduction = reduction_of(p, mass, spec, 4)
-            errors[name] = np.linalg.norm(p - reduction.reconstruct(p))
+            errors[name] = np.linalg.norm(p - reduction_of(p, mass, spec, 4).reconstruct(p))
     pod = errors.pop("pod")
     basis = compute_basis(p, mass, 0.0, P, PRESETS["pod"])
     assert pod == pytest.approx(np.linalg.norm(basis.singular_values[4:]), rel=1e-12)
@@ -176,9 +172,8 @@ def test_pod_is_the_best_approximation_of_all_shared_methods():
 def test_whole_elements_have_a_smaller_gain_than_single_entries():
     gains = {"deim": [], "block-deim": [], "qdeim": [], "block-qdeim": []}
     for seed in range(20):
-        p, mass = data(seed)
         for name, values in gains.items():
-            values.append(reduction_of(p, mass, PRESETS[name], 6).gain)
+            values.append(made(PRESETS[name], seed, 6)[1].gain)
     mean = {name: np.mean(values) for name, values in gains.items()}
     assert mean["block-deim"] < mean["deim"]
     assert mean["block-qdeim"] < mean["qdeim"]
@@ -186,8 +181,7 @@ def test_whole_elements_have_a_smaller_gain_than_single_entries():
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_only_sampled_elements_are_read(preset):
-    p, mass = data(9)
-    reduction = reduction_of(p, mass, PRESETS[preset], 4)
+    p, reduction = made(PRESETS[preset], 9, 4)
     unsampled = np.setdiff1d(np.arange(ELEMENTS), reduction.elements)
     assert (len(unsampled) == 0) == (preset == "pod")
     other = p.reshape(8, ELEMENTS, P, 3).copy()
@@ -198,8 +192,7 @@ def test_only_sampled_elements_are_read(preset):
 
 
 def test_numbers_of_rows_and_elements():
-    p, mass = data(11)
-    by_name = {name: reduction_of(p, mass, spec, 4) for name, spec in PRESETS.items()}
+    by_name = {name: made(spec, 11, 4)[1] for name, spec in PRESETS.items()}
     assert by_name["pod"].rows_sampled == ROWS
     assert by_name["block-deim"].rows_sampled == by_name["block-qdeim"].rows_sampled == 4 * P
     assert by_name["deim-joint"].rows_sampled == 4
@@ -390,9 +383,6 @@ def test_repeats_need_permission():
         Sampling.of_elements(np.array([2, 2]), 1, 4)
 
 
-SOLVE_SEEDS = st.integers(0, 2**32 - 1)
-
-
 def full_rank(rows: int, columns: int, seed: int) -> np.ndarray:
     """Random matrix with singular values between 0.1 and 1."""
     rng = np.random.default_rng(seed)
@@ -401,7 +391,7 @@ def full_rank(rows: int, columns: int, seed: int) -> np.ndarray:
     return u * rng.uniform(0.1, 1.0, columns) @ w.T
 
 
-@given(st.integers(1, 12), SOLVE_SEEDS)
+@given(st.integers(1, 12), SEEDS)
 def test_square_is_the_inverse(r, seed):
     a = full_rank(r, r, seed)
     before = a.copy()
@@ -410,13 +400,13 @@ def test_square_is_the_inverse(r, seed):
     np.testing.assert_allclose(operator, np.linalg.inv(a), atol=1e-11)
 
 
-@given(st.integers(1, 12), st.integers(0, 20), SOLVE_SEEDS)
+@given(st.integers(1, 12), st.integers(0, 20), SEEDS)
 def test_qr_is_the_pseudo_inverse(r, extra, seed):
     a = full_rank(r + extra, r, seed)
     np.testing.assert_allclose(solution_operator(a, "qr", 1e-8), np.linalg.pinv(a), atol=1e-11)
 
 
-@given(st.integers(1, 12), st.integers(0, 20), SOLVE_SEEDS)
+@given(st.integers(1, 12), st.integers(0, 20), SEEDS)
 def test_tikhonov_minimises_its_functional(r, extra, seed):
     """c minimises |A c - b|^2 + t |c|^2: least squares of the system [A; sqrt(t) I]."""
     a, t = full_rank(r + extra, r, seed), 1e-3
