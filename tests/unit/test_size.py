@@ -15,7 +15,7 @@ from places import ROOT
 LIMITS = {
     "lines of src": 42_650,
     "modules of src": 345,
-    "lines of tests": 29_603,
+    "lines of tests": 29_188,
     "words of documentation": 24_789,
     "tables": 23,
     "figures": 23,
