@@ -9,8 +9,7 @@ from pdrom.core.yamlfile import read_yaml
 from pdrom.reduction.method import load_methods
 from places import ROOT
 from study.experiments.hard_cases.catalogue import CASES
-from study.experiments.hard_cases.experiment import HardCases
-from study.experiments.hard_cases.outcomes import Training
+from study.experiments.hard_cases.outcomes import HardCases, Training
 
 METHODS = load_methods(ROOT / "config" / "methods.yaml")
 EXPECTED = HardCases(**read_yaml(ROOT / "config" / "default.yaml")["hard_cases"]).expected

@@ -4,7 +4,7 @@ import pytest
 
 from pdrom.model.runs.full_order import trajectory
 from places import ROOT
-from study.experiments.kit.sensitivity import perturbation_field, relative_difference
+from study.experiments.sensitivity import perturbation_field, relative_difference
 from study.pipeline.scenes import load_bound_scene
 
 WELL_POSED = sorted(

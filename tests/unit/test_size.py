@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 42_650,
-    "modules of src": 345,
-    "lines of tests": 29_188,
+    "lines of src": 42_490,
+    "modules of src": 333,
+    "lines of tests": 29_187,
     "words of documentation": 24_789,
-    "tables": 23,
+    "tables": 25,
     "figures": 23,
     "experiments": 21,
-    "percent of src in decorators, signatures and imports": 21.81,
+    "percent of src in decorators, signatures and imports": 21.72,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

@@ -1,13 +1,32 @@
-"""Full-order runs of a scene, with the snapshots that its reductions need."""
+"""The mesh of a scene, checked, and its full-order runs with the snapshots for reductions."""
 
+from pathlib import Path
+
+from pdrom.model.mesh.checks import check_mesh
+from pdrom.model.mesh.config import MeshConfig
+from pdrom.model.mesh.types import save_mesh
 from pdrom.model.runs.full_order import run
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.snapshots import stored_frames, test_frames
 from study.artifact.paths import HELDOUT, KICK, MESH, STIFFNESS, TRAIN, File
-from study.artifact.reads import Setting
+from study.artifact.reads import Setting, SourcesOf
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.scenes import scene_of
 from study.experiments.kit.settings import Solver
+
+
+@experiment(
+    "Mesh {mesh}",
+    reads={"sources": SourcesOf("mesh"), "config": Setting("mesh")},
+    writes={"out": MESH},
+)
+def mesh(sources: list[Path], config: MeshConfig, out: File) -> None:
+    """Build the mesh of ``config`` with its ``sources``, check it and save it to ``out``.
+
+    MeshError names the fault. Jobs run in the project's folder.
+    """
+    made = check_mesh(config.build(Path()), config.label)
+    save_mesh(made, out.path, {"label": config.label})
 
 
 @experiment(

@@ -23,8 +23,8 @@ from study.artifact.paths import MESH, NOISE, NOISE_RUNS, SENSITIVITY, File
 from study.artifact.reads import Settings
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.scenes import scene_of
-from study.experiments.kit.sensitivity import perturbation_field
 from study.experiments.kit.settings import BlowupExtent, Horizon, Modes
+from study.experiments.sensitivity import perturbation_field
 
 log = logging.getLogger(__name__)
 

@@ -1,31 +1,158 @@
-"""Reduced runs repeated: from moved starts, and trained on other frames."""
+"""Reduced runs repeated, and the ladder from the published choices to sound ones.
+
+A run is one draw of what nobody means to choose: which frames train, and the last digits of the
+start. Where an error of the run decides something, its repetitions say how much of it is that.
+"""
 
 import logging
-from typing import Annotated
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
 
+import numpy as np
 import pandas as pd
 from pydantic import Field
 
 from pdrom.core.names import SceneName
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.model.scene import SceneConfig
+from pdrom.model.metrics import relative_errors
+from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.basis import Basis, basis_of
+from pdrom.reduction.deviations import error_within
+from pdrom.reduction.local.rerun import rerun_reduced
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.snapshots import load_snapshots
+from pdrom.reduction.rerun import Rerun, displacement_norms
+from pdrom.reduction.sampling import Reduction, reductions
+from pdrom.reduction.snapshots import SPLITS, SnapshotSet, load_snapshots
 from study.artifact import paths
-from study.artifact.paths import File
-from study.artifact.reads import Settings
+from study.artifact.paths import LADDER, MESH, SENSITIVITY, SNAPSHOTS, TRAIN, File
+from study.artifact.reads import Setting, Settings
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.repetition import ReducedRuns, Repetitions, Varied
 from study.experiments.kit.scenes import positions_of, scene_of
-from study.experiments.kit.settings import BlowupExtent, Horizon, Modes
+from study.experiments.kit.settings import BlowupExtent, Horizon, Modes, Tolerance
+from study.experiments.sensitivity import perturbation_field
 
+Varied = Literal["start", "training", "both"]
 log = logging.getLogger(__name__)
-
 COLUMNS = [
     "scene", "group", "method", "r", "varied", "seed", "gain", "finite", "error",
 ]  # fmt: skip
 VARIED: tuple[Varied, ...] = ("start", "training")
+LADDER_COLUMNS = [
+    "scene", "group", "direction", "rung", "rows_per_element", "entries", "r", "condition", "gain",
+    "error_train", "error_test",
+    "error_heldout", "finite", "blowup_frame", "relative_error_within_horizon", "repetitions",
+    "error_median", "error_low", "error_high", "gain_low", "gain_high",
+]  # fmt: skip
+Rungs = Annotated[tuple[MethodSpec, ...], Field(min_length=1)]
+
+
+class Repetitions(ConfigModel):
+    """Settings of repeated runs.
+
+    repetitions : draws, each with a seed of its own, from 1
+    perturbation : length by which a start is moved, over the extent
+    """
+
+    repetitions: Annotated[int, Field(ge=1, le=1000)] = 5
+    perturbation: Tolerance = 1e-10
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """One repeated run; ``error`` up to the horizon, inf for a run that ended earlier."""
+
+    r: int
+    seed: int
+    gain: float
+    error: float
+    finite: bool
+
+
+class ReducedRuns:
+    """Runs of a scene with one group reduced, compared with its full-order run.
+
+    Parameters
+    ----------
+    data : snapshots of the group
+    reference : (F + 1, N, 3) m, positions of the full-order run
+    end : first frame that is not judged
+    blowup_extent : see `pdrom.reduction.local.rerun.rerun`
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        group: str,
+        data: SnapshotSet,
+        reference: np.ndarray,
+        end: int,
+        blowup_extent: float,
+    ) -> None:
+        self.scene, self.group, self.data = scene, group, data
+        self.reference, self.end, self.blowup_extent = reference, end, blowup_extent
+        self.displacement = displacement_norms(reference)
+        self._bases: dict[tuple[str, int | None, int | None], Basis] = {}
+
+    def until_the_end(self) -> "ReducedRuns":
+        """Copy of the runs up to the first frame that is not judged, but of two frames at least."""
+        frames = min(self.scene.config.frames, max(2, self.end))
+        scene = self.scene.changed(frames=frames)
+        reference = self.reference[: frames + 1]
+        return ReducedRuns(scene, self.group, self.data, reference, self.end, self.blowup_extent)
+
+    def basis(
+        self, method: MethodSpec, frames: int | None = None, signs: int | None = None
+    ) -> Basis:
+        """Basis for ``method``; seeds may draw training ``frames``, and ``signs`` of the modes."""
+        key = (method.basis_id, frames, signs)
+        if key not in self._bases:
+            train = None if frames is None else drawn(self.data, frames)
+            flips = None if signs is None else np.random.default_rng(signs)
+            self._bases[key] = basis_of(self.data, method, train, flips)
+        return self._bases[key]
+
+    def run(self, reduction: Reduction, offset: np.ndarray | None = None) -> Rerun:
+        """Run with ``reduction`` from the scene's start, moved by ``offset`` (N, 3) m."""
+        return rerun_reduced(
+            self.scene, self.group, reduction, self.reference, self.blowup_extent, offset=offset
+        )
+
+    def error(self, outcome: Rerun) -> float | None:
+        """Relative error before the end; None for a run that did not get there."""
+        return error_within(outcome.difference, self.displacement, self.end)
+
+    def repeat(
+        self, method: MethodSpec, sizes: Sequence[int], varied: Varied, asked: Repetitions
+    ) -> Iterator[Repetition]:
+        """Every repetition of ``method`` at each of ``sizes`` that its basis has.
+
+        ``varied`` says what the seed draws: the start, or the training snapshots.
+        """
+        own = reductions(self.basis(method), method, sizes) if varied == "start" else None
+        for seed in range(1, asked.repetitions + 1):
+            made = own
+            if made is None:
+                made = reductions(self.basis(method, frames=seed), method, sizes)
+            offset = None
+            if varied != "training":
+                offset = perturbation_field(self.scene, asked.perturbation, seed)
+            for r, reduction in made.items():
+                outcome = self.run(reduction, offset)
+                error = self.error(outcome)
+                yield Repetition(
+                    r, seed, reduction.gain, np.inf if error is None else error, outcome.finite
+                )
+
+
+def drawn(data: SnapshotSet, seed: int) -> np.ndarray:
+    """Snapshots (n, e p, 3), as many as train in ``data``, drawn by ``seed`` from all, in order."""
+    frames = np.concatenate([data.frames["train"], data.frames["test"]])
+    chosen = np.random.default_rng(seed).choice(len(frames), len(data.train), replace=False)
+    chosen = chosen[np.argsort(frames[chosen])]
+    count = len(data.train)
+    return np.stack([data.train[i] if i < count else data.test[i - count] for i in chosen])
 
 
 class Cells(ConfigModel):
@@ -94,3 +221,126 @@ def repetitions(
             rows += [cell | vars(run) for run in sorted(found, key=lambda run: run.r)]
         log.info("%s", own.method)
     write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
+
+
+class Ladder(Repetitions):
+    """The rungs of a ladder; runs are repeated on other training frames.
+
+    r : basis size of all rungs (the numerical rank where that is smaller)
+    signs : how many choices of the singular vectors' signs the first rung is repeated with
+    repeated : scenes whose runs are repeated
+    up, down : methods, from the published one upwards, and the sound one less one ingredient
+    square : separate or shared coefficients on single rows or whole elements, at each of ``sizes``;
+        rows are sampled p times as often as elements, which have p of them: as many entries
+    """
+
+    r: Annotated[int, Field(ge=1, le=100_000)] = 20
+    signs: Annotated[int, Field(ge=0, le=100)] = 0
+    repeated: tuple[str, ...] = ()
+    up: Rungs = ()
+    down: Rungs = ()
+    square: tuple[MethodSpec, ...] = ()
+    sizes: tuple[Modes, ...] = ()
+
+    def rungs(self, p: int) -> list[tuple[str, MethodSpec, int | None, int]]:
+        """(direction, method, seed of the signs, size) of all rows of a group, in order."""
+        rows: list[tuple[str, MethodSpec, int | None, int]] = []
+        rows += [("up", method, None, self.r) for method in self.up]
+        rows += [("down", method, None, self.r) for method in self.down]
+        rows += [("signs", self.up[0], seed, self.r) for seed in range(1, self.signs + 1)]
+        square = [
+            method.model_copy(update={"oversampling": p * method.oversampling})
+            if method.rows == "joint"
+            else method
+            for method in self.square
+        ]
+        return rows + [("square", method, None, r) for r in self.sizes for method in square]
+
+
+class LadderSection(Ladder):
+    """Section ``ladder``: the rungs, and ``scenes`` whose reduced groups are run with them."""
+
+    scenes: tuple[str, ...] = ()
+
+
+@experiment(
+    "Ladder of {group} in {scene}",
+    reads={
+        "mesh": MESH,
+        "fom": TRAIN,
+        "snapshots": SNAPSHOTS,
+        "sensitivity": SENSITIVITY,
+        "config": Setting("scene"),
+        "ladder": Setting("ladder"),
+        "horizon": Setting("horizon"),
+        "blowup_extent": Setting("blowup_extent"),
+    },
+    writes={"out": LADDER},
+)
+def ladder(
+    mesh: File,
+    fom: File,
+    snapshots: File,
+    sensitivity: File,
+    config: SceneConfig,
+    ladder: Ladder,
+    horizon: Horizon,
+    blowup_extent: BlowupExtent,
+    out: File,
+) -> None:
+    """Reduce and rerun the scene with every rung."""
+    labels, data = out.labels, load_snapshots(snapshots.path)
+    runs = ReducedRuns(
+        scene_of(config, mesh),
+        labels["group"],
+        data,
+        reference=positions_of(fom),
+        end=horizon.frames(sensitivity),
+        blowup_extent=blowup_extent,
+    )
+    judged = runs.until_the_end() if labels["scene"] in ladder.repeated else None
+    rows = []
+    for direction, method, seed, r in ladder.rungs(data.rows_per_element):
+        rung = method.title if seed is None else f"signs {seed}"
+        row = {**labels, "direction": direction, "rung": rung, "r": r}
+        row["rows_per_element"] = data.rows_per_element
+        basis = runs.basis(method, signs=seed)
+        if direction == "square" and r > basis.rank:
+            continue
+        size = min(r, basis.rank)
+        # a group that is round-off has no reduction
+        for reduction in reductions(basis, method, [size] if size else []).values():
+            outcome = runs.run(reduction)
+            row |= {**outcome.row(runs.displacement), "r": size, **_measures(reduction, data)}
+            row["relative_error_within_horizon"] = runs.error(outcome)
+            if judged is not None and seed is None and direction != "square":
+                row |= _ranges(list(judged.repeat(method, [size], "training", ladder)))
+        rows.append(row)
+        log.info("%s, %s", direction, row["rung"])
+    table = pd.DataFrame(rows, columns=LADDER_COLUMNS)
+    whole = dict.fromkeys(("blowup_frame", "repetitions", "entries"), "Int64")
+    write_table(table.astype(whole), out.path)
+
+
+def _measures(reduction: Reduction, data: SnapshotSet) -> dict[str, Any]:
+    errors = {}
+    for split in SPLITS:
+        p = getattr(data, split)
+        errors[f"error_{split}"] = relative_errors(p, reduction.reconstruct(p), data.roundoff)[0]
+    entries = sum(len(block.entries) for block in reduction.blocks)
+    return {"entries": entries, "condition": reduction.condition, "gain": reduction.gain, **errors}
+
+
+def _ranges(runs: list[Repetition]) -> dict[str, Any]:
+    """Ranges over the repetitions; a run that ended before the horizon has an infinite error."""
+    if not runs:
+        return {}
+    errors, gains = [run.error for run in runs], [run.gain for run in runs]
+    return {
+        "repetitions": len(runs),
+        "error_median": float(np.median(errors)),
+        "error_low": min(errors),
+        "error_high": max(errors),
+        "gain_low": min(gains),
+        "gain_high": max(gains),
+    }

@@ -27,12 +27,10 @@ from pdrom.reduction.snapshots import row_masses
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
 from study.artifact.paths import BREAK_EVEN_SIZED, EFFECTS_SIZED, SCALING, File
 from study.artifact.reads import Settings, SourcesOf
+from study.experiments.kit.costs import effect_costs, local_costs, variant
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.effect_costs import effect_costs
-from study.experiments.kit.local_costs import local_costs, variant
 from study.experiments.kit.measurement import Measurement, Protocol, Variant, measure
-from study.experiments.kit.names import FOM
-from study.experiments.kit.settings import Modes, Repeats, Solver, Tolerance
+from study.experiments.kit.settings import FOM, Modes, Repeats, Solver, Tolerance
 
 log = logging.getLogger(__name__)
 

@@ -1,6 +1,10 @@
-"""Drift of runs of a scene that should be the same, and what its effects do in it."""
+"""Drift of full-order runs that should be the same (docs/study.md), and what effects do in a run.
 
-from collections.abc import Iterable
+What a run does when its start moves by 1e-10 of the extent bounds what any reduced model can be
+blamed for. Beside the start, the solver (another order of summation), the number of iterations and
+the time step are changed, and each effect is left out.
+"""
+
 from typing import Annotated, Self
 
 import numpy as np
@@ -9,21 +13,25 @@ from pydantic import Field, model_validator
 
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.dynamics.solvers import solver_class
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import State, Stepper
-from pdrom.model.effects.base import Boundary, Contact, Effect, Force, Seed
+from pdrom.model.dynamics.system import DEFAULT_SOLVER
+from pdrom.model.effects.base import Contact, Effect, Force, Seed
 from pdrom.model.held_out import MOTIONS
+from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from study.artifact.paths import CONTRIBUTIONS, MESH, SENSITIVITY, File
 from study.artifact.reads import Setting
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.scenes import scene_of
-from study.experiments.kit.sensitivity import heldout_floor, sensitivities
 
 Perturbation = Annotated[float, Field(gt=0.0, lt=1.0)]
-COLUMNS = ["scene", "effect", "role", "frame", "force", "energy"]
+EFFECTS = ["scene", "effect", "role", "frame", "force", "energy"]
 Row = tuple[str, str, int, float, float]
+COLUMNS = ["scene", "perturbation", "seed", "frame", "relative_difference"]
+# A run is repeated with the first of these that it does not use itself.
+OTHER_SOLVERS = ("splu", "splu-columns")
 
 
 class PerturbedRuns(ConfigModel):
@@ -83,7 +91,7 @@ class _Watched:
 
 
 def contributions(scene: Scene) -> pd.DataFrame:
-    """Table of `COLUMNS` of a run of ``scene``: force (norm, N) and energy (J) by effect and frame.
+    """Force (norm, N) and energy (J) by effect and frame of a run of ``scene``, `EFFECTS`.
 
     Effects with the same name count as one. Forces are those at the end of a frame, on the vertices
     that nothing holds: S^T W (p - S q) of a group, M a of a force, M d / h^2 of a contact that
@@ -101,21 +109,15 @@ def contributions(scene: Scene) -> pd.DataFrame:
         acceleration=scene.acceleration(),
     )  # fmt: skip
     state, rows = scene.initial_state(), []
-    rows += _starts(scene)
+    for start in scene.starts:
+        v, m = start.velocity(), scene.masses[:, None]
+        force = float(np.linalg.norm(m * v)) / config.time_step
+        rows.append((start.name, "start", 0, force, 0.5 * float(np.sum(m * v**2))))
     for frame in range(config.frames):
         after, _ = loop.step(state, frame)
         rows += _frame(scene, watched, state, after, frame)
         state = after
-    return pd.DataFrame([(config.name, *row) for row in rows], columns=COLUMNS)
-
-
-def _starts(scene: Scene) -> list[Row]:
-    rows = []
-    for start in scene.starts:
-        v, m = start.velocity(), scene.masses[:, None]
-        force = float(np.linalg.norm(m * v)) / scene.config.time_step
-        rows.append((start.name, "start", 0, force, 0.5 * float(np.sum(m * v**2))))
-    return rows
+    return pd.DataFrame([(config.name, *row) for row in rows], columns=EFFECTS)
 
 
 def _frame(
@@ -134,12 +136,16 @@ def _frame(
         forces[key] = forces.get(key, 0.0) + np.broadcast_to(force, after.positions.shape)
         energies[effect.name] = energies.get(effect.name, 0.0) + energy
 
-    for group in scene.groups:
-        add(group, "constraint group", *_of_group(group, after.positions))
+    for group in scene.groups:  # what is frozen is that of the last frame
+        missing = group.project(after.positions) - group.S @ after.positions
+        weighted = group.row_weights[:, None] * missing
+        energy = 0.5 * float(np.sum(missing * weighted))
+        add(group, "constraint group", group.S.T @ weighted, energy)
     for force in scene.forces:
         pull = m * force.acceleration(before.positions, before.velocities)
         own = force.potential(after.positions, scene.masses)
-        add(force, "force", pull, own if _conserves(force) else np.nan)
+        conserves = type(force).potential is not Force.potential
+        add(force, "force", pull, own if conserves else np.nan)
     needed = m * (after.positions - before.positions - h * before.velocities) / h**2
     lacking = needed - sum(forces.values())
     for contact in watched:
@@ -148,27 +154,102 @@ def _frame(
         (name, role, frame, float(np.linalg.norm(force[~held])), energies[name])
         for (name, role), force in forces.items()
     ]
-    return [*rows, *_holds(scene.boundaries, active, lacking, frame)]
+    squares: dict[str, float] = {}  # a hold that is not active exerts nothing
+    for boundary in scene.boundaries:
+        pulled = lacking[boundary.held(frame)] if boundary in active else np.zeros(3)
+        squares[boundary.name] = squares.get(boundary.name, 0.0) + float(np.sum(pulled**2))
+    holds = [(name, "hold", frame, np.sqrt(total), np.nan) for name, total in squares.items()]
+    return [*rows, *holds]
 
 
-def _of_group(group: ConstraintGroup, q: np.ndarray) -> tuple[np.ndarray, float]:
-    """Force (N, 3) N and energy J of a group at q; what is frozen is that of the last frame."""
-    missing = group.project(q) - group.S @ q
-    weighted = group.row_weights[:, None] * missing
-    return group.S.T @ weighted, 0.5 * float(np.sum(missing * weighted))
+def relative_difference(other: np.ndarray, base: np.ndarray) -> np.ndarray:
+    """Per-frame difference of ``other`` from ``base``, trajectories (F + 1, N, 3), relative, (F,).
+
+    || Q'_f - Q_f ||_F over the root mean square of || Q_f - Q_0 ||_F over the run: one
+    normalisation for all frames, so that a slow start is not divided by nothing.
+    """
+    frames = len(base) - 1
+    difference = np.linalg.norm((other - base)[1:].reshape(frames, -1), axis=1)
+    motion = np.linalg.norm((base[1:] - base[0]).reshape(frames, -1), axis=1)
+    return difference / np.sqrt(np.mean(motion**2))
 
 
-def _conserves(force: Force) -> bool:
-    """Whether a force has a potential of its own."""
-    return type(force).potential is not Force.potential
+def perturbation_field(scene: Scene, size: float, seed: int) -> np.ndarray:
+    """Random directions by ``seed``, of length ``size`` times the extent of ``scene``, (N, 3) m."""
+    field = np.random.default_rng(seed).standard_normal((scene.mesh.vertices, 3))
+    return size * scene.mesh.extent * field / np.linalg.norm(field, axis=1, keepdims=True)
 
 
-def _holds(
-    boundaries: Iterable[Boundary], active: list[Boundary], lacking: np.ndarray, frame: int
-) -> list[Row]:
-    """One row for each name; a hold that is not active exerts nothing."""
-    squares: dict[str, float] = {}
-    for boundary in boundaries:
-        own = lacking[boundary.held(frame)] if boundary in active else np.zeros(3)
-        squares[boundary.name] = squares.get(boundary.name, 0.0) + float(np.sum(own**2))
-    return [(name, "hold", frame, np.sqrt(total), np.nan) for name, total in squares.items()]
+def heldout_floor(heldout: Scene, motion: str, size: float, seeds: tuple[int, ...]) -> pd.DataFrame:
+    """Rows of a held-out motion, whose horizon is its own; its name stands as perturbation.
+
+    ``size`` and ``seeds`` of the starts of ``heldout`` as in `perturbation_field`.
+    """
+    base = trajectory(heldout)
+    runs = [trajectory(heldout, perturbation_field(heldout, size, seed)) for seed in seeds]
+    return pd.concat(
+        _rows(heldout, motion, seed, relative_difference(run, base))
+        for seed, run in zip(seeds, runs, strict=True)
+    )
+
+
+def sensitivities(
+    scene: Scene, perturbations: tuple[float, ...], seeds: tuple[int, ...]
+) -> pd.DataFrame:
+    """Table of `COLUMNS` for ``scene``: ``perturbations`` of the start by ``seeds``, and others.
+
+    The others are another solver, 4 K iterations, half the time step, and no effect of one name
+    (label `without`); the only constraint group cannot be left out.
+    """
+    base = trajectory(scene)
+    parts = []
+    for size in perturbations:
+        for seed in seeds:
+            other = trajectory(scene, perturbation_field(scene, size, seed))
+            parts.append(_rows(scene, f"{size:g}", seed, relative_difference(other, base)))
+    own = solver_class(DEFAULT_SOLVER)
+    solver = next(name for name in OTHER_SOLVERS if solver_class(name) is not own)
+    variants = {
+        "solver": trajectory(scene, system=scene.system_with(solver)),
+        "iterations x4": trajectory(_fresh(scene, iterations=4 * scene.config.iterations)),
+        "h/2": _half_step(scene),
+    }
+    for label, other in variants.items():
+        parts.append(_rows(scene, label, 0, relative_difference(other, base)))
+    for effect in removable(scene.config):
+        other = trajectory(_fresh(scene, effects=scene.config.effects_without(effect)))
+        parts.append(_rows(scene, without(effect), 0, relative_difference(other, base)))
+    return pd.concat(parts, ignore_index=True)
+
+
+def without(effect: str) -> str:
+    """Label of the runs without an effect."""
+    return f"without {effect}"
+
+
+def removable(config: SceneConfig) -> list[str]:
+    """Names of the effects of ``config`` without which the scene still is one, each once."""
+    names = dict.fromkeys(e.effect for e in config.effects)
+    return [name for name in names if config.groups != [name]]
+
+
+def _fresh(scene: Scene, **changes: object) -> Scene:
+    """The scene bound again with changes of its configuration."""
+    return Scene.build(scene.config.model_copy(update=changes), scene.mesh)
+
+
+def _rows(scene: Scene, label: str, seed: int, values: np.ndarray) -> pd.DataFrame:
+    frames = np.arange(len(values))
+    row = (scene.config.name, label, seed, frames, values)
+    return pd.DataFrame(dict(zip(COLUMNS, row, strict=True)))
+
+
+def _half_step(scene: Scene) -> np.ndarray:
+    config = scene.config
+    halved = _fresh(
+        scene,
+        time_step=0.5 * config.time_step,
+        frames=2 * config.frames,
+        effects=tuple(e.with_frames_scaled(2.0) for e in config.effects),
+    )
+    return trajectory(halved)[::2]

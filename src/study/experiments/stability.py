@@ -23,9 +23,8 @@ from study.artifact.paths import BASIS, MESH, SAMPLING, STABILITY, SUBSPACES, Fi
 from study.artifact.reads import Every, Setting
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.load_reduction import basis_of, load_reduction
-from study.experiments.kit.scenes import scene_of
+from study.experiments.kit.scenes import scene_of, varied
 from study.experiments.kit.settings import BlowupExtent, Rank, Solver, resolve_ranks
-from study.experiments.kit.variation import varied
 
 log = logging.getLogger(__name__)
 

@@ -26,14 +26,12 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Settings
 from study.experiments.iterations import IterationCounts, accelerated, stepper_of
+from study.experiments.kit.costs import effect_costs, left_out, local_costs, variant
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.effect_costs import effect_costs, left_out
 from study.experiments.kit.load_reduction import basis_of, load_reduction
-from study.experiments.kit.local_costs import local_costs, variant
 from study.experiments.kit.measurement import Measurement, Protocol, Variant, measure
-from study.experiments.kit.names import ANDERSON, FOM
 from study.experiments.kit.scenes import scene_of
-from study.experiments.kit.settings import Count, Rank, Solver, resolve_ranks
+from study.experiments.kit.settings import ANDERSON, FOM, Count, Rank, Solver, resolve_ranks
 
 log = logging.getLogger(__name__)
 

@@ -11,7 +11,7 @@ from pdrom.view import style
 from pdrom.view.artists import Artist, Axes, Figure, Line2D, SubFigure
 from pdrom.view.multiples import clipped, label_counts, log_axis, time_axis
 from study.artifact.reads import Settings, TableOf
-from study.experiments.kit.names import ANDERSON, FOM
+from study.experiments.kit.settings import ANDERSON, FOM
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Drawn, Methods, Scenes
 from study.tables.accuracy_cost import FEWER, pareto

@@ -8,7 +8,7 @@ from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from study.artifact.paths import CONTRIBUTIONS, File
 from study.artifact.reads import EachOf, Settings, TableOf
-from study.experiments.kit.names import GLOBAL, REST, RIGHT
+from study.experiments.kit.settings import GLOBAL, REST, RIGHT
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Drawn, Scenes
 from study.tables.effects_cost import NOTHING

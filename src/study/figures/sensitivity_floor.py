@@ -11,8 +11,7 @@ from pdrom.view.artists import Axes, Figure
 from pdrom.view.multiples import clipped, label_outer, log_axis, small_multiples
 from study.artifact.paths import SENSITIVITY, File
 from study.artifact.reads import EachOf, Read, Setting, Settings
-from study.experiments.kit.horizon import floor_of, horizon
-from study.experiments.kit.settings import Horizon
+from study.experiments.kit.settings import Horizon, floor_of, horizon
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Columns, Drawn, NothingToDraw, Scenes
 

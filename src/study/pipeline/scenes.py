@@ -19,7 +19,7 @@ from pdrom.model.effects.base import Seed
 from pdrom.model.effects.entries import effect_config
 from pdrom.model.mesh.config import MeshFile
 from pdrom.model.scene import Scene, SceneConfig
-from study.experiments.kit.variation import varied
+from study.experiments.kit.scenes import varied
 
 Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0, le=1e12, allow_inf_nan=False)]

@@ -18,13 +18,12 @@ from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
 from study.experiments.alternatives.settings import Alternatives
 from study.experiments.frame_times import FrameTimes
-from study.experiments.hard_cases.experiment import HardCases
+from study.experiments.hard_cases.outcomes import HardCases
 from study.experiments.iterations import IterationSweep
 from study.experiments.kit.settings import BlowupExtent, Rank, Solver
-from study.experiments.ladder import LadderSection
 from study.experiments.live import Live
 from study.experiments.noise import Noise
-from study.experiments.repetitions import RepetitionSection
+from study.experiments.repetitions import LadderSection, RepetitionSection
 from study.experiments.requested_tolerances import RequestedTolerances
 from study.experiments.reruns import Sweep
 from study.experiments.scaling import Scaling

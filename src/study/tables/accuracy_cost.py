@@ -22,7 +22,7 @@ import pandas as pd
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, PerScene, TableOf
-from study.experiments.kit.names import ANDERSON, FOM
+from study.experiments.kit.settings import ANDERSON, FOM
 from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
 from study.tables.kit.parts import joined, timings_in_one_time
 from study.tables.kit.reruns import COLUMNS, MEDIAN, trained, with_held_out

@@ -6,9 +6,8 @@ import pandas as pd
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
-from study.experiments.kit.horizon import floor_of, horizons
-from study.experiments.kit.names import FOM, GLOBAL, REST, RIGHT
-from study.experiments.kit.sensitivity import without
+from study.experiments.kit.settings import FOM, GLOBAL, REST, RIGHT, floor_of, horizons
+from study.experiments.sensitivity import without
 from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
 from study.tables.kit.parts import in_one_time, joined, timings_in_one_time
 from study.tables.kit.vocabulary import (

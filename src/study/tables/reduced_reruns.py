@@ -12,7 +12,7 @@ from pdrom.reduction.deviations import DEVIATIONS, ERRORS, REFERENCE, Series, er
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
-from study.experiments.kit.horizon import floor_of, horizons
+from study.experiments.kit.settings import floor_of, horizons
 from study.tables.kit import vocabulary
 from study.tables.kit.declaration import table, text
 from study.tables.kit.parts import timings_in_one_time

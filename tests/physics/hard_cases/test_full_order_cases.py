@@ -4,7 +4,7 @@ import pytest
 
 from hard_cases import parameters
 from study.experiments.hard_cases.catalogue import CASES
-from study.experiments.hard_cases.checks import CHECKS, faults
+from study.experiments.hard_cases.record import CHECKS, faults
 
 
 @pytest.mark.parametrize("name", parameters(CASES))

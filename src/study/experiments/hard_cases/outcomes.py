@@ -1,13 +1,17 @@
 """Every reduction, made from a hard case's own run, its outcome, and the outcome expected."""
 
-from collections.abc import Iterator, Mapping
+import logging
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
+import pandas as pd
 from pydantic import AfterValidator, Field, model_validator
 
 from pdrom.core.errors import NotReducibleError, PdromError, choices
+from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel, shown
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import State, Stepper
@@ -23,22 +27,45 @@ from pdrom.reduction.subspace.hrpd import HrpdSpec, hrpd, sampled_space
 from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
 from pdrom.reduction.subspace.space import coordinates
+from study.artifact.paths import HARD_CASES, File
+from study.artifact.reads import ProjectFiles, Setting
 from study.experiments.hard_cases.case import HardCase
-from study.experiments.hard_cases.catalogue import CASES
-from study.experiments.hard_cases.checks import momentum, reach
-from study.experiments.hard_cases.record import Record, Roundoff, Watched, full_order, record
+from study.experiments.hard_cases.catalogue import CASES, MESHES, modules_of, reducible_cases
+from study.experiments.hard_cases.record import (
+    Record,
+    Roundoff,
+    Watched,
+    full_order,
+    momentum,
+    reach,
+    record,
+)
+from study.experiments.kit.declaration import experiment
 
 HOLDS, NOTHING, NOT_TAKEN = "holds", "nothing to reduce", "not taken"
 FAILURES = ("refused", "singular", "blow-up", "distorted", "objective rises", "momentum changes")
+R, K, TOLERANCE = 10, 6, 1e-2
+HRPD = HrpdSpec(dimension=20, samples=60)
+BASES = {"pod": ("full", "ecsw", "hrpd"), "skinning": ("full", "hrpd")}
+# Multiples of the full-order run's scale: a larger extent is a blow-up, or a distorted shape.
+BLOWUP, DISTORTED = 100.0, 3.0
+# Manifolds that are bounded: no projection onto them exceeds a number known before the run.
+BOUNDED = ("clamped", "length", "half sphere")
+log = logging.getLogger(__name__)
+COLUMNS = [
+    "case", "method", "bounded_projections", "k", "r", "gain", "frames", "finite", "blowup_frame",
+    "max_extent", "objective_rise", "outcome", "why",
+]  # fmt: skip
 
 
-def _known(case: str) -> str:
-    if case not in CASES:
-        raise ValueError(f"unknown case {shown(case, 60)}{choices(case, CASES)}")
+def _known(case: str, cases: Collection[str]) -> str:
+    if case not in cases:
+        raise ValueError(f"unknown case {shown(case, 60)}{choices(case, cases)}")
     return case
 
 
-Cases = tuple[Annotated[str, AfterValidator(_known)], ...]
+Cases = tuple[Annotated[str, AfterValidator(lambda case: _known(case, CASES))], ...]
+ReducibleCase = Annotated[str, AfterValidator(lambda case: _known(case, reducible_cases()))]
 
 
 class Expectation(ConfigModel):
@@ -71,12 +98,6 @@ def surprise(outcome: str, case: str, expected: Expectation | None) -> str:
     if must and not failed:
         return f"{outcome}, but the entry expects a failure"
     return ""
-
-
-R, K, TOLERANCE = 10, 6, 1e-2
-
-HRPD = HrpdSpec(dimension=20, samples=60)
-BASES = {"pod": ("full", "ecsw", "hrpd"), "skinning": ("full", "hrpd")}
 
 
 def _samples(
@@ -195,12 +216,6 @@ def _subspace(training: Training, kind: str, sampling: str, limit: float) -> Red
     return ReducedRun(run, model.elements_evaluated(scene), columns.B.shape[1], None)
 
 
-# Multiples of the full-order run's scale: a larger extent is a blow-up, or a distorted shape.
-BLOWUP, DISTORTED = 100.0, 3.0
-# Manifolds that are bounded: no projection onto them exceeds a number known before the run.
-BOUNDED = ("clamped", "length", "half sphere")
-
-
 def scale_of(training: Training) -> float:
     """Largest extent of the full-order run of ``training``, of rest, start and held vertices, m."""
     return max(training.run.extent, reach(training.scene, training.run))
@@ -271,3 +286,49 @@ def row(
         "outcome": outcome,
         "why": entry.why if entry and outcome in FAILURES else "",
     }
+
+
+class HardCases(ConfigModel):
+    """Section ``hard_cases``: the cases, all that are not slow if empty.
+
+    expected : by reduction, where it fails and why; one not named never fails
+    """
+
+    cases: tuple[ReducibleCase, ...] = ()
+    expected: dict[str, Expectation] = Field(default_factory=dict)
+
+    @property
+    def modules(self) -> list[str]:
+        """Places of the effects of the cases."""
+        return modules_of(self.cases or reducible_cases())
+
+
+@experiment(
+    "Hard cases of every reduction",
+    reads={
+        "meshes": ProjectFiles(tuple(f"config/scenes/meshes/{name}" for name in MESHES)),
+        "every_method": Setting("every_method"),
+        "asked": Setting("hard_cases"),
+    },
+    writes={"cases": HARD_CASES},
+)
+def hard_cases(
+    meshes: list[Path],
+    every_method: dict[str, MethodSpec],
+    asked: HardCases,
+    cases: File,
+) -> None:
+    """Put every reduction through the cases; log what contradicts the expectations.
+
+    The cases find the ``meshes`` themselves.
+    """
+    found = []
+    for name in asked.cases or reducible_cases():
+        for row in rows(CASES[name], every_method, asked.expected):
+            found.append(row)
+            contradiction = surprise(row["outcome"], name, asked.expected.get(row["method"]))
+            if contradiction:
+                log.warning("%s, %s: %s", name, row["method"], contradiction)
+        log.info("%s: done", name)
+    whole = dict.fromkeys(["k", "r", "frames", "blowup_frame"], "Int64")
+    write_table(pd.DataFrame(found, columns=COLUMNS).astype(whole), cases.path)

@@ -25,8 +25,8 @@ from pdrom.reduction.local.local_step import ReducedLocalStep
 from pdrom.reduction.local.rerun import replace_group
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.subspace.store import load_models
+from study.experiments.kit.costs import variant
 from study.experiments.kit.load_reduction import load_reduction
-from study.experiments.kit.local_costs import variant
 from study.experiments.kit.measurement import Protocol, Variant, measure
 from study.experiments.kit.settings import Solver
 

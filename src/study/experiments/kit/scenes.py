@@ -1,10 +1,12 @@
-"""Scene of a run bound to its mesh file, and that run, for several experiments."""
+"""Scene of a run bound to its mesh file, that run, and the scene at another time step."""
 
+from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
 
 from pdrom.core.store import open_hdf5
+from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.held_out import HeldOutMotion
 from pdrom.model.mesh.types import load_mesh
 from pdrom.model.scene import Scene, SceneConfig
@@ -25,3 +27,28 @@ def positions_of(run: File, frames: int | None = None) -> np.ndarray:
     """Positions (F + 1, N, 3) m of a full-order run, or of its first ``frames``."""
     with open_hdf5(run.path) as file:
         return file["positions"][: None if frames is None else frames + 1]
+
+
+def varied(
+    config: SceneConfig,
+    time_step: float,
+    stiffness_ratio: float,
+    duration: float,
+    frames: Sequence[int],
+) -> SceneConfig:
+    """``config`` with ``time_step`` (s) and the reduced groups' weights times ``stiffness_ratio``.
+
+    Schedules keep their times in seconds, so that their frame numbers change. The run takes
+    ``duration`` seconds, but at least ``frames[0]`` and at most ``frames[1]`` frames. The other
+    groups keep their weights.
+    """
+    count = min(max(round(duration / time_step), frames[0]), frames[1])
+    effects = []
+    for effect in config.effects:
+        effect = effect.with_frames_scaled(config.time_step / time_step)
+        if isinstance(effect, GroupConfig) and effect.effect in config.reduce:
+            effect = effect.model_copy(update={"weight": stiffness_ratio * effect.weight})
+        effects.append(effect)
+    # the experiments, with their numbers of training snapshots, belong to the original run
+    changes = {"time_step": time_step, "frames": count, "effects": tuple(effects)}
+    return config.model_copy(update=changes)

@@ -1,15 +1,63 @@
-"""Kinds of values that the settings of several experiments share."""
+"""Settings that several experiments share, and up to which frame a run can be judged.
+
+The floor of a scene is how far its full-order run drifts when the start is moved a little, by frame
+and over all seeds (`study.experiments.sensitivity`). From the horizon on the floor exceeds a
+threshold, and a difference between two runs says nothing about their methods.
+"""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
+import numpy as np
+import pandas as pd
 from pydantic import AfterValidator, Field
 
 from pdrom.core.store import read_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.dynamics.solvers import SOLVERS
 from study.artifact.paths import File
-from study.experiments.kit.horizon import floor_of, horizon
+
+FOM = "fom"  # the full-order run with its own or another number of iterations
+ANDERSON = "fom-anderson"  # the same with accelerated iterations
+
+# phases of a frame other than effects
+RIGHT, GLOBAL, REST = "right-hand side", "global solve", "rest of the frame"
+# a run ends when its bounding box exceeds this multiple of the rest extent
+BlowupExtent = Annotated[float, Field(gt=1.0, le=1e12)]
+Count = Annotated[int, Field(ge=1, le=100_000)]
+Repeats = Annotated[int, Field(ge=1, le=1000)]
+Modes = Annotated[int, Field(ge=1, le=1000)]
+Tolerance = Annotated[float, Field(gt=0.0, lt=1.0)]
+PositionBasis = Literal["pod", "skinning"]
+Rank = Annotated[int, Field(ge=1, le=100_000)] | Literal["full"]
+
+
+def floor_of(table: pd.DataFrame, scene: str, perturbation: float | str) -> np.ndarray:
+    """Sensitivity floor (F,) of a scene at one size (or under one label) of the perturbation.
+
+    Empty if the scene was not perturbed in this way.
+
+    Parameters
+    ----------
+    table : perturbed runs with scene, perturbation, frame and relative_difference; seeds may be
+        rows of their own or joined
+    """
+    label = perturbation if isinstance(perturbation, str) else f"{perturbation:g}"
+    # a column without words is read from a file as numbers
+    rows = table[(table.scene == scene) & (table.perturbation.astype(str) == label)]
+    return rows.groupby("frame").relative_difference.max().to_numpy(float)
+
+
+def horizon(floor: np.ndarray, threshold: float) -> int:
+    """First frame at which the floor (F,) exceeds ``threshold``; F if it never does."""
+    above = np.flatnonzero(~(floor <= threshold))
+    return int(above[0]) if len(above) else len(floor)
+
+
+def horizons(table: pd.DataFrame, perturbation: float | str, threshold: float) -> dict[str, int]:
+    """`horizon` of every scene of the table by ``threshold``, see `floor_of` (``perturbation``)."""
+    scenes = table.scene.unique()
+    return {s: horizon(floor_of(table, s, perturbation), threshold) for s in scenes}
 
 
 def _known(solver: str) -> str:
@@ -19,13 +67,6 @@ def _known(solver: str) -> str:
 
 
 Solver = Annotated[str, AfterValidator(_known)]
-# a run ends when its bounding box exceeds this multiple of the rest extent
-BlowupExtent = Annotated[float, Field(gt=1.0, le=1e12)]
-Count = Annotated[int, Field(ge=1, le=100_000)]
-Repeats = Annotated[int, Field(ge=1, le=1000)]
-Modes = Annotated[int, Field(ge=1, le=1000)]
-Tolerance = Annotated[float, Field(gt=0.0, lt=1.0)]
-PositionBasis = Literal["pod", "skinning"]
 
 
 class Horizon(ConfigModel):
@@ -42,9 +83,6 @@ class Horizon(ConfigModel):
         label = self.perturbation if run == "train" else run
         spread = floor_of(read_table(perturbed.path), perturbed["scene"], label)
         return horizon(spread, self.threshold)
-
-
-Rank = Annotated[int, Field(ge=1, le=100_000)] | Literal["full"]
 
 
 def resolve_ranks(ranks: Sequence[Rank], rank: int) -> list[int]:

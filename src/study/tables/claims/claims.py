@@ -30,7 +30,7 @@ from study.tables.claims.verdicts import (
     satisfied,
     values_of,
 )
-from study.tables.kit.declaration import compared, flag, integer, number, text, timed
+from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
 from study.tables.kit.declaration import table as declare
 
 # What the rule of a claim says of it.
@@ -148,7 +148,7 @@ def _timed_of_tests(table: pd.DataFrame, **files: Path) -> list[set[str]]:
     return [set(FOUND) if tests[key].timed else set() for key in keys]
 
 
-@declare(
+@table(
     title="Tests of the claims",
     columns=(
         text("claim", "its identifier in config/claims.yaml"),
@@ -208,7 +208,7 @@ def _timed_of_variations(table: pd.DataFrame, **files: Path) -> list[set[str]]:
     ]
 
 
-@declare(
+@table(
     title="Verdicts under other rules",
     columns=(
         text("claim", "its identifier in config/claims.yaml"),

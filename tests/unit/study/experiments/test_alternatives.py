@@ -9,7 +9,7 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.core.store import read_table, write_table
 from pdrom.core.yamlfile import validate
 from study.artifact.paths import File
-from study.experiments.alternatives import experiment, processes
+from study.experiments.alternatives import experiment
 from study.experiments.alternatives.settings import Alternatives, Comparison
 from study.tables.alternatives import _pays, alternatives, winners
 
@@ -62,7 +62,7 @@ def table(written):
 def test_rows_of_a_scene(written, table):
     made = read_table(written[0].path)
     assert made.columns.tolist() == experiment.COLUMNS
-    assert read_table(written[1].path).columns.tolist() == processes.COLUMNS
+    assert read_table(written[1].path).columns.tolist() == experiment.TIME_COLUMNS
     assert len(table) == len(made)
     # a reduction is trained twice
     all_of = sum(map(len, STEPS.values()))
@@ -140,7 +140,7 @@ def test_winners_are_the_cheapest_that_reach_the_error(tmp_path):
     # the ratio in a process counts: both are slower in the second
     ms = rows.dropna(subset="ms_per_frame").drop(columns="error_implicit")
     slow = ms.assign(process=2, ms_per_frame=4.0 * ms.ms_per_frame)
-    measured = pd.concat([ms.assign(process=1), slow])[processes.COLUMNS]
+    measured = pd.concat([ms.assign(process=1), slow])[experiment.TIME_COLUMNS]
     write_table(measured, tmp_path / "times.csv")
     found = winners(rows, [File(str(tmp_path / "times.csv"), {})], [0.1, 0.01])
     found = found.set_index(["reference", "limit"])

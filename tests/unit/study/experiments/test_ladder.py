@@ -7,7 +7,7 @@ from pdrom.core.yamlfile import read_yaml
 from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.sampling import Reduction, select
 from places import ROOT
-from study.experiments.ladder import LadderSection
+from study.experiments.repetitions import LadderSection
 
 LADDER = LadderSection(**read_yaml(ROOT / "config" / "default.yaml")["ladder"])
 

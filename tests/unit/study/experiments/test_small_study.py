@@ -22,7 +22,7 @@ from small_scene import run_jobs
 from study.artifact import paths
 from study.artifact.paths import File, Place
 from study.experiments.kit.settings import Horizon
-from study.experiments.ladder import LadderSection, ladder
+from study.experiments.repetitions import LadderSection, ladder
 from study.pipeline.study import Study
 
 SCENE, GROUP, METHOD = "small", "spring", "block-deim"

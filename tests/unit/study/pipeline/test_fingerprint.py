@@ -99,7 +99,7 @@ def test_effects_are_in_no_closure_that_does_not_list_them():
         "pdrom.model.constraints.bending",
         "pdrom.model.effects.poke",
     }
-    assert not kernels & set(closure("study.experiments.mesh"))
+    assert not kernels & set(closure("study.experiments.fom"))
     assert not kernels & set(closure("study.experiments.fom"))
     with_spring = closure("study.experiments.fom", "pdrom.model.constraints.spring")
     assert kernels & set(with_spring) == {"pdrom.model.constraints.spring"}
@@ -150,7 +150,7 @@ def test_selections_are_in_no_closure_that_does_not_list_them():
 
 
 def test_order_and_repetition_of_modules_do_not_matter():
-    names = ["study.experiments.mesh", "pdrom.model.metrics", "pdrom.reduction.snapshots"]
+    names = ["study.experiments.fom", "pdrom.model.metrics", "pdrom.reduction.snapshots"]
     assert fingerprint(*names) == fingerprint(*reversed(names), names[0])
     assert fingerprint(*names) != fingerprint(*names[1:])
 
@@ -173,7 +173,7 @@ def prints(tmp_path_factory):
     def taken() -> tuple[str, ...]:
         code = (
             "from study.pipeline.fingerprint import fingerprint as f; import pdrom;"
-            "print(pdrom.__file__, f('study.experiments.mesh'),"
+            "print(pdrom.__file__, f('study.experiments.fom'),"
             "f('study.experiments.fom', 'pdrom.model.constraints.spring'))"
         )
         done = subprocess.run(
@@ -207,7 +207,7 @@ def prints(tmp_path_factory):
 
 
 def test_copy_has_the_fingerprint_of_the_original(prints):
-    assert prints["none"][0] == fingerprint("study.experiments.mesh")
+    assert prints["none"][0] == fingerprint("study.experiments.fom")
 
 
 @pytest.mark.parametrize(

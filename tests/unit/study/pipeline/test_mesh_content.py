@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from bad_input.project import MESH, SCENE, SQUARE, STUDY, Replace, load_project, make_project
-from study.experiments.mesh import mesh
+from study.experiments.fom import mesh
 from study.experiments.scaling import scaling
 from study.experiments.subspaces import online
 

@@ -14,7 +14,7 @@ from pdrom.model.held_out import MOTIONS
 from pdrom.reduction.basis import Basis, save_basis
 from study.artifact import paths
 from study.artifact.paths import File, Place
-from study.experiments.kit.horizon import floor_of
+from study.experiments.kit.settings import floor_of
 from study.tables.accuracy_cost import accuracy_cost, pareto, reference_of
 from study.tables.effects_cost import local_share
 from study.tables.kit.reruns import TRAIN, trained

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from study.experiments.hard_cases.catalogue import CASES
-from study.experiments.hard_cases.checks import CHECKS, faults
-from study.experiments.hard_cases.record import Roundoff, full_order, record
+from study.experiments.hard_cases.record import CHECKS, Roundoff, faults, full_order, record
 
 CASE = CASES["inverted_uneven"]
 

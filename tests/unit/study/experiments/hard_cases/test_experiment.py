@@ -11,10 +11,12 @@ from pdrom.core.yamlfile import read_yaml, validate
 from pdrom.reduction.method import load_methods
 from places import ROOT
 from study.artifact.paths import File
-from study.experiments.hard_cases.experiment import COLUMNS, HardCases, hard_cases
 from study.experiments.hard_cases.outcomes import (
+    COLUMNS,
     FAILURES,
     Expectation,
+    HardCases,
+    hard_cases,
     surprise,
 )
 from study.pipeline.resolve import Resolver

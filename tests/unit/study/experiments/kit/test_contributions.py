@@ -5,8 +5,7 @@ import pytest
 
 from builders import make_scene
 from pdrom.model.runs.full_order import trajectory
-from study.experiments.kit.sensitivity import removable, sensitivities, without
-from study.experiments.sensitivity import COLUMNS, contributions
+from study.experiments.sensitivity import EFFECTS, contributions, removable, sensitivities, without
 
 SPRING = {"effect": "spring", "weight": 1e3}
 GRAVITY = {"effect": "gravity"}
@@ -20,7 +19,7 @@ def table(*effects, **settings):
 
 def test_a_free_fall_is_gravity_alone():
     scene, made = table(SPRING, GRAVITY, mesh={"kind": "cloth", "rows": 4, "columns": 4}, frames=5)
-    assert made.columns.tolist() == COLUMNS
+    assert made.columns.tolist() == EFFECTS
     weight = 9.81 * np.sqrt(np.square(scene.masses).sum())
     force = made.set_index(["effect", "frame"]).force
     assert force["gravity"].to_numpy() == pytest.approx(np.full(5, weight))

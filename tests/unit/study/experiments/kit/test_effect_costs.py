@@ -5,7 +5,7 @@ import pytest
 
 from builders import make_scene
 from pdrom.model.constraints.local_kernel import LocalPass
-from study.experiments.kit.effect_costs import (
+from study.experiments.kit.costs import (
     COSTS,
     LEFT_OUT,
     Timed,
@@ -13,7 +13,7 @@ from study.experiments.kit.effect_costs import (
     left_out,
     left_out_sets,
 )
-from study.experiments.kit.names import GLOBAL, REST, RIGHT
+from study.experiments.kit.settings import GLOBAL, REST, RIGHT
 
 EFFECTS = (
     {"effect": "gravity"},
@@ -96,7 +96,7 @@ def test_a_scene_without_an_effect_does_not_ask_it(monkeypatch):
     monkeypatch.setattr(TriangleStrain, "accumulate", refuse)
     with pytest.raises(AssertionError, match="strain was asked"):
         left_out(scene, costs, 2, 0, 1, "splu")
-    monkeypatch.setattr("study.experiments.kit.effect_costs.left_out_sets", lambda _: [("strain",)])
+    monkeypatch.setattr("study.experiments.kit.costs.left_out_sets", lambda _: [("strain",)])
     table = left_out(scene, costs, 2, 0, 1, "splu")
     assert list(table.columns) == LEFT_OUT
     row = table.iloc[0]

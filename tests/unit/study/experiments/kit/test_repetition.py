@@ -9,7 +9,7 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import reductions
 from pdrom.reduction.snapshots import SnapshotSet
-from study.experiments.kit.repetition import ReducedRuns, Repetitions, drawn
+from study.experiments.repetitions import ReducedRuns, Repetitions, drawn
 
 FULL = MethodSpec(title="all", centring="affine", rows="all")
 BLOCK = MethodSpec(title="elements", centring="affine", rows="element", solve="qr")

@@ -12,8 +12,8 @@ from builders import make_scene
 from pdrom.core.store import read_table, write_table
 from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.deviations import error_within
-from study.experiments.kit.horizon import floor_of, horizon, horizons
-from study.experiments.kit.sensitivity import (
+from study.experiments.kit.settings import floor_of, horizon, horizons
+from study.experiments.sensitivity import (
     COLUMNS,
     heldout_floor,
     perturbation_field,

@@ -6,7 +6,7 @@ import pytest
 from builders import make_scene
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
-from study.experiments.kit.variation import varied
+from study.experiments.kit.scenes import varied
 
 EFFECTS = (
     {"effect": "gravity"},
