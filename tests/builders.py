@@ -21,6 +21,9 @@ OBSTACLES = {
     "sphere": {"centre": [0.1, 0.2, 0.3], "radius": 0.7},
     "box": {"lower": [-0.4, -0.5, -0.6], "upper": [0.7, 0.6, 0.5]},
 }
+GRAVITY = {"effect": "gravity"}
+LEFT = {"effect": "pins", "select": "left"}
+TOP = {"effect": "pins", "select": "top"}
 # File of a small sheet, for commands.
 SMALL = """\
 name: small
@@ -49,6 +52,12 @@ def make_scene(
         }
     )
     return Scene.build(config, config.mesh.build(ROOT))
+
+
+def with_effects(scene: Scene, *effects: dict) -> Scene:
+    """The scene with further effects."""
+    further = make_scene({"effect": "spring", "weight": 1.0}, *effects).config.effects[1:]
+    return scene.changed(effects=(*scene.config.effects, *further))
 
 
 def random_rotation(rng: np.random.Generator) -> np.ndarray:

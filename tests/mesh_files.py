@@ -6,7 +6,9 @@ import zlib
 from pathlib import Path
 
 import meshio
+import numpy as np
 
+from pdrom.model.mesh import reader
 from pdrom.model.mesh.files import FORMATS
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh
@@ -32,6 +34,22 @@ def write_mesh(path: Path, name: str) -> Mesh:
     points = mesh.points.round(3)
     meshio.write(path, meshio.Mesh(points, [cells]), file_format=name)
     return Mesh(points, mesh.triangles, mesh.tetrahedra)
+
+
+def read_here(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Points and cells of a file, read in this process."""
+    return reader.read(str(path), list(FORMATS[path.suffix]), 10**6, 10**6)
+
+
+def refusal(path: Path) -> str:
+    """Why the file is refused, on one line; nothing if it is read."""
+    said = ""
+    try:
+        read_here(path)
+    except ValueError as error:
+        said = str(error)
+    assert "\n" not in said
+    return said
 
 
 def zeros_vtu(blocks: int) -> str:

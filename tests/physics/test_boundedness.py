@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from builders import GROUPS, make_scene
+from builders import GRAVITY, GROUPS, LEFT, make_scene
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects.held import held_vertices
 from pdrom.model.scene import Scene
@@ -16,7 +16,6 @@ BAR = {"kind": "bar", "nx": 3, "ny": 2, "nz": 2}
 MESHES = {"spring": SHEET, "strain": SHEET, "bending": SHEET, "deformation_gradient": BAR}
 FRAMES = 16
 SCENES = 300
-LEFT = {"effect": "pins", "select": "left"}
 RIGHT = {"effect": "pins", "select": "right"}
 RELEASED = [{**LEFT, "until": 20}, {**RIGHT, "start": 10, "until": 30}]
 MOVED = {"effect": "translate", "select": "left", "over": 6, "offset": [0.3, 0.0, 0.2]}
@@ -116,7 +115,7 @@ def allowed(scene: Scene) -> np.ndarray:
 def test_a_run_with_any_bounded_projections_stays_within_its_bound(group, holds, rng):
     """Other random projections in every iteration, a hundred times as large as projections are."""
     own = {"effect": group, "weight": 1e4}
-    scene = make_scene({"effect": "gravity"}, *holds, own, mesh=GROUPS[group], frames=60)
+    scene = make_scene(GRAVITY, *holds, own, mesh=GROUPS[group], frames=60)
     g = scene.group(group)
     radii = 100.0 * largest_projections(g, scene.mesh.points)
 
@@ -133,7 +132,7 @@ def test_a_run_with_any_bounded_projections_stays_within_its_bound(group, holds,
 def random_scene(rng: np.random.Generator) -> Scene:
     """Masses over two decades, any mixture of the forces with a rate, any of `HOLDS`."""
     group, h = str(rng.choice(list(MESHES))), float(10.0 ** rng.uniform(-2.5, -1.0))
-    effects = [{"effect": "gravity"}] if rng.random() < 0.5 else []
+    effects = [GRAVITY] if rng.random() < 0.5 else []
     if rng.random() < 0.3:
         effects.append({"effect": "damping", "rate": rng.uniform(0.0, 0.99) / h})
     if rng.random() < 0.3:
@@ -189,7 +188,7 @@ def test_the_bound_holds_in_random_scenes_and_is_nearly_met():
 
 def test_forces_keep_what_their_accelerations_leave_of_a_velocity(rng):
     """Reference: the difference of two predictions with velocities that differ."""
-    forces = [{"effect": "gravity"}, {"effect": "damping", "rate": 3.0}]
+    forces = [GRAVITY, {"effect": "damping", "rate": 3.0}]
     scene = make_scene(
         *forces, {"effect": "drag", "coefficient": 50.0}, {"effect": "strain", "weight": 1.0}
     )

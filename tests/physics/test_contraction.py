@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from builders import GROUPS, make_scene
+from builders import GRAVITY, GROUPS, LEFT, make_scene
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
@@ -16,7 +16,7 @@ METHODS = {
     "pod": MethodSpec(title="pod", centring="affine", rows="all"),
     "block": MethodSpec(title="block", centring="affine", rows="element"),
 }
-MOVING = [{"effect": "gravity"}, {"effect": "pins", "select": "left"}]
+MOVING = [GRAVITY, LEFT]
 
 
 def _case(group: str, method: MethodSpec, r: int = 6) -> tuple[Scene, Reduction, np.ndarray]:

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from builders import GROUPS, make_scene, random_rotation
+from builders import GRAVITY, GROUPS, TOP, make_scene, random_rotation, with_effects
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs.full_order import simulate, trajectory
-
-GRAVITY = {"effect": "gravity"}
 
 
 def test_rest_state_stays_at_rest(group_scene):
@@ -17,21 +15,12 @@ def test_rest_state_stays_at_rest(group_scene):
 
 
 def test_free_fall_is_a_rigid_parabola(group_scene):
-    scene = group_scene.__class__.build(
-        group_scene.config.model_copy(
-            update={"effects": (*group_scene.config.effects, *_configs(GRAVITY))}
-        ),
-        group_scene.mesh,
-    )
+    scene = with_effects(group_scene, GRAVITY)
     positions = trajectory(scene)
     h, frames = scene.config.time_step, scene.config.frames
     fall = -9.81 * h**2 * np.arange(frames + 1) * np.arange(1, frames + 2) / 2
     expected = scene.mesh.points[None] + fall[:, None, None] * np.array([0.0, 1.0, 0.0])
     assert np.abs(positions - expected).max() < 1e-8
-
-
-def _configs(*effects):
-    return make_scene({"effect": "spring", "weight": 1.0}, *effects).config.effects[1:]
 
 
 def test_momenta_in_free_flight(group_scene, rng):
@@ -74,9 +63,7 @@ def test_angular_momentum_of_the_converged_step(group, rng):
 @pytest.mark.parametrize("spread", [0.05, 1.0, 50.0])
 def test_objective_never_rises(group_scene, rng, spread):
     """For fixed s each local/global iteration is a descent step, from any state."""
-    scene = group_scene
-    config = scene.config.model_copy(update={"iterations": 40, "frames": 3})
-    scene = scene.__class__.build(config, scene.mesh)
+    scene = group_scene.changed(iterations=40, frames=3)
     loop = scene.stepper()
     shape = scene.mesh.points.shape
     state = State(
@@ -91,7 +78,7 @@ def test_objective_never_rises(group_scene, rng, spread):
 def test_objective_never_rises_with_all_groups_and_pins(rng):
     scene = make_scene(
         GRAVITY,
-        {"effect": "pins", "select": "top"},
+        TOP,
         {"effect": "bending", "weight": 1e-1},
         {"effect": "spring", "weight": 1e6},
         {"effect": "strain", "weight": 1e-2},

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 
+from builders import GRAVITY, LEFT
 from pdrom import api
 from pdrom.api.pictures import viewed_scenes
 from pdrom.core.errors import ConfigurationError, PdromError, RankError, StorageError
@@ -24,11 +25,7 @@ from study.pipeline.scenes import load_bound_scene
 PAGE = (
     (ROOT / "docs" / "library.md").read_text("utf-8").split("## From Python")[1].split("\n## ")[0]
 )
-EFFECTS = [
-    {"effect": "gravity"},
-    {"effect": "pins", "select": "left"},
-    {"effect": "spring", "weight": 1e5},
-]
+EFFECTS = [GRAVITY, LEFT, {"effect": "spring", "weight": 1e5}]
 KEYS = {"mesh": {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}, "frames": 12}
 
 

@@ -3,26 +3,16 @@
 import numpy as np
 import pytest
 
-from builders import make_scene
+from builders import GRAVITY, TOP, make_scene, with_effects
 from pdrom.model.energy import STRIDE, EnergyScale, energies
 from pdrom.model.runs.full_order import trajectory
 
 SPRING = {"effect": "spring", "weight": 1e4}
-GRAVITY = {"effect": "gravity"}
-PINS = {"effect": "pins", "select": "top"}
 
 
 def test_the_full_order_run_has_ratio_one(group_scene):
     """Whatever the group, and whether or not the initial state or a later one has the most."""
-    pushed = group_scene.config.model_copy(
-        update={
-            "effects": (
-                *group_scene.config.effects,
-                *make_scene(SPRING, GRAVITY).config.effects[1:],
-            )
-        }
-    )
-    scene = type(group_scene).build(pushed, group_scene.mesh)
+    scene = with_effects(group_scene, GRAVITY)
     run = trajectory(scene)
     assert EnergyScale.of(scene, run).ratio(run) == 1.0
 
@@ -58,7 +48,7 @@ def test_the_last_frame_counts_whatever_the_stride():
 
 
 def test_a_run_that_gains_energy_has_a_ratio_above_one():
-    scene = make_scene(SPRING, GRAVITY, PINS, frames=12)
+    scene = make_scene(SPRING, GRAVITY, TOP, frames=12)
     run = trajectory(scene)
     scale = EnergyScale.of(scene, run)
     rest = scene.mesh.points
@@ -68,7 +58,7 @@ def test_a_run_that_gains_energy_has_a_ratio_above_one():
 
 
 def test_overflow_is_infinite_and_nothing_to_compare_is_none():
-    scene = make_scene(SPRING, GRAVITY, PINS, frames=4)
+    scene = make_scene(SPRING, GRAVITY, TOP, frames=4)
     run = trajectory(scene)
     assert EnergyScale.of(scene, run).ratio(1e200 * run) == np.inf
     still = make_scene(SPRING, frames=4)

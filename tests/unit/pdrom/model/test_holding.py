@@ -5,6 +5,7 @@ import logging
 import numpy as np
 import pytest
 
+from builders import LEFT
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene, SceneConfig
@@ -23,10 +24,9 @@ def held(caplog, mesh: Mesh, *effects: dict) -> list[tuple[str, str]]:
 
 
 def test_every_hold_is_counted(caplog):
-    pins = {"effect": "pins", "select": "left"}
     poke = {"effect": "poke", "count": 2, "avoid": ["left", [19]]}
     listed = {"effect": "translate", "select": [19], "offset": [0, 0, 1], "over": 2}
-    assert held(caplog, cloth(5, 4), pins, poke, listed) == [
+    assert held(caplog, cloth(5, 4), LEFT, poke, listed) == [
         ("INFO", "scene 'sheet', effect 'pins': holds 4 of 20 vertices (select: left)"),
         ("INFO", "scene 'sheet', effect 'poke': holds 2 of 20 vertices"),
         ("INFO", "scene 'sheet', effect 'translate': holds 1 of 20 vertices"),
@@ -37,9 +37,7 @@ def test_a_side_of_one_vertex_is_a_warning(caplog):
     """An unstructured sheet: no two vertices lie on one line along y."""
     mesh = cloth(5, 4)
     moved = mesh.points + np.random.default_rng(1).uniform(-0.01, 0.01, mesh.points.shape)
-    ((level, message),) = held(
-        caplog, Mesh(moved, mesh.triangles), {"effect": "pins", "select": "left"}
-    )
+    ((level, message),) = held(caplog, Mesh(moved, mesh.triangles), LEFT)
     assert level == "WARNING"
     assert "effect 'pins': holds 1 of 20 vertices, fewer than 3 (select: left" in message
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from builders import make_scene
+from builders import GRAVITY, TOP, make_scene
 from pdrom.core.store import open_hdf5
 from pdrom.model.compiled import rows
 from pdrom.model.constraints.local_kernel import OWN, LocalKernel, call, local_kernel
@@ -60,7 +60,7 @@ def test_only_needed_snapshots_are_stored(tmp_path):
 
 def test_stored_snapshot_is_the_projection_of_the_last_iterate(tmp_path):
     """Replay frame 3 and project at the last local iterate."""
-    effects = [{"effect": "gravity"}, {"effect": "pins", "select": "top"}, SPRING]
+    effects = [GRAVITY, TOP, SPRING]
     scene = make_scene(*effects, frames=5)
     run(scene, tmp_path / "run.h5", {"spring": np.array([3])})
     seen = []

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from builders import make_scene
+from builders import GRAVITY, TOP, make_scene
 from pdrom.core.errors import SnapshotError, StorageError
 from pdrom.core.store import open_hdf5, write_hdf5
 from pdrom.model.runs.full_order import run
@@ -72,7 +72,7 @@ def test_row_mass_of_springs_by_hand():
 def runs(tmp_path_factory):
     """Scene with a training and a held-out run of 12 frames."""
     folder = tmp_path_factory.mktemp("runs")
-    effects = [{"effect": "gravity"}, {"effect": "pins", "select": "top"}]
+    effects = [GRAVITY, TOP]
     scene = make_scene(*effects, {"effect": "spring", "weight": 1e4}, frames=12)
     run(scene, folder / "train.h5", {"spring": stored_frames(12, 3)})
     run(scene, folder / "held.h5", {"spring": np.array([1, 6])})

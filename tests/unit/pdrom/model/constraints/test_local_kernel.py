@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from builders import GROUPS, make_scene
+from builders import GRAVITY, GROUPS, LEFT, make_scene
 from pdrom.model.compiled import rows
 from pdrom.model.constraints.local_kernel import (
     FIRST,
@@ -17,7 +17,6 @@ from pdrom.model.constraints.local_kernel import (
 from pdrom.model.effects import EFFECTS
 from pdrom.model.scene import Scene
 
-GRAVITY = {"effect": "gravity"}
 SPLIT = [name for name in sorted(GROUPS) if hasattr(EFFECTS.load(name), "split_from")]
 
 
@@ -48,7 +47,7 @@ def test_compiled_iterations_add_both_parts(monkeypatch):
     """All groups of a scene, several frames: without the compiled loop each adds its own parts."""
     mesh = {"kind": "cloth", "rows": 9, "columns": 8, "plane": "xz", "wave": 0.1}
     effects = [{"effect": name, "weight": 1e3} for name in ("bending", "spring", "strain")]
-    scene = make_scene(GRAVITY, {"effect": "pins", "select": "left"}, *effects, mesh=mesh)
+    scene = make_scene(GRAVITY, LEFT, *effects, mesh=mesh)
     for group in scene.groups:
         monkeypatch.setattr(type(group), "split_from", 2)
     scene = Scene.build(scene.config, scene.mesh)

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from builders import GROUPS, make_scene
+from builders import GRAVITY, GROUPS, LEFT, make_scene
 from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.runs.full_order import simulate, trajectory
-
-PINNED = {"effect": "pins", "select": "left"}
 
 
 def affine_map(rng, n=12, distinct=4):
@@ -53,7 +51,7 @@ def test_residual_is_that_of_gmres(rng):
 
 @pytest.mark.parametrize("group", sorted(GROUPS))
 def test_same_fixed_point_and_monotone_objective(group):
-    effects = ({"effect": group, "weight": 1e4}, {"effect": "gravity"})
+    effects = ({"effect": group, "weight": 1e4}, GRAVITY)
     settings = {"mesh": GROUPS[group], "frames": 3}
     plain = trajectory(make_scene(*effects, **settings, iterations=2000))
     for window in (1, 3, 6):
@@ -66,7 +64,7 @@ def test_same_fixed_point_and_monotone_objective(group):
 
 @pytest.mark.parametrize("group", ["spring", "strain", "deformation_gradient"])
 def test_ten_accelerated_iterations_beat_ten_plain_ones(group):
-    effects = ({"effect": group, "weight": 1e5}, {"effect": "gravity"}, PINNED)
+    effects = ({"effect": group, "weight": 1e5}, GRAVITY, LEFT)
     runs = {
         (k, w): trajectory(
             make_scene(*effects, mesh=GROUPS[group], frames=8, iterations=k, anderson_window=w)
@@ -97,8 +95,7 @@ def test_window_zero_is_the_plain_iteration(group_scene):
 
 def test_pinned_vertices_stay_exactly_in_place():
     scene = make_scene(
-        {"effect": "spring", "weight": 1e5}, {"effect": "gravity"}, PINNED,
-        frames=5, anderson_window=4,
-    )  # fmt: skip
+        {"effect": "spring", "weight": 1e5}, GRAVITY, LEFT, frames=5, anderson_window=4
+    )
     held = scene.boundaries[0].vertices
     assert np.array_equal(trajectory(scene)[-1][held], scene.mesh.points[held])

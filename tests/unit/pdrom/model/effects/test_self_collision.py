@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from scipy.spatial.distance import pdist, squareform
 
-from builders import make_scene
+from builders import GRAVITY, LEFT, make_scene
 from pdrom.core.errors import NotReducibleError
 from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.subspace.model import make_columns
@@ -37,7 +37,7 @@ def closest(scene, positions):
 )  # fmt: skip
 def test_no_pair_ends_closer_than_nine_tenths(start):
     """A sheet that falls on the floor as a heap: vertices coincide at the start."""
-    scene = sheet({"effect": "gravity"}, {"effect": "floor"})
+    scene = sheet(GRAVITY, {"effect": "floor"})
     loop, state = scene.stepper(), start(scene)
     assert closest(scene, state.positions) < 0.5
     for frame in range(40):
@@ -51,7 +51,7 @@ def test_a_folded_cloth_keeps_its_layers_apart():
         "effect": "keyframes", "select": "right", "interpolation": "smooth",
         "keys": [{"at": 30, "offset": [-0.5, 0.5, 0]}, {"at": 60, "offset": [-0.9, 0.1, 0]}],
     }  # fmt: skip
-    effects = [{"effect": "gravity"}, {"effect": "floor"}, {"effect": "pins", "select": "left"}]
+    effects = [GRAVITY, {"effect": "floor"}, LEFT]
     with_it = sheet(*effects, over, frames=80)
     last = trajectory(with_it)[-1]
     assert closest(with_it, last) >= 0.9
@@ -99,7 +99,7 @@ def test_what_is_apart_is_left_alone():
 
 
 def test_two_runs_give_the_same_bits():
-    scenes = [sheet({"effect": "gravity"}, {"effect": "floor"}, frames=20) for _ in range(2)]
+    scenes = [sheet(GRAVITY, {"effect": "floor"}, frames=20) for _ in range(2)]
     first, second = (trajectory(scene, perturbation=folding(scene)) for scene in scenes)
     assert np.array_equal(first, second)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from builders import make_scene
+from builders import GRAVITY, LEFT, make_scene
 from pdrom.core.errors import ConfigurationError
 from pdrom.model.runs.full_order import trajectory
 from pdrom.model.scene import Scene
@@ -20,11 +20,7 @@ from pdrom.reduction.requested.run import (
     transferred,
 )
 
-EFFECTS = (
-    {"effect": "gravity"},
-    {"effect": "pins", "select": "left"},
-    {"effect": "spring", "weight": 1e5},
-)
+EFFECTS = (GRAVITY, LEFT, {"effect": "spring", "weight": 1e5})
 SHEET = {"kind": "cloth", "rows": 7, "columns": 7, "plane": "xz"}
 SETTINGS = ToleranceSettings(modes=(8,), tolerances=(1e-2,), iterations=(10,), factor=2.0)
 FRAMES, KICK = 24, {"effect": "kick", "speed": 0.4, "seed": 7}

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from builders import make_scene, random_rotation
+from builders import TOP, make_scene, random_rotation
 from pdrom.core.errors import SolverError
 from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.subspace.columns import (
@@ -80,7 +80,7 @@ def test_orthonormal_leaves_out_dependent_and_zero_columns():
 
 
 HELD = (
-    {"effect": "pins", "select": "top"},
+    TOP,
     {"effect": "translate", "select": "bottom", "offset": [0.0, -0.2, 0.1], "over": 5, "until": 8},
 )
 SPRING = {"effect": "spring", "weight": 1e5}
@@ -263,9 +263,7 @@ def test_a_regular_system_is_solved(rng):
 @pytest.mark.parametrize("mass", [1e-100, 1e-6, 1.0, 1e100])
 def test_coordinates_do_not_depend_on_the_unit_of_mass(mass, rng):
     """With held vertices, whose columns are not mass-orthonormal; the rest shape is met exactly."""
-    scene = make_scene(
-        {"effect": "pins", "select": "top"}, {"effect": "spring", "weight": 1e5}, vertex_mass=mass
-    )
+    scene = make_scene(TOP, {"effect": "spring", "weight": 1e5}, vertex_mass=mass)
     points = scene.mesh.points
     motion = points + 0.1 * rng.standard_normal((5, *points.shape))
     columns = make_columns(scene, motion, "pod", 4)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from builders import GROUPS, make_scene
+from builders import GRAVITY, GROUPS, LEFT, TOP, make_scene
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.subspace import ecsw
@@ -23,8 +23,7 @@ from pdrom.reduction.subspace.model import SubspaceModel, make_columns, rerun_mo
 from pdrom.reduction.subspace.space import ReducedSpace, coordinates
 
 SCENES = {
-    name: make_scene({"effect": name, "weight": 1e4}, {"effect": "gravity"}, mesh=GROUPS[name])
-    for name in GROUPS
+    name: make_scene({"effect": name, "weight": 1e4}, GRAVITY, mesh=GROUPS[name]) for name in GROUPS
 }
 
 
@@ -63,14 +62,10 @@ def test_objective_never_rises_whatever_the_factors(name, seed, spread):
 @pytest.fixture(scope="module")
 def pulled():
     """Scene of springs and strain under a handle, its run, and a snapshot basis."""
-    scene = make_scene(
-        {"effect": "spring", "weight": 1e4},
-        {"effect": "strain", "weight": 1e5},
-        {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]},
-        {"effect": "pins", "select": "top"},
-        mesh={"kind": "cloth", "rows": 10, "columns": 9},
-        frames=12,
-    )
+    groups = {"effect": "spring", "weight": 1e4}, {"effect": "strain", "weight": 1e5}
+    pull = {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]}
+    mesh = {"kind": "cloth", "rows": 10, "columns": 9}
+    scene = make_scene(*groups, pull, TOP, mesh=mesh, frames=12)
     run = trajectory(scene)
     return scene, run, make_columns(scene, run[1:], "pod", 4)
 
@@ -222,11 +217,9 @@ FRAME = 5
 @pytest.fixture
 def hanging():
     """A sheet that hangs from a side, in a subspace, and its stiffness and mass there."""
-    scene = make_scene(
-        {"effect": "gravity"}, {"effect": "pins", "select": "left"},
-        {"effect": "spring", "weight": 1e4},
-        mesh={"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}, frames=100,
-    )  # fmt: skip
+    mesh = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
+    effects = GRAVITY, LEFT, {"effect": "spring", "weight": 1e4}
+    scene = make_scene(*effects, mesh=mesh, frames=100)
     columns = make_columns(scene, trajectory(scene)[1:], "pod", 6)
     steps = [SubspaceLocalStep(group, columns) for group in scene.groups]
     space = ReducedSpace(scene, columns, [step.matrix for step in steps])

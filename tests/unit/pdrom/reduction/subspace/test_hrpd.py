@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_subspace_run import GRAVITY, PINS, SCENES, SPRING, hrpd_of, run_model, whole_space
+from test_subspace_run import GRAVITY, SCENES, SPRING, hrpd_of, run_model, whole_space
 
-from builders import GROUPS, make_scene, random_rotation
+from builders import GROUPS, LEFT, TOP, make_scene, random_rotation
 from pdrom.core.errors import SamplingError
 from pdrom.core.store import open_hdf5, write_hdf5
 from pdrom.model.constraints.lanes import LANES
@@ -167,7 +167,7 @@ def test_arrays_of_a_step_have_the_size_of_the_sample():
     """Meshes of two sizes: nothing that the step holds grows."""
     sizes = []
     for rows in (10, 20):
-        scene = make_scene(SPRING, PINS, mesh={"kind": "cloth", "rows": rows, "columns": 10})
+        scene = make_scene(SPRING, TOP, mesh={"kind": "cloth", "rows": rows, "columns": 10})
         run = trajectory(scene)
         columns = make_columns(scene, run[1:], "skinning", 4)
         found = hrpd(
@@ -195,7 +195,7 @@ def group_vertices(scene) -> int:
 
 def test_projections_that_are_round_off_need_no_element():
     """A flat sheet has nothing to bend: no mode, no sample, and the same run as with all."""
-    scene = make_scene({"effect": "bending", "weight": 10.0}, SPRING, GRAVITY, PINS, frames=5)
+    scene = make_scene({"effect": "bending", "weight": 10.0}, SPRING, GRAVITY, TOP, frames=5)
     reference = trajectory(scene)
     columns = make_columns(scene, reference[1:], "pod", 3)
     found = hrpd_of(scene, columns)
@@ -226,8 +226,8 @@ def test_interpolations_survive_a_file(tmp_path):
     ids=["joint rows", "whole elements"],
 )
 def test_the_right_hand_side_by_a_reduction_is_that_of_its_reconstruction(choices):
-    pull, pins = {"effect": "gravity"}, {"effect": "pins", "select": "left"}
-    scene = make_scene(pull, pins, {"effect": "strain", "weight": 1e4}, mesh=GROUPS["strain"])
+    effects = {"effect": "gravity"}, LEFT, {"effect": "strain", "weight": 1e4}
+    scene = make_scene(*effects, mesh=GROUPS["strain"])
     (group,) = scene.groups
     run = trajectory(scene, track_objective=False)
     snapshots = np.stack([group.project(q) for q in run])

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from builders import GROUPS, make_scene
+from builders import GROUPS, LEFT, TOP, make_scene
 from pdrom.core.errors import SceneError
 from pdrom.core.store import write_hdf5
 from pdrom.model.dynamics.stepper import Stepper
@@ -22,46 +22,27 @@ from pdrom.reduction.subspace.store import load_models, store_columns, store_mod
 SPRING = {"effect": "spring", "weight": 1e5}
 STRAIN = {"effect": "strain", "weight": 1e5}
 GRAVITY = {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]}
-PINS = {"effect": "pins", "select": "top"}
-HANDLES = (
-    PINS,
-    {"effect": "rotate", "select": "bottom", "axis": "y", "degrees": 30.0, "over": 6},
-)
+HANDLES = (TOP, {"effect": "rotate", "select": "bottom", "axis": "y", "degrees": 30.0, "over": 6})
+DAMPING = {"effect": "damping", "rate": 2.0}
+DRAG = {"effect": "drag", "coefficient": 5.0}
+BENDING = {"effect": "bending", "weight": 10.0}
+TETRAHEDRA = {"effect": "tetrahedron_strain", "weight": 1e6}
 BAR = GROUPS["tetrahedron_strain"]
+POKE = {"effect": "poke", "over": 4, "rest": 2, "count": 2, "avoid": ["top"]}
+DOWN = {"effect": "gravity", "acceleration": [0.0, -300.0, 0.0]}
 
 # each test makes its own: what a module holds is not released before the interpreter ends
 SCENES = {
     "free": partial(make_scene, SPRING, STRAIN, GRAVITY, frames=6),
-    "pins": partial(make_scene, SPRING, GRAVITY, PINS, frames=6),
+    "pins": partial(make_scene, SPRING, GRAVITY, TOP, frames=6),
     "handles": partial(make_scene, SPRING, STRAIN, GRAVITY, *HANDLES, frames=8),
-    "damped": partial(
-        make_scene, SPRING, GRAVITY, {"effect": "damping", "rate": 2.0}, PINS, frames=6
-    ),
-    "dragged": partial(
-        make_scene,
-        SPRING, GRAVITY, {"effect": "damping", "rate": 2.0}, {"effect": "drag", "coefficient": 5.0},
-        PINS, frames=6,
-    ),
-    "bending": partial(
-        make_scene,
-        {"effect": "bending", "weight": 10.0}, GRAVITY, PINS, mesh=GROUPS["bending"], frames=6
-    ),
-    "bar": partial(
-        make_scene,
-        {"effect": "tetrahedron_strain", "weight": 1e6}, GRAVITY,
-        {"effect": "pins", "select": "left"}, mesh=BAR, frames=6,
-    ),
-    "poke": partial(
-        make_scene,
-        SPRING, {"effect": "poke", "over": 4, "rest": 2, "count": 2, "avoid": ["top"]}, PINS,
-        frames=12,
-    ),
-    "floor": partial(
-        make_scene,
-        SPRING, {"effect": "gravity", "acceleration": [0.0, -300.0, 0.0]}, {"effect": "floor"},
-        frames=12,
-    ),
-}  # fmt: skip
+    "damped": partial(make_scene, SPRING, GRAVITY, DAMPING, TOP, frames=6),
+    "dragged": partial(make_scene, SPRING, GRAVITY, DAMPING, DRAG, TOP, frames=6),
+    "bending": partial(make_scene, BENDING, GRAVITY, TOP, mesh=GROUPS["bending"], frames=6),
+    "bar": partial(make_scene, TETRAHEDRA, GRAVITY, LEFT, mesh=BAR, frames=6),
+    "poke": partial(make_scene, SPRING, POKE, TOP, frames=12),
+    "floor": partial(make_scene, SPRING, DOWN, {"effect": "floor"}, frames=12),
+}
 
 
 def ecsw_of(scene, columns, every=5):
@@ -144,7 +125,7 @@ def test_snapshot_basis_error_falls_with_its_size():
 
 def test_released_pins_move_again():
     scene = make_scene(
-        SPRING, GRAVITY, PINS, {"effect": "pins", "select": "bottom", "until": 3}, frames=8
+        SPRING, GRAVITY, TOP, {"effect": "pins", "select": "bottom", "until": 3}, frames=8
     )
     reference = trajectory(scene)
     bottom = scene.boundaries[1].vertices
@@ -241,7 +222,7 @@ def test_arrays_of_a_step_have_the_size_of_the_sample():
     """The same sampled elements on meshes of two sizes: nothing grows with the mesh."""
     sizes = []
     for rows in (32, 64):
-        scene = make_scene(SPRING, PINS, mesh={"kind": "cloth", "rows": rows, "columns": 8})
+        scene = make_scene(SPRING, TOP, mesh={"kind": "cloth", "rows": rows, "columns": 8})
         run = trajectory(scene)
         columns = make_columns(scene, run[1:], "skinning", 4)
         step = SubspaceLocalStep(scene.groups[0], columns, np.array([3, 11]), np.ones(2))
