@@ -67,6 +67,20 @@ def random_rotation(rng: np.random.Generator) -> np.ndarray:
     return q * np.sign(np.linalg.det(q))
 
 
+class Pushing:
+    """A local step that adds what ``draw`` gives in each call: (N, 3) N, or a number."""
+
+    def __init__(self, draw, name: str = "spring") -> None:
+        self.draw, self.name = draw, name
+
+    def begin_frame(self, q: np.ndarray) -> None:
+        """Nothing is frozen."""
+
+    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
+        rhs += self.draw()
+        return float("nan")
+
+
 @njit
 def call_kernel(address, d, parameters, p, m):
     """Call the compiled kernel at ``address`` for ``m`` elements; p is written."""

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from builders import GRAVITY, GROUPS, LEFT, make_scene
+from builders import GRAVITY, GROUPS, LEFT, Pushing, make_scene
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects.held import held_vertices
 from pdrom.model.scene import Scene
@@ -29,20 +29,6 @@ HOLDS: list[list[dict]] = [
     [{"effect": "rotate", "select": "left", "axis": "x", "degrees": 90.0, "over": 8}],
     [{"effect": "poke", "over": 4, "rest": 1, "count": 3}],
 ]
-
-
-class Forces:
-    """A local step that adds a force (N, 3) N, new for each call of ``draw``."""
-
-    def __init__(self, draw) -> None:
-        self.name, self._draw = "forces", draw
-
-    def begin_frame(self, q: np.ndarray) -> None:
-        """Nothing is frozen."""
-
-    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        rhs += self._draw()
-        return float("nan")
 
 
 def largest_projections(group: ConstraintGroup, points: np.ndarray) -> np.ndarray:
@@ -90,7 +76,7 @@ def differences(scene: Scene, draw, without) -> np.ndarray:
     """|e|_K (F,) after each frame of two runs with the forces of ``draw`` and ``without``."""
     ends = []
     for forces in (draw, without):
-        loop = scene.stepper(local_steps=[Forces(forces)], track_objective=False)
+        loop = scene.stepper(local_steps=[Pushing(forces)], track_objective=False)
         state, positions = scene.initial_state(), []
         for frame in range(scene.config.frames):
             state, _ = loop.step(state, frame)

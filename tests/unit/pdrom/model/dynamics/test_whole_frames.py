@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from builders import GROUPS, make_scene
+from builders import GROUPS, TOP, make_scene
 from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.scene import Scene
 from places import ROOT
@@ -14,40 +14,33 @@ from study.pipeline.scenes import Coarsen, read_scene, scene_names
 SPRING = {"effect": "spring", "weight": 1e5}
 STRAIN = {"effect": "strain", "weight": 1e5}
 FALL = {"effect": "gravity", "acceleration": [0.0, -200.0, 1.0]}
+FLOOR = {"effect": "floor", "height": -0.1}
+MOVED = {"effect": "translate", "select": "bottom", "start": 5, "over": 4, "offset": [1, 0, 0]}
 OWN = {
-    "floor": ([SPRING, FALL, {"effect": "floor", "height": -0.1}], {}),
-    "held in the floor": (
-        [SPRING, FALL, {"effect": "floor", "height": 0.1}, {"effect": "pins", "select": "bottom"}],
-        {},
-    ),
-    "drag and damping": (
-        [SPRING, FALL, {"effect": "drag", "coefficient": 3.0}, {"effect": "damping", "rate": 2.0}],
-        {},
-    ),
-    "taken hold of on the way": (
-        [
-            STRAIN,
-            FALL,
-            {"effect": "pins", "select": "top", "until": 7},
-            {"effect": "translate", "select": "bottom", "start": 5, "over": 4, "offset": [1, 0, 0]},
-        ],
-        {},
-    ),
-    "poke": ([SPRING, {"effect": "poke", "over": 4, "rest": 0, "count": 3}], {}),
-    "accelerated": ([STRAIN, FALL, {"effect": "pins", "select": "top"}], {"anderson_window": 3}),
-    "bar": (
-        [{"effect": "tetrahedron_strain", "weight": 1e6}, FALL],
-        {"mesh": GROUPS["tetrahedron_strain"]},
-    ),
-    "plane": ([SPRING, FALL, {"effect": "plane"}], {}),
-    "bending": ([{"effect": "bending", "weight": 1.0}, FALL], {"mesh": GROUPS["bending"]}),
-    "wind": ([SPRING, {"effect": "wind", "velocity": [3.0, 0.0, 1.0]}], {}),
+    "floor": [SPRING, FALL, FLOOR],
+    "held in the floor": [
+        SPRING, FALL, {**FLOOR, "height": 0.1}, {"effect": "pins", "select": "bottom"},
+    ],
+    "drag and damping": [
+        SPRING, FALL, {"effect": "drag", "coefficient": 3.0}, {"effect": "damping", "rate": 2.0},
+    ],
+    "taken hold of on the way": [STRAIN, FALL, {**TOP, "until": 7}, MOVED],
+    "poke": [SPRING, {"effect": "poke", "over": 4, "rest": 0, "count": 3}],
+    "accelerated": [STRAIN, FALL, TOP],
+    "bar": [{"effect": "tetrahedron_strain", "weight": 1e6}, FALL],
+    "plane": [SPRING, FALL, {"effect": "plane"}],
+    "bending": [{"effect": "bending", "weight": 1.0}, FALL],
+    "wind": [SPRING, {"effect": "wind", "velocity": [3.0, 0.0, 1.0]}],
+}  # fmt: skip
+SETTINGS = {
+    "accelerated": {"anderson_window": 3},
+    "bar": {"mesh": GROUPS["tetrahedron_strain"]},
+    "bending": {"mesh": GROUPS["bending"]},
 }
 
 
 def own(name: str) -> Scene:
-    effects, settings = OWN[name]
-    return make_scene(*effects, **settings)
+    return make_scene(*OWN[name], **SETTINGS.get(name, {}))
 
 
 def assert_same(scene: Scene, loop: Stepper) -> None:

@@ -53,6 +53,14 @@ def reduction_of(spec: MethodSpec, seed: int = 1) -> tuple[np.ndarray, Reduction
     return p, Reduction(basis, select(basis, spec, R), spec, R)
 
 
+def whole(group, p: np.ndarray, preset: str, r: int | None = None) -> Reduction:
+    """Reduction of a group's snapshots by a preset, with all modes unless ``r`` is given."""
+    spec = PRESETS[preset]
+    basis = compute_basis(p, np.ones(p.shape[1]), 0.0, group.rows_per_element, spec)
+    r = basis.rank if r is None else r
+    return Reduction(basis, select(basis, spec, r), spec, r)
+
+
 def added(step: ReducedLocalStep) -> np.ndarray:
     """What a step adds to the right-hand side."""
     rhs = np.zeros((N, 3))
@@ -127,9 +135,7 @@ def test_the_local_kernel_adds_what_python_code_adds(preset, group_scene, rng, m
     group, q = group_scene.groups[0], group_scene.mesh.points
     group.begin_frame(q)
     p = np.stack([group.project(q + 0.05 * rng.standard_normal(q.shape)) for _ in range(5)])
-    spec = PRESETS[preset]
-    basis = compute_basis(p, np.ones(p.shape[1]), 0.0, group.rows_per_element, spec)
-    reduction = Reduction(basis, select(basis, spec, basis.rank), spec, basis.rank)
+    reduction = whole(group, p, preset)
     y, sums = q + 0.05 * rng.standard_normal(q.shape), []
     for split in (1, 1 << 17):
         monkeypatch.setattr("pdrom.reduction.local.lift.SPLIT_FROM", split)
@@ -149,9 +155,7 @@ def test_the_local_kernel_adds_what_python_code_adds(preset, group_scene, rng, m
 def test_the_lift_is_timed_apart(group_scene, rng):
     group, q = group_scene.groups[0], group_scene.mesh.points
     p = np.stack([group.project(q + 0.05 * rng.standard_normal(q.shape)) for _ in range(5)])
-    spec = PRESETS["block-deim"]
-    basis = compute_basis(p, np.ones(p.shape[1]), 0.0, group.rows_per_element, spec)
-    step = ReducedLocalStep(group, Reduction(basis, select(basis, spec, 2), spec, 2))
+    step = ReducedLocalStep(group, whole(group, p, "block-deim", 2))
     assert step.lift_seconds == 0.0
     for _ in range(1000):
         step.accumulate(q, np.zeros_like(q))
@@ -186,14 +190,13 @@ def test_failed_method_spoils_its_axis_and_raises_nothing():
 @pytest.mark.parametrize("preset", [name for name in PRESETS if name != "published"])
 def test_real_groups_reproduce_their_full_local_step(group_scene, preset):
     """Snapshots of random positions; at one of them all modes give the group's own S^T W p."""
-    group, spec = group_scene.groups[0], PRESETS[preset]
+    group = group_scene.groups[0]
     rng = np.random.default_rng(4)
     rest = group_scene.mesh.points
     positions = [rest + 0.05 * rng.standard_normal(rest.shape) for _ in range(5)]
     group.begin_frame(rest)
     p = np.stack([group.project(q) for q in positions])
-    basis = compute_basis(p, np.ones(p.shape[1]), 0.0, group.rows_per_element, spec)
-    reduction = Reduction(basis, select(basis, spec, basis.rank), spec, basis.rank)
+    reduction = whole(group, p, preset)
     step = ReducedLocalStep(group, reduction)
     for q in positions:
         full, reduced = np.zeros_like(q), np.zeros_like(q)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from builders import make_scene
+from builders import TOP, Pushing, make_scene
 from pdrom.core.errors import SceneError
 from pdrom.model.runs.full_order import trajectory
 from pdrom.reduction.basis import compute_basis
@@ -15,10 +15,7 @@ from pdrom.reduction.sampling import Reduction, select
 from places import CONFIG
 
 PRESETS = load_methods(CONFIG / "methods.yaml")
-EFFECTS = (
-    {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]},
-    {"effect": "pins", "select": "top"},
-)
+EFFECTS = {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]}, TOP
 
 
 def scene_with(*groups: str, frames: int = 4, **settings):
@@ -38,22 +35,6 @@ class Watched:
     def accumulate(self, y, rhs):
         self.seen.append(self.group.project(y))
         return self.group.accumulate(y, rhs)
-
-
-class Pushing:
-    """A local step that adds what it is told in each call."""
-
-    name = "spring"
-
-    def __init__(self, value) -> None:
-        self.value = value
-
-    def begin_frame(self, q):
-        self.frame_positions = q
-
-    def accumulate(self, y, rhs):
-        rhs += self.value
-        return float("nan")
 
 
 @pytest.mark.parametrize("group", ["spring", "strain"])
@@ -94,10 +75,10 @@ def test_growth_beyond_the_limit_ends_the_run_with_its_last_frame():
     scene = scene_with("spring", frames=30)
     reference = trajectory(scene)
     push = np.linspace(-2e5, 2e5, scene.mesh.vertices)[:, None] * [1.0, 0.0, 0.0]
-    whole = rerun(scene, scene.system, [Pushing(push)], reference, np.inf)
+    whole = rerun(scene, scene.system, [Pushing(lambda: push)], reference, np.inf)
     assert (whole.blowup_frame, whole.frames) == (None, 30)
     limit = float(np.median(whole.extent))
-    result = rerun(scene, scene.system, [Pushing(push)], reference, limit)
+    result = rerun(scene, scene.system, [Pushing(lambda: push)], reference, limit)
     first = int(np.flatnonzero(whole.extent > limit)[0])
     assert 0 < first < 29
     assert result.blowup_frame == first
@@ -109,7 +90,7 @@ def test_growth_beyond_the_limit_ends_the_run_with_its_last_frame():
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e308])
 def test_numbers_that_are_none_end_the_run_before_them(bad):
     scene = scene_with("spring")
-    result = rerun(scene, scene.system, [Pushing(bad)], trajectory(scene), 2.0)
+    result = rerun(scene, scene.system, [Pushing(lambda: bad)], trajectory(scene), 2.0)
     assert result.blowup_frame == 0
     assert np.isfinite(result.positions).all()
     assert result.frames <= 1
@@ -123,7 +104,7 @@ def test_an_empty_run_has_no_extent():
 
 def test_replaced_group_keeps_the_others_and_their_order():
     scene = scene_with("spring", "strain")
-    other = Pushing(0.0)
+    other = Pushing(lambda: 0.0)
     steps = replace_group(scene, "spring", other)
     assert [s is g for s, g in zip(steps, scene.groups, strict=True)] == [False, True]
     assert steps[0] is other
@@ -133,7 +114,7 @@ def test_replaced_group_keeps_the_others_and_their_order():
 def test_replacing_what_is_not_there_names_what_is():
     scene = scene_with("spring", "strain")
     with pytest.raises(SceneError, match=r"no group 'bending' \(spring, strain\)"):
-        replace_group(scene, "bending", Pushing(0.0))
+        replace_group(scene, "bending", Pushing(lambda: 0.0))
 
 
 def test_steps_are_those_of_the_velocities():

@@ -8,6 +8,8 @@ from scipy.optimize import nnls
 
 from pdrom.reduction.subspace.nnls import _remove_row, nnls_path
 
+SMOOTH = np.exp(-np.outer(np.linspace(0.0, 1.0, 60), np.linspace(0.1, 5.0, 200)))
+
 
 def stopped(g: np.ndarray, b: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
     return nnls_path(g, b, [tolerance])[0]
@@ -38,9 +40,7 @@ def test_without_tolerance_it_is_the_method_of_lawson_and_hanson(m, e, seed, sca
 @pytest.mark.parametrize("tolerance", [0.5, 0.1, 1e-2, 1e-4])
 def test_stops_at_the_tolerance_with_few_columns(tolerance):
     """Sum of many smooth columns: far fewer of them suffice."""
-    t = np.linspace(0.0, 1.0, 60)
-    g = np.exp(-np.outer(t, np.linspace(0.1, 5.0, 200)))
-    b = g.sum(axis=1)
+    g, b = SMOOTH, SMOOTH.sum(axis=1)
     support, values = stopped(g, b, tolerance)
     assert np.linalg.norm(g[:, support] @ values - b) <= tolerance * np.linalg.norm(b)
     assert 0 < len(support) < 15
@@ -60,9 +60,7 @@ def test_blocks_of_columns_end_at_the_same_minimum(rng):
 
 
 def test_a_path_meets_each_of_its_tolerances():
-    t = np.linspace(0.0, 1.0, 60)
-    g = np.exp(-np.outer(t, np.linspace(0.1, 5.0, 200)))
-    b = g.sum(axis=1)
+    g, b = SMOOTH, SMOOTH.sum(axis=1)
     path = nnls_path(g, b, [1e-3, 0.5, 1e-2])
     for (support, values), tolerance in zip(path, [1e-3, 0.5, 1e-2], strict=True):
         assert (values > 0.0).all()
