@@ -1,6 +1,7 @@
 """Builders of small scenes."""
 
 import numpy as np
+import pandas as pd
 from numba import njit
 
 from pdrom.model.constraints.gradient_kernel import call
@@ -58,6 +59,11 @@ def with_effects(scene: Scene, *effects: dict) -> Scene:
     """The scene with further effects."""
     further = make_scene({"effect": "spring", "weight": 1.0}, *effects).config.effects[1:]
     return scene.changed(effects=(*scene.config.effects, *further))
+
+
+def frame(header: str, *rows: tuple) -> pd.DataFrame:
+    """Rows under the columns that a header names."""
+    return pd.DataFrame(list(rows), columns=header.split())
 
 
 def random_rotation(rng: np.random.Generator) -> np.ndarray:

@@ -13,9 +13,9 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from sandbox import Sandbox, kill_all, wait_for
@@ -45,6 +45,12 @@ def sandbox(undisturbed: Sandbox, tmp_path: Path) -> Sandbox:
     return undisturbed.copy(tmp_path / "run")
 
 
+@pytest.fixture
+def fresh(tmp_path: Path) -> Sandbox:
+    """A sandbox in which nothing was run."""
+    return Sandbox.make(tmp_path / "run")
+
+
 @pytest.fixture(scope="module")
 def finished_study(tmp_path_factory: pytest.TempPathFactory) -> Sandbox:
     """The whole micro study with its manuscript."""
@@ -58,9 +64,11 @@ def last_lines(output: str, count: int = 2) -> str:
     return "\n".join(output.splitlines()[-count:])
 
 
-def no_leftovers(sandbox: Sandbox) -> bool:
-    """No temporary file stands among the results."""
-    return not sandbox.temporaries()
+def heals(sandbox: Sandbox, undisturbed: Sandbox, target: str = TABLE) -> None:
+    """A plain rerun ends with the results of an undisturbed one, and no temporary file is left."""
+    sandbox.finish(target)
+    assert sandbox.results() == undisturbed.results()
+    assert not sandbox.temporaries()
 
 
 # Killed jobs and runs -------------------------------------------------------------------------
@@ -77,9 +85,7 @@ def test_a_lost_row_and_a_killed_job_are_named_and_made_again(
     expected = f"job reconstruction_error_table failed while making {TABLE}: killed (SIGKILL)"
     assert expected in last_lines(output)
     assert not sandbox.path(TABLE).exists()
-    sandbox.finish(TABLE)
-    assert sandbox.results() == undisturbed.results()
-    assert no_leftovers(sandbox)
+    heals(sandbox, undisturbed)
 
 
 # rule -> an output of it
@@ -108,97 +114,85 @@ def test_a_job_that_is_killed_in_any_rule(
     status, said = sandbox.run(target, fault=f"kill:/\\.{re.escape(output.stem)}\\.[0-9a-f]{{12}}")
     assert status != 0
     assert re.search(rf"job {rule} failed while making \S+: killed \(SIGKILL\)", last_lines(said))
-    sandbox.finish(target)
-    assert sandbox.results() == finished_study.results()
-    assert no_leftovers(sandbox)
+    heals(sandbox, finished_study, target)
 
 
 @slow
-def test_a_run_that_is_killed_with_all_its_jobs(undisturbed: Sandbox, tmp_path: Path) -> None:
+def test_a_run_that_is_killed_with_all_its_jobs(undisturbed: Sandbox, fresh: Sandbox) -> None:
     """Half-written files and the locks of both programs are left, and nobody unlocks by hand."""
-    sandbox = Sandbox.make(tmp_path / "run")
     for folder in ("fom", "snapshots", "pod", "reruns"):
-        process = _caught_writing(sandbox, folder)
+        process = _caught_writing(fresh, folder)
         kill_all(process)
-        assert list(sandbox.path(".snakemake/locks").iterdir())
-    sandbox.finish(TABLE)
-    assert sandbox.results() == undisturbed.results()
-    assert no_leftovers(sandbox)
+        assert list(fresh.path(".snakemake/locks").iterdir())
+    heals(fresh, undisturbed)
 
 
-def _caught_writing(sandbox: Sandbox, folder: str, kind: str = "slow") -> subprocess.Popen[str]:
+def _caught_writing(fresh: Sandbox, folder: str, kind: str = "slow") -> subprocess.Popen[str]:
     """A run one of whose jobs is at a file of ``folder``, kept there as ``kind`` says."""
-    process = sandbox.start(TABLE, fault=f"{kind}:/{MICRO_RESULTS}/{folder}/")
-    place = sandbox.path(MICRO_RESULTS) / folder
-    wait_for(lambda: any(place in p.parents for p in sandbox.temporaries()), process)
+    process = fresh.start(TABLE, fault=f"{kind}:/{MICRO_RESULTS}/{folder}/")
+    place = fresh.path(MICRO_RESULTS) / folder
+    wait_for(lambda: any(place in p.parents for p in fresh.temporaries()), process)
     return process
 
 
 @slow
-def test_jobs_that_survive_their_run_do_no_harm(undisturbed: Sandbox, tmp_path: Path) -> None:
+def test_jobs_that_survive_their_run_do_no_harm(undisturbed: Sandbox, fresh: Sandbox) -> None:
     """``kill -9`` of the main process alone: its jobs go on beside those of the next run."""
-    sandbox = Sandbox.make(tmp_path / "run")
-    process = _caught_writing(sandbox, "fom")
+    process = _caught_writing(fresh, "fom")
     process.kill()
     process.wait()
-    sandbox.finish(TABLE)
+    fresh.finish(TABLE)
     process.communicate(timeout=60)
-    assert sandbox.results() == undisturbed.results()
+    assert fresh.results() == undisturbed.results()
 
 
 @slow
-def test_an_interrupted_run_goes_on(undisturbed: Sandbox, tmp_path: Path) -> None:
-    sandbox = Sandbox.make(tmp_path / "run")
-    process = _caught_writing(sandbox, "fom")
+def test_an_interrupted_run_goes_on(undisturbed: Sandbox, fresh: Sandbox) -> None:
+    process = _caught_writing(fresh, "fom")
     os.killpg(process.pid, signal.SIGINT)
     said, _ = process.communicate(timeout=60)
     assert process.returncode == 130
     assert last_lines(said).startswith("pdrom: interrupted\n")
     assert "Traceback" not in said
-    assert no_leftovers(sandbox)
-    sandbox.finish(TABLE)
-    assert sandbox.results() == undisturbed.results()
+    assert not fresh.temporaries()
+    heals(fresh, undisturbed)
 
 
 @slow
-def test_sigterm_to_the_run_alone_ends_its_jobs(undisturbed: Sandbox, tmp_path: Path) -> None:
+def test_sigterm_to_the_run_alone_ends_its_jobs(undisturbed: Sandbox, fresh: Sandbox) -> None:
     """One of which would never end by itself."""
-    sandbox = Sandbox.make(tmp_path / "run")
-    process = _caught_writing(sandbox, "fom", "hold")
+    process = _caught_writing(fresh, "fom", "hold")
     process.terminate()
     said, _ = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "pdrom: SIGTERM: ending the jobs that run\n" in said
     assert last_lines(said).startswith("pdrom: ended by SIGTERM\n")
-    sandbox.finish(TABLE)
-    assert sandbox.results() == undisturbed.results()
+    heals(fresh, undisturbed)
 
 
 @slow
-def test_the_second_run_at_once_says_so_and_ends(undisturbed: Sandbox, tmp_path: Path) -> None:
+def test_the_second_run_at_once_says_so_and_ends(undisturbed: Sandbox, fresh: Sandbox) -> None:
     """Whether by ``./reproduce`` or by ``snakemake``; what only looks works meanwhile."""
-    sandbox = Sandbox.make(tmp_path / "run")
-    first = _caught_writing(sandbox, "fom", "hold")
-    for second in (sandbox.run(TABLE), sandbox.snakemake(TABLE), sandbox.snakemake("--unlock")):
+    first = _caught_writing(fresh, "fom", "hold")
+    for second in (fresh.run(TABLE), fresh.snakemake(TABLE), fresh.snakemake("--unlock")):
         assert second[0] != 0
         line = second[1].splitlines()[-1]
         assert line.startswith(f"pdrom: another run (process {first.pid} on ")
-    status, output = sandbox.snakemake("-n", TABLE)
+    status, output = fresh.snakemake("-n", TABLE)
     assert status == 0, output
-    sandbox.path("release").touch()
+    fresh.path("release").touch()
     said, _ = first.communicate(timeout=300)
     assert first.returncode == 0, said
-    assert sandbox.results() == undisturbed.results()
+    assert fresh.results() == undisturbed.results()
 
 
 @slow
-def test_snakemake_itself_heals_after_a_kill(undisturbed: Sandbox, tmp_path: Path) -> None:
-    sandbox = Sandbox.make(tmp_path / "run")
-    kill_all(_caught_writing(sandbox, "fom"))
-    assert list(sandbox.path(".snakemake/locks").iterdir())
-    status, output = sandbox.snakemake("--rerun-incomplete", TABLE)
+def test_snakemake_itself_heals_after_a_kill(undisturbed: Sandbox, fresh: Sandbox) -> None:
+    kill_all(_caught_writing(fresh, "fom"))
+    assert list(fresh.path(".snakemake/locks").iterdir())
+    status, output = fresh.snakemake("--rerun-incomplete", TABLE)
     assert status == 0, output
-    assert sandbox.results() == undisturbed.results()
+    assert fresh.results() == undisturbed.results()
 
 
 @slow
@@ -236,47 +230,42 @@ def mount() -> Iterator[Callable[..., None]]:
 
 
 @slow
-def test_a_full_disk(undisturbed: Sandbox, tmp_path: Path, mount: Callable[..., None]) -> None:
+def test_a_full_disk(undisturbed: Sandbox, fresh: Sandbox, mount: Callable[..., None]) -> None:
     """A file system of its own for the results, which fills up while the runs are simulated."""
-    sandbox = Sandbox.make(tmp_path / "run")
-    results = sandbox.path("results")
+    results = fresh.path("results")
     results.mkdir()
     mount(results, "-t", "tmpfs", "-o", "size=96k", "tmpfs")
-    status, output = sandbox.run(TABLE)
+    status, output = fresh.run(TABLE)
     assert status != 0
     assert "cannot be written (No space left on device)" in last_lines(output, 3)
     assert "Traceback" not in output
     subprocess.run(["mount", "-o", "remount,size=64m", results], check=True)
-    sandbox.finish(TABLE)
-    assert sandbox.results() == undisturbed.results()
-    assert no_leftovers(sandbox)
+    heals(fresh, undisturbed)
 
 
-@slow
-def test_a_write_that_fails_for_lack_of_space(undisturbed: Sandbox, sandbox: Sandbox) -> None:
-    """The same without a file system: the system call of the job reports that there is no space."""
-    sandbox.path(TABLE).unlink()
-    status, output = sandbox.run(TABLE, fault="full:reconstruction_error")
-    assert status != 0
-    expected = f"job reconstruction_error_table failed: {TABLE}: cannot be written (No space left"
-    assert expected in last_lines(output)
-    assert no_leftovers(sandbox)
-    sandbox.finish(TABLE)
-    assert sandbox.results() == undisturbed.results()
-
-
-@slow
-def test_a_limit_on_the_size_of_files(undisturbed: Sandbox, sandbox: Sandbox) -> None:
+def files_of_20_kb() -> None:
     """As by a quota; no mount is needed."""
-    sandbox.path(RUN).unlink()
-    limit = (20_000, 20_000)
-    status, output = sandbox.run(
-        RUN, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit)
-    )
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+
+
+@slow
+@pytest.mark.parametrize(
+    ("target", "how", "words"),
+    [
+        # the system call of the job reports that there is no space
+        (TABLE, {"fault": "full:reconstruction_error"}, "No space left"),
+        (RUN, {"preexec_fn": files_of_20_kb}, "File too large"),
+    ],
+)
+def test_a_write_that_fails(
+    target: str, how: dict[str, Any], words: str, undisturbed: Sandbox, sandbox: Sandbox
+) -> None:
+    sandbox.path(target).unlink()
+    status, output = sandbox.run(target, **how)
     assert status != 0
-    assert f"{RUN}: cannot be written (File too large)" in last_lines(output)
-    sandbox.finish(RUN)
-    assert sandbox.results() == undisturbed.results()
+    assert re.search(rf"job \w+ failed: {target}: cannot be written \({words}", last_lines(output))
+    assert not sandbox.temporaries()
+    heals(sandbox, undisturbed, target)
 
 
 @slow
@@ -291,16 +280,14 @@ def test_results_that_are_read_only(
     assert status != 0
     assert output.splitlines() == [f"reproduce: no write permission in {results}"]
     subprocess.run(["mount", "-o", "remount,rw,bind", results], check=True)
-    sandbox.finish(TABLE)
-    assert sandbox.results() == undisturbed.results()
+    heals(sandbox, undisturbed)
 
 
-def test_a_file_in_place_of_the_results(tmp_path: Path) -> None:
-    sandbox = Sandbox.make(tmp_path / "run")
-    sandbox.path("results").write_text("")
-    status, output = sandbox.run(TABLE)
+def test_a_file_in_place_of_the_results(fresh: Sandbox) -> None:
+    fresh.path("results").write_text("")
+    status, output = fresh.run(TABLE)
     assert status != 0
-    assert output.splitlines() == [f"reproduce: no write permission in {sandbox.path('results')}"]
+    assert output.splitlines() == [f"reproduce: no write permission in {fresh.path('results')}"]
 
 
 # Damaged files --------------------------------------------------------------------------------
@@ -355,15 +342,15 @@ def lose_the_checksum(path: Path) -> None:
     checksum_path(path).unlink()
 
 
-def find_damage(sandbox: Sandbox, damaged: str, missing: list[str], target: str = TABLE) -> None:
+def find_damage(fresh: Sandbox, damaged: str, missing: list[str], target: str = TABLE) -> None:
     """Run what reads the damaged file: it is named and set aside."""
     for name in missing:
-        sandbox.path(name).unlink()
-    status, output = sandbox.run(target)
+        fresh.path(name).unlink()
+    status, output = fresh.run(target)
     assert status != 0
     assert f"{damaged}: damaged, its c" in last_lines(output)
     assert f"set aside as {Path(damaged).name}.damaged, the next run" in last_lines(output)
-    sandbox.path(f"{damaged}.damaged").unlink()
+    fresh.path(f"{damaged}.damaged").unlink()
 
 
 # what lies between a damaged file and the table, or nothing would be read again
@@ -394,8 +381,7 @@ def test_a_damaged_result(
 ) -> None:
     damage(sandbox.path(name))
     find_damage(sandbox, name, BETWEEN[name])
-    sandbox.finish(TABLE)
-    assert sandbox.results() == undisturbed.results()
+    heals(sandbox, undisturbed)
 
 
 @slow
@@ -414,33 +400,34 @@ def test_what_the_manuscript_is_made_from(
     sandbox = finished_study.copy(tmp_path / "run")
     flip_a_bit(sandbox.path(name))
     find_damage(sandbox, name, sorted({missing, MICRO_MANUSCRIPT}), MICRO_MANUSCRIPT)
-    sandbox.finish(MICRO_MANUSCRIPT)
-    assert sandbox.results() == finished_study.results()
+    heals(sandbox, finished_study, MICRO_MANUSCRIPT)
 
 
 # Clocks and edited files ----------------------------------------------------------------------
 
 
+ANY_ORDER = random.Random(1)
+
+
 @slow
-@pytest.mark.parametrize("days", [-4000, 4000])
-def test_a_clock_that_jumped(days: int, undisturbed: Sandbox, sandbox: Sandbox) -> None:
-    """The files of a finished run bear the wrong date, in the order of the run."""
+@pytest.mark.parametrize(
+    "seconds",
+    [
+        lambda: -4000 * 86_400,
+        lambda: 4000 * 86_400,
+        # a copy that kept no dates, or a clock that jumped several times during a run
+        lambda: ANY_ORDER.uniform(-1e6, 1e6),
+    ],
+    ids=["back", "ahead", "in no order"],
+)
+def test_a_clock_that_jumped(
+    seconds: Callable[[], float], undisturbed: Sandbox, sandbox: Sandbox
+) -> None:
+    """The files of a finished run bear the wrong date."""
     for path in sandbox.path(MICRO_RESULTS).rglob("*"):
         stat = path.stat()
-        os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + days * 86_400 * 10**9))
-    sandbox.finish(TABLE)
-    assert sandbox.results() == undisturbed.results()
-
-
-@slow
-def test_dates_in_no_order(undisturbed: Sandbox, sandbox: Sandbox) -> None:
-    """As after a copy that kept no dates, or a clock that jumped several times during a run."""
-    generator = random.Random(1)
-    for path in sandbox.path(MICRO_RESULTS).rglob("*"):
-        date = time.time() + generator.uniform(-1e6, 1e6)
-        os.utime(path, (date, date))
-    sandbox.finish(TABLE)
-    assert sandbox.results() == undisturbed.results()
+        os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + int(seconds() * 1e9)))
+    heals(sandbox, undisturbed)
 
 
 MESH = "config/scenes/sheet.obj"

@@ -101,6 +101,16 @@ class Folder:
             start_new_session=start_new_session,
         )
 
+    def refused(self, **environment: str) -> list[str]:
+        """Lines on standard error of a run that fails."""
+        status, errors = self.run(**environment)
+        assert status != 0
+        return errors
+
+    def touch(self, name: str, text: str = "") -> None:
+        """Write a file of the folder."""
+        self.path.joinpath(name).write_text(text)
+
     def run(self, *arguments: str, **environment: str) -> tuple[int, list[str]]:
         """Exit status and lines on standard error."""
         process = self.start(*arguments, **environment)
@@ -116,13 +126,15 @@ class Folder:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Folder:
-    return Folder(tmp_path)
+    """A folder with a Python that fits."""
+    made = Folder(tmp_path)
+    made.add_python()
+    return made
 
 
 def test_no_python(folder: Folder) -> None:
-    status, errors = folder.run()
-    assert status != 0
-    (line,) = errors
+    folder.programs.joinpath("python3").unlink()
+    (line,) = folder.refused()
     assert line.startswith("reproduce: Python 3.11, 3.12 or 3.13 is needed")
     assert line.endswith("found none (set PYTHON to its path)")
 
@@ -130,26 +142,20 @@ def test_no_python(folder: Folder) -> None:
 @pytest.mark.parametrize("version", ["3.9", "3.14"])
 def test_a_python_without_wheels(version: str, folder: Folder) -> None:
     folder.add_python(version=version, too_old=True)
-    status, errors = folder.run()
-    assert status != 0
-    (line,) = errors
+    (line,) = folder.refused()
     assert f"(some packages have no wheels for other ones), found only {version}" in line
 
 
 def test_python_without_venv(folder: Folder) -> None:
     folder.add_python(no_venv=True)
-    status, errors = folder.run()
-    assert status != 0
-    (line,) = errors
+    (line,) = folder.refused()
     assert "has no venv module" in line
     assert not (folder.path / ".venv").exists()
 
 
 def test_a_folder_in_which_nothing_can_be_made(folder: Folder) -> None:
-    folder.add_python()
-    folder.path.joinpath(".cache").write_text("a file where the folder should be")
-    status, errors = folder.run()
-    assert status != 0
+    folder.touch(".cache", "a file where the folder should be")
+    errors = folder.refused()
     assert errors == [f"reproduce: no write permission in {folder.path}"]
 
 
@@ -179,28 +185,25 @@ def test_a_folder_of_another_user(readable_by_all: Path) -> None:
 
 
 def test_no_network(folder: Folder) -> None:
+    folder.programs.joinpath("python3").unlink()
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         closed_port = listener.getsockname()[1]
-    status, errors = folder.run(
+    announcement, line = folder.refused(
         PYTHON=getattr(sys, "_base_executable", sys.executable),
         PIP_INDEX_URL=f"http://127.0.0.1:{closed_port}/simple",
         PIP_CONFIG_FILE="/dev/null",
         PIP_NO_CACHE_DIR="1",
         PIP_RETRIES="0",
     )
-    assert status != 0
-    announcement, line = errors
     assert "making .venv" in announcement
     assert "the packages cannot be downloaded: no network? See " in line
     assert Path(line.partition("See ")[2]).is_file()
 
 
 def test_a_failed_set_up_is_made_anew(folder: Folder) -> None:
-    folder.add_python()
-    folder.path.joinpath("pip-fails").write_text("ERROR: no\n")
-    status, errors = folder.run()
-    assert status != 0
+    folder.touch("pip-fails", "ERROR: no\n")
+    errors = folder.refused()
     assert errors[-1].startswith("reproduce: the packages cannot be installed")
     assert errors[-1].endswith("ERROR: no")
     assert folder.calls == []
@@ -211,16 +214,14 @@ def test_a_failed_set_up_is_made_anew(folder: Folder) -> None:
 
 
 def test_the_environment_is_made_once_for_each_lock_file(folder: Folder) -> None:
-    folder.add_python()
     making = [any("making .venv" in line for line in folder.run()[1]) for _ in range(2)]
-    folder.path.joinpath("requirements.lock").write_text("")
+    folder.touch("requirements.lock", "")
     making.append(any("making .venv" in line for line in folder.run()[1]))
     assert making == [True, False, True]
 
 
 @pytest.mark.parametrize("change", ["a version", "one more", "one less"])
 def test_packages_that_another_program_changed_are_noticed(change: str, folder: Folder) -> None:
-    folder.add_python()
     folder.run()
     assert folder.run()[1] == ["reproduce: planning"]
     packages = folder.path / ".venv" / PACKAGES
@@ -237,7 +238,6 @@ def test_packages_that_another_program_changed_are_noticed(change: str, folder: 
 
 
 def test_the_executor_for_clusters_may_be_added(folder: Folder) -> None:
-    folder.add_python()
     folder.run()
     for name in _locked("requirements-cluster.lock"):
         (folder.path / ".venv" / PACKAGES / f"{name.replace('-', '_')}-1.0.dist-info").mkdir()
@@ -251,18 +251,14 @@ def _locked(name: str) -> list[str]:
 
 @pytest.mark.parametrize("name", ["two\nlines", "ends\n"])
 def test_a_path_with_a_line_break_is_refused(name: str, folder: Folder) -> None:
-    folder.add_python()
     folder.path = folder.path.rename(folder.path.with_name(name))
-    status, errors = folder.run()
-    assert status != 0
-    (line,) = errors
+    (line,) = folder.refused()
     assert line.startswith("reproduce: ")
     assert "line break" in line
     assert not (folder.path / ".venv").exists()
 
 
 def test_arguments_are_handed_on(folder: Folder) -> None:
-    folder.add_python()
     folder.run("-n", "results/figures/a b.pdf")
     folder.run("test", "-q", "tests/unit")
     assert folder.calls == [
@@ -282,7 +278,6 @@ def test_help_makes_nothing(folder: Folder) -> None:
 
 
 def test_set_up_shows_that_it_is_alive(folder: Folder) -> None:
-    folder.add_python()
     _, errors = folder.run()
     assert errors[1:] == [
         "reproduce: 10 of 1 packages",
@@ -292,38 +287,30 @@ def test_set_up_shows_that_it_is_alive(folder: Folder) -> None:
 
 
 def test_only_what_plans_says_so(folder: Folder) -> None:
-    folder.add_python()
     folder.run()
     words = [folder.run(*arguments)[1] for arguments in ([], ["-n"], ["test"], ["run", "true"])]
     assert words == [["reproduce: planning"], ["reproduce: planning"], [], []]
 
 
 def test_a_platform_without_wheels_ends_before_anything_is_made(folder: Folder) -> None:
-    folder.add_python()
-    folder.path.joinpath("unsupported").touch()
-    status, errors = folder.run()
-    assert status != 0
+    folder.touch("unsupported")
+    errors = folder.refused()
     assert errors[-1] == "no wheel for it"
     assert not folder.path.joinpath("installing").exists()
     assert not (folder.path / ".venv").exists()
 
 
 def test_a_full_disk_is_told_from_a_missing_network(folder: Folder) -> None:
-    folder.add_python()
     said = "ERROR: Could not install: [Errno 28] No space left on device (timed out)\n"
-    folder.path.joinpath("pip-fails").write_text(said)
-    status, errors = folder.run()
-    assert status != 0
+    folder.touch("pip-fails", said)
+    errors = folder.refused()
     assert "no space left on the disk" in errors[-1]
 
 
 def test_broken_linear_algebra_is_named_and_the_environment_does_not_count(folder: Folder) -> None:
-    folder.add_python()
-    folder.path.joinpath("broken").touch()
+    folder.touch("broken")
     for _ in range(2):
-        status, errors = folder.run()
-        assert status != 0
-        assert errors[-1] == (
+        assert folder.refused()[-1] == (
             "reproduce: linear algebra is broken on this machine: numpy 2.1.0: X.T @ X crashes "
             f"(signal 11), see {folder.path}/.cache/setup.log"
         )
@@ -336,8 +323,7 @@ def test_broken_linear_algebra_is_named_and_the_environment_does_not_count(folde
 @pytest.fixture
 def installing(folder: Folder) -> Iterator[tuple[Folder, subprocess.Popen[str]]]:
     """A set-up that stays at work."""
-    folder.add_python()
-    folder.path.joinpath("hold").touch()
+    folder.touch("hold")
     process = folder.start(start_new_session=True)
     limit = time.monotonic() + 60
     while not folder.path.joinpath("installing").exists() and time.monotonic() < limit:
@@ -351,8 +337,7 @@ def test_the_second_of_two_set_ups_ends_at_once(
     installing: tuple[Folder, subprocess.Popen[str]],
 ) -> None:
     folder, first = installing
-    status, errors = folder.run()
-    assert status != 0
+    errors = folder.refused()
     assert errors == [
         f"reproduce: another run (process {first.pid}, making .venv) is at work in this folder"
     ]
@@ -372,39 +357,31 @@ def test_a_killed_set_up_leaves_no_lock(installing: tuple[Folder, subprocess.Pop
     assert folder.calls == [FRONT]
 
 
-def test_an_interrupted_set_up_says_so(installing: tuple[Folder, subprocess.Popen[str]]) -> None:
-    folder, first = installing
-    os.killpg(first.pid, signal.SIGTERM)
-    _, errors = first.communicate(timeout=60)
-    assert first.returncode == 130
-    assert "reproduce: interrupted" in errors.splitlines()
-    assert folder.calls == []
-
-
-def test_a_signal_to_the_script_alone_ends_a_set_up(
-    installing: tuple[Folder, subprocess.Popen[str]],
+@pytest.mark.parametrize("whole", [True, False], ids=["all processes", "the script alone"])
+def test_an_interrupted_set_up_ends_and_says_so(
+    installing: tuple[Folder, subprocess.Popen[str]], whole: bool
 ) -> None:
     """It does not wait for the packages, which are no longer installed: the streams close."""
     folder, first = installing
-    first.send_signal(signal.SIGTERM)
+    (os.killpg if whole else os.kill)(first.pid, signal.SIGTERM)
     _, errors = first.communicate(timeout=60)
     assert folder.path.joinpath("hold").exists()
     assert first.returncode == 130
-    assert errors.splitlines()[-1] == "reproduce: interrupted"
+    said = [line for line in errors.splitlines() if "packages" not in line]
+    assert said[-1] == "reproduce: interrupted"
+    assert folder.calls == []
 
 
 def test_no_number_of_a_process_stays_that_a_later_set_up_would_kill(folder: Folder) -> None:
-    folder.add_python()
     folder.run()
     assert not folder.path.joinpath(".cache/pip.pid").exists()
 
 
 def test_an_interrupted_set_up_kills_nothing_that_an_older_one_left(folder: Folder) -> None:
-    folder.add_python()
-    folder.path.joinpath("hold-search").touch()
+    folder.touch("hold-search")
     with subprocess.Popen(["sleep", "600"]) as stranger:
         folder.path.joinpath(".cache").mkdir()
-        folder.path.joinpath(".cache/pip.pid").write_text(f"{stranger.pid}\n")
+        folder.touch(".cache/pip.pid", f"{stranger.pid}\n")
         process = folder.start()
         while not folder.path.joinpath("searching").exists():
             time.sleep(0.02)

@@ -6,6 +6,7 @@ The scene is a sheet of springs, held at its left side, that falls for eight fra
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,7 +14,8 @@ import pytest
 from bad_input.project import make_project
 from pdrom import api
 from pdrom.command import main
-from pdrom.core.store import open_hdf5, read_table
+from pdrom.core.store import open_hdf5, read_table, write_table
+from pdrom.core.store.checksum import write_block
 from pdrom.core.yamlfile import read_yaml
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.mesh.types import Mesh, stored_mesh
@@ -21,15 +23,18 @@ from places import CONFIG
 from small_scene import run_jobs
 from study.artifact import paths
 from study.artifact.paths import File, Place
-from study.experiments.kit.settings import Horizon
+from study.experiments.iterations import IterationSweep, iterations
+from study.experiments.kit.declaration import Experiment
 from study.experiments.repetitions import LadderSection, ladder
+from study.experiments.stability import ShortRuns, stability
+from study.pipeline.resolve import Resolver
 from study.pipeline.study import Study
 
 SCENE, GROUP, METHOD = "small", "spring", "block-deim"
 ASKED = {
     "ranks": [2, "full"],
     "sensitivity": {"perturbations": [1e-10, 1e-8], "seeds": [1, 2]},
-    "iterations": {"counts": [1, 2, 5, 20]},
+    "iterations": {"counts": [1, 2, 5, 20, 60]},
     "subspace": {"bases": ["pod"], "sizes": [2, 4], "tolerances": [1e-2]},
     "timing": {"frames": 2, "repeats": 1, "breakeven": [2], "breakeven_repeats": 5},
     "repetitions": {
@@ -76,6 +81,28 @@ def array(at: PathOf) -> Callable[[Place, str], np.ndarray]:
             return file[name][...].astype(float)
 
     return read
+
+
+def again_at(study: Study, at: PathOf, folder: Path) -> Callable[..., dict[str, pd.DataFrame]]:
+    """Make an experiment once more, with other arguments; its tables."""
+
+    def made(experiment: Experiment, **changes: object) -> dict[str, pd.DataFrame]:
+        labels = {"scene": SCENE, "group": GROUP}
+        results = str(Path(at(paths.MACHINE)).parent)
+        job = Resolver(study, results).job(experiment, labels)
+        given = {name: read.content(job.inputs[name]) for name, read in experiment.files.items()}
+        asked = {k: t for k, t in experiment.types.items() if k not in changes}
+        given |= {k: t.validate_python(job.settings[k]) for k, t in asked.items()} | changes
+        files = {name: File(str(folder / f"{name}.csv"), labels) for name in job.outputs}
+        experiment.function(**given, **files)
+        return {name: read_table(file.path) for name, file in files.items()}
+
+    return made
+
+
+@pytest.fixture
+def again(study, at, tmp_path):
+    return again_at(study, at, tmp_path)
 
 
 @pytest.fixture
@@ -211,7 +238,7 @@ def test_more_iterations_approach_the_converged_run(table):
     rows = table(paths.ITERATIONS)
     plain = rows[rows.window == 0].sort_values("iterations")
     mixed = rows[rows.window == 5].set_index("iterations").error_converged
-    assert plain.iterations.tolist() == [1, 2, 5, 10, 20]
+    assert plain.iterations.tolist() == [1, 2, 5, 10, 20, 60]
     assert (np.diff(plain.error_converged) < 0.0).all()
     assert (mixed < plain.set_index("iterations").error_converged[mixed.index]).all()
     own, limit = plain[plain.iterations == 10].iloc[0], rows.iloc[-1]
@@ -219,6 +246,75 @@ def test_more_iterations_approach_the_converged_run(table):
     assert limit.residual <= 1e-8
     # the same two runs, each relative to the other's motion
     assert limit.error_scene == pytest.approx(own.error_converged, rel=2e-2)
+    assert (mixed[[10, 20]] < 0.5 * plain.set_index("iterations").error_converged[[10, 20]]).all()
+    assert plain.error_converged.iloc[-1] < 0.1 * plain.error_converged.iloc[0]
+    assert plain.error_scene.iloc[1] < plain.error_scene.iloc[0]
+
+
+def test_the_sweep_ends_at_the_horizon_and_with_runs_that_end(again, at, table, tmp_path):
+    """Of a run in a subspace that ends before, and of frames that do not converge, no error."""
+    floor = table(paths.SENSITIVITY)
+    early = tmp_path / "floor.csv"
+    write_table(floor.assign(relative_difference=np.where(floor.frame < 5, 1e-9, 1.0)), early)
+    models = tmp_path / "models.h5"
+    models.write_bytes(Path(at(paths.SUBSPACES)).read_bytes())
+    with h5py.File(models, "a") as file:
+        run = file["models/pod_k004_full/train"]
+        few = run["coordinates"][:3]
+        del run["coordinates"]
+        run["coordinates"] = few
+    write_block(models)
+    cut = {
+        "sensitivity": File(str(early), {"scene": SCENE}),
+        "subspaces": [File(str(models), {"scene": SCENE})],
+    }
+    found = again(iterations, **cut)
+    assert (found["out"].frames == 5).all()
+    own = found["out"].set_index(["iterations", "window"]).error_converged[10, 0]
+    inside = found["models"].set_index(["k", "method"]).error_converged
+    assert inside[2, "full"] > own > 0.0
+    assert np.isnan(inside[4, "full"])
+    unfinished = again(iterations, sweep=IterationSweep(counts=(1,), tolerance=1e-10, limit=2))
+    assert unfinished["out"].error_converged.isna().all()
+    assert unfinished["out"].error_scene.notna().all()
+
+
+@pytest.fixture(scope="module")
+def short_runs(study: Study, at: PathOf, tmp_path_factory) -> pd.DataFrame:
+    """Runs at another time step and another stiffness."""
+    asked = ShortRuns(
+        time_steps=(0.1,), stiffness_ratios=(0.01,), ranks=(2, 30), duration=0.08, min_frames=4,
+        max_frames=6,
+    )  # fmt: skip
+    return again_at(study, at, tmp_path_factory.mktemp("short"))(stability, short=asked)["out"]
+
+
+def test_every_setting_holds_every_model_once(short_runs):
+    """(h, ratio): own, other h, other ratio; full order, two methods at two sizes, two models."""
+    keys = ["h", "stiffness_ratio", "method", "position_basis", "r"]
+    assert len(short_runs) == 3 * (1 + 2 * 2 + 2)
+    assert not short_runs.duplicated(keys).any()
+    own = {(STEP, 1.0), (0.1, 1.0), (STEP, 0.01)}
+    assert set(zip(short_runs.h, short_runs.stiffness_ratio, strict=True)) == own
+    assert short_runs.groupby("h").frames.max().to_dict() == {STEP: 5, 0.1: 4}
+    assert set(short_runs[short_runs.position_basis == "pod"].k) == {4}
+    full = short_runs[(short_runs.method == "full") & (short_runs.position_basis == "full")]
+    assert full.finite.all()
+    assert (full.relative_error == 0.0).all()
+    assert (full.energy_ratio == 1.0).all()
+    beyond = short_runs[short_runs.r == 30]
+    assert len(beyond) == 6
+    assert (beyond.frames == 0).all()
+    assert beyond[["finite", "relative_error", "energy_ratio", "gain"]].isna().all(axis=None)
+    at_home = (short_runs.h == STEP) & (short_runs.stiffness_ratio == 1.0) & (short_runs.r == 2)
+    own = short_runs[at_home].set_index("method")
+    assert own.relative_error["pod"] < 0.05
+    assert own.gain["pod"] == 1.0 < own.gain[METHOD]
+
+
+def test_the_subspaces_know_their_energy(table):
+    for place in (paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT):
+        assert table(place).energy_ratio.between(0.5, 1.5, inclusive="neither").all()
 
 
 @pytest.mark.parametrize("split", ["train", *MOTIONS])
@@ -249,24 +345,11 @@ def test_a_moved_start_changes_nothing_and_other_training_does(table):
     assert training[training.r == 2].error.min() > 1.1 * own
 
 
-def test_every_rung_of_a_ladder_is_run_and_judged(study, at, array, tmp_path):
+def test_every_rung_of_a_ladder_is_run_and_judged(again, array):
     """Whole elements with shared coefficients are worse than the best by their gain at most."""
     few = {"r": 2, "signs": 2, "repetitions": 3, "sizes": (2, 50), "repeated": (SCENE,)}
     asked = LadderSection(**read_yaml(CONFIG / "default.yaml")["ladder"]).model_copy(update=few)
-    section = study.settings.sensitivity
-    out = File(str(tmp_path / "ladder.csv"), {"scene": SCENE, "group": GROUP})
-    ladder(
-        mesh=paths.MESH.file(at(paths.MESH)),
-        fom=paths.TRAIN.file(at(paths.TRAIN)),
-        snapshots=paths.SNAPSHOTS.file(at(paths.SNAPSHOTS)),
-        sensitivity=paths.SENSITIVITY.file(at(paths.SENSITIVITY)),
-        config=study.scenes[SCENE],
-        ladder=asked,
-        horizon=Horizon(perturbation=section.reference, threshold=section.threshold),
-        blowup_extent=study.settings.blowup_extent,
-        out=out,
-    )
-    rows = read_table(out.path)
+    rows = again(ladder, ladder=asked)["out"]
     kinds = {"up": len(asked.up), "down": len(asked.down), "signs": 2, "square": len(asked.square)}
     assert rows.direction.value_counts(sort=False).to_dict() == kinds  # none at 50: three modes
     sigma, train = array(paths.BASIS, "singular_values"), array(paths.SNAPSHOTS, "train")

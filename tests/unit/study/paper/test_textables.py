@@ -1,8 +1,8 @@
 """TeX tables from the tables of the study, cell by cell."""
 
-import pandas as pd
 import pytest
 
+from builders import frame
 from study.paper.tex import build_pdfs
 from study.paper.textables import (
     TEX_TABLES,
@@ -20,61 +20,37 @@ from study.paper.textables import (
 from study.paper.textables import scenes as scene_table
 
 ERROR = "relative_error_within_horizon"
-COLUMNS = [
-    "scene", "group", "method", "position_basis", "r", "frames", "blowup_frame", "horizon_frame",
-    ERROR, "k", "speedup",
-]  # fmt: skip
-
-
-def frame(header: str, *rows: tuple) -> pd.DataFrame:
-    """Rows under the columns that a header names."""
-    return pd.DataFrame(list(rows), columns=header.split())
-
 
 TABLES = {
-    "methods": pd.DataFrame(
-        {
-            "method": ["pod", "deim_x"],
-            "title": ["A & B", "50 %"],
-            "centring": ["none", "affine"],
-            "rows": ["all", "scalar"],
-            "selection": ["greedy", "greedy"],
-            "solve": ["square", "qr"],
-            "oversampling": [1, 3],
-            "gain_bound": [None, None],
-        }
+    "methods": frame(
+        "method title centring rows selection solve oversampling gain_bound",
+        ("pod", "A & B", "none", "all", "greedy", "square", 1, None),
+        ("deim_x", "50 %", "affine", "scalar", "greedy", "qr", 3, None),
     ),
-    "scenes": pd.DataFrame(
-        {
-            "scene": ["bar_a", "b"],
-            "groups": ["triangle_strain (1e+07)", "spring (1)"],
-            "vertices": [400, 9],
-            "elements": [722, 12],
-            "frames": [10, 20],
-        }
+    "scenes": frame(
+        "scene groups vertices elements frames",
+        ("bar_a", "triangle_strain (1e+07)", 400, 722, 10),
+        ("b", "spring (1)", 9, 12, 20),
     ),
-    "reduced_reruns": pd.DataFrame(
-        [
-            ("bar_a", "edge_spring", "pod", "full", 6, 10, None, 10, 0.5, None, None),
-            ("bar_a", "edge_spring", "pod", "full", 20, 10, None, 10, 0.25, None, None),
-            ("bar_a", "edge_spring", "pod", "full", 30, 0, None, 10, None, None, None),
-            ("bar_a", "edge_spring", "deim_x", "full", 6, 10, None, 10, 0.75, None, None),
-            ("bar_a", "edge_spring", "deim_x", "full", 20, 5, 4, 10, None, None, None),
-            ("b", "bending", "pod", "full", 6, 0, None, 7, None, None, None),
-            ("b", "all", "full", "pod", 6, 10, None, 7, 0.125, 6, 2.5),
-            ("b", "all", "ecsw-1e-02", "pod", 90, 10, None, 7, 0.375, 6, 4.0),
-            *(("b", "all", "full", "pod", 7, 9, None, 9, e, 6, None) for e in (0.25, 0.5, 9.0)),
-        ],
-        columns=COLUMNS,
+    "reduced_reruns": frame(
+        "scene group method position_basis r frames blowup_frame horizon_frame "
+        f"{ERROR} k speedup",
+        ("bar_a", "edge_spring", "pod", "full", 6, 10, None, 10, 0.5, None, None),
+        ("bar_a", "edge_spring", "pod", "full", 20, 10, None, 10, 0.25, None, None),
+        ("bar_a", "edge_spring", "pod", "full", 30, 0, None, 10, None, None, None),
+        ("bar_a", "edge_spring", "deim_x", "full", 6, 10, None, 10, 0.75, None, None),
+        ("bar_a", "edge_spring", "deim_x", "full", 20, 5, 4, 10, None, None, None),
+        ("b", "bending", "pod", "full", 6, 0, None, 7, None, None, None),
+        ("b", "all", "full", "pod", 6, 10, None, 7, 0.125, 6, 2.5),
+        ("b", "all", "ecsw-1e-02", "pod", 90, 10, None, 7, 0.375, 6, 4.0),
+        *(("b", "all", "full", "pod", 7, 9, None, 9, e, 6, None) for e in (0.25, 0.5, 9.0)),
     ).assign(motion=["train"] * 8 + ["heldout", "kick", "stiffness"]),
-    "accuracy_cost": pd.DataFrame(
-        [
-            ("bar_a", "fom", 1, 0.5, 0.25),
-            ("bar_a", "fom", 10, 0.125, 2.0),
-            ("bar_a", "fom-anderson", 10, 0.0625, 3.0),
-            ("bar_a", "pod", None, 0.03, 1.0),
-        ],
-        columns=["scene", "method", "iterations", ERROR, "ms_per_frame"],
+    "accuracy_cost": frame(
+        f"scene method iterations {ERROR} ms_per_frame",
+        ("bar_a", "fom", 1, 0.5, 0.25),
+        ("bar_a", "fom", 10, 0.125, 2.0),
+        ("bar_a", "fom-anderson", 10, 0.0625, 3.0),
+        ("bar_a", "pod", None, 0.03, 1.0),
     ),
     "breakeven": frame(
         "scene group method factor vertices r breakeven_r",
@@ -89,15 +65,10 @@ TABLES = {
         ("bar_a", "ecsw", 400, 3, 0.125, None, None),
         ("bar_b", "fom", 400, 1, None, None, None),
     ),
-    "singular_values": pd.DataFrame(
-        {
-            "scene": "bar_a",
-            "group": "edge_spring",
-            "component": [1, 6, 10, 20],
-            "relative": [1.0, 0.5, 0.01, 1e-15],
-            "above_roundoff": [True, True, True, False],
-        }
-    ),
+    "singular_values": frame(
+        "component relative above_roundoff",
+        (1, 1.0, True), (6, 0.5, True), (10, 0.01, True), (20, 1e-15, False),
+    ).assign(scene="bar_a", group="edge_spring"),
     "stability": frame(
         "method position_basis experiment outcome energy_ratio",
         ("full", "full", "rerun", "accurate", 1.0),
@@ -108,30 +79,19 @@ TABLES = {
         ("pod", "full", "sweep", "wrong", 2.0),
         ("ecsw", "pod", "rerun", "accurate", 0.5),
     ),
-    "local_share": pd.DataFrame(
-        {
-            "scene": "bar_a",
-            "implementation": ["compiled", "interpreted", "numpy"],
-            "local_ms": [1.0, 100.0, 10.0],
-            "assembly_ms": [0.0, 20.0, 2.0],
-            "global_ms": [1.0, 30.0, 4.0],
-            "local_share": [0.5, 0.8, 0.75],
-        }
-    ),
-    "claims": pd.DataFrame(
-        {
-            "claim": ["C1", "C2", "C3"],
-            "paper": ["70 % or more", "x", "y"],
-            "verdict": ["holds", "cannot be decided", "does not hold"],
-            "figure_or_table": ["local_share", "a", "b"],
-            "verdict_beyond": ["depends", "holds", "does not hold"],
-            "section": "4",
-            "shown": ["5", "none", "6"],
-            "text": ["a claim_1", "t", "t"],
-            "qualifiers": ["often", "q", "q"],
-            "history": ["2026-01-31: first.", "h", "h"],
-        }
-    ),
+    "local_share": frame(
+        "implementation local_ms assembly_ms global_ms local_share",
+        ("compiled", 1.0, 0.0, 1.0, 0.5),
+        ("interpreted", 100.0, 20.0, 30.0, 0.8),
+        ("numpy", 10.0, 2.0, 4.0, 0.75),
+    ).assign(scene="bar_a"),
+    "claims": frame(
+        "claim paper verdict figure_or_table verdict_beyond shown text qualifiers history",
+        ("C1", "70 % or more", "holds", "local_share", "depends", "5", "a claim_1", "often",
+         "2026-01-31: first."),
+        ("C2", "x", "cannot be decided", "a", "holds", "none", "t", "q", "h"),
+        ("C3", "y", "does not hold", "b", "does not hold", "6", "t", "q", "h"),
+    ).assign(section="4"),
     "claims_tests": frame(
         "claim part what decides compare threshold satisfied of least median most",
         ("C1", "published", "some_one", True, ">=", 0.1, 1, 2, 0.05, 0.1, float("inf")),
@@ -158,7 +118,7 @@ TABLES = {
         ("full", "deim_x", 3, 0, 0, 0, *5 * [None], 0, 0, 0),
         ("pod", "ecsw", 3, 2, 1, 1, *5 * [0.5], 2, 2, 1),
     ),
-}
+}  # fmt: skip
 
 
 def rows(text: str) -> list[str]:

@@ -66,30 +66,21 @@ def test_a_forgotten_separator_is_explained(arguments, expected):
     assert str(caught.value).endswith(f": {expected}")
 
 
-def test_targets_are_replaced_and_options_kept():
-    command = parse("--configfile a.yaml -n -- b a")
-    made = {"a": ["x"], "b": ["y", "z"]}
-    assert command.rewritten(["-q"], made) == [
-        "--configfile",
-        "a.yaml",
-        "-n",
-        "-q",
-        "--",
-        "y",
-        "z",
-        "x",
-    ]
-    assert parse("-n").rewritten([], {}) == ["-n"]
-    forced = parse("-n --forcerun x -- x").rewritten([], {"x": ["a.pdf"]})
-    assert forced == ["-n", "--forcerun", "x", "--", "a.pdf"]
-    assert parse("x --forcerun x").rewritten([], {"x": ["a"]}) == ["--forcerun", "x", "--", "a"]
-    assert parse("x -n").rewritten(["--cores", "2"], {"x": ["x"]}) == [
-        "-n",
-        "--cores",
-        "2",
-        "--",
-        "x",
-    ]
+@pytest.mark.parametrize(
+    ("given", "more", "made", "expected"),
+    [
+        (
+            "--configfile a.yaml -n -- b a", "-q", {"a": ["x"], "b": ["y", "z"]},
+            "--configfile a.yaml -n -q -- y z x",
+        ),
+        ("-n", "", {}, "-n"),
+        ("-n --forcerun x -- x", "", {"x": ["a.pdf"]}, "-n --forcerun x -- a.pdf"),
+        ("x --forcerun x", "", {"x": ["a"]}, "--forcerun x -- a"),
+        ("x -n", "--cores 2", {"x": ["x"]}, "-n --cores 2 -- x"),
+    ],
+)  # fmt: skip
+def test_targets_are_replaced_and_options_kept(given, more, made, expected):
+    assert parse(given).rewritten(more.split(), made) == expected.split()
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from pdrom.core.errors import INTERRUPTED
 from study.artifact.logs import job_log
 from study.pipeline.failures import ADVICE, Failures, cause
 
+FOM = "pdrom: job fom failed while making results/x.h5"
 ENDED = "CalledProcessError in file x, line 3:\nCommand 'python x.py' "
 
 
@@ -105,19 +106,7 @@ def test_every_failed_job_is_named_with_its_error(snakemake, tmp_path):
     assert status == 1
     assert lines == [
         f"pdrom: job pod failed: ValueError: vertex 3 is nan (traceback in {log})",
-        "pdrom: job fom failed while making results/x.h5: killed (SIGKILL): out of memory?",
-    ]
-
-
-def test_the_log_of_an_earlier_run_is_not_the_cause(snakemake, tmp_path):
-    """A job whose interpreter was not found did not open its log."""
-    log = tmp_path / "job.log"
-    with pytest.raises(SystemExit), job_log(str(log)):
-        raise ValueError("long ago")
-    fail(snakemake, "pod", str(log), ENDED + "returned non-zero exit status 127.")
-    _, lines = end(snakemake)
-    assert lines == [
-        "pdrom: job pod failed while making results/x.h5: its interpreter was not found"
+        f"{FOM}: killed (SIGKILL): out of memory?",
     ]
 
 
@@ -141,7 +130,7 @@ def test_a_job_that_crashes_is_named_with_the_line_it_was_at(snakemake, tmp_path
     assert done.returncode == -signal.SIGSEGV
     fail(snakemake, "fom", str(log), ENDED + "died with <Signals.SIGSEGV: 11>.")
     _, (line,) = end(snakemake)
-    begin = "pdrom: job fom failed while making results/x.h5: crashed (SIGSEGV) at "
+    begin = f"{FOM}: crashed (SIGSEGV) at "
     assert line.startswith(begin)
     place, _, function = line.removeprefix(begin).partition(" in ")
     assert function == f"place_of (log: {log})"
@@ -154,9 +143,16 @@ def test_the_crash_of_an_earlier_run_is_not_this_one(snakemake, tmp_path):
     subprocess.run([sys.executable, "-c", CRASHING, log], capture_output=True, check=False)
     os.utime(log, (1, 1))
     fail(snakemake, "fom", str(log), ENDED + "died with <Signals.SIGKILL: 9>.")
-    assert end(snakemake)[1] == [
-        "pdrom: job fom failed while making results/x.h5: killed (SIGKILL): out of memory?"
-    ]
+    assert end(snakemake)[1] == [f"{FOM}: killed (SIGKILL): out of memory?"]
+
+
+def test_the_error_of_an_earlier_run_is_not_the_cause(snakemake, tmp_path):
+    """A job whose interpreter was not found did not open its log."""
+    log = tmp_path / "job.log"
+    with pytest.raises(SystemExit), job_log(str(log)):
+        raise ValueError("long ago")
+    fail(snakemake, "fom", str(log), ENDED + "returned non-zero exit status 127.")
+    assert end(snakemake)[1] == [f"{FOM}: its interpreter was not found"]
 
 
 @pytest.mark.parametrize("word", ["interrupted", "ended by SIGTERM"])

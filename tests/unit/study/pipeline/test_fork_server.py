@@ -38,6 +38,14 @@ def run(*commands: str, owner: str = OWNER, **options) -> subprocess.CompletedPr
     )  # fmt: skip
 
 
+def start(command: str, **environment: str) -> subprocess.Popen[str]:
+    """The owner with this command, at work."""
+    return subprocess.Popen(
+        [sys.executable, "-c", OWNER, command], env={**os.environ, **environment},
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+
+
 def script(folder: Path, text: str) -> str:
     """Shell command that runs ``text`` as the workflow runs a script."""
     path = folder / "a script é.py"
@@ -104,10 +112,7 @@ print("ready", os.getpid(), os.getppid(), flush=True)
 signal.pause()
 """
     command = f"exec {script(tmp_path, code)}"
-    owner = subprocess.Popen(
-        [sys.executable, "-c", OWNER, f"{command} & read line; kill -TERM $!; wait $!"],
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
+    owner = start(f"{command} & read line; kill -TERM $!; wait $!")
     assert owner.stdout.readline().startswith("ready")
     out, _ = owner.communicate("go\n")
     assert out == "ended 5\n"
@@ -140,16 +145,12 @@ print(os.getpid(), flush=True)
 signal.pause()
 """
     told = "import os; os.execv('/bin/sh', ['sh', '-c', 'echo $$; exec ' + os.environ['JOB']])"
-    command = f"exec {shlex.join([sys.executable, '-c', told])}"
-    environment = {**os.environ, "JOB": script(tmp_path, code)}
-    owner = subprocess.Popen(
-        [sys.executable, "-c", OWNER, command], stdout=subprocess.PIPE, text=True, env=environment
-    )
+    owner = start(f"exec {shlex.join([sys.executable, '-c', told])}", JOB=script(tmp_path, code))
     client, _job = int(owner.stdout.readline()), int(owner.stdout.readline())
     os.kill(client if victim == "client" else owner.pid, signal.SIGKILL)
     rest = owner.stdout.read()
     assert rest == ("ended -9\n" if victim == "client" else "")
-    owner.wait()
+    owner.communicate()
 
 
 # A process that is a server: its address, its patience; its owner holds its standard input.
@@ -228,14 +229,12 @@ def test_what_is_no_request_is_dropped(tmp_path, content):
 
 
 @pytest.mark.parametrize("sent", [b"", b"%20d/" % 40], ids=["nothing", "half a request"])
-def test_a_silent_client_keeps_nobody_waiting(tmp_path, sent):
+def test_a_silent_client_keeps_nobody_waiting_and_patience_with_it_ends(tmp_path, sent):
     with ForkServer(tmp_path) as server, server.connect() as connection:
         connection.sendall(sent)
         assert server.serves()
-
-
-def test_the_patience_with_a_silent_client_ends(tmp_path):
-    with ForkServer(tmp_path, patience=0.01) as server, server.connect() as connection:
+    (tmp_path / "impatient").mkdir()
+    with ForkServer(tmp_path / "impatient", 0.01) as server, server.connect() as connection:
         assert connection.recv(20) == b""
 
 
@@ -271,10 +270,7 @@ def test_what_a_job_has_started_ends_with_the_server(tmp_path):
 import os, subprocess
 subprocess.run("echo $PPID; read nothing", shell=True)
 """
-    owner = subprocess.Popen(
-        [sys.executable, "-c", OWNER, f"exec {script(tmp_path, code)} 2>&1"],
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
+    owner = start(f"exec {script(tmp_path, code)} 2>&1")
     job = int(owner.stdout.readline())
     os.kill(psutil.Process(job).ppid(), signal.SIGKILL)
     assert owner.stdout.read() == "pdrom: the process that jobs start from is gone\nended 1\n"
@@ -303,15 +299,15 @@ subprocess.run({f"{interpreter()} {path}; echo its end"!r}, shell=True)
 
 def test_without_a_server_the_client_is_a_plain_interpreter(tmp_path):
     command = script(tmp_path, "import sys; print('fractions' in sys.modules, sys.argv[1:])")
-    for environment in ({}, {ADDRESS: str(tmp_path / "nobody")}):
+    for ran, environment, said in (
+        (command, {}, "False []\n"),
+        (command, {ADDRESS: str(tmp_path / "nobody")}, "False []\n"),
+        (f"{interpreter()} -c 'print(1 + 1)'", {}, "2\n"),
+    ):
         done = subprocess.run(
-            command, shell=True, capture_output=True, text=True, env={**os.environ, **environment}
+            ran, shell=True, capture_output=True, text=True, env={**os.environ, **environment}
         )
-        assert done.stdout == "False []\n"
-    done = subprocess.run(
-        f"{interpreter()} -c 'print(1 + 1)'", shell=True, capture_output=True, text=True
-    )
-    assert done.stdout == "2\n"
+        assert done.stdout == said
 
 
 def test_a_killed_run_leaves_no_file_behind(tmp_path):
@@ -320,14 +316,11 @@ def test_a_killed_run_leaves_no_file_behind(tmp_path):
     scripts.mkdir()
     temporary.mkdir()
     command = script(scripts, "import signal; print('ready', flush=True); signal.pause()")
-    owner = subprocess.Popen(
-        [sys.executable, "-c", OWNER, command],
-        stdout=subprocess.PIPE, text=True, env={**os.environ, "TMPDIR": str(temporary)},
-    )  # fmt: skip
+    owner = start(command, TMPDIR=str(temporary))
     assert owner.stdout.readline() == "ready\n"
     os.kill(owner.pid, signal.SIGKILL)
     assert owner.stdout.read() == ""
-    owner.wait()
+    owner.communicate()
     assert list(temporary.iterdir()) == []
 
 

@@ -14,38 +14,26 @@ TINY = Folders("results/studies/tiny", "results/studies/tiny/paper/main.pdf")
 
 
 @pytest.mark.parametrize(
-    ("target", "default", "tiny"),
+    ("target", "names"),
     [
-        ("floor", ["results/figures/floor.pdf"], ["results/studies/tiny/figures/floor.pdf"]),
-        ("claims", ["results/tables/claims.csv"], ["results/studies/tiny/tables/claims.csv"]),
-        (
-            "scaling",
-            ["results/figures/scaling.pdf", "results/tables/scaling.csv"],
-            [
-                "results/studies/tiny/figures/scaling.pdf",
-                "results/studies/tiny/tables/scaling.csv",
-            ],
-        ),
-        ("results/fom/a.h5", ["results/fom/a.h5"], ["results/studies/tiny/fom/a.h5"]),
-        ("results/studies/tiny/x", ["results/studies/tiny/x"], ["results/studies/tiny/x"]),
-        ("paper/main.pdf", ["paper/main.pdf"], ["results/studies/tiny/paper/main.pdf"]),
-        (
-            "paper/supplement.pdf",
-            ["paper/supplement.pdf"],
-            ["results/studies/tiny/paper/supplement.pdf"],
-        ),
-        ("figure_floor", ["figure_floor"], ["figure_floor"]),
-        (
-            "figure scaling",
-            ["results/figures/scaling.pdf"],
-            ["results/studies/tiny/figures/scaling.pdf"],
-        ),
-        ("figure none", ["figure none"], ["figure none"]),
+        ("floor", ["figures/floor.pdf"]),
+        ("claims", ["tables/claims.csv"]),
+        ("scaling", ["figures/scaling.pdf", "tables/scaling.csv"]),
+        ("figure scaling", ["figures/scaling.pdf"]),
+        ("results/fom/a.h5", ["fom/a.h5"]),
     ],
 )
-def test_files_of_a_target(target, default, tiny):
-    assert NAMES.files(target, Folders()) == default
-    assert NAMES.files(target, TINY) == tiny
+def test_files_of_a_target(target, names):
+    for place in (Folders(), TINY):
+        assert NAMES.files(target, place) == [f"{place.results}/{name}" for name in names]
+
+
+def test_files_that_have_a_place_of_their_own():
+    for name in ("results/studies/tiny/x", "figure_floor", "figure none"):
+        assert NAMES.files(name, Folders()) == NAMES.files(name, TINY) == [name]
+    for name in ("paper/main.pdf", "paper/supplement.pdf"):
+        assert NAMES.files(name, Folders()) == [name]
+        assert NAMES.files(name, TINY) == [f"results/studies/tiny/{name}"]
 
 
 @dataclass

@@ -103,16 +103,15 @@ def test_without_a_reason_nothing_is_updated(subject, reason):
         update(subject, reason)
 
 
-def test_from_missing_tables_nothing_is_updated(subject, tmp_path):
-    with pytest.raises(StorageError, match=r"not there; make it by ./reproduce --configfile"):
-        update(subject, "a reason")
-    assert not (tmp_path / "results" / "reference").exists()
-
-
-def test_from_a_damaged_table_nothing_is_updated(subject, tmp_path):
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(None, r"not there; make it by ./reproduce --configfile"), ("scene\n", "damaged")],
+)
+def test_from_missing_or_damaged_tables_nothing_is_updated(subject, tmp_path, content, message):
     folder = tmp_path / "results" / "studies" / "tiny" / "tables"
     folder.mkdir(parents=True)
-    (folder / f"{min(declared())}.csv").write_text("scene\n")
-    with pytest.raises(StorageError, match="damaged"):
+    if content:
+        (folder / f"{min(declared())}.csv").write_text(content)
+    with pytest.raises(StorageError, match=message):
         update(subject, "a reason")
     assert not (tmp_path / "results" / "reference").exists()

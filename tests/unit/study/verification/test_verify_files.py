@@ -140,11 +140,6 @@ def test_a_file_with_checksum_that_its_inputs_do_not_give_is_noticed(content, mo
     assert f"{NAMES[2]}: not what its inputs give; make it again by" in capsys.readouterr().out
 
 
-def test_what_inputs_do_not_give_any_more_is_noticed(monkeypatch):
-    monkeypatch.setattr(SUBJECT.plan, "fixed", {"paper": [job_of(BROKEN)]})
-    assert verify_files(SUBJECT) is Status.DIFFERS
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_an_entry_that_was_taken_out_is_noticed(name, capsys):
     rewrite(lambda entries: entries.pop(f"../{name}".replace("../results/", "")))
@@ -165,24 +160,6 @@ def test_what_a_target_names_beside_the_study_may_be_listed(monkeypatch):
     assert verify_files(SUBJECT) is Status.HOLDS
 
 
-def test_a_checksum_that_does_not_fit_is_noticed():
-    Path(NAMES[3]).with_name(".m.tex.blake2b").unlink()
-    assert verify_files(SUBJECT) is Status.DIFFERS
-
-
-def test_a_lost_file_has_a_code_of_its_own(capsys):
-    Path(NAMES[0]).unlink()
-    assert verify_files(SUBJECT) is Status.MISSING
-    assert f"{NAMES[0]}: not there; make it again by" in capsys.readouterr().out
-
-
-def test_a_file_that_was_removed_and_left_out_of_the_manifest_is_missing(monkeypatch):
-    Path(NAMES[3]).unlink()
-    renew_checksum(monkeypatch)
-    assert "paper/m.tex" not in read_manifest("results").files
-    assert verify_files(SUBJECT) is Status.MISSING
-
-
 def test_many_faults_are_counted(monkeypatch, capsys):
     more = {f"results/tables/{i}.csv" for i in range(30)}
     monkeypatch.setattr(files, "own_files", lambda *_: {*NAMES, *more})
@@ -190,13 +167,6 @@ def test_many_faults_are_counted(monkeypatch, capsys):
     said = capsys.readouterr().out
     assert "and 10 more; finish the study by ./reproduce --configfile 'my study.yaml'\n" in said
     assert "4 of 34 files" in said
-
-
-def test_damage_before_the_manifest_is_noticed_after_it():
-    """A later run does not take a damaged file for a good one."""
-    Path(NAMES[0]).write_text("x\n1.5\n2.6\n")
-    write_manifest(None, Folders(), OPTIONS)
-    assert verify_files(SUBJECT) is Status.DIFFERS
 
 
 @pytest.mark.parametrize("content", ["{", '{"format": 2}', '{"format": 1, "file": {}}'])
@@ -208,14 +178,52 @@ def test_a_manifest_that_is_none_is_said(content, capsys):
     assert "a run that succeeds writes it: ./reproduce --configfile" in capsys.readouterr().out
 
 
-def test_an_edited_manifest_is_damaged_and_a_lost_one_missing():
-    path = Path("results/manifest.json")
-    text = json.loads(path.read_text())
+def broken_maker(monkeypatch):
+    """What made a file fails now."""
+    monkeypatch.setattr(SUBJECT.plan, "fixed", {"paper": [job_of(BROKEN)]})
+
+
+def lost_checksum(_):
+    Path(NAMES[3]).with_name(".m.tex.blake2b").unlink()
+
+
+def lost_and_unlisted(monkeypatch):
+    Path(NAMES[3]).unlink()
+    renew_checksum(monkeypatch)
+    assert "paper/m.tex" not in read_manifest("results").files
+
+
+def damaged_before_a_later_run(_):
+    Path(NAMES[0]).write_text("x\n1.5\n2.6\n")
+    write_manifest(None, Folders(), OPTIONS)
+
+
+def edited_manifest(_):
+    text = json.loads(Path("results/manifest.json").read_text())
     text["files"].popitem()
-    path.write_text(json.dumps(text))
-    assert verify_files(SUBJECT) is Status.DIFFERS
-    path.unlink()
+    Path("results/manifest.json").write_text(json.dumps(text))
+
+
+@pytest.mark.parametrize(
+    ("fault", "status"),
+    [
+        (broken_maker, Status.DIFFERS),
+        (lost_checksum, Status.DIFFERS),
+        (damaged_before_a_later_run, Status.DIFFERS),
+        (edited_manifest, Status.DIFFERS),
+        (lost_and_unlisted, Status.MISSING),
+        (lambda _: Path("results/manifest.json").unlink(), Status.MISSING),
+    ],
+)
+def test_a_fault_is_noticed(fault, status, monkeypatch):
+    fault(monkeypatch)
+    assert verify_files(SUBJECT) is status
+
+
+def test_a_lost_file_is_named(capsys):
+    Path(NAMES[0]).unlink()
     assert verify_files(SUBJECT) is Status.MISSING
+    assert f"{NAMES[0]}: not there; make it again by" in capsys.readouterr().out
 
 
 def figure_job(subject):

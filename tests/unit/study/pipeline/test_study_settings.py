@@ -1,10 +1,13 @@
-"""Section stability of the configuration, and the jobs that come of it."""
+"""Settings of a study: its defaults, and section stability with the jobs that come of it."""
+
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import read_yaml, validate
-from places import ROOT
+from places import CONFIG, ROOT
 from study.artifact import paths
 from study.experiments.stability import stability
 from study.pipeline.contents import labels_of
@@ -52,10 +55,42 @@ def test_nothing_to_plan_is_no_fault():
 @pytest.mark.parametrize("name", ["default", "tiny"])
 def test_the_configurations_hold_what_they_ask_for(name):
     """Nothing in these two files is left out without a word."""
-    config = read_yaml(ROOT / "config" / "default.yaml")
+    config = read_yaml(CONFIG / "default.yaml")
     if name == "tiny":
-        tiny = read_yaml(ROOT / "config" / "tiny.yaml")
+        tiny = read_yaml(CONFIG / "tiny.yaml")
         config |= tiny | {"stability": config["stability"] | tiny.get("stability", {})}
     settings = validate(StudySettings, config, name)
     assert set(settings.stability.scenes) <= set(settings.scenes)
     assert set(settings.stability.ranks) <= set(settings.ranks)
+
+
+# scenes and methods have no default
+GIVEN = {"scenes", "methods"}
+
+
+def defaults() -> dict[str, Any]:
+    study = StudySettings(scenes=["spring_oop"], methods=["pod"])
+    return study.model_dump(mode="json", by_alias=True, exclude=GIVEN)
+
+
+def given(content: dict[str, Any], known: Any) -> Iterator[tuple[str, Any, Any]]:
+    """(key, value, default) of every value that a configuration gives, inside sections too."""
+    for key, value in content.items():
+        default = known.get(key) if isinstance(known, dict) else None
+        if isinstance(value, dict) and isinstance(default, dict) and default:
+            for inner, *rest in given(value, default):
+                yield f"{key}.{inner}", *rest
+        else:
+            yield key, value, default
+
+
+def test_the_study_repeats_no_default() -> None:
+    content = read_yaml(CONFIG / "default.yaml")
+    repeated = [key for key, value, default in given(content, defaults()) if value == default]
+    assert repeated == []
+
+
+@pytest.mark.parametrize(("key", "value"), [("sweep", 10), ("timing", 10), ("stability", 120)])
+def test_what_the_study_was_made_with(key: str, value: int) -> None:
+    """Values that the code once had differently from the file."""
+    assert value in defaults()[key].values()

@@ -1,8 +1,13 @@
-"""A title is no physical setting: who edits one makes nothing again but what prints it."""
+"""A job depends on what is in a mesh file, and on no title: what prints one alone is made again."""
 
 from pathlib import Path
 
-from bad_input.project import SCENE, STUDY, load_project, make_project
+import pytest
+
+from bad_input.project import MESH, SCENE, SQUARE, STUDY, Replace, load_project, make_project
+from study.experiments.fom import mesh
+from study.experiments.scaling import scaling
+from study.experiments.subspaces import online
 from study.pipeline.contents import labels_of
 
 # with a page of models, which prints titles
@@ -42,3 +47,22 @@ def test_an_edited_weight_plans_the_simulation(tmp_path: Path) -> None:
     found = changed(root, "weight: 1.0e+5", "weight: 2.0e+5")
     assert {"fom", "timing", "sensitivity"} <= found
     assert "mesh" not in found
+
+
+USED = Replace("{kind: cloth, rows: 5, columns: 4, plane: xz}", f"{{kind: file, path: {MESH}}}")
+
+
+@pytest.mark.parametrize("experiment", [mesh, online, scaling], ids=lambda e: e.name)
+def test_an_edited_mesh_has_another_checksum(tmp_path: Path, experiment) -> None:
+    root = make_project(tmp_path, {SCENE: USED})
+    (root / STUDY).write_text((root / STUDY).read_text() + "online: {scenes: [small]}\n")
+
+    def content() -> str:
+        plan = load_project(root)
+        labels = {"scene": "small", "mesh": plan.study.mesh_of("small"), "factor": "1"}
+        return plan.job(experiment, labels).content
+
+    before = content()
+    assert before == content()
+    (root / "config" / "scenes" / MESH).write_text(SQUARE.replace("v 1 0 1", "v 1 0 2"))
+    assert content() != before
