@@ -23,15 +23,9 @@ def test_its_environment_is_made_by_the_script_alone() -> None:
 
 def test_what_the_script_needs_is_not_left_out_of_it() -> None:
     needed = (
-        "reproduce",
-        "requirements.lock",
-        "requirements-cluster.lock",
-        "src",
-        "config",
-        "paper",
-        "workflow",
-        "tests",
-    )
+        "reproduce", "requirements.lock", "requirements-cluster.lock", "src", "config", "paper",
+        "workflow", "tests",
+    )  # fmt: skip
     assert not set(needed) & set(IGNORED)
     assert all((ROOT / name).exists() for name in needed)
     assert {".venv*", "results/*"} <= set(IGNORED)

@@ -63,14 +63,6 @@ def test_a_new_job_starts_a_new_log(path):
     assert "first" not in path.read_text()
 
 
-def test_a_mistake_of_the_user_is_one_line_without_traceback(path):
-    with pytest.raises(SystemExit) as caught, job_log(str(path)):
-        raise MeshError("a.obj: vertex 3 is nan")
-    assert caught.value.code == "pdrom: a.obj: vertex 3 is nan"
-    assert "ERROR   pdrom: a.obj: vertex 3 is nan" in path.read_text()
-    assert "Traceback" not in path.read_text()
-
-
 def test_any_other_failure_keeps_its_traceback_in_the_log(path):
     with pytest.raises(SystemExit) as caught, job_log(str(path)):
         raise ZeroDivisionError("by zero")
@@ -100,13 +92,18 @@ def test_logger_is_as_before_whatever_happened(path, failure):
         (OSError(errno.ENOSPC, "No space left on device", "a.h5"), "no space left on the disk ("),
         (OSError(errno.EDQUOT, "Disk quota exceeded"), "no space left on the disk ("),
         (OSError(errno.EIO, "Input/output error"), "OSError: [Errno 5] Input/output error"),
+        (MeshError("a.obj: vertex 3 is nan"), "a.obj: vertex 3 is nan"),
     ],
 )
-def test_lack_of_memory_or_space_is_said_in_words(path, failure, said):
+def test_mistakes_and_lack_of_memory_or_space_are_said_in_words(path, failure, said):
+    """Those of the user in one line without a traceback."""
     with pytest.raises(SystemExit) as caught, job_log(str(path)):
         raise failure
     assert caught.value.code.startswith(f"pdrom: {said}")
     assert f"ERROR   pdrom: {said}" in path.read_text()
+    if isinstance(failure, MeshError):
+        assert caught.value.code == f"pdrom: {said}"
+        assert "Traceback" not in path.read_text()
 
 
 def test_an_interrupted_job_ends_without_a_traceback(path, capfd):

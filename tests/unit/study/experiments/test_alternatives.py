@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from builders import make_scene
+from builders import frame, make_scene
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.store import read_table, write_table
 from pdrom.core.yamlfile import validate
@@ -118,14 +118,8 @@ def test_tables_of_the_rows(written, table):
 
 
 def test_winners_are_the_cheapest_that_reach_the_error(tmp_path):
-    labels = {
-        "scene": "s",
-        "factor": 1.0,
-        "stiffness": 1.0,
-        "substeps": 1,
-        "iterations": 1,
-        "k": np.nan,
-    }
+    labels = {"scene": "s", "factor": 1.0, "stiffness": 1.0, "substeps": 1, "iterations": 1}
+    labels["k"] = np.nan
     rows = pd.DataFrame(
         [
             ("a", 1.0, 0.05), ("b", 2.0, 0.005), ("ecsw", 0.5, 0.02), ("c", 0.1, np.nan),
@@ -186,16 +180,10 @@ def test_weights_vary_on_the_own_mesh_only():
 
 
 def test_the_size_from_which_a_reduction_pays():
-    rows = pd.DataFrame(
-        {
-            "vertices": [100, 400, 10_000],
-            "plain_ms": [2.0, 8.0, 200.0],
-            "reduced_ms": [1.0, 1.0, 1.0],
-            "reduced_speedup": [0.25, 0.5, 50.0],
-            "reduced_speedup_low": [0.2, 0.4, 40.0],
-            "reduced_speedup_high": [0.3, 0.6, 60.0],
-        }
-    )
+    rows = frame(
+        "vertices plain_ms reduced_speedup reduced_speedup_low reduced_speedup_high",
+        (100, 2.0, 0.25, 0.2, 0.3), (400, 8.0, 0.5, 0.4, 0.6), (10_000, 200.0, 50.0, 40.0, 60.0),
+    ).assign(reduced_ms=1.0)  # fmt: skip
 
     def pays(own: pd.DataFrame, *others: pd.DataFrame) -> dict[str, object]:
         slower = own.assign(

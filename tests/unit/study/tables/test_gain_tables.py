@@ -104,13 +104,8 @@ def test_interventions_compare_runs_on_one_basis():
 def test_scenes_count_once_however_many_sizes_they_have():
     reruns, _ = tables()
     parts = []
-    for scene, ratio, sizes in (
-        ("s", 0.5, 40),
-        ("t", 2.0, 2),
-        ("u", 0.25, 3),
-        ("v", 0.1, 2),
-        ("w", 1.0, 2),
-    ):
+    ratios, numbers = (0.5, 2.0, 0.25, 0.1, 1.0), (40, 2, 3, 2, 2)
+    for scene, ratio, sizes in zip("stuvw", ratios, numbers, strict=True):
         for r in range(1, sizes + 1):
             for method, gain, error in (
                 ("pod", 1, 1e-3),

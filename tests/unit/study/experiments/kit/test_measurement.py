@@ -50,11 +50,16 @@ def test_variants_take_turns_and_start_afresh():
     assert (START.positions == 0.0).all()
 
 
-def test_warm_up_does_not_count():
-    (result,) = measure([variant("a", [], [1e6, 2.0, 2.0, 2.0])], warmup=1, repeats=3)
+@pytest.mark.parametrize(
+    ("times", "frames", "warmup", "repeats"),
+    [([1e6, 2.0, 2.0, 2.0], 1, 1, 3), ([1.0, 3.0], 2, 0, 1)],
+)
+def test_time_is_per_frame_and_warm_up_does_not_count(times, frames, warmup, repeats):
+    (result,) = measure([variant("a", [], times, frames)], warmup=warmup, repeats=repeats)
     assert result.frame == pytest.approx(2000.0)
-    assert result.repeats == 3
-    assert (result.low, result.high) == pytest.approx((2000.0, 2000.0))
+    assert result.repeats == repeats
+    if warmup:
+        assert (result.low, result.high) == pytest.approx((2000.0, 2000.0))
 
 
 def test_median_repeat_with_its_own_phases():
@@ -73,11 +78,6 @@ def test_an_interruption_of_one_frame_is_left_out():
     (result,) = measure([variant("a", [], runs, 3)], warmup=0, repeats=3)
     assert result.frame == pytest.approx(1e3 * (1.0 + 2.0 + 3.0) / 3)
     assert result.local == pytest.approx(0.5 * result.frame)
-
-
-def test_time_is_per_frame():
-    (result,) = measure([variant("a", [], [1.0, 3.0], 2)], warmup=0, repeats=1)
-    assert result.frame == pytest.approx(2000.0)
 
 
 def test_assembly_is_taken_out_of_the_local_step():

@@ -44,11 +44,8 @@ CELLS = {
 def test_whatever_is_empty_the_types_are_the_declared_ones(rows):
     made = invented(rows)
     assert tuple(made.columns) == invented.column_names
-    assert [str(made[c].dtype) for c in ("count", "size", "good")] == [
-        "Int64",
-        "float64",
-        "boolean",
-    ]
+    types = {"count": "Int64", "size": "float64", "good": "boolean"}
+    assert {c: str(made[c].dtype) for c in types} == types
     for name in CELLS:
         assert [None if pd.isna(v) else v for v in made[name]] == [row[name] for row in rows]
 
@@ -102,21 +99,19 @@ def test_missing_columns_are_named():
         invented([{"name": "a", "size": 1.0, "seconds": 2.0}])
 
 
-def test_a_function_must_take_what_it_reads():
-    declare = table(title="", columns=COLUMNS, reads={"rows": Setting("a"), "other": Setting("b")})
-    with pytest.raises(TypeError, match=r"lonely_table: .*other"):
+@pytest.mark.parametrize(
+    ("columns", "reads", "message"),
+    [
+        (COLUMNS, {"rows": Setting("a"), "other": Setting("b")}, "lonely_table: .*other"),
+        ((*COLUMNS, integer("count", "again")), {"rows": Setting("a")}, "table lonely: .*count"),
+    ],
+    ids=["a function must take what it reads", "a column is declared once"],
+)
+def test_a_faulty_declaration_is_refused(columns, reads, message):
+    with pytest.raises(TypeError, match=message):
 
-        @declare
+        @table(title="", columns=columns, reads=reads)
         def lonely(rows):
-            """Nothing."""
-
-
-def test_a_column_is_declared_once():
-    declare = table(title="", columns=(*COLUMNS, integer("count", "again")), reads={})
-    with pytest.raises(TypeError, match=r"table double: .*count"):
-
-        @declare
-        def double():
             """Nothing."""
 
 
