@@ -1,4 +1,4 @@
-"""Expected times of jobs, what the logs of a run say of them, and what a cluster is asked for."""
+"""What git keeps of runs: times of jobs, as a cluster is asked for them, and recorded verdicts."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,13 +9,17 @@ import yaml
 
 from pdrom.core.errors import PdromError
 from pdrom.core.machine import Units, machine
+from pdrom.core.store import write_table
 from places import ROOT
 from study.artifact.usage import Usage
 from study.experiments.kit.declaration import experiments
 from study.pipeline.expectation import RUN_TIMES, expected_seconds, units_of
 from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import minutes
-from study.pipeline.tracked import COLUMNS, COSTS, main, measured_costs
+from study.pipeline.tracked import COLUMNS, COSTS, main, measured_costs, recorded_verdicts
+from study.tables.claims.claims import claims
+from study.tables.claims.rules import load_claims
+from study.tables.claims.verdicts import MEASURED, RECORDED, RULES, replication
 
 TABLE = pd.read_csv(ROOT / COSTS).set_index("kind")
 PROFILE = yaml.safe_load((ROOT / "workflow/profiles/slurm/config.yaml").read_text("utf-8"))
@@ -128,3 +132,26 @@ def test_the_profile_asks_for_more_than_any_measured_job_needed(kind, attempt):
     assert memory >= attempt * (ABOVE_MB + TABLE.memory_mb[kind])
     assert 60.0 * minutes >= attempt * (ABOVE_S + ROOM * TABLE.longest_s[kind])
     assert set(PROFILE["set-resources"]) <= set(TABLE.index)
+
+
+def verdicts(**columns: str) -> pd.DataFrame:
+    made = pd.DataFrame({"claim": ["C1", "C5"], **dict.fromkeys(MEASURED, "holds"), **columns})
+    return made.reindex(columns=claims.column_names)
+
+
+def test_another_verdict_is_not_the_same(tmp_path: Path) -> None:
+    write_table(claims.checked(verdicts()), tmp_path / "claims.csv")
+    recorded = recorded_verdicts(tmp_path / "claims.csv", ROOT / RULES)
+    recorded.to_csv(tmp_path / "kept.csv", index=False)
+    today = verdicts(verdict_beyond="does not hold")
+    table = replication.checked(replication(today, ROOT / RULES, tmp_path / "kept.csv"))
+    assert table.same.tolist() == [True, True, False, False]
+    assert table.rules_unchanged.all()
+    other = recorded.assign(rules=["00000000", recorded.rules[1]])
+    other.to_csv(tmp_path / "kept.csv", index=False)
+    table = replication(today, ROOT / RULES, tmp_path / "kept.csv")
+    assert table.rules_unchanged.tolist() == [False, True, False, True]
+
+
+def test_the_kept_record_has_every_claim() -> None:
+    assert pd.read_csv(ROOT / RECORDED).claim.tolist() == list(load_claims(ROOT / RULES))
