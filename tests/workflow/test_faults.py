@@ -127,11 +127,11 @@ def test_a_run_that_is_killed_with_all_its_jobs(undisturbed: Sandbox, fresh: San
     heals(fresh, undisturbed)
 
 
-def _caught_writing(fresh: Sandbox, folder: str, kind: str = "slow") -> subprocess.Popen[str]:
+def _caught_writing(sandbox: Sandbox, folder: str, kind: str = "slow") -> subprocess.Popen[str]:
     """A run one of whose jobs is at a file of ``folder``, kept there as ``kind`` says."""
-    process = fresh.start(TABLE, fault=f"{kind}:/{MICRO_RESULTS}/{folder}/")
-    place = fresh.path(MICRO_RESULTS) / folder
-    wait_for(lambda: any(place in p.parents for p in fresh.temporaries()), process)
+    process = sandbox.start(TABLE, fault=f"{kind}:/{MICRO_RESULTS}/{folder}/")
+    place = sandbox.path(MICRO_RESULTS) / folder
+    wait_for(lambda: any(place in p.parents for p in sandbox.temporaries()), process)
     return process
 
 
@@ -342,15 +342,15 @@ def lose_the_checksum(path: Path) -> None:
     checksum_path(path).unlink()
 
 
-def find_damage(fresh: Sandbox, damaged: str, missing: list[str], target: str = TABLE) -> None:
+def find_damage(sandbox: Sandbox, damaged: str, missing: list[str], target: str = TABLE) -> None:
     """Run what reads the damaged file: it is named and set aside."""
     for name in missing:
-        fresh.path(name).unlink()
-    status, output = fresh.run(target)
+        sandbox.path(name).unlink()
+    status, output = sandbox.run(target)
     assert status != 0
     assert f"{damaged}: damaged, its c" in last_lines(output)
     assert f"set aside as {Path(damaged).name}.damaged, the next run" in last_lines(output)
-    fresh.path(f"{damaged}.damaged").unlink()
+    sandbox.path(f"{damaged}.damaged").unlink()
 
 
 # what lies between a damaged file and the table, or nothing would be read again
