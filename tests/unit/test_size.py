@@ -15,7 +15,7 @@ from places import ROOT
 LIMITS = {
     "lines of src": 42_490,
     "modules of src": 333,
-    "lines of tests": 29_082,
+    "lines of tests": 28_601,
     "words of documentation": 24_789,
     "tables": 25,
     "figures": 23,
