@@ -101,8 +101,7 @@ def _reduction(
 ) -> Reduction:
     """Reduction of a basis with one row an element (three entries)."""
     count, r = len(v) // 3, v.shape[1]
-    trained = np.zeros((3 if separate else 1, 2, r))
-    basis = Basis(v, np.zeros(len(v)), np.ones(r), r, 1e-15, 1, separate, (True,) * 3, trained)
+    basis = Basis(v, np.zeros(len(v)), np.ones(r), r, 1e-15, 1, separate, (True,) * 3)
     return Reduction(basis, Sampling.of_elements(elements, 1, count), method, r)
 
 

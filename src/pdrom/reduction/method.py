@@ -16,7 +16,6 @@ Centring = Literal["none", "affine", "mean-in-modes"]
 Layout = Literal["vectorised", "per-axis"]
 Rows = Literal["all", "scalar", "joint", "element"]
 Solve = Literal["square", "qr", "tikhonov"]
-Bounds = Literal["none", "training"]
 
 
 class BasisSpec(ConfigModel):
@@ -53,8 +52,6 @@ class MethodSpec(BasisSpec):
         GappyPOD+E
     gain_bound : samples are added (GappyPOD+E) until the gain is at most this, so that the error of
         a projection is at most this multiple of the best approximation's; None: no bound
-    bounds : "training" keeps the coefficients in the range of the training snapshots
-    margin : by how much of its width that range is extended at both ends
     coefficients : "shared" by the axes or "per-axis"; None takes what the rows and the basis imply
     repeat_rows : whether the greedy may pick a row again (the published code does not exclude it)
     title : what the method is called in figures and tables
@@ -67,8 +64,6 @@ class MethodSpec(BasisSpec):
     repeat_rows: bool = False
     oversampling: Annotated[int, Field(ge=1, le=100)] = 1
     gain_bound: Annotated[float, Field(gt=1.0, le=1e6)] | None = None
-    bounds: Bounds = "none"
-    margin: Annotated[float, Field(ge=0.0, le=10.0)] = 0.1
     coefficients: Literal["shared", "per-axis"] | None = None
     tikhonov: Annotated[float, Field(gt=0.0, le=1.0)] = 1e-8
 
@@ -97,10 +92,6 @@ class MethodSpec(BasisSpec):
                 f"gain_bound = {self.gain_bound} with rows = '{self.rows}', solve = "
                 f"'{self.solve}': only rows = 'scalar' or 'element' with solve = 'qr', "
                 "'tikhonov' and coefficients that the axes share"
-            )
-        if self.bounds != "none" and self.per_axis:
-            raise ValueError(
-                f"bounds = '{self.bounds}' with coefficients per axis: only with shared ones"
             )
         if self.separate_axes and self.coefficients == "shared":
             raise ValueError(

@@ -62,8 +62,6 @@ def compute_basis(
     if spec.centring == "mean-in-modes":
         v = _mean_in_modes(v, centred, mean * scale, active, signs)
         mean = np.zeros_like(mean)
-    separate = spec.layout == "per-axis" or spec.centring == "mean-in-modes"
-    offsets = (matrix - mean[:, None]) * scale[:, None]
     return Basis(
         V=np.ascontiguousarray(v / scale[:, None]),
         mean=mean,
@@ -71,9 +69,8 @@ def compute_basis(
         rank=rank,
         roundoff=noise,
         rows_per_element=rows_per_element,
-        separate_axes=separate,
+        separate_axes=spec.layout == "per-axis" or spec.centring == "mean-in-modes",
         active_axes=active,
-        trained=_trained(v, offsets, separate),
     )
 
 
@@ -169,17 +166,6 @@ def _per_axis(centred: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray
         modes[axis::3, :own] = u[:, :own]
         ranks.append(own)
     return modes, np.linalg.norm(sigma, axis=0), ranks
-
-
-def _trained(v: np.ndarray, offsets: np.ndarray, separate: bool) -> np.ndarray:
-    """Range (A, 2, rank) of the coefficients V^T (p - mean) of the training snapshots.
-
-    ``v`` and ``offsets`` are in the inner product in which v is orthonormal, as a whole or (if
-    ``separate``) axis by axis.
-    """
-    parts = [slice(axis, None, 3) for axis in range(3)] if separate else [slice(None)]
-    coefficients = [v[part].T @ offsets[part] for part in parts]
-    return np.array([[c.min(axis=1), c.max(axis=1)] for c in coefficients])
 
 
 def _mean_in_modes(

@@ -24,8 +24,6 @@ class Basis:
     rank : number of singular values above round-off; V has no further columns
     roundoff : absolute size of a singular value that is noise
     active_axes : whether an axis carries anything above round-off
-    trained : (A, 2, rank) least and largest coefficient of each mode over the training snapshots;
-        A = 3 (x, y, z) if ``separate_axes``, else 1: the axes share the coefficients
     origin : what error messages call the basis: its file
     """
 
@@ -37,7 +35,6 @@ class Basis:
     rows_per_element: int
     separate_axes: bool
     active_axes: tuple[bool, ...]
-    trained: np.ndarray
     origin: str = "basis"
 
     __repr__ = brief
@@ -57,7 +54,7 @@ class Basis:
         return self.V[:, :r]
 
 
-_ARRAYS = ("V", "mean", "singular_values", "trained")
+_ARRAYS = ("V", "mean", "singular_values")
 _ATTRIBUTES = ("rank", "roundoff", "rows_per_element", "separate_axes", "active_axes")
 
 

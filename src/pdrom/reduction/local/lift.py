@@ -31,8 +31,8 @@ SPLIT_FROM = 1 << 17  # entries of a lift (N, r) from which its rows are in two 
 # Entries of the record: the numbers of modes, sets, columns and sampled numbers, address and record
 # of the sampler; then the places of the arrays of `Lift` in their order, and that of a clock.
 MODES, SETS, COLUMNS, SAMPLED, SAMPLER, SAMPLER_RECORD = range(OWN, OWN + 6)
-STARTS, POSITIONS, PACKED, OPERATORS, SHIFTS, LIMITS, COEFFICIENTS = range(OWN + 6, OWN + 13)
-AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 13, OWN + 21)
+STARTS, POSITIONS, PACKED, OPERATORS, SHIFTS, COEFFICIENTS = range(OWN + 6, OWN + 12)
+AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 12, OWN + 20)
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,6 @@ class Lift:
     packed : room for those of one set
     operators : (r, m) of each set, flat, one after the other
     shifts : (sets, r) what is taken from operator times entries: the part of the mean
-    limits : (2, r) least and largest coefficients
     coefficients : (sets, r) those of the last evaluation
     axes, own_sets : (c,) axis that a column adds to, set whose coefficients it takes
     lifted : (c, N, r) S^T W V
@@ -57,7 +56,6 @@ class Lift:
     packed: np.ndarray
     operators: np.ndarray
     shifts: np.ndarray
-    limits: np.ndarray
     coefficients: np.ndarray
     axes: np.ndarray
     own_sets: np.ndarray
@@ -96,13 +94,13 @@ class Lift:
 
 
 @compiled(nogil=True)
-def coefficients(sampled, starts, positions, packed, operators, shifts, limits, result):
+def coefficients(sampled, starts, positions, packed, operators, shifts, result):
     """Write the coefficients of all sets that belong to the numbers of the sampled elements.
 
     Parameters
     ----------
     sampled : projections of the sampled elements, one after the other
-    starts, positions, packed, operators, shifts, limits : see `Lift`
+    starts, positions, packed, operators, shifts : see `Lift`
     result : (sets, r) that is written
     """
     sets, modes = shifts.shape
@@ -124,12 +122,6 @@ def coefficients(sampled, starts, positions, packed, operators, shifts, limits, 
                 packed,
                 (-shifts[k, a], -shifts[k, b], -shifts[k, c]),
             )
-        for i in range(modes):
-            # not a number stays one
-            if result[k, i] < limits[0, i]:
-                result[k, i] = limits[0, i]
-            elif result[k, i] > limits[1, i]:
-                result[k, i] = limits[1, i]
 
 
 @compiled(nogil=True)
@@ -176,7 +168,6 @@ def _accumulate(y, rhs_place, record, part):
             rows.doubles(entries[PACKED], count),
             rows.doubles(entries[OPERATORS], count * modes),
             rows.doubles(entries[SHIFTS], sets * modes).reshape((sets, modes)),
-            rows.doubles(entries[LIMITS], 2 * modes).reshape((2, modes)),
             values,
         )
         return 0.0

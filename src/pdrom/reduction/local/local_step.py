@@ -63,7 +63,7 @@ class ReducedLocalStep:
         data = self._lift
         coefficients(
             sampled, data.starts, data.positions, data.packed, data.operators, data.shifts,
-            data.limits, data.coefficients,
+            data.coefficients,
         )  # fmt: skip
 
     def lift(self, rhs: np.ndarray) -> None:
@@ -92,9 +92,6 @@ def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
     operator = group.S.T.multiply(group.row_weights[None, :]).tocsr()
     vertices = operator.shape[0]
     place = _local_positions(reduction)
-    limits = np.full((2, r), np.inf) * [[-1.0], [1.0]]
-    if reduction.limits is not None:
-        limits = reduction.limits
     every = [range(3) if block.axis is None else (block.axis,) for block in blocks]
     columns = [(axis, k) for k, axes in enumerate(every) for axis in axes]
     lifted = np.zeros((len(columns), vertices, r))
@@ -106,7 +103,6 @@ def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
         packed=np.empty(sum(len(block.entries) for block in blocks)),
         operators=_joined([block.operator.ravel() for block in blocks], np.float64),
         shifts=np.array([b.operator @ mean[b.entries] for b in blocks]).reshape(-1, r),
-        limits=np.ascontiguousarray(limits),
         coefficients=np.zeros((len(blocks), r)),
         axes=np.array([axis for axis, _ in columns], dtype=np.int64),
         own_sets=np.array([k for _, k in columns], dtype=np.int64),

@@ -126,7 +126,6 @@ class Reduction:
     ----------
     v : (3 e p, r) modes
     blocks : sets of coefficients
-    limits : (2, r) least and largest coefficients; None if they are free, see `limited`
     """
 
     def __init__(self, basis: Basis, sampling: Sampling, spec: MethodSpec, r: int) -> None:
@@ -135,24 +134,11 @@ class Reduction:
         self.v = basis.truncated(r)
         axes = [int(a) for a in np.flatnonzero(basis.active_axes)] if spec.per_axis else [None]
         self.blocks = [self._block(axis) for axis in axes]
-        self.limits = _limits(basis, spec, r)
 
     @property
     def elements(self) -> np.ndarray:
         """Elements to evaluate, in the order that `coefficients` expects."""
         return self.sampling.elements
-
-    def limited(self, coefficients: np.ndarray) -> np.ndarray:
-        """``coefficients`` (..., r) in the range of the training, if the method limits them.
-
-        Each one is clipped: for orthonormal modes the nearest admissible point to V c. It brings c
-        nearer to every admissible c*, so that it cannot hurt where the true ones are in range;
-        where a run rightly leaves the range, it does.
-        Bounded least squares would fit the samples better, but needs an iteration per evaluation.
-        """
-        if self.limits is None:
-            return coefficients
-        return np.clip(coefficients, *self.limits)
 
     def _block(self, axis: int | None) -> Block:
         if self.spec.rows == "all":
@@ -201,18 +187,8 @@ class Reduction:
         result = np.tile(self.basis.mean, (len(matrix), 1))
         for block in self.blocks:
             sampled = matrix[:, block.entries] - self.basis.mean[block.entries]
-            coefficients = self.limited(sampled @ block.operator.T)
-            result[:, block.output] += coefficients @ self.v[block.output].T
+            result[:, block.output] += sampled @ block.operator.T @ self.v[block.output].T
         return result.reshape(snapshots.shape)
-
-
-def _limits(basis: Basis, spec: MethodSpec, r: int) -> np.ndarray | None:
-    """Smallest and largest admissible coefficients (2, r); None if they are free."""
-    if spec.bounds == "none":
-        return None
-    lower, upper = basis.trained[0, :, :r]
-    extra = spec.margin * (upper - lower)
-    return np.stack([lower - extra, upper + extra])
 
 
 def _entries_of(entries: np.ndarray, rows: str, axis: int | None) -> np.ndarray:

@@ -111,7 +111,6 @@ def interpolation_of(
 ) -> Interpolation:
     """Interpolation in ``columns`` by a ``reduction`` of full-order projections (joint rows, say).
 
-    The reduction has no limits of its coefficients.
     Coefficients of blocks that serve one axis each stand below each other.
     """
     strain, stiffness = reduced_strain(group, columns)

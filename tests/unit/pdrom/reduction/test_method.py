@@ -29,7 +29,6 @@ def test_presets_are_the_methods_of_the_literature():
         "block-qdeim": (*affine, "element", "pivoted-qr", "qr", False),
         "gappy": (*affine, "element", "greedy", "qr", False),
         "bounded": (*affine, "element", "greedy", "qr", False),
-        "bounded-range": (*affine, "element", "greedy", "qr", False),
         "s-opt": (*affine, "scalar", "s-opt", "square", False),
         "block-s-opt": (*affine, "element", "s-opt", "qr", False),
     }  # fmt: skip
@@ -60,8 +59,6 @@ def test_methods_with_the_same_basis_share_its_name():
         {"rows": "joint", "gain_bound": 2.0},
         {"rows": "element", "coefficients": "per-axis", "gain_bound": 2.0},
         {"rows": "element", "gain_bound": 1.0},
-        {"rows": "element", "coefficients": "per-axis", "bounds": "training"},
-        {"rows": "element", "bounds": "training", "margin": -0.1},
         {"rows": "joint", "solve": "square", "repeat_rows": True},
         {"rows": "vertices"},
         {"rows": "all", "oversampling": 3},

@@ -51,10 +51,8 @@ def written(path, columns, *rows) -> File:
 
 
 def basis_file(path, sigma, rank) -> File:
-    basis = Basis(
-        np.zeros((6, rank)), np.zeros(6), np.array(sigma), rank, 1e-9, 1, False, (True,) * 3,
-        np.zeros((1, 2, rank)),
-    )  # fmt: skip
+    axes = (True,) * 3
+    basis = Basis(np.zeros((6, rank)), np.zeros(6), np.array(sigma), rank, 1e-9, 1, False, axes)
     path.parent.mkdir(parents=True, exist_ok=True)
     save_basis(basis, path)
     return paths.BASIS.file(str(path))

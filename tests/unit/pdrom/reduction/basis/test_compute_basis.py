@@ -289,19 +289,3 @@ def test_file_round_trip(spec, tmp_path):
 def test_empty_basis_survives_a_file(tmp_path):
     save_basis(basis_of(np.zeros((4, ROWS, 3)), BasisSpec()), tmp_path / "b.h5")
     assert load_basis(tmp_path / "b.h5").V.shape == (3 * ROWS, 0)
-
-
-def test_the_trained_range_holds_every_snapshot_and_is_reached(spec):
-    """The least box around the coefficients that reconstruct the snapshots (full rank)."""
-    p, mass = snapshots(47)
-    basis = basis_of(p, spec, mass=mass)
-    parts = [slice(a, None, 3) for a in range(3)] if basis.separate_axes else [slice(None)]
-    assert basis.trained.shape == (len(parts), 2, basis.rank)
-    offsets = p.reshape(len(p), -1) - basis.mean
-    weights = np.sqrt(np.repeat(mass, 3)) if spec.weighting == "mass" else np.ones(3 * ROWS)
-    for part, (low, high) in zip(parts, basis.trained, strict=True):
-        # an independent way: weighted least squares, unique because the modes are independent
-        scaled = weights[part, None] * basis.V[part]
-        c = linalg.lstsq(scaled, (weights * offsets)[:, part].T)[0]
-        np.testing.assert_allclose(low, c.min(axis=1), atol=1e-10)
-        np.testing.assert_allclose(high, c.max(axis=1), atol=1e-10)

@@ -79,7 +79,7 @@ def span_part(basis: Basis, v: np.ndarray, p: np.ndarray, per_axis: bool) -> np.
 def test_the_presets_are_those_of_the_study():
     assert set(PRESETS) == {
         "pod", "deim", "qdeim", "deim-joint", "published", "block-deim", "block-qdeim", "gappy",
-        "bounded", "bounded-range", "s-opt", "block-s-opt",
+        "bounded", "s-opt", "block-s-opt",
     }  # fmt: skip
     assert len(EVERY) > 50
 
