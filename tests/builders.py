@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from numba import njit
 
-from pdrom.model.constraints.gradient_kernel import call
+from pdrom.model.constraints.local_kernel import call_gradients
 from pdrom.model.scene import Scene, SceneConfig
 from places import ROOT
 
@@ -90,7 +90,7 @@ class Pushing:
 @njit
 def call_kernel(address, d, parameters, p, m):
     """Call the compiled kernel at ``address`` for ``m`` elements; p is written."""
-    call(address, d.ctypes.data, parameters.ctypes.data, p.ctypes.data, m)
+    call_gradients(address, d.ctypes.data, parameters.ctypes.data, p.ctypes.data, m)
 
 
 def from_python(function):

@@ -56,7 +56,7 @@ def loaded() -> list[str]:
 def state_of(group: str) -> dict:
     """What a scene with one constraint group holds, and what its run gives."""
     from builders import make_scene
-    from pdrom.model.runs.full_order import trajectory
+    from pdrom.model.runs import trajectory
 
     scene = make_scene({"effect": group, "weight": 1e4}, mesh=SHEET, frames=FRAMES)
     run = trajectory(scene)

@@ -6,10 +6,15 @@ import numpy as np
 
 from pdrom.core.store import write_hdf5
 from pdrom.model.mesh.types import save_mesh
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
-from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
-from pdrom.reduction.subspace.store import store_columns, store_model
+from pdrom.reduction.subspace.model import (
+    Samples,
+    SubspaceModel,
+    make_columns,
+    store_columns,
+    store_model,
+)
 from places import ROOT
 from study.artifact.paths import File
 from study.experiments.live import LiveModels, Options, live

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from families import FAMILIES, KERNELS, twisted
 
-from pdrom.model.constraints.implementations import NumpyLocalStep
+from study.experiments.timing import NumpyLocalStep
 
 STEPS = {"compiled": lambda group: group, "numpy": NumpyLocalStep}
 

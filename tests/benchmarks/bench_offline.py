@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from pdrom.reduction.basis.pod import pod
+from pdrom.reduction.basis import pod
 from pdrom.reduction.sampling.deim import block_elements, deim_entries, joint_rows, tie_weights
 from pdrom.reduction.sampling.qdeim import qdeim_elements
 from pdrom.reduction.sampling.s_opt import s_opt_path

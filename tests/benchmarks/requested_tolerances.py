@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from pdrom.api import FullRun, build_scene, reduce
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.requested.levels import relative_errors
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from builders import GRAVITY, GROUPS, LEFT, Pushing, make_scene
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.effects.held import held_vertices
+from pdrom.model.effects.base import held_vertices
 from pdrom.model.scene import Scene
 from study.experiments.hard_cases.outcomes import BOUNDED
 

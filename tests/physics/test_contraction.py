@@ -5,12 +5,12 @@ import pytest
 
 from builders import GRAVITY, GROUPS, LEFT, make_scene
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
-from pdrom.reduction.basis.compute import compute_basis
-from pdrom.reduction.local.local_step import ReducedLocalStep
+from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, select_path
+from pdrom.reduction.sampling.local_step import ReducedLocalStep
 
 METHODS = {
     "pod": MethodSpec(title="pod", centring="affine", rows="all"),

@@ -5,7 +5,7 @@ import pytest
 
 from builders import GRAVITY, GROUPS, TOP, make_scene, random_rotation, with_effects
 from pdrom.model.dynamics.stepper import State
-from pdrom.model.runs.full_order import simulate, trajectory
+from pdrom.model.runs import simulate, trajectory
 
 
 def test_rest_state_stays_at_rest(group_scene):

@@ -45,7 +45,7 @@ def test_stretched_spring_relaxes_to_its_rest_length():
         {"effect": "spring", "weight": 1e5}, {"effect": "damping", "rate": 10.0}, mesh=mesh,
         frames=300,
     )  # fmt: skip
-    from pdrom.model.runs.full_order import simulate
+    from pdrom.model.runs import simulate
 
     stretched = 0.2 * (scene.mesh.points - scene.mesh.points.mean(axis=0))
     *_, (state, _) = simulate(scene, perturbation=stretched)

@@ -8,8 +8,8 @@ from scipy.linalg import eigh
 
 from builders import make_scene
 from pdrom.model.dynamics.stepper import State
-from pdrom.model.runs.full_order import trajectory
-from pdrom.reduction.basis.types import Basis
+from pdrom.model.runs import trajectory
+from pdrom.reduction.basis import Basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, Sampling
 from pdrom.reduction.sampling.gappy_pod_e import eigenvalue_growth

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from places import ROOT
 from study.experiments.sensitivity import perturbation_field, relative_difference
 from study.pipeline.scenes import load_bound_scene

@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 42_490,
-    "modules of src": 333,
-    "lines of tests": 28_601,
-    "words of documentation": 24_789,
+    "lines of src": 41_968,
+    "modules of src": 285,
+    "lines of tests": 28_512,
+    "words of documentation": 24_745,
     "tables": 25,
     "figures": 23,
     "experiments": 21,
-    "percent of src in decorators, signatures and imports": 21.72,
+    "percent of src in decorators, signatures and imports": 21.38,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

@@ -256,12 +256,12 @@ def test_a_removed_effect_reruns_the_scene_that_listed_it(finished: Checkout) ->
 
 # Registry, entry, module and its code.
 SELECTION = (
-    "src/pdrom/reduction/selections.py", "first:First", "pdrom.reduction.sampling.first",
+    "src/pdrom/reduction/method.py", "first:First", "pdrom.reduction.sampling.first",
     '''"""The first blocks."""
 
 import numpy as np
 
-from pdrom.reduction.sampling.selection import Selection
+from pdrom.reduction.sampling.deim import Selection
 
 
 class First(Selection):
@@ -273,7 +273,7 @@ EFFECT = (
     "src/pdrom/model/effects/__init__.py", "nothing:Nothing", "pdrom.model.effects.nothing",
     '''"""Nothing at all."""
 
-from pdrom.model.effects.gravity import Gravity
+from pdrom.model.effects.forces import Gravity
 
 
 class Nothing(Gravity):

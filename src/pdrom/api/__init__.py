@@ -4,11 +4,10 @@ docs/library.md has a worked example.
 """
 
 from pdrom.api.arguments import methods
-from pdrom.api.files import load, save
+from pdrom.api.files import build_scene, load, load_scene, save
 from pdrom.api.pictures import plot, view
 from pdrom.api.records import FullRun, ReducedRun, RequestedRun
 from pdrom.api.runs import basis, reduce, run
-from pdrom.api.scenes import build_scene, load_scene
 
 __all__ = [
     "FullRun",

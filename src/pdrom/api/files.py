@@ -1,16 +1,16 @@
-"""Runs in files, which ``pdrom show`` and ``pdrom view`` open, too."""
+"""Scenes from files or keys, and runs in files, which ``pdrom show`` and ``pdrom view`` open."""
 
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 
 from pdrom.api.arguments import file_path, require
 from pdrom.api.records import AnyRun, FullRun, ReducedRun, RequestedRun, full_run
-from pdrom.api.scenes import bound
-from pdrom.core.errors import PdromError, StorageError
+from pdrom.core.errors import ConfigurationError, PdromError, StorageError
 from pdrom.core.provenance import made_by
 from pdrom.core.store import (
     open_hdf5,
@@ -19,12 +19,66 @@ from pdrom.core.store import (
     require_self_contained,
     write_hdf5,
 )
-from pdrom.core.yamlfile import validate
-from pdrom.model.mesh.config import MeshFile
+from pdrom.core.yamlfile import named, read_yaml, validate
+from pdrom.model.mesh.config import GivenMesh, MeshFile, given_mesh
 from pdrom.model.mesh.types import store_mesh, stored_mesh
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.requested.run import Outcome, Request
 from pdrom.reduction.rerun import Rerun, displacement_norms
+
+
+def load_scene(path: str | os.PathLike[str]) -> Scene:
+    """Scene of a YAML file, bound to its mesh.
+
+    A mesh file is looked for from the folder of the scene's file on.
+
+    Parameters
+    ----------
+    path : the YAML file
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the file, the key and the fault.
+    """
+    path = file_path(path)
+    config = validate(SceneConfig, named(read_yaml(path), path.stem), str(path))
+    return bound(config, path.parent, str(path))
+
+
+def build_scene(folder: str | os.PathLike[str] = ".", mesh: Any = None, **keys: Any) -> Scene:
+    """Scene of the keys that a scene's file has, bound to its mesh.
+
+    Parameters
+    ----------
+    folder : where a mesh file is looked for
+    mesh : a mapping, as in a scene's file; or a pair of arrays: points (N, 3) m with triangles
+        (T, 3) or tetrahedra (E, 4), which name points from 0 on
+    keys : ``effects`` and ``frames`` are required, see config/README.md; ``name`` and ``title``
+        are given ones without them
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the key and the fault.
+    """
+    keys, source = named(keys, "scene"), "build_scene"
+    if not isinstance(mesh, (tuple, list)):
+        keys |= {} if mesh is None else {"mesh": mesh}
+        return bound(validate(SceneConfig, keys, source), file_path(folder), source)
+    if len(mesh) != 2:
+        raise ConfigurationError(f"{source}: mesh of {len(mesh)} parts, required: (points, cells)")
+    points, cells = mesh
+    made = given_mesh(points, cells, f"{source}: mesh")
+    return Scene.build(validate(SceneConfig, keys | {"mesh": GivenMesh.of(made)}, source), made)
+
+
+def bound(config: SceneConfig, folder: Path, source: str) -> Scene:
+    """Bind ``config`` to its mesh, read below ``folder``; errors begin with ``source``."""
+    try:
+        return Scene.build(config, config.mesh.build(folder))
+    except PdromError as error:
+        raise ConfigurationError(f"{source}: {error}") from error
 
 
 def save(reduced: ReducedRun | RequestedRun, path: str | os.PathLike[str]) -> None:

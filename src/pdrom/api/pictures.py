@@ -14,8 +14,7 @@ from pdrom.reduction.rerun import mean_motion
 from pdrom.view import style
 from pdrom.view.artists import Figure
 from pdrom.view.multiples import clipped, log_axis
-from pdrom.view.page import write_page
-from pdrom.view.runs import ViewedRun, ViewedScene
+from pdrom.view.page import ViewedRun, ViewedScene, write_page
 
 LOW, HIGH = 1e-7, 1e3  # errors outside are drawn on the limit
 

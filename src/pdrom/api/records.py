@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import h5py
 import numpy as np
 
-from pdrom.core.brief import brief
+from pdrom.core.packed import brief
 from pdrom.model.scene import Scene
 from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.requested.run import Outcome, Request

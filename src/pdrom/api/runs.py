@@ -24,17 +24,16 @@ from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5, require_own, require_place
 from pdrom.model.dynamics.stepper import FrameReport, State
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
-from pdrom.model.runs.bounded import Advance, BoundedRun, frame_by_frame
-from pdrom.model.runs.full_order import run as run_full_order
+from pdrom.model.runs import Advance, BoundedRun, frame_by_frame
+from pdrom.model.runs import run as run_full_order
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis import Basis, compute_basis
-from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.rerun import replace_group
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.requested import run as requested
 from pdrom.reduction.requested.levels import OnFrame, silent
 from pdrom.reduction.rerun import compare
 from pdrom.reduction.sampling import Reduction
+from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
 from pdrom.reduction.sampling.select import select
 from pdrom.reduction.snapshots import row_masses, training_frames
 

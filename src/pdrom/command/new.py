@@ -96,8 +96,8 @@ def template(stem: str, file: str | None = None, mesh: "Mesh | None" = None, up:
 
     ``up`` is the axis that points up there.
     """
-    from pdrom.core.names import named
-    from pdrom.model.mesh.measures import vertex_measures
+    from pdrom.core.yamlfile import named
+    from pdrom.model.mesh.types import vertex_measures
 
     names = {key: json.dumps(value, ensure_ascii=False) for key, value in named({}, stem).items()}
     if mesh is None:
@@ -158,7 +158,7 @@ def _about(mesh: "Mesh") -> str:
 def _sides(mesh: "Mesh") -> dict[str, int]:
     """The sides that the mesh has, and how many vertices lie on each."""
     from pdrom.core.errors import SceneError
-    from pdrom.model.mesh.select import SIDES, select_vertices
+    from pdrom.model.mesh.selection import SIDES, select_vertices
 
     found = {}
     for side in SIDES:

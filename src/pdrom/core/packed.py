@@ -1,7 +1,8 @@
-"""Arrays as plain data for scripts of a page: text in JSON, or changes of quantised positions."""
+"""Arrays for scripts of a page, as text or changes of quantised positions, and on one line."""
 
 import base64
 import zlib
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -37,3 +38,19 @@ def pack_positions(positions: np.ndarray) -> dict[str, Any]:
         "step": step.tolist(),
         "changes": pack_text(changes.astype("<u2")),
     }
+
+
+def brief(record: Any) -> str:
+    """The dataclass ``record`` as its name and fields; an array is shown by its shape and type.
+
+    A class takes it as its ``__repr__``.
+    """
+    shown = []
+    for field in fields(record):
+        value = getattr(record, field.name)
+        if isinstance(value, np.ndarray):
+            text = f"<{' x '.join(map(str, value.shape)) or 'one'} {value.dtype}>"
+        else:
+            text = " ".join(repr(value).split())
+        shown.append(f"{field.name}={text}")
+    return f"{type(record).__name__}({', '.join(shown)})"

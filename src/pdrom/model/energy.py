@@ -86,17 +86,11 @@ def _energy(scene: Scene, positions: np.ndarray, frame: int) -> float:
     else:
         v = (q - positions[frame - 1]) / scene.config.time_step
     kinetic = 0.5 * float(scene.masses @ np.einsum("ij,ij->i", v, v))
-    return kinetic + _group_potential(scene, q) + _force_potential(scene, q)
-
-
-def _group_potential(scene: Scene, q: np.ndarray) -> float:
-    """Sum of W_j(q); frame-lagged data are taken at q itself."""
-    unused = np.zeros_like(q)
-    total = 0.0
+    unused, potential = np.zeros_like(q), 0.0
     for group in scene.groups:
-        group.begin_frame(q)
-        total += group.accumulate(q, unused)
-    return total
+        group.begin_frame(q)  # frame-lagged data are taken at q itself
+        potential += group.accumulate(q, unused)
+    return kinetic + potential + _force_potential(scene, q)
 
 
 def _force_potential(scene: Scene, q: np.ndarray) -> float:

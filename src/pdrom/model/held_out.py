@@ -7,8 +7,7 @@ from pydantic import Field
 
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import GroupConfig
-from pdrom.model.effects.base import EffectConfig, Seed
-from pdrom.model.effects.entries import effect_config
+from pdrom.model.effects.base import EffectConfig, Seed, effect_config
 
 HeldOutMotion = Literal["heldout", "kick", "stiffness", "speed", "gravity", "kick_stiffness"]
 WIDE_MOTIONS: tuple[HeldOutMotion, ...] = get_args(HeldOutMotion)
@@ -43,7 +42,12 @@ class HeldOut(ConfigModel):
     ) -> tuple[EffectConfig, ...]:
         """Effects of the held-out ``motion``, made from the ``effects`` of the training one."""
         if motion == FIRST:
-            return self._own(effects)
+            own = [effect.with_frames_scaled(self.frames_factor) for effect in effects]
+            if self.reverse:
+                own = [effect.reversed() for effect in own]
+            if self.kick:
+                own.append(self._kick(self.kick, 0, len(own)))
+            return tuple(own)
         if motion == "kick_stiffness":
             return self.variant(self.variant(effects, "stiffness"), "kick")
         place, speed = WIDE_MOTIONS.index(motion), self.kick or KICK
@@ -53,14 +57,6 @@ class HeldOut(ConfigModel):
         if changed != tuple(effects):
             return changed
         return (*effects, self._kick(2.0 * speed, place, len(effects)))
-
-    def _own(self, effects: Sequence[EffectConfig]) -> tuple[EffectConfig, ...]:
-        changed = [effect.with_frames_scaled(self.frames_factor) for effect in effects]
-        if self.reverse:
-            changed = [effect.reversed() for effect in changed]
-        if self.kick:
-            changed.append(self._kick(self.kick, 0, len(changed)))
-        return tuple(changed)
 
     def _kick(self, speed: float, shift: int, place: int) -> EffectConfig:
         seed = (self.seed + shift) % 2**63

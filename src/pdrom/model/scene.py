@@ -1,30 +1,93 @@
-"""A scene: a mesh and a list of effects, typed, checked, and bound to the step loop."""
+"""A scene: a mesh and a list of effects, typed, checked, and bound to the step loop.
 
+Contradictions of what holds vertices or stops them are refused, doubts are logged. Masses are
+lumped: one for all vertices, or by selection."""
+
+import logging
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from pdrom.core.errors import SceneError
-from pdrom.core.names import SceneName
-from pdrom.core.yamlfile import ConfigModel
+from pdrom.core.yamlfile import ConfigModel, SceneName
 from pdrom.model.constraints.base import ConstraintGroup, GroupConfig
 from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import LocalStep, State, Stepper
 from pdrom.model.dynamics.system import DEFAULT_SOLVER, GlobalSystem
 from pdrom.model.effects import EFFECTS
-from pdrom.model.effects.base import Boundary, Contact, EffectConfig, Force, Start
-from pdrom.model.effects.entries import EffectConfigs, bind
+from pdrom.model.effects.base import (
+    Boundary,
+    Contact,
+    EffectConfig,
+    EffectConfigs,
+    Force,
+    Start,
+    bind,
+    held_targets,
+)
 from pdrom.model.held_out import FIRST, HeldOut, HeldOutMotion
-from pdrom.model.holding import check_holds, log_contacts, log_holds, log_obstructed
-from pdrom.model.masses import Mass, MassConfig, vertex_masses
 from pdrom.model.mesh.checks import check_mesh
 from pdrom.model.mesh.config import MeshConfig
-from pdrom.model.mesh.types import Mesh
+from pdrom.model.mesh.selection import Selection, select_vertices
+from pdrom.model.mesh.types import Mesh, vertex_measures
+
+Mass = Annotated[float, Field(ge=1e-150, le=1e150)]
+
+
+class MassConfig(ConfigModel):
+    """Mass of the vertices of ``select`` (all if it is left out), given in one of two ways.
+
+    vertex_mass : kg a vertex
+    density : kg/m^2 of a surface, kg/m^3 of a volume; a vertex has its share of the rest shape
+    """
+
+    select: Selection | None = None
+    vertex_mass: Mass | None = None
+    density: Mass | None = None
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Self:
+        if (self.vertex_mass is None) == (self.density is None):
+            raise ValueError("either vertex_mass or density is required")
+        return self
+
+
+def vertex_masses(
+    mesh: Mesh, scene: str, vertex_mass: float, entries: tuple[MassConfig, ...]
+) -> np.ndarray:
+    """Masses (N,) kg of ``scene``: ``vertex_mass``, changed by each of ``entries`` in turn.
+
+    Raises
+    ------
+    SceneError
+        A selection that the mesh does not have.
+    """
+    masses = np.full(mesh.vertices, vertex_mass)
+    for number, entry in enumerate(entries):
+        try:
+            masses = _changed(masses, mesh, entry)
+        except SceneError as error:
+            raise SceneError(f"scene '{scene}', masses[{number}]: {error}") from error
+    return masses
+
+
+def _changed(masses: np.ndarray, mesh: Mesh, entry: MassConfig) -> np.ndarray:
+    chosen = np.arange(mesh.vertices)
+    if entry.select is not None:
+        chosen = select_vertices(mesh, entry.select)
+    masses = masses.copy()
+    if entry.density is None:
+        masses[chosen] = entry.vertex_mass
+    else:
+        masses[chosen] = entry.density * vertex_measures(mesh)[chosen]
+    return masses
 
 
 class ReductionPlan(ConfigModel):
@@ -171,7 +234,11 @@ class Scene:
             Faulty mesh, an empty selection, or effects that hold a vertex in different places.
         """
         check_mesh(mesh, config.name)
-        _check_size(config, mesh)
+        if config.frames * mesh.vertices > MAX_VERTEX_FRAMES:
+            raise SceneError(
+                f"scene '{config.name}': frames = {config.frames} on {mesh.vertices} vertices: "
+                f"allowed are at most {MAX_VERTEX_FRAMES // mesh.vertices} frames"
+            )
         if masses is None:
             masses = vertex_masses(mesh, config.name, config.vertex_mass, entries=config.masses)
         return cls._bound(config, mesh, masses)
@@ -270,10 +337,95 @@ class Scene:
         return VertexSpace(system, self.forces, self.boundaries, contacts=self.contacts)
 
 
-def _check_size(config: SceneConfig, mesh: Mesh) -> None:
-    """A run that cannot be stored is refused before anything is allocated."""
-    if config.frames * mesh.vertices > MAX_VERTEX_FRAMES:
-        raise SceneError(
-            f"scene '{config.name}': frames = {config.frames} on {mesh.vertices} vertices: allowed "
-            f"are at most {MAX_VERTEX_FRAMES // mesh.vertices} frames"
-        )
+log = logging.getLogger(__name__)
+
+# Fewer vertices leave a body free to turn about a line.
+FEW = 3
+# Targets no deeper in an obstacle than this part of the extent lie on it.
+SLACK = 1e-9
+# Vertices that a message names.
+NAMED = 10
+
+
+def check_holds(boundaries: Sequence[Boundary], scene: str, frames: int) -> None:
+    """SceneError for a vertex that is held twice at once, unless nothing that holds it moves."""
+    for first, second in combinations(boundaries, 2):
+        if not (first.moves or second.moves):
+            continue
+        shared = np.intersect1d(first.vertices, second.vertices)
+        if len(shared) == 0:
+            continue
+        for frame in range(frames):
+            if first.active(frame) and second.active(frame):
+                raise SceneError(
+                    f"scene '{scene}': vertex {shared[0]} is held by '{first.name}' and by "
+                    f"'{second.name}' in frame {frame}"
+                )
+
+
+def log_holds(boundaries: Sequence[Boundary], scene: str, vertices: int) -> None:
+    """Log how many of the ``vertices`` of ``scene`` (name) each of its ``boundaries`` holds.
+
+    A side that holds fewer than `FEW` is a warning: on an unstructured mesh a side is often one
+    single vertex.
+    """
+    for boundary in boundaries:
+        count = len(boundary.vertices)
+        counted = f"scene '{scene}', effect '{boundary.name}': holds {count} of {vertices} vertices"
+        if boundary.side is None:
+            log.info("%s", counted)
+        elif count >= FEW:
+            log.info("%s (select: %s)", counted, boundary.side)
+        else:
+            advice = "a list of vertices selects more"
+            log.warning("%s, fewer than %d (select: %s; %s)", counted, FEW, boundary.side, advice)
+
+
+def log_obstructed(
+    boundaries: Sequence[Boundary],
+    contacts: Sequence[Contact],
+    scene: str,
+    points: np.ndarray,
+    frames: int,
+) -> None:
+    """Warn of held vertices whose targets lie inside an obstacle, where they stay.
+
+    Vertices that are taken hold of later are taken to be where obstacles have pushed the mesh at
+    rest, ``points`` (N, 3) m.
+    """
+    obstacles = [contact for contact in contacts if contact.each_alone]
+    inside, blocked = np.zeros(len(points), dtype=bool), dict[str, None]()
+    # boundaries remember where they took hold
+    boundaries, positions = deepcopy(boundaries), points.copy()
+    slack = SLACK * float(np.ptp(points, axis=0).max())
+    for frame in range(frames if obstacles and boundaries else 0):
+        held, targets = held_targets(boundaries, frame, positions)
+        positions[held] = targets
+        for obstacle in obstacles:
+            before = positions.copy()
+            obstacle.correct(positions, before)
+            pushed = held[np.linalg.norm(positions[held] - targets, axis=1) > slack]
+            positions[held] = targets
+            if len(pushed):
+                inside[pushed], blocked[obstacle.name] = True, None
+    vertices = np.flatnonzero(inside)
+    if len(vertices):
+        named = ", ".join(map(str, vertices[:NAMED])) + (", ..." if len(vertices) > NAMED else "")
+        log.warning(
+            "scene '%s': %d held vertices have targets inside '%s' and stay there: %s",
+            scene, len(vertices), "', '".join(blocked), named,
+        )  # fmt: skip
+
+
+def log_contacts(
+    contacts: Sequence[Contact], boundaries: Sequence[Boundary], scene: str, rest: np.ndarray
+) -> None:
+    """Warn of contacts that do not fit the shape ``rest`` (N, 3) m; held vertices do not count."""
+    free = np.ones(len(rest), dtype=bool)
+    for boundary in boundaries:
+        if boundary.active(0):
+            free[boundary.held(0)] = False
+    for contact in contacts:
+        doubt = contact.doubt(rest, np.flatnonzero(free)) if free.any() else ""
+        if doubt:
+            log.warning("scene '%s', effect '%s': %s", scene, contact.name, doubt)

@@ -129,14 +129,22 @@ def errors_within(
     if len(run["difference"]) < end:
         return dict.fromkeys(ERRORS)
     displacement, shape = reference["displacement"], run["shape_difference"]
+    drift, count = None, end // STRIDE + 1  # the first energy is that of the start
+    if count > 1 and len(reference["energy"]):
+        drift = float(np.abs(run["energy"][:count] - reference["energy"][:count]).max())
+    # the first contact: late, never (inf), or one that should not come (-inf)
+    first, wanted = (
+        float(np.argmax(touched)) if np.any(touched) else np.inf
+        for touched in (run["contact"][:end], reference["contact"][:end])
+    )
     found = (
         error_within(run["difference"], displacement, end),
         rms_within(run["difference"], extent_norm, end),
         rms_within(shape, extent_norm, end),
         error_within(shape, displacement, end),
         error_within(run["step_difference"], reference["step"], end),
-        _drift(run["energy"], reference["energy"], end),
-        _delay(run["contact"][:end], reference["contact"][:end], time_step),
+        drift,
+        None if first == wanted == np.inf else time_step * (first - wanted),
     )
     return dict(zip(ERRORS, found, strict=True))
 
@@ -161,22 +169,6 @@ def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> 
     if len(difference) < end:
         return None
     return trajectory_error(difference[:end], displacement[:end])
-
-
-def _drift(energy: np.ndarray, own: np.ndarray, end: int) -> float | None:
-    """Largest difference of two series of energies before a frame."""
-    count = end // STRIDE + 1  # the first is that of the start
-    if count == 1 or not len(own):
-        return None
-    return float(np.abs(energy[:count] - own[:count]).max())
-
-
-def _delay(contact: np.ndarray, own: np.ndarray, time_step: float) -> float | None:
-    """Seconds by which the first contact comes late, inf if never, -inf if it should not come."""
-    first, wanted = (
-        float(np.argmax(touched)) if np.any(touched) else np.inf for touched in (contact, own)
-    )
-    return None if first == wanted == np.inf else time_step * (first - wanted)
 
 
 def _blocks(positions: np.ndarray, reference: np.ndarray) -> list[tuple[Any, Any]]:

@@ -1,4 +1,7 @@
-"""A reduction method is a combination of ingredients; the presets are named combinations."""
+"""A reduction method is a combination of ingredients; the presets are named combinations.
+
+The code of a selection is loaded when a method uses it.
+"""
 
 import re
 from pathlib import Path
@@ -7,8 +10,18 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from pdrom.core.errors import ConfigurationError, choices
+from pdrom.core.registry import Registry
 from pdrom.core.yamlfile import ConfigModel, read_yaml, shown, validate
-from pdrom.reduction.selections import SELECTIONS
+
+SELECTIONS = Registry(
+    "selection",
+    {
+        "greedy": "pdrom.reduction.sampling.greedy:Greedy",
+        "pivoted-qr": "pdrom.reduction.sampling.qdeim:PivotedQR",
+        "s-opt": "pdrom.reduction.sampling.s_opt:SOpt",
+    },
+)
+
 
 METHOD_NAME = "[a-z0-9][a-z0-9-]{0,63}"
 Weighting = Literal["none", "mass"]

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from pdrom.core.brief import brief
+from pdrom.core.packed import brief
 from pdrom.model.metrics import trajectory_error
-from pdrom.model.runs.bounded import BoundedRun
+from pdrom.model.runs import BoundedRun
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,10 @@ from pdrom.model.mesh.types import Mesh
 from pdrom.view import style
 from pdrom.view.artists import Figure
 from pdrom.view.camera import Camera
-from pdrom.view.pack import shown_region
-from pdrom.view.panels import RunPanel, shared_window
+from pdrom.view.page import ViewedRun, ViewedScene, rotation_to, shown_region, up_of
+from pdrom.view.panels import Row, RunPanel, draw_rows, shared_window
 from pdrom.view.read import frame_numbers
-from pdrom.view.run_rows import Row, draw_rows
-from pdrom.view.runs import ViewedRun, ViewedScene
 from pdrom.view.text import plain_words
-from pdrom.view.view import rotation_to, up_of
 
 INSTANTS = (0.25, 0.5, 0.75, 1.0)  # fractions of the run
 CAMERA = Camera(30.0, 20.0)

@@ -8,9 +8,8 @@ import numpy as np
 
 from pdrom.core.store import atomic_path, require_own
 from pdrom.core.store.atomic import MARK
-from pdrom.model.mesh.types import Mesh
 from pdrom.view.frames import shown_runs
-from pdrom.view.runs import ViewedScene
+from pdrom.view.page import ViewedScene
 
 NAME = "frame_{:05d}.vtu"
 
@@ -27,9 +26,14 @@ def vtk(scene: ViewedScene, collection: Path) -> None:
     earlier = sorted(collection.parent.glob("frame_*.vtu"))
     for path in (collection, *earlier):
         require_own(path)
+    volume, mesh = len(scene.mesh.tetrahedra) > 0, scene.mesh
+    cells = [("tetra", mesh.tetrahedra) if volume else ("triangle", mesh.triangles)]
     for frame, name in enumerate(names):
         data = point_data(scene, frame)
-        _write(scene.mesh, scene.positions[frame], data, collection.with_name(name))
+        with atomic_path(collection.with_name(name), with_checksum=False) as temporary:
+            written = meshio.Mesh(scene.positions[frame], cells, point_data=data)
+            written.write(temporary, file_format="vtu")
+            _mark(temporary)
     for path in earlier:  # of a longer run
         if path.name not in names:
             path.unlink()
@@ -51,14 +55,6 @@ def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
         apart = np.full_like(now, np.nan) if ended else run.positions[frame] - now
         data[f"{run.group} {run.method} r={run.r}"] = apart
     return {name: np.asarray(values, dtype=np.float32) for name, values in data.items()}
-
-
-def _write(mesh: Mesh, points: np.ndarray, data: dict[str, np.ndarray], path: Path) -> None:
-    volume = len(mesh.tetrahedra) > 0
-    cells = [("tetra", mesh.tetrahedra) if volume else ("triangle", mesh.triangles)]
-    with atomic_path(path, with_checksum=False) as temporary:
-        meshio.Mesh(points, cells, point_data=data).write(temporary, file_format="vtu")
-        _mark(temporary)
 
 
 def _write_collection(path: Path, names: list[str], time_step: float) -> None:

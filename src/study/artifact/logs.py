@@ -12,8 +12,8 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from pdrom.core.aside import damaged_set_aside
 from pdrom.core.errors import INTERRUPTED, PdromError
+from pdrom.core.store.checksum import damaged_set_aside
 from study.artifact.usage import Meter
 
 PACKAGES = ("pdrom", "study")
@@ -41,7 +41,7 @@ def job_log(path: str) -> Iterator[logging.Logger]:
     of space on the disk is reported in words. The last line of a job that ends well reports its
     usage. Where a signal ends it, Python's own lines are the last.
 
-    Damaged results that the job reads are set aside (`pdrom.core.aside`).
+    Damaged results that the job reads are set aside (`pdrom.core.store.checksum`).
     """
     meter = Meter()
     loggers = [logging.getLogger(name) for name in PACKAGES]

@@ -5,7 +5,7 @@ from pathlib import Path
 from pdrom.model.mesh.checks import check_mesh
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.mesh.types import save_mesh
-from pdrom.model.runs.full_order import run
+from pdrom.model.runs import run
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.snapshots import stored_frames, test_frames
 from study.artifact.paths import HELDOUT, KICK, MESH, STIFFNESS, TRAIN, File

@@ -12,9 +12,8 @@ from time import process_time
 
 import pandas as pd
 
-from pdrom.core.names import SceneName
 from pdrom.core.store import write_table
-from pdrom.core.yamlfile import ConfigModel
+from pdrom.core.yamlfile import ConfigModel, SceneName
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.basis import basis_of
 from pdrom.reduction.method import MethodSpec

@@ -16,7 +16,7 @@ from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.deviations import error_within
 from pdrom.reduction.rerun import displacement_norms
-from pdrom.reduction.subspace.store import load_models
+from pdrom.reduction.subspace.model import load_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting

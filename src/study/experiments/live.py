@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from pdrom.core.errors import StorageError
-from pdrom.core.names import SceneName
 from pdrom.core.packed import pack_array, pack_positions
 from pdrom.core.store import write_text
-from pdrom.core.yamlfile import ConfigModel
+from pdrom.core.yamlfile import ConfigModel, SceneName
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import load_basis
 from pdrom.reduction.method import MethodSpec
@@ -26,8 +25,7 @@ from pdrom.reduction.subspace.exported import (
     needed_vertices,
 )
 from pdrom.reduction.subspace.interpolation import interpolation_of
-from pdrom.reduction.subspace.model import SubspaceModel, ecsw_name
-from pdrom.reduction.subspace.store import load_models
+from pdrom.reduction.subspace.model import SubspaceModel, ecsw_name, load_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Settings

@@ -14,10 +14,10 @@ from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, compute_basis
-from pdrom.reduction.local.rerun import rerun_reduced
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling import reductions
+from pdrom.reduction.sampling.local_step import rerun_reduced
 from pdrom.reduction.snapshots import row_masses, training_frames
 from study.artifact.paths import MESH, NOISE, NOISE_RUNS, SENSITIVITY, File
 from study.artifact.reads import Settings

@@ -13,17 +13,16 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from pdrom.core.names import SceneName
 from pdrom.core.store import write_table
-from pdrom.core.yamlfile import ConfigModel
+from pdrom.core.yamlfile import ConfigModel, SceneName
 from pdrom.model.metrics import relative_errors
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, basis_of
 from pdrom.reduction.deviations import error_within
-from pdrom.reduction.local.rerun import rerun_reduced
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling import Reduction, reductions
+from pdrom.reduction.sampling.local_step import rerun_reduced
 from pdrom.reduction.snapshots import SPLITS, SnapshotSet, load_snapshots
 from study.artifact import paths
 from study.artifact.paths import LADDER, MESH, SENSITIVITY, SNAPSHOTS, TRAIN, File
@@ -78,7 +77,7 @@ class ReducedRuns:
     data : snapshots of the group
     reference : (F + 1, N, 3) m, positions of the full-order run
     end : first frame that is not judged
-    blowup_extent : see `pdrom.reduction.local.rerun.rerun`
+    blowup_extent : see `pdrom.reduction.sampling.local_step.rerun`
     """
 
     def __init__(

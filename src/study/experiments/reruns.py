@@ -16,10 +16,10 @@ from pdrom.model.metrics import relative_errors
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, load_basis
 from pdrom.reduction.deviations import Yardstick
-from pdrom.reduction.local.rerun import rerun_reduced
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.sampling import Reduction, reductions
+from pdrom.reduction.sampling.local_step import rerun_reduced
 from pdrom.reduction.snapshots import SPLITS, SnapshotSet, load_snapshots
 from study.artifact import paths
 from study.artifact.paths import File

@@ -19,10 +19,9 @@ from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, compute_basis
-from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.rerun import replace_group
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, select, select_path
+from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
 from pdrom.reduction.snapshots import row_masses
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
 from study.artifact.paths import BREAK_EVEN_SIZED, EFFECTS_SIZED, SCALING, File

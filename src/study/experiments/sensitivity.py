@@ -19,7 +19,7 @@ from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.effects.base import Contact, Effect, Force, Seed
 from pdrom.model.held_out import MOTIONS
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from study.artifact.paths import CONTRIBUTIONS, MESH, SENSITIVITY, File
 from study.artifact.reads import Setting

@@ -13,12 +13,11 @@ from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.energy import EnergyScale
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import load_basis
-from pdrom.reduction.local.rerun import rerun, rerun_reduced
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling import Reduction
-from pdrom.reduction.subspace.model import SubspaceModel, rerun_model
-from pdrom.reduction.subspace.store import load_models
+from pdrom.reduction.sampling.local_step import rerun, rerun_reduced
+from pdrom.reduction.subspace.model import SubspaceModel, load_models, rerun_model
 from study.artifact.paths import BASIS, MESH, SAMPLING, STABILITY, SUBSPACES, File
 from study.artifact.reads import Every, Setting
 from study.experiments.kit.declaration import experiment

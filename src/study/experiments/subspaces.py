@@ -14,12 +14,11 @@ import h5py
 import numpy as np
 import pandas as pd
 
-from pdrom.core.names import SceneName
 from pdrom.core.store import write_hdf5, write_table
-from pdrom.core.yamlfile import ConfigModel
+from pdrom.core.yamlfile import ConfigModel, SceneName
 from pdrom.model.energy import largest
 from pdrom.model.held_out import MOTIONS
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.rerun import Rerun
@@ -36,8 +35,9 @@ from pdrom.reduction.subspace.model import (
     make_columns,
     rerun_model,
     sample_elements,
+    store_columns,
+    store_model,
 )
-from pdrom.reduction.subspace.store import store_columns, store_model
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Settings, SourcesOf

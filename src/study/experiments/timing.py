@@ -4,24 +4,24 @@ import logging
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from time import perf_counter
 from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
 from pydantic import Field
+from scipy import sparse
 
 from pdrom.core.store import open_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.constraints.implementations import IMPLEMENTATIONS
 from pdrom.model.dynamics.stepper import LocalStep
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import load_basis
-from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.rerun import replace_group
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.subspace.store import load_models
+from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
+from pdrom.reduction.subspace.model import load_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Settings
@@ -32,6 +32,78 @@ from study.experiments.kit.load_reduction import basis_of, load_reduction
 from study.experiments.kit.measurement import Measurement, Protocol, Variant, measure
 from study.experiments.kit.scenes import scene_of
 from study.experiments.kit.settings import ANDERSON, FOM, Count, Rank, Solver, resolve_ranks
+
+
+class _Slower:
+    """Base of the implementations; the time of their products with S^T is counted separately."""
+
+    implementation: str
+
+    def __init__(self, group: ConstraintGroup) -> None:
+        self.name = group.name
+        self.group = group
+        self.assembly_seconds = 0.0
+
+    def begin_frame(self, q: np.ndarray) -> None:
+        self.group.begin_frame(q)
+
+
+class NumpyLocalStep(_Slower):
+    """Vectorised NumPy projections of all elements, SciPy sparse products around them."""
+
+    implementation = "numpy"
+
+    def __init__(self, group: ConstraintGroup) -> None:
+        super().__init__(group)
+        self._shape = (group.elements, group.rows_per_element, 3)
+        self._all = np.arange(group.elements)
+        self._weights = group.row_weights[:, None]
+        self._lift = sparse.csr_array(group.S.T.multiply(group.row_weights[None, :]))
+
+    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
+        """Add S^T W p(y) of ``y`` (N, 3) m to ``rhs`` (N, 3) and return the energy, J."""
+        d = self.group.S @ y
+        p = self.group.reference_project(d.reshape(self._shape), self._all).reshape(d.shape)
+        energy = 0.5 * float(np.sum(self._weights * (d - p) ** 2))
+        before = perf_counter()
+        rhs += self._lift @ p
+        self.assembly_seconds += perf_counter() - before
+        return energy
+
+
+class InterpretedLocalStep(_Slower):
+    """One element after the other in interpreted Python, as straightforward codes do it."""
+
+    implementation = "interpreted"
+
+    def __init__(self, group: ConstraintGroup) -> None:
+        super().__init__(group)
+        rows = group.rows_per_element
+        self._blocks = []
+        for e in range(group.elements):
+            block = group.S[rows * e : rows * (e + 1)]
+            columns = np.unique(block.indices)
+            self._blocks.append((columns, block.toarray()[:, columns], group.weights[e]))
+
+    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
+        """Add S^T W p(y) of ``y`` (N, 3) m to ``rhs`` (N, 3) and return the energy, J."""
+        energy = 0.0
+        for e, (columns, block, weight) in enumerate(self._blocks):
+            d = block @ y[columns]
+            p = self.group.reference_project(d[None], np.array([e]))[0]
+            energy += 0.5 * weight * float(np.sum((d - p) ** 2))
+            before = perf_counter()
+            rhs[columns] += weight * (block.T @ p)
+            self.assembly_seconds += perf_counter() - before
+        return energy
+
+
+# Makers of a local step of the step loop, by name.
+IMPLEMENTATIONS: dict[str, Callable[[ConstraintGroup], Any]] = {
+    "numpy": NumpyLocalStep,
+    "interpreted": InterpretedLocalStep,
+}
+
 
 log = logging.getLogger(__name__)
 

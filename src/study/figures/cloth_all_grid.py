@@ -7,9 +7,16 @@ import numpy as np
 from pdrom.model.mesh.types import Mesh
 from pdrom.view import style
 from pdrom.view.artists import Figure, ScalarMappable
-from pdrom.view.panels import RunPanel, fit_aspect, shared_window
+from pdrom.view.panels import (
+    NOTHING_RAN,
+    Row,
+    RunPanel,
+    draw_rows,
+    fit_aspect,
+    run_panel,
+    shared_window,
+)
 from pdrom.view.read import choose_ranks, rerun_infos
-from pdrom.view.run_rows import NOTHING_RAN, Row, draw_rows, run_panel
 from study.artifact.paths import File
 from study.experiments.kit.settings import Horizon
 from study.figures.kit.declaration import figure

@@ -10,9 +10,8 @@ import pandas as pd
 from pdrom.model.mesh.types import Mesh, load_mesh
 from pdrom.view import style
 from pdrom.view.artists import Figure
-from pdrom.view.panels import RunPanel, shared_window
+from pdrom.view.panels import NOTHING_RAN, Row, RunPanel, draw_rows, run_panel, shared_window
 from pdrom.view.read import choose_ranks, positions_at, rerun_infos
-from pdrom.view.run_rows import NOTHING_RAN, Row, draw_rows, run_panel
 from study.artifact.paths import MESH, NOISE_RUNS, RERUNS, TRAIN, File
 from study.artifact.reads import EachOf, Every, Read, Settings, TableOf
 from study.experiments.kit.settings import Horizon

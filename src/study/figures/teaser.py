@@ -8,8 +8,7 @@ import pandas as pd
 from pdrom.core.store import open_hdf5
 from pdrom.view import style
 from pdrom.view.artists import Figure
-from pdrom.view.panels import RunPanel
-from pdrom.view.run_rows import Row, draw_rows
+from pdrom.view.panels import Row, RunPanel, draw_rows
 from study.artifact.paths import SUBSPACES, File
 from study.artifact.reads import EachOf, TableOf
 from study.experiments.kit.settings import Horizon

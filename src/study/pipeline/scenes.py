@@ -11,12 +11,10 @@ from typing import Annotated, NamedTuple, Self
 from pydantic import Field, model_validator
 
 from pdrom.core.errors import ConfigurationError, PdromError, choices
-from pdrom.core.names import SceneName, named
-from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
+from pdrom.core.yamlfile import ConfigModel, SceneName, named, read_yaml, validate
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.effects import EFFECTS
-from pdrom.model.effects.base import Seed
-from pdrom.model.effects.entries import effect_config
+from pdrom.model.effects.base import Seed, effect_config
 from pdrom.model.mesh.config import MeshFile
 from pdrom.model.scene import Scene, SceneConfig
 from study.experiments.kit.scenes import varied

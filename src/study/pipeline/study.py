@@ -9,8 +9,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from pdrom.core.errors import ConfigurationError, choices
-from pdrom.core.names import SceneName
-from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
+from pdrom.core.yamlfile import ConfigModel, SceneName, read_yaml, validate
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.config import MeshConfig

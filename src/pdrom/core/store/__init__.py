@@ -7,7 +7,16 @@ job of the workflow sets a damaged one aside: the next run finds it missing and 
 Nobody else moves a file that it reads.
 """
 
-from pdrom.core.store.atomic import atomic_path, require_own, require_place
+from pdrom.core.store.atomic import (
+    atomic_path,
+    read_table,
+    read_text,
+    require_finite,
+    require_own,
+    require_place,
+    write_table,
+    write_text,
+)
 from pdrom.core.store.checksum import (
     Checksum,
     Condition,
@@ -18,7 +27,6 @@ from pdrom.core.store.checksum import (
     require_intact,
 )
 from pdrom.core.store.hdf5 import open_hdf5, require_self_contained, write_hdf5
-from pdrom.core.store.text import read_table, read_text, require_finite, write_table, write_text
 
 __all__ = [
     "Checksum",

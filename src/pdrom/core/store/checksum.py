@@ -20,13 +20,37 @@ import hashlib
 import json
 import os
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from pdrom.core.aside import sets_aside
 from pdrom.core.errors import StorageError
 from pdrom.core.provenance import as_text, provenance
+
+_ASIDE: ContextVar[bool] = ContextVar("damaged results are set aside", default=False)
+
+
+@contextmanager
+def damaged_set_aside() -> Iterator[None]:
+    """Inside this context a damaged result that is read is renamed to ``NAME.damaged``.
+
+    Only jobs of the workflow do it, whose next run makes them again. Nobody else renames a file
+    that it reads: it may be the only copy of somebody's run.
+    """
+    previous = _ASIDE.set(True)
+    try:
+        yield
+    finally:
+        _ASIDE.reset(previous)
+
+
+def sets_aside() -> bool:
+    """Whether a damaged result that is read now is renamed."""
+    return _ASIDE.get()
+
 
 CHECKSUM_SUFFIX = ".blake2b"
 _SHORT = 16  # hexadecimal digits of the checksum of a comment

@@ -1,8 +1,8 @@
-"""Inner products of three rows of a matrix with a vector at once.
+"""Inner products, and sums of vectors, in compiled code.
 
-Together they read the vector once, and the processor fetches three rows ahead. The order of the
-sums does not depend on the processor: sixteen partial sums, then four, then one by one.
-"""
+Those of three rows of a matrix with a vector read the vector once, and the processor fetches three
+rows ahead. The order of the sums does not depend on the processor: sixteen partial sums, then four,
+then one by one."""
 
 from pdrom.model.compiled.arithmetic import (
     add,
@@ -10,6 +10,7 @@ from pdrom.model.compiled.arithmetic import (
     constant,
     first_three,
     of_three,
+    total,
     transposed,
 )
 from pdrom.model.compiled.functions import compiled
@@ -76,3 +77,24 @@ def dots(matrix, i, j, k, count, vector, starts):
         y += at(matrix, j + p) * v
         z += at(matrix, k + p) * v
     return x, y, z
+
+
+@compiled(nogil=True)
+def dot(a, b):
+    """Inner product of ``a`` and ``b`` (n,), in eight sums that do not wait for each other."""
+    first = second = constant(0.0)
+    whole = len(a) - len(a) % (2 * WIDTH)
+    for k in range(0, whole, 2 * WIDTH):
+        first = add_product(first, load(a, k), load(b, k))
+        second = add_product(second, load(a, k + WIDTH), load(b, k + WIDTH))
+    result = total(add(first, second))
+    for k in range(whole, len(a)):
+        result += a[k] * b[k]
+    return result
+
+
+@compiled(nogil=True)
+def add_multiple(a, s, b):
+    """a <- a + s b."""
+    for k in range(len(a)):
+        a[k] += s * b[k]

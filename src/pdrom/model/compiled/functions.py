@@ -1,10 +1,12 @@
-"""Compiling the compiled functions of the model, and keeping them."""
+"""Compiling the compiled functions of the model, keeping them, and their clock."""
 
+import time
 from functools import cache, cached_property
 from pathlib import Path
 from zlib import crc32
 
-from numba import cfunc, njit
+import numpy as np
+from numba import cfunc, njit, types
 
 KERNELS = ("compiled", "constraints", "dynamics")  # folders whose functions others inline
 
@@ -79,3 +81,19 @@ class Callback:
     def address(self):
         """Address of the compiled function."""
         return self._compiled.address
+
+
+_CLOCK = time.CLOCK_MONOTONIC
+_clock_gettime = types.ExternalFunction("clock_gettime", types.int32(types.int32, types.voidptr))
+
+
+def clock() -> np.ndarray:
+    """Memory that `now` works with."""
+    return np.zeros(2, np.int64)
+
+
+@compiled(nogil=True)
+def now(clock):
+    """Seconds since some moment, by the ``clock``."""
+    _clock_gettime(_CLOCK, clock.ctypes)
+    return clock[0] + 1e-9 * clock[1]

@@ -9,7 +9,6 @@ from typing import Literal
 import numpy as np
 
 from pdrom.model.constraints import products
-from pdrom.model.constraints.gradient_kernel import gradient_kernel
 from pdrom.model.constraints.lanes import (
     LANES,
     SMALLEST,
@@ -22,7 +21,7 @@ from pdrom.model.constraints.lanes import (
     save,
     scaled,
 )
-from pdrom.model.constraints.local_kernel import local_kernel
+from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.constraints.simplex import SIZE, F, P
 from pdrom.model.constraints.singular_values import (
     StrainConfig,

@@ -16,8 +16,7 @@ from pdrom.core.errors import SceneError
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.local_kernel import LocalKernel, LocalPass, projections
 from pdrom.model.effects.base import Effect, EffectConfig
-from pdrom.model.mesh.select import select_vertices
-from pdrom.model.mesh.selection import Selection
+from pdrom.model.mesh.selection import Selection, select_vertices
 from pdrom.model.mesh.types import Mesh
 
 # Kinds of cells that elements lie on, with a function: mesh -> vertices of all such cells.

@@ -175,3 +175,44 @@ def _table(kernels: Sequence[LocalKernel], part: int) -> Table:
     addresses = np.array([kernel.address for kernel in kernels], dtype=np.int64)
     records = np.array([kernel.record.ctypes.data for kernel in kernels], dtype=np.int64)
     return addresses, records, part
+
+
+_GRADIENTS = types.void(
+    types.CPointer(types.float64),
+    types.CPointer(types.float64),
+    types.CPointer(types.float64),
+    types.intp,
+)
+
+
+def gradient_kernel(function):
+    """Compile ``function(d, parameters, p, m)``, a projection of a batch from S q alone.
+
+    In a position subspace S q comes from a small dense product, not from vertices. The iterations
+    of a subspace call it by its attribute ``address``, so that one compiled loop serves every mix
+    of groups.
+
+    d : pointer to (m, rows, 3) values of S q
+    parameters : pointer to the numbers of `ConstraintGroup.kernel_parameters`
+    p : pointer to (m, rows, 3), where the projections go
+    """
+    return Callback(function, _GRADIENTS)
+
+
+@intrinsic
+def call_gradients(typing_context, address, d, parameters, p, m):
+    """Call a gradient kernel by its ``address``.
+
+    ``d``, ``parameters`` and ``p``, see `gradient_kernel`, are addresses; ``m`` elements.
+    ``typing_context`` is Numba's own: callers leave it out.
+    """
+    integers = (types.intp,) * 5
+
+    def generate(context, builder, signature, arguments):
+        integer = ir.IntType(types.intp.bitwidth)
+        kind = ir.FunctionType(ir.VoidType(), [integer] * 4)
+        function = builder.inttoptr(arguments[0], kind.as_pointer())
+        builder.call(function, arguments[1:])
+        return context.get_dummy_value()
+
+    return types.void(*integers), generate

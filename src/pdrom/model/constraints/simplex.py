@@ -275,18 +275,14 @@ def visiting_order(stencil: np.ndarray, vertices: int) -> np.ndarray | None:
     """
     if len(stencil) == 0:
         return None
+    e, m = stencil.shape
+    places = (np.repeat(np.arange(e), m), stencil.ravel())
+    incidence = sparse.csr_array((np.ones(e * m), places), shape=(e, vertices))
+    neighbours = sparse.csr_array(incidence.T @ incidence)  # with an element in common
     rank = np.empty(vertices, dtype=np.int64)
-    rank[csgraph.reverse_cuthill_mckee(_neighbours(stencil, vertices), True)] = np.arange(vertices)
+    rank[csgraph.reverse_cuthill_mckee(neighbours, True)] = np.arange(vertices)
     order = np.lexsort(np.sort(rank[stencil], axis=1).T[::-1])
     return order if _corners(stencil) > KEPT * _corners(stencil[order]) else None
-
-
-def _neighbours(stencil: np.ndarray, vertices: int) -> sparse.csr_array:
-    """Graph (N, N) of the vertices that have an element in common."""
-    e, m = stencil.shape
-    rows = np.repeat(np.arange(e), m)
-    incidence = sparse.csr_array((np.ones(e * m), (rows, stencil.ravel())), shape=(e, vertices))
-    return sparse.csr_array(incidence.T @ incidence)
 
 
 def _corners(stencil: np.ndarray) -> int:

@@ -21,9 +21,8 @@ from pdrom.model.compiled.arithmetic import (
 )
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.constraints.base import GroupConfig, directions
-from pdrom.model.constraints.gradient_kernel import gradient_kernel
 from pdrom.model.constraints.lanes import LANES, SMALLEST, lane_function, pack, take
-from pdrom.model.constraints.local_kernel import local_kernel
+from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.constraints.simplex import (
     ARRAYS,
     EDGE,

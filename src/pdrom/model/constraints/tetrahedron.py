@@ -5,12 +5,13 @@ matrices far from singular with positive determinant; module `svd3` does the oth
 singular values lie in the range already is its own projection.
 """
 
+from typing import Literal
+
 import numpy as np
 
 from pdrom.model.compiled.rows import at
 from pdrom.model.constraints import svd3
 from pdrom.model.constraints.base import GroupConfig, require_cells
-from pdrom.model.constraints.gradient_kernel import gradient_kernel
 from pdrom.model.constraints.lanes import (
     LANES,
     SMALLEST,
@@ -25,10 +26,11 @@ from pdrom.model.constraints.lanes import (
     scaled,
     square_distance,
 )
-from pdrom.model.constraints.local_kernel import local_kernel
+from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.constraints.simplex import EDGE, ENERGY, FORCE, OPERATOR, SIZE, WEIGHT, F, P
 from pdrom.model.constraints.singular_values import (
     SingularValueGroup,
+    StrainConfig,
     accumulate,
     project,
     project_gradients,
@@ -215,3 +217,23 @@ class TetrahedronGroup(SingularValueGroup):
         edges = (corner[:, 1:] - corner[:, :1]).transpose(0, 2, 1)
         self.weights = self.element_weights(mesh) * np.abs(np.linalg.det(edges)) / 6.0
         self._set_up(mesh, np.linalg.inv(edges))
+
+
+class TetrahedronStrain(TetrahedronGroup):
+    """Clamps to [minimum, maximum] > 0: an inverted tetrahedron is turned right side out."""
+
+    class Config(StrainConfig):
+        """Weight w per volume, N/m^2."""
+
+        effect: Literal["tetrahedron_strain"] = "tetrahedron_strain"
+
+
+class DeformationGradient(TetrahedronGroup):
+    """The clamp range [1, 1] leaves U V^T with det +1, the nearest rotation of F."""
+
+    class Config(GroupConfig):
+        """Weight w per volume, N/m^2."""
+
+        effect: Literal["deformation_gradient"] = "deformation_gradient"
+
+    allowed = (1.0, 1.0)

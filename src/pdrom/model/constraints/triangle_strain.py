@@ -17,7 +17,6 @@ import numpy as np
 
 from pdrom.model.compiled.rows import at
 from pdrom.model.constraints.base import require_cells
-from pdrom.model.constraints.gradient_kernel import gradient_kernel
 from pdrom.model.constraints.lanes import (
     LANES,
     SMALLEST,
@@ -33,7 +32,7 @@ from pdrom.model.constraints.lanes import (
     scaled,
     square_distance,
 )
-from pdrom.model.constraints.local_kernel import local_kernel
+from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.constraints.simplex import EDGE, ENERGY, FORCE, OPERATOR, SIZE, WEIGHT, F, P
 from pdrom.model.constraints.singular_values import (
     SingularValueGroup,

@@ -9,9 +9,8 @@ from typing import Literal
 import numpy as np
 
 from pdrom.model.constraints import products, svd3
-from pdrom.model.constraints.gradient_kernel import gradient_kernel
 from pdrom.model.constraints.lanes import LANES, cross, dot, lane_function, load, save
-from pdrom.model.constraints.local_kernel import local_kernel
+from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.constraints.simplex import SIZE, F, P
 from pdrom.model.constraints.singular_values import (
     StrainConfig,

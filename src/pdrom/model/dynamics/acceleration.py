@@ -9,9 +9,9 @@ same.
 
 import numpy as np
 
+from pdrom.model.compiled.dots import dot
 from pdrom.model.compiled.functions import compiled, inner
 from pdrom.model.compiled.rows import flat, write
-from pdrom.model.compiled.vectors import dot
 
 # Relative Tikhonov term of the small least-squares problem: nearly parallel residual differences
 # (close to convergence) must not blow up the weights.

@@ -8,12 +8,16 @@ import numpy as np
 
 from pdrom.model.compiled.rows import copied, flat, unflat
 from pdrom.model.dynamics.acceleration import Anderson
-from pdrom.model.dynamics.frames import end, predict, weighted
-from pdrom.model.dynamics.iterations import CompiledIterations
+from pdrom.model.dynamics.frames import CompiledIterations, WholeFrames, end, predict, weighted
 from pdrom.model.dynamics.system import GlobalSystem
-from pdrom.model.dynamics.whole_frames import WholeFrames
-from pdrom.model.effects.base import Boundary, Contact, Force
-from pdrom.model.effects.held import held_path, held_targets, held_vertices
+from pdrom.model.effects.base import (
+    Boundary,
+    Contact,
+    Force,
+    held_path,
+    held_targets,
+    held_vertices,
+)
 
 
 class Solve(Protocol):

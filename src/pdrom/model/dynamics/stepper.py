@@ -57,7 +57,7 @@ class FrameReport:
 
 
 class CompiledFrames(Protocol):
-    """Frames that run in compiled code alone, see `pdrom.model.dynamics.whole_frames`."""
+    """Frames that run in compiled code alone, see `pdrom.model.dynamics.frames`."""
 
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool

@@ -1,4 +1,4 @@
-"""Roles of effects, and the base classes of each role.
+"""Roles of effects, the base classes of each role, and a scene's list of effects.
 
 A scene is a mesh and a list of effects. Each effect is one class with one typed configuration,
 registered under the name that the configuration uses. It plays exactly one role, and the step loop
@@ -21,11 +21,12 @@ from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import BeforeValidator, Field, SerializeAsAny, ValidationError
 
-from pdrom.core.yamlfile import ConfigModel
-from pdrom.model.mesh.lengths import Length
-from pdrom.model.mesh.types import Mesh
+from pdrom.core.errors import ConfigurationError, SceneError
+from pdrom.core.yamlfile import ConfigModel, describe, shown
+from pdrom.model.effects import EFFECTS
+from pdrom.model.mesh.types import Length, Mesh
 
 # A vertex no deeper than this part of the extent touches an obstacle and is not inside.
 TOUCHING = 1e-6
@@ -50,7 +51,10 @@ class EffectConfig(ConfigModel):
         changes: dict[str, Any] = {}
         for name, field in type(self).model_fields.items():
             value = getattr(self, name)
-            if value and any(isinstance(m, ScaledWithFrames) for m in _metadata(field)):
+            # also the markers inside ``FrameNumber | None``
+            inside = getattr(field.annotation, "__args__", ())
+            nested = [m for part in inside for m in getattr(part, "__metadata__", ())]
+            if value and any(isinstance(m, ScaledWithFrames) for m in (*field.metadata, *nested)):
                 changes[name] = max(1, round(value * factor))
         return self.model_copy(update=changes)
 
@@ -74,16 +78,6 @@ class EffectConfig(ConfigModel):
     def body(self, low: np.ndarray, high: np.ndarray) -> Mesh | None:
         """Surface that pictures of the region from ``low`` to ``high`` (3,) m show."""
         return None
-
-
-def _metadata(field: Any) -> list[Any]:
-    """Markers of a field, also those inside ``FrameNumber | None``."""
-    nested = [m for a in getattr(field.annotation, "__args__", ()) for m in _arguments(a)]
-    return [*field.metadata, *nested]
-
-
-def _arguments(annotation: Any) -> tuple[Any, ...]:
-    return getattr(annotation, "__metadata__", ())
 
 
 class Effect(ABC):
@@ -225,3 +219,87 @@ class Contact(Effect):
             f"{count} of {len(free)} free vertices lie inside it at rest and are moved by up to "
             f"{distances.max():.3g} m in the first frame"
         )
+
+
+def effect_config(entry: Any, index: int) -> EffectConfig:
+    """Typed configuration of ``entry``, number ``index`` of ``effects``; ValueError for a fault."""
+    if isinstance(entry, EffectConfig):
+        return entry
+    if not isinstance(entry, dict) or not isinstance(entry.get("effect"), str):
+        raise ValueError(f"effects[{index}] = {shown(entry, 60)}: a mapping with a key 'effect'")
+    try:
+        model = EFFECTS.load(entry["effect"]).Config
+    except ConfigurationError as error:
+        raise ValueError(f"effects[{index}]: {error}") from error
+    try:
+        return model.model_validate(entry)
+    except ValidationError as error:
+        fault = describe(error, model)
+        raise ValueError(f"effects[{index}] ({entry['effect']}): {fault}") from error
+
+
+def _typed(entries: Any) -> tuple[EffectConfig, ...]:
+    if not isinstance(entries, (list, tuple)):
+        raise ValueError("a list of effects is required")
+    return tuple(effect_config(entry, index) for index, entry in enumerate(entries))
+
+
+EffectConfigs = Annotated[tuple[SerializeAsAny[EffectConfig], ...], BeforeValidator(_typed)]
+
+
+def bind(config: EffectConfig, scene: str, mesh: Mesh, masses: np.ndarray) -> Effect:
+    """Effect ``config`` on a mesh of ``masses`` (N,) kg; SceneError names ``scene`` and effect."""
+    try:
+        return EFFECTS.load(config.effect)(config, mesh, masses)
+    except SceneError as error:
+        raise SceneError(f"scene '{scene}', effect '{config.effect}': {error}") from error
+
+
+def held_vertices(boundaries: Sequence[Boundary], frame: int) -> np.ndarray:
+    """Vertices that any of the ``boundaries`` holds in ``frame``, ascending (n,) int64."""
+    held = [b.held(frame) for b in boundaries if b.active(frame)]
+    return np.unique(np.concatenate(held)) if held else np.empty(0, dtype=np.int64)
+
+
+def held_targets(
+    boundaries: Sequence[Boundary], frame: int, positions: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The vertices that are held in ``frame``, as `held_vertices`, and their targets (n, 3) m.
+
+    ``positions`` (N, 3) m are those at the frame's beginning; ``boundaries`` are the scene's.
+    """
+    vertices, path = held_path(boundaries, range(frame, frame + 1), positions)
+    return vertices, path[0]
+
+
+def held_path(
+    boundaries: Sequence[Boundary], frames: range, positions: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """`held_targets` of the first of ``frames``, and of those whose targets are known by then.
+
+    Targets are (n, m, 3) m for n >= 1 frames: up to the first in which others are held, or in which
+    any are taken hold of.
+
+    Parameters
+    ----------
+    positions : (N, 3) m at the beginning of the first frame
+    """
+    active = [b for b in boundaries if b.active(frames.start)]
+    held = [b.held(frames.start) for b in active]
+    current = [positions[v] for v in held]
+    single = len(active) == 1 and bool((held[0][1:] > held[0][:-1]).all())
+    vertices, first = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    if single:
+        vertices = held[0]
+    elif active:
+        vertices, first = np.unique(np.concatenate(held), return_index=True)
+    known = 1
+    while known < len(frames) and not (
+        any(b.active(frames[known]) != (b in active) for b in boundaries)
+        or any(b.takes_hold(frames[known]) for b in active)
+    ):
+        known += 1
+    paths = [b.path(frames[:known], q) for b, q in zip(active, current, strict=True)]
+    if single:
+        return vertices, np.array(paths[0], order="C")  # a view is another type, compiled again
+    return vertices, np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]

@@ -7,8 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from pdrom.model.effects.base import Boundary, EffectConfig, FrameNumber, Vector
-from pdrom.model.mesh.select import select_vertices
-from pdrom.model.mesh.selection import Selection
+from pdrom.model.mesh.selection import Selection, select_vertices
 from pdrom.model.mesh.types import Mesh
 
 

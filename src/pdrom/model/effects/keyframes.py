@@ -77,17 +77,13 @@ class Keyframes(Hold):
         self._poses = np.stack([np.zeros(6), *poses])
         self._smooth = config.interpolation == "smooth"
 
-    def _pose(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Offset (3,) m and rotation vector (3,) degrees at a ``time`` in frames."""
-        time = min(time, self._times[-1])
+    def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
+        time = min(frame + 1 - self.config.start, self._times[-1])
         if self._smooth:
             pose = PchipInterpolator(self._times, self._poses)(time)
         else:
             pose = np.array([np.interp(time, self._times, line) for line in self._poses.T])
-        return pose[:3], pose[3:]
-
-    def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
-        offset, turn = self._pose(frame + 1 - self.config.start)
+        offset, turn = pose[:3], pose[3:]
         middle = 0.5 * (anchor.min(axis=0) + anchor.max(axis=0))
         rotation = Rotation.from_rotvec(turn, degrees=True)
         return middle + rotation.apply(anchor - middle) + offset

@@ -8,10 +8,8 @@ from pydantic import Field
 from pdrom.core.errors import SceneError
 from pdrom.model.effects.base import Boundary, EffectConfig, FrameNumber
 from pdrom.model.effects.hold import AXES
-from pdrom.model.mesh.lengths import Length
-from pdrom.model.mesh.select import farthest_points, select_vertices
-from pdrom.model.mesh.selection import Selection
-from pdrom.model.mesh.types import Mesh
+from pdrom.model.mesh.selection import Selection, farthest_points, select_vertices
+from pdrom.model.mesh.types import Length, Mesh
 
 # displacement over amplitude at equally spaced times: 0 -> -z -> +z -> -z -> 0
 KNOTS = (0.0, -1.0, 1.0, -1.0, 0.0)

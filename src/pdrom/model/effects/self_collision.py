@@ -8,8 +8,7 @@ from pydantic import Field
 from scipy.spatial import cKDTree
 
 from pdrom.model.effects.base import Contact, EffectConfig
-from pdrom.model.mesh.lengths import MAX_LENGTH, MIN_LENGTH
-from pdrom.model.mesh.types import Mesh
+from pdrom.model.mesh.types import MAX_LENGTH, MIN_LENGTH, Mesh
 
 # Searches for close pairs in a frame, and sweeps over the pairs of each search, at most.
 SEARCHES, SWEEPS = 20, 100

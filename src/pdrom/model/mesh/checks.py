@@ -6,8 +6,7 @@ from scipy.sparse import csgraph
 
 from pdrom.core.errors import DegenerateElementError, MeshError
 from pdrom.core.store import require_finite
-from pdrom.model.mesh.lengths import MAX_LENGTH, MIN_LENGTH
-from pdrom.model.mesh.types import Mesh
+from pdrom.model.mesh.types import MAX_LENGTH, MIN_LENGTH, Mesh
 
 # An element is degenerate when its measure is below this fraction of its longest edge's power.
 RELATIVE_MEASURE = 1e-12

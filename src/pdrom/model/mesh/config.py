@@ -12,13 +12,11 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from pdrom.core.errors import MeshError
-from pdrom.core.names import check_lengths
-from pdrom.core.yamlfile import ConfigModel
+from pdrom.core.yamlfile import ConfigModel, check_lengths
 from pdrom.model.mesh.checks import check_indices, check_mesh, check_range, turned_alike
 from pdrom.model.mesh.files import MAX_VERTICES, read_mesh_file
 from pdrom.model.mesh.generators import Plane, bar, boundary, cloth, orient
-from pdrom.model.mesh.lengths import Length, PositiveLength
-from pdrom.model.mesh.types import Mesh
+from pdrom.model.mesh.types import Length, Mesh, PositiveLength
 
 log = logging.getLogger(__name__)
 

@@ -40,15 +40,11 @@ def cloth(
     order = (grid_u, grid_v, height) if plane == "xy" else (grid_u, height, grid_v)
     points = np.column_stack(order)
     points[:, 1] += lift
-    return Mesh(points, _cloth_triangles(rows, columns))
-
-
-def _cloth_triangles(rows: int, columns: int) -> np.ndarray:
     i, j = (a.ravel() for a in np.meshgrid(range(rows - 1), range(columns - 1), indexing="ij"))
     ll = i * columns + j
     ul, lr, ur = ll + 1, ll + columns, ll + columns + 1
     pairs = np.stack([np.stack([ll, ur, ul], 1), np.stack([ll, lr, ur], 1)], axis=1)
-    return pairs.reshape(-1, 3).astype(np.int32)
+    return Mesh(points, pairs.reshape(-1, 3).astype(np.int32))
 
 
 def bar(

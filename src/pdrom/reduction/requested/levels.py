@@ -15,8 +15,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from pdrom.model.dynamics.frames import WholeFrames
 from pdrom.model.dynamics.stepper import State, Stepper
-from pdrom.model.dynamics.whole_frames import WholeFrames
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import projector

@@ -23,7 +23,7 @@ from pydantic import Field
 from pdrom.core.errors import ConfigurationError, PdromError, choices
 from pdrom.core.yamlfile import ConfigModel, shown
 from pdrom.model.constraints.base import GroupConfig
-from pdrom.model.effects.entries import effect_config
+from pdrom.model.effects.base import effect_config
 from pdrom.model.held_out import KICK
 from pdrom.model.scene import Scene
 from pdrom.reduction.requested.levels import (

@@ -1,11 +1,46 @@
-"""Discrete empirical interpolation (Chaturantabut and Sorensen 2010, algorithm 1), greedy.
+"""Selections of samples: their interface, and discrete empirical interpolation, greedy.
 
-Of single entries, of whole elements (all 3p entries of an element are taken at once), and the
-preprint's variant: one row for x, y and z by the joint residual norm.
+DEIM (Chaturantabut and Sorensen 2010, algorithm 1) of single entries, of whole elements (all 3p
+entries of an element are taken at once), and the preprint's variant: one row for x, y and z by the
+joint residual norm.
 """
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
 import numpy as np
 from scipy import linalg
+
+from pdrom.reduction.sampling.gappy_pod_e import oversample
+
+
+class Selection(ABC):
+    """A rule that picks blocks of rows: entries (blocks of one row) or whole elements.
+
+    A subclass is named in `pdrom.reduction.method`.
+    """
+
+    @abstractmethod
+    def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
+        """Distinct blocks, as many as modes (all, if there are fewer) for every r of ``ranks``.
+
+        Parameters
+        ----------
+        v : (size e, r) modes, ``size`` consecutive rows for each of the e blocks; at least as many
+            columns as the largest of ``ranks``
+        """
+
+    def extend(self, v: np.ndarray, size: int, chosen: np.ndarray, count: int) -> np.ndarray:
+        """``chosen`` blocks followed by others, ``count`` in all: by GappyPOD+E.
+
+        Parameters
+        ----------
+        v : (rows, r) basis
+        chosen : (m,) blocks to start with
+        size : rows of a block
+        """
+        return oversample(v, size, chosen, count=count)
+
 
 # Residuals of one size up to a little more than round-off are a tie, see `tie_weights`.
 TIE = 1e-6

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pdrom.reduction.sampling.deim import block_elements, deim_entries
-from pdrom.reduction.sampling.selection import Selection
+from pdrom.reduction.sampling.deim import Selection, block_elements, deim_entries
 
 
 class Greedy(Selection):

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pdrom.reduction.sampling.deim import tie_weights
-from pdrom.reduction.sampling.selection import Selection
+from pdrom.reduction.sampling.deim import Selection, tie_weights
 
 EPS = np.finfo(float).eps
 # Rows of candidates for each mode, and how few pivots among them ask for twice as many.
@@ -66,7 +65,12 @@ class _Left:
                 break
             weights[best] = -1.0
             self.picked.append(int(candidates[best]))
-            direction = self._take(left[self._size * best : self._size * (best + 1)])
+            # the dominant direction of the group; zero where nothing is left, of dependent modes
+            group = left[self._size * best : self._size * (best + 1)]
+            direction = np.linalg.svd(group, full_matrices=False)[2][0] if group.any() else group[0]
+            direction = direction - self._directions.T @ (self._directions @ direction)
+            direction /= np.linalg.norm(direction) or 1.0
+            self._directions = np.vstack([self._directions, direction])
             left -= np.outer(left @ direction, direction)
         new = self._directions[before:]
         self._squares -= self._norms(self._rows @ new.T)
@@ -83,17 +87,6 @@ class _Left:
         split = np.argpartition(bounds, self.total - count)
         rest = bounds[split[: self.total - count]].max()
         return np.sort(split[self.total - count :]), float(rest)
-
-    def _take(self, group: np.ndarray) -> np.ndarray:
-        """Remove the dominant direction of what is left of a group; return it, of unit length.
-
-        Zero where nothing is left: then the modes depend on each other.
-        """
-        direction = np.linalg.svd(group, full_matrices=False)[2][0] if group.any() else group[0]
-        direction = direction - self._directions.T @ (self._directions @ direction)
-        direction /= np.linalg.norm(direction) or 1.0
-        self._directions = np.vstack([self._directions, direction])
-        return direction
 
     def _norms(self, rows: np.ndarray) -> np.ndarray:
         """Squared Frobenius norms of groups."""

@@ -7,7 +7,7 @@ import numpy as np
 from scipy import linalg
 
 from pdrom.core.errors import SamplingError
-from pdrom.reduction.basis.types import Basis
+from pdrom.reduction.basis import Basis
 from pdrom.reduction.method import MethodSpec, Solve
 
 
@@ -144,8 +144,16 @@ class Reduction:
         if self.spec.rows == "all":
             entries = np.arange(len(self.v))[slice(None) if axis is None else slice(axis, None, 3)]
             matrix = self.v[entries]
-            return Block(axis, entries, matrix, _orthogonal_operator(matrix))
-        entries = _entries_of(self.sampling.entries, self.spec.rows, axis)
+            # of orthonormal columns the pseudo-inverse is V^T
+            gram = matrix.T @ matrix
+            orthonormal = np.allclose(gram, np.eye(len(gram)), rtol=0.0, atol=1e-12)
+            return Block(axis, entries, matrix, matrix.T if orthonormal else np.linalg.pinv(matrix))
+        entries = self.sampling.entries
+        if self.spec.rows == "joint":  # one index stands for the whole row
+            axes = np.arange(3) if axis is None else np.array([axis])
+            entries = (3 * (entries // 3)[:, None] + axes).ravel()
+        elif axis is not None:
+            entries = entries[entries % 3 == axis]
         matrix = self.v[entries]
         operator = solution_operator(matrix, self.spec.solve, self.spec.tikhonov)
         return Block(axis, entries, matrix, operator)
@@ -189,20 +197,3 @@ class Reduction:
             sampled = matrix[:, block.entries] - self.basis.mean[block.entries]
             result[:, block.output] += sampled @ block.operator.T @ self.v[block.output].T
         return result.reshape(snapshots.shape)
-
-
-def _entries_of(entries: np.ndarray, rows: str, axis: int | None) -> np.ndarray:
-    """Entries that determine the coefficients of ``axis`` (None: of all axes)."""
-    if rows == "joint":
-        # one index stands for the whole row
-        axes = np.arange(3) if axis is None else np.array([axis])
-        return (3 * (entries // 3)[:, None] + axes).ravel()
-    return entries if axis is None else entries[entries % 3 == axis]
-
-
-def _orthogonal_operator(matrix: np.ndarray) -> np.ndarray:
-    """Pseudo-inverse of a full-rank matrix (n, r): V^T for orthonormal columns."""
-    gram = matrix.T @ matrix
-    if np.allclose(gram, np.eye(len(gram)), rtol=0.0, atol=1e-12):
-        return matrix.T
-    return np.linalg.pinv(matrix)

@@ -11,8 +11,7 @@ import numpy as np
 from scipy import linalg
 
 from pdrom.core.errors import SamplingError
-from pdrom.reduction.sampling.deim import GrowingFit
-from pdrom.reduction.sampling.selection import Selection
+from pdrom.reduction.sampling.deim import GrowingFit, Selection
 
 # Columns of length one depend on each other when what the others leave of one of them is below
 # this. Round-off leaves up to 1e-15 sqrt(r) of a column that is a copy; a column with less than
@@ -101,7 +100,7 @@ class _Sampled:
         if self._picked:
             self._fit.add(self._blocks[self._picked].reshape(-1, v.shape[1]))
             self._modes = v.shape[1]
-            self._products = self._from_scratch()
+            self._products = self._blocks @ self._inverse() @ self._blocks.transpose(0, 2, 1)
 
     @property
     def chosen(self) -> np.ndarray:
@@ -163,11 +162,6 @@ class _Sampled:
             )
         half = linalg.solve_triangular(factor, np.eye(self._modes), check_finite=False)
         return half @ half.T
-
-    def _from_scratch(self) -> np.ndarray:
-        """M (e, s, s) of every element, computed anew."""
-        columns = self._blocks[:, :, : self._modes]
-        return columns @ self._inverse() @ columns.transpose(0, 2, 1)
 
     def _shifted(self) -> np.ndarray:
         """I + M of every element."""

@@ -4,13 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pdrom.reduction.basis.types import Basis
-from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.sampling.deim import joint_rows
+from pdrom.reduction.basis import Basis
+from pdrom.reduction.method import SELECTIONS, MethodSpec
+from pdrom.reduction.sampling.deim import Selection, joint_rows
 from pdrom.reduction.sampling.gappy_pod_e import bound_gain
 from pdrom.reduction.sampling.reduction import Reduction, Sampling
-from pdrom.reduction.sampling.selection import Selection
-from pdrom.reduction.selections import SELECTIONS
 
 
 def select(basis: Basis, spec: MethodSpec, r: int) -> Sampling:

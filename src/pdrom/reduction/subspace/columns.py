@@ -14,8 +14,8 @@ import numpy as np
 from scipy import linalg
 
 from pdrom.model.effects.base import Boundary
-from pdrom.model.mesh.select import farthest_points
-from pdrom.reduction.basis.pod import fix_signs, pod
+from pdrom.model.mesh.selection import farthest_points
+from pdrom.reduction.basis import fix_signs, pod
 
 # Columns that add less than this (relative) to the span are dropped.
 DEPENDENT = 1e-9

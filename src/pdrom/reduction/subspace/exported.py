@@ -14,8 +14,8 @@ from pdrom.core.packed import pack_array
 from pdrom.model.constraints.base import ConstraintGroup, StencilGroup
 from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import Force, Start
-from pdrom.model.effects.floor import Floor
 from pdrom.model.effects.hold import Pins
+from pdrom.model.effects.obstacle import Floor
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.interpolation import Interpolation

@@ -10,6 +10,11 @@ D and L are (m p, K'): two small dense products and the projections, nothing els
 and no array that grows with the mesh. Without frame-lagged groups c is one product, of s with its
 held coordinates at their targets, and a call does many frames: those before the first that meets
 a floor.
+
+The matrix of a product lies in blocks of `TALL` rows, column by column, so that a column of a block
+meets a vector in `TALL` products that do not wait for each other. Vectors are three numbers each,
+one after the other, and are read and written four numbers at a time: their arrays are longer by
+what that needs (`vectors`). The order of every sum is that of the columns, whatever the processor.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,15 +23,16 @@ from typing import TypeGuard
 
 import numpy as np
 
-from pdrom.model.compiled.clock import clock
-from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, History
+from pdrom.model.compiled.arithmetic import add_scaled
+from pdrom.model.compiled.functions import clock, compiled, inner, now
+from pdrom.model.compiled.rows import WIDTH, at, copied, load, store, zeros
+from pdrom.model.compiled.rows import write as copy
+from pdrom.model.constraints.local_kernel import call_gradients
+from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, History, combine, forget, refuse
+from pdrom.model.dynamics.frames import BLOCK, Blocks
 from pdrom.model.dynamics.space import Solve
 from pdrom.model.dynamics.stepper import LocalStep, Stepper
-from pdrom.model.dynamics.whole_frames import BLOCK, Blocks
-from pdrom.reduction.subspace.dense import blocks, product, read, vectors, write
-from pdrom.reduction.subspace.fused_frames import frames as run_frames
-from pdrom.reduction.subspace.fused_frames import iterations as run_iterations
-from pdrom.reduction.subspace.local_step import SubspaceLocalStep
+from pdrom.reduction.subspace.interpolation import SubspaceLocalStep
 from pdrom.reduction.subspace.space import DenseElimination, ReducedSpace
 
 
@@ -206,3 +212,171 @@ class _Operators:
         self.begun = (
             response, self.coupling, self.nothing, vectors(len(inertia)), vectors(len(fixed))
         )  # fmt: skip
+
+
+TALL = 8
+
+
+def blocks(matrix: np.ndarray) -> np.ndarray:
+    """A matrix (m, n) as the blocks of `product`, flat; rows of zeros fill up the last one."""
+    m, n = matrix.shape
+    whole = np.zeros((-(-m // TALL) * TALL, n))
+    whole[:m] = matrix
+    return copied(
+        np.ascontiguousarray(whole.reshape(len(whole) // TALL, TALL, n).transpose(0, 2, 1)).ravel()
+    )
+
+
+def vectors(count: int) -> np.ndarray:
+    """Zeros for ``count`` vectors, to be read and written by `product`."""
+    return zeros(3 * (-(-count // TALL) * TALL) + WIDTH)
+
+
+def write(values: np.ndarray, to: np.ndarray) -> None:
+    """Copy vectors ``values`` (n, 3) ``to`` where `product` reads them."""
+    to[: values.size] = values.ravel()
+
+
+def read(vectors: np.ndarray, count: int) -> np.ndarray:
+    """The first ``count`` of ``vectors`` as a view (count, 3)."""
+    return vectors[: 3 * count].reshape(count, 3)
+
+
+@compiled(nogil=True)
+def product(matrix, m, n, start, x, out):
+    """Write ``start`` + M ``x`` into ``out``, `vectors`; ``matrix`` M (m, n) is in `blocks`."""
+    entry = 0
+    for row in range(0, 3 * m, 3 * TALL):
+        a, b = load(start, row), load(start, row + 3)
+        c, d = load(start, row + 6), load(start, row + 9)
+        e, f = load(start, row + 12), load(start, row + 15)
+        g, h = load(start, row + 18), load(start, row + 21)
+        for k in range(0, 3 * n, 3):
+            v = load(x, k)
+            a, b = add_scaled(a, at(matrix, entry), v), add_scaled(b, at(matrix, entry + 1), v)
+            c, d = add_scaled(c, at(matrix, entry + 2), v), add_scaled(d, at(matrix, entry + 3), v)
+            e, f = add_scaled(e, at(matrix, entry + 4), v), add_scaled(f, at(matrix, entry + 5), v)
+            g, h = add_scaled(g, at(matrix, entry + 6), v), add_scaled(h, at(matrix, entry + 7), v)
+            entry += TALL
+        # the fourth lane of each is overwritten by the next one
+        store(out, row, a)
+        store(out, row + 3, b)
+        store(out, row + 6, c)
+        store(out, row + 9, d)
+        store(out, row + 12, e)
+        store(out, row + 15, f)
+        store(out, row + 18, g)
+        store(out, row + 21, h)
+
+
+@compiled(nogil=True)
+def run_iterations(count, size, rows, operators, sampled, history):
+    """Do ``count`` iterations of the ``size`` free coordinates z, in place.
+
+    Parameters
+    ----------
+    rows : of the sampled strain D
+    operators : see ``iterated`` of `_Operators`
+    sampled : arrays of `_Sampled`
+    history : of the acceleration, see `Anderson`; `NO_HISTORY` without one
+    """
+    strain, lift, offset, constant, z, weights, inertia, start = operators
+    addresses, elements, starts, parameters, parameter_starts, d, p = sampled
+    y = z[: 3 * size]
+    if history is not None:
+        copy(y, start)
+        forget(history)
+    for k in range(count):
+        product(strain, rows, size, offset, z, d)
+        for g in range(len(addresses)):
+            call_gradients(
+                addresses[g],
+                d[3 * starts[g] :].ctypes.data,
+                parameters[parameter_starts[g] :].ctypes.data,
+                p[3 * starts[g] :].ctypes.data,
+                elements[g],
+            )
+        refused = False
+        if history is not None:
+            refused = refuse(history, y, _objective(weights, d, p, inertia, y, start))
+        if not refused:
+            product(lift, size, rows, constant, p, z)
+            if history is not None and k < count - 1:
+                combine(history, y)
+
+
+@inner
+def _objective(weights, d, p, inertia, y, s):
+    """1/2 sum_i w_i |d_i - p_i|^2 + 1/2 (y - s)^T (M/h^2) (y - s)."""
+    total = 0.0
+    for i in range(len(weights)):
+        for axis in range(3):
+            total += weights[i] * (d[3 * i + axis] - p[3 * i + axis]) ** 2
+    for i in range(len(inertia)):
+        for axis in range(3):
+            moved = 0.0
+            for k in range(i):
+                moved += inertia[i, k] * (y[3 * k + axis] - s[3 * k + axis])
+            own = y[3 * i + axis] - s[3 * i + axis]
+            total += own * (2.0 * moved + inertia[i, i] * own)
+    return 0.5 * total
+
+
+@inner
+def _predict(z, v, acceleration, rate, rates, h, s):
+    """Write s = z + h v + h^2 (a + c v + C v)."""
+    for i in range(len(z)):
+        for axis in range(3):
+            total = acceleration[i, axis] + rate * v[i, axis]
+            for k in range(len(rates)):
+                total += rates[i, k] * v[k, axis]
+            s[3 * i + axis] = z[i, axis] + h * v[i, axis] + h**2 * total
+
+
+@compiled(nogil=True)
+def run_frames(
+    positions, velocities, acceleration, rate, rates, h, fixed, free, targets, begun, count,
+    rows, operators, sampled, history, seconds, watch,
+):  # fmt: skip
+    """Do a frame for each of ``targets``, with the iterations of `run_iterations`.
+
+    Parameters
+    ----------
+    positions, velocities : (F + 1, K, 3) coordinates, the first ones given, the others written
+    acceleration, rate, rates : by all forces, see `ReducedSpace.affine`
+    h : time step, s
+    fixed, free : (m,), (K',) held coordinates and the others
+    targets : (F, m, 3) of the held coordinates
+    begun : see `_Operators`
+    count, rows, operators, sampled, history : see `run_iterations`
+    seconds : (F, 4) s, times of the phases of each frame, written
+    watch : clock, see `pdrom.model.compiled.functions`
+    """
+    response, coupling, nothing, s, held = begun
+    offset, constant, z = operators[2:5]
+    for f in range(len(targets)):
+        began = now(watch)
+        before, after, speeds = positions[f], positions[f + 1], velocities[f + 1]
+        _predict(before, velocities[f], acceleration, rate, rates, h, s)
+        for i in range(len(fixed)):
+            for axis in range(3):
+                s[3 * fixed[i] + axis] = held[3 * i + axis] = targets[f, i, axis]
+        product(response, len(free), len(before), nothing, s, constant)
+        # targets that stay the same have the product of the frame before
+        if f == 0 or (targets[f] != targets[f - 1]).any():
+            product(coupling, rows, len(fixed), nothing, held, offset)
+        for i in range(len(free)):
+            for axis in range(3):
+                z[3 * i + axis] = s[3 * free[i] + axis]
+        between = now(watch)
+        run_iterations(count, len(free), rows, operators, sampled, history)
+        ended = now(watch)
+        for i in range(len(free)):
+            for axis in range(3):
+                s[3 * free[i] + axis] = z[3 * i + axis]
+        for i in range(len(before)):
+            for axis in range(3):
+                after[i, axis] = s[3 * i + axis]
+                speeds[i, axis] = (after[i, axis] - before[i, axis]) / h
+        seconds[f, 0], seconds[f, 1] = between - began, ended - between
+        seconds[f, 3] = now(watch) - ended

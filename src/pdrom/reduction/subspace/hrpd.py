@@ -18,8 +18,8 @@ from scipy import linalg, sparse
 from pdrom.core.errors import SamplingError
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.mesh.select import farthest_points
-from pdrom.reduction.basis.pod import pod
+from pdrom.model.mesh.selection import farthest_points
+from pdrom.reduction.basis import pod
 from pdrom.reduction.sampling.reduction import norm_and_condition, solution_operator
 from pdrom.reduction.subspace.columns import DEPENDENT, Columns, orthonormal, skinning_weights
 from pdrom.reduction.subspace.interpolation import Interpolation, element_rows, reduced_strain

@@ -16,8 +16,7 @@ from pdrom.core.errors import NotReducibleError, SolverError
 from pdrom.model.dynamics.space import Solve, Space
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.dynamics.system import require_accurate
-from pdrom.model.effects.base import Boundary, Contact
-from pdrom.model.effects.held import held_path, held_targets, held_vertices
+from pdrom.model.effects.base import Boundary, Contact, held_path, held_targets, held_vertices
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.columns import Columns
 

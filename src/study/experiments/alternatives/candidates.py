@@ -7,8 +7,7 @@ import numpy as np
 
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.dynamics.system import GlobalSystem
-from pdrom.model.runs.bounded import BoundedRun
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import BoundedRun, trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns, sample_elements

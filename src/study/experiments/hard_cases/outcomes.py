@@ -17,10 +17,9 @@ from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis import Basis, compute_basis
-from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.rerun import replace_group
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, select
+from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
 from pdrom.reduction.snapshots import row_masses
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.hrpd import HrpdSpec, hrpd, sampled_space

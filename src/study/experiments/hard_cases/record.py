@@ -24,7 +24,7 @@ import numpy as np
 from pdrom.core.errors import PdromError
 from pdrom.model.dynamics.stepper import FrameReport, LocalStep, State, Stepper
 from pdrom.model.metrics import shape_residuals
-from pdrom.model.runs.bounded import BoundedRun, frame_by_frame
+from pdrom.model.runs import BoundedRun, frame_by_frame
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.columns import Columns
 from study.experiments.hard_cases.case import HardCase

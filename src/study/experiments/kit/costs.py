@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.model.compiled import rows
-from pdrom.model.compiled.clock import clock, now
+from pdrom.model.compiled.functions import clock, now
 from pdrom.model.compiled.rows import as_vertices, vertices
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.constraints.local_kernel import OWN, PREPARE, LocalKernel, call, local_kernel
@@ -21,7 +21,7 @@ from pdrom.model.dynamics.stepper import LocalStep, Stepper
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.effects.base import Boundary, Contact, Effect, Force
 from pdrom.model.scene import Scene
-from pdrom.reduction.local.local_step import ReducedLocalStep
+from pdrom.reduction.sampling.local_step import ReducedLocalStep
 from study.experiments.kit.measurement import (
     Measurement,
     Variant,

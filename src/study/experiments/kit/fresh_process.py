@@ -13,18 +13,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pdrom.core.aside import damaged_set_aside
 from pdrom.core.errors import PdromError
 from pdrom.core.store import read_table, write_table
+from pdrom.core.store.checksum import damaged_set_aside
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.dynamics.stepper import LocalStep
 from pdrom.model.mesh.types import load_mesh
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import load_basis
-from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.rerun import replace_group
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.subspace.store import load_models
+from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
+from pdrom.reduction.subspace.model import load_models
 from study.experiments.kit.costs import variant
 from study.experiments.kit.load_reduction import load_reduction
 from study.experiments.kit.measurement import Protocol, Variant, measure

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from pdrom.core.errors import StorageError
 from pdrom.core.store import open_hdf5
-from pdrom.reduction.basis.types import Basis
+from pdrom.reduction.basis import Basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling.reduction import Reduction, Sampling
 from study.artifact.paths import File

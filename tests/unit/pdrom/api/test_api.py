@@ -16,7 +16,7 @@ from pdrom import api
 from pdrom.api.pictures import viewed_scenes
 from pdrom.core.errors import ConfigurationError, PdromError, RankError, StorageError
 from pdrom.core.store import write_hdf5
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.snapshots import training_frames
 from places import CONFIG, ROOT

@@ -19,10 +19,10 @@ from pdrom.command.base import Status
 from pdrom.command.main import run
 from pdrom.core.errors import StorageError
 from pdrom.core.store.checksum import write_block
-from pdrom.model.effects.gravity import Gravity
+from pdrom.model.effects.forces import Gravity
 from pdrom.model.effects.obstacle import Sphere
 from pdrom.view.frames import write_frames
-from pdrom.view.view import rotation_to
+from pdrom.view.page import rotation_to
 
 
 @pytest.fixture(scope="module")

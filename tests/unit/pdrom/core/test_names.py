@@ -2,7 +2,7 @@
 
 import pytest
 
-from pdrom.core.names import MAX_NAME, MAX_PATH, check_lengths
+from pdrom.core.yamlfile import MAX_NAME, MAX_PATH, check_lengths
 from pdrom.model.effects import EFFECTS
 from study.artifact import paths
 from study.artifact.paths import Place

@@ -11,7 +11,7 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.core.registry import Registry
 from pdrom.model.dynamics.solvers import SOLVERS
 from pdrom.model.effects import EFFECTS
-from pdrom.reduction.selections import SELECTIONS
+from pdrom.reduction.method import SELECTIONS
 
 REGISTRY = Registry("thing", {"loads": "json:loads", "absent": "no.such.module:x"})
 

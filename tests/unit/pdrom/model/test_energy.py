@@ -5,7 +5,7 @@ import pytest
 
 from builders import GRAVITY, TOP, make_scene, with_effects
 from pdrom.model.energy import STRIDE, EnergyScale, energies
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 
 SPRING = {"effect": "spring", "weight": 1e4}
 

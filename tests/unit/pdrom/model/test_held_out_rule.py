@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pdrom.model.effects.gravity import Gravity
+from pdrom.model.effects.forces import Gravity
 from pdrom.model.held_out import FASTER, MOTIONS, TILT, WIDE_MOTIONS
 from pdrom.model.scene import Scene
 from places import ROOT

@@ -6,7 +6,7 @@ from pydantic import ValidationError
 
 from builders import make_scene
 from pdrom.core.errors import SceneError
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 
 SPRING = {"effect": "spring", "weight": 1e5}
 BAR = {"kind": "bar", "nx": 4, "ny": 3, "nz": 3, "extent": 2.0}

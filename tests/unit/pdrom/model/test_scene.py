@@ -8,7 +8,7 @@ from pdrom.core.store import open_hdf5
 from pdrom.model.compiled import rows
 from pdrom.model.constraints.local_kernel import OWN, LocalKernel, call, local_kernel
 from pdrom.model.dynamics.stepper import State
-from pdrom.model.runs.full_order import run, trajectory
+from pdrom.model.runs import run, trajectory
 from places import ROOT
 from study.pipeline.scenes import Coarsen, load_bound_scene, read_scene
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from builders import OBSTACLES, make_scene, random_rotation
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.reduction import deviations
 from pdrom.reduction.deviations import DEVIATIONS, ERRORS, REFERENCE, TOUCH, Yardstick
 from pdrom.reduction.rerun import displacement_norms

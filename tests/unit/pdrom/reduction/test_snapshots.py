@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from builders import GRAVITY, TOP, make_scene
 from pdrom.core.errors import SnapshotError, StorageError
 from pdrom.core.store import open_hdf5, write_hdf5
-from pdrom.model.runs.full_order import run
+from pdrom.model.runs import run
 from pdrom.reduction import snapshots
 from pdrom.reduction.snapshots import (
     collect,

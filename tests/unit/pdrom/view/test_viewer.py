@@ -17,13 +17,20 @@ from playwright.sync_api import Locator, Page
 from browser import browser_or_skip, page_at
 from pdrom.core.errors import StorageError
 from pdrom.core.packed import LEVELS, pack_positions
-from pdrom.model.effects.entries import effect_config
+from pdrom.model.effects.base import effect_config
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.view import page as writer
-from pdrom.view.pack import FRAMES, pack_scene, shown_region
-from pdrom.view.page import write_page
-from pdrom.view.runs import ViewedRun, ViewedScene
-from pdrom.view.view import EYE, Y, rotation_to
+from pdrom.view.page import (
+    EYE,
+    FRAMES,
+    ViewedRun,
+    ViewedScene,
+    Y,
+    pack_scene,
+    rotation_to,
+    shown_region,
+    write_page,
+)
 
 
 def unpack_positions(packed: dict[str, Any]) -> np.ndarray:

@@ -36,7 +36,7 @@ class Section(ConfigModel):
     @property
     def modules(self) -> list[str]:
         """A module that the settings name."""
-        return ["pdrom.model.effects.gravity"]
+        return ["pdrom.model.effects.forces"]
 
 
 class Whole(Section):
@@ -103,7 +103,7 @@ def test_a_job_runs_from_plain_data_and_says_what_made_it(tmp_path):
 def test_a_job_depends_on_as_much_of_a_section_as_its_function_asks_for():
     settings = multiplied.settings(Sources(), {"scene": "s"})
     assert multiplied.plain(settings) == {"section": {"factor": 2.0}}
-    assert list(modules_in(settings)) == ["pdrom.model.effects.gravity"]
+    assert list(modules_in(settings)) == ["pdrom.model.effects.forces"]
 
 
 @pytest.mark.parametrize("settings", [{"section": {"factor": "much"}}, {"section": {"other": 1}}])

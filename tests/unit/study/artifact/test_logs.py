@@ -8,8 +8,8 @@ import pytest
 import scipy.linalg  # noqa: F401  -- loads libraries that have threads
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from pdrom.core.aside import sets_aside
 from pdrom.core.errors import INTERRUPTED, MeshError
+from pdrom.core.store.checksum import sets_aside
 from study.artifact.logs import job_log, planning_log
 
 LOGGER = logging.getLogger("pdrom")

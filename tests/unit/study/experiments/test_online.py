@@ -10,9 +10,9 @@ from pdrom.core.store import read_table, write_table
 from pdrom.core.yamlfile import validate
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.held_out import MOTIONS
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.model.scene import SceneConfig
-from pdrom.reduction.subspace.store import load_models
+from pdrom.reduction.subspace.model import load_models
 from study.artifact.paths import File
 from study.experiments import subspaces as experiment
 from study.experiments.kit.fresh_process import Request, Subspaces, TimedScene, in_fresh_process

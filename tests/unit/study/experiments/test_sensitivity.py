@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from builders import make_scene
 from pdrom.core.store import read_table, write_table
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.reduction.deviations import error_within
 from study.experiments.kit.settings import floor_of, horizon, horizons
 from study.experiments.sensitivity import (

@@ -124,7 +124,7 @@ def test_kernels_are_compiled_for_the_target():
     """What numba says it compiled a kernel for, and keys its cache by, is what was chosen."""
     target = compiled_for(platform.machine(), features_here())
     code = (
-        "import json; from pdrom.model.compiled.vectors import dot; import numpy as np;"
+        "import json; from pdrom.model.compiled.dots import dot; import numpy as np;"
         "dot(np.ones(3), np.ones(3)); library = dot.overloads[dot.signatures[0]].library;"
         "print(json.dumps(library.codegen.magic_tuple()[1:]))"
     )

@@ -10,8 +10,7 @@ import pytest
 import pdrom
 from pdrom.core.errors import ConfigurationError
 from pdrom.model.effects import EFFECTS
-from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.selections import SELECTIONS
+from pdrom.reduction.method import SELECTIONS, MethodSpec
 from study.pipeline.fingerprint import closure, digest_of_source, fingerprint
 
 PACKAGE = Path(pdrom.__file__).parent
@@ -82,7 +81,7 @@ def test_closure_follows_imports():
     assert {"pdrom.core.store", "pdrom.model.constraints.base"} < set(
         closure("pdrom.model.dynamics.system")
     )
-    assert "pdrom.reduction.basis.pod" in closure("pdrom.reduction.subspace.model")
+    assert "pdrom.reduction.basis" in closure("pdrom.reduction.subspace.model")
 
 
 def test_effects_are_in_no_closure_that_does_not_list_them():
@@ -195,7 +194,7 @@ def prints(tmp_path_factory):
         "spring": edited("model/constraints/spring.py", "\nADDED = 1\n"),
         "bending": edited("model/constraints/bending.py", "\nADDED = 1\n"),
         "mesh": edited("model/mesh/generators.py", "\nADDED = 1\n"),
-        "store": edited("core/store/text.py", "\nADDED = 1\n"),
+        "store": edited("core/store/atomic.py", "\nADDED = 1\n"),
     }
 
 

@@ -7,9 +7,9 @@ local/global iteration itself. Steps are shortened until the objective falls eno
 
 import numpy as np
 
+from pdrom.model.compiled.dots import add_multiple, dot
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
-from pdrom.model.compiled.vectors import add_multiple, dot
 from pdrom.model.dynamics.frames import inertia_energy, weighted
 from pdrom.model.dynamics.sweeps import sweep
 from pdrom.model.scene import Scene

@@ -24,7 +24,7 @@ from pdrom.model.dynamics.solvers import Factor
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import PHASES, FrameReport, State, Stepper
 from pdrom.model.dynamics.system import Elimination, GlobalSystem
-from pdrom.model.effects.gravity import Gravity
+from pdrom.model.effects.forces import Gravity
 from pdrom.model.scene import Scene
 
 # Arguments of `add_projections`, and of `multiply`.

@@ -14,7 +14,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pdrom import __version__
-from pdrom.core.aside import damaged_set_aside
 from pdrom.core.errors import StorageError
 from pdrom.core.store import (
     check_file,
@@ -28,7 +27,7 @@ from pdrom.core.store import (
     write_table,
     write_text,
 )
-from pdrom.core.store.checksum import BLOCK
+from pdrom.core.store.checksum import BLOCK, damaged_set_aside
 
 
 def write_one(path: Path) -> None:

@@ -9,10 +9,9 @@ import h5py
 import numpy as np
 import pytest
 
-from pdrom.core.aside import damaged_set_aside
 from pdrom.core.errors import StorageError
 from pdrom.core.store import check_file, checksum_path, open_hdf5, write_hdf5
-from pdrom.core.store.checksum import new_checksum
+from pdrom.core.store.checksum import damaged_set_aside, new_checksum
 
 
 def test_equal_content_equal_bytes(tmp_path):

@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 
 from builders import call_kernel, random_rotation
 from pdrom.model.constraints.bending import VertexBending
-from pdrom.model.constraints.deformation_gradient import DeformationGradient
 from pdrom.model.constraints.lanes import LANES, pack
 from pdrom.model.constraints.spring import EdgeSpring
-from pdrom.model.constraints.tetrahedron_strain import TetrahedronStrain
+from pdrom.model.constraints.tetrahedron import DeformationGradient, TetrahedronStrain
 from pdrom.model.constraints.triangle_strain import TriangleStrain
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import Mesh

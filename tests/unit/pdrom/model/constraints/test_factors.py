@@ -6,7 +6,7 @@ from pydantic import ValidationError
 
 from builders import GROUPS, make_scene
 from pdrom.core.errors import SceneError
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from study.experiments.kit.scenes import varied
 
 BOX = {"kind": "plane", "point": [0.1, 0, 0], "normal": [-1, 0, 0]}

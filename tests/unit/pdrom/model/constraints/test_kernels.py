@@ -5,7 +5,7 @@ import pytest
 
 from builders import GROUPS, call_kernel, make_scene
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.constraints.implementations import IMPLEMENTATIONS
+from study.experiments.timing import IMPLEMENTATIONS
 
 STATES = {
     "rest": lambda points, rng: points.copy(),

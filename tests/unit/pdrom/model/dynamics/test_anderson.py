@@ -5,7 +5,7 @@ import pytest
 
 from builders import GRAVITY, GROUPS, LEFT, make_scene
 from pdrom.model.dynamics.acceleration import Anderson
-from pdrom.model.runs.full_order import simulate, trajectory
+from pdrom.model.runs import simulate, trajectory
 
 
 def affine_map(rng, n=12, distinct=4):

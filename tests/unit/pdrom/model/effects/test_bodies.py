@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from builders import OBSTACLES, make_scene
-from pdrom.model.effects.bodies import ball, cuboid
-from pdrom.model.effects.entries import effect_config
-from pdrom.model.mesh.measures import barycentric_areas
+from pdrom.model.effects.base import effect_config
+from pdrom.model.effects.obstacle import ball, cuboid
+from pdrom.model.mesh.types import barycentric_areas
 from strategies import SEEDS
 
 LOW, HIGH = np.array([-0.5, 1.0, -0.5]), np.array([0.7, 2.0, 0.5])

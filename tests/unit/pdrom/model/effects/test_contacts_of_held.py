@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from builders import make_scene
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns
 
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "lift": 1.0}

@@ -6,7 +6,7 @@ from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from builders import make_scene
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 
 SPRING = {"effect": "spring", "weight": 1e4}
 KEYS = [

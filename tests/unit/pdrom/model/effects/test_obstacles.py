@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from builders import OBSTACLES, make_scene
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from strategies import SEEDS
 
 SPRING = {"effect": "spring", "weight": 1.0}

@@ -9,7 +9,7 @@ from scipy.spatial.distance import pdist, squareform
 
 from builders import GRAVITY, LEFT, make_scene
 from pdrom.core.errors import NotReducibleError
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.reduction.subspace.model import make_columns
 from pdrom.reduction.subspace.space import ReducedSpace
 from strategies import SEEDS

@@ -11,7 +11,7 @@ import pytest
 from builders import GROUPS, make_scene
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.model.scene import SceneConfig
 from places import ROOT
 from study.pipeline.fingerprint import closure

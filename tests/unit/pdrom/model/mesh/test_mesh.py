@@ -12,9 +12,9 @@ from pdrom.core.errors import DegenerateElementError, MeshError
 from pdrom.model.mesh.checks import check_mesh, turned_alike
 from pdrom.model.mesh.config import MeshFile
 from pdrom.model.mesh.generators import bar, cloth
-from pdrom.model.mesh.select import farthest_points, select_vertices
+from pdrom.model.mesh.selection import farthest_points, select_vertices
 from pdrom.model.mesh.types import Mesh, load_mesh, save_mesh
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from strategies import cells, wild_meshes
 from study.experiments.hard_cases.case import build

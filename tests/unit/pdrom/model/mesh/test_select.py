@@ -9,8 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 from builders import make_scene
 from pdrom.core.errors import SceneError
 from pdrom.model.mesh.generators import bar, cloth
-from pdrom.model.mesh.select import select_vertices
-from pdrom.model.mesh.selection import KINDS, Selection
+from pdrom.model.mesh.selection import KINDS, Selection, select_vertices
 from pdrom.model.mesh.types import Mesh
 
 SELECTION = TypeAdapter(Selection)

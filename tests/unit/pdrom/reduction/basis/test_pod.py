@@ -8,8 +8,8 @@ from pymor.algorithms.pod import pod as pymor_pod
 from pymor.vectorarrays.numpy import NumpyVectorSpace
 from scipy import linalg
 
-from pdrom.reduction.basis import pod as module
-from pdrom.reduction.basis.pod import fix_signs, numerical_rank, pod, thin_qr
+from pdrom.reduction import basis as module
+from pdrom.reduction.basis import fix_signs, numerical_rank, pod, thin_qr
 
 SHAPES = st.tuples(st.integers(1, 60), st.integers(1, 12), st.integers(0, 2**32 - 1))
 

@@ -7,9 +7,9 @@ import pytest
 from scipy import sparse
 
 from pdrom.reduction.basis import Basis, compute_basis
-from pdrom.reduction.local.local_step import ReducedLocalStep
 from pdrom.reduction.method import MethodSpec, load_methods
 from pdrom.reduction.sampling import Reduction, select
+from pdrom.reduction.sampling.local_step import ReducedLocalStep
 from places import CONFIG
 
 PRESETS = load_methods(CONFIG / "methods.yaml")
@@ -138,7 +138,7 @@ def test_the_local_kernel_adds_what_python_code_adds(preset, group_scene, rng, m
     reduction = whole(group, p, preset)
     y, sums = q + 0.05 * rng.standard_normal(q.shape), []
     for split in (1, 1 << 17):
-        monkeypatch.setattr("pdrom.reduction.local.lift.SPLIT_FROM", split)
+        monkeypatch.setattr("pdrom.reduction.sampling.local_step.SPLIT_FROM", split)
         step = ReducedLocalStep(group, reduction)
         step.begin_frame(q)
         assert len(step.local_kernel.touched) == (len(q) - len(q) // 2 if split == 1 else 0)

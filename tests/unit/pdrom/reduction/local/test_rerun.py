@@ -5,13 +5,12 @@ import pytest
 
 from builders import TOP, Pushing, make_scene
 from pdrom.core.errors import SceneError
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.reduction.basis import compute_basis
-from pdrom.reduction.local.local_step import ReducedLocalStep
-from pdrom.reduction.local.rerun import replace_group, rerun
 from pdrom.reduction.method import load_methods
 from pdrom.reduction.rerun import Rerun, displacement_norms, step_norms
 from pdrom.reduction.sampling import Reduction, select
+from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group, rerun
 from places import CONFIG
 
 PRESETS = load_methods(CONFIG / "methods.yaml")

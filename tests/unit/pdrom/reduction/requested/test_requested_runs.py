@@ -5,7 +5,7 @@ import pytest
 
 from builders import GRAVITY, LEFT, make_scene
 from pdrom.core.errors import ConfigurationError
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.requested import run as requested
 from pdrom.reduction.requested.levels import Level, Trajectory, last_within, relative_errors

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from builders import TOP, make_scene, random_rotation
 from pdrom.core.errors import SolverError
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.reduction.subspace.columns import (
     affine_columns,
     atoms,

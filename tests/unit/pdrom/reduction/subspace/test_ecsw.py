@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from builders import GRAVITY, GROUPS, LEFT, TOP, make_scene
 from pdrom.model.dynamics.stepper import State, Stepper
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.reduction.subspace import ecsw
 from pdrom.reduction.subspace.columns import build_columns
 from pdrom.reduction.subspace.ecsw import (
@@ -18,7 +18,7 @@ from pdrom.reduction.subspace.ecsw import (
     training_equations,
     training_run,
 )
-from pdrom.reduction.subspace.local_step import SubspaceLocalStep
+from pdrom.reduction.subspace.interpolation import SubspaceLocalStep
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns, rerun_model, sample_elements
 from pdrom.reduction.subspace.space import ReducedSpace, coordinates
 

@@ -10,7 +10,7 @@ from builders import GROUPS, LEFT, TOP, make_scene, random_rotation
 from pdrom.core.errors import SamplingError
 from pdrom.core.store import open_hdf5, write_hdf5
 from pdrom.model.constraints.lanes import LANES
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling.reduction import Reduction
@@ -26,9 +26,9 @@ from pdrom.reduction.subspace.hrpd import (
 from pdrom.reduction.subspace.interpolation import (
     InterpolatedLocalStep,
     Interpolation,
+    SubspaceLocalStep,
     interpolation_of,
 )
-from pdrom.reduction.subspace.local_step import SubspaceLocalStep
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns
 from pdrom.reduction.subspace.space import coordinates
 

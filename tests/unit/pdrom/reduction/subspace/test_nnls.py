@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from pdrom.reduction.subspace.nnls import _remove_row, nnls_path
+from pdrom.reduction.subspace.ecsw import _remove_row, nnls_path
 
 SMOOTH = np.exp(-np.outer(np.linspace(0.0, 1.0, 60), np.linspace(0.1, 5.0, 200)))
 

@@ -10,14 +10,21 @@ from builders import GROUPS, LEFT, TOP, make_scene
 from pdrom.core.errors import SceneError
 from pdrom.core.store import write_hdf5
 from pdrom.model.dynamics.stepper import Stepper
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.reduction.subspace.columns import atoms, build_columns
 from pdrom.reduction.subspace.fused import FusedStepper
 from pdrom.reduction.subspace.hrpd import HrpdSpec, hrpd, sampled_space
-from pdrom.reduction.subspace.local_step import SubspaceLocalStep
-from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
+from pdrom.reduction.subspace.interpolation import SubspaceLocalStep
+from pdrom.reduction.subspace.model import (
+    Samples,
+    SubspaceModel,
+    load_models,
+    make_columns,
+    sample_elements,
+    store_columns,
+    store_model,
+)
 from pdrom.reduction.subspace.space import ReducedSpace, coordinates
-from pdrom.reduction.subspace.store import load_models, store_columns, store_model
 
 SPRING = {"effect": "spring", "weight": 1e5}
 STRAIN = {"effect": "strain", "weight": 1e5}

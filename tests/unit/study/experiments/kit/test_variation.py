@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from builders import make_scene
-from pdrom.model.runs.full_order import trajectory
+from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
 from study.experiments.kit.scenes import varied
 

@@ -1,1 +1,0 @@
-"""Runs of the full-order model."""

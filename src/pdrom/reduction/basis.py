@@ -1,0 +1,335 @@
+"""Bases of projection snapshots: weighting, centring, POD with fixed signs, numerical rank."""
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from pdrom.core.errors import RankError, SnapshotError
+from pdrom.core.packed import brief
+from pdrom.core.store import open_hdf5, require_finite, write_hdf5
+from pdrom.reduction.method import BasisSpec
+from pdrom.reduction.snapshots import SnapshotSet
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """Affine space mean + span V of vectorised projections.
+
+    Entry i of a vector is axis i % 3 of row i // 3; row i // 3 belongs to element
+    i // (3 * rows_per_element).
+
+    V : (3 e p, rank); orthonormal (in the weighted inner product), or orthonormal axis by axis if
+        ``separate_axes``
+    mean : (3 e p,)
+    singular_values : all singular values of the weighted, centred train matrix
+    rank : number of singular values above round-off; V has no further columns
+    roundoff : absolute size of a singular value that is noise
+    active_axes : whether an axis carries anything above round-off
+    origin : what error messages call the basis: its file
+    """
+
+    V: np.ndarray
+    mean: np.ndarray
+    singular_values: np.ndarray
+    rank: int
+    roundoff: float
+    rows_per_element: int
+    separate_axes: bool
+    active_axes: tuple[bool, ...]
+    origin: str = "basis"
+
+    __repr__ = brief
+
+    @property
+    def elements(self) -> int:
+        """Number of elements e."""
+        return len(self.mean) // (3 * self.rows_per_element)
+
+    def truncated(self, r: int) -> np.ndarray:
+        """First r modes (3 e p, r); RankError if there are fewer."""
+        if not 1 <= r <= self.rank:
+            raise RankError(
+                f"{self.origin}: r = {r}, the snapshots have numerical rank {self.rank} "
+                f"(round-off {self.roundoff:.1e}), allowed are 1 to {self.rank}"
+            )
+        return self.V[:, :r]
+
+
+_ARRAYS = ("V", "mean", "singular_values")
+_ATTRIBUTES = ("rank", "roundoff", "rows_per_element", "separate_axes", "active_axes")
+
+
+def save_basis(basis: Basis, path: str | os.PathLike[str]) -> None:
+    """Write ``basis`` to the HDF5 file ``path``."""
+    with write_hdf5(path) as file:
+        for name in _ARRAYS:
+            file[name] = getattr(basis, name)
+        for name in _ATTRIBUTES:
+            file.attrs[name] = getattr(basis, name)
+
+
+def load_basis(path: str | os.PathLike[str]) -> Basis:
+    """Read the file ``path`` by `save_basis`; StorageError if it is damaged."""
+    with open_hdf5(path) as file:
+        return Basis(
+            **{name: file[name][...] for name in _ARRAYS},
+            rank=int(file.attrs["rank"]),
+            roundoff=float(file.attrs["roundoff"]),
+            rows_per_element=int(file.attrs["rows_per_element"]),
+            separate_axes=bool(file.attrs["separate_axes"]),
+            active_axes=tuple(bool(a) for a in file.attrs["active_axes"]),
+            origin=str(path),
+        )
+
+
+def compute_basis(
+    snapshots: np.ndarray,
+    row_mass: np.ndarray,
+    roundoff: float,
+    rows_per_element: int,
+    spec: BasisSpec,
+    signs: np.random.Generator | None = None,
+) -> Basis:
+    """Basis of training snapshots.
+
+    Parameters
+    ----------
+    snapshots : (n, e p, 3) projections
+    row_mass : (e p,) kg, used by mass weighting
+    roundoff : Frobenius norm of the rounding errors in ``snapshots``
+    rows_per_element : p
+    signs : flips the modes at random before "mean-in-modes" adds the mean to them; there the span
+        depends on these arbitrary signs
+    spec : weighting, centring and layout
+
+    Raises
+    ------
+    SnapshotError
+        Fewer than two snapshots, a wrong shape, NaN or Inf, a row without mass where it weighs.
+    """
+    _check(snapshots, row_mass, rows_per_element, spec)
+    matrix = snapshots.reshape(len(snapshots), -1).T
+    scale = np.ones(3 * len(row_mass))  # square root of the inner product's diagonal
+    if spec.weighting != "none":
+        scale = np.repeat(np.sqrt(row_mass), 3)
+    mean, error, shown = np.zeros(len(matrix)), roundoff, matrix
+    if spec.centring == "affine":
+        mean, error = matrix.mean(axis=1), max(roundoff, _mean_error(matrix))
+        # a constant axis is in the mean already; "mean-in-modes" puts it back into the modes
+        shown = matrix - mean[:, None]
+    elif spec.centring == "mean-in-modes":
+        mean = matrix[:, 0].copy()
+    centred = (matrix - mean[:, None]) * scale[:, None]
+    noise = error * float(scale.max())
+    active = _active_axes(shown, error)
+    if spec.layout == "per-axis":
+        modes, sigma, ranks = _per_axis(centred, noise)
+        active = tuple(a and own > 0 for a, own in zip(active, ranks, strict=True))
+        rank = max(ranks)
+    else:
+        modes, sigma = pod(centred)
+        rank = numerical_rank(sigma, centred.shape, noise)
+    if not any(active):
+        rank = 0
+    if spec.centring == "mean-in-modes":
+        # orthonormal axis by axis: no more modes than rows
+        rank = min(rank, len(row_mass))
+    v = modes[:, :rank]
+    if spec.centring == "mean-in-modes":
+        v = _mean_in_modes(v, centred, mean * scale, active, signs)
+        mean = np.zeros_like(mean)
+    return Basis(
+        V=np.ascontiguousarray(v / scale[:, None]),
+        mean=mean,
+        singular_values=sigma,
+        rank=rank,
+        roundoff=noise,
+        rows_per_element=rows_per_element,
+        separate_axes=spec.layout == "per-axis" or spec.centring == "mean-in-modes",
+        active_axes=active,
+    )
+
+
+def basis_of(
+    data: SnapshotSet,
+    spec: BasisSpec,
+    train: np.ndarray | None = None,
+    signs: np.random.Generator | None = None,
+) -> Basis:
+    """Basis ``spec`` of the training snapshots of ``data``; ``signs`` and errors: `compute_basis`.
+
+    ``train`` (n, e p, 3) takes their place.
+    """
+    return compute_basis(
+        data.train if train is None else train,
+        data.row_mass,
+        data.roundoff,
+        rows_per_element=data.rows_per_element,
+        spec=spec,
+        signs=signs,
+    )
+
+
+def _check(
+    snapshots: np.ndarray, row_mass: np.ndarray, rows_per_element: int, spec: BasisSpec
+) -> None:
+    if snapshots.ndim != 3 or snapshots.shape[2] != 3 or len(snapshots) < 2:
+        raise SnapshotError(f"snapshots of shape {snapshots.shape}, required: (n >= 2, e p, 3)")
+    rows = snapshots.shape[1]
+    if rows == 0 or rows % rows_per_element:
+        raise SnapshotError(
+            f"snapshots of {rows} rows, required: a multiple of rows_per_element "
+            f"= {rows_per_element}"
+        )
+    if row_mass.shape != (rows,):
+        raise SnapshotError(f"row_mass of shape {row_mass.shape}, required: ({rows},)")
+    require_finite("snapshots", snapshots, SnapshotError)
+    if spec.weighting == "mass":
+        require_finite("row_mass", row_mass, SnapshotError)
+        if row_mass.min() <= 0.0:
+            row = int(np.argmin(row_mass))
+            raise SnapshotError(f"row_mass: row {row} has {row_mass[row]} kg, required: above 0")
+
+
+def _mean_error(matrix: np.ndarray) -> float:
+    """Bound on what a computed mean leaves in the centred matrix, as a Frobenius norm.
+
+    A sum of n terms is wrong by at most n eps/2 times the sum of their magnitudes (Higham 2002,
+    section 4.2), the same in every column. Without this bound constant snapshots, whose centred
+    matrix is that error and nothing else, would get a basis made of it. Subtracting the first
+    snapshot makes no such error.
+    """
+    return 0.5 * np.finfo(float).eps * matrix.shape[1] * float(np.linalg.norm(matrix))
+
+
+def _active_axes(matrix: np.ndarray, roundoff: float) -> tuple[bool, ...]:
+    """Axes that hold more than round-off (of the data, or relative to the largest axis)."""
+    norms = np.array([np.linalg.norm(matrix[axis::3]) for axis in range(3)])
+    relative = max(matrix.shape) * np.finfo(float).eps * norms.max()
+    return tuple(bool(norm > max(roundoff, relative)) for norm in norms)
+
+
+def _per_axis(centred: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray, list[int]]:
+    """One basis per axis, stored side by side, and their ranks; zero modes beyond an axis's rank.
+
+    The k-th singular value is the norm of the three axes' k-th ones.
+    """
+    n, m = centred.shape
+    modes = np.zeros((n, min(n // 3, m)))
+    sigma = np.zeros((3, min(n // 3, m)))
+    ranks = []
+    for axis in range(3):
+        u, sigma[axis] = pod(centred[axis::3])
+        own = numerical_rank(sigma[axis], centred[axis::3].shape, noise)
+        modes[axis::3, :own] = u[:, :own]
+        ranks.append(own)
+    return modes, np.linalg.norm(sigma, axis=0), ranks
+
+
+def _mean_in_modes(
+    v: np.ndarray,
+    centred: np.ndarray,
+    first: np.ndarray,
+    active: tuple[bool, ...],
+    signs: np.random.Generator | None,
+) -> np.ndarray:
+    """The published code's modes: rescaled, first snapshot added to each, QR axis by axis.
+
+    As there, an axis that holds fewer independent columns than modes gets the completion that the
+    Householder vectors happen to give: orthonormal, but not from data.
+    """
+    if v.shape[1] == 0:
+        return v
+    if signs is not None:
+        v = v * signs.choice([-1.0, 1.0], size=v.shape[1])
+    shifted = v * np.std(centred) + first[:, None]
+    result = np.zeros_like(shifted)
+    for axis in np.flatnonzero(active):
+        q = linalg.qr(shifted[axis::3], mode="economic")[0]
+        result[axis::3] = fix_signs(q)
+    return result
+
+
+def pod(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Left singular vectors (n, m) and singular values (m,) of ``matrix`` (n, m), n >= m or not.
+
+    A tall matrix is first reduced by a QR factorisation, A = Q R, and R is decomposed: backward
+    stable like the SVD of A itself (Chan 1982), unlike the eigenvalues of A^T A, which lose all
+    singular values below sqrt(eps) sigma_1. Each vector's entry of largest magnitude is positive.
+    """
+    if matrix.shape[0] > matrix.shape[1]:
+        q, second, r = thin_qr(matrix)
+        u, sigma, _ = linalg.svd(r, full_matrices=False, check_finite=False)
+        u = (linalg.solve_triangular(second, u, check_finite=False).T @ q.T).T
+    else:
+        u, sigma, _ = linalg.svd(matrix, full_matrices=False, check_finite=False)
+    return fix_signs(u), sigma
+
+
+def fix_signs(u: np.ndarray) -> np.ndarray:
+    """Columns of ``u`` (n, m) with their entry of largest magnitude made positive.
+
+    Magnitudes are compared after rounding to single precision, so that entries which are equal up
+    to round-off tie and the first of them decides.
+    """
+    if u.shape[1] == 0:
+        return u
+    largest = [np.argmax(np.abs(mode).astype(np.float32)) for mode in u.T]
+    signs = np.sign(u[largest, np.arange(u.shape[1])])
+    return u * np.where(signs == 0.0, 1.0, signs)
+
+
+# Largest |Q_1^T Q_1 - I| that counts as good: round-off leaves 1e-14 to 1e-13, a factor L of
+# condition 1e2 about 1e-12.
+DEPARTURE = 1e-12
+
+
+def thin_qr(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Q_1 (n, m), R_2 (m, m) and R (m, m) of A = ``matrix`` (n, m), n > m: A = (Q_1 R_2^-1) R.
+
+    Q_1 R_2^-1 has orthonormal columns up to round-off, also where A has no full rank. It is not
+    formed: what comes next multiplies it by something, and that is better done to R_2^-1 first.
+
+    Householder's reflections go through A once a column and wait for memory. Here (Terao, Ozaki and
+    Ogita 2020) LU with partial pivoting, A = P L U, leaves a well-conditioned L, and two Cholesky
+    factorisations of Gram matrices make it orthonormal: L = Q_1 R_1, Q_1 = Q R_2, R = R_2 R_1 U.
+    That L is well-conditioned is no theorem: where Q_1 is not orthonormal up to `DEPARTURE`,
+    reflections do it. Where it is, the error of R is that of the LU factorisation, some eps cond(L)
+    of each column of A.
+    """
+    lower, swaps, _ = linalg.lapack.dgetrf(np.array(matrix, order="F"), overwrite_a=True)
+    m = matrix.shape[1]
+    upper = np.triu(lower[:m])
+    lower[:m] = np.tril(lower[:m], -1) + np.eye(m)
+    try:
+        first = linalg.cholesky(lower.T @ lower, check_finite=False)
+    except linalg.LinAlgError:
+        return _by_reflections(matrix)
+    q = linalg.blas.dtrsm(1.0, first, lower, side=1, overwrite_b=True)
+    gram = q.T @ q
+    if not np.abs(gram - np.eye(m)).max() <= DEPARTURE:
+        return _by_reflections(matrix)
+    second = linalg.cholesky(gram, check_finite=False)
+    for k in reversed(range(m)):
+        q[[k, swaps[k]]] = q[[swaps[k], k]]
+    return q, second, second @ (first @ upper)
+
+
+def _by_reflections(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    q, r = linalg.qr(matrix, mode="economic", check_finite=False)
+    return q, np.eye(len(r)), r
+
+
+def numerical_rank(singular_values: np.ndarray, shape: tuple[int, int], roundoff: float) -> int:
+    """Number of ``singular_values`` (n,) of a matrix of that ``shape`` above both round-off levels.
+
+    The relative level max(shape) eps sigma_1 is the backward error of the SVD. The absolute level
+    ``roundoff`` is the error of the data themselves: where a projection is the difference of
+    cancelling terms, all of its singular values may be noise although they decay nicely.
+    """
+    if len(singular_values) == 0:
+        return 0
+    relative = max(shape) * np.finfo(float).eps * singular_values[0]
+    return int(np.count_nonzero(singular_values > max(relative, roundoff)))

@@ -1,1 +1,0 @@
-"""Reduced runs: the reduced local step and the rerun of a scene with it."""

@@ -1,0 +1,360 @@
+"""The reduced local step: S^T W p(y) is replaced by S^T W (mean + V c(y)).
+
+Its compiled part gets the coefficients from sampled entries and reconstructs ("lift"). Coefficients
+come in sets: one that all axes share, or one an axis. A column of the lift adds the coefficients of
+its set to one axis of the right-hand side."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdrom.model.compiled import rows
+from pdrom.model.compiled.dots import dots
+from pdrom.model.compiled.functions import clock, compiled, now
+from pdrom.model.compiled.rows import WIDTH, as_vertices, at, flat, shares, unflat
+from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.constraints.local_kernel import (
+    FIRST,
+    OWN,
+    PARTS,
+    PREPARE,
+    VERTICES,
+    LocalKernel,
+    LocalPass,
+    call,
+    local_kernel,
+)
+from pdrom.model.dynamics.stepper import LocalStep
+from pdrom.model.dynamics.system import GlobalSystem
+from pdrom.model.runs import BoundedRun
+from pdrom.model.scene import Scene
+from pdrom.reduction.rerun import Rerun, compare
+from pdrom.reduction.sampling.reduction import Reduction
+
+SPLIT_FROM = 1 << 17  # entries of a lift (N, r) from which its rows are in two parts
+
+# Entries of the record: the numbers of modes, sets, columns and sampled numbers, address and record
+# of the sampler; then the places of the arrays of `Lift` in their order, and that of a clock.
+MODES, SETS, COLUMNS, SAMPLED, SAMPLER, SAMPLER_RECORD = range(OWN, OWN + 6)
+STARTS, POSITIONS, PACKED, OPERATORS, SHIFTS, COEFFICIENTS = range(OWN + 6, OWN + 12)
+AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 12, OWN + 20)
+
+
+@dataclass(frozen=True)
+class Lift:
+    """Arrays of a reduced local step, for r modes, N vertices and c columns.
+
+    starts : (sets + 1,) where the sampled entries of each set begin
+    positions : sampled entries of each set among the numbers of the sampled elements
+    packed : room for those of one set
+    operators : (r, m) of each set, flat, one after the other
+    shifts : (sets, r) what is taken from operator times entries: the part of the mean
+    coefficients : (sets, r) those of the last evaluation
+    axes, own_sets : (c,) axis that a column adds to, set whose coefficients it takes
+    lifted : (c, N, r) S^T W V
+    offset : (4 N,) S^T W mean, padded vectors
+    seconds : (2,) time of the two parts of the lift so far
+    """
+
+    starts: np.ndarray
+    positions: np.ndarray
+    packed: np.ndarray
+    operators: np.ndarray
+    shifts: np.ndarray
+    coefficients: np.ndarray
+    axes: np.ndarray
+    own_sets: np.ndarray
+    lifted: np.ndarray
+    offset: np.ndarray
+    seconds: np.ndarray
+
+    @property
+    def arrays(self) -> Sequence[np.ndarray]:
+        """All of them, in the order of the kernel's record."""
+        return tuple(getattr(self, name) for name in self.__dataclass_fields__)
+
+    @property
+    def split(self) -> bool:
+        """Whether its rows are in two parts."""
+        _, vertices, modes = self.lifted.shape
+        return bool(vertices * modes >= SPLIT_FROM)
+
+    def kernel(self, sampler: LocalKernel, sampled: int) -> LocalKernel:
+        """Local kernel that adds the lift; ``sampler`` writes so many ``sampled`` numbers."""
+        columns, vertices, modes = self.lifted.shape
+        numbers = (
+            modes, len(self.shifts), columns, sampled, sampler.address, sampler.record.ctypes.data
+        )  # fmt: skip
+        clocks = np.stack([clock(), clock()])
+        arrays = (*self.arrays, np.empty(sampled), clocks, sampler.record, *sampler.arrays)
+        return LocalKernel.of(
+            _accumulate,
+            vertices,
+            units=vertices,
+            arrays=arrays,
+            numbers=numbers,
+            touched=(lambda first: np.arange(first, vertices)) if self.split else None,
+            prepares=True,
+        )
+
+
+@compiled(nogil=True)
+def coefficients(sampled, starts, positions, packed, operators, shifts, result):
+    """Write the coefficients of all sets that belong to the numbers of the sampled elements.
+
+    Parameters
+    ----------
+    sampled : projections of the sampled elements, one after the other
+    starts, positions, packed, operators, shifts : see `Lift`
+    result : (sets, r) that is written
+    """
+    sets, modes = shifts.shape
+    for k in range(sets):
+        first, last = starts[k], starts[k + 1]
+        # side by side, so that a product for each mode reads whole vectors
+        for j in range(last - first):
+            packed[j] = at(sampled, at(positions, first + j))
+        size = last - first
+        for i in range(0, modes, 3):
+            # the last one again where there are fewer than three
+            a, b, c = i, min(i + 1, modes - 1), min(i + 2, modes - 1)
+            result[k, a], result[k, b], result[k, c] = dots(
+                operators,
+                first * modes + a * size,
+                first * modes + b * size,
+                first * modes + c * size,
+                size,
+                packed,
+                (-shifts[k, a], -shifts[k, b], -shifts[k, c]),
+            )
+
+
+@compiled(nogil=True)
+def lift(values, axes, own_sets, lifted, offset, first, last, rhs):
+    """Add S^T W (mean + V c) to the rows ``first`` to ``last`` - 1 of the right-hand side.
+
+    Parameters
+    ----------
+    values : (sets, r) coefficients
+    axes, own_sets, lifted, offset : see `Lift`
+    rhs : (4 N,) right-hand side, padded vectors
+    """
+    for i in range(WIDTH * first, WIDTH * last):
+        rhs[i] += offset[i]
+    columns, vertices, modes = lifted.shape
+    flat = lifted.reshape(columns * vertices * modes)
+    for column in range(columns):
+        own, axis, start = values[own_sets[column]], axes[column], column * vertices
+        for vertex in range(first, last - 2, 3):
+            i = (start + vertex) * modes
+            x, y, z = dots(flat, i, i + modes, i + 2 * modes, modes, own, (0.0, 0.0, 0.0))
+            rhs[WIDTH * vertex + axis] += x
+            rhs[WIDTH * (vertex + 1) + axis] += y
+            rhs[WIDTH * (vertex + 2) + axis] += z
+        for vertex in range(last - (last - first) % 3, last):
+            i = (start + vertex) * modes
+            rhs[WIDTH * vertex + axis] += dots(flat, i, i, i, modes, own, (0.0, 0.0, 0.0))[0]
+
+
+@local_kernel
+def _accumulate(y, rhs_place, record, part):
+    entries = rows.indices(record, SIZE)
+    modes, sets, columns = entries[MODES], entries[SETS], entries[COLUMNS]
+    values = rows.doubles(entries[COEFFICIENTS], sets * modes).reshape((sets, modes))
+    if part == PREPARE:
+        starts = rows.indices(entries[STARTS], sets + 1)
+        count = starts[sets]
+        projections = entries[PROJECTIONS]
+        call(entries[SAMPLER], y, projections, entries[SAMPLER_RECORD], PARTS[0])
+        coefficients(
+            rows.doubles(projections, entries[SAMPLED]),
+            starts,
+            rows.indices(entries[POSITIONS], count),
+            rows.doubles(entries[PACKED], count),
+            rows.doubles(entries[OPERATORS], count * modes),
+            rows.doubles(entries[SHIFTS], sets * modes).reshape((sets, modes)),
+            values,
+        )
+        return 0.0
+    vertices = entries[VERTICES]
+    watch = rows.indices(entries[CLOCK] + 16 * part, 2)
+    before = now(watch)
+    lift(
+        values,
+        rows.indices(entries[AXES], columns),
+        rows.indices(entries[OWN_SETS], columns),
+        rows.doubles(entries[LIFTED], columns * vertices * modes).reshape(
+            (columns, vertices, modes)
+        ),
+        rows.doubles(entries[OFFSET], WIDTH * vertices),
+        entries[FIRST + part],
+        entries[FIRST + part + 1],
+        rows.doubles(rhs_place, WIDTH * vertices),
+    )
+    rows.doubles(entries[SECONDS], 2)[part] += now(watch) - before
+    return np.nan
+
+
+class ReducedLocalStep:
+    """Evaluates sampled elements of a group and lifts their coefficients to the right-hand side.
+
+    Precomputed: the offset S^T W mean (N, 3), the reconstruction S^T W V for each coefficient
+    block, and the solution operators. Online: the projections of the sampled elements, a small
+    dense product for c, and the dense reconstruction.
+
+    Attributes
+    ----------
+    local_kernel : all of this as compiled code; None for a group without a sampler
+    """
+
+    def __init__(self, group: ConstraintGroup, reduction: Reduction) -> None:
+        """Precompute what ``reduction`` of ``group`` needs online."""
+        self.name = group.name
+        self._group = group
+        self._elements = np.ascontiguousarray(reduction.elements, dtype=np.int64)
+        self._everything = len(self._elements) == group.elements
+        self._lift = _lift(group, reduction)
+        self.local_kernel: LocalKernel | None = None
+        self._pass: LocalPass | None = None
+        if getattr(group, "local_kernel", None) is not None:
+            sampled = 3 * group.rows_per_element * len(self._elements)
+            self.local_kernel = self._lift.kernel(group.sampler(self._elements), sampled)
+            self._pass = LocalPass([self.local_kernel])
+
+    @property
+    def frame_lagged(self) -> bool:
+        """Whether ``begin_frame`` freezes anything."""
+        return self._group.frame_lagged
+
+    def begin_frame(self, q: np.ndarray) -> None:
+        """Freeze frame-lagged data of the sampled elements at positions ``q`` (N, 3) m."""
+        self._group.begin_frame(q, None if self._everything else self._elements)
+
+    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
+        """Add the reduced S^T W p(y) of ``y`` (N, 3) m to ``rhs`` (N, 3); energy unknown: nan."""
+        if self._pass is not None:
+            return self._pass.accumulate(y, rhs)
+        self.solve(self.sample(y))
+        self.lift(rhs)
+        return float("nan")
+
+    def sample(self, y: np.ndarray) -> np.ndarray:
+        """Projections of the sampled elements at ``y`` (N, 3) m, as one vector."""
+        return self._group.project_elements(y, self._elements).ravel()
+
+    def solve(self, sampled: np.ndarray) -> None:
+        """Set the coefficients from ``sampled`` (`sample`); the systems are inverted already."""
+        data = self._lift
+        coefficients(
+            sampled, data.starts, data.positions, data.packed, data.operators, data.shifts,
+            data.coefficients,
+        )  # fmt: skip
+
+    def lift(self, rhs: np.ndarray) -> None:
+        """Add S^T W (mean + V c) with the coefficients of the last `solve` to ``rhs`` (N, 3)."""
+        data, right = self._lift, flat(rhs)
+        added = right if shares(rhs, right) else np.zeros_like(right)
+        lift(
+            data.coefficients, data.axes, data.own_sets, data.lifted, data.offset, 0,
+            data.lifted.shape[1], added,
+        )  # fmt: skip
+        if added is not right:
+            rhs += unflat(added)
+
+    @property
+    def lift_seconds(self) -> float:
+        """Time of the reconstruction so far."""
+        return float(self._lift.seconds.sum())
+
+    @lift_seconds.setter
+    def lift_seconds(self, seconds: float) -> None:
+        self._lift.seconds[:] = seconds
+
+
+def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
+    mean, blocks, r = reduction.basis.mean, reduction.blocks, reduction.r
+    operator = group.S.T.multiply(group.row_weights[None, :]).tocsr()
+    vertices = operator.shape[0]
+    place = _local_positions(reduction)
+    every = [range(3) if block.axis is None else (block.axis,) for block in blocks]
+    columns = [(axis, k) for k, axes in enumerate(every) for axis in axes]
+    lifted = np.zeros((len(columns), vertices, r))
+    for own, (axis, _) in zip(lifted, columns, strict=True):
+        own[...] = operator @ reduction.v[axis::3]
+    return Lift(
+        starts=np.cumsum([0, *(len(block.entries) for block in blocks)], dtype=np.int64),
+        positions=_joined([place(block.entries) for block in blocks], np.int64),
+        packed=np.empty(sum(len(block.entries) for block in blocks)),
+        operators=_joined([block.operator.ravel() for block in blocks], np.float64),
+        shifts=np.array([b.operator @ mean[b.entries] for b in blocks]).reshape(-1, r),
+        coefficients=np.zeros((len(blocks), r)),
+        axes=np.array([axis for axis, _ in columns], dtype=np.int64),
+        own_sets=np.array([k for _, k in columns], dtype=np.int64),
+        lifted=lifted,
+        offset=flat(as_vertices(operator @ mean.reshape(-1, 3))),
+        seconds=np.zeros(2),
+    )
+
+
+def _joined(parts: list[np.ndarray], kind: type) -> np.ndarray:
+    return np.concatenate([np.empty(0, kind), *parts]).astype(kind)
+
+
+def _local_positions(reduction: Reduction) -> Callable[[np.ndarray], np.ndarray]:
+    """Map from entries of the full vector to entries of the sampled elements' vector."""
+    size = 3 * reduction.basis.rows_per_element
+    order = np.argsort(reduction.elements, kind="stable")
+    ordered = reduction.elements[order]
+
+    def place(entries: np.ndarray) -> np.ndarray:
+        element, inside = np.divmod(entries, size)
+        return size * order[np.searchsorted(ordered, element)] + inside
+
+    return place
+
+
+def replace_group(scene: Scene, group: str, replacement: LocalStep) -> list[LocalStep]:
+    """Local steps of the scene with the one of ``group`` replaced by ``replacement``."""
+    scene.group(group)
+    return [replacement if g.name == group else g for g in scene.groups]
+
+
+def rerun(
+    scene: Scene,
+    system: GlobalSystem,
+    local_steps: Sequence[LocalStep],
+    reference: np.ndarray,
+    blowup_extent: float,
+    offset: np.ndarray | None = None,
+) -> Rerun:
+    """Run a scene with other local steps and compare it with its full-order trajectory.
+
+    Parameters
+    ----------
+    reference : (F + 1, N, 3) positions of the full-order run
+    blowup_extent : the run ends when the extent exceeds this multiple of the rest extent
+    offset : (N, 3) m, added to the first positions
+    system : factored system of the scene's global step
+    local_steps : those that take the place of the scene's own
+    """
+    loop = scene.stepper(system, local_steps, track_objective=False)
+    start, frames, unit = scene.initial_state(offset), scene.config.frames, scene.mesh.extent
+    return compare(BoundedRun(loop.run, start, frames, blowup_extent, unit), reference)
+
+
+def rerun_reduced(
+    scene: Scene,
+    group: str,
+    reduction: Reduction,
+    reference: np.ndarray,
+    blowup_extent: float,
+    system: GlobalSystem | None = None,
+    offset: np.ndarray | None = None,
+) -> Rerun:
+    """Run a scene with the projections of a ``group`` by ``reduction``, see `rerun`.
+
+    ``system`` is the scene's own unless another is given.
+    """
+    steps = replace_group(scene, group, ReducedLocalStep(scene.group(group), reduction))
+    return rerun(scene, system or scene.system, steps, reference, blowup_extent, offset)
