@@ -13,10 +13,10 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 41_968,
-    "modules of src": 285,
-    "lines of tests": 28_512,
-    "words of documentation": 24_745,
+    "lines of src": 41_967,
+    "modules of src": 279,
+    "lines of tests": 28_504,
+    "words of documentation": 24_744,
     "tables": 25,
     "figures": 23,
     "experiments": 21,

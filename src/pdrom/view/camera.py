@@ -1,11 +1,18 @@
-"""Orthographic camera and the window of a picture."""
+"""Orthographic camera, the window of a picture, what is up in it, and obstacles in view."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+
+from pdrom.model.effects.base import EffectConfig
+from pdrom.model.effects.forces import Gravity
+from pdrom.model.mesh.types import Mesh
+
+ROOM = 0.2  # margin around a run, over its longest side
+Y = np.array([0.0, 1.0, 0.0])
 
 
 class Window(NamedTuple):
@@ -39,14 +46,16 @@ class Window(NamedTuple):
 
 @dataclass(frozen=True)
 class Camera:
-    """Parallel projection; y points up.
+    """Parallel projection.
 
-    azimuth : degrees about the y axis; 0 looks along -z, 90 along -x
+    azimuth : degrees about the upward axis; where that is y, 0 looks along -z and 90 along -x
     elevation : degrees above the horizon
+    up : unit vector that points up in the picture
     """
 
     azimuth: float = 30.0
     elevation: float = 20.0
+    up: tuple[float, ...] = (0.0, 1.0, 0.0)
 
     @cached_property
     def basis(self) -> np.ndarray:
@@ -54,7 +63,7 @@ class Camera:
         a, e = np.radians([self.azimuth, self.elevation])
         right = np.array([np.cos(a), 0.0, -np.sin(a)])
         eye = np.array([np.cos(e) * np.sin(a), np.sin(e), np.cos(e) * np.cos(a)])
-        return np.stack([right, np.cross(eye, right), eye])
+        return np.stack([right, np.cross(eye, right), eye]) @ rotation_to(np.array(self.up)).T
 
     def project(self, points: np.ndarray) -> np.ndarray:
         """Picture coordinates (n, 2), m, of points (n, 3)."""
@@ -75,3 +84,54 @@ def bounds(flat: np.ndarray, margin: float = 0.08) -> Window:
 def window_of(camera: Camera, clouds: Iterable[np.ndarray], margin: float = 0.08) -> Window:
     """Window by ``camera`` that shows all ``clouds`` (n, 3); ``margin`` as in `bounds`."""
     return bounds(np.concatenate([camera.project(cloud) for cloud in clouds]), margin)
+
+
+def up_of(effects: Sequence[EffectConfig]) -> np.ndarray:
+    """Unit vector (3,) against the gravity among ``effects`` of a scene; y where it has none."""
+    pull = sum(
+        (np.array(e.acceleration) for e in effects if isinstance(e, Gravity.Config)), 0.0 * Y
+    )
+    strength = float(np.linalg.norm(pull))
+    return -pull / strength if strength > 0.0 else Y
+
+
+def rotation_to(up: np.ndarray) -> np.ndarray:
+    """The smallest rotation (3, 3) that takes y to the unit vector ``up``; half a turn about x."""
+    cosine = float(up @ Y)
+    if cosine <= -1.0 + 1e-12:
+        return np.diag([1.0, -1.0, -1.0])
+    x, y, z = np.cross(Y, up)
+    square = float(x * x + y * y + z * z)
+    if square == 0.0:
+        return np.eye(3)
+    turn = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    # not divided by 1 + cosine, which loses all digits near half a turn
+    return np.eye(3) + turn + turn @ turn * ((1.0 - cosine) / square)
+
+
+def shown_region(
+    positions: np.ndarray, effects: Sequence[EffectConfig]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of a cube about ``positions`` (F, N, 3) of a run, with room around it, m.
+
+    Obstacles that the run comes near to are shown whole, unless they are larger than the run; runs
+    and bodies that leave the cube are cut off. Obstacles are among the ``effects``.
+    """
+    low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
+    size = float((high - low).max())
+    for body in (effect.body(low, high) for effect in effects):
+        if body is None:
+            continue
+        lower, upper = body.points.min(axis=0), body.points.max(axis=0)
+        near = (lower <= high + ROOM * size).all() and (upper >= low - ROOM * size).all()
+        if near and (upper - lower).max() <= size:
+            low, high = np.minimum(low, lower), np.maximum(high, upper)
+    middle, half = 0.5 * (low + high), (0.5 + ROOM) * float((high - low).max())
+    return middle - half, middle + half
+
+
+def obstacles(positions: np.ndarray, effects: Sequence[EffectConfig]) -> list[Mesh]:
+    """Surfaces of the obstacles near a run, see `shown_region`; the largest, behind, first."""
+    region = shown_region(positions, effects)
+    found = [body for effect in effects if (body := effect.body(*region))]
+    return sorted(found, key=lambda body: -float(np.ptp(body.points, axis=0).max()))

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from pdrom.core.store import atomic_path
 from pdrom.core.store.atomic import MARK
 from pdrom.model.constraints.base import ConstraintGroup
@@ -13,8 +11,8 @@ from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.types import Mesh
 from pdrom.view import style
 from pdrom.view.artists import Figure
-from pdrom.view.camera import Camera
-from pdrom.view.page import ViewedRun, ViewedScene, rotation_to, shown_region, up_of
+from pdrom.view.camera import Camera, obstacles, rotation_to, up_of
+from pdrom.view.page import ViewedRun, ViewedScene
 from pdrom.view.panels import Row, RunPanel, draw_rows, shared_window
 from pdrom.view.read import frame_numbers
 from pdrom.view.text import plain_words
@@ -46,12 +44,10 @@ def shown_runs(scene: ViewedScene) -> list[ViewedRun]:
 def _upright(scene: ViewedScene) -> tuple[ViewedScene, list[Mesh]]:
     """Turn ``scene`` so that y is up; also its obstacles, the largest, which are behind, first."""
     turn = rotation_to(up_of(scene.effects))
-    region = shown_region(scene.positions, scene.effects)
-    bodies = [effect.body(*region) for effect in scene.effects]
     runs = tuple(replace(run, positions=run.positions @ turn) for run in scene.runs)
     turned = replace(scene, positions=scene.positions @ turn, runs=runs)
-    surfaces = [replace(body, points=body.points @ turn) for body in bodies if body]
-    return turned, sorted(surfaces, key=lambda body: -float(np.ptp(body.points, axis=0).max()))
+    bodies = obstacles(scene.positions, scene.effects)
+    return turned, [replace(body, points=body.points @ turn) for body in bodies]
 
 
 def _draw(scene: ViewedScene) -> Figure:
@@ -71,11 +67,12 @@ def _draw(scene: ViewedScene) -> Figure:
     windows = [
         shared_window(CAMERA, q, [panels[i] for panels in every]) for i, q in enumerate(full)
     ]
+    with_bodies = [[replace(p, obstacles=bodies) for p in panels] for panels in every]
     rows = [
-        Row(label, scene.mesh, [replace(p, obstacles=bodies) for p in panels], windows, full)
-        for label, panels in zip(labels, every, strict=True)
+        Row(label, scene.mesh, row, windows, full, CAMERA)
+        for label, row in zip(labels, with_bodies, strict=True)
     ]
-    return draw_rows(rows, CAMERA, NO_LIMIT)
+    return draw_rows(rows, NO_LIMIT)
 
 
 def panel_of(run: ViewedRun, frame: int) -> RunPanel:

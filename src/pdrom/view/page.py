@@ -16,8 +16,8 @@ from pdrom.core.errors import StorageError
 from pdrom.core.packed import pack_positions, pack_text
 from pdrom.core.store import write_text
 from pdrom.model.effects.base import EffectConfig
-from pdrom.model.effects.forces import Gravity
 from pdrom.model.mesh.types import Mesh
+from pdrom.view.camera import rotation_to, shown_region, up_of
 
 
 @dataclass(frozen=True)
@@ -129,8 +129,8 @@ def filled(template: str, parts: dict[str, str]) -> str:
     return "".join(pieces)
 
 
+EYE = np.array([0.85, 0.55, 1.45])  # direction to the viewer where y points up
 FRAMES = 75  # frames that the page holds of a run, at most
-ROOM = 0.2  # margin around a run, over its longest side
 
 
 def pack_scene(scene: ViewedScene) -> dict[str, Any]:
@@ -139,7 +139,7 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
     stride = max(1, ceil((len(scene.positions) - 1) / FRAMES))
     full = scene.positions[::stride, used]
     low, high = shown_region(full, scene.effects)
-    bodies = [effect.body(low, high) for effect in scene.effects]
+    bodies, up = [effect.body(low, high) for effect in scene.effects], up_of(scene.effects)
     return {
         "name": scene.name,
         "title": scene.title,
@@ -148,7 +148,7 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
         "timeStep": scene.time_step,
         "stride": stride,
         "full": pack_positions(full),
-        "view": view_of(scene.effects),
+        "view": {"up": up.tolist(), "eye": (rotation_to(up) @ EYE).tolist()},
         "ranges": np.stack([low, high], axis=1).tolist(),
         "bodies": [
             {
@@ -163,27 +163,6 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
         "horizon": scene.horizon,
         "runs": [_pack_run(run, stride, used) for run in scene.runs],
     }
-
-
-def shown_region(
-    positions: np.ndarray, effects: Sequence[EffectConfig]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of a cube about ``positions`` (F, N, 3) of a run, with room around it, m.
-
-    Obstacles that the run comes near to are shown whole, unless they are larger than the run; runs
-    and bodies that leave the cube are cut off. Obstacles are among the ``effects``.
-    """
-    low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
-    size = float((high - low).max())
-    for body in (effect.body(low, high) for effect in effects):
-        if body is None:
-            continue
-        lower, upper = body.points.min(axis=0), body.points.max(axis=0)
-        near = (lower <= high + ROOM * size).all() and (upper >= low - ROOM * size).all()
-        if near and (upper - lower).max() <= size:
-            low, high = np.minimum(low, lower), np.maximum(high, upper)
-    middle, half = 0.5 * (low + high), (0.5 + ROOM) * float((high - low).max())
-    return middle - half, middle + half
 
 
 def _pack_run(run: ViewedRun, stride: int, used: np.ndarray) -> dict[str, Any]:
@@ -201,36 +180,3 @@ def _pack_run(run: ViewedRun, stride: int, used: np.ndarray) -> dict[str, Any]:
 def _numbers(values: np.ndarray) -> list[float | None]:
     """Four digits of each number; null where there is none."""
     return [float(f"{v:.4g}") if np.isfinite(v) else None for v in values]
-
-
-Y = np.array([0.0, 1.0, 0.0])
-EYE = np.array([0.85, 0.55, 1.45])  # direction to the viewer where y points up
-
-
-def up_of(effects: Sequence[EffectConfig]) -> np.ndarray:
-    """Unit vector (3,) against the gravity among ``effects`` of a scene; y where it has none."""
-    pull = sum(
-        (np.array(e.acceleration) for e in effects if isinstance(e, Gravity.Config)), 0.0 * Y
-    )
-    strength = float(np.linalg.norm(pull))
-    return -pull / strength if strength > 0.0 else Y
-
-
-def rotation_to(up: np.ndarray) -> np.ndarray:
-    """The smallest rotation (3, 3) that takes y to the unit vector ``up``; half a turn about x."""
-    cosine = float(up @ Y)
-    if cosine <= -1.0 + 1e-12:
-        return np.diag([1.0, -1.0, -1.0])
-    x, y, z = np.cross(Y, up)
-    square = float(x * x + y * y + z * z)
-    if square == 0.0:
-        return np.eye(3)
-    turn = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    # not divided by 1 + cosine, which loses all digits near half a turn
-    return np.eye(3) + turn + turn @ turn * ((1.0 - cosine) / square)
-
-
-def view_of(effects: Sequence[EffectConfig]) -> dict[str, list[float]]:
-    """``up`` and ``eye`` of the picture of a scene with these effects, each (3,)."""
-    up = up_of(effects)
-    return {"up": up.tolist(), "eye": (rotation_to(up) @ EYE).tolist()}

@@ -178,6 +178,7 @@ NOTHING_RAN = "not run: the projections are round-off, there is nothing to reduc
 class Row:
     """Panels of one row; ``ghosts`` (n, N, 3) m are outlined behind the reduced runs.
 
+    camera : that sees all of them
     note : text in place of the reduced runs, for an experiment in which none ran
     """
 
@@ -186,6 +187,7 @@ class Row:
     panels: list[RunPanel]
     windows: list[Window]
     ghosts: np.ndarray
+    camera: Camera
     note: str | None = None
 
     @property
@@ -233,10 +235,8 @@ def run_panel(
     return RunPanel(title, colour, positions, failure, remark)
 
 
-def draw_rows(
-    rows: list[Row], camera: Camera, height_limit: float = HEIGHT_LIMIT, footer: float = 0.0
-) -> Figure:
-    """Figure of ``rows``, one below the other, as ``camera`` sees them.
+def draw_rows(rows: list[Row], height_limit: float = HEIGHT_LIMIT, footer: float = 0.0) -> Figure:
+    """Figure of ``rows``, one below the other.
 
     It is no higher than ``height_limit``, inches; ``footer`` inches at its lower end are left free.
     """
@@ -252,13 +252,11 @@ def draw_rows(
     figure = style.new_figure(height, None)
     tops = 1.0 - np.concatenate([[0.0], np.cumsum(heights)]) / height
     for row, (top, bottom) in zip(rows, pairwise(tops), strict=True):
-        _draw_row(figure, row, camera, columns, top, bottom)
+        _draw_row(figure, row, columns, top, bottom)
     return figure
 
 
-def _draw_row(
-    figure: Figure, row: Row, camera: Camera, columns: int, top: float, bottom: float
-) -> None:
+def _draw_row(figure: Figure, row: Row, columns: int, top: float, bottom: float) -> None:
     inch = 1.0 / figure.get_figheight()
     low, high = bottom + (BELOW + LINE * row.lines) * inch, top - ABOVE * inch
     left = LEFT / style.WIDTH
@@ -267,7 +265,7 @@ def _draw_row(
     for i, panel in enumerate(drawn):
         ax = figure.add_axes((left + (i + 0.02) * step, low, 0.96 * step, high - low))
         ghost = None if panel.reference else row.ghosts[i]
-        draw_run(ax, row.mesh, panel, camera=camera, window=row.windows[i], ghost=ghost)
+        draw_run(ax, row.mesh, panel, camera=row.camera, window=row.windows[i], ghost=ghost)
     if row.note:
         start = left + len(drawn) * step
         ax = figure.add_axes((start, low, 1.0 - start, high - low))

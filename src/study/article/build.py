@@ -1,7 +1,9 @@
 """The article: paper and supplement as pages, and those of tables, figures and claims."""
 
+import io
 import json
 import re
+import shutil
 import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -10,22 +12,128 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pandas as pd
+from PIL import Image
 
 from pdrom.core.errors import PaperError
-from pdrom.core.store import read_table, read_text, write_text
+from pdrom.core.store import atomic_path, read_table, read_text, require_intact, write_text
 from study.article.latex import Origins, linked_table, prepared
-from study.article.pictures import copy_pdf, shown_figure, write_picture
 from study.article.tables import FACTS, claims_page, contents, list_page, table_page
-from study.article.tree import Labels, Tree, numbered, resolved
+from study.article.tree import (
+    Labels,
+    Node,
+    Tree,
+    attributes,
+    link,
+    numbered,
+    plain,
+    resolved,
+    words,
+)
 from study.article.verified import INDEX, write_verified
 from study.artifact.files import Files
 from study.artifact.paths import ARTICLE, FIGURE_PICTURE, File, Place
-from study.artifact.reads import Every, ProjectFile, Setting
+from study.artifact.reads import Every, ProjectFile, Setting, TableOf
 from study.figures.kit.declaration import declarations
 from study.paper.build import NUMBERS, Facts, fact_tables, paper, paper_inputs
 from study.paper.source import DOCUMENTS, documents
 from study.tables import declared
 from study.tables.claims.rules import Added, load_claims
+
+# Bytes: a larger picture loses what nobody sees; a larger PDF is left to the command.
+LOSSLESS, COPIED = 150_000, 200_000
+MANY = 4  # keys of options that say what is drawn
+
+
+def write_picture(png: Path, out: Path) -> tuple[int, int]:
+    """Write the picture ``png`` of a figure as WebP ``out``; return width and height, pixels."""
+    require_intact(png)
+    with Image.open(png) as image:
+        drawn = image.convert("RGB")
+    packed = io.BytesIO()
+    drawn.save(packed, "WEBP", lossless=True, method=3)
+    if packed.tell() > LOSSLESS:
+        packed = io.BytesIO()
+        drawn.save(packed, "WEBP", quality=85, method=4)
+    with atomic_path(out) as temporary:
+        temporary.write_bytes(packed.getvalue())
+    return drawn.size
+
+
+def copy_pdf(pdf: Path, out: Path) -> bool:
+    """Copy a figure's ``pdf`` to ``out`` where it is small; whether it is."""
+    require_intact(pdf)
+    small = pdf.stat().st_size <= COPIED
+    if small:
+        with atomic_path(out) as temporary:
+            shutil.copyfile(pdf, temporary)
+    return small
+
+
+def shown_figure(
+    name: str, node: Node, size: tuple[int, int], with_pdf: bool, pages: Mapping[str, str]
+) -> Node:
+    """A figure with its picture, the caption as its words, its command, data, PDF and kin.
+
+    Parameters
+    ----------
+    node : of the figure in the syntax tree
+    size : of the picture, pixels
+    with_pdf : whether its PDF lies beside the page
+    pages : of the figures that stand in the documents, by name
+    """
+    attribute, caption, _ = node["c"]
+    inlines = [attributes("", "", width=str(size[0]), height=str(size[1]), loading="lazy")]
+    alternative = words(plain(caption[1]).strip())
+    image = {"t": "Image", "c": [*inlines, alternative, [f"figures/{name}.webp", ""]]}
+    lines = {"t": "Div", "c": [attributes("", "origin"), [_para(_origin(name, with_pdf, pages))]]}
+    return {"t": "Figure", "c": [attribute, [caption[0], [*caption[1], lines]], [_para([image])]]}
+
+
+def _para(inlines: list[Node]) -> Node:
+    return {"t": "Plain", "c": inlines}
+
+
+def _origin(name: str, with_pdf: bool, pages: Mapping[str, str]) -> list[Node]:
+    declared = declarations()[name]
+    tables = [read.name for read in declared.reads.values() if isinstance(read, TableOf)]
+    made = [*words("Command: "), {"t": "Code", "c": [attributes(), f"./reproduce figure {name}"]}]
+    made += words(". Data: " if tables else ". Drawn from the runs themselves")
+    for place, table in enumerate(tables):
+        made += [*words(", " if place else ""), link(words(table), f"tables/{table}.html")]
+    made += words(". ")
+    if with_pdf:
+        made += [link(words("PDF"), f"figures/{name}.pdf"), *words(". ")]
+    for place, other in enumerate(_kin(name, pages)):
+        made += words(", " if place else "Other scenes: ")
+        made.append(link(words(other), f"{pages[other]}#fig:{other}", "kin"))
+    if made[-1]["t"] == "Link":
+        made += words(".")
+    mark = {
+        "t": "Span",
+        "c": [attributes("", "", data_verified=f"figure {name}"), words("not yet")],
+    }
+    return [*made, *words(" Last verification: "), mark, *words(".")]
+
+
+def _kin(name: str, pages: Mapping[str, str]) -> list[str]:
+    """Names of figures that show the same of other scenes.
+
+    They share the type of their options, where that has many keys, or their name.
+    """
+    listed = declarations()
+    mine = listed[name].options
+    return [
+        other
+        for other, declared in listed.items()
+        if other in pages
+        and other != name
+        and (
+            (declared.options is mine and len(mine.model_fields) >= MANY)
+            or other.startswith(f"{name}_")
+            or name.startswith(f"{other}_")
+        )
+    ]
+
 
 FOLDER = Path("src/study/article")
 CLAIMS = "config/claims.yaml"

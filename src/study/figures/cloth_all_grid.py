@@ -51,10 +51,11 @@ def cloth_all_grid(
     have the same camera and scale but for framed ones, whose scale is given. The size is the first
     of ``options.ranks`` that ran.
     """
-    camera, methods, runs = options.camera, drawn.methods, Runs(horizon, **files)
+    methods, runs = drawn.methods, Runs(horizon, **files)
     if not drawn.experiments or not methods:
         raise NothingToDraw(options.words())
     one = drawn.experiments[0]
+    camera = options.camera(one)
     mesh, end = runs.mesh(one), runs.floors.horizon(one.scene)
     frames, full = runs.at(one, options.frames, end)
     first = [
@@ -78,10 +79,10 @@ def cloth_all_grid(
     windows = [fit_aspect(w.resized(*size)) for w in windows] * len(methods)
     ghosts = np.concatenate([full] * len(methods))
     made = [
-        Row(label, mesh, [panel.seen_by(camera) for panel in panels], windows, ghosts, note)
+        Row(label, mesh, [panel.seen_by(camera) for panel in panels], windows, ghosts, camera, note)
         for label, panels, note in rows
     ]
-    figure = draw_rows(made, camera, footer=FOOTER)
+    figure = draw_rows(made, footer=FOOTER)
     _draw_scale(figure)
     return figure
 

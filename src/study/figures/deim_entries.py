@@ -64,7 +64,7 @@ def deim_entries(
     for row, (each, samplings) in zip(axes, sampled, strict=True):
         elements, per_element = _elements(each.group, each.path(meshes), each.path(snapshots))
         chosen = _at(samplings[scalar[0]], options.ranks)
-        _draw_hits(row[0], elements, axes_hit(chosen.entries, per_element), options.camera)
+        _draw_hits(row[0], elements, axes_hit(chosen.entries, per_element), options.camera(each))
         row[0].set_title(f"{each.title}\nr = {chosen.r} entries")
         _draw_counts(row[1], chosen, per_element)
         _draw_evaluations(row[2], samplings, per_element)

@@ -95,7 +95,7 @@ def deim_iterations(
     mesh = load_mesh(meshes[0].path)
     elements = element_map(experiment.group, mesh, basis.elements, source=str(path))
     title = f"{experiment.title}, {drawn.title(method)}"
-    return _draw_steps(steps, elements, options.camera, options.columns, title)
+    return _draw_steps(steps, elements, options.camera(experiment), options.columns, title)
 
 
 def _draw_steps(

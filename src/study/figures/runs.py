@@ -10,6 +10,7 @@ import pandas as pd
 from pdrom.model.mesh.types import Mesh, load_mesh
 from pdrom.view import style
 from pdrom.view.artists import Figure
+from pdrom.view.camera import obstacles
 from pdrom.view.panels import NOTHING_RAN, Row, RunPanel, draw_rows, run_panel, shared_window
 from pdrom.view.read import choose_ranks, positions_at, rerun_infos
 from study.artifact.paths import MESH, NOISE_RUNS, RERUNS, TRAIN, File
@@ -53,6 +54,13 @@ class Runs:
         return positions_at(experiment.path(self.full_order), instants, end)
 
 
+def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | None:
+    """Obstacles near ``positions`` (F, N, 3) m; None for a floor alone, which has a shadow."""
+    bodies = obstacles(positions, experiment.effects)
+    floor = any(effect.effect == "floor" for effect in experiment.effects)
+    return None if floor and len(bodies) == 1 else bodies
+
+
 RUNS: dict[str, Read] = {
     "drawn": Settings(Drawn),
     "meshes": EachOf(MESH, "experiments"),
@@ -60,6 +68,10 @@ RUNS: dict[str, Read] = {
     "reruns": EachOf(RERUNS, "runs"),
     **FLOORS,
 }
+COMPARED = (
+    "full order against reduced projections, by basis size. The grey outline is the full-order run "
+    "at the same instant; a framed picture is drawn to the smaller scale given below it."
+)
 RowsOf = Callable[[ReducedRuns, Drawn, Runs, Experiment], list[Row]]
 
 
@@ -67,25 +79,25 @@ def experiment_rows(
     options: ReducedRuns, drawn: Drawn, runs: Runs, experiment: Experiment
 ) -> list[Row]:
     """A row per method; a single one that says so where no method has anything to reduce."""
-    camera = options.camera
+    camera = options.camera(experiment)
     colour = style.surface_colour(drawn.looks[experiment.group][0])
     frames, full = runs.at(experiment, options.frames[-1:])
+    bodies = obstacles_of(experiment, full)
     frame, mesh = frames[0], runs.mesh(experiment)
     when = runs.floors.instant(experiment.scene, frame).replace(", ", "\n")
-    reference = RunPanel("full order", style.FULL_ORDER, full[0], reference=True)
+    reference = RunPanel("full order", style.FULL_ORDER, full[0], reference=True, obstacles=bodies)
     reduced = {}
     for method in drawn.methods:
         path = experiment.path(runs.reruns, method=method)
         infos = choose_ranks(rerun_infos(path), options.ranks)
-        reduced[method] = [
-            run_panel(path, i, frame, colour=colour, title=i.title).seen_by(camera) for i in infos
-        ]
+        panels = [run_panel(path, i, frame, colour=colour, title=i.title) for i in infos]
+        reduced[method] = [replace(p, obstacles=bodies).seen_by(camera) for p in panels]
     everything = [panel for panels in reduced.values() for panel in panels]
     window = shared_window(camera, full[0], everything)
     reference = reference.seen_by(camera)
     if all(panel.positions is None and not panel.failure for panel in everything):
         label = f"{experiment.title}\nany method\n{when}"
-        return [Row(label, mesh, [reference], [window], full, NOTHING_RAN)]
+        return [Row(label, mesh, [reference], [window], full, camera, NOTHING_RAN)]
     return [
         Row(
             f"{experiment.title}\n{drawn.title(method)}\n{when}",
@@ -93,6 +105,7 @@ def experiment_rows(
             [reference, *panels],
             [window] * (len(panels) + 1),
             np.repeat(full, len(panels) + 1, axis=0),
+            camera,
         )
         for method, panels in reduced.items()
     ]
@@ -112,16 +125,12 @@ def draw_experiments(
     if not drawn.experiments or not drawn.methods:
         raise NothingToDraw(options.words())
     rows = [row for each in drawn.experiments for row in rows_of(options, drawn, runs, each)]
-    return draw_rows(rows, options.camera)
+    return draw_rows(rows)
 
 
 @figure(
     title="The bar, reduced",
-    caption=(
-        "Bars with tetrahedral constraints: full order against reduced projections, by basis "
-        "size. The grey outline is the full-order run at the same instant; a framed picture is "
-        "drawn to the smaller scale given below it."
-    ),
+    caption=f"Bars with tetrahedral constraints: {COMPARED}",
     reads=RUNS,
     options=ReducedRuns,
 )
@@ -168,11 +177,7 @@ def bending_runs(
 @figure(
     number=6,
     title="Springs only, reduced",
-    caption=(
-        "Sheets with edge springs only: full order against reduced projections, by basis size. "
-        "The grey outline is the full-order run at the same instant; a framed picture is drawn to "
-        "the smaller scale given below it."
-    ),
+    caption=f"Sheets with edge springs only: {COMPARED}",
     reads=RUNS,
     options=ReducedRuns,
 )
@@ -186,11 +191,7 @@ def spring_runs(
 @figure(
     number=7,
     title="Triangle strain only, reduced",
-    caption=(
-        "Sheets with triangle strain only: full order against reduced projections, by basis size. "
-        "The grey outline is the full-order run at the same instant; a framed picture is drawn to "
-        "the smaller scale given below it."
-    ),
+    caption=f"Sheets with triangle strain only: {COMPARED}",
     reads=RUNS,
     options=ReducedRuns,
 )
@@ -218,7 +219,7 @@ def noise_rows(
     table : rows of the table ``noise`` of this ``experiment``
     path : file of its ``runs`` on bases of round-off
     """
-    camera = options.camera
+    camera = options.camera(experiment)
     colour = style.surface_colour(drawn.looks[experiment.group][0])
     frames, full = runs.at(experiment, options.frames[-1:])
     mesh = runs.mesh(experiment)
@@ -246,6 +247,7 @@ def noise_rows(
                     [reference, *panels],
                     [shared_window(camera, full[0], panels)] * (len(panels) + 1),
                     np.repeat(full, len(panels) + 1, axis=0),
+                    camera,
                 )
             )
     return rows

@@ -76,7 +76,7 @@ def snapshots_and_modes(
     elements = element_map(experiment.group, mesh, snapshots.elements, source=str(path))
     centred = snapshots.train.reshape(len(snapshots.train), -1).T - basis.mean[:, None]
     frames, positions = positions_at(full_order[0].path, options.frames)
-    camera = options.camera
+    camera = options.camera(experiment)
     taken = [int(np.argmin(np.abs(snapshots.frames["train"] - (f - 1)))) for f in frames]
     moving = _same_size([window_of(camera, [q], 0.04) for q in positions])
     resting = fit_aspect(window_of(camera, [mesh.points], 0.05))

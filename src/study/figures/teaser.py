@@ -58,8 +58,8 @@ def teaser(
     for each in drawn.experiments:
         found = experiment_rows(options, drawn, runs, each)
         subspace = _subspace(options, runs, each, each.find(subspaces))
-        rows.append(_merged(drawn, each, found, trained(errors), subspace))
-    return draw_rows(rows, options.camera)
+        rows.append(_merged(drawn, each, found, trained(errors), subspace, len(options.ranks) or 1))
+    return draw_rows(rows)
 
 
 def _merged(
@@ -68,19 +68,24 @@ def _merged(
     rows: list[Row],
     errors: pd.DataFrame,
     subspace: RunPanel | None,
+    most: int,
 ) -> Row:
-    """Rows of an experiment as one, its panels named by their methods."""
+    """Rows of an experiment as one, its panels named by their methods, ``most`` of each."""
     scene, group, first = experiment.scene, experiment.group, rows[0]
     panels = first.panels[:1]
     if first.note is None:
         own = errors[(errors.scene == scene) & (errors.group == group)]
         for method, row in zip(drawn.methods, rows, strict=True):
             found = own[(own.method == method) & (own.position_basis == "full")]
-            panels += [_with_error(p, method, found, "r") for p in row.panels[1:]]
+            ran = [panel for panel in row.panels[1:] if panel.positions is not None]
+            # the largest sizes where the study has none of those that are chosen
+            sizes = (ran or row.panels[1:])[-most:]
+            panels += [_with_error(panel, method, found, "r") for panel in sizes]
     if subspace is not None:
         found = errors[(errors.scene == scene) & (errors.position_basis == "pod")]
         found = found[found.method == TOLERANCE]
         panels.append(_with_error(subspace, "ecsw", found, "k"))
+    panels = [replace(panel, obstacles=first.panels[0].obstacles) for panel in panels]
     label = f"{experiment.title}\n{first.label.splitlines()[-1]}"
     ghosts = np.repeat(first.ghosts[:1], len(panels), axis=0)
     windows = first.windows[:1] * len(panels)
@@ -98,18 +103,19 @@ def _with_error(panel: RunPanel, method: str, rows: pd.DataFrame, size: str) -> 
 def _subspace(
     options: Options, runs: Runs, experiment: Experiment, path: str | None
 ) -> RunPanel | None:
-    """Panel of the run with sampled elements; None where a configuration has none of that size."""
-    base = f"pod_k{options.modes:03d}"
+    """Panel of the run with sampled elements; None where a configuration has none that small."""
     if path is None:
         return None
-    title, colour = f"k = {options.modes}", style.surface_colour(style.GREEN)
+    colour = style.surface_colour(style.GREEN)
     (frame,), _ = runs.at(experiment, options.frames[-1:])
     with open_hdf5(path) as file:
-        run = file["models"].get(f"{base}_{TOLERANCE}")
-        if run is None:
+        models = file["models"]
+        sizes = [k for k in range(options.modes, 0, -1) if f"pod_k{k:03d}_{TOLERANCE}" in models]
+        if not sizes:
             return None
-        stored = run["train"]["coordinates"]
+        title, base = f"k = {sizes[0]}", f"pod_k{sizes[0]:03d}"
+        stored = models[f"{base}_{TOLERANCE}"]["train"]["coordinates"]
         if len(stored) <= frame:
             return RunPanel(title, colour, None, "blew up")
         positions = file["columns"][base]["B"][...] @ stored[frame]
-    return RunPanel(title, colour, positions).seen_by(options.camera)
+    return RunPanel(title, colour, positions).seen_by(options.camera(experiment))

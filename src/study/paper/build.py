@@ -28,7 +28,7 @@ from study.paper.source import DOCUMENTS, documents
 from study.paper.tex import build_pdfs
 from study.paper.textables import TEX_TABLES
 
-PAGES = {"main": 16, "supplement": 30}  # at most
+PAGES = {"main": 16, "supplement": 30}  # at most, of the paper
 
 
 class Facts(BaseModel):
@@ -37,6 +37,7 @@ class Facts(BaseModel):
     captions : titles and captions of the figures, as TeX, by name
     part : what the study was read from where it is not the full one, else None
     full_study : the configuration of the full study
+    pages : at most, by document
     tables : facts of the configuration (scenes, methods, study), as rows of tables
     """
 
@@ -45,6 +46,7 @@ class Facts(BaseModel):
     captions: dict[str, str]
     part: str | None
     full_study: str
+    pages: dict[str, int] = PAGES
     tables: dict[str, list[dict[str, Any]]]
 
 
@@ -137,7 +139,7 @@ def build(
         require_intact(path)
     folder = source[0].parent
     made = {folder / f"{name}.tex": Path(outputs[name]) for name in DOCUMENTS}
-    build_pdfs(made, sorted({path.parent for path in results}), PAGES)
+    build_pdfs(made, sorted({path.parent for path in (*source[:3], *results)}), facts.pages)
 
 
 _CITE = re.compile(r"\\cite\{([^}]*)\}")

@@ -1,4 +1,4 @@
-r"""The manuscript's source: two documents, the paper and its supplement, with a file a section."""
+r"""The manuscript's source: paper and supplement, a file a section; `OWN` is of other scenes."""
 
 import re
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 from pdrom.core.errors import PaperError
 
 DOCUMENTS = ("main", "supplement")
+OWN = "paper/own"
 _PART = re.compile(r"\\input\{((?:sections/|supplement/|preamble)[^{}]*\.tex)\}")
 
 
@@ -19,10 +20,10 @@ def whole_source(document: Path) -> str:
     """
 
     def part(match: re.Match[str]) -> str:
-        path = document.parent / match[1]
-        if not path.is_file():
-            raise PaperError(f"{document}: no file {path}")
-        return path.read_text(encoding="utf-8")
+        for folder in document.parents[:2]:  # the preamble of `OWN` is the paper's
+            if (path := folder / match[1]).is_file():
+                return path.read_text(encoding="utf-8")
+        raise PaperError(f"{document}: no file {document.parent / match[1]}")
 
     return _PART.sub(part, document.read_text(encoding="utf-8"))
 
@@ -38,10 +39,11 @@ def documents(folder: Path) -> dict[str, str]:
     return {name: whole_source(folder / f"{name}.tex") for name in DOCUMENTS}
 
 
-def source_files(root: Path) -> list[str]:
-    """Files of the source below ``root``, the documents first."""
+def source_files(root: Path, own: bool = False) -> list[str]:
+    """Files of the source below ``root``, documents and preamble first; or those of `OWN`."""
     folder = root / "paper"
-    files = [folder / f"{name}.tex" for name in (*DOCUMENTS, "preamble")]
-    for below in ("sections", "supplement"):
+    files = [(root / OWN if own else folder) / f"{name}.tex" for name in DOCUMENTS]
+    files.append(folder / "preamble.tex")
+    for below in () if own else ("sections", "supplement"):
         files += sorted((folder / below).glob("*.tex"))
     return [path.relative_to(root).as_posix() for path in files]

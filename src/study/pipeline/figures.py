@@ -24,11 +24,17 @@ class Run(Experiment):
 
 
 def options(study: Study, labels: Labels) -> Options:
-    """Options of the figure of ``labels`` with the scenes that ``study`` holds, or with all."""
+    """Options of the figure of ``labels`` with the scenes that ``study`` holds.
+
+    A list of scenes, methods or groups of which it holds none becomes empty, which means all.
+    """
     chosen = study.figures[labels["figure"]]
-    named = chosen.names("scenes")
-    held = tuple(scene for scene in named if scene in study.scenes)
-    return chosen.model_copy(update={"scenes": held}) if named else chosen
+    held = {"methods": study.methods, "groups": {group for _, group in study.experiments}}
+    lost = [key for key, names in held.items() if {*chosen.names(key)}.isdisjoint(names)]
+    update: dict[str, tuple[str, ...]] = {key: () for key in lost if chosen.names(key)}
+    if scenes := chosen.names("scenes"):
+        update["scenes"] = tuple(scene for scene in scenes if scene in study.scenes)
+    return chosen.model_copy(update=update)
 
 
 def experiments(study: Study, labels: Labels) -> tuple[Experiment, ...]:
@@ -40,7 +46,11 @@ def experiments(study: Study, labels: Labels) -> tuple[Experiment, ...]:
         reduced = tuple(config.reduce)
         found += [
             Experiment(
-                scene=scene, group=group, mesh=config.mesh.identifier, only=len(reduced) == 1
+                scene=scene,
+                group=group,
+                mesh=config.mesh.identifier,
+                effects=config.effects,
+                only=len(reduced) == 1,
             )
             for group in chosen.names("groups") or reduced
             if group in reduced

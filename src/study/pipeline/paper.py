@@ -8,7 +8,7 @@ from pdrom.model.constraints.base import GroupConfig
 from pdrom.view.text import require_typeset
 from study.artifact.markup import to_tex
 from study.figures.kit.declaration import declarations
-from study.paper.build import Facts
+from study.paper.build import PAGES, Facts
 from study.paper.source import source_files
 from study.pipeline.folders import DEFAULT
 from study.pipeline.study import Study
@@ -27,17 +27,19 @@ class Manuscript:
 
 def manuscript(study: Study, labels: Labels) -> Manuscript:
     """Files of the manuscript's source below the root of ``study``."""
-    return Manuscript(source_files(study.root))
+    return Manuscript(source_files(study.root, study.is_own))
 
 
 def facts(study: Study, labels: Labels) -> Facts:
-    """Facts that the manuscript states beside results of ``study``."""
+    """Facts that the manuscript states beside results of ``study``; one of its own is no part."""
+    own = study.is_own
     return Facts(
         captions={
             name: _caption(*each.words(study.value)) for name, each in declarations().items()
         },
-        part=None if study.is_full else study.configuration,
-        full_study=DEFAULT,
+        part=None if study.is_full or own else study.configuration,
+        full_study=study.configuration if own else DEFAULT,
+        pages={} if own else PAGES,
         tables={
             "study": [_study(study)],
             "methods": [

@@ -190,10 +190,19 @@ class Study:
         return single
 
     @cached_property
+    def _full(self) -> StudySettings:
+        path = self.root / DEFAULT
+        return validate(StudySettings, read_yaml(path), str(path))
+
+    @property
     def is_full(self) -> bool:
         """Whether it has the settings of config/default.yaml."""
-        path = self.root / DEFAULT
-        return self.settings == validate(StudySettings, read_yaml(path), str(path))
+        return self.settings == self._full
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it has none of the scenes of config/default.yaml."""
+        return not {*self.settings.scenes} & {*self._full.scenes}
 
     @property
     def apart(self) -> str:

@@ -1,20 +1,81 @@
 """Command line of ``./reproduce verify``."""
 
 import argparse
-from collections.abc import Sequence
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 
-from pdrom.core.errors import ConfigurationError
-from pdrom.core.store import write_text
+import pandas as pd
+
+from pdrom.core.errors import ConfigurationError, StorageError
+from pdrom.core.machine import machine
+from pdrom.core.store import Condition, check_file, read_table, write_text
 from study.article.verified import INDEX, write_verified
-from study.artifact.paths import ARTICLE
+from study.artifact.paths import ARTICLE, TABLE
+from study.tables import declared
 from study.verification.examine import Examination
 from study.verification.files import verify_files
 from study.verification.lines import Line, counted, page, status_of
-from study.verification.references import LOG, folder_of
+from study.verification.references import LOG, folder_of, note, write_reference
 from study.verification.status import Status, say
 from study.verification.subject import Subject
-from study.verification.update import update
+
+NOTHING = "Nothing to be done"
+
+
+def update(subject: Subject, reason: str) -> Path:
+    """Write the expected tables of ``subject`` again, for a ``reason``; the folder that holds them.
+
+    Raises
+    ------
+    ConfigurationError
+        No reason is given.
+    StorageError
+        A table is missing, damaged, or older than what it is made from: nothing is written.
+    """
+    words = " ".join(reason.split())
+    if not words:
+        raise ConfigurationError('verify --update: say why, as in --reason "a new method"')
+    paths = {name: TABLE.at(subject.results, name=name) for name in declared()}
+    for name, path in paths.items():
+        if not Path(path).is_file():
+            raise StorageError(f"{path}: not there; make it by {subject.command(name)}")
+        if check_file(path) is not Condition.INTACT:
+            raise StorageError(f"{path}: damaged; delete it and run {subject.command(name)}")
+    _require_new(subject)
+    frames = {name: declared()[name].checked(read_table(path)) for name, path in paths.items()}
+    return write(subject.results, frames, words)
+
+
+def write(results: str, frames: Mapping[str, pd.DataFrame], reason: str) -> Path:
+    """Write the expected form of ``frames`` of ``results`` and a line with the ``reason``."""
+    folder = folder_of(results)
+    for name, frame in frames.items():
+        write_reference(declared()[name], frame, folder)
+    for path in [*folder.glob("*.csv"), *folder.glob("*.csv.xz")]:
+        if path.name.partition(".")[0] not in frames:
+            path.unlink()  # a table that no longer exists
+    here = machine()
+    code = f"{here.pdrom} ({here.commit})"
+    note(folder, reason, datetime.now(UTC).date(), code)
+    return folder
+
+
+def _require_new(subject: Subject) -> None:
+    """StorageError if a run would make one of the tables again."""
+    command = [sys.executable, "-m", "study.pipeline.front", "-n", *subject.options, "--"]
+    done = subprocess.run([*command, *declared()], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        last = (done.stderr.strip().splitlines() or ["no word"])[-1]
+        raise StorageError(f"verify --update: the run cannot be planned: {last}")
+    if NOTHING not in done.stdout + done.stderr:
+        raise StorageError(
+            f"verify --update: tables are older than what they are made from; run "
+            f"{subject.command()} first"
+        )
+
 
 CODES = "exit codes: 0 all holds; 1 faulty input; 2 not understood; 3 differs; 4 not there"
 PAGE = "verification.md"

@@ -8,9 +8,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.effects import EFFECTS
+from pdrom.model.effects.base import EffectConfigs
 from pdrom.view import style
 from pdrom.view.artists import Line2D
-from pdrom.view.camera import Camera
+from pdrom.view.camera import Camera, up_of
 from pdrom.view.text import plain_words
 from study.artifact.paths import File
 
@@ -28,7 +29,7 @@ class Options(ConfigModel):
     """A figure without a choice; the others add keys.
 
     Whatever a configuration does not hold is left out of the picture. An empty list of names means
-    all there is, as does a list of which a configuration holds no scene.
+    all there is, as does a list of which a configuration holds nothing.
     """
 
     def names(self, key: str) -> Names:
@@ -80,15 +81,14 @@ class Instants(Options):
 
 
 class View(Options):
-    """Camera, degrees; y points up."""
+    """Camera, degrees; up is against the gravity of a scene."""
 
     azimuth: Annotated[float, Field(ge=-180.0, le=180.0)] = 30.0
     elevation: Annotated[float, Field(ge=-90.0, le=90.0)] = 20.0
 
-    @property
-    def camera(self) -> Camera:
-        """The camera."""
-        return Camera(self.azimuth, self.elevation)
+    def camera(self, experiment: "Experiment") -> Camera:
+        """Camera for the scene of an experiment."""
+        return Camera(self.azimuth, self.elevation, tuple(up_of(experiment.effects).tolist()))
 
 
 class Columns(Options):
@@ -130,19 +130,20 @@ class _Plain(BaseModel):
 class Experiment(_Plain):
     """A constraint group that is reduced in a scene.
 
-    mesh : identifier of the scene's mesh
+    mesh, effects : identifier of the scene's mesh, and all of its effects
     only : whether the scene reduces no other group
     """
 
     scene: str
     group: str
     mesh: str
+    effects: EffectConfigs
     only: bool
 
     @property
     def modules(self) -> tuple[str, ...]:
-        """Code of the group, which says where its elements lie."""
-        return (EFFECTS[self.group],)
+        """Code of the effects: a group says where its elements lie, an obstacle how it looks."""
+        return tuple(sorted({EFFECTS[effect.effect] for effect in self.effects}))
 
     @property
     def labels(self) -> dict[str, str]:

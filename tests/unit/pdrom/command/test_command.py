@@ -24,7 +24,7 @@ from pdrom.core.store.atomic import MARK
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.view.page import up_of
+from pdrom.view.camera import up_of
 
 
 @pytest.fixture

@@ -21,8 +21,8 @@ from pdrom.core.errors import StorageError
 from pdrom.core.store.checksum import write_block
 from pdrom.model.effects.forces import Gravity
 from pdrom.model.effects.obstacle import Sphere
+from pdrom.view.camera import rotation_to
 from pdrom.view.frames import write_frames
-from pdrom.view.page import rotation_to
 
 
 @pytest.fixture(scope="module")

@@ -20,17 +20,8 @@ from pdrom.core.packed import LEVELS, pack_positions
 from pdrom.model.effects.base import effect_config
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.view import page as writer
-from pdrom.view.page import (
-    EYE,
-    FRAMES,
-    ViewedRun,
-    ViewedScene,
-    Y,
-    pack_scene,
-    rotation_to,
-    shown_region,
-    write_page,
-)
+from pdrom.view.camera import Y, rotation_to, shown_region
+from pdrom.view.page import EYE, FRAMES, ViewedRun, ViewedScene, pack_scene, write_page
 
 
 def unpack_positions(packed: dict[str, Any]) -> np.ndarray:

@@ -61,13 +61,14 @@ def test_files_follow_the_configuration(small_study):
 
 
 @pytest.mark.parametrize("name", ["bar_runs", "spring_runs", "teaser", "local_share", "ladder"])
-def test_a_list_of_which_a_study_holds_no_scene_means_all_of_its_scenes(small_study, name):
-    invented = small_study(["strain_twist"], ["deim-joint"])
+def test_a_list_of_which_a_study_holds_nothing_means_all_that_it_holds(small_study, name):
+    invented = small_study(["strain_twist"], ["pod"])
     assert "strain_twist" not in invented.study.figures[name].scenes
     settings = invented.job(name).settings
     assert settings["options"]["scenes"] == []
     if "drawn" in settings:
         assert [each["scene"] for each in settings["drawn"]["experiments"]] == ["strain_twist"]
+        assert [*settings["drawn"]["reductions"]] == ["pod"]
 
 
 def test_figures_of_one_experiment_read_one_experiment(study):

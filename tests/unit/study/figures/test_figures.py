@@ -20,6 +20,8 @@ from matplotlib.figure import Figure
 from pdrom.core.errors import StorageError
 from pdrom.core.store import checksum_path, write_hdf5
 from pdrom.core.store.checksum import write_block
+from pdrom.model.effects.forces import Gravity
+from pdrom.model.effects.obstacle import Sphere
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import save_mesh
 from pdrom.view.multiples import log_axes
@@ -27,6 +29,7 @@ from pdrom.view.style import new_figure, note
 from study.artifact.paths import MESH, RERUNS, SUBSPACES
 from study.figures.kit.declaration import declarations, write_figure
 from study.figures.requested_tolerances import dots
+from study.figures.runs import obstacles_of
 from study.pipeline.study import Study
 
 from .conftest import BLOWN_UP, BLOWUP_FRAME, FRAMES, ROOT, SCENES, mesh_of
@@ -230,15 +233,39 @@ def test_experiments_of_round_off_only(round_off_only, figure_name):
         assert texts(round_off_only.draw(figure_name, scenes=("bend_fall",)))
 
 
-@pytest.mark.parametrize(("ran", "shown"), [(FRAMES, "ecsw, k = 20"), (2, "blew up")])
-def test_the_teaser_shows_a_sampled_subspace_as_far_as_it_ran(small_study, ran, shown):
+def test_the_teaser_shows_the_largest_size_where_a_study_has_none_that_is_chosen(study):
+    titles = [ax.get_title() for ax in study.draw("teaser", ranks=(3,)).axes]
+    chosen = ["deim-joint, r = 14", "deim, r = 14", "block-deim, r = 14"]
+    assert titles[:4] == ["full order", *chosen]
+    assert max(map(len, titles)) < 20
+
+
+def test_figures_are_upright_and_have_the_obstacles_that_the_scene_lists(study):
+    """A floor alone has a shadow; of a scene without one none is drawn."""
+    read = study.read("bar_runs", scenes=("bar_release",))
+    (each,), full = read["drawn"].experiments, mesh_of("bar_release").points[None]
+    gravity = Gravity.Config(acceleration=(0.0, 0.0, -9.81))
+    ball = Sphere.Config(centre=(0.0, 0.0, -0.3), radius=0.2)
+    turned = each.model_copy(update={"effects": (gravity, ball)})
+    assert read["options"].camera(each).up == (0.0, 1.0, 0.0)
+    assert read["options"].camera(turned).up == (0.0, 0.0, 1.0)
+    assert obstacles_of(each, full) is None
+    assert [len(b.points) > 4 for b in obstacles_of(turned, full)] == [True]
+    assert obstacles_of(each.model_copy(update={"effects": (gravity,)}), full) == []
+
+
+@pytest.mark.parametrize(
+    ("k", "ran", "shown"),
+    [(20, FRAMES, "ecsw, k = 20"), (9, FRAMES, "ecsw, k = 9"), (20, 2, "blew up")],
+)
+def test_the_teaser_shows_a_sampled_subspace_as_far_as_it_ran(small_study, k, ran, shown):
     study = small_study(["bar_release"], ["pod"])
     assert not any("ecsw" in text for text in texts(study.draw("teaser", methods=("pod",))))
     points = mesh_of("bar_release").points
     study.study = Study.load(study.settings | {"subspace": {}}, ROOT)
     with write_hdf5(study.path(SUBSPACES, "bar_release")) as file:
-        file["columns/pod_k020/B"] = np.eye(len(points))
-        model = file.create_group("models/pod_k020_ecsw-1e-02")
+        file[f"columns/pod_k{k:03d}/B"] = np.eye(len(points))
+        model = file.create_group(f"models/pod_k{k:03d}_ecsw-1e-02")
         model["train/coordinates"] = np.repeat(points[None], ran + 1, axis=0)
     assert any(shown in text for text in texts(study.draw("teaser", methods=("pod",))))
 

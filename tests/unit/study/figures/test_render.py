@@ -40,16 +40,17 @@ from study.figures.kit.elements import element_map, magnitudes, signed_entry
 
 from .conftest import BLOWN_UP, BLOWUP_FRAME
 
-CAMERAS = [Camera(), Camera(0.0, 0.0), Camera(-120.0, 60.0), Camera(90.0, -30.0)]
+CAMERAS = [Camera(), Camera(0.0, 0.0), Camera(-120.0, 60.0), Camera(90.0, -30.0),
+           Camera(up=(0.0, 0.0, 1.0))]  # fmt: skip
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-def test_camera_is_a_rotation_with_y_up(camera):
+def test_camera_is_a_rotation_with_its_direction_up(camera):
     assert np.allclose(camera.basis @ camera.basis.T, np.eye(3))
     assert np.linalg.det(camera.basis) == pytest.approx(1.0)
-    x, y = camera.project(np.array([[0.0, 1.0, 0.0]]))[0]
+    x, y = camera.project(np.array([camera.up]))[0]
     assert x == pytest.approx(0.0)
-    assert y > 0.0
+    assert y == pytest.approx(np.cos(np.radians(camera.elevation)))
 
 
 def test_front_camera_sees_x_right_and_z_near():

@@ -19,6 +19,7 @@ from study.tables import declared
 SOURCES = documents(ROOT / "paper")
 PAPER = SOURCES["main"]
 SOURCE = "".join(SOURCES.values())
+OWN = documents(ROOT / "paper" / "own")
 
 # What may hold digits without stating a result: mathematics, keys, lengths, names of claims.
 _NOT_PROSE = [
@@ -62,7 +63,32 @@ def typed_numbers(source: str) -> list[str]:
 
 @pytest.mark.parametrize("document", SOURCES)
 def test_no_result_is_typed(document):
-    assert typed_numbers(SOURCES[document]) == []
+    assert typed_numbers(SOURCES[document]) == typed_numbers(OWN[document]) == []
+
+
+def test_the_text_of_other_scenes_speaks_of_what_it_shows_and_of_no_claim():
+    source = "".join(text.partition(r"\title")[2] for text in OWN.values())
+    assert re.findall(r"verdict|claim|preprint|replication|ifpart", source) == []
+    figures = set(re.findall(r"(?:figureof\{|keepaspectratio\]\{)(\w+)", source))
+    tables = set(re.findall(r"(?:label\{|\}\{)tab:(\w+)\}", source))
+    assert set(re.findall(r"\\ref\{fig:(\w+)\}", source)) <= figures <= set(declarations())
+    assert set(re.findall(r"\\ref\{tab:(\w+)\}", source)) == tables != set()
+    for text in OWN.values():
+        assert r"\bibitem" in bibliography(text, ROOT / "paper" / "references.bib")
+        for key in keys_of(text):
+            assert key.split("|")[0] in ("study", "scenes", "methods", "machine")
+
+
+def test_a_study_of_other_scenes_has_its_own_text():
+    settings = read_yaml(ROOT / "config" / "default.yaml")
+    changes = {"scenes": ["ball_shell"], "noise": {"cases": {}}}
+    study = Study.load({**settings, **changes}, ROOT, configuration="config/mine.yaml")
+    made = Plan(study).job(paper)
+    facts = made.settings["facts"]
+    assert (facts["part"], facts["full_study"], facts["pages"]) == (None, "config/mine.yaml", {})
+    assert made.inputs["source"][:2] == ["paper/own/main.tex", "paper/own/supplement.tex"]
+    of_default = Plan(Study.load(settings, ROOT)).job(paper)
+    assert of_default.inputs["source"][:2] == ["paper/main.tex", "paper/supplement.tex"]
 
 
 @pytest.mark.parametrize(

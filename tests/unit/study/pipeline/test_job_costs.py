@@ -13,7 +13,7 @@ from pdrom.core.store import write_table
 from places import ROOT
 from study.artifact.usage import Usage
 from study.experiments.kit.declaration import experiments
-from study.pipeline.expectation import RUN_TIMES, expected_seconds, units_of
+from study.pipeline.run import RUN_TIMES, expected_seconds, units_of
 from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import minutes
 from study.pipeline.tracked import COLUMNS, COSTS, main, measured_costs, recorded_verdicts

@@ -10,8 +10,8 @@ from places import ROOT
 from study.artifact import paths
 from study.experiments.kit.declaration import experiments
 from study.pipeline.contents import labels_of
+from study.pipeline.plan import check_live, check_subspaces
 from study.pipeline.study import Study
-from study.pipeline.subspace_scenes import check_live, check_subspaces
 
 # What only a position subspace has.
 INSIDE = (
@@ -83,7 +83,7 @@ def test_where_a_subspace_is_asked_for_the_scene_is_refused(root, key, section):
     [
         ({"anderson_window": 3}, "anderson_window = 3: the page's engine has no acceleration"),
         ({"effects": [{"effect": "bending", "weight": 1.0}], "reduce": {}}, "has no 'bending'"),
-        ({"mesh": {"kind": "cloth", "rows": 150, "columns": 150}}, r"10.8 MB .* allowed are 3.0"),
+        ({"mesh": {"kind": "cloth", "rows": 150, "columns": 150}}, r"7.9 MB .* allowed are 3.0"),
     ],
 )
 def test_a_scene_that_the_page_cannot_hold_is_refused_by_the_plan(root, changes, words):

@@ -9,6 +9,7 @@ from pdrom.core.errors import ConfigurationError, StorageError
 from places import ROOT
 from study.tables import declared
 from study.verification import references
+from study.verification.command import update
 from study.verification.compare import NOT_COMPARED
 from study.verification.references import (
     compact,
@@ -18,7 +19,6 @@ from study.verification.references import (
     write_reference,
 )
 from study.verification.subject import Subject
-from study.verification.update import update
 
 TABLE = declared()["reduced_reruns"]
 LIMIT = 1_250_000  # bytes

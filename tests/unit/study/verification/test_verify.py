@@ -17,11 +17,10 @@ from study.artifact.paths import ARTICLE, TABLE
 from study.figures.kit.declaration import declarations
 from study.tables import declared
 from study.verification.again import made
-from study.verification.command import parser, verify, verify_tables
+from study.verification.command import NOTHING, parser, update, verify, verify_tables
 from study.verification.lines import Line, Outcome, status_of
 from study.verification.references import LOG, folder_of
 from study.verification.status import Status
-from study.verification.update import NOTHING, update
 
 RESULTS = "results/studies/tiny"
 CLAIMS = ("claims", "claims_tests", "claims_sensitivity")
