@@ -139,7 +139,7 @@ class Sandbox:
     def temporaries(self) -> list[Path]:
         """Files of the results that have not got their names yet."""
         files = [p for p in self.path("results").rglob(".*") if p.is_file()]
-        return [p for p in files if re.search(r"\.[0-9a-f]{12}(\.|$)", p.name)]
+        return [p for p in files if re.search(r"\.[0-9a-f]{16}(\.|$)", p.name)]
 
 
 def _cksum(content: bytes) -> str:

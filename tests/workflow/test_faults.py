@@ -111,7 +111,7 @@ def test_a_job_that_is_killed_in_any_rule(
     (output,) = sandbox.folder.glob(RULES[rule])
     target = str(output.relative_to(sandbox.folder))
     output.unlink()
-    status, said = sandbox.run(target, fault=f"kill:/\\.{re.escape(output.stem)}\\.[0-9a-f]{{12}}")
+    status, said = sandbox.run(target, fault=f"kill:/\\.{re.escape(output.stem)}\\.[0-9a-f]{{16}}")
     assert status != 0
     assert re.search(rf"job {rule} failed while making \S+: killed \(SIGKILL\)", last_lines(said))
     heals(sandbox, finished_study, target)
@@ -243,9 +243,9 @@ def test_a_full_disk(undisturbed: Sandbox, fresh: Sandbox, mount: Callable[..., 
     heals(fresh, undisturbed)
 
 
-def files_of_20_kb() -> None:
-    """As by a quota; no mount is needed."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+def files_of_32_kb() -> None:
+    """As by a quota; no mount is needed. The script of the job is smaller, the run is not."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (32_000, 32_000))
 
 
 @slow
@@ -254,7 +254,7 @@ def files_of_20_kb() -> None:
     [
         # the system call of the job reports that there is no space
         (TABLE, {"fault": "full:reconstruction_error"}, "No space left"),
-        (RUN, {"preexec_fn": files_of_20_kb}, "File too large"),
+        (RUN, {"preexec_fn": files_of_32_kb}, "File too large"),
     ],
 )
 def test_a_write_that_fails(
