@@ -14,11 +14,11 @@ labels of a job (scene, group ...) are those of the paths that it writes.
 """
 
 import inspect
-import pkgutil
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import import_module
+from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
 from pydantic import BaseModel, TypeAdapter
@@ -177,11 +177,18 @@ def load(address: str) -> Artifact:
 
 @cache
 def declared_in(package: str, kind: type[A]) -> dict[str, A]:
-    """Return the artifacts of a kind that modules of a package declare, by name, sorted."""
-    found = {}
-    for info in pkgutil.walk_packages(import_module(package).__path__, f"{package}."):
-        for value in vars(import_module(info.name)).values():
-            if isinstance(value, kind) and value.module == info.name:
+    """Return the artifacts of a kind that modules of a package declare, by name, sorted.
+
+    Only modules that import something from that of the kind can declare one: no other is imported.
+    """
+    root, found = Path(import_module(package).__path__[0]), {}
+    for path in root.rglob("*.py"):
+        if f"\nfrom {kind.__module__} import " not in path.read_text(encoding="utf-8"):
+            continue
+        name = ".".join((package, *path.relative_to(root).with_suffix("").parts))
+        module = import_module(name.removesuffix(".__init__"))
+        for value in vars(module).values():
+            if isinstance(value, kind) and value.module == module.__name__:
                 found[value.name] = value
     return dict(sorted(found.items()))
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model import constraints
 from pdrom.model.effects import EFFECTS
 from study.artifact.paths import SUBSPACES
 from study.figures.kit.options import Experiment, Options, Reduction
@@ -83,7 +83,7 @@ def drawn_subspaces(study: Study, labels: Labels) -> tuple[Experiment, ...]:
 
 def groups(study: Study, labels: Labels) -> tuple[str, ...]:
     """Names of all constraint groups."""
-    return tuple(name for name in EFFECTS if issubclass(EFFECTS.load(name), ConstraintGroup))
+    return tuple(name for name in EFFECTS if EFFECTS[name].startswith(constraints.__name__))
 
 
 DERIVED = {

@@ -162,11 +162,11 @@ def _text(code: CodeType) -> str:
 
 def _instructions(code: bytes) -> bytes:
     """Instructions of two bytes; one that does nothing stands for a docstring."""
-    nothing = opmap["NOP"]
-    if nothing not in code[::2]:
-        return code
-    pairs = zip(code[::2], code[1::2], strict=True)
-    return bytes(byte for pair in pairs if pair[0] != nothing for byte in pair)
+    operations, parts, start = code[::2], [], 0
+    while (place := operations.find(opmap["NOP"], start)) >= 0:
+        parts.append(code[2 * start : 2 * place])
+        start = place + 1
+    return b"".join([*parts, code[2 * start :]])
 
 
 def _constant(value: object) -> object:

@@ -4,8 +4,6 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
-from scipy.interpolate import PchipInterpolator
-from scipy.spatial.transform import Rotation
 
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.effects.base import Vector
@@ -78,6 +76,9 @@ class Keyframes(Hold):
         self._smooth = config.interpolation == "smooth"
 
     def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
+        from scipy.interpolate import PchipInterpolator
+        from scipy.spatial.transform import Rotation
+
         time = min(frame + 1 - self.config.start, self._times[-1])
         if self._smooth:
             pose = PchipInterpolator(self._times, self._poses)(time)

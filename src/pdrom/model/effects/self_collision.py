@@ -5,7 +5,6 @@ from typing import Annotated, Literal
 import numpy as np
 from numba import njit
 from pydantic import Field
-from scipy.spatial import cKDTree
 
 from pdrom.model.effects.base import Contact, EffectConfig
 from pdrom.model.mesh.types import MAX_LENGTH, MIN_LENGTH, Mesh
@@ -82,6 +81,8 @@ class SelfCollision(Contact):
         """Pairs (n, 2) that are close now and were not at rest, in lexicographic order."""
         if not np.isfinite(positions).all():
             return np.empty((0, 2), dtype=np.int64)
+        from scipy.spatial import cKDTree
+
         close = cKDTree(positions).query_pairs(REACH * self._thickness, output_type="ndarray")
         apart = np.linalg.norm(self._rest[close[:, 0]] - self._rest[close[:, 1]], axis=1)
         close = close[apart > self._thickness].astype(np.int64)
