@@ -13,8 +13,8 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 41_967,
-    "modules of src": 279,
+    "lines of src": 41_966,
+    "modules of src": 278,
     "lines of tests": 28_504,
     "words of documentation": 24_744,
     "tables": 25,

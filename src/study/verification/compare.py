@@ -10,8 +10,7 @@ import pandas as pd
 
 from study.artifact.reads import ProjectFile
 from study.tables.kit.declaration import Column, Quantity, Table
-from study.verification.pairing import pairs
-from study.verification.rows import RUN, Context, names, of_fitted_samples, of_wrong_runs
+from study.verification.rows import RUN, Context, names, of_fitted_samples, of_wrong_runs, pairs
 
 # Differences below it count for nothing: rounding errors of sums.
 FLOOR = 1e-12

@@ -18,9 +18,8 @@ from study.verification.again import is_derived, made
 from study.verification.compare import Comparison
 from study.verification.judge import Judgement, in_words, judge
 from study.verification.lines import Line, Outcome, table_line
-from study.verification.pairing import names_row
 from study.verification.references import Reference, folder_of, kept, read_reference
-from study.verification.rows import RUNS, Context
+from study.verification.rows import RUNS, Context, names_row
 from study.verification.subject import Subject
 
 RULES = Path("config/claims.yaml")

@@ -9,8 +9,7 @@ import pandas as pd
 
 from study.tables.kit.declaration import Column, Table
 from study.verification.compare import Comparison
-from study.verification.pairing import names_row
-from study.verification.rows import SAMPLES, names
+from study.verification.rows import SAMPLES, names, names_row
 
 # Columns of a row that say which one it is.
 NAMED = 6

@@ -12,9 +12,8 @@ from study.tables import declared
 from study.tables.kit.declaration import QUANTITIES, TALLY, TOLERANCES
 from study.verification.compare import FITTED, NOT_COMPARED, Comparison
 from study.verification.judge import LEAST, judge
-from study.verification.pairing import names_row
 from study.verification.references import read_reference
-from study.verification.rows import OF_RUNS, RUN, Context, names, of_fitted_samples
+from study.verification.rows import OF_RUNS, RUN, Context, names, names_row, of_fitted_samples
 
 FOLDERS = [ROOT / "results/reference/tables", ROOT / "results/reference/studies/tiny/tables"]
 ROWS = 6
