@@ -135,7 +135,7 @@ def plan_says(monkeypatch, code: int, words: str) -> None:
     """In place of Snakemake, which would plan the tables: its exit code and ``words``."""
     done = CompletedProcess([], code, words, "")
     run = SimpleNamespace(run=lambda *_, **__: done)
-    monkeypatch.setattr("study.verification.update.subprocess", run)
+    monkeypatch.setattr("study.verification.command.subprocess", run)
 
 
 def test_an_update_writes_every_table_and_notes_the_reason(results, subject, monkeypatch):

@@ -106,13 +106,9 @@ def test_a_part_of_a_group_stands_for_all_and_grows_where_it_misses(
     monkeypatch.setattr(ecsw, "CANDIDATES", candidates)
     ((elements, factors),) = ecsw_elements(group, columns, training, [tolerance])
     assert number or len(elements) > candidates
+    assert len(np.unique(elements)) == len(elements)
     left = rows[:, elements] @ factors - total
     assert np.linalg.norm(left) <= tolerance * np.linalg.norm(total) * (1.0 if number else 1.01)
-
-
-def test_an_element_is_a_candidate_once():
-    drawn = ecsw._eligible(100, 60)
-    assert len(np.unique(drawn)) == len(drawn) == 60
 
 
 def test_factors_of_one_repeat_the_iterations(pulled):
