@@ -13,8 +13,8 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 41_966,
-    "modules of src": 278,
+    "lines of src": 41_964,
+    "modules of src": 277,
     "lines of tests": 28_504,
     "words of documentation": 24_744,
     "tables": 25,

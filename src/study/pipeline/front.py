@@ -27,7 +27,7 @@ LINES = ("--logger", "pdrom")
 # First arguments that hand the others on, with the modules that get them.
 HANDED_ON = {
     "test": "pytest",
-    "verify": "study.verification",
+    "verify": "study.verification.command",
     "bundle": "study.verification.bundle",
 }
 

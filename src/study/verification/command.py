@@ -19,7 +19,7 @@ from study.verification.examine import Examination
 from study.verification.files import verify_files
 from study.verification.lines import Line, counted, page, status_of
 from study.verification.references import LOG, folder_of, note, write_reference
-from study.verification.status import Status, say
+from study.verification.status import Status, ended, say
 from study.verification.subject import Subject
 
 NOTHING = "Nothing to be done"
@@ -155,3 +155,7 @@ def _about(subject: Subject, folder: Path) -> list[str]:
         f"Results in `{subject.results}`, expected ones in `{folder}` (`{LOG}` says why).",
         "What is compared, and what the outcomes mean, is in `docs/verification.md`.",
     ]
+
+
+if __name__ == "__main__":
+    sys.exit(ended(lambda: verify(sys.argv[1:])))

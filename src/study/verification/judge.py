@@ -15,9 +15,10 @@ from study.verification.rows import SAMPLES, names, names_row
 NAMED = 6
 # So many cells of a column are far closer than the tolerance of one: nine of ten errors, half of
 # less than `TEN` and of other quantities, from `LEAST` cells on. Closer means this distance, or
-# that part of the tolerance which a column has of its own.
+# that part of the tolerance which a column has of its own. Fewer cells are each closer than `LONE`,
+# where the column has no tolerance of its own.
 MOST, HALF, TEN, LEAST = 0.9, 0.5, 10, 3
-CLOSE, OWN = 1e-5, 50
+CLOSE, OWN, LONE = 1e-5, 50, 0.01
 # Of cells that rounding decides about, a tenth may have another outcome or another order of
 # magnitude, and half may be off by more than a factor of two; and by what they are counted.
 LOOSE = (
@@ -113,11 +114,13 @@ def _shifted(comparison: Comparison, column: Column, firm: np.ndarray) -> Iterat
     """A small shift of all cells is noticed although one may be off by more."""
     there = (comparison.e[column.name].fillna(0) != 0).to_numpy(dtype=bool)
     cells = firm & there & comparison.compared(column)
-    if cells.sum() < LEAST:
+    own, count = column.tolerance, cells.sum()
+    if not count or (own is not None and count < LEAST):
         return
-    own = column.tolerance
-    strict = column.quantity == "error" and own is None and cells.sum() >= TEN
+    strict = column.quantity == "error" and own is None and count >= TEN
     share, close = MOST if strict else HALF, CLOSE if own is None else own / OWN
+    if count < LEAST:
+        share, close = 1.0, LONE
     size = float(np.quantile(comparison.apart(column)[cells], share))
     if size > close:
         words = f"a share of {share:g} of the cells within {close:g}", f"within {size:.2g}"
