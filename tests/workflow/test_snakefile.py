@@ -211,7 +211,8 @@ def test_no_text_and_no_date_reruns_anything(finished: Checkout) -> None:
 
 
 def test_the_edited_script_reruns_every_job(finished: Checkout, plan: dict[str, Made]) -> None:
-    finished.edit("workflow/scripts/artifact.py", "code=snakemake", "code='' or snakemake")
+    old, new = "code=snakemake.params.code", "code=str(snakemake.params.code)"
+    finished.edit("workflow/scripts/artifact.py", old, new)
     wanted = [needed(plan, target) for target in (MICRO_MANUSCRIPT, PAGE, ARTICLE)]
     assert finished.planned(*MICRO_ARGUMENTS) == set[str]().union(*wanted)
 
