@@ -19,7 +19,7 @@ TOUCH = (
     "--touch",
 )
 DOCUMENTS = ("paper/main.tex", "paper/supplement.tex", "paper/preamble.tex")
-PAPER = (*DOCUMENTS, "paper/sections", "paper/supplement", "paper/references.bib")
+PAPER = (*DOCUMENTS, "paper/own", "paper/sections", "paper/supplement", "paper/references.bib")
 PARTS = ("Snakefile", "config", *PAPER, "src", "workflow")
 
 

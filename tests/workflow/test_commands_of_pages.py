@@ -69,8 +69,8 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
     for name in yaml.safe_load(study)["scenes"]:
         own = scene.replace("my_sheet", name)
         (config / "scenes" / f"{name}.yaml").write_text(own, encoding="utf-8")
-    mesh = made.folder / yaml.safe_load(scene)["mesh"]["path"]
-    mesh.parent.mkdir()
+    mesh = config / "scenes" / yaml.safe_load(scene)["mesh"]["path"]
+    mesh.parent.mkdir(exist_ok=True)
     sheet(mesh)
     shutil.copy(ROOT / "CITATION.cff", made.folder)
     return made
