@@ -13,9 +13,9 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 41_964,
+    "lines of src": 41_855,
     "modules of src": 277,
-    "lines of tests": 28_504,
+    "lines of tests": 28_458,
     "words of documentation": 24_744,
     "tables": 25,
     "figures": 23,

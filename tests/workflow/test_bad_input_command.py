@@ -34,10 +34,7 @@ def test_broken_input_of_the_corpus(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("content", "expected"),
-    [
-        (None, "no such configuration file"),
-        (b"__use_yte__: true\n", "templates are not allowed"),
-    ],
+    [(None, "no such configuration file"), (b"__use_yte__: true\n", "templates are not allowed")],
 )
 def test_a_broken_file_of_the_user(content: bytes | None, expected: str, tmp_path: Path) -> None:
     """As ``./reproduce --configfile FILE``; Snakemake itself shows a traceback for some of them."""

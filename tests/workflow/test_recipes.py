@@ -17,13 +17,7 @@ from places import ROOT
 
 # Files that a recipe may touch at most; pages that a command writes from the declarations (a list
 # of tables, one of figures) are not counted.
-MOST = {
-    "A figure": 2,
-    "A table": 2,
-    "A selection": 3,
-    "A constraint group": 3,
-    "An experiment": 1,
-}
+MOST = {"A figure": 2, "A table": 2, "A selection": 3, "A constraint group": 3, "An experiment": 1}
 SCENE = {
     "name": "cable_sheet",
     "title": "A sheet of cables, hanging from one side",

@@ -261,10 +261,7 @@ def test_a_path_with_a_line_break_is_refused(name: str, folder: Folder) -> None:
 def test_arguments_are_handed_on(folder: Folder) -> None:
     folder.run("-n", "results/figures/a b.pdf")
     folder.run("test", "-q", "tests/unit")
-    assert folder.calls == [
-        f"{FRONT} -n results/figures/a b.pdf",
-        f"{FRONT} test -q tests/unit",
-    ]
+    assert folder.calls == [f"{FRONT} -n results/figures/a b.pdf", f"{FRONT} test -q tests/unit"]
 
 
 def test_help_makes_nothing(folder: Folder) -> None:

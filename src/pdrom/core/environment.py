@@ -115,10 +115,7 @@ def compiled_for(machine: str, features: set[str]) -> dict[str, str]:
         return {TARGET: "generic", FEATURES: ""}
     if machine != "x86_64" or not features >= COMPILED_HASWELL.keys():
         return {}
-    return {
-        TARGET: "haswell",
-        FEATURES: ",".join(f"+{name}" for name in COMPILED_HASWELL.values()),
-    }
+    return {TARGET: "haswell", FEATURES: ",".join(f"+{name}" for name in COMPILED_HASWELL.values())}
 
 
 def processor_features(cpuinfo: str) -> set[str]:

@@ -216,12 +216,7 @@ class Scene:
         return Scene.build, (self.config, self.mesh, self.masses)
 
     @classmethod
-    def build(
-        cls,
-        config: SceneConfig,
-        mesh: Mesh,
-        masses: np.ndarray | None = None,
-    ) -> "Scene":
+    def build(cls, config: SceneConfig, mesh: Mesh, masses: np.ndarray | None = None) -> "Scene":
         """Bind ``config`` to ``mesh``.
 
         Parameters

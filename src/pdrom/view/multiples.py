@@ -129,11 +129,7 @@ def clipped(values: np.ndarray, low: float, high: float) -> np.ndarray:
 
 
 def label_counts(
-    ax: Axes,
-    x: Iterable[float],
-    y: Iterable[float],
-    counts: Iterable[float],
-    prefix: str = "",
+    ax: Axes, x: Iterable[float], y: Iterable[float], counts: Iterable[float], prefix: str = ""
 ) -> None:
     """A number below and left of each marker of a logarithmic x axis; near ones share a label.
 

@@ -212,11 +212,7 @@ class Row:
 
 
 def run_panel(
-    path: str,
-    info: RerunInfo,
-    frame: int,
-    colour: tuple[float, float, float],
-    title: str,
+    path: str, info: RerunInfo, frame: int, colour: tuple[float, float, float], title: str
 ) -> RunPanel:
     """Panel of a reduced run at ``frame``; what it says about a run that failed or never began.
 

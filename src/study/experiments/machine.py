@@ -27,10 +27,7 @@ REPEATS = 15
 
 
 @experiment(
-    "Record of the machine and the library versions",
-    reads={},
-    writes={"out": MACHINE},
-    alone=True,
+    "Record of the machine and the library versions", reads={}, writes={"out": MACHINE}, alone=True
 )
 def machine(out: File) -> None:
     """Measure the units, and write them to ``out`` with what is known of the machine."""

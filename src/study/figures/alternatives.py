@@ -6,14 +6,7 @@ import pandas as pd
 from pdrom.model.held_out import FIRST
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
-from pdrom.view.multiples import (
-    clipped,
-    label_outer,
-    log_axis,
-    panels,
-    rows_of,
-    time_axis,
-)
+from pdrom.view.multiples import clipped, label_outer, log_axis, panels, rows_of, time_axis
 from study.artifact.reads import TableOf
 from study.experiments.alternatives.settings import ACCELERATED, CONVERGED, REDUCED, TWO_LEVEL
 from study.figures.kit.declaration import figure

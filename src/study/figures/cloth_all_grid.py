@@ -88,12 +88,7 @@ def cloth_all_grid(
 
 
 def _run(
-    path: str,
-    options: ReducedRuns,
-    title: str,
-    frames: list[int],
-    full: np.ndarray,
-    mesh: Mesh,
+    path: str, options: ReducedRuns, title: str, frames: list[int], full: np.ndarray, mesh: Mesh
 ) -> list[RunPanel] | None:
     """A reduced run at every instant, coloured by its distance; None if no size ran."""
     infos = choose_ranks(rerun_infos(path), options.ranks)

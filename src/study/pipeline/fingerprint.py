@@ -33,8 +33,7 @@ _MODULE = rf"(?:{'|'.join(PACKAGES)})\b[\w.]*"
 # ``from NAME import (NAMES)``, ``from NAME import NAMES`` or ``import NAME``, inside functions too;
 # an example in a docstring would count, which makes a job depend on more than it uses
 _IMPORT = re.compile(
-    rf"^[ ]*(?:from ({_MODULE}) import (?:\(([^)]*)\)|(.*))|import ({_MODULE}))",
-    re.M,
+    rf"^[ ]*(?:from ({_MODULE}) import (?:\(([^)]*)\)|(.*))|import ({_MODULE}))", re.M
 )
 
 

@@ -21,10 +21,7 @@ MOST, HALF, TEN, LEAST = 0.9, 0.5, 10, 3
 CLOSE, OWN, LONE = 1e-5, 50, 0.01
 # Of cells that rounding decides about, a tenth may have another outcome or another order of
 # magnitude, and half may be off by more than a factor of two; and by what they are counted.
-LOOSE = (
-    (0.1, 1 - 1 / 10, ("scene", "noisy_axes", "method")),
-    (0.5, 1 - 1 / 2, ("scene",)),
-)
+LOOSE = ((0.1, 1 - 1 / 10, ("scene", "noisy_axes", "method")), (0.5, 1 - 1 / 2, ("scene",)))
 # Cells of a column with a share of its own that may differ in any case.
 FEW = 3
 

@@ -11,12 +11,7 @@ from scipy import sparse
 from pdrom.core.errors import SceneError
 from pdrom.model.compiled import arithmetic, rows
 from pdrom.model.compiled.rows import WIDTH, at
-from pdrom.model.constraints.base import (
-    ConstraintGroup,
-    GroupConfig,
-    directions,
-    require_cells,
-)
+from pdrom.model.constraints.base import ConstraintGroup, GroupConfig, directions, require_cells
 from pdrom.model.constraints.lanes import (
     LANES,
     SMALLEST,

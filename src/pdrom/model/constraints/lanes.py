@@ -121,11 +121,7 @@ def mix3(r, a, s, b, t, c):
 @lane_function
 def choose(condition, a, b):
     """a where the condition holds, else b."""
-    return (
-        a[0] if condition else b[0],
-        a[1] if condition else b[1],
-        a[2] if condition else b[2],
-    )
+    return (a[0] if condition else b[0], a[1] if condition else b[1], a[2] if condition else b[2])
 
 
 @lane_function
@@ -155,8 +151,6 @@ def perpendicular(a):
     second = not first and y <= z
     # a x e_k with the axis k along which a is smallest
     turned = choose(
-        first,
-        (0.0, a[2], -a[1]),
-        choose(second, (-a[2], 0.0, a[0]), (a[1], -a[0], 0.0)),
+        first, (0.0, a[2], -a[1]), choose(second, (-a[2], 0.0, a[0]), (a[1], -a[0], 0.0))
     )
     return scaled(1.0 / np.sqrt(dot(turned, turned)), turned)

@@ -85,10 +85,7 @@ class CompiledIterations:
     """
 
     def __init__(
-        self,
-        local_steps: Sequence[Any],
-        inertia: np.ndarray,
-        acceleration: Anderson | None = None,
+        self, local_steps: Sequence[Any], inertia: np.ndarray, acceleration: Anderson | None = None
     ) -> None:
         local = self._pass = LocalPass([step.local_kernel for step in local_steps])
         self._inertia = inertia

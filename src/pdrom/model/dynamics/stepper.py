@@ -97,10 +97,7 @@ class Stepper:
             self._whole = space.whole(self.local_steps, self._compiled, acceleration)
 
     def step(
-        self,
-        state: State,
-        frame: int,
-        on_last_iterate: Callable[[np.ndarray], None] | None = None,
+        self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
         """Do ``frame`` (0-based) from ``state``; ``on_last_iterate`` sees the last iterate y."""
         if on_last_iterate is None:

@@ -267,7 +267,4 @@ def _array(values: Any, name: str, kind: type[np.generic], widths: tuple[int, ..
         raise MeshError(f"{name}: an array {required} is required ({fault})") from error
 
 
-MeshConfig = Annotated[
-    ClothMesh | BarMesh | MeshFile | GivenMesh,
-    Field(discriminator="kind"),
-]
+MeshConfig = Annotated[ClothMesh | BarMesh | MeshFile | GivenMesh, Field(discriminator="kind")]

@@ -48,12 +48,7 @@ def cloth(
 
 
 def bar(
-    nx: int,
-    ny: int,
-    nz: int,
-    extent: float = 1.0,
-    lift: float = 2.0,
-    exchanged: bool = False,
+    nx: int, ny: int, nz: int, extent: float = 1.0, lift: float = 2.0, exchanged: bool = False
 ) -> Mesh:
     """Bar of nx x ny x nz vertices with cubic cells, five tetrahedra a cell, alternating parity.
 

@@ -132,10 +132,7 @@ def block_elements(v: np.ndarray, size: int) -> np.ndarray:
 
 
 def joint_rows(
-    v: np.ndarray,
-    active: tuple[bool, ...],
-    repeat: bool,
-    factors: np.ndarray | None = None,
+    v: np.ndarray, active: tuple[bool, ...], repeat: bool, factors: np.ndarray | None = None
 ) -> np.ndarray:
     """Row indices (r,) of the basis ``v`` (3 rows, r), nested in r.
 

@@ -20,12 +20,7 @@ from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.model import Samples, SubspaceModel
-from pdrom.reduction.subspace.space import (
-    PROBES,
-    ReducedSpace,
-    probe_vertices,
-    reduced_state,
-)
+from pdrom.reduction.subspace.space import PROBES, ReducedSpace, probe_vertices, reduced_state
 
 # Size of a basis above which only the rows that an iteration needs are stored as doubles.
 DOUBLES = 60_000
@@ -106,20 +101,14 @@ def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str
         "B": pack_array(columns.B, "f8" if exact else "f4"),
         "exact": None
         if exact
-        else {
-            "vertices": pack_array(rows, "u4"),
-            "rows": pack_array(columns.B[rows], "f8"),
-        },
+        else {"vertices": pack_array(rows, "u4"), "rows": pack_array(columns.B[rows], "f8")},
         "atoms": [atom.tolist() for atom in columns.atoms],
         "atomColumns": [own.tolist() for own in columns.atom_columns],
         "inertia": pack_array(space.inertia_matrix, "f8"),
         "positions": pack_array(start.positions, "f8"),
         "velocities": pack_array(start.velocities, "f8"),
         "forces": [
-            {
-                "constant": pack_array(constant, "f8"),
-                "rate": pack_array(np.atleast_2d(rate), "f8"),
-            }
+            {"constant": pack_array(constant, "f8"), "rate": pack_array(np.atleast_2d(rate), "f8")}
             for constant, rate in space.forces
         ],
     }

@@ -166,11 +166,7 @@ def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
 def _rows(scene: Scene, models: tuple[Trained, ...], settings: Options) -> Iterator[dict[str, Any]]:
     """Errors of every candidate in the motion of ``scene``, those of the reference first."""
     frames, against = scene.config.frames, references(scene, settings.alternatives)
-    common = {
-        "vertices": scene.mesh.vertices,
-        "frames": frames,
-        "reference_error": against.error,
-    }
+    common = {"vertices": scene.mesh.vertices, "frames": frames, "reference_error": against.error}
     implicit = against.errors(against.implicit)
     yield {**common, "method": CONVERGED, "substeps": 1, "finite": True, **implicit}
     for candidate in candidates(scene, models, settings.alternatives):

@@ -312,10 +312,7 @@ class HardCases(ConfigModel):
     writes={"cases": HARD_CASES},
 )
 def hard_cases(
-    meshes: list[Path],
-    every_method: dict[str, MethodSpec],
-    asked: HardCases,
-    cases: File,
+    meshes: list[Path], every_method: dict[str, MethodSpec], asked: HardCases, cases: File
 ) -> None:
     """Put every reduction through the cases; log what contradicts the expectations.
 

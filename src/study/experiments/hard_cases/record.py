@@ -293,16 +293,7 @@ def still(case: HardCase, scene: Scene, run: Record) -> str:
 
 CHECKS: dict[str, Check] = {
     check.__name__: check
-    for check in (
-        finite,
-        bounded,
-        objective,
-        energy,
-        momentum,
-        determinism,
-        recovers,
-        still,
-    )
+    for check in (finite, bounded, objective, energy, momentum, determinism, recovers, still)
 }
 
 

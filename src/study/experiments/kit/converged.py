@@ -129,10 +129,7 @@ class ConvergedStepper(Stepper):
         return all(change <= self._tolerance for change in self.changes)
 
     def step(
-        self,
-        state: State,
-        frame: int,
-        on_last_iterate: Callable[[np.ndarray], None] | None = None,
+        self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
         """Do ``frame`` from ``state``, see `Stepper.step`, ``on_last_iterate`` included.
 

@@ -28,6 +28,8 @@ from study.tables.claims.verdicts import (
     combined,
     evaluate,
     satisfied,
+    timed_columns,
+    timed_parts,
     values_of,
 )
 from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
@@ -48,19 +50,6 @@ FRAGILE = 0.01
 _Rows = list[pd.DataFrame]
 _Keep = Callable[[pd.Series], pd.Series]
 _Variation = tuple[str, str, Sequence[TestRule], _Rows]  # what, how, the tests and their rows
-
-
-def timed_columns(rule: ClaimRule) -> set[str]:
-    """Columns of the row of a ``rule`` that depend on timing: two runs may differ there."""
-    found: set[str] = set()
-    for part, suffix in PARTS.items():
-        timed = [test for test in getattr(rule, part) if test.timed]
-        if timed:
-            found.add(f"why{suffix}")
-        if any(test.decides for test in timed):
-            found |= {f"{name}{suffix}" for name in ("measured", "verdict", "condition")}
-            found.add("answer")
-    return found
 
 
 def _timed_of_claims(table: pd.DataFrame, **files: Path) -> list[set[str]]:
@@ -199,15 +188,6 @@ def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
     return {"margin": margin, **dict(zip(FOUND, found, strict=True))}
 
 
-def _timed_of_variations(table: pd.DataFrame, **files: Path) -> list[set[str]]:
-    loaded = load_claims(files["rules"])
-    cells = {"verdict", "verdict_of_rules", "same"}
-    return [
-        cells if f"verdict{PARTS[part]}" in timed_columns(loaded[claim]) else set()
-        for claim, part in zip(table.claim, table.part, strict=True)
-    ]
-
-
 @table(
     title="Verdicts under other rules",
     columns=(
@@ -216,14 +196,11 @@ def _timed_of_variations(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         text("varied", f"what is changed in all of them: {', '.join(VARIED)}"),
         text("variation", "how: factor, share, sizes, split, scene left out"),
         compared("exact", timed(text("verdict", f"one of: {', '.join(VERDICTS)}")), FRAGILE),
-        compared(
-            "exact",
-            timed(text("verdict_of_rules", "the verdict of the rules as they are")),
-        ),
+        compared("exact", timed(text("verdict_of_rules", "the verdict of the rules as they are"))),
         compared("exact", timed(flag("same", "the two agree")), FRAGILE),
     ),
     reads=READS,
-    timed_cells=_timed_of_variations,
+    timed_cells=timed_parts("verdict", "verdict_of_rules", "same"),
 )
 def claims_sensitivity(
     rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame

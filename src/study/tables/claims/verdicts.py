@@ -9,8 +9,8 @@ import pandas as pd
 
 from study.artifact.reads import ProjectFile, TableOf
 from study.tables.claims.metrics import METRICS, VALUE, Tables, filtered
-from study.tables.claims.rules import PARTS, TestRule, load_claims
-from study.tables.kit.declaration import compared, flag, table, text, timed
+from study.tables.claims.rules import PARTS, ClaimRule, TestRule, load_claims
+from study.tables.kit.declaration import TimedCells, compared, flag, table, text, timed
 
 VERDICTS = HOLDS, FAILS, DEPENDS, MACHINE, UNDECIDED = (
     "holds", "does not hold", "depends", "depends on the machine", "cannot be decided",
@@ -137,6 +137,32 @@ def combined(verdicts: Sequence[str]) -> str:
     return HOLDS
 
 
+def timed_columns(rule: ClaimRule) -> set[str]:
+    """Columns of the row of a ``rule`` that depend on timing: two runs may differ there."""
+    found: set[str] = set()
+    for part, suffix in PARTS.items():
+        timed = [test for test in getattr(rule, part) if test.timed]
+        if timed:
+            found.add(f"why{suffix}")
+        if any(test.decides for test in timed):
+            found |= {f"{name}{suffix}" for name in ("measured", "verdict", "condition")}
+            found.add("answer")
+    return found
+
+
+def timed_parts(*cells: str) -> TimedCells:
+    """The columns ``cells`` of a row are timed where the verdict of its claim and part is."""
+
+    def timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
+        loaded = load_claims(files["rules"])
+        return [
+            set(cells) if f"verdict{PARTS[part]}" in timed_columns(loaded[claim]) else set()
+            for claim, part in zip(table.claim, table.part, strict=True)
+        ]
+
+    return timed_cells
+
+
 @table(
     title="Verdicts on another sample of the scenes, by the same rules",
     columns=(
@@ -155,6 +181,7 @@ def combined(verdicts: Sequence[str]) -> str:
         "rules": ProjectFile(RULES),
         "recorded": ProjectFile(RECORDED),
     },
+    timed_cells=timed_parts("verdict", "same", "measured"),
 )
 def replication(claims: pd.DataFrame, rules: Path, recorded: Path) -> pd.DataFrame:
     """One row per claim and part that the study decides and the record holds."""

@@ -26,13 +26,7 @@ from pdrom.view.mesh_render import (
     silhouette_edges,
 )
 from pdrom.view.panels import RunPanel, fit_aspect
-from pdrom.view.read import (
-    choose_ranks,
-    frame_numbers,
-    positions_at,
-    rerun_infos,
-    rerun_positions,
-)
+from pdrom.view.read import choose_ranks, frame_numbers, positions_at, rerun_infos, rerun_positions
 from places import CONFIG
 from study.artifact.paths import RERUNS, TRAIN
 from study.figures.deim_iterations import iterations

@@ -89,10 +89,7 @@ def test_a_batch_on_a_cluster_is_named_with_the_jobs_that_wrote_an_error(
         snakemake.error("Error in rule", extra={**job, "indent": True})
     assert end(snakemake) == (
         1,
-        [
-            f"pdrom: batch scene_x failed: {why} (log: {whole})",
-            "pdrom: job fom failed: too stiff",
-        ],
+        [f"pdrom: batch scene_x failed: {why} (log: {whole})", "pdrom: job fom failed: too stiff"],
     )
 
 

@@ -58,10 +58,7 @@ def test_a_figure_has_two_numbers_and_a_name(name, document, preprint, asked, ca
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
-        (
-            [],
-            r"figure: its number or name is missing \(allowed: 1, .*, preprint:1, .*, ladder",
-        ),
+        ([], r"figure: its number or name is missing \(allowed: 1, .*, preprint:1, .*, ladder"),
         (["99"], r"figure 99: there is none \(allowed: 1, 2, 3,"),
         (["preprint:10"], r"figure preprint:10: there is none \(allowed: 1, 2, 3,"),
         (["strain_run"], "figure strain_run: .*did you mean 'strain_runs'"),

@@ -48,11 +48,7 @@ def say(results: Path, log: str, processor: float, wall: float = 0.0, memory: fl
 
 @pytest.mark.parametrize(
     ("log", "kind"),
-    [
-        ("fom/sheet.log", "fom"),
-        ("hard_cases.log", "hard_cases"),
-        ("tables/payoff.log", "tables"),
-    ],
+    [("fom/sheet.log", "fom"), ("hard_cases.log", "hard_cases"), ("tables/payoff.log", "tables")],
 )
 def test_a_job_takes_what_jobs_of_its_kind_took_on_meshes_like_its_own(log, kind):
     place = f"results/studies/logs/logs/{log}"

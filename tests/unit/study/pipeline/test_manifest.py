@@ -30,9 +30,7 @@ def test_files_of_the_study_and_what_was_asked_for_beside_them(plan, tmp_path, m
         "paper/main.pdf",
         "paper/supplement.pdf",
     ]
-    asked_for = [
-        paths.TRAIN.at("results", scene="spring_oop"),
-    ]
+    asked_for = [paths.TRAIN.at("results", scene="spring_oop")]
     others = [
         paths.TRAIN.at("results", scene="no_such_scene"),
         paths.RERUNS.at("results", scene="bend_fall", group="bending", method="no-such-method"),

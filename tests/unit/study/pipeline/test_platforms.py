@@ -27,11 +27,7 @@ def test_a_platform_without_wheels_is_named_with_the_remedy(machine, words):
 @pytest.mark.parametrize("version", [(3, 11), (3, 12), (3, 13)])
 @pytest.mark.parametrize(
     ("system", "processor", "libc"),
-    [
-        ("Linux", "x86_64", "glibc"),
-        ("Linux", "aarch64", "glibc"),
-        ("Darwin", "arm64", ""),
-    ],
+    [("Linux", "x86_64", "glibc"), ("Linux", "aarch64", "glibc"), ("Darwin", "arm64", "")],
 )
 def test_platforms_that_work(version, system, processor, libc):
     assert Machine(system, processor, version, libc).obstacle() is None

@@ -11,13 +11,7 @@ from study.tables import declared
 from study.verification import references
 from study.verification.command import update
 from study.verification.compare import NOT_COMPARED
-from study.verification.references import (
-    compact,
-    folder_of,
-    note,
-    read_reference,
-    write_reference,
-)
+from study.verification.references import compact, folder_of, note, read_reference, write_reference
 from study.verification.subject import Subject
 
 TABLE = declared()["reduced_reruns"]

@@ -156,10 +156,7 @@ class _Pattern:
         matrix = sparse.csc_array((entries, self._places, self._starts), shape=(size, size))
         try:
             factor = splu(
-                matrix,
-                permc_spec="NATURAL",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True},
+                matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
             )
         except RuntimeError as error:
             raise SolverError(f"Hessian of size {size}: {error}") from error

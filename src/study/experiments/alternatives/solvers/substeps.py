@@ -83,11 +83,7 @@ class Alternative(Stepper):
     space: VertexSpace
 
     def __init__(
-        self,
-        scene: Scene,
-        substeps: int,
-        iterations: int = 1,
-        system: GlobalSystem | None = None,
+        self, scene: Scene, substeps: int, iterations: int = 1, system: GlobalSystem | None = None
     ) -> None:
         self._require_constant(scene)
         self._require_groups(scene)
@@ -119,10 +115,7 @@ class Alternative(Stepper):
                 )
 
     def step(
-        self,
-        state: State,
-        frame: int,
-        on_last_iterate: Callable[[np.ndarray], None] | None = None,
+        self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
         """Do ``frame`` from ``state``; no objective, and no iterate for ``on_last_iterate``."""
         started = perf_counter()
@@ -260,11 +253,7 @@ def multiply(matrix, y, out):
 
 
 def alternative(
-    name: str,
-    scene: Scene,
-    substeps: int,
-    iterations: int = 1,
-    system: GlobalSystem | None = None,
+    name: str, scene: Scene, substeps: int, iterations: int = 1, system: GlobalSystem | None = None
 ) -> Alternative:
     """Step loop of a scene by the method ``name``: so many ``substeps`` a frame, see `Alternative`.
 

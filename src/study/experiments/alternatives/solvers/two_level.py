@@ -45,13 +45,7 @@ class TwoLevel(Alternative):
 
     name = "two-level"
 
-    def __init__(
-        self,
-        scene: Scene,
-        substeps: int,
-        iterations: int,
-        model: SubspaceModel,
-    ) -> None:
+    def __init__(self, scene: Scene, substeps: int, iterations: int, model: SubspaceModel) -> None:
         self._model = model
         super().__init__(scene, substeps, iterations)
 

@@ -37,11 +37,7 @@ def by_numpy(f: np.ndarray) -> np.ndarray:
     return (u * np.clip(sigma, *RANGE)) @ vt
 
 
-@given(
-    seed=st.integers(0, 10**6),
-    large=st.floats(1e-3, 1e3),
-    ratio=st.floats(1e-6, 1.0),
-)
+@given(seed=st.integers(0, 10**6), large=st.floats(1e-3, 1e3), ratio=st.floats(1e-6, 1.0))
 def test_projections_are_those_of_numpy(seed, large, ratio):
     f = matrix(np.random.default_rng(seed), (large, large * ratio))
     (p,), (closed,) = projected(f[None])

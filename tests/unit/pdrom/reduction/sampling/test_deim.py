@@ -10,13 +10,7 @@ from pymor.algorithms.ei import deim as pymor_deim
 from pymor.algorithms.ei import qdeim as pymor_qdeim
 from pymor.vectorarrays.numpy import NumpyVectorSpace
 
-from pdrom.reduction.sampling.deim import (
-    TIE,
-    block_elements,
-    deim_entries,
-    joint_rows,
-    tie_weights,
-)
+from pdrom.reduction.sampling.deim import TIE, block_elements, deim_entries, joint_rows, tie_weights
 from pdrom.reduction.sampling.qdeim import qdeim_elements
 from strategies import SEEDS
 

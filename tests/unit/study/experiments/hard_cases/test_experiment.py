@@ -35,12 +35,7 @@ EXPECTED = read_yaml(ROOT / "config" / "default.yaml")["hard_cases"]["expected"]
 def make(folder, expected=EXPECTED):
     path = folder / "hard_cases.csv"
     asked = HardCases(cases=("one_triangle", "flat_bending"), expected=expected)
-    hard_cases(
-        meshes=[],
-        every_method=METHODS,
-        asked=asked,
-        cases=File(str(path), {}),
-    )
+    hard_cases(meshes=[], every_method=METHODS, asked=asked, cases=File(str(path), {}))
     return path
 
 

@@ -13,7 +13,7 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import validate
 from places import ROOT
 from study.tables import declared
-from study.tables.claims.claims import claims, claims_rows, timed_columns
+from study.tables.claims.claims import claims, claims_rows
 from study.tables.claims.metrics import METRICS
 from study.tables.claims.rules import MARGIN, ClaimRule, TestRule, load_claims
 from study.tables.claims.verdicts import (
@@ -24,6 +24,8 @@ from study.tables.claims.verdicts import (
     UNDECIDED,
     answer,
     answer_of,
+    replication,
+    timed_columns,
     values_of,
 )
 from study.tables.claims.verdicts import evaluate as evaluated
@@ -542,6 +544,15 @@ def test_another_verdict_is_seen_where_no_clock_decides():
         other.loc[place, "verdict"] = UNDECIDED
         changed = not claims.without_times(other, ROOT).equals(kept)
         assert changed == ("verdict" not in timed_columns(RULES[name])), name
+
+
+def test_the_replication_is_judged_where_no_clock_decides_either():
+    made = pd.DataFrame({"claim": ["C2", "C9"], "part": "published", "verdict": HOLDS})
+    made = made.reindex(columns=replication.column_names, fill_value="")
+    of_c2, of_c9 = made.assign(verdict=[FAILS, HOLDS]), made.assign(verdict=[HOLDS, FAILS])
+    kept, changed, timed = (replication.without_times(t, ROOT) for t in (made, of_c2, of_c9))
+    assert timed.equals(kept)
+    assert not changed.equals(kept)
 
 
 def test_a_test_beside_the_verdict_makes_its_reason_timed():
