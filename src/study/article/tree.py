@@ -5,12 +5,12 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
+from urllib.parse import quote
 
 from pdrom.core.errors import PaperError
 from study.article.latex import ORIGIN
 
-Node = dict[str, Any]
-Tree = dict[str, Any]
+Node = dict[str, Any]  # and the whole tree
 
 
 def attributes(identifier: str = "", classes: str = "", **keys: str) -> list[Any]:
@@ -83,7 +83,7 @@ class Labels:
 
     prefix: str
     page: str
-    numbers: dict[str, tuple[str, str]] = field(default_factory=dict)
+    numbers: dict[str, tuple[str, str]]
     counts: Counter[str] = field(default_factory=Counter)
 
     def next(self, kind: str, label: str = "") -> str:
@@ -91,19 +91,13 @@ class Labels:
         self.counts[kind] += 1
         return self.note(label, f"{self.prefix}{self.counts[kind]}")
 
-    def section(self, level: int, appendix: bool, label: str) -> str:
-        """Number of the next section of a ``level``; a ``label`` will stand for it.
-
-        Those of an ``appendix`` begin with a letter.
-        """
-        if appendix and level == 1 and not self.counts["appendix"]:
-            self.counts["appendix"], self.counts["level1"] = 1, 0
+    def section(self, level: int, label: str) -> str:
+        """Number of the next section of a ``level``; a ``label`` will stand for it."""
         self.counts[f"level{level}"] += 1
         for deeper in range(level + 1, PARAGRAPH):
             self.counts[f"level{deeper}"] = 0
-        parts = [self.counts[f"level{above}"] for above in range(1, level + 1)]
-        first = chr(64 + parts[0]) if self.counts["appendix"] else f"{self.prefix}{parts[0]}"
-        return self.note(label, ".".join([first, *map(str, parts[1:])]))
+        parts = [str(self.counts[f"level{above}"]) for above in range(1, level + 1)]
+        return self.note(label, self.prefix + ".".join(parts))
 
     def note(self, label: str, number: str) -> str:
         """Let a label stand for a number."""
@@ -112,7 +106,7 @@ class Labels:
         return number
 
 
-def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> Tree:
+def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> Node:
     """Number sections, figures, tables, equations and theorems of ``tree``, and lay them out.
 
     Parameters
@@ -125,13 +119,12 @@ def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> 
         kind, content = node["t"], content_of(node)
         if kind == "Header" and content[0] < PARAGRAPH:
             level, attribute, inlines = content
-            appendix = "unnumbered" in attribute[1]
-            number = labels.section(level, appendix, attribute[0])
+            number = labels.section(level, attribute[0])
             return {"t": kind, "c": [level, attribute, [*words(f"{number}\u2002"), *inlines]]}
         if kind == "Figure":
             name = re.sub(r"^fig:", "", content[0][0])
             number = labels.next("figure", content[0][0])
-            return shown(name, _captioned(node, f"Figure {number}. ", 1))
+            return shown(name, _captioned(node, f"Figure {number}."))
         if kind == "Div" and content[1] and content[1][0]["t"] == "Table":
             return _table(content[0][0], content[1][0], labels)
         if kind == "Div" and content[0][0] == "refs":
@@ -149,7 +142,7 @@ def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> 
 
 def _table(label: str, node: Node, labels: Labels) -> Node:
     """A table that scrolls, below its caption, which does not."""
-    content = _captioned(node, f"Table {labels.next('table', label)}. ", 1)["c"]
+    content = _captioned(node, f"Table {labels.next('table', label)}.")["c"]
     caption = {"t": "Div", "c": [attributes("", "caption"), content[1][1]]}
     region = {"role": "region", "tabindex": "0", "aria_label": plain(content[1])[:80]}
     head = changed(content[3], _headed)
@@ -171,15 +164,13 @@ def _heard(text: str) -> Node:
     return {"t": "Span", "c": [attributes("", "heard"), words(text)]}
 
 
-def _captioned(node: Node, opening: str, place: int) -> Node:
+def _captioned(node: Node, opening: str) -> Node:
     """A figure or a table whose caption opens with its number."""
-    content = list(node["c"])
-    short, blocks = content[place]
-    first = blocks[0] if blocks else {"t": "Plain", "c": []}
-    strong = {"t": "Strong", "c": words(opening.strip())}
-    opened = {"t": "Plain", "c": [strong, {"t": "Space"}, *first["c"]]}
-    content[place] = [short, [opened, *blocks[1:]]]
-    return {"t": node["t"], "c": content}
+    attribute, (short, blocks), *others = node["c"]
+    words_of_caption = blocks[0]["c"] if blocks else []
+    strong = {"t": "Strong", "c": words(opening)}
+    opened = {"t": "Plain", "c": [strong, {"t": "Space"}, *words_of_caption]}
+    return {"t": node["t"], "c": [attribute, [short, [opened, *blocks[1:]]], *others]}
 
 
 def _equation(node: Node, labels: Labels) -> Node:
@@ -200,7 +191,7 @@ def _equation(node: Node, labels: Labels) -> Node:
     return {"t": "Span", "c": [attributes("", "equation", tabindex="0"), [math, numbers]]}
 
 
-def resolved(tree: Tree, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Tree:
+def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Node:
     """Give references their numbers, numbers and claims their links; open paragraphs in bold.
 
     Parameters
@@ -248,23 +239,18 @@ def _run_in(blocks: list[Node]) -> list[Node]:
 
 def _resolved_link(node: Node, labels: Mapping[str, tuple[str, str]]) -> Node | None:
     attribute, inlines, (address, _) = node["c"]
-    keys = dict(attribute[2])
     if address.startswith(ORIGIN):
-        return link(
-            inlines, address_of(bytes.fromhex(address.removeprefix(ORIGIN)).decode()), "val"
-        )
-    if "reference" in keys:
-        if keys["reference"] not in labels:
-            raise PaperError(f"manuscript: no label {keys['reference']}, which the text refers to")
-        number, page = labels[keys["reference"]]
-        shown = f"({number})" if keys["reference-type"] == "eqref" else number
-        return link(words(shown), f"{page}#{keys['reference']}")
-    return None
-
-
-def address_of(key: str) -> str:
-    """Address of the rows that a key names (`study.paper.macros`) on the table's page."""
-    table, _, rows = key.partition("|")
-    signs = {"%": "%25", " ": "%20", '"': "%22", "<": "%3C", ">": "%3E", "#": "%23"}
-    place = "".join(signs.get(sign, sign) for sign in rows)
-    return f"tables/{table}.html" + (f"#{place}" if place else "")
+        key = bytes.fromhex(address.removeprefix(ORIGIN)).decode()
+        # the rows that a key names (`study.paper.macros`) on the table's page
+        table, _, rows = key.partition("|")
+        place = re.sub(r'[% "<>#]', lambda sign: quote(sign[0]), rows)
+        return link(inlines, f"tables/{table}.html" + (f"#{place}" if place else ""), "val")
+    keys = dict(attribute[2])
+    if "reference" not in keys:
+        return None
+    label = keys["reference"]
+    if label not in labels:
+        raise PaperError(f"manuscript: no label {label}, which the text refers to")
+    number, page = labels[label]
+    shown = f"({number})" if keys["reference-type"] == "eqref" else number
+    return link(words(shown), f"{page}#{label}")

@@ -24,10 +24,9 @@ from pdrom.core.errors import PaperError
 from pdrom.core.machine import machine
 from pdrom.core.store import atomic_path, write_table, write_text
 from places import ROOT
-from study.article.build import ASSETS, FOLDER, PAGES, article
+from study.article.build import ASSETS, FOLDER, PAGES, article, write_verified
 from study.article.latex import linked_table, plain_columns
 from study.article.tables import FACTS
-from study.article.verified import write_verified
 from study.artifact.paths import File
 from study.paper.build import Facts
 from study.paper.macros import (

@@ -10,10 +10,19 @@ import pytest
 from places import ROOT
 from study.tables import declared
 from study.tables.kit.declaration import QUANTITIES, TALLY, TOLERANCES
-from study.verification.compare import FITTED, NOT_COMPARED, Comparison
+from study.verification.compare import (
+    FITTED,
+    NOT_COMPARED,
+    OF_RUNS,
+    RUN,
+    Comparison,
+    Context,
+    kept,
+    names,
+    names_row,
+)
 from study.verification.judge import LEAST, judge
 from study.verification.references import read_reference
-from study.verification.rows import OF_RUNS, RUN, Context, names, names_row, of_fitted_samples
 
 FOLDERS = [ROOT / "results/reference/tables", ROOT / "results/reference/studies/tiny/tables"]
 ROWS = 6
@@ -54,8 +63,8 @@ def firm_and_loose(table, column, context, frame):
     numbers = frame[column.name].to_numpy(dtype=float, na_value=np.nan)
     held = np.isfinite(numbers) & (column.quantity == "share") | (np.abs(numbers) > SMALL)
     held &= np.isfinite(numbers) & alone.compared(column)
-    loose = np.any([np.zeros(len(frame)), *alone.loose(column).values()], axis=0)
-    return np.flatnonzero(held & ~loose), np.flatnonzero(held & loose)
+    firm = alone.firm(column)
+    return np.flatnonzero(held & firm), np.flatnonzero(held & ~firm)
 
 
 def changed_cell(table, column, context, frame, cell):
@@ -123,11 +132,9 @@ def test_most_cells_are_compared_one_by_one(studies):
     for tables, context in studies:
         loose = total = 0
         for name, frame in tables.items():
-            table = declared()[name]
-            alone = Comparison(table, frame, frame, context)
-            for column in alone.columns():
-                cells = np.any([np.zeros(len(frame)), *alone.loose(column).values()], axis=0)
-                loose, total = loose + int(cells.sum()), total + len(frame)
+            alone = Comparison(declared()[name], frame, frame, context)
+            for column in kept(alone.table).values():
+                loose, total = loose + int((~alone.firm(column)).sum()), total + len(frame)
         assert loose < 0.4 * total
 
 
@@ -175,7 +182,8 @@ def test_a_run_on_amplified_samples_may_end_otherwise(tiny):
 def test_a_fit_may_leave_an_element_more_and_no_other_selection_may(tiny):
     tables, context = tiny
     rows = tables["scaling"]
-    fitted = of_fitted_samples(rows) & (rows.elements_sampled > 20).fillna(False).to_numpy(bool)
+    alone = Comparison(declared()["scaling"], rows, rows, context)
+    fitted = alone.fitted() & (rows.elements_sampled > 20).fillna(False).to_numpy(bool)
     row = int(np.flatnonzero(fitted)[0])
     more = rows.assign(elements_sampled=rows.elements_sampled + (rows.index == row))
     assert not judged(tables, context, "scaling", more)
@@ -205,8 +213,7 @@ def test_messages_name_the_row_and_how_far_it_is_off(tiny):
 
 def good(comparison, column):
     """Rows in which rounding decides nothing about the cells of ``column``, and no run is wrong."""
-    firm = ~np.any([np.zeros(len(comparison.e)), *comparison.loose(column).values()], axis=0)
-    return firm & ~comparison.wrong(column) & comparison.compared(column)
+    return comparison.firm(column) & ~comparison.wrong(column) & comparison.compared(column)
 
 
 def noticed(table, context, expected, found):
@@ -216,7 +223,7 @@ def noticed(table, context, expected, found):
 def every_column(tables, context):
     for name, frame in tables.items():
         alone = Comparison(declared()[name], frame, frame, context)
-        for column in alone.columns():
+        for column in kept(alone.table).values():
             yield declared()[name], column, frame, alone
 
 

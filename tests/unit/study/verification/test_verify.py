@@ -12,7 +12,7 @@ import pytest
 
 from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.store import read_table, write_table, write_text
-from study.article.verified import INDEX, NAME
+from study.article.build import INDEX, VERIFIED
 from study.artifact.paths import ARTICLE, TABLE
 from study.figures.kit.declaration import declarations
 from study.tables import declared
@@ -44,11 +44,11 @@ def test_expected_results_hold(results, subject):
     assert {"claim C1", "claim C12", "figure singular_values"} <= names
     assert any(re.match("table [a-z_]+: not comparable", line) for line in printed)
     assert "| C1 | reproduced |" in page
-    assert not Path(ARTICLE.at(RESULTS, name=NAME)).exists()
+    assert not Path(ARTICLE.at(RESULTS, name=VERIFIED)).exists()
 
 
 def test_outcomes_reach_the_article_where_it_was_made(results, subject):
-    place = Path(ARTICLE.at(RESULTS, name=NAME))
+    place = Path(ARTICLE.at(RESULTS, name=VERIFIED))
     write_text("<!DOCTYPE html>", place.with_name(INDEX))
     *lines, _, _ = verified(subject)[1]
     text = place.read_text(encoding="utf-8")
