@@ -18,7 +18,7 @@ from pdrom.core.store import atomic_path, read_table, read_text, require_intact,
 from pdrom.view.page import safe_json
 from study.article.latex import linked_table, prepared
 from study.article.tables import FACTS, claims_page, list_page, table_page
-from study.article.tree import Labels, Node, attributes, numbered, plain, resolved, words
+from study.article.tree import Labels, Node, attributes, boxed, numbered, plain, resolved, words
 from study.artifact.files import Files
 from study.artifact.paths import ARTICLE, FIGURE_PICTURE, File, Place
 from study.artifact.reads import Every, ProjectFile, Setting, TableOf
@@ -52,8 +52,7 @@ def shown_figure(
     # words, since pandoc hides a caption that says what the alternative text does
     made = {"t": "RawInline", "c": ["html", _origin(name, with_pdf, pages)]}
     origin = [{"t": "Plain", "c": [*words("Command: "), made]}]
-    lines = {"t": "Div", "c": [attributes("", "origin"), origin]}
-    told = [caption[0], [*caption[1], lines]]
+    told = [caption[0], [*caption[1], boxed("Div", origin, "", "origin")]]
     return {"t": "Figure", "c": [attribute, told, [{"t": "Plain", "c": [image]}]]}
 
 

@@ -18,6 +18,13 @@ def attributes(identifier: str = "", classes: str = "", **keys: str) -> list[Any
     return [identifier, classes.split(), [[k.replace("_", "-"), v] for k, v in keys.items()]]
 
 
+def boxed(
+    kind: str, content: list[Node], identifier: str = "", classes: str = "", **keys: str
+) -> Node:
+    """A Span or a Div (``kind``) around ``content``, see `attributes`."""
+    return {"t": kind, "c": [attributes(identifier, classes, **keys), content]}
+
+
 def words(text: str) -> list[Node]:
     """Plain text as inline nodes."""
     return [{"t": "Str", "c": text}]
@@ -33,23 +40,18 @@ def link(inlines: list[Node], address: str, classes: str = "") -> Node:
     return {"t": "Link", "c": [attributes("", classes), inlines, [address, title * formula]]}
 
 
-def content_of(node: Node) -> Any:
-    """Content of a node, None of one without any."""
-    return node.get("c")
-
-
 def plain(node: Any) -> str:
     """Text of a node without its marks."""
     if isinstance(node, list):
         return "".join(map(plain, node))
     if not isinstance(node, dict):
         return ""
-    kind, content = node.get("t"), content_of(node)
+    kind, content = node.get("t"), node.get("c")
     if kind in ("Space", "SoftBreak", "LineBreak"):
         return " "
     if kind == "Str":
         return str(content)
-    return str(content[1]) if kind in ("Math", "Code") else plain(content)
+    return str(node["c"][1]) if kind in ("Math", "Code") else plain(content)
 
 
 def changed(node: Any, visit: Callable[[Node], Any]) -> Any:
@@ -116,7 +118,7 @@ def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> 
     """
 
     def visit(node: Node) -> Any:
-        kind, content = node["t"], content_of(node)
+        kind, content = node["t"], node.get("c", [])
         if kind == "Header" and content[0] < PARAGRAPH:
             level, attribute, inlines = content
             number = labels.section(level, attribute[0])
@@ -142,26 +144,23 @@ def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> 
 
 def _table(label: str, node: Node, labels: Labels) -> Node:
     """A table that scrolls, below its caption, which does not."""
+
+    def headed(node: Node) -> Node | None:
+        """A formula in a head, with its letters for those who listen."""
+        return boxed("Span", [node, _heard(plain(node))]) if node["t"] == "Math" else None
+
     content = _captioned(node, f"Table {labels.next('table', label)}.")["c"]
-    caption = {"t": "Div", "c": [attributes("", "caption"), content[1][1]]}
-    region = {"role": "region", "tabindex": "0", "aria_label": plain(content[1])[:80]}
-    head = changed(content[3], _headed)
+    head = changed(content[3], headed)
     for cell in (cell for row in head[1] for cell in row[1]):
         cell[4] = cell[4] if plain(cell[4]).strip() else [{"t": "Plain", "c": [_heard("row")]}]
     table = {"t": "Table", "c": [content[0], [None, []], content[2], head, *content[4:]]}
-    scroll = {"t": "Div", "c": [attributes("", "scroll", **region), [table]]}
-    return {"t": "Div", "c": [attributes(label), [caption, scroll]]}
-
-
-def _headed(node: Node) -> Node | None:
-    """A formula in a head, with its letters for those who listen."""
-    if node["t"] != "Math":
-        return None
-    return {"t": "Span", "c": [attributes(), [node, _heard(plain(node))]]}
+    region = {"role": "region", "tabindex": "0", "aria_label": plain(content[1])[:80]}
+    caption = boxed("Div", content[1][1], "", "caption")
+    return boxed("Div", [caption, boxed("Div", [table], "", "scroll", **region)], label)
 
 
 def _heard(text: str) -> Node:
-    return {"t": "Span", "c": [attributes("", "heard"), words(text)]}
+    return boxed("Span", words(text), "", "heard")
 
 
 def _captioned(node: Node, opening: str) -> Node:
@@ -180,15 +179,11 @@ def _equation(node: Node, labels: Labels) -> Node:
     lines = [] if found is None else [tex] if found[1] == "equation" else tex.split(r"\\")
     names = [named[1] if (named := _LABEL.search(line)) else "" for line in lines]
     marks = [
-        {
-            "t": "Span",
-            "c": [attributes(name, "number"), words(f"({labels.next('equation', name)})")],
-        }
-        for name in names
+        boxed("Span", words(f"({labels.next('equation', name)})"), name, "number") for name in names
     ]
-    numbers = {"t": "Span", "c": [attributes("", "numbers"), marks]}
     math = {"t": "Math", "c": [kind, _LABEL.sub("", tex)]}
-    return {"t": "Span", "c": [attributes("", "equation", tabindex="0"), [math, numbers]]}
+    numbers = boxed("Span", marks, "", "numbers")
+    return boxed("Span", [math, numbers], "", "equation", tabindex="0")
 
 
 def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Node:
@@ -206,14 +201,14 @@ def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], claims: Mapping[
     """
 
     def visit(node: Node) -> Any:
-        kind, content = node["t"], content_of(node)
+        kind, content = node["t"], node.get("c", [])
         if kind == "Link":
             return _resolved_link(node, labels)
         if kind == "Str" and (found := _CLAIM.fullmatch(content)) and found[2] in claims:
             here = link(words(found[2]), f"claims.html#{found[2]}", "claim")
             return [*words(found[1]), here, *words(found[3])]
         if kind == "Span" and (colour := _COLOUR.search(str(content[0][2]))):
-            return {"t": kind, "c": [attributes("", colour[1]), changed(content[1], visit)]}
+            return boxed(kind, changed(content[1], visit), "", colour[1])
         return None
 
     found = changed(tree, visit)

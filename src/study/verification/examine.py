@@ -1,8 +1,7 @@
 """Lines about claims, figures and tables of a results folder."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
@@ -28,27 +27,30 @@ PARTS = {"verdict": ("published", "as published"), "verdict_beyond": ("beyond", 
 GOOD = (Outcome.REPRODUCED, Outcome.NOT_COMPARABLE)
 
 
-@dataclass
 class Examination:
-    """Examination of what is there, what is expected, and what differs."""
+    """Examination of what is there, what is expected, and what differs.
 
-    subject: Subject
-    conditions: dict[str, Condition | None] = field(default_factory=dict)
-    tables: dict[str, pd.DataFrame] = field(default_factory=dict)
-    made_again: dict[str, pd.DataFrame] = field(default_factory=dict)
+    condition : of a file by its path, None if it is not there
+    read : table by its name, see `found`
+    again : table by its name, made again from those at hand, see `_again`
+    """
+
+    def __init__(self, subject: Subject) -> None:
+        self.subject = subject
+        self.condition = cache(lambda path: check_file(path) if Path(path).is_file() else None)
+        self.read, self.again = cache(self._read), cache(self._again)
 
     def lines(self) -> list[Line]:
-        """Lines of all claims, figures and tables."""
+        """Lines of all claims, figures and tables, and of files among these that are none."""
         tables = {name: self.table(name) for name in declared()}
         figures = [self._figure(job, tables) for job in self.subject.plan.fixed["figures"]]
-        return [*self.claims(), *figures, *tables.values(), *self._strangers()]
-
-    def condition(self, path: str) -> Condition | None:
-        """Condition of the file ``path``, None if it is not there."""
-        if path not in self.conditions:
-            there = Path(path).is_file()
-            self.conditions[path] = check_file(path) if there else None
-        return self.conditions[path]
+        folder = Path(TABLE.at(self.subject.results, name="any")).parent
+        strangers = [
+            Line("table", path.stem, Outcome.DIFFERS, f"{path} is no table of the study")
+            for path in sorted(folder.glob("*.csv"))
+            if path.stem not in declared() and path.name[0] != "."
+        ]
+        return [*self.claims(), *figures, *tables.values(), *strangers]
 
     def found(self, name: str) -> pd.DataFrame:
         """Table ``name``, which is there and intact.
@@ -58,16 +60,16 @@ class Examination:
         StorageError
             It cannot be read, or has other columns than those that are declared.
         """
-        if name not in self.tables:
-            path, table = TABLE.at(self.subject.results, name=name), declared()[name]
-            if self.condition(path) is not Condition.INTACT:
-                raise StorageError(f"{path}: not there, or damaged")
-            frame = read_table(path)
-            other = sorted(set(frame.columns) - set(table.column_names))
-            if other:
-                raise StorageError(f"{path}: has the unknown column(s) {', '.join(other)}")
-            self.tables[name] = read_table(path, table.column_names)
-        return declared()[name].checked(self.tables[name])
+        return declared()[name].checked(self.read(name))
+
+    def _read(self, name: str) -> pd.DataFrame:
+        path, columns = TABLE.at(self.subject.results, name=name), declared()[name].column_names
+        if self.condition(path) is not Condition.INTACT:
+            raise StorageError(f"{path}: not there, or damaged")
+        other = sorted(set(read_table(path).columns) - set(columns))
+        if other:
+            raise StorageError(f"{path}: has the unknown column(s) {', '.join(other)}")
+        return read_table(path, columns)
 
     @cached_property
     def expected(self) -> dict[str, Reference]:
@@ -85,7 +87,7 @@ class Examination:
         except StorageError:
             return Context.of(tables)
 
-    def again(self, name: str) -> pd.DataFrame | None:
+    def _again(self, name: str) -> pd.DataFrame | None:
         """Table ``name``, made from other tables alone, made again from those at hand.
 
         None for other tables, and where one of those is not intact.
@@ -95,10 +97,8 @@ class Examination:
         job = self.subject.plan.job(declared()[name])
         if any(self.condition(path) is not Condition.INTACT for path in _results(job.files)):
             return None
-        if name not in self.made_again:
-            with made(job) as files:
-                self.made_again[name] = read_table(files[job.outputs["table"]])
-        return self.made_again[name]
+        with made(job) as files:
+            return read_table(files[job.outputs["table"]])
 
     def table(self, name: str) -> Line:
         """Line of the table ``name``."""
@@ -116,7 +116,7 @@ class Examination:
             frame, again = self.found(name), self.again(name)
         except StorageError as error:
             return line(Outcome.DIFFERS, str(error))
-        other = None if again is None else _first_difference(self.tables[name], again)
+        other = None if again is None else _first_difference(self.read(name), again)
         if other is not None:
             return line(Outcome.DIFFERS, f"not what the tables at hand give, {other}")
         lacking = set(frame.columns) - set(reference.columns)
@@ -155,16 +155,6 @@ class Examination:
                 text = f"{path} is {fault}; make it by {self.subject.command(name)}"
                 return Line(kind, name, Outcome.MISSING, text)
         return None
-
-    def _strangers(self) -> list[Line]:
-        """Lines of files that lie among the tables and are none."""
-        known = {TABLE.at(self.subject.results, name=name) for name in declared()}
-        folder = Path(TABLE.at(self.subject.results, name="any")).parent
-        return [
-            Line("table", path.stem, Outcome.DIFFERS, f"{path} is no table of the study")
-            for path in sorted(folder.glob("*.csv"))
-            if str(path) not in known and path.name[0] != "."
-        ]
 
     def _figure(self, figure: Job, tables: Mapping[str, Line]) -> Line:
         name = figure.artifact.name
