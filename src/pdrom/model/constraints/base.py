@@ -126,11 +126,6 @@ class ConstraintGroup(Effect):
         """
         raise NotImplementedError(f"{self.name} has no gradient kernel")
 
-    @property
-    def streamed(self) -> tuple[np.ndarray, ...]:
-        """Arrays that a pass of the local kernel reads once each, not counting the positions."""
-        return ()
-
     def project(self, y: np.ndarray) -> np.ndarray:
         """Projections p(y) of all elements at ``y`` (N, 3) m, (e p, 3)."""
         return self.project_elements(y, np.arange(self.elements))

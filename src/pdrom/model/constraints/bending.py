@@ -386,10 +386,6 @@ class VertexBending(ConstraintGroup):
         fan_normals(q, self.vertices, curved, *fans, self.normals)
         put_poles(self._manifold, curved, self.side, self.normals)
 
-    @property
-    def streamed(self) -> tuple[np.ndarray, ...]:
-        return *self._operator(), self._manifold
-
     def sampler(self, elements: np.ndarray) -> LocalKernel:
         return LocalKernel.of(
             project_vertices,

@@ -77,10 +77,6 @@ class SimplexGroup(StencilGroup):
         """Values (e, ...) of the elements in the order in which the kernel visits them."""
         return values if self._order is None else values[self._order]
 
-    @property
-    def streamed(self) -> tuple[np.ndarray, ...]:
-        return self._corners, self._geometry
-
     def sampler(self, elements: np.ndarray) -> LocalKernel:
         places = elements if self._order is None else np.argsort(self._order)[elements]
         return LocalKernel.of(
@@ -227,22 +223,6 @@ def scatter(work, corners, block, edges, rhs):
             add_to(rhs, corners, base + (i + 1) * LANES, transposed(fx, fy, fz, none))
             x, y, z = add(x, fx), add(y, fy), add(z, fz)
         take_from(rhs, corners, base, transposed(x, y, z, none))
-
-
-@lane_function
-def start_energy(work):
-    """Set the sums of w |S q - p|^2 in ``work`` to zero."""
-    for lane in range(LANES):
-        work[ENERGY * LANES + lane] = 0.0
-
-
-@lane_function
-def energy(work):
-    """Energy of all blocks done in ``work`` since `start_energy`."""
-    total = 0.0
-    for lane in range(LANES):
-        total += work[ENERGY * LANES + lane]
-    return 0.5 * total
 
 
 @lane_function
