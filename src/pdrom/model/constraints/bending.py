@@ -387,7 +387,7 @@ class VertexBending(ConstraintGroup):
         put_poles(self._manifold, curved, self.side, self.normals)
 
     def sampler(self, elements: np.ndarray) -> LocalKernel:
-        return LocalKernel.of(
+        return LocalKernel(
             project_vertices,
             self.S.shape[1],
             blocks(self.elements),
@@ -430,7 +430,7 @@ class VertexBending(ConstraintGroup):
         self._manifold = pack(np.column_stack(numbers))
         self._work = workspaces(SIZE)
         self._taken = workspace(MANIFOLD)
-        self.local_kernel = LocalKernel.of(
+        self.local_kernel = LocalKernel(
             accumulate_vertices,
             self.S.shape[1],
             blocks(self.elements),

@@ -100,7 +100,7 @@ def save_matrix(work, first, lane, matrix):
 
 @lane_function
 def unmarked(work, mark):
-    """How many lanes of a block have the number ``mark`` of ``work`` zero."""
+    """Number of lanes of a block whose number ``mark`` of ``work`` is zero."""
     left = 0.0
     for lane in range(LANES):
         left += 1.0 if work[mark * LANES + lane] == 0.0 else 0.0
