@@ -57,8 +57,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.api import FullRun, load, load_scene, plot, reduce, run, save
     from pdrom.command.progress import Progress
     from pdrom.core.errors import StorageError
-    from pdrom.core.store import atomic_path
-    from pdrom.core.store.atomic import MARK
+    from pdrom.core.store import MARK, atomic_path
 
     file = Path(arguments.scene)
     name = f"{file.stem}_{arguments.group}_{arguments.method}_{arguments.r}.h5"
