@@ -17,8 +17,9 @@ from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling import reductions
 from pdrom.reduction.sampling.local_step import rerun_reduced
 from pdrom.reduction.snapshots import row_masses, training_frames
+from study.experiments.kit.reruns import store_end
+from study.experiments.kit.scenes import perturbation_field
 from study.experiments.kit.settings import Modes
-from study.experiments.sensitivity import perturbation_field
 
 log = logging.getLogger(__name__)
 
@@ -77,9 +78,7 @@ def noisy_runs(
             store = file.create_group(f"{axes}/{row['method']}/r{row['r']:04d}")
             store.attrs.update(r=row["r"], marked=outcome is None)
             if outcome is not None:
-                blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
-                store.attrs.update(blowup_frame=blowup, max_extent=outcome.max_extent)
-                store["positions"] = outcome.positions.astype(np.float32)
+                store_end(store, outcome)
         log.info("%s: %d starts", axes, asked.repetitions)
     return rows
 

@@ -29,11 +29,10 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Settings
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.scenes import positions_of, scene_of
+from study.experiments.kit.scenes import perturbation_field, positions_of, scene_of
 from study.experiments.kit.settings import BlowupExtent, Horizon, Modes, Tolerance
 from study.experiments.noise import COLUMNS as NOISE_COLUMNS
 from study.experiments.noise import NoiseRuns, noisy_runs
-from study.experiments.sensitivity import perturbation_field
 
 Varied = Literal["start", "training", "both"]
 log = logging.getLogger(__name__)
