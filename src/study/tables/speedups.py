@@ -7,7 +7,7 @@ import pandas as pd
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, TableOf
-from study.experiments.kit.fresh_process import CONTROL, FULL, REDUCED
+from study.experiments.frame_times import CONTROL, FULL, REDUCED
 from study.tables.kit.declaration import flag, integer, number, table, text, timed
 from study.tables.kit.parts import confirmed, in_words, joined, median_interval
 from study.tables.kit.reruns import COLUMNS, HIGH, LOW, MEDIAN, TRAIN, TWIN, over_motions, trained
